@@ -1,0 +1,29 @@
+"""What shipbench raises: one family, one form of message.
+
+Every message says what is wrong, the value received, what is accepted and what to do.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class ShipbenchError(Exception):
+    """Base of every error that shipbench raises on purpose."""
+
+
+class InputError(ShipbenchError):
+    """Bad input from the user (the command line ends with exit code 2)."""
+
+
+class WorkError(ShipbenchError):
+    """The work itself failed on valid input (exit code 1, or a `failed` row in a study)."""
+
+
+def unknown_name(kind: str, name: str, names: Iterable[str]) -> InputError:
+    """Return the error for a name that is not registered, with the nearest match and the full list."""
+    known = sorted(names)
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    return InputError(f"unknown {kind} '{name}'.{hint} Known: {', '.join(known) or 'none'}.")

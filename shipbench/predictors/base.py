@@ -1,0 +1,245 @@
+"""What every predictor is: fit, predict, save, load; and how a model spec becomes one.
+
+A part is one file of this folder whose class is bound to `PREDICTOR`. Its dataclass fields are the parameters that a spec sets
+(`mlp[hidden=64,seed=3]`); arrays that `fit` finds are returned by `_arrays` and taken back by `_restore`.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import re
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+
+import numpy as np
+
+from ..errors import InputError, WorkError, unknown_name
+from ..records import Dataset
+from ..registry import Registry
+from ..signals import COMMANDS, STATES
+
+PREDICTORS = Registry("predictor", "predictors", "PREDICTOR", helpers=frozenset({"base", "training"}))
+
+History = tuple[np.ndarray, np.ndarray]
+
+
+@runtime_checkable
+class Predictor(Protocol):
+    """The seam of the benchmark; foreign classes conform without inheriting.
+
+    `predict(s0, U, history)`: s0 (batch, 10), U (batch, K, inputs) -> S (batch, K, 10), S[:, k] at t_k+1. A class may also offer the
+    class method `fit_group(models, trains, valids, seeds)`, which fits many at once (folds and seeds) in place.
+    """
+
+    def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Any: ...
+
+    def predict(self, s0: np.ndarray, U: np.ndarray, history: History | None = None) -> np.ndarray: ...
+
+
+class PredictorBase(ABC):
+    """Input checks, single runs, saving and loading, for the predictors of this package."""
+
+    name: ClassVar[str]
+    inputs: tuple[str, ...] = COMMANDS
+    """Names of the columns of U, known after `fit`."""
+
+    @abstractmethod
+    def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
+        """Learn from `train`; `valid` only decides when to stop or what to keep."""
+
+    @abstractmethod
+    def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
+        """`predict` on checked arrays with a batch axis."""
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        """What `fit` found."""
+        return {}
+
+    def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+        """Take back what `_arrays` and `_meta` returned."""
+
+    def _meta(self) -> dict[str, Any]:
+        """Anything else to save, as JSON."""
+        return {}
+
+    def predict(self, s0: np.ndarray, U: np.ndarray, history: History | None = None) -> np.ndarray:
+        """Roll out from `s0` under the inputs `U`.
+
+        Args:
+            s0: (batch, 10) or (10,), order and units of `signals.STATES`.
+            U: (batch, K, inputs) or (K, inputs); U[:, k] is held on [t_k, t_k+1).
+            history: states (batch, H, 10) and inputs (batch, H, inputs) before s0, or None.
+
+        Returns:
+            S (batch, K, 10) or (K, 10); S[:, k] is the state at t_k+1.
+
+        Raises:
+            InputError: a shape does not fit or a value is not finite.
+        """
+        s0, U = np.asarray(s0, dtype=float), np.asarray(U, dtype=float)
+        single = s0.ndim == 1
+        if single:
+            s0, U = s0[None], U[None]
+            history = None if history is None else (np.asarray(history[0])[None], np.asarray(history[1])[None])
+        if s0.ndim != 2 or s0.shape[1] != len(STATES):
+            raise InputError(f"s0 has shape {s0.shape}; accepted: (batch, {len(STATES)}) or ({len(STATES)},): {', '.join(STATES)}.")
+        if U.ndim != 3 or U.shape[0] != s0.shape[0] or U.shape[2] != len(self.inputs) or U.shape[1] == 0:
+            raise InputError(
+                f"U has shape {U.shape}; accepted: ({s0.shape[0]}, K, {len(self.inputs)}) with K >= 1 and the inputs {', '.join(self.inputs)}."
+            )
+        for label, array in (("s0", s0), ("U", U)):
+            if not np.isfinite(array).all():
+                where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+                raise InputError(f"{label}{list(where)} is {array[where]}; every value must be finite.")
+        if history is not None and (history[0].shape[2] != len(STATES) or history[1].shape[:2] != history[0].shape[:2]):
+            raise InputError(f"history has shapes {history[0].shape} and {history[1].shape}; accepted: (batch, H, 10) and (batch, H, inputs).")
+        S = self._rollout(s0, U, history)
+        return S[0] if single else S
+
+    def save(self, path: str | Path) -> None:
+        """Write the model into the folder `path` (JSON and plain arrays: nothing is pickled)."""
+        folder = Path(path)
+        folder.mkdir(parents=True, exist_ok=True)
+        params = asdict(self) if is_dataclass(self) else {}
+        meta = {"predictor": self.name, "params": params, "inputs": list(self.inputs), "meta": self._meta()}
+        arrays = folder / ".arrays.tmp.npz"
+        np.savez(arrays, **self._arrays())  # pyright: ignore[reportArgumentType]
+        os.replace(arrays, folder / "arrays.npz")
+        text = folder / ".model.tmp.json"
+        text.write_text(json.dumps(meta, indent=1))
+        os.replace(text, folder / "model.json")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a model that `save` wrote.
+
+        Raises:
+            InputError: the folder holds no saved model of this kind.
+        """
+        folder = Path(path)
+        try:
+            meta = json.loads((folder / "model.json").read_text())
+            with np.load(folder / "arrays.npz", allow_pickle=False) as file:
+                arrays = {k: file[k] for k in file.files}
+            model = cls(**meta["params"])
+            model.inputs = tuple(meta["inputs"])
+            model._restore(arrays, meta["meta"])
+        except (OSError, KeyError, ValueError, TypeError) as error:
+            raise InputError(f"{folder} is not a saved '{cls.name}' model: {error}. Give a folder that save() wrote.") from None
+        return model
+
+
+@dataclass(frozen=True)
+class Spec:
+    """A model spec taken apart: `physics+current[..]` -> name "physics", effects ("current",)."""
+
+    text: str
+    name: str
+    params: dict[str, Any]
+    effects: tuple[str, ...] = ()
+    path: Path | None = None
+    class_name: str | None = None
+
+    @property
+    def seeds(self) -> list[int] | None:
+        """The seed that the spec itself fixes, if any."""
+        return [int(self.params["seed"])] if "seed" in self.params else None
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text
+
+
+def parse_spec(text: str) -> Spec:
+    """Take a model spec apart (contract, section 2).
+
+    Raises:
+        InputError: the text has none of the accepted forms.
+    """
+    match = re.fullmatch(r"(?P<base>[^\[\]]+?)(\[(?P<params>[^\[\]]*)\])?(?P<tail>(\+[\w.]+)*)", text.strip())
+    if match is None:
+        raise InputError(f"model spec '{text}' cannot be read; accepted: name, name[key=value,...], physics+effect, path.py:Class, a saved folder.")
+    params: dict[str, Any] = {}
+    for item in filter(None, (match["params"] or "").split(",")):
+        key, sep, value = item.partition("=")
+        if not sep or not key.strip():
+            raise InputError(f"model spec '{text}': parameter '{item}' has no value; write name[key=value,key=value].")
+        params[key.strip()] = _value(value.strip())
+    base = match["base"]
+    file, colon, class_name = base.rpartition(":")
+    if colon and file.endswith(".py"):
+        return Spec(text, class_name, params, path=Path(file), class_name=class_name)
+    if Path(base, "model.json").is_file():
+        return Spec(text, base, params, path=Path(base))
+    name, *effects = (base + (match["tail"] or "")).split("+")
+    return Spec(text, name, params, tuple(effects))
+
+
+def _class_from_file(path: Path, class_name: str) -> Any:
+    if not path.is_file():
+        raise InputError(f"model file {path} does not exist; give path/to/model.py:ClassName.")
+    module_spec = importlib.util.spec_from_file_location(f"shipbench_user_{path.stem}", path)
+    if module_spec is None or module_spec.loader is None:
+        raise InputError(f"model file {path} cannot be imported; it must be a Python file.")
+    module = importlib.util.module_from_spec(module_spec)
+    sys.modules[module_spec.name] = module
+    module_spec.loader.exec_module(module)
+    if not hasattr(module, class_name):
+        classes = [k for k, v in vars(module).items() if isinstance(v, type) and v.__module__ == module_spec.name]
+        raise unknown_name(f"class in {path}", class_name, classes)
+    return getattr(module, class_name)
+
+
+def make_predictor(spec: Spec) -> Any:
+    """The unfitted predictor of a spec (or the fitted one, for a saved folder).
+
+    Raises:
+        InputError: unknown name or parameter, or a value that the class refuses.
+    """
+    if spec.path is not None and spec.class_name is None:
+        kind = json.loads((spec.path / "model.json").read_text()).get("predictor", "?")
+        return PREDICTORS.get(kind).load(spec.path)
+    cls = _class_from_file(spec.path, str(spec.class_name)) if spec.path is not None else PREDICTORS.get(spec.name)
+    if spec.effects:
+        raise InputError(f"model spec '{spec.text}': no effect is available in this version; use '{spec.name}' alone.")
+    params = {k: v for k, v in spec.params.items() if k != "seed"}
+    if is_dataclass(cls):
+        for key in params:
+            if key not in {f.name for f in fields(cls)}:
+                raise unknown_name(f"parameter of '{spec.name}'", key, [f.name for f in fields(cls)] + ["seed"])
+    try:
+        return cls(**params)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"model spec '{spec.text}': {error}. See `shipbench models` for the parameters.") from None
+
+
+def fit_models(models: Sequence[Any], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]) -> list[Exception | None]:
+    """Fit several models of one spec (folds x seeds), together where the class can; one model's failure stays its own.
+
+    Returns:
+        For each model None, or the exception that its fit raised.
+    """
+    group = getattr(type(models[0]), "fit_group", None)
+    if group is not None and len(models) > 1:
+        try:
+            group(models, trains, valids, seeds)
+            return [None] * len(models)
+        except (ArithmeticError, RuntimeError, ValueError, WorkError) as error:
+            return [error] * len(models)
+    errors: list[Exception | None] = []
+    for model, train, valid, seed in zip(models, trains, valids, seeds, strict=True):
+        try:
+            model.fit(train, valid, seed=seed)
+            errors.append(None)
+        except Exception as error:  # a user's model may raise anything; its row says what
+            errors.append(error)
+    return errors

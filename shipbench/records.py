@@ -1,0 +1,187 @@
+"""Runs and data sets in memory: SI units, our signs, checked once on construction."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .errors import InputError
+from .ship import Ship
+from .signals import COMMANDS, ENVIRONMENT, STATES
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One recorded manoeuvre, uniformly sampled.
+
+    Args:
+        id: unique inside the data set.
+        t: (samples,) [s].
+        states: (samples, 10), order and units of `signals.STATES`; heading unwrapped.
+        inputs: (samples, inputs), the four commands, then the environment channels; row k is held on [t_k, t_k+1).
+        inputs_names: names of the columns of `inputs`.
+        meta: anything known of the run (manoeuvre, group, split, parent).
+    """
+
+    id: str
+    t: np.ndarray
+    states: np.ndarray
+    inputs: np.ndarray
+    inputs_names: tuple[str, ...] = COMMANDS
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        n = len(self.t)
+        if self.states.shape != (n, len(STATES)) or self.inputs.shape != (n, len(self.inputs_names)):
+            raise InputError(
+                f"run '{self.id}': t has {n} samples, states {self.states.shape}, inputs {self.inputs.shape}; "
+                f"accepted: states ({n}, {len(STATES)}), inputs ({n}, {len(self.inputs_names)})."
+            )
+        for array, names in ((self.states, STATES), (self.inputs, self.inputs_names)):
+            bad = np.argwhere(~np.isfinite(array))
+            if len(bad):
+                k, j = bad[0]
+                raise InputError(
+                    f"run '{self.id}', t = {self.t[k]:g} s: {names[j]} is {array[k, j]} ({len(bad)} such values in the run). "
+                    "Every value must be finite: cut the run there or fill the gap before loading."
+                )
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def dt(self) -> float:
+        """Sample time [s]."""
+        return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
+
+    def slice(self, start: int, stop: int, suffix: str = "") -> Run:
+        """Samples [start, stop) as a run that keeps the metadata and names its parent."""
+        return Run(
+            self.id + suffix, self.t[start:stop], self.states[start:stop], self.inputs[start:stop], self.inputs_names,
+            {"parent": self.meta.get("parent", self.id), **self.meta},
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Runs of equal length, stacked for a rollout: what a predictor gets (s0, U, history) and the truth that it must not see.
+
+    Shapes: s0 (batch, 10), U (batch, K, inputs), truth (batch, K, 10), history ((batch, H, 10), (batch, H, inputs)) or None.
+    """
+
+    ids: tuple[str, ...]
+    s0: np.ndarray
+    U: np.ndarray
+    truth: np.ndarray
+    history: tuple[np.ndarray, np.ndarray] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """Runs of one ship with one sample time and one list of inputs.
+
+    Args:
+        name: registered name or folder name.
+        ship: the vessel's particulars.
+        dt: sample time [s].
+        runs: the runs.
+        actuators: "measured" (n, delta, F_b, F_s are sensor readings) or "commanded" (they repeat the commands).
+        source, licence: where the data come from and under which terms.
+        simulation: name of the simulator's ship file when the data are simulated without a hidden cause, else None.
+        notes: what a reader must know (estimated or missing channels).
+    """
+
+    name: str
+    ship: Ship
+    dt: float
+    runs: tuple[Run, ...]
+    actuators: str = "measured"
+    source: str = ""
+    licence: str = ""
+    simulation: str | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.runs:
+            raise InputError(f"data set '{self.name}' has no runs; at least one is needed.")
+        if self.actuators not in ("measured", "commanded"):
+            raise InputError(f"data set '{self.name}': actuators = '{self.actuators}'; accepted: 'measured' or 'commanded'.")
+        ids = [r.id for r in self.runs]
+        if len(set(ids)) != len(ids):
+            twice = sorted({i for i in ids if ids.count(i) > 1})
+            raise InputError(f"data set '{self.name}': run ids are not unique: {', '.join(twice[:5])}. Rename them.")
+        for run in self.runs:
+            if run.inputs_names != self.inputs:
+                raise InputError(f"run '{run.id}' has inputs {run.inputs_names}, the data set {self.inputs}; they must agree.")
+            if len(run) > 1 and abs(run.dt - self.dt) > 1e-3 * self.dt:
+                raise InputError(f"run '{run.id}' is sampled at {run.dt:g} s, the data set at {self.dt:g} s; resample one of them.")
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the columns of U: the four commands, then the measured environment channels."""
+        return self.runs[0].inputs_names
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 (first 16 digits) over every sample, the run names, dt, the inputs and the ship."""
+        digest = hashlib.sha256(repr((self.dt, self.inputs, self.actuators, self.ship.model_dump_json())).encode())
+        for run in self.runs:
+            digest.update(run.id.encode())
+            for array in (run.t, run.states, run.inputs):
+                digest.update(np.ascontiguousarray(array, dtype=np.float64).tobytes())
+        return digest.hexdigest()[:16]
+
+    def with_runs(self, runs: Iterable[Run]) -> Dataset:
+        """The same data set with other runs."""
+        return replace(self, runs=tuple(runs))
+
+    def subset(self, indices: Sequence[int]) -> Dataset:
+        """The runs at `indices`."""
+        return self.with_runs(self.runs[i] for i in indices)
+
+    def merged(self, other: Dataset | None) -> Dataset:
+        """The runs of both (used by predictors that need no validation set)."""
+        return self if other is None else self.with_runs((*self.runs, *other.runs))
+
+    def windows(self, steps: int, stride: int | None = None, history: int = 0) -> Dataset:
+        """Cut every run into windows of `history + steps` transitions, `stride` samples apart (default: non-overlapping).
+
+        A run of exactly `history + steps + 1` samples gives one window; a run that gives one window only keeps its name.
+
+        Raises:
+            InputError: no run is long enough.
+        """
+        need = history + steps + 1
+        windows = []
+        for run in self.runs:
+            starts = list(range(0, len(run) - need + 1, stride or steps))
+            windows += [run.slice(s, s + need, f"@{run.t[s]:g}s" if len(starts) > 1 else "") for s in starts]
+        if not windows:
+            longest = max(self.runs, key=len)
+            raise InputError(
+                f"data set '{self.name}': no run is as long as the horizon: {steps} steps + {history} of history need {need} samples "
+                f"({(need - 1) * self.dt:g} s); the longest run '{longest.id}' has {len(longest)}. Shorten the horizon."
+            )
+        return self.with_runs(windows)
+
+    def batch(self, history: int = 0) -> Batch:
+        """Stack runs of equal length; the first `history` samples before s0 become the history.
+
+        Raises:
+            InputError: the runs differ in length (cut them with `windows` first).
+        """
+        lengths = {len(r) for r in self.runs}
+        if len(lengths) > 1:
+            raise InputError(f"data set '{self.name}': runs have {min(lengths)} to {max(lengths)} samples; cut them with windows().")
+        S = np.stack([r.states for r in self.runs])
+        U = np.stack([r.inputs for r in self.runs])
+        past = (S[:, :history], U[:, :history]) if history else None
+        return Batch(tuple(r.id for r in self.runs), S[:, history], U[:, history:-1], S[:, history + 1 :], past)

@@ -1,0 +1,211 @@
+"""The vessel's particulars as a user knows them (`ship.toml`), and what is estimated where they are silent.
+
+Units are SI; lengths along the ship are measured from midship, forward positive (a rudder has x < 0).
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from .errors import InputError
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Propeller(_Part):
+    """One fixed-pitch screw. `kt` are k0, k1, k2 of K_T = k0 + k1 J + k2 J^2."""
+
+    diameter: float = Field(gt=0)
+    x: float | None = None
+    pitch_ratio: float | None = Field(None, gt=0)
+    blades: int | None = Field(None, ge=2, le=7)
+    area_ratio: float | None = Field(None, gt=0, le=1.5)
+    kt: tuple[float, float, float] | None = None
+    wake: float | None = Field(None, ge=0, lt=1)
+    thrust_deduction: float | None = Field(None, ge=0, lt=1)
+
+
+class Rudder(_Part):
+    """Movable rudder area [m^2], span `height` [m], position `x` [m]."""
+
+    area: float = Field(gt=0)
+    height: float | None = Field(None, gt=0)
+    x: float | None = None
+
+
+class Thrusters(_Part):
+    """Tunnel thrusters: positions [m] and greatest force of each [N]."""
+
+    x_bow: float = 0.0
+    x_stern: float = 0.0
+    max_force: float = Field(0.0, ge=0)
+
+
+class Wind(_Part):
+    """Areas above water [m^2]."""
+
+    frontal_area: float = Field(gt=0)
+    lateral_area: float = Field(gt=0)
+
+
+class Ship(_Part):
+    """Main dimensions [m], displacement [m^3] or mass [kg], and the optional rest of `ship.toml` (contract, section 3)."""
+
+    name: str
+    L: float = Field(gt=0)
+    B: float = Field(gt=0)
+    T: float = Field(gt=0)
+    displacement: float | None = Field(None, gt=0)
+    mass: float | None = Field(None, gt=0)
+    Cb: float | None = Field(None, gt=0, le=1)
+    xG: float | None = None
+    Izz: float | None = Field(None, gt=0)
+    rho: float = Field(1025.0, gt=0)
+    propeller: Propeller | None = None
+    rudder: Rudder | None = None
+    thrusters: Thrusters | None = None
+    wind: Wind | None = None
+
+    @model_validator(mode="after")
+    def _needs_displacement_or_mass(self) -> Ship:
+        if self.displacement is None and self.mass is None:
+            raise ValueError("one of 'displacement' [m^3] or 'mass' [kg] is required")
+        return self
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], where: str) -> Ship:
+        """Validate `data`; `where` names the source in messages.
+
+        Raises:
+            InputError: a required key is missing, a key is unknown or a value is out of range.
+        """
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            first = error.errors()[0]
+            key = ".".join(str(k) for k in first["loc"]) or "ship"
+            more = f" ({error.error_count() - 1} more faults)" if error.error_count() > 1 else ""
+            value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:80]})"
+            raise InputError(
+                f"{where}: {key}: {first['msg']}{value}{more}. Required: name, L, B, T [m], displacement [m^3] or mass [kg]; "
+                "optional: Cb, xG, Izz, rho, [propeller], [rudder], [thrusters], [wind] (SI)."
+            ) from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Ship:
+        """Read a `ship.toml`.
+
+        Raises:
+            InputError: the file is missing, is not TOML, or has a missing, unknown or impossible entry.
+        """
+        data = read_toml(path)
+        data.pop("mmg", None)  # the simulator's own coefficients: never visible to a predictor
+        return cls.from_dict(data, str(path))
+
+    def to_toml(self) -> str:
+        """The particulars as the text of a `ship.toml`."""
+        return tomli_w.dumps(self.model_dump(exclude_none=True))
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """Parse a TOML file.
+
+    Raises:
+        InputError: the file is missing, unreadable or not TOML.
+    """
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}. Give the path of an existing TOML file.") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is not valid TOML: {error}. Mend the line that the message names.") from None
+
+
+class Particulars(BaseModel):
+    """A ship with nothing missing: `complete(ship)` fills in estimates and says so."""
+
+    model_config = ConfigDict(frozen=True)
+    L: float
+    B: float
+    T: float
+    Cb: float
+    rho: float
+    mass: float
+    xG: float
+    Izz: float
+    D_P: float
+    x_P: float
+    kt: tuple[float, float, float]
+    w_P0: float
+    t_P: float
+    A_R: float
+    H_R: float
+    x_R: float
+    x_bow: float
+    x_stern: float
+    F_max: float
+    A_F: float
+    A_L: float
+    notes: tuple[str, ...]
+
+
+def complete(ship: Ship) -> Particulars:
+    """Fill in what `ship` does not give from published regressions and rules of thumb, each named in `notes`.
+
+    Raises:
+        InputError: mass, displacement and Cb contradict one another by more than 10 %.
+    """
+    notes: list[str] = []
+
+    def take(value: float | None, estimate: float, what: str, source: str) -> float:
+        if value is not None:
+            return float(value)
+        notes.append(f"{what} not given: {estimate:.4g} from {source}")
+        return estimate
+
+    box = ship.L * ship.B * ship.T
+    mass = ship.mass if ship.mass is not None else ship.rho * float(ship.displacement or 0.0)
+    Cb = take(ship.Cb, mass / (ship.rho * box), "Cb", "mass / (rho L B T)")
+    if not 0.9 < mass / (ship.rho * box * Cb) < 1.1 or Cb > 1.0:
+        raise InputError(
+            f"ship '{ship.name}': mass {mass:.4g} kg, rho {ship.rho:g} kg/m^3 and L B T = {box:.4g} m^3 give a block coefficient of "
+            f"{mass / (ship.rho * box):.3f}, the file says {Cb:.3f}; they must agree within 10 %. Check units (kg, m, m^3)."
+        )
+    xG = take(ship.xG, 0.0, "xG", "the centre of gravity at midship")
+    Izz = take(ship.Izz, mass * (0.25 * ship.L) ** 2, "Izz", "a radius of gyration of 0.25 L")
+    prop = ship.propeller or Propeller(diameter=0.6 * ship.T)
+    if ship.propeller is None:
+        notes.append(f"propeller not given: diameter {prop.diameter:.4g} m from 0.6 T")
+    pitch = prop.pitch_ratio or 0.8
+    # Line through K_T(0) and the zero-thrust point J ~ 1.05 P/D of the Wageningen B series (Oosterveld & van Oossanen 1975),
+    # curvature from the B4-70 fit in the physics reference, section 2.5.
+    k0, k2 = 0.44 * pitch, -0.135
+    kt = prop.kt
+    if kt is None:
+        kt = (k0, -(k0 + k2 * (1.05 * pitch) ** 2) / (1.05 * pitch), k2)
+        notes.append(f"propeller.kt not given: ({kt[0]:.3f}, {kt[1]:.3f}, {kt[2]:.3f}) from the B series at P/D = {pitch:g}")
+    wake = take(prop.wake, max(0.1, 0.5 * Cb - 0.05), "propeller.wake", "Taylor's 0.5 Cb - 0.05")
+    t_P = take(prop.thrust_deduction, 0.6 * wake, "propeller.thrust_deduction", "0.6 w")
+    rudder = ship.rudder or Rudder(area=ship.L * ship.T / 55.0)
+    if ship.rudder is None:
+        notes.append(f"rudder not given: area {rudder.area:.4g} m^2 from L T / 55")
+    thrusters = ship.thrusters or Thrusters()
+    wind = ship.wind or Wind(frontal_area=0.6 * ship.B**2, lateral_area=ship.L * 0.08 * ship.L)
+    if ship.wind is None:
+        notes.append(f"wind areas not given: frontal {wind.frontal_area:.4g} m^2 from 0.6 B^2, lateral {wind.lateral_area:.4g} m^2 from 0.08 L^2")
+    return Particulars(
+        L=ship.L, B=ship.B, T=ship.T, Cb=Cb, rho=ship.rho, mass=mass, xG=xG, Izz=Izz,
+        D_P=prop.diameter, x_P=take(prop.x, -0.48 * ship.L, "propeller.x", "-0.48 L"), kt=kt, w_P0=wake, t_P=t_P,
+        A_R=rudder.area, H_R=take(rudder.height, math.sqrt(1.5 * rudder.area), "rudder.height", "an aspect ratio of 1.5"),
+        x_R=take(rudder.x, -0.5 * ship.L, "rudder.x", "-0.5 L"),
+        x_bow=thrusters.x_bow, x_stern=thrusters.x_stern, F_max=thrusters.max_force,
+        A_F=wind.frontal_area, A_L=wind.lateral_area, notes=tuple(notes),
+    )  # fmt: skip
