@@ -1,0 +1,100 @@
+"""Standard manoeuvres on the simulator and the indices read off them (IMO MSC.137(76), ITTC)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import WorkError
+from ..signals import N, PSI, R, U, V, X, Y
+from .simulator import Simulator
+
+
+@dataclass(frozen=True)
+class Turning:
+    """Indices of a turning circle in ship lengths, steady values at its end, time of 90 degrees of heading change [s]."""
+
+    advance: float
+    transfer: float
+    tactical_diameter: float
+    steady_speed_ratio: float
+    steady_r_dash: float
+    steady_drift_deg: float
+    time_90: float
+
+
+def straight_state(speed: float, rpm: float, batch: int = 1) -> np.ndarray:
+    """States (batch, 10) going north at `speed` [m/s] with the shaft at `rpm`."""
+    s = np.zeros((batch, 10))
+    s[:, U], s[:, N] = speed, rpm
+    return s
+
+
+def turning_circle(sim: Simulator, speed: float, rpm: float, delta_deg: float, dt: float, duration: float) -> Turning:
+    """Turn with the rudder at `delta_deg` (positive starboard) from a straight course.
+
+    Raises:
+        WorkError: 180 degrees of heading change are not reached within `duration` [s].
+    """
+    steps = int(round(duration / dt))
+    command = np.zeros((1, steps, 4))
+    command[..., 0], command[..., 1] = rpm, np.deg2rad(delta_deg)
+    s0 = straight_state(speed, rpm)
+    S = np.concatenate([s0[:, None], sim.rollout(s0, command, dt)], axis=1)[0]
+    turned = np.abs(S[:, PSI])
+    if not turned[-1] > np.pi:
+        raise WorkError(f"turning circle: {np.rad2deg(turned[-1]):.0f} deg of heading change after {duration:g} s; 180 are needed: sail longer.")
+    L, t = sim.ship.L, np.arange(steps + 1) * dt
+
+    def at(angle: float, values: np.ndarray) -> float:
+        return float(np.interp(angle, np.maximum.accumulate(turned), values))
+
+    end = S[-1]
+    speed_end = float(np.hypot(end[U], end[V]))
+    return Turning(
+        advance=at(np.pi / 2, S[:, X]) / L,
+        transfer=abs(at(np.pi / 2, S[:, Y])) / L,
+        tactical_diameter=abs(at(np.pi, S[:, Y])) / L,
+        steady_speed_ratio=speed_end / speed,
+        steady_r_dash=abs(float(end[R])) * L / speed_end,
+        steady_drift_deg=abs(float(np.rad2deg(np.arctan2(-end[V], end[U])))),
+        time_90=at(np.pi / 2, t),
+    )
+
+
+def zigzag_overshoots(sim: Simulator, speed: float, rpm: float, amplitude_deg: float, dt: float, duration: float) -> tuple[float, float]:
+    """First and second overshoot angles [deg] of a zig-zag that starts with the rudder at `amplitude_deg` (negative: to port first)."""
+    amplitude, sign = np.deg2rad(abs(amplitude_deg)), np.sign(amplitude_deg)
+    state, command = straight_state(speed, rpm), np.zeros((1, 4))
+    command[0, 0] = rpm
+    switches: list[int] = []
+    heading = [0.0]
+    for k in range(int(round(duration / dt))):
+        side = sign * (-1) ** len(switches)  # heading side on which the rudder is reversed next
+        if side * state[0, PSI] >= amplitude:
+            switches.append(k)
+            side = -side
+        command[0, 1] = side * amplitude
+        state = sim.step(state, command, dt)
+        heading.append(float(state[0, PSI]))
+        if len(switches) == 3:
+            break
+    if len(switches) < 3:
+        raise WorkError(f"zig-zag: only {len(switches)} rudder reversals within {duration:g} s; 3 are needed: sail longer.")
+    psi = np.rad2deg(np.asarray(heading))
+    first = float(np.max(sign * psi[switches[0] : switches[1] + 1])) - abs(amplitude_deg)
+    second = float(np.max(-sign * psi[switches[1] : switches[2] + 1])) - abs(amplitude_deg)
+    return first, second
+
+
+def self_propulsion_rpm(sim: Simulator, speed: float) -> float:
+    """Shaft speed [rpm] at which the ship holds `speed` [m/s] straight ahead (bisection on the surge acceleration)."""
+    from ..physics.mmg import accelerations
+
+    low, high = 0.0, 60_000.0 / sim.ship.propeller.D**0.5
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        du = accelerations(sim.ship, 0.0, speed, 0.0, 0.0, middle, 0.0, 0.0, 0.0)[0]
+        low, high = (middle, high) if du < 0 else (low, middle)
+    return 0.5 * (low + high)
