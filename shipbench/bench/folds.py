@@ -1,0 +1,124 @@
+"""Folds by run: never by window and never by sample; runs of one group stay on one side; windows are cut after the split."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..records import Dataset, Run
+from .task import Task
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Windows for fitting, for early stopping (or None) and for scoring."""
+
+    index: int
+    train: Dataset
+    valid: Dataset | None
+    test: Dataset
+
+
+def select_runs(dataset: Dataset, task: Task) -> tuple[Dataset, tuple[str, ...]]:
+    """The runs that can be used (long enough; at most `max_runs`, evenly spread), and a note on each reduction.
+
+    Raises:
+        InputError: no run is as long as the horizon.
+    """
+    steps, history = task.steps(dataset.dt), task.history(dataset.dt)
+    usable = [r for r in dataset.runs if len(r) > steps + history]
+    notes: list[str] = []
+    if not usable:
+        dataset.windows(steps, history=history)  # raises with the figures
+    if len(usable) < len(dataset):
+        short = [r.id for r in dataset.runs if len(r) <= steps + history]
+        notes.append(f"{len(short)} of {len(dataset)} runs are shorter than the horizon and left out: {', '.join(short[:8])}")
+    if task.max_runs is not None and len(usable) > task.max_runs:
+        notes.append(f"max_runs = {task.max_runs}: {task.max_runs} of {len(usable)} runs are used, evenly spread")
+        usable = [usable[i] for i in np.linspace(0, len(usable) - 1, task.max_runs).round().astype(int)]
+    return dataset.with_runs(usable), tuple(notes)
+
+
+def group_of(run: Run) -> str:
+    """Runs with the same group (pieces of one log, copies of one manoeuvre) must not be split; a run without one is its own."""
+    return str(run.meta.get("group", run.id))
+
+
+def _groups(runs: Sequence[Run], rng: np.random.Generator) -> list[list[Run]]:
+    """Runs by group, groups in random order."""
+    groups: dict[str, list[Run]] = {}
+    for run in runs:
+        groups.setdefault(group_of(run), []).append(run)
+    ordered = list(groups.values())
+    return [ordered[i] for i in rng.permutation(len(ordered))]
+
+
+def _deal(groups: list[list[Run]], folds: int) -> list[list[Run]]:
+    """Whole groups into `folds` parts of nearly equal numbers of runs: the greatest first, each to the smallest part."""
+    parts: list[list[Run]] = [[] for _ in range(folds)]
+    for group in sorted(groups, key=len, reverse=True):
+        min(parts, key=len).extend(group)
+    return parts
+
+
+def _carve_valid(runs: Sequence[Run], count: int | None, rng: np.random.Generator) -> tuple[list[Run], list[Run]]:
+    """(train, valid) from the training runs: whole groups, until `count` runs (default: one ninth) are set aside."""
+    wanted = max(1, round(len(runs) / 9)) if count is None else count
+    valid: list[Run] = []
+    groups = _groups(runs, rng)
+    while len(valid) < wanted and len(groups) > 1:
+        valid += groups.pop()
+    if count is not None and len(valid) < count:
+        raise InputError(
+            f"valid_runs = {count}, but only {len(runs)} training runs in {len(_groups(runs, rng))} groups are there, "
+            "and one group must remain for training. Give a smaller number."
+        )
+    chosen = {r.id for r in valid}
+    return [r for r in runs if r.id not in chosen], valid
+
+
+def _published(dataset: Dataset) -> list[tuple[list[Run], list[Run]]]:
+    sides = {side: [r for r in dataset.runs if r.meta.get("split") == side] for side in ("train", "test")}
+    for side, runs in sides.items():
+        if not runs:
+            raise InputError(
+                f"split = 'published', but no usable run of data set '{dataset.name}' has split = \"{side}\" in its metadata; "
+                "use split = 'folds', or add it under [runs.<id>] in dataset.toml."
+            )
+    return [(sides["train"], sides["test"])]
+
+
+def _by_folds(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]:
+    groups = _groups(dataset.runs, np.random.default_rng(task.fold_seed))
+    if task.folds > len(groups):
+        what = "runs" if len(groups) == len(dataset) else "groups of runs"
+        raise InputError(f"folds = {task.folds}, but data set '{dataset.name}' has {len(groups)} {what}; give at most {len(groups)} folds.")
+    parts = [{r.id for r in part} for part in _deal(groups, task.folds)]
+    return [([r for r in dataset.runs if r.id not in ids], [r for r in dataset.runs if r.id in ids]) for ids in parts]
+
+
+def make_folds(dataset: Dataset, task: Task) -> list[Fold]:
+    """The folds of a task, the same for every model. The published split is a single fold.
+
+    `dataset` holds whole runs (see `select_runs`). Training and validation windows do not overlap; scored windows are `stride_s` apart.
+
+    Raises:
+        InputError: more folds than groups, too many validation runs, or no published split.
+    """
+    steps, history, stride = task.steps(dataset.dt), task.history(dataset.dt), task.stride(dataset.dt)
+    pairs = _published(dataset) if task.split == "published" else _by_folds(dataset, task)
+    folds = []
+    for index, (rest, test) in enumerate(pairs):
+        train, valid = _carve_valid(rest, task.valid_runs, np.random.default_rng([task.fold_seed, index, 1]))
+        folds.append(
+            Fold(
+                index,
+                dataset.with_runs(train).windows(steps, history=history),
+                dataset.with_runs(valid).windows(steps, history=history) if valid else None,
+                dataset.with_runs(test).windows(steps, stride, history=history),
+            )
+        )
+    return folds

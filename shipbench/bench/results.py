@@ -1,0 +1,202 @@
+"""Results on disk: one folder per study, one sub-folder per cell (data set, model, fold, seed), written whole or not at all.
+
+    OUT/study.json                          tasks, command, code, machine, times
+    OUT/rows.parquet                        one row per (dataset, model, fold, seed, run) of the study
+    OUT/summary.json                        one entry per cell that alone identifies its experiment
+    OUT/truth/<dataset>/fold0.npz           ids, s0, U, truth of the scored windows (the same for all models)
+    OUT/cells/<dataset>/<model>/fold0-seed0/  rows.parquet, summary.json, predictions.npz (S), equations.txt, model/
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..records import Batch
+from .scoring import measure
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PROTOCOL = 1
+"""Version of what a score means. A change that moves a published score raises it; rows of different protocols are never ranked together."""
+
+STATUSES = ("ok", "diverged", "failed", "skipped")
+
+
+def slug(text: str) -> str:
+    """`text` as a folder name; a changed text keeps a digest so that two specs never share a folder."""
+    safe = re.sub(r"[^\w.+=,\[\]-]+", "-", text)[:80]
+    return safe if safe == text else f"{safe}-{hashlib.sha256(text.encode()).hexdigest()[:6]}"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One unit of work."""
+
+    dataset: str
+    model: str
+    fold: int
+    seed: int
+
+    @property
+    def label(self) -> str:
+        """For messages."""
+        return f"{self.dataset} {self.model} fold {self.fold} seed {self.seed}"
+
+    @property
+    def folder(self) -> Path:
+        """Relative to the study's folder."""
+        return Path("cells", slug(self.dataset), slug(self.model), f"fold{self.fold}-seed{self.seed}")
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write JSON in one step: a reader sees the old file or the new one, never half of it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    part.write_text(json.dumps(data, indent=1, default=str) + "\n", encoding="utf-8")
+    os.replace(part, path)
+
+
+def write_rows(path: Path, rows: pd.DataFrame) -> None:
+    """Write parquet in one step."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    rows.to_parquet(part, index=False)
+    os.replace(part, path)
+
+
+def write_truth(out: Path, dataset: str, fold: int, batch: Batch) -> None:
+    """Save what every model of this fold is scored against."""
+    path = out / "truth" / slug(dataset) / f"fold{fold}.npz"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.stem}.{os.getpid()}.tmp.npz")
+    np.savez_compressed(part, ids=np.array(batch.ids), s0=batch.s0, U=batch.U, truth=batch.truth)
+    os.replace(part, path)
+
+
+def read_truth(out: Path, dataset: str, fold: int) -> Batch:
+    """What `write_truth` saved (without history)."""
+    with np.load(out / "truth" / slug(dataset) / f"fold{fold}.npz") as file:
+        return Batch(tuple(file["ids"].tolist()), file["s0"], file["U"], file["truth"])
+
+
+def read_predictions(out: Path, cell: Cell) -> np.ndarray | None:
+    """S (batch, K, 10) of a cell, or None where nothing was predicted (failed, skipped)."""
+    path = out / cell.folder / "predictions.npz"
+    if not path.is_file():
+        return None
+    with np.load(path) as file:
+        return file["S"]
+
+
+def write_cell(out: Path, cell: Cell, rows: pd.DataFrame, summary: dict[str, Any], S: np.ndarray | None, model: Any = None) -> None:
+    """Write a finished cell: into a hidden folder first, then renamed into place (an older one is replaced).
+
+    The fitted `model` is saved where it can be; a foreign model's own failure to save or describe itself is noted in the summary.
+    """
+    final = out / cell.folder
+    part = final.with_name(f".{final.name}.{os.getpid()}.tmp")
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    summary = dict(summary)
+    if S is not None:
+        np.savez_compressed(part / "predictions.npz", S=S)
+    if model is not None:
+        summary.update(_keep_model(part, model))
+    rows.to_parquet(part / "rows.parquet", index=False)
+    write_json(part / "summary.json", summary)
+    shutil.rmtree(final, ignore_errors=True)
+    os.replace(part, final)
+
+
+def _keep_model(folder: Path, model: Any) -> dict[str, str]:
+    notes: dict[str, str] = {}
+    for method, action in (("save", lambda: model.save(folder / "model")), ("describe", lambda: model.describe())):
+        if not callable(getattr(model, method, None)):
+            continue
+        try:
+            text = action()
+        except Exception as error:  # a user's own model; its predictions are good all the same
+            notes[f"{method}_failed"] = f"{type(error).__name__}: {error}"
+            continue
+        if method == "describe" and text:
+            (folder / "equations.txt").write_text(str(text).rstrip() + "\n", encoding="utf-8")
+    return notes
+
+
+def read_summary(out: Path, cell: Cell) -> dict[str, Any] | None:
+    """The summary of a finished cell, or None if it is not there."""
+    path = out / cell.folder / "summary.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+
+
+def assemble(out: Path, cells: Iterable[Cell]) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
+    """Gather the finished cells of a study into `rows.parquet` and `summary.json`, and return both."""
+    import pandas as pd
+
+    done = [(cell, summary) for cell in cells if (summary := read_summary(out, cell)) is not None]
+    rows = pd.concat([pd.read_parquet(out / cell.folder / "rows.parquet") for cell, _ in done], ignore_index=True) if done else pd.DataFrame()
+    summaries = [summary for _, summary in done]
+    write_rows(out / "rows.parquet", rows)
+    write_json(out / "summary.json", summaries)
+    return rows, summaries
+
+
+@dataclass(frozen=True)
+class Results:
+    """Rows and summaries of one or more studies; `sources` are their folders, one per summary."""
+
+    rows: pd.DataFrame
+    summaries: list[dict[str, Any]]
+    sources: list[Path]
+
+
+def read_results(folders: Sequence[str | Path]) -> Results:
+    """Read the result folders of `shipbench run`.
+
+    Raises:
+        InputError: a folder holds no results, or the same cell stands in two of them.
+    """
+    import pandas as pd
+
+    frames, summaries, sources = [], [], []
+    for folder in map(Path, folders):
+        try:
+            frames.append(pd.read_parquet(folder / "rows.parquet"))
+            found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise InputError(f"{folder} holds no results: {error}. Give a folder that `shipbench run --out` wrote.") from None
+        summaries += found
+        sources += [folder] * len(found)
+    if not summaries:
+        raise InputError(f"no finished cell in {', '.join(map(str, folders))}; run `shipbench run` (again, with --resume) first.")
+    seen: dict[tuple[Any, ...], Path] = {}
+    for summary, source in zip(summaries, sources, strict=True):
+        cell = (summary["dataset"], summary["fingerprint"], summary["model"], summary["fold"], summary["seed"])
+        if cell in seen:
+            raise InputError(
+                f"'{summary['model']}' on '{summary['dataset']}', fold {summary['fold']}, seed {summary['seed']} stands in {seen[cell]} "
+                f"and in {source}; leave one of them out."
+            )
+        seen[cell] = source
+    return Results(pd.concat(frames, ignore_index=True), summaries, sources)
+
+
+def rescore(out: Path, summary: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Every metric of a cell computed again from its saved predictions and truth (NaN where nothing was predicted)."""
+    cell = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"])
+    batch, S = read_truth(out, cell.dataset, cell.fold), read_predictions(out, cell)
+    ok = np.array([status == "ok" for status in summary["run_status"]])
+    S = np.full_like(batch.truth, np.nan) if S is None else S
+    return measure(summary["task"]["metrics"], batch, S, L=summary["ship_L"], dt=summary["dt"], ok=ok)

@@ -1,0 +1,141 @@
+"""The task: data that fully identifies an experiment, read from a TOML file and from the command line."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from ..errors import InputError, unknown_name
+from ..metrics.base import METRICS
+from ..ship import read_toml
+
+DEFAULT_METRICS = ("ed", "edh", "cvdm", "final_displacement", "heading_error", "position_rmse", "signal_rmse")
+_NOT_IDENTITY = {"models", "metrics", "seeds", "title"}
+
+
+class Task(BaseModel):
+    """One data set, the split, the horizon, and the models and metrics to run. Times in s.
+
+    `history_s`: recorded time before s0 that every predictor may use. `split`: "folds" (by run, seeded by `fold_seed`) or "published"
+    (the data set's own `split` of each run). `stride_s`: distance of the scored windows in runs longer than the horizon (default: they
+    do not overlap). `valid_runs`: training runs set aside for early stopping (default: one ninth, 8 of 72). `max_runs`: use only
+    that many runs, evenly spread over the data set.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    dataset: str
+    models: tuple[str, ...] = Field(min_length=1)
+    horizon_s: float = Field(120.0, gt=0)
+    history_s: float = Field(0.0, ge=0)
+    folds: int = Field(5, ge=2)
+    split: Literal["folds", "published"] = "folds"
+    stride_s: float | None = Field(None, gt=0)
+    seeds: tuple[int, ...] = Field((0,), min_length=1)
+    metrics: tuple[str, ...] = DEFAULT_METRICS
+    valid_runs: int | None = Field(None, ge=0)
+    max_runs: int | None = Field(None, ge=2)
+    fold_seed: int = 0
+    title: str = ""
+
+    @field_validator("models", "seeds", "metrics")
+    @classmethod
+    def _once_each(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(dict.fromkeys(value))
+
+    @field_validator("metrics")
+    @classmethod
+    def _known_metrics(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        for name in value:
+            if name not in METRICS.names():
+                raise unknown_name("metric", name, METRICS.names())
+        if "ed" not in value:
+            raise ValueError("'ed' must be among the metrics: models are ranked by it")
+        return value
+
+    def steps(self, dt: float) -> int:
+        """Knots of the horizon at sample time `dt` [s]."""
+        return _samples(self.horizon_s, dt, "horizon_s")
+
+    def history(self, dt: float) -> int:
+        """Samples of the history at sample time `dt` [s]."""
+        return _samples(self.history_s, dt, "history_s") if self.history_s else 0
+
+    def stride(self, dt: float) -> int | None:
+        """Distance of scored windows in samples, or None for windows that do not overlap."""
+        return _samples(self.stride_s, dt, "stride_s") if self.stride_s else None
+
+    def key(self, fingerprint: str) -> str:
+        """Digest of all that decides what is scored on which data; rows are ranked together only where it agrees."""
+        data = self.model_dump(mode="json", exclude=_NOT_IDENTITY)
+        data["dataset"] = fingerprint  # the data's own digest: the same data under another path is the same task
+        return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def _samples(seconds: float, dt: float, name: str) -> int:
+    count = round(seconds / dt)
+    if count < 1 or abs(count * dt - seconds) > 1e-3 * dt:
+        raise InputError(f"{name} = {seconds:g} s is not a whole number of samples of {dt:g} s; give a multiple of {dt:g} s.")
+    return count
+
+
+def make_task(data: dict[str, Any], where: str = "task") -> Task:
+    """A validated task.
+
+    Raises:
+        InputError: a key is missing or unknown, or a value is not accepted; `where` names the source in the message.
+    """
+    try:
+        return Task.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(k) for k in first["loc"])
+        if first["type"] == "extra_forbidden":
+            raise InputError(f"{where}: {unknown_name('key', key, [*Task.model_fields, 'datasets'])}") from None
+        if key == "models" and first["type"] in ("missing", "too_short"):
+            raise InputError(f"{where}: no model is given; name at least one (--model physics). `shipbench models` lists them.") from None
+        value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:80]})"
+        raise InputError(f"{where}: {key}: {first['msg']}{value}. Keys: {', '.join(Task.model_fields)}.") from None
+
+
+def configs_folder() -> Path:
+    """Folder of the shipped configs: inside an installed package, else the repository's `configs`."""
+    package = Path(__file__).resolve().parent.parent
+    inside = package / "configs"
+    return inside if inside.is_dir() else package.parent / "configs"
+
+
+def read_config(path: str | Path) -> dict[str, Any]:
+    """The table of a task file; a bare name ("paper", "smoke") means a shipped one.
+
+    Raises:
+        InputError: the file is missing, unreadable or not TOML.
+    """
+    shipped = configs_folder() / f"{path}.toml"
+    return read_toml(shipped if not Path(path).exists() and shipped.is_file() else path)
+
+
+def load_tasks(config: str | Path | None = None, overrides: dict[str, Any] | None = None) -> list[Task]:
+    """The tasks of a config, one per data set; entries of `overrides` that are not None replace those of the file.
+
+    A config names one `dataset` or several `datasets`; all other keys are those of `Task`. Without either, harbour90 is meant.
+
+    Raises:
+        InputError: as `read_config` and `make_task`.
+    """
+    data = read_config(config) if config is not None else {}
+    where = str(config) if config is not None else "command line"
+    given = {k: v for k, v in (overrides or {}).items() if v is not None}
+    if "datasets" in given:
+        data.pop("dataset", None)
+    data.update(given)
+    if "dataset" in data and "datasets" in data:
+        raise InputError(f"{where}: both 'dataset' and 'datasets' are given; keep one of them.")
+    names = data.pop("datasets", [data.pop("dataset", "harbour90")])
+    if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
+        raise InputError(f"{where}: datasets = {names!r}; accepted: a list of names or folders, such as [\"harbour90\"].")
+    return [make_task({**data, "dataset": name}, where) for name in dict.fromkeys(names)]

@@ -1,0 +1,79 @@
+"""What a metric is: a function of the true and the predicted states, with its label and unit.
+
+One file per metric; the file's name is the metric's name and the file binds a `Metric` to `METRIC`. The function takes keyword-only
+arguments, and only those of these that it needs:
+
+- `true`, `pred`: (batch, K, 10), states at the K predicted knots, order and units of `signals.STATES`;
+- `s0`: (batch, 10), the state that the predictor was given. It is known, so it is never scored;
+- `L`: the ship's length [m]; `dt`: sample time [s].
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..registry import Registry
+from ..signals import PSI, STATES, wrap_angle
+
+METRICS = Registry("metric", "metrics", "METRIC", helpers=frozenset({"base"}))
+
+
+@dataclass(frozen=True)
+class Column:
+    """One number per run: its name in the rows, the label and unit that tables and axes print."""
+
+    name: str
+    label: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A function with what is needed to print its values.
+
+    Args:
+        function: keyword-only; returns (batch, K) if `per_knot`, else (batch,); with several columns they are a further, last axis.
+        columns: what the function returns, in that order.
+        per_knot: the per-run value is the mean over the K knots.
+        smaller_is_better: direction of ranking.
+    """
+
+    function: Callable[..., np.ndarray]
+    columns: tuple[Column, ...]
+    per_knot: bool = True
+    smaller_is_better: bool = True
+
+    def values(self, *, true: np.ndarray, pred: np.ndarray, s0: np.ndarray, L: float, dt: float) -> np.ndarray:
+        """What the function returns, (batch, K[, columns]) or (batch[, columns]).
+
+        Raises:
+            InputError: the shapes of truth and prediction differ.
+        """
+        if true.shape != pred.shape or true.ndim != 3 or true.shape[2] != len(STATES) or s0.shape != (len(true), len(STATES)):
+            raise InputError(
+                f"{self.columns[0].label}: true {true.shape}, pred {pred.shape}, s0 {s0.shape}; accepted: true and pred "
+                f"(batch, K, {len(STATES)}), s0 (batch, {len(STATES)})."
+            )
+        known = {"true": true, "pred": pred, "s0": s0, "L": L, "dt": dt}
+        return self.function(**{name: known[name] for name in inspect.signature(self.function).parameters})
+
+    def per_run(self, *, true: np.ndarray, pred: np.ndarray, s0: np.ndarray, L: float, dt: float) -> dict[str, np.ndarray]:
+        """For each column the values (batch,): the mean over knots where the metric is one per knot."""
+        values = self.values(true=true, pred=pred, s0=s0, L=L, dt=dt)
+        if self.per_knot:
+            values = values.mean(axis=1)
+        if len(self.columns) == 1:
+            return {self.columns[0].name: values}
+        return {column.name: values[:, i] for i, column in enumerate(self.columns)}
+
+
+def state_error(true: np.ndarray, pred: np.ndarray) -> np.ndarray:
+    """`pred - true` (batch, K, 10); the heading's difference is wrapped to (-pi, pi]."""
+    error = pred - true
+    error[..., PSI] = wrap_angle(error[..., PSI])
+    return error

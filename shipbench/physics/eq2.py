@@ -1,0 +1,142 @@
+"""The model that is fitted to data: equations (2) to (8) of the source paper, in the reading of the physics reference, section 3.2.
+
+The left side (masses, hull derivatives) comes from published regressions on the main dimensions; the right side holds p0..p10. Its structure (quadratic
+hull, lift and drag polynomials of the rudder) differs from the MMG simulator's on purpose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..ops import Array, absolute, arctan2, clip, cos, maximum, sin, sqrt
+from ..ship import Particulars
+from . import propeller, regressions, thruster, wind
+
+NUM_PARAMETERS = 11
+ALPHA_MAX = 1.2
+"""Angle of attack [rad] beyond which the lift and drag polynomials are held: cubic polynomials mean nothing there."""
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Dimensional left side and geometry (SI), from `coefficients`."""
+
+    m: float
+    x_G: float
+    m_x: float
+    m11: float
+    m12_Y: float
+    m12_N: float
+    m22: float
+    Y_v: float
+    Y_r: float
+    N_v: float
+    N_r: float
+    X_vr: float
+    X_rr: float
+    Y_vv: float
+    Y_vr: float
+    Y_rr: float
+    N_rr: float
+    N_vvr: float
+    N_vrr: float
+    eps: float
+    rho: float
+    L: float
+    T: float
+    D_P: float
+    x_P: float
+    w_P0: float
+    t_P: float
+    kt: tuple[float, float, float]
+    A_R: float
+    eta: float
+    x_R: float
+    a_H: float
+    x_H: float
+    tunnels: thruster.Tunnels
+    A_F: float
+    A_L: float
+
+
+def coefficients(ship: Particulars) -> Coefficients:
+    """Left side of eq. (2) for a ship.
+
+    Source: Clarke et al. (1983) for added masses and linear derivatives, Inoue et al. (1981) for the nonlinear ones, Soeding (1982) for the surge added
+    mass, X_vr = -0.28 m_y from KCS (physics reference 3.2), a_H and x_H of Yoshimura & Masumoto (2012).
+    """
+    L, B, T, rho = ship.L, ship.B, ship.T, ship.rho
+    lin, non = regressions.clarke_1983(L, B, T, ship.Cb), regressions.inoue_nonlinear(L, B, T, ship.Cb)
+    q2, qd = 0.5 * rho * L**2, 0.5 * rho * L * T
+    m_x = regressions.surge_added_mass(ship.mass / rho, L, rho)
+    m_y = -lin.Y_vd * q2 * L
+    Y_rd, N_vd, N_rd = lin.Y_rd * q2 * L**2, lin.N_vd * q2 * L**2, lin.N_rd * q2 * L**3
+    a_H, x_H = regressions.hull_rudder_interaction(L, B, ship.Cb)
+    X_vr = -0.28 * m_y
+    return Coefficients(
+        m=ship.mass, x_G=ship.xG, m_x=m_x,
+        m11=ship.mass + m_y, m12_Y=ship.mass * ship.xG - Y_rd, m12_N=ship.mass * ship.xG - N_vd,
+        m22=ship.Izz + ship.mass * ship.xG**2 - N_rd,
+        Y_v=lin.Y_v * q2, Y_r=lin.Y_r * q2 * L, N_v=lin.N_v * q2 * L, N_r=lin.N_r * q2 * L**2,
+        X_vr=m_y + X_vr + ship.mass, X_rr=ship.mass * ship.xG - Y_rd,
+        Y_vv=non.Y_vv * qd, Y_vr=non.Y_vr * qd * L, Y_rr=non.Y_rr * qd * L**2,
+        N_rr=non.N_rr * qd * L**3, N_vvr=non.N_vvr * qd * L**2, N_vrr=non.N_vrr * qd * L**3,
+        eps=0.05 * (L / 100.0) ** 0.5, rho=rho, L=L, T=T, D_P=ship.D_P, x_P=ship.x_P, w_P0=ship.w_P0, t_P=ship.t_P, kt=ship.kt,
+        A_R=ship.A_R, eta=min(ship.D_P / ship.H_R, 1.0), x_R=ship.x_R, a_H=a_H, x_H=x_H * L,
+        tunnels=thruster.Tunnels(ship.x_bow, ship.x_stern), A_F=ship.A_F, A_L=ship.A_L,
+    )  # fmt: skip
+
+
+def propulsion(u: Array, n: Array, c: Coefficients) -> tuple[Array, Array]:
+    """(X_n, race): thrust on the ship (1 - t) T [N] and axial speed of the propeller race [m/s]; n in rpm."""
+    V_A = u - c.w_P0 * maximum(u, 0.0)  # no wake going astern: the propeller then leads
+    thrust = propeller.thrust_quadratic(n / 60.0, V_A, c.D_P, c.kt, c.rho)
+    return (1.0 - c.t_P) * thrust, propeller.race_speed(V_A, maximum(thrust, 0.0), c.D_P, c.rho)
+
+
+def rudder(u: Array, v: Array, r: Array, delta: Array, race: Array, c: Coefficients, p: Sequence[Array]) -> tuple[Array, Array, Array]:
+    """Rudder force (X, Y, N) from lift and drag, c_L = p4 + p5 a + p6 a^2 + p7 a^3, c_D = p8 + p9 a + p10 a^2 (eq. 7, 8).
+
+    Inflow: the share eta = D_P/H_R of the blade stands in the race, the rest in the wake; sideways 0.364 v + 0.66 x_R r (Kose/Brix flow straightening).
+    Angle of attack a = delta + atan2(w_R, u_R). Lift acts across the inflow, to port for a > 0; drag along it.
+    """
+    V_A = u - c.w_P0 * maximum(u, 0.0)
+    u2 = c.eta * race * race + (1.0 - c.eta) * V_A * V_A
+    u_R = sqrt(u2 + 1e-6)
+    w_R = 0.364 * v + 0.66 * c.x_R * r
+    beta = arctan2(w_R, u_R)
+    a = clip(delta + beta, -ALPHA_MAX, ALPHA_MAX)
+    q = 0.5 * c.rho * c.A_R * (u2 + w_R * w_R)
+    lift = q * (p[4] + a * (p[5] + a * (p[6] + a * p[7])))
+    drag = q * (p[8] + a * (p[9] + a * p[10]))
+    cb, sb = cos(beta), sin(beta)
+    side = -(lift * cb + drag * sb)
+    return lift * sb - drag * cb, (1.0 + c.a_H) * side, (c.x_R + c.a_H * c.x_H) * side
+
+
+def accelerations(
+    u: Array, v: Array, r: Array, n: Array, delta: Array, F_b: Array, F_s: Array, air: tuple[Array, Array] | None, c: Coefficients, p: Sequence[Array]
+) -> tuple[Array, Array, Array]:
+    """(du, dv, dr) of eq. (2) [m/s^2, m/s^2, rad/s^2].
+
+    n in rpm, delta in rad, F_b and F_s in N; `air` is the ship's velocity relative to the air in body axes (`wind.apparent_wind`) or None without wind;
+    p holds p0..p10: p0 lateral over axial propeller force [1], p1..p3 resistance [N s/m, N s^2/m^2, N s^3/m^3], p4..p10 rudder [1].
+
+    X_e, Y_e, N_e are thrusters and measured wind. R(u) = -(p1 u + p2 u|u| + p3 u^3): it opposes the motion on both tacks of u.
+    """
+    speed = sqrt(u * u + v * v + c.eps * c.eps)
+    X_n, race = propulsion(u, n, c)
+    X_d, Y_d, N_d = rudder(u, v, r, delta, race, c, p)
+    Y_T, N_T = thruster.tunnel_thrusters(u, F_b, F_s, c.tunnels)
+    abs_r = absolute(r)
+    X = X_n + X_d - u * (p[1] + p[2] * absolute(u) + p[3] * u * u) + c.X_vr * v * r + c.X_rr * r * r
+    Y_n = p[0] * X_n
+    Y = Y_n + Y_d + Y_T + c.Y_v * speed * v + (c.Y_r * speed - c.m * u) * r + c.Y_vv * v * absolute(v) + c.Y_vr * v * abs_r + c.Y_rr * r * abs_r
+    N = c.x_P * Y_n + N_d + N_T + c.N_v * speed * v + (c.N_r * speed - c.m * c.x_G * u) * r + c.N_rr * r * abs_r
+    N = N + (c.N_vvr * v + c.N_vrr * r) * v * r / speed
+    if air is not None:
+        X_W, Y_W, N_W = wind.harmonic(*air, c.A_F, c.A_L, c.L)
+        X, Y, N = X + X_W, Y + Y_W, N + N_W
+    det = c.m11 * c.m22 - c.m12_Y * c.m12_N
+    return X / (c.m + c.m_x), (c.m22 * Y - c.m12_Y * N) / det, (c.m11 * N - c.m12_N * Y) / det

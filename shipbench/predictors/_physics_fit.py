@@ -1,0 +1,177 @@
+"""Constrained nonlinear least squares over full rollouts (eq. 9): Gauss-Newton steps whose constrained subproblems IPOPT solves.
+
+CasADi differentiates one integration step; the sensitivities are carried along all runs at once. IPOPT then meets a problem of 11 unknowns with the bounds and the nonlinear
+constraints exact, so a step costs milliseconds, and the rollouts are evaluated once per step instead of once per barrier iteration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from ..integrate import motion_rhs, rk4_step
+from ..physics import eq2
+from ..physics.wind import apparent_wind
+from ..records import Batch
+from ..signals import COMMANDS, MOTION
+from .hold import Hold
+
+_P = eq2.NUM_PARAMETERS
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Parameters (11,), their 95 % intervals (11, 2; NaN where a parameter sits at a bound), cost per run and knot, steps taken."""
+
+    p: np.ndarray
+    ci95: np.ndarray
+    cost: float
+    steps: int
+
+
+@lru_cache(maxsize=8)
+def _rollout_function(c: eq2.Coefficients, steps: int, runs: int, h: float, wind: bool, sensitivities: bool) -> ca.Function:
+    """Rollout of `runs` runs: (x0, S0, w, p) -> (X, S), or (x0, w, p) -> X without sensitivities."""
+    x, S, p = ca.SX.sym("x", 6), ca.SX.sym("S", 6, _P), ca.SX.sym("p", _P)
+    w = ca.SX.sym("w", 14 if wind else 12)
+
+    def acc(psi, u, v, r, stage):
+        air = apparent_wind(psi, u, v, w[12], w[13]) if wind else None
+        return eq2.accelerations(u, v, r, *(w[4 * stage + i] for i in range(4)), air, c, [p[i] for i in range(_P)])
+
+    x_next = ca.vertcat(*rk4_step(motion_rhs(acc), tuple(x[i] for i in range(6)), h))
+    if not sensitivities:
+        return ca.Function("step", [x, w, p], [x_next], {"cse": True}).mapaccum("roll", steps).map(runs)
+    S_next = ca.jacobian(x_next, x) @ S + ca.jacobian(x_next, p)
+    step = ca.Function("step", [x, S, w, p], [x_next, S_next], {"cse": True})
+    return step.mapaccum("roll", steps, 2).map(runs)
+
+
+def parameter_scale(c: eq2.Coefficients) -> np.ndarray:
+    """Typical sizes of p0..p10 for this ship; resistance terms follow rho L T and the speed sqrt(g L)/10 (130 m: 3.6 m/s)."""
+    area = 0.5 * c.rho * c.L * c.T
+    speed = 0.1 * np.sqrt(9.81 * c.L)
+    return np.array([0.05, 0.01 * area * speed, 0.015 * area, 0.005 * area / speed, 0.05, 2.5, 0.5, 2.0, 0.03, 0.1, 1.5])
+
+
+def _bounds(scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Box of p (physics reference, section 3.5, in units of the scale)."""
+    low = np.array([-0.3, 0.0, 0.0, 0.0, -0.15, 0.5, -2.0, -8.0, 0.0, -0.5, 0.0])
+    high = np.array([0.3, 3.0 * scale[1], 3.0 * scale[2], 5.0 * scale[3], 0.15, 6.0, 2.0, 0.0, 0.3, 0.5, 6.0])
+    return low, high
+
+
+def _constraints(p: ca.SX) -> ca.SX:
+    """g(p) <= 0: lift rises for |a| <= 20 deg, |c_L| <= 2 for |a| <= 35 deg, drag never negative, at most 3 deg of built-in helm."""
+    a, b = np.deg2rad(20.0), np.deg2rad(35.0)
+    lift = [p[4] + s * b * (p[5] + s * b * (p[6] + s * b * p[7])) for s in (1, -1)]
+    return ca.vertcat(
+        *(-(p[5] + 2 * s * a * p[6] + 3 * a * a * p[7]) for s in (1, -1)),
+        lift[0] - 2.0,
+        -lift[1] - 2.0,
+        p[9] ** 2 - 4 * p[8] * p[10],
+        p[4] - np.deg2rad(3.0) * p[5],
+        -p[4] - np.deg2rad(3.0) * p[5],
+    )
+
+
+def _subproblem(low: np.ndarray, high: np.ndarray, scale: np.ndarray) -> ca.Function:
+    """IPOPT solver of min_q g'(q - q0) + (q - q0)' H (q - q0)/2 over q = p/scale with the constraints of the paper's eq. (9)."""
+    q, q0, grad, H = ca.SX.sym("q", _P), ca.SX.sym("q0", _P), ca.SX.sym("g", _P), ca.SX.sym("H", _P, _P)
+    d = q - q0
+    problem = {"x": q, "p": ca.veccat(q0, grad, H), "f": ca.dot(grad, d) + 0.5 * ca.bilin(H, d, d), "g": _constraints(q * scale)}
+    options = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-9, "ipopt.max_iter": 200}
+    return ca.nlpsol("step", "ipopt", problem, options)
+
+
+def fit_parameters(
+    c: eq2.Coefficients, batch: Batch, path: np.ndarray, wind: np.ndarray | None, dt: float, substeps: int, iterations: int, tolerance: float
+) -> Fit:
+    """Minimise the mean over runs of the weighted squared trajectory error of x, y, psi, u, v, r.
+
+    W holds, per signal, the inverse mean square of how far holding s0's velocities errs: the size of what there is to predict.
+
+    Args:
+        c: left side.
+        batch: runs of equal length.
+        path: actuators at the stages of every substep (batch, K * substeps, 3, 4).
+        wind: (batch, K, 2) wind speed and direction, or None.
+        dt: sample time [s].
+        substeps: integration steps per sample.
+        iterations, tolerance: stop after so many steps, or when the cost falls by less than this share.
+    """
+    runs, steps = path.shape[:2]
+    w = path.reshape(runs, steps, 12)
+    if wind is not None:
+        w = np.concatenate([w, np.repeat(wind, substeps, axis=1)], axis=2)
+    w = w.reshape(runs * steps, -1).T
+    x0 = batch.s0[:, MOTION].T
+    truth = batch.truth[:, :, MOTION]
+    weight = 1.0 / (_hold_error(batch, dt) * np.sqrt(truth.shape[0] * truth.shape[1] * 6.0))
+    args = (c, steps, runs, dt / substeps, wind is not None)
+    full, plain = _rollout_function(*args, True), _rollout_function(*args, False)
+
+    def residuals(X: ca.DM) -> np.ndarray:
+        at = np.asarray(X).T.reshape(runs, steps, 6)[:, substeps - 1 :: substeps]
+        return (at - truth) * weight
+
+    scale = parameter_scale(c)
+    low, high = (b / scale for b in _bounds(scale))
+    solver = _subproblem(low, high, scale)
+    q = np.clip(np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, -0.8, 1.0, 0.0, 1.0]), low, high)
+
+    def linearise(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        X, S = full(x0, np.zeros((6, _P * runs)), w, q * scale)
+        jac = np.asarray(S).reshape(6, runs, steps, _P)[:, :, substeps - 1 :: substeps].transpose(1, 2, 0, 3)
+        return residuals(X), jac * weight[:, None] * scale
+
+    e, J = linearise(q)
+    cost, damping, taken = float(np.sum(e * e)), 1e-3, 0
+    while taken < iterations and damping < 1e6 and np.isfinite(cost):
+        taken += 1
+        grad, H = np.einsum("bksp,bks->p", J, e), np.einsum("bksp,bksq->pq", J, J)
+        damped = H + damping * np.diag(np.maximum(np.diag(H), 1e-9 * np.trace(H)))
+        trial = np.asarray(solver(x0=q, p=ca.veccat(q, grad, damped), lbx=low, ubx=high, lbg=-np.inf, ubg=0.0)["x"]).ravel()
+        trial = np.clip(trial, low, high)
+        new = float(np.sum(residuals(plain(x0, w, trial * scale)) ** 2))
+        if np.isfinite(new) and new < cost:
+            done = cost - new < tolerance * cost
+            q, damping = trial, max(damping * 0.1, 1e-8)
+            e, J = linearise(q)
+            cost = float(np.sum(e * e))
+            if done:
+                break
+        else:
+            damping *= 10.0
+    return Fit(q * scale, _intervals(q, e, J, low, high) * scale[:, None], cost, taken)
+
+
+def _hold_error(batch: Batch, dt: float) -> np.ndarray:
+    """Root mean square error (6,) of keeping u, v, r: x and y share the position's."""
+    hold = Hold()
+    hold.dt = dt
+    error = (hold.predict(batch.s0, batch.U[:, :, : len(COMMANDS)]) - batch.truth)[:, :, MOTION]
+    size = np.sqrt(np.mean(error**2, axis=(0, 1)))
+    size[:2] = np.sqrt(np.mean(size[:2] ** 2))
+    return np.maximum(size, 1e-9)
+
+
+def _intervals(q: np.ndarray, e: np.ndarray, J: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """95 % intervals (11, 2) of the scaled parameters: sandwich covariance clustered over runs, Student's t; NaN at a bound."""
+    from scipy.stats import t
+
+    free = (q > low + 1e-6) & (q < high - 1e-6)
+    interval = np.full((_P, 2), np.nan)
+    runs = len(e)
+    if runs < 2 or not free.any():
+        return interval
+    G = J[..., free]
+    bread = np.linalg.pinv(np.einsum("bksp,bksq->pq", G, G))
+    scores = np.einsum("bksp,bks->bp", G, e)
+    spread = np.sqrt(np.diag(bread @ (scores.T @ scores * runs / (runs - 1)) @ bread))
+    half = float(t.ppf(0.975, runs - 1)) * spread
+    interval[free] = np.stack([q[free] - half, q[free] + half], axis=1)
+    return interval

@@ -1,0 +1,197 @@
+"""Building blocks of stacked networks: data, scalers and layers with a leading member axis (folds and seeds of one network).
+
+Every layer is one batched matrix product, since small networks on a CPU are all overhead.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from ..records import Dataset
+from ..signals import PSI, R, U, V, X, Y
+
+CHANNELS = slice(U, None)
+"""The channels y = u, v, r, n, delta, F_b, F_s of a state that networks predict; the pose follows from them."""
+
+
+def generators(seeds: Sequence[int]) -> list[torch.Generator]:
+    """One generator per member: what is drawn for a member does not depend on the others."""
+    return [torch.Generator().manual_seed(int(seed)) for seed in seeds]
+
+
+def with_valid(train: Dataset, valid: Dataset | None, seed: int) -> tuple[Dataset, Dataset]:
+    """`train` and `valid`; without `valid`, a tenth of the training runs (at least one) is set aside, drawn from `seed`.
+
+    A single training run serves as both, since nothing can be set aside.
+    """
+    if valid is not None:
+        return train, valid
+    if len(train) == 1:
+        return train, train
+    order = np.random.default_rng(seed).permutation(len(train))
+    cut = max(1, round(0.1 * len(train)))
+    return train.subset(sorted(order[cut:])), train.subset(sorted(order[:cut]))
+
+
+@dataclass(frozen=True)
+class StackedRuns:
+    """Runs of all members, one member after another.
+
+    Args:
+        S: (runs, K + 1, 10) states; U: (runs, K, inputs) held inputs.
+        counts: number of runs of each member.
+    """
+
+    S: Tensor
+    U: Tensor
+    counts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, datasets: Sequence[Dataset], dtype: torch.dtype = torch.float32) -> StackedRuns:
+        """Stack data sets whose runs are equally long."""
+        batches = [d.batch() for d in datasets]
+        S = np.concatenate([np.concatenate([b.s0[:, None], b.truth], axis=1) for b in batches])
+        held = np.concatenate([b.U for b in batches])
+        return cls(torch.as_tensor(S, dtype=dtype), torch.as_tensor(held, dtype=dtype), tuple(len(b.ids) for b in batches))
+
+    @property
+    def steps(self) -> int:
+        """Number of steps K of every run."""
+        return self.U.shape[1]
+
+    def offsets(self) -> Tensor:
+        """(members,) index of each member's first run."""
+        return torch.tensor([0, *np.cumsum(self.counts)[:-1].tolist()])
+
+    def padded(self) -> tuple[Tensor, Tensor]:
+        """Indices of all runs (members, most runs), repeated where a member has fewer, and weights that sum to 1 per member."""
+        most = max(self.counts)
+        index = torch.stack([o + torch.arange(most) % c for o, c in zip(self.offsets(), self.counts, strict=True)])
+        weight = torch.stack([(torch.arange(most) < c) / c for c in self.counts])
+        return index, weight
+
+
+class Scaler(nn.Module):
+    """Per-member mean and standard deviation (members, 1, features); a constant feature keeps scale 1."""
+
+    mean: Tensor
+    std: Tensor
+
+    def __init__(self, mean: Tensor, std: Tensor) -> None:
+        super().__init__()
+        self.register_buffer("mean", mean)
+        self.register_buffer("std", std)
+
+    @classmethod
+    def fit(cls, samples: Sequence[Tensor], centred: bool = True) -> Scaler:
+        """From each member's training samples (..., features); `centred=False` keeps zero at zero (for increments)."""
+        flat = [s.reshape(-1, s.shape[-1]).double() for s in samples]
+        mean = torch.stack([f.mean(0, keepdim=True) for f in flat])
+        spread = torch.stack([f.std(0, keepdim=True, correction=0) if centred else f.square().mean(0, keepdim=True).sqrt() for f in flat])
+        # A channel that does not move up to round-off has nothing to be scaled by.
+        still = spread <= 1e-9 * (mean.abs() + 1e-12)
+        dtype = samples[0].dtype
+        return cls((mean if centred else torch.zeros_like(mean)).to(dtype), torch.where(still, 1.0, spread).to(dtype))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Standardised `x` (members, batch, features)."""
+        return (x - self.mean) / self.std
+
+    def inverse(self, z: Tensor) -> Tensor:
+        """`z` in the units of the samples."""
+        return z * self.std + self.mean
+
+
+class StackedLinear(nn.Module):
+    """`torch.nn.Linear` for every member: weight (members, inputs, outputs), bias (members, 1, outputs), same initial values per seed."""
+
+    def __init__(self, inputs: int, outputs: int, draw: Sequence[torch.Generator], zero: bool = False) -> None:
+        super().__init__()
+        bound = 1.0 / math.sqrt(inputs)
+        weights, biases = [], []
+        for g in draw:  # weight before bias, as nn.Linear.reset_parameters draws them
+            weights.append(torch.empty(outputs, inputs).uniform_(-bound, bound, generator=g).T)
+            biases.append(torch.empty(1, outputs).uniform_(-bound, bound, generator=g))
+        scale = 0.0 if zero else 1.0
+        self.weight = nn.Parameter(scale * torch.stack(weights).contiguous())
+        self.bias = nn.Parameter(scale * torch.stack(biases))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(members, batch, inputs) -> (members, batch, outputs)."""
+        return torch.baddbmm(self.bias, x, self.weight)
+
+
+class StackedMLP(nn.Module):
+    """Fully connected layers of `sizes`; `zero_last` starts with an output of exactly zero."""
+
+    def __init__(self, sizes: Sequence[int], draw: Sequence[torch.Generator], activation: Any = torch.relu, zero_last: bool = False) -> None:
+        super().__init__()
+        last = len(sizes) - 2
+        pairs = list(zip(sizes[:-1], sizes[1:], strict=True))
+        self.layers = nn.ModuleList(StackedLinear(a, b, draw, zero=zero_last and i == last) for i, (a, b) in enumerate(pairs))
+        self.activation = activation
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(members, batch, sizes[0]) -> (members, batch, sizes[-1])."""
+        for layer in self.layers[:-1]:
+            x = self.activation(layer(x))
+        return self.layers[-1](x)
+
+
+class InputFeatures:
+    """Inputs as a network sees them: wind as its components from ahead and from starboard, so that a turned frame changes nothing.
+
+    Args:
+        names: columns of U.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.wind = names.index("wind_from") if "wind_from" in names else None
+        self.speed = names.index("wind_speed") if "wind_speed" in names else None
+        special = {self.wind, self.speed} if self.wind is not None else set()
+        self.plain = [i for i in range(len(names)) if i not in special]
+        self.count = len(self.plain) + (0 if self.wind is None else 2)
+
+    def __call__(self, held: Tensor, psi: Tensor) -> Tensor:
+        """Features (..., count) of inputs (..., inputs) at heading psi (...)."""
+        if self.wind is None:
+            return held
+        speed = held[..., self.speed] if self.speed is not None else torch.ones_like(psi)
+        angle = held[..., self.wind] - psi
+        wind = torch.stack([speed * torch.cos(angle), speed * torch.sin(angle)], dim=-1)
+        return torch.cat([held[..., self.plain], wind], dim=-1)
+
+
+def dead_reckoning(s0: Tensor, y: Tensor, dt: float) -> Tensor:
+    """Pose (..., K, 3) from velocities at the ends of the steps.
+
+    Args:
+        s0: (..., 10) initial states; y: (..., K, 7) channels at t_1 .. t_K.
+
+    Source: paper, eq. (10) to (14): p_k+1 = p_k + dt [u' cos psi - v' sin psi, u' sin psi + v' cos psi, r'], u', v', r' at k + 1, psi at k.
+    """
+    u, v, r = y[..., 0], y[..., 1], y[..., 2]
+    psi = s0[..., None, PSI] + dt * torch.cumsum(r, dim=-1)
+    before = torch.cat([s0[..., None, PSI], psi[..., :-1]], dim=-1)
+    cos, sin = torch.cos(before), torch.sin(before)
+    x = s0[..., None, X] + dt * torch.cumsum(u * cos - v * sin, dim=-1)
+    east = s0[..., None, Y] + dt * torch.cumsum(u * sin + v * cos, dim=-1)
+    return torch.stack([x, east, psi], dim=-1)
+
+
+def trapezoid_pose(s0: Tensor, y: Tensor, dt: float) -> Tensor:
+    """Pose (..., K, 3) by the trapezoidal rule, second order in dt (eq. (10) is first order); arguments as `dead_reckoning`."""
+    path = torch.cat([s0[..., None, U : R + 1], y[..., :3]], dim=-2)
+    turned = 0.5 * dt * torch.cumsum(path[..., 1:, 2] + path[..., :-1, 2], dim=-1)
+    psi = s0[..., None, PSI] + torch.cat([torch.zeros_like(turned[..., :1]), turned], dim=-1)
+    cos, sin = torch.cos(psi), torch.sin(psi)
+    rates = torch.stack([path[..., 0] * cos - path[..., 1] * sin, path[..., 0] * sin + path[..., 1] * cos], dim=-1)
+    moved = 0.5 * dt * torch.cumsum(rates[..., 1:, :] + rates[..., :-1, :], dim=-2)
+    return torch.cat([s0[..., None, X : Y + 1] + moved, psi[..., 1:, None]], dim=-1)

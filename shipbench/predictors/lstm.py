@@ -1,0 +1,265 @@
+"""A recurrent network that rolls itself out: increments of y from a long short-term memory fed with its own predictions.
+
+Trained free-running on windows that grow in length, on y and on the pose that follows from it. Without history the memory starts
+from a network of y at s0; with history the cell first runs over the measured y.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from ..errors import InputError
+from ..records import Dataset
+from ..signals import PSI
+from ._stacked import CHANNELS, InputFeatures, Scaler, StackedLinear, StackedMLP, StackedRuns, generators, trapezoid_pose, with_valid
+from .base import History, PredictorBase
+from .training import Chunk, Recipe, StackedTask, train
+
+_Y = 7
+_MOST_STEPS = 150
+
+
+class _Network(nn.Module):
+    """Cell, head and initial memory of all members, with their scalers."""
+
+    def __init__(self, features: InputFeatures, hidden: int, scalers: tuple[Scaler, Scaler, Scaler], draw: Sequence[torch.Generator]) -> None:
+        super().__init__()
+        self.features = features
+        self.scale_y, self.scale_u, self.scale_dy = scalers
+        width = _Y + features.count
+        self.initial = StackedMLP([_Y, hidden, 2 * hidden], draw, torch.tanh)
+        self.cell = StackedLinear(width + hidden, 4 * hidden, draw)
+        self.head = StackedMLP([width + hidden, hidden, _Y], draw, torch.tanh, zero_last=True)
+
+    def memory(self, y: Tensor) -> tuple[Tensor, Tensor]:
+        """Hidden and cell state (members, batch, hidden) for a start at y (members, batch, 7)."""
+        h, c = self.initial(self.scale_y(y)).chunk(2, dim=-1)
+        return torch.tanh(h), c
+
+    def step(self, y: Tensor, held: Tensor, psi: Tensor, memory: tuple[Tensor, Tensor]) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+        """y at the end of the step and the memory; held (members, batch, inputs), psi (members, batch) [rad]."""
+        h, c = memory
+        x = torch.cat([self.scale_y(y), self.scale_u(self.features(held, psi))], dim=-1)
+        gates = self.cell(torch.cat([x, h], dim=-1))
+        keep, write, show, new = gates.chunk(4, dim=-1)
+        c = torch.sigmoid(keep + 1.0) * c + torch.sigmoid(write) * torch.tanh(new)  # + 1: remembers to begin with
+        h = torch.sigmoid(show) * torch.tanh(c)
+        return y + self.scale_dy.inverse(self.head(torch.cat([x, h], dim=-1))), (h, c)
+
+    def rollout(self, past: tuple[Tensor, Tensor], start: Tensor, held: Tensor, dt: float) -> Tensor:
+        """y (members, batch, steps, 7) from states start (members, batch, 10).
+
+        Args:
+            past: states (members, batch, H, 10) and inputs (members, batch, H, inputs) before the start, H >= 0.
+            held: (members, batch, steps, inputs).
+            dt: model step [s].
+        """
+        states, inputs = past
+        first = states[:, :, 0] if states.shape[2] else start
+        memory = self.memory(first[..., CHANNELS])
+        for k in range(states.shape[2]):
+            _, memory = self.step(states[:, :, k, CHANNELS], inputs[:, :, k], states[:, :, k, PSI], memory)
+        y, psi, path = start[..., CHANNELS], start[..., PSI], []
+        for k in range(held.shape[2]):
+            before = y
+            y, memory = self.step(y, held[:, :, k], psi, memory)
+            psi = psi + 0.5 * dt * (before[..., 2] + y[..., 2])
+            path.append(y)
+        return torch.stack(path, dim=2)
+
+
+class Stage(NamedTuple):
+    """Part of the training: rollout length [model steps], windows per minibatch, number of minibatches, longest history [steps]."""
+
+    steps: int
+    batch: int
+    minibatches: int
+    history: int
+
+
+def hold_error(runs: StackedRuns, dt: float, steps: int) -> Tensor:
+    """Root mean square error (members, 2) of position [m] and heading [rad] when the initial velocities are kept, up to `steps`."""
+    start = runs.S[:, 0]
+    kept = start[:, None, CHANNELS].expand(-1, steps, -1)
+    error = trapezoid_pose(start, kept, dt) - runs.S[:, 1 : steps + 1, :3]
+    square = torch.stack([error[..., :2].square().sum(-1), error[..., 2].square()], dim=-1)
+    return torch.stack([part.mean((0, 1)).sqrt() for part in square.split(runs.counts)]).clamp(min=1e-6)
+
+
+class _Rollouts(StackedTask):
+    """Free-running rollouts from random starts of random runs; the score is the mean position error of whole validation windows [m]."""
+
+    CHUNK = 10
+
+    def __init__(self, net: _Network, training: StackedRuns, validation: StackedRuns, stages: Sequence[Stage], draw: Sequence[torch.Generator],
+                 dt: float, pose_weight: float) -> None:  # fmt: skip
+        super().__init__()
+        self.net, self.training_runs, self.validation, self.stages, self.draw = net, training, validation, stages, draw
+        self.dt, self.pose_weight = dt, pose_weight
+        self.members = len(training.counts)
+        self.pose_scale = {s.steps: hold_error(training, dt, s.steps) for s in stages}
+
+    @property
+    def num_chunks(self) -> int:
+        """How often it is validated."""
+        return sum(-(-s.minibatches // self.CHUNK) for s in self.stages)
+
+    def _windows(self, stage: Stage, history: int) -> Tensor:
+        """Rows (members, batch, history + steps + 1) into the flattened samples: one random window per random run."""
+        steps = history + stage.steps
+        runs, starts = [], []
+        for offset, count, g in zip(self.training_runs.offsets().tolist(), self.training_runs.counts, self.draw, strict=True):
+            runs.append(offset + torch.randint(count, (stage.batch,), generator=g))
+            starts.append(torch.randint(self.training_runs.steps - steps + 1, (stage.batch,), generator=g))
+        samples = self.training_runs.steps + 1
+        return (torch.stack(runs) * samples + torch.stack(starts))[..., None] + torch.arange(steps + 1)
+
+    def chunks(self) -> Iterator[Chunk]:
+        everyone = torch.ones(self.members, dtype=torch.bool)
+        for stage in self.stages:
+            for done in range(0, stage.minibatches, self.CHUNK):
+                numbers = range(done, min(done + self.CHUNK, stage.minibatches))
+                # Every other minibatch has a history, of a length that goes through its range: the same for all members.
+                lengths = [0 if i % 2 == 0 or not stage.history else 1 + (i * 7) % stage.history for i in numbers]
+                yield Chunk([(self._windows(stage, length), length, stage.steps) for length in lengths], everyone)
+
+    def losses(self, minibatch: tuple[Tensor, int, int]) -> Tensor:
+        rows, history, steps = minibatch
+        device = self.net.cell.weight.device
+        S = self.training_runs.S.flatten(0, 1)[rows].to(device)
+        # The row after a run's last input is never used: windows end at the last sample.
+        held = self.training_runs.U[rows // (self.training_runs.steps + 1), (rows % (self.training_runs.steps + 1)).clamp(max=self.training_runs.steps - 1)]
+        held = held.to(device)[:, :, :-1]
+        start, truth = S[:, :, history], S[:, :, history + 1 :]
+        y = self.net.rollout((S[:, :, :history], held[:, :, :history]), start, held[:, :, history:], self.dt)
+        error = (y - truth[..., CHANNELS]) / self.net.scale_y.std[:, None]
+        pose = trapezoid_pose(start, y, self.dt) - truth[..., :3]
+        scale = self.pose_scale[steps].to(device)[:, None, None]
+        far = (pose[..., :2].square().sum(-1) / scale[..., 0].square()) + pose[..., 2].square() / scale[..., 1].square()
+        return error.square().mean((1, 2, 3)) + self.pose_weight * far.mean((1, 2))
+
+    def scores(self) -> Tensor:
+        device = self.net.cell.weight.device
+        index, weight = self.validation.padded()
+        S, held = self.validation.S[index].to(device), self.validation.U[index].to(device)
+        start = S[:, :, 0]
+        y = self.net.rollout((S[:, :, :0], held[:, :, :0]), start, held, self.dt)
+        miss = torch.linalg.vector_norm(trapezoid_pose(start, y, self.dt)[..., :2] - S[:, :, 1:, :2], dim=-1)
+        return (miss.mean(2) * weight.to(device)).sum(1)
+
+
+def thinned(runs: StackedRuns, stride: int) -> StackedRuns:
+    """Every `stride`-th sample; inputs as they stand at the beginning of each longer step."""
+    steps = runs.steps // stride
+    return StackedRuns(runs.S[:, : steps * stride + 1 : stride], runs.U[:, : steps * stride : stride], runs.counts)
+
+
+@dataclass
+class LSTM(PredictorBase):
+    """The recurrent network.
+
+    Args:
+        hidden: width of the memory and of the head.
+        lr, minibatches: Adam's first step size and the number of minibatches (a cosine takes the step size down to a hundredth).
+        pose_weight: weight of the pose error (in units of the error of kept velocities) against the error of standardised y.
+        device: where to train.
+    """
+
+    name: ClassVar[str] = "lstm"
+    hidden: int = 64
+    lr: float = 4e-3
+    minibatches: int = 600
+    pose_weight: float = 1.0
+    device: str = "cpu"
+
+    def __post_init__(self) -> None:
+        for key in ("hidden", "minibatches"):
+            if getattr(self, key) < 1:
+                raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
+        self._weights: dict[str, np.ndarray] = {}
+        self._dt, self._stride = 0.0, 1
+
+    def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
+        """Train on windows of `train`; `valid` chooses the weights that are kept."""
+        type(self).fit_group([self], [train], [valid], [seed])
+        return self
+
+    def _stages(self, steps: int) -> list[Stage]:
+        """Short windows first: they are cheap and their gradients tame."""
+        n = self.minibatches
+        s, m = max(1, steps // 12), max(1, steps // 4)
+        return [
+            Stage(s, 128, max(1, n // 2), min(10, steps - s)),
+            Stage(m, 64, max(1, n // 4), min(20, steps - m)),
+            Stage(max(1, steps * 2 // 3), 48, max(1, n // 4), min(30, steps - max(1, steps * 2 // 3))),
+        ]
+
+    @classmethod
+    def fit_group(cls, models: Sequence[LSTM], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]) -> None:
+        """Train several (folds, seeds) of the same parameters as one stacked batch; each comes out as it would alone."""
+        lead, dt, names = models[0], trains[0].dt, trains[0].inputs
+        pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
+        training, validation = StackedRuns.of([t for t, _ in pairs]), StackedRuns.of([v for _, v in pairs])
+        stride = -(-training.steps // _MOST_STEPS)
+        training, validation = thinned(training, stride), thinned(validation, stride)
+        features, draw = InputFeatures(names), generators(seeds)
+        parts = list(zip(training.S.split(training.counts), training.U.split(training.counts), strict=True))
+        scalers = (
+            Scaler.fit([S[..., CHANNELS] for S, _ in parts]),
+            Scaler.fit([features(held, S[:, :-1, PSI]) for S, held in parts]),
+            Scaler.fit([S[:, 1:, CHANNELS] - S[:, :-1, CHANNELS] for S, _ in parts], centred=False),
+        )
+        net = _Network(features, lead.hidden, scalers, draw)
+        task = _Rollouts(net, training, validation, lead._stages(training.steps), draw, dt * stride, lead.pose_weight)
+        train(task, Recipe(lr=lead.lr, lr_end=0.01, chunks=task.num_chunks, clip=1.0, device=lead.device))
+        state = {k: v.detach().cpu().numpy() for k, v in net.state_dict().items()}
+        for m, model in enumerate(models):
+            model.inputs, model._dt, model._stride = names, dt, stride
+            model._weights = {k: v[m : m + 1].copy() for k, v in state.items()}
+
+    def _network(self) -> _Network:
+        """The fitted network of this one member in float64."""
+        if not self._weights:
+            raise InputError("lstm: predict was called before fit; fit or load the model first.")
+        w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
+        scalers = tuple(Scaler(w[f"scale_{k}.mean"], w[f"scale_{k}.std"]) for k in ("y", "u", "dy"))
+        net = _Network(InputFeatures(self.inputs), self.hidden, scalers, generators([0])).double()
+        net.load_state_dict(w)
+        return net
+
+    @torch.no_grad()
+    def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
+        net, d, K = self._network(), self._stride, U.shape[1]
+        start, held = torch.as_tensor(s0)[None], torch.as_tensor(U[:, ::d])[None]
+        past = (torch.empty(1, len(s0), 0, s0.shape[1], dtype=torch.float64), held[:, :, :0])
+        if history is not None and len(history[0][0]) >= d:
+            past = tuple(torch.as_tensor(np.ascontiguousarray(a[:, ::-1][:, d - 1 :: d][:, ::-1]), dtype=torch.float64)[None] for a in history)
+        y = net.rollout(past, start, held, d * self._dt)[0]
+        if d > 1:
+            y = _between(start[0, :, CHANNELS], y, d)[:, :K]
+        return torch.cat([trapezoid_pose(start[0], y, self._dt), y], dim=-1).numpy()
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return self._weights
+
+    def _meta(self) -> dict[str, Any]:
+        return {"dt": self._dt, "stride": self._stride}
+
+    def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+        self._weights, self._dt, self._stride = arrays, float(meta["dt"]), int(meta["stride"])
+
+
+def _between(y0: Tensor, y: Tensor, stride: int) -> Tensor:
+    """Linear interpolation to `stride` samples per model step: y (batch, steps, 7) at the ends of steps -> (batch, steps * stride, 7)."""
+    before = torch.cat([y0[:, None], y[:, :-1]], dim=1)
+    share = torch.arange(1, stride + 1, dtype=y.dtype)[:, None] / stride
+    return (before[:, :, None] + share * (y - before)[:, :, None]).flatten(1, 2)
+
+
+PREDICTOR = LSTM

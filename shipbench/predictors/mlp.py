@@ -1,0 +1,171 @@
+"""The paper's multilayer perceptron: y and the commands at k -> y at k + 1, pose by eq. (10) to (14).
+
+y = [u, v, r, n, delta, F_b, F_s]; three hidden layers of 100, ReLU, mean squared error on standardised data, Adam 1e-3, batch 32, at most
+200 epochs, stop when validation does not improve by 1e-4 for 10 epochs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ..errors import InputError
+from ..records import Dataset
+from ..signals import PSI
+from ._stacked import CHANNELS, InputFeatures, Scaler, StackedMLP, StackedRuns, dead_reckoning, generators, with_valid
+from .base import History, PredictorBase
+from .training import Chunk, Recipe, StackedTask, epochs_of_samples, train
+
+_Y = 7
+
+
+def transitions(runs: StackedRuns, features: InputFeatures) -> list[tuple[Tensor, Tensor, Tensor]]:
+    """Per member: y_k (samples, 7), input features at k (samples, features), y_k+1 (samples, 7)."""
+    parts = []
+    for S, held in zip(runs.S.split(runs.counts), runs.U.split(runs.counts), strict=True):
+        inputs = features(held, S[:, :-1, PSI])
+        parts.append((S[:, :-1, CHANNELS].flatten(0, 1), inputs.flatten(0, 1), S[:, 1:, CHANNELS].flatten(0, 1)))
+    return parts
+
+
+class _OneStep(StackedTask):
+    """Standardised one-step regression of all members."""
+
+    def __init__(self, model: MLP, training: list[Any], validation: list[Any], seeds: Sequence[int]) -> None:
+        super().__init__()
+        self.members, self.epochs, self.batch = len(seeds), model.epochs, model.batch
+        self.increment = model.target == "increment"
+        self.draw = generators(seeds)
+        self.scale_x = Scaler.fit([torch.cat([y, inputs], dim=-1) for y, inputs, _ in training])
+        self.scale_z = Scaler.fit([self._target(y, after) for y, _, after in training])
+        sizes = [_Y + training[0][1].shape[-1], *[model.hidden] * model.layers, _Y]
+        self.net = StackedMLP(sizes, self.draw)
+        self.counts = [len(y) for y, _, _ in training]
+        self.data = self._standardised(training)
+        self.valid = self._standardised(validation)
+        self.valid_counts = [len(y) for y, _, _ in validation]
+
+    def _target(self, y: Tensor, after: Tensor) -> Tensor:
+        return after - y if self.increment else after
+
+    def _standardised(self, parts: list[Any]) -> tuple[Tensor, Tensor, Tensor]:
+        """x and z of all members one after another, and the first row of each member."""
+        x = [(torch.cat([y, i], dim=-1) - self.scale_x.mean[m]) / self.scale_x.std[m] for m, (y, i, _) in enumerate(parts)]
+        z = [(self._target(y, after) - self.scale_z.mean[m]) / self.scale_z.std[m] for m, (y, _, after) in enumerate(parts)]
+        first = torch.tensor([0, *np.cumsum([len(part) for part in x])[:-1].tolist()])
+        return torch.cat(x), torch.cat(z), first
+
+    def chunks(self) -> Iterator[Chunk]:
+        device = self.net.layers[0].weight.device
+        x, z, first = (part.to(device) for part in self.data)
+        for index, ended in epochs_of_samples(self.counts, self.batch, self.epochs, self.draw):
+            rows = (index.to(device) + first[:, None]).flatten()
+            shape = (*index.shape, -1)
+            # One gather per chunk: a step then costs no indexing at all.
+            yield Chunk(list(zip(x[rows].view(shape).unbind(0), z[rows].view(shape).unbind(0), strict=True)), ended)
+
+    def losses(self, minibatch: tuple[Tensor, Tensor]) -> Tensor:
+        x, z = minibatch
+        return (self.net(x) - z).square().mean((1, 2))
+
+    def scores(self) -> Tensor:
+        device = self.net.layers[0].weight.device
+        x, z, first = (part.to(device) for part in self.valid)
+        most = max(self.valid_counts)
+        index = torch.stack([f + torch.arange(most, device=device) % c for f, c in zip(first, self.valid_counts, strict=True)])
+        weight = torch.stack([(torch.arange(most, device=device) < c) / c for c in self.valid_counts])
+        return ((self.net(x[index]) - z[index]).square().mean(2) * weight).sum(1)
+
+
+@dataclass
+class MLP(PredictorBase):
+    """The paper's network.
+
+    Args:
+        hidden, layers: width and number of the hidden layers.
+        epochs, batch, lr, patience, min_delta: training, as in the paper.
+        target: "state" predicts y at k + 1 as the paper does; "increment" predicts y_k+1 - y_k, an honest stronger variant.
+        device: where to train ("cpu", "cuda").
+    """
+
+    name: ClassVar[str] = "mlp"
+    hidden: int = 100
+    layers: int = 3
+    epochs: int = 200
+    batch: int = 32
+    lr: float = 1e-3
+    patience: int = 10
+    min_delta: float = 1e-4
+    target: str = "state"
+    device: str = "cpu"
+
+    def __post_init__(self) -> None:
+        if self.target not in ("state", "increment"):
+            raise ValueError(f"target = '{self.target}'; accepted: 'state' or 'increment'")
+        for key in ("hidden", "layers", "epochs", "batch", "patience"):
+            if getattr(self, key) < 1:
+                raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
+        self._weights: dict[str, np.ndarray] = {}
+        self._dt = 0.0
+        self._epochs_run = 0
+
+    def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
+        """Train on the transitions of `train`; `valid` stops it."""
+        type(self).fit_group([self], [train], [valid], [seed])
+        return self
+
+    @classmethod
+    def fit_group(cls, models: Sequence[MLP], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]) -> None:
+        """Train several (folds, seeds) of the same parameters as one stacked batch; each comes out as it would alone."""
+        lead = models[0]
+        pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
+        names = trains[0].inputs
+        features = InputFeatures(names)
+        training = transitions(StackedRuns.of([t for t, _ in pairs]), features)
+        validation = transitions(StackedRuns.of([v for _, v in pairs]), features)
+        task = _OneStep(lead, training, validation, seeds)
+        watch = train(task, Recipe(lr=lead.lr, patience=lead.patience, min_delta=lead.min_delta, device=lead.device))
+        state = {k: v.detach().cpu().numpy() for k, v in task.state_dict().items()}
+        for m, model in enumerate(models):
+            model.inputs, model._dt = names, trains[m].dt
+            model._weights = {k: v[m : m + 1].copy() for k, v in state.items()}
+            model._epochs_run = int(watch.validations[m])
+
+    @torch.no_grad()
+    def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
+        if not self._weights:
+            raise InputError("mlp: predict was called before fit; fit or load the model first.")
+        # Float64: what is predicted for a run then does not depend, to far below 1 mm, on the runs beside it.
+        w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
+        start, held = torch.as_tensor(s0), torch.as_tensor(U)
+        layers = [(w[f"net.layers.{i}.weight"][0], w[f"net.layers.{i}.bias"][0]) for i in range(self.layers + 1)]
+        features = InputFeatures(self.inputs)
+        y, psi, path = start[:, CHANNELS], start[:, PSI], []
+        for k in range(U.shape[1]):
+            h = torch.cat([y, features(held[:, k], psi)], dim=-1)
+            h = (h - w["scale_x.mean"][0]) / w["scale_x.std"][0]
+            for weight, bias in layers[:-1]:
+                h = torch.relu(torch.addmm(bias, h, weight))
+            z = torch.addmm(layers[-1][1], h, layers[-1][0]) * w["scale_z.std"][0] + w["scale_z.mean"][0]
+            y = y + z if self.target == "increment" else z
+            psi = psi + self._dt * y[:, 2]
+            path.append(y)
+        channels = torch.stack(path, dim=1)
+        return torch.cat([dead_reckoning(start, channels, self._dt), channels], dim=-1).numpy()
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return self._weights
+
+    def _meta(self) -> dict[str, Any]:
+        return {"dt": self._dt, "epochs_run": self._epochs_run}
+
+    def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+        self._weights, self._dt, self._epochs_run = arrays, float(meta["dt"]), int(meta["epochs_run"])
+
+
+PREDICTOR = MLP
