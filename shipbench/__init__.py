@@ -1,0 +1,50 @@
+"""shipbench: a benchmark of ship-motion prediction. Names below are loaded when they are first used; importing costs nothing."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .bench.leaderboard import build_board, write_boards
+    from .bench.results import read_results
+    from .bench.runner import run_tasks
+    from .bench.task import Task, load_tasks
+    from .data.base import DATASETS, load_dataset
+    from .errors import InputError, ShipbenchError, WorkError
+    from .metrics.base import METRICS
+    from .predictors.base import PREDICTORS, Predictor, PredictorBase, make_predictor, parse_spec
+    from .records import Batch, Dataset, Run
+    from .ship import Ship
+
+    __version__: str
+
+_HOME = {
+    "build_board": "bench.leaderboard", "write_boards": "bench.leaderboard", "read_results": "bench.results",
+    "run_tasks": "bench.runner", "Task": "bench.task", "load_tasks": "bench.task",
+    "DATASETS": "data.base", "load_dataset": "data.base",
+    "InputError": "errors", "ShipbenchError": "errors", "WorkError": "errors", "METRICS": "metrics.base",
+    "PREDICTORS": "predictors.base", "Predictor": "predictors.base", "PredictorBase": "predictors.base",
+    "make_predictor": "predictors.base", "parse_spec": "predictors.base",
+    "Batch": "records", "Dataset": "records", "Run": "records", "Ship": "ship",
+}  # fmt: skip
+
+__all__ = [
+    "DATASETS", "METRICS", "PREDICTORS", "Batch", "Dataset", "InputError", "Predictor", "PredictorBase", "Run", "Ship", "ShipbenchError",
+    "Task", "WorkError", "__version__", "build_board", "load_dataset", "load_tasks", "make_predictor", "parse_spec", "read_results",
+    "run_tasks", "write_boards",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("shipbench")
+    if name not in _HOME:
+        raise AttributeError(f"module 'shipbench' has no attribute '{name}'")
+    return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -73,12 +73,13 @@ maximum = _binary("maximum", "maximum", "fmax")
 
 
 def where(condition: Array, yes: Array, no: Array) -> Array:
-    """`yes` where `condition` holds, else `no`. Both sides are evaluated: keep both finite."""
+    """`yes` where `condition` holds, else `no`. Both sides are evaluated: keep both finite.
+
+    With a torch condition at least one side must be a tensor: two plain numbers have no dtype, and torch would round them to float32.
+    """
     backend = _backend(condition, yes, no)
     if backend == "torch":
         torch = sys.modules["torch"]
-        if not any(isinstance(a, torch.Tensor) for a in (yes, no)):
-            yes, no = (torch.as_tensor(a, dtype=torch.get_default_dtype(), device=condition.device) for a in (yes, no))
         yes, no = _tensors(yes, no)
         return torch.where(torch.as_tensor(condition, device=yes.device), yes, no)
     if backend == "casadi":

@@ -32,7 +32,7 @@ class Silent:
 
 
 def duration(seconds: float) -> str:
-    """"42 s", "3 min 05 s", "1 h 12 min"."""
+    """Seconds as people say them: 42 s, 3 min 05 s, 1 h 12 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -1,10 +1,10 @@
 """Results on disk: one folder per study, one sub-folder per cell (data set, model, fold, seed), written whole or not at all.
 
-    OUT/study.json                          tasks, command, code, machine, times
-    OUT/rows.parquet                        one row per (dataset, model, fold, seed, run) of the study
-    OUT/summary.json                        one entry per cell that alone identifies its experiment
-    OUT/truth/<dataset>/fold0.npz           ids, s0, U, truth of the scored windows (the same for all models)
-    OUT/cells/<dataset>/<model>/fold0-seed0/  rows.parquet, summary.json, predictions.npz (S), equations.txt, model/
+- `study.json`: tasks, command, code, machine, times.
+- `rows.parquet`: one row per (dataset, model, fold, seed, run) of the study.
+- `summary.json`: one entry per cell that alone identifies its experiment.
+- `truth/<dataset>/fold0.npz`: ids, s0, U and truth of the scored windows (the same for all models).
+- `cells/<dataset>/<model>/fold0-seed0/`: rows.parquet, summary.json, predictions.npz (S), equations.txt, model/.
 """
 
 from __future__ import annotations
@@ -146,7 +146,8 @@ def assemble(out: Path, cells: Iterable[Cell]) -> tuple[pd.DataFrame, list[dict[
     import pandas as pd
 
     done = [(cell, summary) for cell in cells if (summary := read_summary(out, cell)) is not None]
-    rows = pd.concat([pd.read_parquet(out / cell.folder / "rows.parquet") for cell, _ in done], ignore_index=True) if done else pd.DataFrame()
+    frames = [pd.read_parquet(out / cell.folder / "rows.parquet") for cell, _ in done]
+    rows = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
     summaries = [summary for _, summary in done]
     write_rows(out / "rows.parquet", rows)
     write_json(out / "summary.json", summaries)

@@ -66,7 +66,9 @@ class _Study:
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
 
 
-def run_tasks(tasks: Sequence[Task], out: str | Path, *, resume: bool = False, progress: Progress | None = None, command: str = "") -> Outcome:
+def run_tasks(
+    tasks: Sequence[Task], out: str | Path, *, resume: bool = False, progress: Progress | None = None, command: str = ""
+) -> Outcome:
     """Run every task and write the results below `out` (see `results`).
 
     Args:
@@ -81,6 +83,7 @@ def run_tasks(tasks: Sequence[Task], out: str | Path, *, resume: bool = False, p
     """
     out, progress = Path(out), progress or Silent()
     studies = [_prepare(task) for task in tasks]
+    _refuse_same_names([study.data.name for study in studies])
     plan = [(study, spec, study.cells(spec)) for study in studies for spec in study.specs]
     began = datetime.now(UTC)
     try:
@@ -113,6 +116,12 @@ def _prepare(task: Task) -> _Study:
     batches = [fold.test.batch(task.history(data.dt)) for fold in folds]
     found = [asdict(c) for c in columns(task.metrics, task.horizon_s, data.dt)]
     return _Study(task, data, folds, batches, specs, (*data.notes, *notes), found)
+
+
+def _refuse_same_names(names: list[str]) -> None:
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise InputError(f"two data sets of this study are named '{twice[0]}'; rename one in its dataset.toml, or run them apart.")
 
 
 def _new_model(spec: Spec) -> Any:
@@ -246,7 +255,10 @@ def _rows(
         "status": statuses,
         "reason": reasons,
     }
-    return pd.DataFrame({**{k: [v] * len(runs) for k, v in identity.items()}, **per_run, **values, **{k: [v] * len(runs) for k, v in times.items()}})
+    rows = pd.DataFrame({**per_run, **values}).assign(**times)
+    for place, (name, value) in enumerate(identity.items()):
+        rows.insert(place, name, value)
+    return rows
 
 
 def _summary(study: _Study, spec: Spec, cell: Cell, fitted: _Fitted, times: dict[str, float]) -> dict[str, Any]:

@@ -137,5 +137,5 @@ def load_tasks(config: str | Path | None = None, overrides: dict[str, Any] | Non
         raise InputError(f"{where}: both 'dataset' and 'datasets' are given; keep one of them.")
     names = data.pop("datasets", [data.pop("dataset", "harbour90")])
     if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
-        raise InputError(f"{where}: datasets = {names!r}; accepted: a list of names or folders, such as [\"harbour90\"].")
+        raise InputError(f'{where}: datasets = {names!r}; accepted: a list of names or folders, such as ["harbour90"].')
     return [make_task({**data, "dataset": name}, where) for name in dict.fromkeys(names)]

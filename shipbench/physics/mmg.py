@@ -102,7 +102,7 @@ def accelerations(
     m_x, m_y, J_z, factors = ship.m_x, ship.m_y, ship.J_z, hull.DEEP
     if env.depth is not None:
         deep = shallow_water.depth_factors(env.depth, ship.L, ship.B, ship.T, ship.Cb)
-        m_x, m_y, J_z, factors = m_x * deep.m_x, m_y * deep.m_y, J_z * deep.J_z, deep.hull
+        m_y, J_z, factors = m_y * deep.m_y, J_z * deep.J_z, deep.hull
     X, Y, N = water_forces(ship, u_w, v_w, r, n / 60.0, delta, F_b, F_s, factors)
     X_W, Y_W, N_W = wind.blendermann(*wind.apparent_wind(psi, u, v, env.wind_speed, env.wind_from), ship.A_F, ship.A_L, ship.L)
     X, Y, N = X + X_W, Y + Y_W, N + N_W

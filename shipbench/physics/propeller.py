@@ -71,7 +71,7 @@ def wake_fraction(u: Array, v: Array, r: Array, w_P0: float, x_P: float, C1: flo
     the wake stays w_P0.
     """
     beta_P = arctan2(-(v + x_P * r), maximum(u, 0.0) + 1e-3)
-    C2 = where(beta_P > 0, C2_plus, C2_minus)
+    C2 = where(beta_P > 0, C2_plus + 0.0 * beta_P, C2_minus)
     wake = 1.0 - (1.0 - w_P0) * (1.0 + (1.0 - exp(-C1 * absolute(beta_P))) * (C2 - 1.0))
     return where(u > 0, wake, 0.0 * wake)
 

@@ -45,7 +45,7 @@ def inflow_speed(u: Array, n: Array, thrust: Array, w_P: Array, c: MMGRudder, D:
     jet2 = 8.0 * absolute(thrust) / (rho * math.pi * D**2)
     race = sqrt(maximum(u_P * u_P + where(thrust > 0, jet2, -jet2), 1e-8))
     inner = u_P + c.kappa * (race - u_P)
-    ahead = c.epsilon * sqrt(eta * inner * inner + (1.0 - eta) * u_P * u_P + 1e-10) * where(inner >= 0, 1.0, -1.0)
+    ahead = c.epsilon * sqrt(eta * inner * inner + (1.0 - eta) * u_P * u_P + 1e-10) * where(inner >= 0, 1.0 + 0.0 * inner, -1.0)
     b = c.epsilon * u_P
     a = b - c.k_xr * sqrt(jet2 + 1e-10)
     loss = c.c_pr * smoothstep(-n, 0.0, 0.5)  # the loss grows with reversed revolutions, so that u_R is continuous at n = 0
@@ -63,8 +63,8 @@ def mmg_rudder(u: Array, v: Array, r: Array, delta: Array, u_R: Array, c: MMGRud
     Source: Yasukawa & Yoshimura (2015), eq. 26-36. Limit: no force at zero rudder going straight.
     """
     side = v + c.l_R * L * r
-    v_R = -where(side < 0, c.gamma_plus, c.gamma_minus) * side  # beta_R > 0 is side < 0
-    flip = where(u_R >= 0, 1.0, -1.0)  # reversed flow: the blade works from its trailing edge
+    v_R = -where(side < 0, c.gamma_plus + 0.0 * side, c.gamma_minus) * side  # beta_R > 0 is side < 0
+    flip = where(u_R >= 0, 1.0 + 0.0 * u_R, -1.0)  # reversed flow: the blade works from its trailing edge
     alpha = delta * flip - arctan2(v_R, absolute(u_R) + 1e-9)
     F_N = 0.5 * rho * c.A_R * c.f_alpha * (u_R * u_R + v_R * v_R) * sin(alpha)
     return (

@@ -1,0 +1,69 @@
+"""What a part says of itself, read from its source without importing it (so that a list never loads torch or casadi)."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from ..registry import Registry
+
+
+def describe_parts(registry: Registry) -> list[dict[str, Any]]:
+    """For each registered part its name, one line on it, its parameters with their defaults as written, and where it comes from."""
+    plugins = {e.name: e.value for e in entry_points(group=f"shipbench.{registry.folder}")}
+    folder = Path(__file__).resolve().parent.parent / registry.folder
+    parts = []
+    for name in registry.names():
+        path = _source(plugins[name]) if name in plugins else folder / f"{name}.py"
+        summary, parameters = read_part(path, registry.attribute, plugins.get(name)) if path else ("", {})
+        parts.append({"name": name, "summary": summary, "parameters": parameters, "from": plugins.get(name, "shipbench")})
+    return parts
+
+
+def _source(entry: str) -> Path | None:
+    """The file of an entry point's module, or None where it cannot be found."""
+    try:
+        found = importlib.util.find_spec(entry.partition(":")[0])
+    except (ImportError, ValueError):
+        return None
+    return Path(found.origin) if found and found.origin and found.origin.endswith(".py") else None
+
+
+def read_part(path: Path, attribute: str, entry: str | None = None) -> tuple[str, dict[str, str]]:
+    """First line of the module's docstring, and the fields (name -> default as written) of the class bound to `attribute`.
+
+    `entry` ("module:Class") names the class of a plug-in instead.
+    """
+    try:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+    except (OSError, SyntaxError, UnicodeDecodeError):
+        return "(its source cannot be read)", {}
+    classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
+    summary = (ast.get_docstring(tree) or "").strip().split("\n")[0]
+    bound = entry.partition(":")[2] if entry else next((_bound_name(n) for n in tree.body if _binds(n, attribute)), "")
+    return summary, _fields(classes[bound], classes) if bound in classes else {}
+
+
+def _binds(node: ast.stmt, attribute: str) -> bool:
+    return isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == attribute for t in node.targets)
+
+
+def _bound_name(node: ast.stmt) -> str:
+    return node.value.id if isinstance(node, ast.Assign) and isinstance(node.value, ast.Name) else ""
+
+
+def _fields(node: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> dict[str, str]:
+    """Annotated fields of a dataclass and of its bases in the same file; class variables and private names are no parameters."""
+    found: dict[str, str] = {}
+    for base in node.bases:
+        if isinstance(base, ast.Name) and base.id in classes:
+            found |= _fields(classes[base.id], classes)
+    for item in node.body:
+        if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name) and not item.target.id.startswith("_"):
+            default = ast.unparse(item.value) if item.value else ""
+            if "ClassVar" not in ast.unparse(item.annotation) and "init=False" not in default:
+                found[item.target.id] = default
+    return found

@@ -1,0 +1,214 @@
+"""Plots of a leaderboard: tracks, box plots and error against horizon, from saved predictions. PNG, drawn without a display."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..metrics.ed import ed
+from ..signals import PSI, X, Y
+from .results import Cell, Results, read_predictions, read_truth
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's palette, told apart with every common colour blindness; line styles differ too.
+_PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_KNOWN = {"physics": "#0072B2", "mlp": "#D55E00", "neural_ode": "#009E73", "lstm": "#CC79A7", "hold": "#8C8C8C", "oracle": "#E69F00"}
+_DASHES: dict[str, Any] = {
+    "physics": "-", "neural_ode": (0, (5, 1.5)), "mlp": (0, (3, 1, 1, 1)), "lstm": (0, (1, 1)), "hold": (0, (7, 3)), "oracle": (0, (1, 2)),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Prediction:
+    """One model's scored windows of one cell: ids, s0 (batch, 10), truth and S (batch, K, 10), which of them are scored."""
+
+    ids: tuple[str, ...]
+    s0: np.ndarray
+    truth: np.ndarray
+    S: np.ndarray
+    ok: np.ndarray
+
+
+def _predictions(results: Results, dataset: str, model: str) -> Iterator[_Prediction]:
+    """The cells of a model that hold predictions; of several seeds the first."""
+    found = [(s, p) for s, p in zip(results.summaries, results.sources, strict=True) if s["dataset"] == dataset and s["model"] == model]
+    first = min((s["seed"] for s, _ in found), default=0)
+    for summary, source in found:
+        if summary["seed"] != first:
+            continue
+        S = read_predictions(source, Cell(dataset, model, summary["fold"], summary["seed"]))
+        if S is not None:
+            batch = read_truth(source, dataset, summary["fold"])
+            yield _Prediction(batch.ids, batch.s0, batch.truth, S, np.array([s == "ok" for s in summary["run_status"]]))
+
+
+def _style(models: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Colour and dashes of each model: the same for a known name in every plot."""
+    free = [c for c in _PALETTE if c not in {_KNOWN.get(m) for m in models}] or list(_PALETTE)
+    styles, used = {}, 0
+    for model in models:
+        colour = _KNOWN.get(model)
+        if colour is None:
+            colour, used = free[used % len(free)], used + 1
+        styles[model] = {"color": colour, "linestyle": _DASHES.get(model, "-")}
+    return styles
+
+
+def _new_figure(width: float, height: float) -> Figure:
+    """A figure on the Agg canvas, without pyplot's global state."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=130, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _save(figure: Figure, path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.stem}.{os.getpid()}.tmp.png")
+    figure.savefig(part)
+    os.replace(part, path)
+    return path
+
+
+def draw_all(results: Results, dataset: str, ranking: Sequence[str], folder: Path) -> list[Path]:
+    """Draw every plot of a data set into `folder`; models without a single scored run are left out."""
+    rows = results.rows[results.rows["dataset"] == dataset]
+    scored = set(rows.loc[rows["status"] == "ok", "model"])
+    models = [m for m in ranking if m in scored]
+    if not models:
+        return []
+    summary = next(s for s in results.summaries if s["dataset"] == dataset)
+    return [
+        _save(tracks(results, dataset, models, summary), folder / "tracks.png"),
+        _save(boxes(rows, models, summary), folder / "errors.png"),
+        _save(against_horizon(results, dataset, models, summary["dt"]), folder / "error-against-horizon.png"),
+    ]
+
+
+def choose_runs(rows: Any, models: Sequence[str]) -> dict[str, str]:
+    """A good, a median and a bad run: the 10, 50 and 90 % points of the models' median ED (floor and ceiling left out)."""
+    compared = [m for m in models if m not in ("hold", "oracle")] or list(models)
+    scored = rows[(rows["status"] == "ok") & rows["model"].isin(compared)]
+    order = scored.groupby("run")["ed"].median().sort_values().index
+    places = {"good": 0.1, "median": 0.5, "bad": 0.9}
+    return {name: str(order[round(q * (len(order) - 1))]) for name, q in places.items()}
+
+
+def _outline(x: float, y: float, psi: float, L: float, B: float) -> np.ndarray:
+    """Corners (east, north) [m] of a ship's deck with its bow at heading `psi` [rad]."""
+    ahead = L * np.array([0.5, 0.3, -0.44, -0.5, -0.5, -0.44, 0.3])
+    starboard = B * np.array([0.0, 0.5, 0.5, 0.3, -0.3, -0.5, -0.5])
+    return np.stack([y + ahead * np.sin(psi) + starboard * np.cos(psi), x + ahead * np.cos(psi) - starboard * np.sin(psi)], axis=1)
+
+
+def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[str, Any]) -> Figure:
+    """True and predicted tracks of a good, a median and a bad run, with the ship's outline every quarter of the horizon."""
+    rows = results.rows[results.rows["dataset"] == dataset]
+    chosen = choose_runs(rows, models)
+    figure = _new_figure(15.0, 6.2)
+    axes = figure.subplots(1, 3)
+    styles = _style(models)
+    for model in reversed(models):  # the best on top
+        for cell in _predictions(results, dataset, model):
+            for axis, run in zip(axes, chosen.values(), strict=True):
+                if run in cell.ids and cell.ok[cell.ids.index(run)]:
+                    i = cell.ids.index(run)
+                    _track(axis, cell.s0[i], cell.truth[i], summary, label="true", color="black", linestyle="-", fill=True)
+                    _track(axis, cell.s0[i], cell.S[i], summary, label=model, **styles[model])
+    for axis, (name, run) in zip(axes, chosen.items(), strict=True):
+        error = rows[(rows["run"] == run) & (rows["status"] == "ok")].groupby("model")["ed"].mean()
+        axis.set_title(f"{name} run: {run}", fontsize=11)
+        axis.set_xlabel("east y [m]")
+        axis.set_ylabel("north x [m]")
+        axis.set_aspect("equal", adjustable="datalim")
+        axis.grid(alpha=0.25)
+        handles = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
+        order = ["true", *[m for m in models if m in handles]]
+        texts = ["true", *[f"{m} (ED {error[m]:.3g} m)" for m in order[1:]]]
+        axis.legend([handles[m] for m in order], texts, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
+    figure.suptitle(f"{dataset}: tracks over {summary['task']['horizon_s']:g} s, outlines every quarter", fontsize=12)
+    return figure
+
+
+def _track(
+    axis: Axes, s0: np.ndarray, states: np.ndarray, summary: dict[str, Any], *, label: str, color: str, linestyle: Any, fill: bool = False
+) -> None:
+    """One line from s0 through the states, with outlines; the true track (`fill`) is drawn once per axis."""
+    if label == "true" and label in axis.get_legend_handles_labels()[1]:
+        return
+    path = np.concatenate([s0[None], states])
+    axis.plot(path[:, Y], path[:, X], color=color, linestyle=linestyle, lw=2.6 if fill else 1.8, label=label, zorder=2 if fill else 3)
+    for k in np.linspace(0, len(path) - 1, 5).round().astype(int):
+        corners = _outline(path[k, X], path[k, Y], path[k, PSI], summary["ship_L"], summary["ship_B"])
+        axis.fill(*corners.T, facecolor="0.85" if fill else "none", edgecolor=color, lw=0.9, alpha=0.9, zorder=1 if fill else 3)
+
+
+def _readable_limits(axis: Axes, groups: Sequence[np.ndarray]) -> None:
+    """Linear from zero, or logarithmic where the models' medians lie more than a factor of 12 apart."""
+    medians = np.array([np.median(g) for g in groups])
+    positive = medians[medians > 0]
+    if len(positive) and positive.max() > 12 * positive.min():
+        axis.set_yscale("log")
+        low = max(min(float(np.quantile(g, 0.05)) for g in groups if np.median(g) > 0), 1e-4 * positive.max())
+        axis.set_ylim(bottom=low / 1.5)
+    else:
+        axis.set_ylim(bottom=0)
+
+
+def boxes(rows: Any, models: Sequence[str], summary: dict[str, Any]) -> Figure:
+    """Box plots of the per-run ED, EDH and cVDM (the paper's fig. 2): quartiles, whiskers at 5 and 95 %, mean as a diamond."""
+    columns = [c for c in summary["columns"] if c["name"] in ("ed", "edh", "cvdm")]
+    figure = _new_figure(4.6 * len(columns), 4.6)
+    styles = _style(models)
+    for axis, column in zip(np.atleast_1d(figure.subplots(1, len(columns))), columns, strict=True):
+        groups = [rows.loc[(rows["model"] == m) & (rows["status"] == "ok"), column["name"]].dropna().to_numpy() for m in models]
+        shown = [(m, g) for m, g in zip(models, groups, strict=True) if len(g)]
+        if not shown:
+            continue
+        drawn = axis.boxplot(
+            [g for _, g in shown], whis=(5, 95), showmeans=True, widths=0.62, patch_artist=True,
+            medianprops={"color": "black", "lw": 1.6}, flierprops={"marker": ".", "ms": 4, "mec": "0.45", "mfc": "0.45"},
+            meanprops={"marker": "D", "mfc": "white", "mec": "black", "ms": 5},
+        )  # fmt: skip
+        for patch, (model, _) in zip(drawn["boxes"], shown, strict=True):
+            patch.set(facecolor=styles[model]["color"], alpha=0.75)
+        axis.set_xticks(range(1, len(shown) + 1), [m for m, _ in shown], rotation=25, ha="right")
+        axis.set_ylabel(f"{column['label']} [{column['unit']}]")
+        axis.grid(axis="y", alpha=0.25)
+        _readable_limits(axis, [g for _, g in shown])
+    what = f"error of each run (mean over {summary['task']['horizon_s']:g} s); box quartiles, whiskers 5 to 95 %, diamond mean"
+    figure.suptitle(f"{summary['dataset']}: {what}", fontsize=11)
+    return figure
+
+
+def against_horizon(results: Results, dataset: str, models: Sequence[str], dt: float) -> Figure:
+    """Position error against time: median over runs, with the band between the quartiles."""
+    figure = _new_figure(8.6, 5.4)
+    axis = figure.subplots()
+    styles = _style(models)
+    ends = []
+    for model in models:
+        errors = np.concatenate([ed(true=c.truth[c.ok], pred=c.S[c.ok]) for c in _predictions(results, dataset, model)])
+        low, middle, high = np.quantile(errors, [0.25, 0.5, 0.75], axis=0)
+        t = dt * np.arange(1, errors.shape[1] + 1)
+        axis.plot(t, middle, lw=2, label=f"{model} ({middle[-1]:.3g} m at the end)", **styles[model])
+        axis.fill_between(t, low, high, color=styles[model]["color"], alpha=0.13, lw=0)
+        ends.append(errors[:, -1])
+    _readable_limits(axis, ends)
+    axis.set_xlim(0, None)
+    axis.set_xlabel("time after the start t [s]")
+    axis.set_ylabel("position error ED [m]")
+    axis.grid(alpha=0.25, which="both" if axis.get_yscale() == "log" else "major")
+    axis.legend(fontsize=9)
+    axis.set_title(f"{dataset}: error against horizon (median and quartiles over runs)", fontsize=11)
+    return figure

@@ -1,0 +1,106 @@
+"""A table of raw values that renders as Markdown, on a terminal and as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+DISPLAY = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "N": ("kN", 1e-3)}
+"""Units that people read, for those that rows keep: name and factor."""
+
+
+def display_unit(unit: str) -> tuple[str, float]:
+    """The unit that a table prints for `unit`, and the factor of the values."""
+    return DISPLAY.get(unit, (unit, 1.0))
+
+
+def number(digits: int) -> Callable[[Any], str]:
+    """Format with that many decimals; missing values as a dash, too large ones in powers of ten."""
+
+    def text(value: Any) -> str:
+        if value is None or (isinstance(value, float) and math.isnan(value)):
+            return "-"
+        return f"{value:.{digits}f}" if abs(value) < 1e6 else f"{value:.2e}"
+
+    return text
+
+
+def significant(digits: int) -> Callable[[Any], str]:
+    """Format with that many significant digits; missing values as a dash."""
+
+    def text(value: Any) -> str:
+        if value is None or (isinstance(value, float) and math.isnan(value)):
+            return "-"
+        if value == 0 or not 1e-3 <= abs(value) < 1e6:
+            return f"{value:.{digits}g}"
+        return f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
+
+    return text
+
+
+@dataclass(frozen=True)
+class TableColumn:
+    """Header, key in the rows, and how a value becomes text (None: text, left aligned)."""
+
+    header: str
+    key: str
+    format: Callable[[Any], str] | None = None
+
+    def text(self, row: dict[str, Any]) -> str:
+        """The cell of `row`."""
+        value = row.get(self.key)
+        return self.format(value) if self.format else "" if value is None else str(value)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows are dicts by column key; a row with `_reference` true is quoted from elsewhere and printed in italics."""
+
+    title: str
+    columns: Sequence[TableColumn]
+    rows: Sequence[dict[str, Any]]
+    notes: Sequence[str] = field(default_factory=tuple)
+
+    def markdown(self) -> str:
+        """Heading, table and notes."""
+        lines = [f"## {self.title}", ""]
+        lines.append("| " + " | ".join(c.header for c in self.columns) + " |")
+        lines.append("|" + "|".join("---:" if c.format else ":---" for c in self.columns) + "|")
+        for row in self.rows:
+            cells = [c.text(row).replace("|", "\\|") for c in self.columns]
+            if row.get("_reference"):
+                cells = [f"*{cell}*" if cell else "" for cell in cells]
+            lines.append("| " + " | ".join(cells) + " |")
+        lines += [""] + [f"{note}  " for note in self.notes]
+        return "\n".join(lines).rstrip() + "\n"
+
+    def show(self, console: Console) -> None:
+        """Print on a terminal."""
+        from rich import box
+        from rich.table import Table as RichTable
+        from rich.text import Text
+
+        table = RichTable(title=Text(self.title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+        for column in self.columns:
+            numeric = column.format is not None
+            table.add_column(Text(column.header), justify="right" if numeric else "left", no_wrap=numeric, overflow="fold")
+        for row in self.rows:
+            table.add_row(*[Text(c.text(row)) for c in self.columns], style="italic dim" if row.get("_reference") else None)
+        console.print(table)
+        for note in self.notes:
+            console.print(Text(note, style="dim"))
+
+    def as_json(self) -> dict[str, Any]:
+        """Title, rows with raw values (NaN as null), notes."""
+
+        def plain(value: Any) -> Any:
+            value = value.item() if hasattr(value, "item") else value
+            return None if isinstance(value, float) and not math.isfinite(value) else value
+
+        rows = [{c.key: plain(row.get(c.key)) for c in self.columns} for row in self.rows]
+        return {"title": self.title, "columns": {c.key: c.header for c in self.columns}, "rows": rows, "notes": list(self.notes)}
