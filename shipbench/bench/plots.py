@@ -112,7 +112,7 @@ def _outline(x: float, y: float, psi: float, L: float, B: float) -> np.ndarray:
 
 
 def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[str, Any]) -> Figure:
-    """True and predicted tracks of a good, a median and a bad run, with the ship's outline every quarter of the horizon."""
+    """True and predicted tracks of a good, a median and a bad run, with the true ship every quarter of the horizon and the predicted ones at its end."""
     rows = results.rows[results.rows["dataset"] == dataset]
     chosen = choose_runs(rows, models)
     figure = _new_figure(15.0, 6.2)
@@ -136,19 +136,20 @@ def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[
         order = ["true", *[m for m in models if m in handles]]
         texts = ["true", *[f"{m} (ED {error[m]:.3g} m)" for m in order[1:]]]
         axis.legend([handles[m] for m in order], texts, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
-    figure.suptitle(f"{dataset}: tracks over {summary['task']['horizon_s']:g} s, outlines every quarter", fontsize=12)
+    figure.suptitle(f"{dataset}: tracks over {summary['task']['horizon_s']:g} s; the true ship every quarter, the predicted ones at the end", fontsize=12)
     return figure
 
 
 def _track(
     axis: Axes, s0: np.ndarray, states: np.ndarray, summary: dict[str, Any], *, label: str, color: str, linestyle: Any, fill: bool = False
 ) -> None:
-    """One line from s0 through the states, with outlines; the true track (`fill`) is drawn once per axis."""
+    """One line from s0 through the states, with ships; the true track (`fill`) is drawn once per axis."""
     if label == "true" and label in axis.get_legend_handles_labels()[1]:
         return
     path = np.concatenate([s0[None], states])
     axis.plot(path[:, Y], path[:, X], color=color, linestyle=linestyle, lw=2.6 if fill else 1.8, label=label, zorder=2 if fill else 3)
-    for k in np.linspace(0, len(path) - 1, 5).round().astype(int):
+    quarters = np.linspace(0, len(path) - 1, 5).round().astype(int)
+    for k in quarters if fill else quarters[-1:] if label != "oracle" else []:
         corners = _outline(path[k, X], path[k, Y], path[k, PSI], summary["ship_L"], summary["ship_B"])
         axis.fill(*corners.T, facecolor="0.85" if fill else "none", edgecolor=color, lw=0.9, alpha=0.9, zorder=1 if fill else 3)
 
@@ -205,7 +206,7 @@ def against_horizon(results: Results, dataset: str, models: Sequence[str], dt: f
         axis.fill_between(t, low, high, color=styles[model]["color"], alpha=0.13, lw=0)
         ends.append(errors[:, -1])
     _readable_limits(axis, ends)
-    axis.set_xlim(0, None)
+    axis.set_xlim(0, max(line.get_xdata()[-1] for line in axis.lines))
     axis.set_xlabel("time after the start t [s]")
     axis.set_ylabel("position error ED [m]")
     axis.grid(alpha=0.25, which="both" if axis.get_yscale() == "log" else "major")

@@ -36,7 +36,9 @@ def significant(digits: int) -> Callable[[Any], str]:
     def text(value: Any) -> str:
         if value is None or (isinstance(value, float) and math.isnan(value)):
             return "-"
-        if value == 0 or not 1e-3 <= abs(value) < 1e6:
+        if abs(value) < 1e-9:  # rounding only
+            return "0"
+        if not 1e-3 <= abs(value) < 1e6:
             return f"{value:.{digits}g}"
         return f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
 

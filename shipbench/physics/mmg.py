@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, unknown_name
 from ..ops import Array, cos, sin
 from ..ship import Ship, read_toml
 from . import hull, propeller, rudder, shallow_water, thruster, wind
@@ -121,8 +121,10 @@ def water_forces(
 ) -> tuple[Array, Array, Array]:
     """Sum of hull, propeller, rudder and thruster forces (X, Y, N) about midship; velocities through the water, n in rev/s."""
     p = ship.propeller
-    hull_force = hull.polynomial if isinstance(ship.hull, hull.PolynomialHull) else hull.unified
-    X_H, Y_H, N_H = hull_force(u, v, r, ship.hull, ship.L, ship.T, ship.rho, factors)
+    if isinstance(ship.hull, hull.PolynomialHull):
+        X_H, Y_H, N_H = hull.polynomial(u, v, r, ship.hull, ship.L, ship.T, ship.rho, factors)
+    else:
+        X_H, Y_H, N_H = hull.unified(u, v, r, ship.hull, ship.L, ship.T, ship.rho, factors)
     w_P = propeller.wake_fraction(u, v, r, p.w_P0, p.x_P, p.C1, p.C2_plus, p.C2_minus)
     V_A = (1.0 - w_P) * u
     if p.form == "quadratic":
@@ -155,8 +157,6 @@ def load_mmg_ship(name: str) -> MMGShip:
     """
     path = ships_folder() / f"{name}.toml"
     if not path.is_file():
-        from ..errors import unknown_name
-
         raise unknown_name("ship", name, [p.stem for p in ships_folder().glob("*.toml")])
     data = read_toml(path)
     ship = Ship.load(path)

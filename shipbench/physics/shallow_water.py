@@ -20,19 +20,17 @@ class DepthFactors(NamedTuple):
 def depth_factors(depth: Array, L: float, B: float, T: float, Cb: float) -> DepthFactors:
     """Multipliers at water depth `depth` [m] (held at or above 1.15 T).
 
-    Derivatives: ratio of the regressions with k_e = k / [T/2h + ((pi T/2h) cot(pi T/2h))^q] to those with k = 2T/L, q = 2.3 (Y_v), 0.7 (Y_r, N_r),
-    1.7 (N_v); resistance 1 + 0.388 (T/h)^2. Added masses: K0 + a K1 b + c K2 b^2 with b = Cb B (1 + B/L)^2 / T, (a, c) = (2/3, 8/15) for m_y and
-    (2/5, 24/105) for J_z.
+    Y_v: -F + (1 - F)^(-0.4 Cb B/T), N_r: -F + (1 - F)^(14.28 T/L - 1.5), F = T/h (Kijima). Y_r and N_v: ratio of the regressions with
+    k_e = k / [T/2h + ((pi T/2h) cot(pi T/2h))^q] to those with k = 2T/L, q = 0.7 and 1.7 (Tang). Resistance 1 + 0.388 F^2 (Furukawa). Nonlinear derivatives
+    K0 + K1 b + K2 b^2; added masses K0 + a K1 b + c K2 b^2 with b = Cb B (1 + B/L)^2 / T, (a, c) = (2/3, 8/15) for m_y and (2/5, 24/105) for J_z (Ankudinov).
 
-    Source: Tang et al. (2020) and Furukawa et al. (2016) as implemented in nikpau/mmgdynamics; K0, K1, K2 of Ankudinov (physics reference, E07). Limit: 1 in deep
-    water. The nonlinear derivatives are left alone: published factors disagree with each other by more than they differ from 1 above h/T = 1.5.
+    Source: physics reference, E07 (Taimuri et al. 2020); Tang et al. (2020) and Furukawa et al. (2016) as in nikpau/mmgdynamics. Limit: 1 in deep water.
     """
     h = maximum(depth, 1.15 * T)
     ratio = T / h
     angle = 0.5 * math.pi * ratio
     cot = cos(angle) / sin(angle)
     k = 2.0 * T / L
-    base = 1.4 * Cb * B / L
 
     def k_e(q: float) -> Array:
         return k / (0.5 * ratio + (angle * cot) ** q)
@@ -44,10 +42,11 @@ def depth_factors(depth: Array, L: float, B: float, T: float, Cb: float) -> Dept
     b = Cb * B * (1.0 + B / L) ** 2 / T
     return DepthFactors(
         hull=HullFactors(
-            Y_v=(0.5 * math.pi * k_e(2.3) + base) / (0.5 * math.pi * k + base),
+            Y_v=(1.0 - ratio) ** (-0.4 * Cb * B / T) - ratio,
             Y_r=k_e(0.7) / k,
             N_v=k_e(1.7) / k,
-            N_r=(0.54 * k_e(0.7) - k_e(0.7) ** 2) / (0.54 * k - k**2),
+            N_r=(1.0 - ratio) ** (14.28 * T / L - 1.5) - ratio,
+            nonlinear=K0 + K1 * b + K2 * b**2,
             resistance=1.0 + 0.388 * ratio**2,
         ),
         m_y=K0 + 2.0 / 3.0 * K1 * b + 8.0 / 15.0 * K2 * b**2,

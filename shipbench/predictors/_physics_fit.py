@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -40,7 +41,8 @@ def _rollout_function(c: eq2.Coefficients, steps: int, runs: int, h: float, wind
 
     def acc(psi, u, v, r, stage):
         air = apparent_wind(psi, u, v, w[12], w[13]) if wind else None
-        return eq2.accelerations(u, v, r, *(w[4 * stage + i] for i in range(4)), air, c, [p[i] for i in range(_P)])
+        n, delta, F_b, F_s = (w[4 * stage + i] for i in range(4))
+        return eq2.accelerations(u, v, r, n, delta, F_b, F_s, air, c, [p[i] for i in range(_P)])
 
     x_next = ca.vertcat(*rk4_step(motion_rhs(acc), tuple(x[i] for i in range(6)), h))
     if not sensitivities:
@@ -82,7 +84,7 @@ def _subproblem(low: np.ndarray, high: np.ndarray, scale: np.ndarray) -> ca.Func
     """IPOPT solver of min_q g'(q - q0) + (q - q0)' H (q - q0)/2 over q = p/scale with the constraints of the paper's eq. (9)."""
     q, q0, grad, H = ca.SX.sym("q", _P), ca.SX.sym("q0", _P), ca.SX.sym("g", _P), ca.SX.sym("H", _P, _P)
     d = q - q0
-    problem = {"x": q, "p": ca.veccat(q0, grad, H), "f": ca.dot(grad, d) + 0.5 * ca.bilin(H, d, d), "g": _constraints(q * scale)}
+    problem: dict[str, Any] = {"x": q, "p": ca.veccat(q0, grad, H), "f": ca.dot(grad, d) + 0.5 * ca.bilin(H, d, d), "g": _constraints(q * scale)}
     options = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-9, "ipopt.max_iter": 200}
     return ca.nlpsol("step", "ipopt", problem, options)
 
@@ -104,7 +106,7 @@ def fit_parameters(
         iterations, tolerance: stop after so many steps, or when the cost falls by less than this share.
     """
     runs, steps = path.shape[:2]
-    w = path.reshape(runs, steps, 12)
+    w: np.ndarray = path.reshape(runs, steps, 12)
     if wind is not None:
         w = np.concatenate([w, np.repeat(wind, substeps, axis=1)], axis=2)
     w = w.reshape(runs * steps, -1).T

@@ -61,7 +61,7 @@ class PredictorBase(ABC):
         """What `fit` found."""
         return {}
 
-    def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+    def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:  # noqa: B027 - a model without memory has nothing to take back
         """Take back what `_arrays` and `_meta` returned."""
 
     def _meta(self) -> dict[str, Any]:
@@ -106,10 +106,10 @@ class PredictorBase(ABC):
         """Write the model into the folder `path` (JSON and plain arrays: nothing is pickled)."""
         folder = Path(path)
         folder.mkdir(parents=True, exist_ok=True)
-        params = asdict(self) if is_dataclass(self) else {}
+        params: dict[str, Any] = asdict(self) if is_dataclass(self) else {}
         meta = {"predictor": self.name, "params": params, "inputs": list(self.inputs), "meta": self._meta()}
         arrays = folder / ".arrays.tmp.npz"
-        np.savez(arrays, **self._arrays())  # pyright: ignore[reportArgumentType]
+        np.savez(arrays, allow_pickle=False, **self._arrays())
         os.replace(arrays, folder / "arrays.npz")
         text = folder / ".model.tmp.json"
         text.write_text(json.dumps(meta, indent=1))

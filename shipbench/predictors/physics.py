@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -119,7 +118,8 @@ class Physics(PredictorBase):
 
                 def acc(psi, u, v, r, stage, j=j, k=k):
                     wind = None if air is None else apparent_wind(psi, u, v, air[:, k, 0], air[:, k, 1])
-                    return eq2.accelerations(u, v, r, *path[:, j, stage].T, wind, self.c, self.p)
+                    n, delta, F_b, F_s = path[:, j, stage].T
+                    return eq2.accelerations(u, v, r, n, delta, F_b, F_s, wind, self.c, list(self.p))
 
                 motion = rk4_step(motion_rhs(acc), motion, h)
                 S[:, k, MOTION] = np.stack(motion, axis=-1)
@@ -155,11 +155,6 @@ class Physics(PredictorBase):
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
         self._set_ship(Ship.from_dict(meta["ship"], "saved model"), self.inputs, float(meta["dt"]), bool(meta["commanded"]))
         self.p, self.ci95, self.actuator_params, self.cost = arrays["p"], arrays["ci95"], arrays["actuators"], float(meta["cost"])
-
-
-def residual_parameters(models: Sequence[Physics]) -> np.ndarray:
-    """Fitted p of several models, (models, 11)."""
-    return np.stack([m.p for m in models])
 
 
 PREDICTOR = Physics

@@ -46,7 +46,8 @@ class Simulator:
             stages = [act, self.actuators(act, commands, 0.5 * h), self.actuators(act, commands, h)]
 
             def acc(psi, u, v, r, stage, stages=stages):
-                return accelerations(self.ship, psi, u, v, r, *stages[stage].T, env)
+                n, delta, F_b, F_s = stages[stage].T
+                return accelerations(self.ship, psi, u, v, r, n, delta, F_b, F_s, env)
 
             motion = rk4_step(motion_rhs(acc), motion, h)
             act = stages[2]

@@ -1,0 +1,58 @@
+"""Rolls a saved model out over whole runs and writes the states as CSV, for use outside the benchmark."""
+
+from __future__ import annotations
+
+import csv
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..predictors.base import make_predictor, parse_spec
+from ..records import Dataset
+from ..signals import STATES
+
+Rollout = tuple[str, np.ndarray, np.ndarray]
+"""Run id, t (K + 1,) [s] and states (K + 1, 10), the first being the recorded start."""
+
+
+def predict_runs(model: str, dataset: Dataset, horizon_s: float | None = None) -> list[Rollout]:
+    """Roll the saved model in the folder `model` out from the first sample of every run, to its end or over `horizon_s` seconds.
+
+    Raises:
+        InputError: the folder is no saved model, its inputs are not those of the data set, or a run is shorter than the horizon.
+    """
+    spec = parse_spec(model)
+    if spec.path is None or spec.class_name is not None:
+        raise InputError(f"'{model}' is not a saved model; give a folder that holds model.json (cells/<dataset>/<model>/fold0-seed0/model).")
+    predictor = make_predictor(spec)
+    if tuple(predictor.inputs) != dataset.inputs:
+        raise InputError(
+            f"the model uses the inputs {', '.join(predictor.inputs)}; data set '{dataset.name}' has {', '.join(dataset.inputs)}. "
+            "Give data with the same channels."
+        )
+    rollouts = []
+    for run in dataset.runs:
+        steps = len(run) - 1 if horizon_s is None else round(horizon_s / dataset.dt)
+        if not 0 < steps < len(run):
+            raise InputError(
+                f"run '{run.id}' lasts {(len(run) - 1) * dataset.dt:g} s, the horizon is {steps * dataset.dt:g} s; give a positive --horizon "
+                "that no run falls short of."
+            )
+        S = predictor.predict(run.states[0], run.inputs[:steps])
+        rollouts.append((run.id, run.t[: steps + 1], np.concatenate([run.states[:1], S])))
+    return rollouts
+
+
+def write_csv(rollouts: list[Rollout], path: str | Path) -> None:
+    """Columns trajectory, t and the ten states (SI, `n` in rpm), written in one step."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    with part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["trajectory", "t", *STATES])
+        for run, t, states in rollouts:
+            writer.writerows([run, f"{time:.10g}", *(f"{value:.10g}" for value in state)] for time, state in zip(t, states, strict=True))
+    os.replace(part, path)

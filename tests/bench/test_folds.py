@@ -1,0 +1,120 @@
+"""No leak: folds by run, groups together, windows after the split."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipbench.bench.folds import make_folds, select_runs
+from shipbench.bench.task import make_task
+from shipbench.errors import InputError
+
+
+def task(**changes):
+    return make_task({"dataset": "toy", "models": ["hold"], "horizon_s": 20, **changes})
+
+
+def parents(dataset):
+    return {r.meta.get("parent", r.id) for r in dataset.runs} if dataset else set()
+
+
+def sides(fold):
+    return parents(fold.train), parents(fold.valid), parents(fold.test)
+
+
+def test_ninety_runs_give_five_folds_of_64_8_and_18(toy):
+    for fold in make_folds(toy(90), task()):
+        assert [len(s) for s in sides(fold)] == [64, 8, 18]
+
+
+def test_every_run_is_tested_once_and_never_seen_in_its_own_fold(toy):
+    data = toy(23)
+    folds = make_folds(data, task(folds=4))
+    tested = [r for f in folds for r in sides(f)[2]]
+    assert sorted(tested) == [r.id for r in data.runs]
+    for fold in folds:
+        train, valid, test = sides(fold)
+        assert not (train & valid or train & test or valid & test)
+        assert len(train | valid | test) == 23
+
+
+def test_folds_depend_on_their_seed_only(toy):
+    first, again, other = (make_folds(toy(20), task(fold_seed=s)) for s in (0, 0, 1))
+    assert [sides(f) for f in first] == [sides(f) for f in again]
+    assert [sides(f) for f in first] != [sides(f) for f in other]
+
+
+def test_runs_of_one_group_stay_on_one_side(toy):
+    data = toy(24, meta=lambda i: {"group": f"log{i // 3}"})
+    groups = {r.id: r.meta["group"] for r in data.runs}
+    folds = make_folds(data, task(folds=4, valid_runs=3))
+    assert [len(sides(f)[2]) for f in folds] == [6, 6, 6, 6]
+    for fold in folds:
+        train, valid, test = ({groups[r] for r in side} for side in sides(fold))
+        assert not (train & valid or train & test or valid & test)
+
+
+def test_windows_are_cut_after_the_split_and_share_no_sample_across_it(toy):
+    data = toy(8, steps=65)
+    for fold in make_folds(data, task(folds=4, stride_s=5)):
+        train, valid, test = sides(fold)
+        assert not (train & test or valid & test or train & valid)
+        seen = {tuple(row) for part in (fold.train, fold.valid) for r in part.runs for row in r.states}
+        scored = {tuple(row) for r in fold.test.runs for row in r.states}
+        assert not seen & scored
+
+
+def test_scored_windows_follow_the_stride_and_training_windows_do_not_overlap(toy):
+    [fold, *_] = make_folds(toy(4, steps=60), task(folds=2, stride_s=10, valid_runs=0))
+    assert [r.id for r in fold.test.runs][:5] == [f"{sorted(parents(fold.test))[0]}@{t}s" for t in (0, 10, 20, 30, 40)]
+    assert [int(r.t[0]) for r in fold.train.runs] == [0, 20, 40] * 2
+
+
+def test_a_run_of_exactly_the_horizon_is_used_and_a_shorter_one_is_told(toy):
+    data = toy(4, steps=20)
+    cut = data.with_runs([*data.runs[:3], data.runs[3].slice(0, 20)])
+    kept, notes = select_runs(cut, task())
+    assert [r.id for r in kept.runs] == ["r00", "r01", "r02"]
+    assert "1 of 4 runs are shorter than the horizon and left out: r03" in notes[0]
+    assert len(select_runs(data, task())[0]) == 4
+
+
+def test_history_comes_before_the_scored_window(toy):
+    data = toy(4, steps=25)
+    [fold, *_] = make_folds(data, task(folds=2, history_s=5))
+    batch = fold.test.batch(5)
+    run = next(r for r in data.runs if r.id == batch.ids[0])
+    np.testing.assert_array_equal(batch.s0[0], run.states[5])
+    np.testing.assert_array_equal(batch.truth[0], run.states[6:])
+    np.testing.assert_array_equal(batch.history[0][0], run.states[:5])
+
+
+def test_max_runs_spreads_over_the_data_set(toy):
+    kept, notes = select_runs(toy(90), task(max_runs=4))
+    assert [r.id for r in kept.runs] == ["r00", "r30", "r59", "r89"]
+    assert "4 of 90 runs" in notes[0]
+
+
+def test_the_published_split_is_one_fold_and_its_validation_runs_come_from_training(toy):
+    data = toy(10, meta=lambda i: {"split": "test" if i >= 8 else "train" if i >= 1 else "other"})
+    [fold] = make_folds(data, task(split="published", valid_runs=2))
+    train, valid, test = sides(fold)
+    assert test == {"r08", "r09"}
+    assert train | valid == {f"r0{i}" for i in range(1, 8)}
+    assert len(valid) == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "meta", "message"),
+    [
+        ({"folds": 11}, lambda i: {}, r"folds = 11, but data set 'toy' has 10 runs; give at most 10"),
+        ({"folds": 3}, lambda i: {"group": i % 2}, r"has 2 groups of runs"),
+        ({"horizon_s": 21}, lambda i: {}, r"no run is as long as the horizon.*\(21 s\).*Shorten the horizon"),
+        ({"split": "published"}, lambda i: {}, r"no usable run of data set 'toy' has split = \"train\""),
+        ({"valid_runs": 8}, lambda i: {}, r"valid_runs = 8, but only 8 training runs"),
+    ],
+)
+def test_what_cannot_be_split_is_refused(toy, changes, meta, message):
+    with pytest.raises(InputError, match=message):
+        data, _ = select_runs(toy(10, meta=meta), task(**changes))
+        make_folds(data, task(**changes))

@@ -1,0 +1,88 @@
+"""Tasks: what identifies an experiment, and what is refused."""
+
+from __future__ import annotations
+
+import pytest
+from pydantic import ValidationError
+
+from shipbench.bench.task import load_tasks, make_task, read_config
+from shipbench.errors import InputError
+
+
+def task(**changes):
+    return make_task({"dataset": "toy", "models": ["hold"], **changes})
+
+
+def test_one_config_gives_one_task_per_data_set(tmp_path):
+    file = tmp_path / "two.toml"
+    file.write_text('datasets = ["a", "b"]\nmodels = ["hold", "physics"]\nfolds = 3\n')
+    tasks = load_tasks(file)
+    assert [t.dataset for t in tasks] == ["a", "b"]
+    assert all(t.folds == 3 and t.models == ("hold", "physics") for t in tasks)
+
+
+def test_the_command_line_replaces_what_the_config_says(tmp_path):
+    file = tmp_path / "c.toml"
+    file.write_text('dataset = "a"\nmodels = ["physics"]\nfolds = 3\n')
+    [changed] = load_tasks(file, {"models": ["hold"], "datasets": ["b"], "folds": None})
+    assert (changed.dataset, changed.models, changed.folds) == ("b", ("hold",), 3)
+
+
+def test_without_a_data_set_harbour90_is_meant():
+    assert load_tasks(None, {"models": ["hold"]})[0].dataset == "harbour90"
+
+
+def test_a_task_cannot_be_changed():
+    with pytest.raises(ValidationError):
+        task().folds = 7  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_names_given_twice_count_once():
+    assert task(models=["hold", "physics", "hold"], seeds=[1, 1]).models == ("hold", "physics")
+
+
+@pytest.mark.parametrize("name", ["paper", "smoke"])
+def test_shipped_configs_are_found_by_name_and_valid(name):
+    assert read_config(name)["models"]
+    assert all(t.dataset.startswith("harbour90") for t in load_tasks(name))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('models = ["hold"]\nhorizn_s = 60', r"unknown key 'horizn_s'. Did you mean 'horizon_s'\?"),
+        ('models = ["hold"]\nhorizon_s = -1', r"horizon_s: .*greater than 0.*\(value: -1\)"),
+        ('models = ["hold"]\nfolds = 1', r"folds: .*\(value: 1\)"),
+        ('models = ["hold"]\nsplit = "random"', r"split: .*'folds' or 'published'"),
+        ('models = ["hold"]\nmetrics = ["ed", "edx"]', r"unknown metric 'edx'. Did you mean 'ed"),
+        ('models = ["hold"]\nmetrics = ["edh"]', r"'ed' must be among the metrics"),
+        ('dataset = "a"\ndatasets = ["b"]\nmodels = ["hold"]', r"both 'dataset' and 'datasets'"),
+        ('datasets = "b"\nmodels = ["hold"]', r"datasets = 'b'; accepted: a list"),
+        ("folds = 5", r"no model is given"),
+        ("models = []", r"no model is given"),
+        ("models = [", r"is not valid TOML"),
+    ],
+)
+def test_a_wrong_config_says_which_key_and_what_is_accepted(tmp_path, text, message):
+    file = tmp_path / "wrong.toml"
+    file.write_text(text)
+    with pytest.raises(InputError, match=message):
+        load_tasks(file)
+
+
+def test_a_missing_config_names_its_path(tmp_path):
+    with pytest.raises(InputError, match=r"cannot read .*none\.toml: No such file"):
+        load_tasks(tmp_path / "none.toml")
+
+
+def test_a_horizon_between_two_samples_is_refused():
+    assert task(horizon_s=60.0).steps(0.1) == 600
+    with pytest.raises(InputError, match=r"horizon_s = 60\.5 s is not a whole number of samples of 1 s"):
+        task(horizon_s=60.5).steps(1.0)
+
+
+def test_the_key_tells_tasks_apart_by_what_changes_a_score_only():
+    key = task().key("data")
+    assert task(models=["physics"], seeds=[3], title="x", metrics=["ed"]).key("data") == key
+    assert task(dataset="the same data elsewhere").key("data") == key
+    assert len({key, task(folds=3).key("data"), task(horizon_s=60).key("data"), task(fold_seed=1).key("data"), task().key("other")}) == 5

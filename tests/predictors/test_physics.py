@@ -1,0 +1,171 @@
+"""The fitted physics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipbench.physics import eq2
+from shipbench.physics.actuators import lag_with_rate_limit
+from shipbench.predictors._actuator_fit import DEFAULT_ACTUATORS, fit_actuators
+from shipbench.predictors.physics import Physics
+from shipbench.records import Batch, Dataset, Run
+from shipbench.ship import complete
+
+
+@pytest.fixture(scope="module")
+def fitted(harbour) -> Physics:
+    return Physics().fit(harbour)
+
+
+def _synthetic(harbour: Dataset, p: np.ndarray) -> tuple[Dataset, Physics]:
+    """The same commands sailed by eq. (2) itself with known parameters."""
+    truth = Physics().fit(harbour)
+    truth.p = p
+    batch = harbour.batch()
+    S = np.concatenate([batch.s0[:, None], truth.predict(batch.s0, batch.U)], axis=1)
+    runs = (Run(r.id, r.t, S[i], r.inputs) for i, r in enumerate(harbour.runs))
+    return harbour.with_runs(runs), truth
+
+
+def test_known_actuators_are_recovered(fitted):
+    """The rudder's rate limit is not asked for: these 16 runs never give it a step that reaches the limit."""
+    T_n, rate_n, T_delta, _, T_F, _ = fitted.actuator_params
+    assert T_n == pytest.approx(6.0, rel=0.02)
+    assert rate_n == pytest.approx(6.0, rel=0.02)
+    assert T_delta == pytest.approx(1.0, rel=0.02)
+    assert T_F == pytest.approx(2.0, rel=0.05)
+
+
+def test_hard_steps_reveal_the_rate_limit_and_an_idle_actuator_keeps_its_default():
+    rng = np.random.default_rng(5)
+    U = np.zeros((6, 60, 4))
+    U[..., 1] = np.repeat(rng.uniform(-0.6, 0.6, (6, 3)), 20, axis=1)
+    s0, truth = np.zeros((6, 10)), np.zeros((6, 60, 10))
+    now = s0[:, 7]
+    for k in range(60):
+        now = lag_with_rate_limit(now, U[:, k, 1], 1.0, 1.4, np.deg2rad(3.0))
+        truth[:, k, 7] = now
+    found = fit_actuators(Batch(tuple("abcdef"), s0, U, truth), 1.0)
+    np.testing.assert_allclose(found[2:4], [1.4, np.deg2rad(3.0)], rtol=0.01)
+    np.testing.assert_array_equal(found[[0, 1, 4, 5]], DEFAULT_ACTUATORS[[0, 1, 4, 5]])
+
+
+def test_known_parameters_of_its_own_structure_are_recovered(harbour):
+    p = np.array([0.05, 1500.0, 6000.0, 40.0, 0.02, 1.9, 0.05, -1.2, 0.03, 0.02, 1.1])
+    data, truth = _synthetic(harbour, p)
+    found = Physics(iterations=40, tolerance=1e-10).fit(data)
+    batch = data.batch()
+    assert np.abs(found.predict(batch.s0, batch.U)[..., :2] - batch.truth[..., :2]).max() < 0.05
+    np.testing.assert_allclose(found.p[[5, 7, 10]], p[[5, 7, 10]], rtol=0.02)
+
+
+def test_the_fit_obeys_bounds_and_constraints(fitted):
+    p, a = fitted.p, np.deg2rad(20.0)
+    assert (p[1:4] >= 0).all()
+    for s in (1, -1):
+        assert p[5] + 2 * s * a * p[6] + 3 * a * a * p[7] >= -1e-6
+    assert p[9] ** 2 <= 4 * p[8] * p[10] + 1e-8
+    assert abs(p[4]) <= np.deg2rad(3.0) * p[5] + 1e-8
+
+
+def test_the_fit_is_much_better_than_its_start(harbour, fitted):
+    start = Physics(iterations=0).fit(harbour)
+    assert fitted.cost < 0.7 * start.cost
+
+
+def test_the_gradient_used_by_the_fit_is_the_finite_difference(harbour):
+    from shipbench.predictors import _physics_fit as fit
+
+    model = Physics(iterations=0).fit(harbour)
+    batch = harbour.subset([0, 1]).batch()
+    path = model.actuator_path(batch.s0, batch.U)
+    w = path.reshape(2 * path.shape[1], 12).T
+    args = (model.c, path.shape[1], 2, 1.0, False)
+    full, plain = fit._rollout_function(*args, True), fit._rollout_function(*args, False)
+    p = np.array([0.05, 1500.0, 6000.0, 40.0, 0.02, 1.9, 0.05, -1.2, 0.03, 0.02, 1.1])
+    x0 = batch.s0[:, :6].T
+    S = np.asarray(full(x0, np.zeros((6, 22)), w, p)[1]).reshape(6, -1, 11)
+    for i in range(11):
+        h = 1e-5 * fit.parameter_scale(model.c)[i]
+        up, down = p.copy(), p.copy()
+        up[i] += h
+        down[i] -= h
+        slope = (np.asarray(plain(x0, w, up)) - np.asarray(plain(x0, w, down))) / (2 * h)
+        np.testing.assert_allclose(S[:, :, i], slope, atol=1e-4 * np.abs(slope).max())
+
+
+def test_rollout_of_the_fit_and_of_predict_are_the_same_model(harbour, fitted):
+    from shipbench.predictors import _physics_fit as fit
+
+    batch = harbour.subset([0, 1, 2]).batch()
+    path = fitted.actuator_path(batch.s0, batch.U)
+    plain = fit._rollout_function(fitted.c, path.shape[1], 3, 1.0, False, False)
+    X = np.asarray(plain(batch.s0[:, :6].T, path.reshape(-1, 12).T, fitted.p)).T.reshape(3, -1, 6)
+    np.testing.assert_allclose(X, fitted.predict(batch.s0, batch.U)[..., :6], rtol=1e-9, atol=1e-9)
+
+
+def test_intervals_cover_and_widen_with_fewer_runs(harbour):
+    few, many = Physics().fit(harbour.subset(range(4))), Physics().fit(harbour)
+    for model in (few, many):
+        free = ~np.isnan(model.ci95[:, 0])
+        assert free.any()
+        assert (model.ci95[free, 0] <= model.p[free]).all()
+        assert (model.ci95[free, 1] >= model.p[free]).all()
+
+
+def test_it_prints_its_equations_with_units_and_intervals(fitted):
+    text = fitted.describe()
+    for word in ("surge", "sway", "yaw", "p10", "N s^2/m^2", "shaft time constant", "["):
+        assert word in text
+    assert "Izz not given" in text
+
+
+def test_it_fits_a_small_model_ship_whose_actuators_are_commands(harbour):
+    """Any ship.toml: 1/40 scale by Froude, commands recorded in place of actuator positions."""
+    s = 1 / 40
+    k = np.sqrt(s)
+    ship = harbour.ship.model_copy(
+        update={"L": 130 * s, "B": 18.2 * s, "T": 6.1 * s, "displacement": 9402 * s**3, "xG": -1.92 * s, "propeller": None, "rudder": None, "thrusters": None}
+    )
+    unit = np.array([s, s, 1, k, k, 1 / k, 1 / k, 1, s**3, s**3])
+    runs = []
+    for r in harbour.runs:
+        S, U = r.states * unit, r.inputs * unit[6:]
+        S[1:, 6:] = U[:-1]
+        runs.append(Run(r.id, r.t * k, S, U))
+    data = Dataset("tank", ship, k, tuple(runs), actuators="commanded")
+    model = Physics().fit(data)
+    batch = data.batch()
+    S = model.predict(batch.s0, batch.U)
+    assert np.isfinite(S).all()
+    np.testing.assert_allclose(S[..., 6:], batch.U)
+    hold = np.linalg.norm(batch.truth[:, -1, :2] - batch.s0[:, :2], axis=1).mean()
+    assert np.linalg.norm(S[:, -1, :2] - batch.truth[:, -1, :2], axis=1).mean() < 0.1 * hold
+
+
+def test_measured_wind_reaches_the_forces(harbour, fitted):
+    batch = harbour.subset([0]).batch()
+    windy = replace(harbour, runs=tuple(
+        Run(r.id, r.t, r.states, np.concatenate([r.inputs, np.tile([12.0, 0.3], (len(r), 1))], axis=1), (*r.inputs_names, "wind_speed", "wind_from"))
+        for r in harbour.runs
+    ))  # fmt: skip
+    model = Physics(iterations=0).fit(windy)
+    model.p = fitted.p
+    b = windy.subset([0]).batch()
+    assert np.abs(model.predict(b.s0, b.U)[0, -1, :2] - fitted.predict(batch.s0, batch.U)[0, -1, :2]).max() > 0.5
+
+
+def test_left_side_is_clarke_and_inoue_by_hand():
+    from shipbench.physics.mmg import load_mmg_ship
+
+    c = eq2.coefficients(complete(load_mmg_ship("container130").particulars))
+    L, B, T, Cb = 130.0, 18.2, 6.1, 0.651
+    Y_v = -np.pi * (T / L) ** 2 * (1 + 0.4 * Cb * B / T) * 0.5 * 1025 * L**2
+    assert c.Y_v == pytest.approx(Y_v)
+    assert c.Y_v / (0.5 * 1025 * L * T) == pytest.approx(-0.262, abs=0.001)  # physics reference, section 3.4
+    assert c.N_r / (0.5 * 1025 * L**3 * T) == pytest.approx(-0.043, abs=0.001)
+    assert c.Y_vv / (0.5 * 1025 * L * T) == pytest.approx(-0.688, abs=0.001)
+    assert c.N_vvr / (0.5 * 1025 * L**3 * T) == pytest.approx(-0.230, abs=0.001)
