@@ -13,9 +13,10 @@ if TYPE_CHECKING:
     from .data.base import DATASETS, load_dataset
     from .errors import InputError, ShipbenchError, WorkError
     from .metrics.base import METRICS
-    from .predictors.base import PREDICTORS, Predictor, PredictorBase, make_predictor, parse_spec
+    from .predictors.base import PREDICTORS, Predictor, PredictorBase, make_predictor
     from .records import Batch, Dataset, Run
     from .ship import Ship
+    from .specs import parse_spec
 
     __version__: str
 
@@ -25,7 +26,7 @@ _HOME = {
     "DATASETS": "data.base", "load_dataset": "data.base",
     "InputError": "errors", "ShipbenchError": "errors", "WorkError": "errors", "METRICS": "metrics.base",
     "PREDICTORS": "predictors.base", "Predictor": "predictors.base", "PredictorBase": "predictors.base",
-    "make_predictor": "predictors.base", "parse_spec": "predictors.base",
+    "make_predictor": "predictors.base", "parse_spec": "specs",
     "Batch": "records", "Dataset": "records", "Run": "records", "Ship": "ship",
 }  # fmt: skip
 

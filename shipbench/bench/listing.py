@@ -1,4 +1,4 @@
-"""What a part says of itself, read from its source without importing it (so that a list never loads torch or casadi)."""
+"""What a part says of itself, read from its source without importing it (so that a list never loads torch or casadi); what a data set holds."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
+from ..records import Dataset
 from ..registry import Registry
+from ..ship import complete
 
 
 def describe_parts(registry: Registry) -> list[dict[str, Any]]:
@@ -67,3 +69,29 @@ def _fields(node: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> dict[str, s
             if "ClassVar" not in ast.unparse(item.annotation) and "init=False" not in default:
                 found[item.target.id] = default
     return found
+
+
+def dataset_facts(dataset: Dataset) -> dict[str, Any]:
+    """What was found in a data set, for a person who checks a loader or a folder."""
+    samples = [len(r) for r in dataset.runs]
+    lengths = sorted((n - 1) * dataset.dt for n in samples)
+
+    def counts(key: str) -> str:
+        values = [str(r.meta[key]) for r in dataset.runs if key in r.meta]
+        return ", ".join(f"{v} {values.count(v)}" for v in dict.fromkeys(values)) or "not given"
+
+    groups = {r.meta.get("group", r.id) for r in dataset.runs}
+    return {
+        "name": dataset.name,
+        "ship": f"{dataset.ship.name}, L = {dataset.ship.L:g} m, B = {dataset.ship.B:g} m, T = {dataset.ship.T:g} m",
+        "runs": f"{len(dataset)} in {len(groups)} groups, {sum(samples)} samples at {dataset.dt:g} s, {lengths[0]:g} to {lengths[-1]:g} s long",
+        "inputs": ", ".join(dataset.inputs),
+        "actuators": dataset.actuators,
+        "manoeuvres": counts("manoeuvre"),
+        "split": counts("split"),
+        "simulated": dataset.simulation or "no",
+        "source": dataset.source or "not stated",
+        "licence": dataset.licence or "not stated",
+        "fingerprint": dataset.fingerprint,
+        "note": [*dataset.notes, *(f"ship: {note}" for note in complete(dataset.ship).notes)] or ["none"],
+    }

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import os
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,16 +52,23 @@ def _predictions(results: Results, dataset: str, model: str) -> Iterator[_Predic
             yield _Prediction(batch.ids, batch.s0, batch.truth, S, np.array([s == "ok" for s in summary["run_status"]]))
 
 
+def short_name(model: str) -> str:
+    """A spec that fits a legend: no folders, at most 28 characters."""
+    name = Path(model).name if "/" in model else model
+    return name if len(name) <= 28 else f"{name[:25]}..."
+
+
 def _style(models: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Colour and dashes of each model: the same for a known name in every plot."""
-    free = [c for c in _PALETTE if c not in {_KNOWN.get(m) for m in models}] or list(_PALETTE)
-    styles, used = {}, 0
-    for model in models:
-        colour = _KNOWN.get(model)
-        if colour is None:
-            colour, used = free[used % len(free)], used + 1
-        styles[model] = {"color": colour, "linestyle": _DASHES.get(model, "-")}
-    return styles
+    bases: dict[str, str] = {}  # of variants such as mlp and mlp[hidden=64] the first has the name's colour
+    for model in sorted(models, key=len):
+        bases.setdefault(re.split(r"[\[+]", model)[0], model)
+    known = {model: base for base, model in bases.items() if base in _KNOWN}
+    free = [c for c in _PALETTE if c not in {_KNOWN[base] for base in known.values()}] or list(_PALETTE)
+    others = itertools.cycle(free)
+    return {
+        m: {"color": _KNOWN[known[m]], "linestyle": _DASHES[known[m]]} if m in known else {"color": next(others), "linestyle": "-"} for m in models
+    }
 
 
 def _new_figure(width: float, height: float) -> Figure:
@@ -112,7 +121,7 @@ def _outline(x: float, y: float, psi: float, L: float, B: float) -> np.ndarray:
 
 
 def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[str, Any]) -> Figure:
-    """True and predicted tracks of a good, a median and a bad run, with the true ship every quarter of the horizon and the predicted ones at its end."""
+    """Tracks of a good, a median and a bad run; the true ship every quarter of the horizon, the predicted ones at its end."""
     rows = results.rows[results.rows["dataset"] == dataset]
     chosen = choose_runs(rows, models)
     figure = _new_figure(15.0, 6.2)
@@ -134,9 +143,11 @@ def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[
         axis.grid(alpha=0.25)
         handles = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
         order = ["true", *[m for m in models if m in handles]]
-        texts = ["true", *[f"{m} (ED {error[m]:.3g} m)" for m in order[1:]]]
+        texts = ["true", *[f"{short_name(m)} (ED {error[m]:.3g} m)" for m in order[1:]]]
         axis.legend([handles[m] for m in order], texts, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
-    figure.suptitle(f"{dataset}: tracks over {summary['task']['horizon_s']:g} s; the true ship every quarter, the predicted ones at the end", fontsize=12)
+    figure.suptitle(
+        f"{dataset}: tracks over {summary['task']['horizon_s']:g} s; the true ship every quarter, the predicted ones at the end", fontsize=12
+    )
     return figure
 
 
@@ -183,7 +194,7 @@ def boxes(rows: Any, models: Sequence[str], summary: dict[str, Any]) -> Figure:
         )  # fmt: skip
         for patch, (model, _) in zip(drawn["boxes"], shown, strict=True):
             patch.set(facecolor=styles[model]["color"], alpha=0.75)
-        axis.set_xticks(range(1, len(shown) + 1), [m for m, _ in shown], rotation=25, ha="right")
+        axis.set_xticks(range(1, len(shown) + 1), [short_name(m) for m, _ in shown], rotation=25, ha="right")
         axis.set_ylabel(f"{column['label']} [{column['unit']}]")
         axis.grid(axis="y", alpha=0.25)
         _readable_limits(axis, [g for _, g in shown])
@@ -202,7 +213,7 @@ def against_horizon(results: Results, dataset: str, models: Sequence[str], dt: f
         errors = np.concatenate([ed(true=c.truth[c.ok], pred=c.S[c.ok]) for c in _predictions(results, dataset, model)])
         low, middle, high = np.quantile(errors, [0.25, 0.5, 0.75], axis=0)
         t = dt * np.arange(1, errors.shape[1] + 1)
-        axis.plot(t, middle, lw=2, label=f"{model} ({middle[-1]:.3g} m at the end)", **styles[model])
+        axis.plot(t, middle, lw=2, label=f"{short_name(model)} ({middle[-1]:.3g} m at the end)", **styles[model])
         axis.fill_between(t, low, high, color=styles[model]["color"], alpha=0.13, lw=0)
         ends.append(errors[:, -1])
     _readable_limits(axis, ends)

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..predictors.base import make_predictor, parse_spec
+from ..predictors.base import make_predictor
 from ..records import Dataset
 from ..signals import STATES
+from ..specs import parse_spec
 
 Rollout = tuple[str, np.ndarray, np.ndarray]
 """Run id, t (K + 1,) [s] and states (K + 1, 10), the first being the recorded start."""

@@ -15,8 +15,9 @@ import numpy as np
 
 from ..data.base import load_dataset
 from ..errors import InputError, ShipbenchError
-from ..predictors.base import Spec, fit_models, make_predictor, parse_spec
+from ..predictors.base import fit_models, make_predictor
 from ..records import Batch, Dataset
+from ..specs import Spec, parse_spec
 from .folds import Fold, make_folds, select_runs
 from .progress import Progress, Silent
 from .provenance import code_version, machine
@@ -66,9 +67,7 @@ class _Study:
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
 
 
-def run_tasks(
-    tasks: Sequence[Task], out: str | Path, *, resume: bool = False, progress: Progress | None = None, command: str = ""
-) -> Outcome:
+def run_tasks(tasks: Sequence[Task], out: str | Path, *, resume: bool = False, progress: Progress | None = None, command: str = "") -> Outcome:
     """Run every task and write the results below `out` (see `results`).
 
     Args:
@@ -238,9 +237,7 @@ def _score(study: _Study, spec: Spec, cell: Cell, fitted: _Fitted) -> _Record:
     return _Record(rows, _summary(study, spec, cell, fitted, times) | {"status": status, "reason": reason, "run_status": statuses}, S)
 
 
-def _rows(
-    study: _Study, cell: Cell, statuses: list[str], reasons: list[str], values: dict[str, np.ndarray], times: dict[str, float]
-) -> pd.DataFrame:
+def _rows(study: _Study, cell: Cell, statuses: list[str], reasons: list[str], values: dict[str, np.ndarray], times: dict[str, float]) -> pd.DataFrame:
     import pandas as pd
 
     runs = study.folds[cell.fold].test.runs
@@ -267,7 +264,7 @@ def _summary(study: _Study, spec: Spec, cell: Cell, fitted: _Fitted, times: dict
     return {
         "protocol": PROTOCOL, "dataset": data.name, "fingerprint": data.fingerprint, "task_key": study.task.key(data.fingerprint),
         "task": study.task.model_dump(mode="json"), "model": cell.model, "name": spec.name,
-        "params": asdict(fitted.model) if is_dataclass(fitted.model) else spec.params,
+        "params": asdict(fitted.model) if is_dataclass(fitted.model) and not isinstance(fitted.model, type) else spec.params,
         "fold": cell.fold, "seed": cell.seed, "ship": data.ship.name, "ship_L": data.ship.L, "ship_B": data.ship.B, "dt": data.dt,
         "inputs": list(data.inputs), "columns": study.columns, "notes": list(study.notes), "source": data.source, "licence": data.licence,
         "runs": {side: [r.id for r in part.runs] if part else [] for side, part in

@@ -41,6 +41,7 @@ class Coefficients:
     N_rr: float
     N_vvr: float
     N_vrr: float
+    max_drift: float
     eps: float
     rho: float
     L: float
@@ -81,7 +82,7 @@ def coefficients(ship: Particulars) -> Coefficients:
         Y_v=lin.Y_v * q2, Y_r=lin.Y_r * q2 * L, N_v=lin.N_v * q2 * L, N_r=lin.N_r * q2 * L**2,
         X_vr=m_y + X_vr + ship.mass, X_rr=ship.mass * ship.xG - Y_rd,
         Y_vv=non.Y_vv * qd, Y_vr=non.Y_vr * qd * L, Y_rr=non.Y_rr * qd * L**2,
-        N_rr=non.N_rr * qd * L**3, N_vvr=non.N_vvr * qd * L**2, N_vrr=non.N_vrr * qd * L**3,
+        N_rr=non.N_rr * qd * L**3, N_vvr=non.N_vvr * qd * L**2, N_vrr=non.N_vrr * qd * L**3, max_drift=min(0.5, 0.8 * abs(non.N_rr / non.N_vrr)),
         eps=0.05 * (L / 100.0) ** 0.5, rho=rho, L=L, T=T, D_P=ship.D_P, x_P=ship.x_P, w_P0=ship.w_P0, t_P=ship.t_P, kt=ship.kt,
         A_R=ship.A_R, eta=min(ship.D_P / ship.H_R, 1.0), x_R=ship.x_R, a_H=a_H, x_H=x_H * L,
         tunnels=thruster.Tunnels(ship.x_bow, ship.x_stern), A_F=ship.A_F, A_L=ship.A_L,
@@ -123,6 +124,9 @@ def accelerations(
     n in rpm, delta in rad, F_b and F_s in N; `air` is the ship's velocity relative to the air in body axes (`wind.apparent_wind`) or None without wind;
     p holds p0..p10: p0 lateral over axial propeller force [1], p1..p3 resistance [N s/m, N s^2/m^2, N s^3/m^3], p4..p10 rudder [1].
 
+    The two cubic yaw terms are divided by U; their v/U is held at 0.5 (30 deg of drift, the end of the charts) or where N_vrr v r^2/U would exceed the yaw damping
+    N_rr r|r|: beyond, a ship set sideways by wind at low speed would spin up without limit.
+
     X_e, Y_e, N_e are thrusters and measured wind. R(u) = -(p1 u + p2 u|u| + p3 u^3): it opposes the motion on both tacks of u.
     """
     speed = sqrt(u * u + v * v + c.eps * c.eps)
@@ -134,7 +138,8 @@ def accelerations(
     Y_n = p[0] * X_n
     Y = Y_n + Y_d + Y_T + c.Y_v * speed * v + (c.Y_r * speed - c.m * u) * r + c.Y_vv * v * absolute(v) + c.Y_vr * v * abs_r + c.Y_rr * r * abs_r
     N = c.x_P * Y_n + N_d + N_T + c.N_v * speed * v + (c.N_r * speed - c.m * c.x_G * u) * r + c.N_rr * r * abs_r
-    N = N + (c.N_vvr * v + c.N_vrr * r) * v * r / speed
+    drift = clip(v / speed, -c.max_drift, c.max_drift)
+    N = N + (c.N_vvr * v + c.N_vrr * r) * drift * r
     if air is not None:
         X_W, Y_W, N_W = wind.harmonic(*air, c.A_F, c.A_L, c.L)
         X, Y, N = X + X_W, Y + Y_W, N + N_W

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from ..records import Dataset
-from ..signals import PSI, R, U, V, X, Y
+from ..signals import PSI, R, U, X, Y
 
 CHANNELS = slice(U, None)
 """The channels y = u, v, r, n, delta, F_b, F_s of a state that networks predict; the pose follows from them."""
@@ -66,16 +66,16 @@ class StackedRuns:
         """Number of steps K of every run."""
         return self.U.shape[1]
 
-    def offsets(self) -> Tensor:
-        """(members,) index of each member's first run."""
-        return torch.tensor([0, *np.cumsum(self.counts)[:-1].tolist()])
 
-    def padded(self) -> tuple[Tensor, Tensor]:
-        """Indices of all runs (members, most runs), repeated where a member has fewer, and weights that sum to 1 per member."""
-        most = max(self.counts)
-        index = torch.stack([o + torch.arange(most) % c for o, c in zip(self.offsets(), self.counts, strict=True)])
-        weight = torch.stack([(torch.arange(most) < c) / c for c in self.counts])
-        return index, weight
+def padded(counts: Sequence[int]) -> tuple[Tensor, Tensor]:
+    """Indices of all members' items (members, most), repeated where a member has fewer, and weights (members, most) that sum to 1 per member."""
+    most, first = max(counts), 0
+    index, weight = [], []
+    for count in counts:
+        index.append(first + torch.arange(most) % count)
+        weight.append((torch.arange(most) < count) / count)
+        first += count
+    return torch.stack(index), torch.stack(weight)
 
 
 class Scaler(nn.Module):
@@ -195,3 +195,27 @@ def trapezoid_pose(s0: Tensor, y: Tensor, dt: float) -> Tensor:
     rates = torch.stack([path[..., 0] * cos - path[..., 1] * sin, path[..., 0] * sin + path[..., 1] * cos], dim=-1)
     moved = 0.5 * dt * torch.cumsum(rates[..., 1:, :] + rates[..., :-1, :], dim=-2)
     return torch.cat([s0[..., None, X : Y + 1] + moved, psi[..., 1:, None]], dim=-1)
+
+
+def hold_error(S: Tensor, counts: Sequence[int], dt: float, steps: int) -> Tensor:
+    """Root mean square error (members, 5) of u, v, r, position [m] and heading [rad] over `steps` steps when the initial velocities are kept.
+
+    S: (runs, samples, 10) of all members; dt: time between samples [s]. It is the size of what there is to predict.
+    """
+    start, truth = S[:, 0], S[:, 1 : steps + 1]
+    kept = start[:, None, U : R + 1].expand(-1, steps, -1)
+    pose = trapezoid_pose(start, kept, dt) - truth[..., :3]
+    square = torch.cat([(kept - truth[..., U : R + 1]).square(), pose[..., :2].square().sum(-1, keepdim=True), pose[..., 2:].square()], dim=-1)
+    return torch.stack([part.mean((0, 1)).sqrt() for part in square.split(list(counts))]).clamp(min=1e-6)
+
+
+def random_windows(counts: Sequence[int], starts: int, batch: int, draw: Sequence[torch.Generator]) -> tuple[Tensor, Tensor]:
+    """A random run of the member's own and one of `starts` first samples for each window: both (members, batch), runs counted over all members."""
+    first = np.concatenate([[0], np.cumsum(counts)[:-1]]).tolist()
+    runs = [f + torch.randint(c, (batch,), generator=g) for f, c, g in zip(first, counts, draw, strict=True)]
+    return torch.stack(runs), torch.stack([torch.randint(starts, (batch,), generator=g) for g in draw])
+
+
+def position_score(pose: Tensor, truth: Tensor, weight: Tensor) -> Tensor:
+    """Mean position error of each member [m]: pose and truth (members, runs, steps, >= 2), weight (members, runs) summing to 1."""
+    return (torch.linalg.vector_norm(pose[..., :2] - truth[..., :2], dim=-1).mean(2) * weight).sum(1)

@@ -9,11 +9,10 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
-import re
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
@@ -23,10 +22,12 @@ from ..errors import InputError, WorkError, unknown_name
 from ..records import Dataset
 from ..registry import Registry
 from ..signals import COMMANDS, STATES
+from ..specs import Spec, parse_spec
 
 PREDICTORS = Registry("predictor", "predictors", "PREDICTOR", helpers=frozenset({"base", "training"}))
 
 History = tuple[np.ndarray, np.ndarray]
+__all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "fit_models", "make_predictor", "parse_spec"]
 
 
 @runtime_checkable
@@ -133,55 +134,6 @@ class PredictorBase(ABC):
         except (OSError, KeyError, ValueError, TypeError) as error:
             raise InputError(f"{folder} is not a saved '{cls.name}' model: {error}. Give a folder that save() wrote.") from None
         return model
-
-
-@dataclass(frozen=True)
-class Spec:
-    """A model spec taken apart: `physics+current[..]` -> name "physics", effects ("current",)."""
-
-    text: str
-    name: str
-    params: dict[str, Any]
-    effects: tuple[str, ...] = ()
-    path: Path | None = None
-    class_name: str | None = None
-
-    @property
-    def seeds(self) -> list[int] | None:
-        """The seed that the spec itself fixes, if any."""
-        return [int(self.params["seed"])] if "seed" in self.params else None
-
-
-def _value(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError:
-        return text
-
-
-def parse_spec(text: str) -> Spec:
-    """Take a model spec apart (contract, section 2).
-
-    Raises:
-        InputError: the text has none of the accepted forms.
-    """
-    match = re.fullmatch(r"(?P<base>[^\[\]]+?)(\[(?P<params>[^\[\]]*)\])?(?P<tail>(\+[\w.]+)*)", text.strip())
-    if match is None:
-        raise InputError(f"model spec '{text}' cannot be read; accepted: name, name[key=value,...], physics+effect, path.py:Class, a saved folder.")
-    params: dict[str, Any] = {}
-    for item in filter(None, (match["params"] or "").split(",")):
-        key, sep, value = item.partition("=")
-        if not sep or not key.strip():
-            raise InputError(f"model spec '{text}': parameter '{item}' has no value; write name[key=value,key=value].")
-        params[key.strip()] = _value(value.strip())
-    base = match["base"]
-    file, colon, class_name = base.rpartition(":")
-    if colon and file.endswith(".py"):
-        return Spec(text, class_name, params, path=Path(file), class_name=class_name)
-    if Path(base, "model.json").is_file():
-        return Spec(text, base, params, path=Path(base))
-    name, *effects = (base + (match["tail"] or "")).split("+")
-    return Spec(text, name, params, tuple(effects))
 
 
 def _class_from_file(path: Path, class_name: str) -> Any:

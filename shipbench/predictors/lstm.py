@@ -17,7 +17,21 @@ from torch import Tensor, nn
 from ..errors import InputError
 from ..records import Dataset
 from ..signals import PSI
-from ._stacked import CHANNELS, InputFeatures, Scaler, StackedLinear, StackedMLP, StackedRuns, generators, trapezoid_pose, with_valid
+from ._stacked import (
+    CHANNELS,
+    InputFeatures,
+    Scaler,
+    StackedLinear,
+    StackedMLP,
+    StackedRuns,
+    generators,
+    hold_error,
+    padded,
+    position_score,
+    random_windows,
+    trapezoid_pose,
+    with_valid,
+)
 from .base import History, PredictorBase
 from .training import Chunk, Recipe, StackedTask, train
 
@@ -83,15 +97,6 @@ class Stage(NamedTuple):
     history: int
 
 
-def hold_error(runs: StackedRuns, dt: float, steps: int) -> Tensor:
-    """Root mean square error (members, 2) of position [m] and heading [rad] when the initial velocities are kept, up to `steps`."""
-    start = runs.S[:, 0]
-    kept = start[:, None, CHANNELS].expand(-1, steps, -1)
-    error = trapezoid_pose(start, kept, dt) - runs.S[:, 1 : steps + 1, :3]
-    square = torch.stack([error[..., :2].square().sum(-1), error[..., 2].square()], dim=-1)
-    return torch.stack([part.mean((0, 1)).sqrt() for part in square.split(runs.counts)]).clamp(min=1e-6)
-
-
 class _Rollouts(StackedTask):
     """Free-running rollouts from random starts of random runs; the score is the mean position error of whole validation windows [m]."""
 
@@ -103,7 +108,7 @@ class _Rollouts(StackedTask):
         self.net, self.training_runs, self.validation, self.stages, self.draw = net, training, validation, stages, draw
         self.dt, self.pose_weight = dt, pose_weight
         self.members = len(training.counts)
-        self.pose_scale = {s.steps: hold_error(training, dt, s.steps) for s in stages}
+        self.pose_scale = {s.steps: hold_error(training.S, training.counts, dt, s.steps)[:, 3:] for s in stages}
 
     @property
     def num_chunks(self) -> int:
@@ -112,13 +117,9 @@ class _Rollouts(StackedTask):
 
     def _windows(self, stage: Stage, history: int) -> Tensor:
         """Rows (members, batch, history + steps + 1) into the flattened samples: one random window per random run."""
-        steps = history + stage.steps
-        runs, starts = [], []
-        for offset, count, g in zip(self.training_runs.offsets().tolist(), self.training_runs.counts, self.draw, strict=True):
-            runs.append(offset + torch.randint(count, (stage.batch,), generator=g))
-            starts.append(torch.randint(self.training_runs.steps - steps + 1, (stage.batch,), generator=g))
-        samples = self.training_runs.steps + 1
-        return (torch.stack(runs) * samples + torch.stack(starts))[..., None] + torch.arange(steps + 1)
+        samples, steps = self.training_runs.steps + 1, history + stage.steps
+        runs, starts = random_windows(self.training_runs.counts, samples - steps, stage.batch, self.draw)
+        return (runs * samples + starts)[..., None] + torch.arange(steps + 1)
 
     def chunks(self) -> Iterator[Chunk]:
         everyone = torch.ones(self.members, dtype=torch.bool)
@@ -146,12 +147,11 @@ class _Rollouts(StackedTask):
 
     def scores(self) -> Tensor:
         device = self.net.cell.weight.device
-        index, weight = self.validation.padded()
+        index, weight = padded(self.validation.counts)
         S, held = self.validation.S[index].to(device), self.validation.U[index].to(device)
         start = S[:, :, 0]
         y = self.net.rollout((S[:, :, :0], held[:, :, :0]), start, held, self.dt)
-        miss = torch.linalg.vector_norm(trapezoid_pose(start, y, self.dt)[..., :2] - S[:, :, 1:, :2], dim=-1)
-        return (miss.mean(2) * weight.to(device)).sum(1)
+        return position_score(trapezoid_pose(start, y, self.dt), S[:, :, 1:], weight.to(device))
 
 
 def thinned(runs: StackedRuns, stride: int) -> StackedRuns:

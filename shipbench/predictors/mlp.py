@@ -17,7 +17,7 @@ from torch import Tensor
 from ..errors import InputError
 from ..records import Dataset
 from ..signals import PSI
-from ._stacked import CHANNELS, InputFeatures, Scaler, StackedMLP, StackedRuns, dead_reckoning, generators, with_valid
+from ._stacked import CHANNELS, InputFeatures, Scaler, StackedMLP, StackedRuns, dead_reckoning, generators, padded, with_valid
 from .base import History, PredictorBase
 from .training import Chunk, Recipe, StackedTask, epochs_of_samples, train
 
@@ -48,23 +48,23 @@ class _OneStep(StackedTask):
         self.counts = [len(y) for y, _, _ in training]
         self.data = self._standardised(training)
         self.valid = self._standardised(validation)
-        self.valid_counts = [len(y) for y, _, _ in validation]
+        self.valid_rows = padded([len(y) for y, _, _ in validation])
 
     def _target(self, y: Tensor, after: Tensor) -> Tensor:
         return after - y if self.increment else after
 
-    def _standardised(self, parts: list[Any]) -> tuple[Tensor, Tensor, Tensor]:
-        """x and z of all members one after another, and the first row of each member."""
+    def _standardised(self, parts: list[Any]) -> tuple[Tensor, Tensor]:
+        """x and z of all members, one member after another."""
         x = [(torch.cat([y, i], dim=-1) - self.scale_x.mean[m]) / self.scale_x.std[m] for m, (y, i, _) in enumerate(parts)]
         z = [(self._target(y, after) - self.scale_z.mean[m]) / self.scale_z.std[m] for m, (y, _, after) in enumerate(parts)]
-        first = torch.tensor([0, *np.cumsum([len(part) for part in x])[:-1].tolist()])
-        return torch.cat(x), torch.cat(z), first
+        return torch.cat(x), torch.cat(z)
 
     def chunks(self) -> Iterator[Chunk]:
         device = self.net.layers[0].weight.device
-        x, z, first = (part.to(device) for part in self.data)
+        x, z = (part.to(device) for part in self.data)
+        first = torch.tensor([0, *np.cumsum(self.counts)[:-1].tolist()])
         for index, ended in epochs_of_samples(self.counts, self.batch, self.epochs, self.draw):
-            rows = (index.to(device) + first[:, None]).flatten()
+            rows = (index + first[:, None]).flatten().to(device)
             shape = (*index.shape, -1)
             # One gather per chunk: a step then costs no indexing at all.
             yield Chunk(list(zip(x[rows].view(shape).unbind(0), z[rows].view(shape).unbind(0), strict=True)), ended)
@@ -75,11 +75,9 @@ class _OneStep(StackedTask):
 
     def scores(self) -> Tensor:
         device = self.net.layers[0].weight.device
-        x, z, first = (part.to(device) for part in self.valid)
-        most = max(self.valid_counts)
-        index = torch.stack([f + torch.arange(most, device=device) % c for f, c in zip(first, self.valid_counts, strict=True)])
-        weight = torch.stack([(torch.arange(most, device=device) < c) / c for c in self.valid_counts])
-        return ((self.net(x[index]) - z[index]).square().mean(2) * weight).sum(1)
+        x, z = (part.to(device) for part in self.valid)
+        rows, weight = (part.to(device) for part in self.valid_rows)
+        return ((self.net(x[rows]) - z[rows]).square().mean(2) * weight).sum(1)
 
 
 @dataclass

@@ -19,8 +19,8 @@ from ..integrate import motion_rhs, rk4_step
 from ..physics import eq2
 from ..physics.wind import apparent_wind
 from ..records import Dataset
-from ..signals import ACTUATORS, MOTION, PSI, R, U
-from ._stacked import Scaler, StackedMLP, StackedRuns, generators, hold_error, random_windows, trapezoid_pose, with_valid
+from ..signals import ACTUATORS, MOTION, PSI, R, U, V
+from ._stacked import CHANNELS, Scaler, StackedMLP, generators, hold_error, padded, position_score, random_windows, trapezoid_pose, with_valid
 from .base import History, PredictorBase
 from .physics import Physics
 from .training import Chunk, Recipe, StackedTask, train
@@ -61,7 +61,7 @@ class Residual(nn.Module):
 
 
 class Stage(NamedTuple):
-    """Part of the training: window length [model steps], windows per minibatch, number of minibatches, Adam's step size at its beginning."""
+    """Part of the training: window length [knots], windows per minibatch, number of minibatches."""
 
     steps: int
     batch: int
@@ -69,18 +69,242 @@ class Stage(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """How the training integrates: `stride` samples per knot, `per_knot` midpoint steps of `step` seconds between knots."""
+    """How the training integrates: a knot every `stride` samples, `per_knot` midpoint steps of `step` seconds between knots."""
 
     stride: int
     per_knot: int
     step: float
 
+    @classmethod
+    def of(cls, physics: Physics) -> Grid:
+        """Steps of about a second for 100 m (the time scale of a ship goes with sqrt(L)), never across a change of the inputs that it misses."""
+        if physics.substeps > 1:
+            return cls(1, physics.substeps, physics.dt / physics.substeps)
+        stride = max(1, int(0.1 * np.sqrt(physics.c.L) / physics.dt))
+        return cls(stride, 1, stride * physics.dt)
+
 
 class Drive(NamedTuple):
-    """What is known ahead of the rollout: states at the knots (runs, knots, 10), actuators at beginning and middle of every step
-    (runs, steps, 2, 4), wind (runs, steps, 2) or None, runs of each member."""
+    """What is known ahead of the rollouts of all members' runs.
+
+    Args:
+        S: (runs, knots + 1, 10) measured states.
+        path: (runs, steps, 2, 4) actuators at the beginning and in the middle of every integration step.
+        air: (runs, steps, 2) true wind, or None.
+        counts: runs of each member.
+    """
 
     S: Tensor
     path: Tensor
     air: Tensor | None
     counts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, physics: Sequence[Physics], datasets: Sequence[Dataset], grid: Grid) -> Drive:
+        """Actuators do not depend on the hull's motion, so that their path is known before the rollout."""
+        parts, counts, d = [], [], grid.stride
+        for model, data in zip(physics, datasets, strict=True):
+            batch = data.batch()
+            knots = batch.U.shape[1] // d
+            S = np.concatenate([batch.s0[:, None], batch.truth], axis=1)[:, : knots * d + 1 : d]
+            full = model.actuator_path(batch.s0, batch.U)
+            begin, middle = full[:, 0 : knots * d * grid.per_knot : d, 0], full[:, d // 2 :: d, d % 2][:, : knots * grid.per_knot]
+            air = model._wind(batch.U)
+            wind = np.zeros((len(S), 0, 2)) if air is None else np.repeat(air[:, : knots * d : d], grid.per_knot, axis=1)
+            parts.append((S, np.stack([begin, middle], axis=2), wind))
+            counts.append(len(S))
+        S, path, wind = (torch.as_tensor(np.concatenate(p), dtype=torch.float32) for p in zip(*parts, strict=True))
+        return cls(S, path, wind if wind.shape[1] else None, tuple(counts))
+
+
+def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step: float) -> Tensor:
+    """u, v, r at the ends of the steps by torchdiffeq's midpoint rule (members, batch, steps, 3).
+
+    Args:
+        start: (members, batch, 10).
+        path: (members, batch, steps, 2, 4); air: (members, batch, steps, 2) or None.
+        step: [s].
+    """
+    from torchdiffeq import odeint
+
+    stages = path.permute(2, 3, 4, 0, 1).contiguous()  # time first: one step is then a contiguous block
+    wind = None if air is None else air.permute(2, 3, 0, 1).contiguous()
+
+    def rate(t: Tensor, y: Tensor) -> Tensor:
+        j, half = divmod(round(2.0 * float(t)), 2)  # time in steps: the rule asks at j and j + 1/2
+        u, v, r = y[0], y[1], y[2]
+        psi, now = (None, None) if wind is None else (y[3], (wind[j, 0], wind[j, 1]))
+        rates = model(psi, u, v, r, stages[j, half].unbind(0), now)
+        return step * torch.stack(rates if wind is None else (*rates, r))
+
+    first = start[..., [U, V, R] if wind is None else [U, V, R, PSI]].movedim(-1, 0)
+    times = torch.arange(path.shape[2] + 1, dtype=start.dtype)
+    return odeint(rate, first, times, method="midpoint")[1:, :3].permute(2, 3, 0, 1)  # pyright: ignore[reportIndexIssue, reportCallIssue, reportArgumentType]
+
+
+class _Windows(StackedTask):
+    """Windows from random starts; the score is the mean position error of the validation rollouts over their full length [m]."""
+
+    CHUNK = 20
+
+    def __init__(self, model: Residual, training: Drive, validation: Drive, grid: Grid, stages: Sequence[Stage], draw: Sequence[torch.Generator],
+                 penalty: float) -> None:  # fmt: skip
+        super().__init__()
+        self.model, self.training_runs, self.validation, self.grid, self.stages = model, training, validation, grid, stages
+        self.draw, self.penalty, self.members = draw, penalty, len(training.counts)
+        self.dt = grid.step * grid.per_knot
+        self.scale = {s.steps: hold_error(training.S, training.counts, self.dt, s.steps) for s in stages}
+
+    @property
+    def num_chunks(self) -> int:
+        """How often it is validated."""
+        return 1 + sum(-(-s.minibatches // self.CHUNK) for s in self.stages)
+
+    def chunks(self) -> Iterator[Chunk]:
+        everyone = torch.ones(self.members, dtype=torch.bool)
+        yield Chunk([], everyone)  # the physics as it is: what any training has to beat
+        knots = self.training_runs.S.shape[1] - 1
+        for stage in self.stages:
+            for done in range(0, stage.minibatches, self.CHUNK):
+                size = min(self.CHUNK, stage.minibatches - done)
+                picks = (random_windows(self.training_runs.counts, knots - stage.steps + 1, stage.batch, self.draw) for _ in range(size))
+                yield Chunk([(runs, starts, stage.steps) for runs, starts in picks], everyone)
+
+    def _roll(self, drive: Drive, runs: Tensor, starts: Tensor, steps: int) -> tuple[Tensor, Tensor, Tensor]:
+        """Predicted u, v, r (members, batch, steps, 3) and pose, and the measured states, of windows at `starts` [knots]."""
+        device, fine = self.model.p.device, self.grid.per_knot
+        S = drive.S[runs[..., None], starts[..., None] + torch.arange(steps + 1)].to(device)
+        at = (runs[..., None], starts[..., None] * fine + torch.arange(steps * fine))
+        air = None if drive.air is None else drive.air[at].to(device)
+        path = solve(self.model, S[:, :, 0], drive.path[at].to(device), air, self.grid.step)[:, :, fine - 1 :: fine]
+        return path, trapezoid_pose(S[:, :, 0], path, self.dt), S[:, :, 1:]
+
+    def losses(self, minibatch: tuple[Tensor, Tensor, int]) -> Tensor:
+        velocity, pose, truth = self._roll(self.training_runs, *minibatch)
+        scale = self.scale[minibatch[2]].to(truth.device)[:, None, None]
+        error = ((velocity - truth[..., U : R + 1]) / scale[..., :3]).square().sum(-1)
+        error = error + (pose[..., :2] - truth[..., :2]).square().sum(-1) / scale[..., 3].square() + ((pose[..., 2] - truth[..., 2]) / scale[..., 4]).square()
+        small = self.model.net(self.model.scale_in(truth[:, :, -1, CHANNELS])).square().sum(-1)
+        return error.mean((1, 2)) + self.penalty * small.mean(1)
+
+    def scores(self) -> Tensor:
+        runs, weight = padded(self.validation.counts)
+        _, pose, truth = self._roll(self.validation, runs, torch.zeros_like(runs), self.validation.S.shape[1] - 1)
+        return position_score(pose, truth, weight.to(pose.device))
+
+
+@dataclass
+class NeuralODE(PredictorBase):
+    """Physics plus learned residual accelerations.
+
+    Args:
+        hidden: width of the two hidden layers.
+        lr: Adam's first step size (a cosine takes it to a fiftieth).
+        effort: scales the number of minibatches of every stage.
+        penalty: weight of the squared residual, in units of the accelerations that occur.
+        weight_decay: of AdamW.
+        device: where to train.
+    """
+
+    name: ClassVar[str] = "neural_ode"
+    hidden: int = 32
+    lr: float = 5e-3
+    effort: float = 1.0
+    penalty: float = 1e-4
+    weight_decay: float = 1e-3
+    device: str = "cpu"
+
+    def __post_init__(self) -> None:
+        if self.hidden < 1 or self.effort <= 0:
+            raise ValueError(f"hidden = {self.hidden}, effort = {self.effort}; accepted: hidden 1 or more, effort above 0")
+        self.physics = Physics()
+        self._weights: dict[str, np.ndarray] = {}
+        self.improved = False
+        """Whether validation preferred the trained residual; without it the predictions are the physics' own."""
+
+    def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
+        """Fit the physics on `train` and `valid`, train the residual on `train`; `valid` decides what is kept."""
+        type(self).fit_group([self], [train], [valid], [seed])
+        return self
+
+    def _stages(self, knots: int) -> list[Stage]:
+        """Short windows first, in large batches: cheap, and their gradients are tame; long ones decide."""
+        lengths = ((1, 1024, 400), (10, 384, 200), (40, 128, 200), (100, 64, 40))
+        return [Stage(min(steps, knots), batch, max(1, round(self.effort * number))) for steps, batch, number in lengths]
+
+    @classmethod
+    def fit_group(cls, models: Sequence[NeuralODE], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]) -> None:
+        """Fit the physics of each, then train all residuals as one stacked batch; each comes out as it would alone."""
+        lead = models[0]
+        pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
+        for model, (training, validation), seed in zip(models, pairs, seeds, strict=True):
+            model.inputs = training.inputs
+            model.physics = Physics().fit(training, validation, seed=seed)
+        physics = [m.physics for m in models]
+        grid = Grid.of(physics[0])
+        training, validation = (Drive.of(physics, part, grid) for part in zip(*pairs, strict=True))
+        draw = generators(seeds)
+        scale_in = Scaler.fit([S[..., CHANNELS] for S in training.S.split(training.counts)])
+        residual = Residual(physics, lead.hidden, scale_in, _typical_accelerations(physics, training), draw)
+        task = _Windows(residual, training, validation, grid, lead._stages(training.S.shape[1] - 1), draw, lead.penalty)
+        recipe = Recipe(lr=lead.lr, lr_end=0.02, chunks=task.num_chunks, clip=1.0, weight_decay=lead.weight_decay, device=lead.device)
+        train(task, recipe)
+        state = {k: v.detach().cpu().numpy() for k, v in residual.state_dict().items()}
+        for m, model in enumerate(models):
+            model._weights = {k: v[:, m : m + 1].copy() if k == "p" else v[m : m + 1].copy() for k, v in state.items()}
+            model.improved = bool(np.any(model._weights["net.layers.2.weight"]))
+
+    def _residual(self) -> Residual:
+        """The fitted accelerations of this one member in float64."""
+        w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
+        scale_in = Scaler(w["scale_in.mean"], w["scale_in.std"])
+        model = Residual([self.physics], self.hidden, scale_in, w["scale_out"], generators([0])).double()
+        model.load_state_dict({**w, "p": model.p})
+        return model
+
+    @torch.no_grad()
+    def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
+        if not self._weights:
+            raise InputError("neural_ode: predict was called before fit; fit or load the model first.")
+        base = self.physics
+        if not self.improved:
+            return base._rollout(s0, U, history)
+        model, air = self._residual(), base._wind(U)
+        path = torch.as_tensor(base.actuator_path(s0, U)).permute(1, 2, 3, 0)[:, :, :, None]
+        wind = None if air is None else torch.as_tensor(air).permute(1, 2, 0)[:, :, None]
+        motion = tuple(torch.as_tensor(s0[:, MOTION]).T[:, None])
+        S = np.empty((len(s0), U.shape[1], s0.shape[1]))
+        for j in range(path.shape[0]):
+            k = j // base.substeps
+
+            def acc(psi, u, v, r, stage, j=j, k=k):
+                return model(psi, u, v, r, path[j, stage].unbind(0), None if wind is None else (wind[k, 0], wind[k, 1]))
+
+            motion = rk4_step(motion_rhs(acc), motion, base.dt / base.substeps)
+            S[:, k, MOTION] = torch.cat(motion).T.numpy()
+        S[:, :, ACTUATORS] = path[base.substeps - 1 :: base.substeps, 2, :, 0].permute(2, 0, 1).numpy()
+        return S
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {**{f"physics.{k}": v for k, v in self.physics._arrays().items()}, **self._weights}
+
+    def _meta(self) -> dict[str, Any]:
+        return {"physics": self.physics._meta(), "improved": self.improved}
+
+    def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+        self.physics.inputs = self.inputs
+        self.physics._restore({k[8:]: v for k, v in arrays.items() if k.startswith("physics.")}, meta["physics"])
+        self._weights = {k: v for k, v in arrays.items() if not k.startswith("physics.")}
+        self.improved = bool(meta["improved"])
+
+
+def _typical_accelerations(physics: Sequence[Physics], drive: Drive) -> Tensor:
+    """Root mean square (members, 1, 3) of the physics' accelerations in still air along the measured states."""
+    sizes = []
+    for model, S in zip(physics, drive.S.double().split(drive.counts), strict=True):
+        found = eq2.accelerations(*S[..., CHANNELS].movedim(-1, 0).numpy(), None, model.c, model.p)
+        sizes.append([float(np.sqrt(np.mean(np.square(a)))) for a in found])
+    return torch.tensor(sizes, dtype=torch.float32)[:, None]
+
+
+PREDICTOR = NeuralODE

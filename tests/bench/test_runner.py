@@ -149,7 +149,9 @@ def test_a_failed_fit_gives_a_row_for_every_run_of_the_fold_and_stops_nothing(st
     assert len(outcome.failed) == 5
 
 
-@pytest.mark.parametrize(("model", "reason"), [("FailsToPredict", "predict: KeyError: 'u'"), ("ReturnsS0", "shape (2, 21, 10); accepted: (2, 20, 10)")])
+@pytest.mark.parametrize(
+    ("model", "reason"), [("FailsToPredict", "predict: KeyError: 'u'"), ("ReturnsS0", "shape (2, 21, 10); accepted: (2, 20, 10)")]
+)
 def test_a_failed_or_misshapen_prediction_says_why(study, model, reason):
     rows = study(model).rows
     assert set(rows["status"]) == {"failed"}

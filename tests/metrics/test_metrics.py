@@ -7,7 +7,7 @@ import pytest
 
 from shipbench.errors import InputError
 from shipbench.metrics.base import METRICS
-from shipbench.signals import DELTA, F_B, PSI, R, STATES, U, V, X, Y
+from shipbench.signals import DELTA, F_B, PSI, STATES, R, U, V, X, Y
 
 ALL = ("ed", "edh", "cvdm", "final_displacement", "heading_error", "position_rmse", "signal_rmse")
 

@@ -1,0 +1,125 @@
+"""Free-running tests of a 3 m Esso Osaka model: real, measured runs, read from the user's own copy (CC BY-NC-SA 4.0, not distributed here).
+
+Source: github.com/NAOE-5thLab/FRT-DS-ESSO, Osaka University; Wakita et al. (2022), Miyauchi et al. (2022).
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ..errors import InputError
+from ..records import Dataset, Run
+from ..ship import Propeller, Rudder, Ship, Wind
+from ..signals import COMMANDS, DELTA, N, PSI, R, U, V, X, Y
+from .base import DatasetPart
+
+_COLUMNS = {
+    X: "x_position_mid [m]", Y: "y_position_mid [m]", PSI: "psi_hat [rad]", U: "u_velo [m/s]", V: "vm_velo [m/s]", R: "r_angvelo [rad/s]",
+}  # fmt: skip
+_RPS, _RUDDER = "n_prop [rps]", "delta_rudder [rad]"
+_WIND_SPEED, _WIND_FROM = "wind_velo_true [m/s]", "wind_dir_true [rad]"
+_SAMPLE = 0.1
+_CUT_COPIES = ("turn_cut_14-Sep-2020_15_58_08",)
+"""Files that are the beginning of another file here: left out, so that no sample stands in training and test at once."""
+
+SHIP = Ship(
+    name="esso_osaka_3m", L=3.0, B=0.48925, T=0.20114, mass=244.6, Cb=0.830, xG=0.09357, rho=998.0,
+    propeller=Propeller(diameter=0.084, x=-1.551, pitch_ratio=0.7151, kt=(0.3278, -0.3323, -0.156), wake=0.614, thrust_deduction=0.22),
+    rudder=Rudder(area=0.01063, height=float(np.sqrt(0.01063 * 1.539)), x=-1.5),
+    wind=Wind(frontal_area=0.13544, lateral_area=0.52038),
+)  # fmt: skip
+"""Particulars and open-water propeller data that the source gives; Izz alone is not given there."""
+
+
+def find_copy(path: str | None = None) -> Path:
+    """Folder of the user's copy: `path`, else the environment variable SHIPBENCH_ESSO_OSAKA, else ../shared/data/esso-osaka-frt.
+
+    Raises:
+        InputError: there is none.
+    """
+    shared = Path("..", "shared", "data", "esso-osaka-frt")
+    named = path or os.environ.get("SHIPBENCH_ESSO_OSAKA")
+    candidates = [Path(named)] if named else [shared, Path(__file__).resolve().parents[2] / shared]
+    for folder in candidates:
+        if (folder / "runs.csv").is_file():
+            return folder
+    raise InputError(
+        f"no Esso Osaka data in {', '.join(map(str, candidates))} (a folder with runs.csv and the folders turning, zigzag, random, berthing). The data are public, "
+        "for non-commercial use: github.com/NAOE-5thLab/FRT-DS-ESSO. Name your copy: --dataset 'esso_osaka[path=FOLDER]' or SHIPBENCH_ESSO_OSAKA=FOLDER."
+    )
+
+
+def make(path: str | None = None, dt: float = 0.5, wind: bool = True) -> Dataset:
+    """Read and convert all runs.
+
+    Args:
+        path: folder of the copy.
+        dt: sample time [s], a multiple of the files' 0.1 s. States are the samples at t_k; commands and wind are means over [t_k, t_k+1), which keeps
+            their impulse.
+        wind: give the measured true wind as inputs, or withhold it.
+
+    Raises:
+        InputError: no copy, an unknown layout, or a dt that is no multiple of 0.1 s.
+    """
+    every = round(dt / _SAMPLE)
+    if every < 1 or abs(every * _SAMPLE - dt) > 1e-9:
+        raise InputError(f"esso_osaka: dt = {dt:g} s; the files are sampled at 0.1 s, so dt must be a positive multiple of 0.1 s.")
+    folder = find_copy(path)
+    index = pd.read_csv(folder / "runs.csv")
+    runs = []
+    for row in index.itertuples():
+        stem = Path(str(row.file)).name.removesuffix(".csv.gz")
+        if stem in _CUT_COPIES:
+            continue
+        runs.append(_read_run(folder / str(row.file), stem, every, wind, str(row.kind), "test" in str(row.wakita2022)))
+    return Dataset(
+        name="esso_osaka" if wind else "esso_osaka_no_wind", ship=SHIP, dt=every * _SAMPLE, runs=tuple(runs), actuators="commanded",
+        source="github.com/NAOE-5thLab/FRT-DS-ESSO, Osaka University (Wakita et al. 2022; Miyauchi et al. 2022)", licence="CC BY-NC-SA 4.0",
+        notes=(
+            "n and delta are commands, not measured positions; the thrusters are not recorded: taken as zero",
+            "the published u and v lag the position by about 0.6 s (the source's own filter); they are used as published",
+        ),
+    )  # fmt: skip
+
+
+def _read_run(file: Path, stem: str, every: int, wind: bool, kind: str, test: bool) -> Run:
+    try:
+        table = pd.read_csv(file)
+        raw = table[["t [s]", *_COLUMNS.values(), _RPS, _RUDDER, _WIND_SPEED, _WIND_FROM]].to_numpy(float)
+    except (OSError, ValueError, KeyError, EOFError) as error:
+        raise InputError(f"{file} cannot be read: {' '.join(str(error).split())[:160]}. Take a fresh copy of the public data.") from None
+    raw = raw[: int(np.isfinite(raw).all(axis=1).cumprod().sum())]  # one file ends in rows of NaN
+    samples = (len(raw) - 1) // every + 1
+    at = np.arange(samples) * every
+    starts = np.minimum(at, len(raw) - 1)
+
+    def held(values: np.ndarray) -> np.ndarray:
+        """Mean over [t_k, t_k+1) of each column; the last interval may be short."""
+        sums = np.add.reduceat(values, starts, axis=0)
+        return sums / np.diff([*starts, len(raw)])[:, None]
+
+    inputs = np.zeros((samples, len(COMMANDS)))
+    inputs[:, :2] = held(raw[:, 7:9] * [60.0, 1.0])
+    states = np.zeros((samples, 10))
+    raw[:, 1 + list(_COLUMNS).index(PSI)] = np.unwrap(raw[:, 1 + list(_COLUMNS).index(PSI)])
+    states[:, list(_COLUMNS)] = raw[at, 1:7]
+    # The actuator "state" at t_k is the command that was in force just before, so that S[:, k] repeats U[:, k].
+    states[1:, [N, DELTA]] = inputs[:-1, :2]
+    states[0, [N, DELTA]] = inputs[0, :2]
+    names: tuple[str, ...] = COMMANDS
+    if wind:
+        vector = held(raw[:, [9]] * np.column_stack([np.cos(raw[:, 10]), np.sin(raw[:, 10])]))
+        inputs = np.column_stack([inputs, np.hypot(*vector.T), np.unwrap(np.arctan2(vector[:, 1], vector[:, 0]))])
+        names = (*COMMANDS, "wind_speed", "wind_from")
+    t = raw[0, 0] + np.arange(samples) * every * _SAMPLE
+    # Files of one log carry its time stamp and a number: they stay in one fold.
+    head, _, last = stem.rpartition("_")
+    group = head if kind == "random" and len(last) == 1 else stem.replace("_cut", "")
+    return Run(stem, t, states, inputs, names, {"manoeuvre": kind, "group": group, "split": "test" if test else "train"})
+
+
+DATASET = DatasetPart("esso_osaka", "measured free-running tests of a 3 m tanker model in wind (your own copy)", "CC BY-NC-SA 4.0", make, cached=False)

@@ -1,0 +1,30 @@
+"""Progress: lines with the remaining time, silence when quiet."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from shipbench.bench.progress import Lines, Silent, duration, make_progress
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0.4, "0 s"), (59.2, "59 s"), (185, "3 min 05 s"), (4330, "1 h 12 min")])
+def test_durations_read_naturally(seconds, text):
+    assert duration(seconds) == text
+
+
+def test_lines_count_and_tell_the_remaining_time(monkeypatch):
+    clock = iter([0.0, 0.0, 10.0, 20.0])
+    monkeypatch.setattr("shipbench.bench.progress.time.monotonic", lambda: next(clock))
+    stream = io.StringIO()
+    lines = Lines(stream)
+    lines.start(3)
+    lines.done("a", "ok")
+    lines.done("b", "failed, 1 of 2 runs: no")
+    assert stream.getvalue().splitlines() == ["   [1/3] a: ok; about 20 s left", "   [2/3] b: failed, 1 of 2 runs: no; about 10 s left"]
+
+
+def test_quiet_means_silent_and_a_pipe_gets_lines():
+    assert isinstance(make_progress(quiet=True), Silent)
+    assert isinstance(make_progress(), Lines)

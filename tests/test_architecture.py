@@ -1,0 +1,62 @@
+"""The house: imports go one way, files and functions stay short, nothing heavy is imported for `--help`."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent / "shipbench"
+FILES = sorted(ROOT.rglob("*.py"))
+
+LAYERS = {
+    "errors": 0, "ops": 0, "signals": 0, "registry": 1, "specs": 1, "integrate": 1, "ship": 1, "records": 2, "physics": 2, "metrics": 2.5, "simulate": 3,
+    "predictors": 3.5, "data": 4, "bench": 5, "cli": 6, "__init__": 7,
+}  # fmt: skip
+
+
+def _part(path: Path) -> str:
+    relative = path.relative_to(ROOT)
+    return relative.parts[0] if len(relative.parts) > 1 else relative.stem
+
+
+def _imports(path: Path) -> set[str]:
+    """First-level parts of shipbench that a module imports, also inside functions."""
+    here = ["shipbench", *path.relative_to(ROOT).with_suffix("").parts]
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            base = here[: -node.level] if node.level else []
+            module = [*base, *(node.module or "").split(".")] if node.level else (node.module or "").split(".")
+            module = [m for m in module if m]
+            if module[:1] == ["shipbench"]:
+                found |= {module[1]} if len(module) > 1 else {alias.name for alias in node.names}
+    return found
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_a_module_imports_only_from_lower_layers(path: Path):
+    part = _part(path)
+    for other in _imports(path) - {part}:
+        assert LAYERS[other] < LAYERS[part], f"{path.relative_to(ROOT)} ({part}) imports {other}, which stands no lower"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_files_and_functions_stay_readable(path: Path):
+    text = path.read_text()
+    assert len(text.splitlines()) <= 350
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef):
+            assert (node.end_lineno or 0) - node.lineno <= 70, f"{node.name} is too long"
+
+
+def test_listing_and_help_import_no_heavy_library():
+    code = (
+        "import sys; from shipbench import cli; from shipbench.predictors.base import PREDICTORS; assert 'lstm' in PREDICTORS.names();"
+        "heavy = {'torch', 'casadi', 'matplotlib', 'lightning', 'pandas', 'scipy'} & set(sys.modules); sys.exit(', '.join(sorted(heavy)) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
