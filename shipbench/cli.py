@@ -283,6 +283,20 @@ def data_check(dataset: DatasetArgument, as_json: Json = False) -> None:
             typer.echo(f"{key + ':':<13s}{line}")
 
 
+@data_app.command("describe")
+def data_describe(dataset: DatasetArgument, as_json: Json = False) -> None:
+    """Print a data set's statistics (beside the paper's Table II)."""
+    from .bench.listing import describe_tables
+    from .data.base import load_dataset
+
+    tables = describe_tables(load_dataset(dataset))
+    if as_json:
+        _print_json([table.as_json() for table in tables])
+        return
+    for table in tables:
+        table.show(_console())
+
+
 def main() -> None:
     """Entry point of the `shipbench` command."""
     app()

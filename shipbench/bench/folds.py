@@ -39,6 +39,10 @@ def select_runs(dataset: Dataset, task: Task) -> tuple[Dataset, tuple[str, ...]]
     if task.max_runs is not None and len(usable) > task.max_runs:
         notes.append(f"max_runs = {task.max_runs}: {task.max_runs} of {len(usable)} runs are used, evenly spread")
         usable = [usable[i] for i in np.linspace(0, len(usable) - 1, task.max_runs).round().astype(int)]
+    if task.split == "published":
+        sides = {side: {group_of(r) for r in usable if r.meta.get("split") == side} for side in ("train", "test")}
+        for group in sorted(sides["train"] & sides["test"]):
+            notes.append(f"the published split has pieces of '{group}' both in training and in test")
     return dataset.with_runs(usable), tuple(notes)
 
 

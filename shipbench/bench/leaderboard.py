@@ -6,14 +6,11 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import InputError
-from .results import PROTOCOL, STATUSES, Results
+from .results import PROTOCOL, STATUSES, Frame, Results
 from .tables import Table, TableColumn, display_unit, number, significant
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 TABLE_III = ("ed", "edh", "cvdm")
 STATISTICS = ("mean", "median", "std", "iqr")
@@ -73,7 +70,7 @@ def build_board(results: Results, dataset: str) -> Board:
     return Board(dataset, models, tables, _head(rows, summaries))
 
 
-def _refuse_mixtures(rows: pd.DataFrame, summaries: list[dict[str, Any]], dataset: str) -> None:
+def _refuse_mixtures(rows: Frame, summaries: list[dict[str, Any]], dataset: str) -> None:
     for column, what in (("protocol", "protocol versions"), ("fingerprint", "data (fingerprints)"), ("task", "tasks")):
         found = sorted(rows[column].unique().tolist())
         if len(found) > 1:
@@ -90,7 +87,7 @@ def _refuse_mixtures(rows: pd.DataFrame, summaries: list[dict[str, Any]], datase
         )
 
 
-def _shares(rows: pd.DataFrame) -> dict[str, tuple[int, int]]:
+def _shares(rows: Frame) -> dict[str, tuple[int, int]]:
     """Model -> (scored rows, expected rows): every window that any model was given, times the model's seeds."""
     windows = len(rows[["fold", "run"]].drop_duplicates())
     return {
@@ -99,7 +96,7 @@ def _shares(rows: pd.DataFrame) -> dict[str, tuple[int, int]]:
     }
 
 
-def _fold_means(rows: pd.DataFrame, column: str) -> pd.DataFrame:
+def _fold_means(rows: Frame, column: str) -> Frame:
     """By model: statistics over the runs of a fold, then their mean over folds and seeds (sigma: n - 1; IQR: linear quantiles)."""
     scored = rows[rows["status"] == "ok"].groupby(["model", "fold", "seed"])[column]
     quartiles = scored.quantile([0.25, 0.75]).unstack()
@@ -108,11 +105,11 @@ def _fold_means(rows: pd.DataFrame, column: str) -> pd.DataFrame:
     return statistics.groupby("model").mean()
 
 
-def _value(statistics: pd.DataFrame, model: str, statistic: str, factor: float = 1.0) -> float:
-    return float(statistics.loc[model, statistic]) * factor if model in statistics.index else float("nan")  # pyright: ignore[reportArgumentType]
+def _value(statistics: Frame, model: str, statistic: str, factor: float = 1.0) -> float:
+    return float(statistics.loc[model, statistic]) * factor if model in statistics.index else float("nan")
 
 
-def _rank(rows: pd.DataFrame) -> list[str]:
+def _rank(rows: Frame) -> list[str]:
     """Models by mean ED; those with a run that is not scored come after all that have none."""
     shares, means = _shares(rows), _fold_means(rows, "ed")
 
@@ -127,7 +124,7 @@ def _runs_text(share: tuple[int, int]) -> str:
     return f"{share[0]}/{share[1]}"
 
 
-def _table_iii(rows: pd.DataFrame, models: list[str], columns: dict[str, Any], dataset: str) -> Table:
+def _table_iii(rows: Frame, models: list[str], columns: dict[str, Any], dataset: str) -> Table:
     metrics = [m for m in TABLE_III if m in columns]
     statistics = {m: _fold_means(rows, m) for m in metrics}
     shares = _shares(rows)
@@ -159,7 +156,7 @@ def _table_iii(rows: pd.DataFrame, models: list[str], columns: dict[str, Any], d
     return Table("Errors over the horizon (layout of the paper's Table III)", head + figures, lines, notes)
 
 
-def _claim(rows: pd.DataFrame) -> Table:
+def _claim(rows: Frame) -> Table:
     """How far `physics` lies below `mlp`, beside the paper's two rows."""
     here: dict[str, Any] = {"where": "here"}
     there: dict[str, Any] = {"where": "paper", "_reference": True}
@@ -174,7 +171,7 @@ def _claim(rows: pd.DataFrame) -> Table:
     return Table("`physics` below `mlp`, in percent", columns, [here, there])
 
 
-def _mean_table(title: str, rows: pd.DataFrame, models: list[str], chosen: list[dict[str, Any]], notes: Sequence[str] = ()) -> Table:
+def _mean_table(title: str, rows: Frame, models: list[str], chosen: list[dict[str, Any]], notes: Sequence[str] = ()) -> Table:
     """Mean over folds of the fold means of the `chosen` columns, in units that people read."""
     means = {c["name"]: _fold_means(rows, c["name"]) for c in chosen}
     units = {c["name"]: display_unit(c["unit"]) for c in chosen}
@@ -183,20 +180,20 @@ def _mean_table(title: str, rows: pd.DataFrame, models: list[str], chosen: list[
     return Table(title, [TableColumn("model", "model"), *figures], lines, notes)
 
 
-def _horizon_table(rows: pd.DataFrame, models: list[str], columns: dict[str, Any]) -> Table:
+def _horizon_table(rows: Frame, models: list[str], columns: dict[str, Any]) -> Table:
     at_times = [c for n, c in columns.items() if n.startswith("ed_at_")]
     chosen = at_times + [columns[n] for n in _WHOLE_RUN if n in columns]
     note = "Mean over runs and folds. `ED at t` is the position error at that time; heading error is the mean of |dpsi| over the run."
     return _mean_table("Error against horizon", rows, models, chosen, [note])
 
 
-def _signal_table(rows: pd.DataFrame, models: list[str], columns: dict[str, Any]) -> Table:
+def _signal_table(rows: Frame, models: list[str], columns: dict[str, Any]) -> Table:
     rest = [c for n, c in columns.items() if n not in (*TABLE_III, *_WHOLE_RUN) and not n.startswith("ed_at_")]
     note = "Mean over runs and folds of the root mean square over the run, each in its own unit."
     return _mean_table("Error of each signal", rows, models, rest, [note])
 
 
-def _kind_table(rows: pd.DataFrame, models: list[str], columns: dict[str, Any]) -> Table:
+def _kind_table(rows: Frame, models: list[str], columns: dict[str, Any]) -> Table:
     """Mean over the windows of each kind of manoeuvre."""
     metric = columns.get("position_rmse", columns["ed"])
     scored = rows[rows["status"] == "ok"]
@@ -210,7 +207,7 @@ def _kind_table(rows: pd.DataFrame, models: list[str], columns: dict[str, Any]) 
     return Table(title, [TableColumn("model", "model"), *figures], lines, [note])
 
 
-def _status_table(rows: pd.DataFrame, models: list[str]) -> Table:
+def _status_table(rows: Frame, models: list[str]) -> Table:
     lines, notes = [], []
     for model in models:
         part = rows[rows["model"] == model]
@@ -237,10 +234,11 @@ def _code_text(code: dict[str, str]) -> str:
     return f"shipbench {code['shipbench']} (source {code['source']}{', git ' + code['git'] if code['git'] else ''})"
 
 
-def _head(rows: pd.DataFrame, summaries: list[dict[str, Any]]) -> list[str]:
+def _head(rows: Frame, summaries: list[dict[str, Any]]) -> list[str]:
     """Lines that identify the experiment."""
     first = summaries[0]
-    task, runs = first["task"], len(rows[["fold", "run"]].drop_duplicates())
+    task, scored, runs = first["task"], len(rows[["fold", "run"]].drop_duplicates()), rows["parent"].nunique()
+    windows = f"{scored} runs" if scored == runs else f"{scored} windows (from {runs} runs)"
     split = "published split" if task["split"] == "published" else f"{rows['fold'].nunique()} folds by run"
     seeds = ", ".join(str(s) for s in sorted(rows["seed"].unique()))
     codes = dict.fromkeys(_code_text(s["code"]) for s in summaries)
@@ -249,7 +247,7 @@ def _head(rows: pd.DataFrame, summaries: list[dict[str, Any]]) -> list[str]:
     notes = dict.fromkeys(note for s in summaries for note in s["notes"])
     history = f", {task['history_s']:g} s of history" if task["history_s"] else ""
     return [
-        f"{runs} runs of {task['horizon_s']:g} s{history}, {split}, seed(s) {seeds}; "
+        f"{windows} of {task['horizon_s']:g} s{history}, {split}, seed(s) {seeds}; "
         f"ship {first['ship']} (L = {first['ship_L']:g} m), dt = {first['dt']:g} s.",
         f"Data fingerprint `{first['fingerprint']}`, task `{first['task_key']}`, protocol {first['protocol']}.",
         f"Made {max(s['finished'] for s in summaries)[:10]} with {'; '.join(codes)} on {'; '.join(machines)}.",

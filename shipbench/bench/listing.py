@@ -11,6 +11,8 @@ from typing import Any
 from ..records import Dataset
 from ..registry import Registry
 from ..ship import complete
+from .leaderboard import PAPER_DATASET
+from .tables import Table, TableColumn, number, significant
 
 
 def describe_parts(registry: Registry) -> list[dict[str, Any]]:
@@ -95,3 +97,22 @@ def dataset_facts(dataset: Dataset) -> dict[str, Any]:
         "fingerprint": dataset.fingerprint,
         "note": [*dataset.notes, *(f"ship: {note}" for note in complete(dataset.ship).notes)] or ["none"],
     }
+
+
+def describe_tables(dataset: Dataset) -> list[Table]:
+    """Statistics of every signal; for the harbour sets, which imitate the paper's data, also its Table II and the differences."""
+    from ..data.describe import STATISTICS, actuator_use, compare_with_paper, statistics, table_ii
+
+    def rows(frame: Any) -> list[dict[str, Any]]:
+        return [{"signal": name, **row} for name, row in frame.to_dict(orient="index").items()]
+
+    layout = [TableColumn("signal", "signal"), TableColumn("unit", "unit"), *[TableColumn(s, s, significant(4)) for s in STATISTICS]]
+    used = ", ".join(f"{name} {100 * share:.1f} %" for name, share in actuator_use(dataset).items())
+    tables = [Table(f"{dataset.name}: all samples", layout, rows(statistics(dataset)), [f"Share of samples with a command other than zero: {used}."])]
+    if dataset.name.startswith(PAPER_DATASET):
+        compared = [TableColumn("signal", "signal"), TableColumn("", "statistic"), TableColumn("unit", "unit")]
+        compared += [TableColumn("here", "ours", significant(3)), TableColumn("paper", "paper", significant(3))]
+        compared += [TableColumn("difference / paper's std", "difference / paper std", number(2))]
+        tables.append(Table("The paper's Table II", layout, rows(table_ii())))
+        tables.append(Table("Here against the paper", compared, compare_with_paper(dataset).to_dict(orient="records")))
+    return tables

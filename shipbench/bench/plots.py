@@ -14,7 +14,7 @@ import numpy as np
 
 from ..metrics.ed import ed
 from ..signals import PSI, X, Y
-from .results import Cell, Results, read_predictions, read_truth
+from .results import Cell, Frame, Results, read_predictions, read_truth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -104,7 +104,7 @@ def draw_all(results: Results, dataset: str, ranking: Sequence[str], folder: Pat
     ]
 
 
-def choose_runs(rows: Any, models: Sequence[str]) -> dict[str, str]:
+def choose_runs(rows: Frame, models: Sequence[str]) -> dict[str, str]:
     """A good, a median and a bad run: the 10, 50 and 90 % points of the models' median ED (floor and ceiling left out)."""
     compared = [m for m in models if m not in ("hold", "oracle")] or list(models)
     scored = rows[(rows["status"] == "ok") & rows["model"].isin(compared)]
@@ -177,7 +177,7 @@ def _readable_limits(axis: Axes, groups: Sequence[np.ndarray]) -> None:
         axis.set_ylim(bottom=0)
 
 
-def boxes(rows: Any, models: Sequence[str], summary: dict[str, Any]) -> Figure:
+def boxes(rows: Frame, models: Sequence[str], summary: dict[str, Any]) -> Figure:
     """Box plots of the per-run ED, EDH and cVDM (the paper's fig. 2): quartiles, whiskers at 5 and 95 %, mean as a diamond."""
     columns = [c for c in summary["columns"] if c["name"] in ("ed", "edh", "cvdm")]
     figure = _new_figure(4.6 * len(columns), 4.6)
@@ -208,7 +208,7 @@ def against_horizon(results: Results, dataset: str, models: Sequence[str], dt: f
     figure = _new_figure(8.6, 5.4)
     axis = figure.subplots()
     styles = _style(models)
-    ends = []
+    ends, last = [], 0.0
     for model in models:
         errors = np.concatenate([ed(true=c.truth[c.ok], pred=c.S[c.ok]) for c in _predictions(results, dataset, model)])
         low, middle, high = np.quantile(errors, [0.25, 0.5, 0.75], axis=0)
@@ -216,8 +216,9 @@ def against_horizon(results: Results, dataset: str, models: Sequence[str], dt: f
         axis.plot(t, middle, lw=2, label=f"{short_name(model)} ({middle[-1]:.3g} m at the end)", **styles[model])
         axis.fill_between(t, low, high, color=styles[model]["color"], alpha=0.13, lw=0)
         ends.append(errors[:, -1])
+        last = max(last, float(t[-1]))
     _readable_limits(axis, ends)
-    axis.set_xlim(0, max(line.get_xdata()[-1] for line in axis.lines))
+    axis.set_xlim(0, last)
     axis.set_xlabel("time after the start t [s]")
     axis.set_ylabel("position error ED [m]")
     axis.grid(alpha=0.25, which="both" if axis.get_yscale() == "log" else "major")

@@ -84,7 +84,7 @@ class Bar:
 
     def done(self, label: str, outcome: str) -> None:
         self.progress.advance(self.bar)
-        if "ok" not in outcome.split():
+        if not outcome.startswith("ok"):
             self.progress.console.print(f"{label}: {outcome}", highlight=False, markup=False)
 
     def finish(self) -> None:

@@ -17,7 +17,7 @@ import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,11 +25,11 @@ from ..errors import InputError
 from ..records import Batch
 from .scoring import measure
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 PROTOCOL = 1
 """Version of what a score means. A change that moves a published score raises it; rows of different protocols are never ranked together."""
+
+Frame = Any
+"""A pandas DataFrame. pandas' own annotations are unions of all that a method can return, which no checker can follow."""
 
 STATUSES = ("ok", "diverged", "failed", "skipped")
 
@@ -68,7 +68,7 @@ def write_json(path: Path, data: Any) -> None:
     os.replace(part, path)
 
 
-def write_rows(path: Path, rows: pd.DataFrame) -> None:
+def write_rows(path: Path, rows: Frame) -> None:
     """Write parquet in one step."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
@@ -100,7 +100,7 @@ def read_predictions(out: Path, cell: Cell) -> np.ndarray | None:
         return file["S"]
 
 
-def write_cell(out: Path, cell: Cell, rows: pd.DataFrame, summary: dict[str, Any], S: np.ndarray | None, model: Any = None) -> None:
+def write_cell(out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, model: Any = None) -> None:
     """Write a finished cell: into a hidden folder first, then renamed into place (an older one is replaced).
 
     The fitted `model` is saved where it can be; a foreign model's own failure to save or describe itself is noted in the summary.
@@ -141,7 +141,7 @@ def read_summary(out: Path, cell: Cell) -> dict[str, Any] | None:
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
-def assemble(out: Path, cells: Iterable[Cell]) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
+def assemble(out: Path, cells: Iterable[Cell]) -> tuple[Frame, list[dict[str, Any]]]:
     """Gather the finished cells of a study into `rows.parquet` and `summary.json`, and return both."""
     import pandas as pd
 
@@ -158,7 +158,7 @@ def assemble(out: Path, cells: Iterable[Cell]) -> tuple[pd.DataFrame, list[dict[
 class Results:
     """Rows and summaries of one or more studies; `sources` are their folders, one per summary."""
 
-    rows: pd.DataFrame
+    rows: Frame
     summaries: list[dict[str, Any]]
     sources: list[Path]
 

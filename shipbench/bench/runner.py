@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, is_dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,12 +21,9 @@ from ..specs import Spec, parse_spec
 from .folds import Fold, make_folds, select_runs
 from .progress import Progress, Silent
 from .provenance import code_version, machine
-from .results import PROTOCOL, Cell, assemble, read_summary, write_cell, write_json, write_truth
+from .results import PROTOCOL, Cell, Frame, assemble, read_summary, write_cell, write_json, write_truth
 from .scoring import columns, divergence, measure
 from .task import Task
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +31,7 @@ class Outcome:
     """What a study left: its folder, the rows, the summaries of its cells, and the cells that failed with their reasons."""
 
     out: Path
-    rows: pd.DataFrame
+    rows: Frame
     summaries: list[dict[str, Any]]
     failed: list[str]
 
@@ -198,7 +195,7 @@ def _one_line(error: Exception) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Record:
-    rows: pd.DataFrame
+    rows: Frame
     summary: dict[str, Any]
     S: np.ndarray | None
 
@@ -237,7 +234,7 @@ def _score(study: _Study, spec: Spec, cell: Cell, fitted: _Fitted) -> _Record:
     return _Record(rows, _summary(study, spec, cell, fitted, times) | {"status": status, "reason": reason, "run_status": statuses}, S)
 
 
-def _rows(study: _Study, cell: Cell, statuses: list[str], reasons: list[str], values: dict[str, np.ndarray], times: dict[str, float]) -> pd.DataFrame:
+def _rows(study: _Study, cell: Cell, statuses: list[str], reasons: list[str], values: dict[str, np.ndarray], times: dict[str, float]) -> Frame:
     import pandas as pd
 
     runs = study.folds[cell.fold].test.runs

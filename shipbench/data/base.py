@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import inspect
 import json
 import logging
 import os
@@ -43,46 +45,65 @@ def cache_folder() -> Path:
     return Path(os.environ.get("SHIPBENCH_CACHE") or Path.home() / ".cache" / "shipbench")
 
 
-def load_dataset(spec: str, *, remake: bool = False) -> Dataset:
+def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
     """A data set by registered name, `name[key=value]`, or the path of a folder in the contract's format.
 
     Args:
         spec: name or folder; a folder is recognised by its dataset.toml.
         remake: make a cached set anew.
+        options: parameters of a registered set, beside those in the brackets.
 
     Raises:
         InputError: neither a known name nor a data set's folder, an unknown parameter, or faulty files.
     """
     folder = Path(spec)
     if (folder / "dataset.toml").is_file():
+        if options:
+            raise InputError(f"{folder} is a folder of files and takes no parameters; given: {', '.join(options)}.")
         return read_dataset(folder)
     if folder.is_dir():
-        raise InputError(f"folder {folder} holds no dataset.toml; a data set has trajectories.csv (or .csv.gz, .parquet), dataset.toml and ship.toml.")
+        files = "trajectories.csv (or .csv.gz, .parquet), dataset.toml and ship.toml"
+        raise InputError(f"folder {folder} holds no dataset.toml; a data set has {files}.")
     parsed = parse_spec(spec)
     if parsed.name not in DATASETS.names():
         more = " (nor is it a folder)" if os.sep in spec else ""
         raise unknown_name(f"data set{more}", parsed.name, DATASETS.names())
+    if parsed.effects or parsed.path is not None:
+        raise InputError(f"data set '{spec}': accepted: name, name[key=value,...] or a folder; effects (+name) belong to models.")
     part: DatasetPart = DATASETS.get(parsed.name)
+    params = parsed.params | options
+    _check_params(part, params)
     if not part.cached:
-        return _make(part, parsed.params)
-    folder = cache_folder() / _cache_key(part, parsed.params)
+        return _make(part, params)
+    folder = cache_folder() / _cache_key(part, params)
     if not remake and (found := _from_cache(folder)) is not None:
         return found
-    dataset = _make(part, parsed.params)
+    dataset = _make(part, params)
     _to_cache(dataset, folder)
     return dataset
+
+
+def _check_params(part: DatasetPart, params: dict[str, Any]) -> None:
+    accepted = inspect.signature(part.make).parameters
+    if not any(p.kind is p.VAR_KEYWORD for p in accepted.values()):
+        for key in params.keys() - accepted.keys():
+            raise unknown_name(f"parameter of data set '{part.name}'", key, accepted)
 
 
 def _make(part: DatasetPart, params: dict[str, Any]) -> Dataset:
     try:
         return part.make(**params)
-    except TypeError as error:
-        raise InputError(f"data set '{part.name}': {error}. Parameters are written name[key=value].") from None
+    except (TypeError, ValueError) as error:
+        if not params:  # then it is no fault of the user's
+            raise
+        given = ", ".join(f"{k}={v}" for k, v in params.items())
+        raise InputError(f"data set '{part.name}' cannot be made with {given}: {error}. Parameters are written name[key=value].") from error
 
 
 def _cache_key(part: DatasetPart, params: dict[str, Any]) -> str:
-    text = "".join(c if c.isalnum() else "-" for c in json.dumps(params, sort_keys=True)).strip("-")
-    return "-".join(filter(None, (part.name, f"v{part.version}", text)))
+    """Folder name; the digest keeps apart what any readable form of the parameters might confuse."""
+    text = json.dumps(params, sort_keys=True, default=str)
+    return "-".join((part.name, f"v{part.version}", *([hashlib.sha256(text.encode()).hexdigest()[:12]] if params else [])))
 
 
 def _from_cache(folder: Path) -> Dataset | None:
@@ -92,7 +113,7 @@ def _from_cache(folder: Path) -> Dataset | None:
     try:
         dataset = read_dataset(folder)
         promised = (folder / "fingerprint.txt").read_text().strip()
-    except (ShipbenchError, OSError) as error:
+    except (ShipbenchError, OSError, ValueError) as error:
         _log.warning("the cached data set %s cannot be read (%s); it is made anew", folder, error)
         return None
     if dataset.fingerprint != promised:
@@ -103,6 +124,7 @@ def _from_cache(folder: Path) -> Dataset | None:
 
 def _to_cache(dataset: Dataset, folder: Path) -> None:
     """Write beside the cache, then move: a reader sees a whole data set or none. A cache that cannot be written costs time, not results."""
+    fresh: Path | None = None
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         fresh = Path(tempfile.mkdtemp(prefix=".making-", dir=folder.parent))
@@ -110,5 +132,7 @@ def _to_cache(dataset: Dataset, folder: Path) -> None:
         (fresh / "fingerprint.txt").write_text(dataset.fingerprint)
         shutil.rmtree(folder, ignore_errors=True)
         os.replace(fresh, folder)
-    except OSError as error:
+    except (ShipbenchError, OSError) as error:
         _log.warning("the data set '%s' cannot be kept in %s (%s); it will be made again next time", dataset.name, folder.parent, error)
+        if fresh is not None:
+            shutil.rmtree(fresh, ignore_errors=True)

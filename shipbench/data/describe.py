@@ -47,8 +47,8 @@ def table_ii() -> pd.DataFrame:
 def compare_with_paper(dataset: Dataset) -> pd.DataFrame:
     """Mean, std, P10 and P90 of u, v, r, n, delta: ours, the paper's, and the difference as a share of the paper's std.
 
-    The paper prints r with two decimals: its 0.01 stands for anything from 0.005 to 0.015 rad/s. For r the difference is taken to the nearest figure that rounds to
-    the printed one, and the std is taken as 0.01.
+    The paper prints r with two decimals: its 0.01 stands for anything from 0.005 to 0.015 rad/s. For r the difference is taken to the nearest
+    figure that rounds to the printed one, and the std is taken as 0.01.
     """
     ours, paper, rows = statistics(dataset), table_ii(), []
     for signal in COMPARED:

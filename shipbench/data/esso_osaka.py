@@ -5,7 +5,9 @@ Source: github.com/NAOE-5thLab/FRT-DS-ESSO, Osaka University; Wakita et al. (202
 
 from __future__ import annotations
 
+import math
 import os
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,7 @@ import pandas as pd
 from ..errors import InputError
 from ..records import Dataset, Run
 from ..ship import Propeller, Rudder, Ship, Wind
-from ..signals import COMMANDS, DELTA, N, PSI, R, U, V, X, Y
+from ..signals import COMMANDS, DELTA, PSI, N, R, U, V, X, Y
 from .base import DatasetPart
 
 _COLUMNS = {
@@ -48,8 +50,9 @@ def find_copy(path: str | None = None) -> Path:
         if (folder / "runs.csv").is_file():
             return folder
     raise InputError(
-        f"no Esso Osaka data in {', '.join(map(str, candidates))} (a folder with runs.csv and the folders turning, zigzag, random, berthing). The data are public, "
-        "for non-commercial use: github.com/NAOE-5thLab/FRT-DS-ESSO. Name your copy: --dataset 'esso_osaka[path=FOLDER]' or SHIPBENCH_ESSO_OSAKA=FOLDER."
+        f"no Esso Osaka data in {', '.join(map(str, candidates))} (a folder with runs.csv and the folders turning, zigzag, random, berthing). "
+        "The data are public, for non-commercial use: github.com/NAOE-5thLab/FRT-DS-ESSO. "
+        "Name your copy: --dataset 'esso_osaka[path=FOLDER]' or SHIPBENCH_ESSO_OSAKA=FOLDER."
     )
 
 
@@ -63,13 +66,20 @@ def make(path: str | None = None, dt: float = 0.5, wind: bool = True) -> Dataset
         wind: give the measured true wind as inputs, or withhold it.
 
     Raises:
-        InputError: no copy, an unknown layout, or a dt that is no multiple of 0.1 s.
+        InputError: no copy, an unknown layout, a dt that is no multiple of 0.1 s, or a `wind` that is neither true nor false.
     """
-    every = round(dt / _SAMPLE)
+    if not isinstance(wind, bool):  # the text "False" would count as yes
+        raise InputError(f"esso_osaka: wind = {wind!r}; accepted: true or false, as in 'esso_osaka[wind=false]'.")
+    number = isinstance(dt, (int, float)) and not isinstance(dt, bool) and math.isfinite(dt)
+    every = round(dt / _SAMPLE) if number else 0
     if every < 1 or abs(every * _SAMPLE - dt) > 1e-9:
-        raise InputError(f"esso_osaka: dt = {dt:g} s; the files are sampled at 0.1 s, so dt must be a positive multiple of 0.1 s.")
-    folder = find_copy(path)
-    index = pd.read_csv(folder / "runs.csv")
+        raise InputError(f"esso_osaka: dt = {dt!r} s; the files are sampled at 0.1 s, so dt must be a positive multiple of 0.1, as 'esso_osaka[dt=0.5]'.")
+    folder = find_copy(None if path is None else str(path))
+    try:
+        index = pd.read_csv(folder / "runs.csv")[["file", "kind", "wakita2022"]]
+    except (OSError, ValueError, KeyError) as error:
+        reason = " ".join(str(error).split())[:160]
+        raise InputError(f"{folder / 'runs.csv'} cannot be read: {reason}. It needs the columns file, kind, wakita2022.") from None
     runs = []
     for row in index.itertuples():
         stem = Path(str(row.file)).name.removesuffix(".csv.gz")
@@ -90,9 +100,18 @@ def _read_run(file: Path, stem: str, every: int, wind: bool, kind: str, test: bo
     try:
         table = pd.read_csv(file)
         raw = table[["t [s]", *_COLUMNS.values(), _RPS, _RUDDER, _WIND_SPEED, _WIND_FROM]].to_numpy(float)
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, zlib.error) as error:
         raise InputError(f"{file} cannot be read: {' '.join(str(error).split())[:160]}. Take a fresh copy of the public data.") from None
-    raw = raw[: int(np.isfinite(raw).all(axis=1).cumprod().sum())]  # one file ends in rows of NaN
+    finite = np.isfinite(raw).all(axis=1)
+    whole = int(finite.cumprod().sum())
+    if whole < 2 or finite[whole:].any():
+        missing = f"{int((~finite).sum())} of {len(raw)} rows lack values, the first is row {whole + 2}"
+        raise InputError(f"{file}: {missing}; only the end of a file may be empty. Take a fresh copy of the public data.")
+    raw = raw[:whole]  # one file ends in rows of NaN
+    steps = np.diff(raw[:, 0])
+    if np.abs(steps - _SAMPLE).max() > 0.01 * _SAMPLE:
+        k = int(np.abs(steps - _SAMPLE).argmax())
+        raise InputError(f"{file}: t goes from {raw[k, 0]:g} s to {raw[k + 1, 0]:g} s; the public files step by 0.1 s. Take a fresh copy.")
     samples = (len(raw) - 1) // every + 1
     at = np.arange(samples) * every
     starts = np.minimum(at, len(raw) - 1)
@@ -122,4 +141,5 @@ def _read_run(file: Path, stem: str, every: int, wind: bool, kind: str, test: bo
     return Run(stem, t, states, inputs, names, {"manoeuvre": kind, "group": group, "split": "test" if test else "train"})
 
 
-DATASET = DatasetPart("esso_osaka", "measured free-running tests of a 3 m tanker model in wind (your own copy)", "CC BY-NC-SA 4.0", make, cached=False)
+SUMMARY = "measured free-running tests of a 3 m tanker model in wind (your own copy)"
+DATASET = DatasetPart("esso_osaka", SUMMARY, "CC BY-NC-SA 4.0", make, cached=False)

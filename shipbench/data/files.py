@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import os
+import warnings
+import zlib
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,6 +23,8 @@ from .units import sign_factor, unit_factor
 _TABLES = ("trajectories.parquet", "trajectories.csv.gz", "trajectories.csv")
 _ACTUATORS = STATES[ACTUATORS]
 _MOTION = STATES[: ACTUATORS.start]
+_SIGNALS = (*STATES, *COMMANDS, *ENVIRONMENT)
+_KNOWN = ("trajectory", "t", *_SIGNALS)
 
 
 class _Description(BaseModel):
@@ -43,17 +48,19 @@ class _Description(BaseModel):
 def read_dataset(folder: str | Path) -> Dataset:
     """Read a folder of the contract's format into SI and our signs.
 
+    A unit or sign given for an actuator also holds for its command, unless the command has its own entry. Columns that are not signals are ignored.
+
     Raises:
         InputError: a file or column is missing, a value is not a finite number, time is not uniform, or a key, unit or sign is unknown.
     """
     folder = Path(folder)
     description = _describe(folder / "dataset.toml")
     ship = Ship.load(folder / description.ship)
-    table, where = _read_table(folder)
-    table = table.rename(columns=description.columns)
+    table, where = _read_table(folder, description)
     notes = list(description.notes)
-    inputs = _complete_columns(table, where, notes)
-    _convert(table, description)
+    _check_columns(table, where)
+    _convert(table, description)  # before columns are filled in: what is copied from another column is in our units already
+    inputs = _complete_columns(table, notes)
     unknown = set(description.runs) - set(table["trajectory"])
     if unknown:
         raise unknown_name(f"run in [runs] of {folder / 'dataset.toml'}", sorted(unknown)[0], table["trajectory"].unique())
@@ -75,26 +82,77 @@ def _describe(path: Path) -> _Description:
         raise InputError(f"{path}: {key}: {first['msg']}{value}. Accepted keys: {', '.join(_Description.model_fields)}.") from None
 
 
-def _read_table(folder: Path) -> tuple[pd.DataFrame, Path]:
-    path = next((folder / name for name in _TABLES if (folder / name).is_file()), None)
-    if path is None:
+def _read_table(folder: Path, description: _Description) -> tuple[pd.DataFrame, Path]:
+    """The table under our column names, and its path."""
+    found = [folder / name for name in _TABLES if (folder / name).is_file()]
+    if not found:
         raise InputError(f"folder {folder} has no trajectories; accepted: {', '.join(_TABLES)}.")
+    if len(found) > 1:
+        raise InputError(f"folder {folder} has {' and '.join(p.name for p in found)}; accepted: one table. Remove the others.")
+    path = found[0]
+    ids = next((theirs for theirs, ours in description.columns.items() if ours == "trajectory"), "trajectory")
     try:
-        table = pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path, dtype={"trajectory": str}, float_precision="round_trip")
-    except (ValueError, OSError, pd.errors.ParserError, EOFError) as error:
+        table = pd.read_parquet(path) if path.suffix == ".parquet" else _read_csv(path, ids)
+    except (ValueError, OSError, EOFError, zlib.error, pd.errors.ParserError, pd.errors.ParserWarning) as error:
         reason = " ".join(str(error).split())[:160]
         raise InputError(f"{path} cannot be read: {reason}. It must be a table with the columns trajectory, t and the states.") from None
     if table.empty:
         raise InputError(f"{path} has no rows; it needs one row per sample.")
-    return table, path
+    return _rename(table, description.columns, path), path
 
 
-def _complete_columns(table: pd.DataFrame, where: Path, notes: list[str]) -> tuple[str, ...]:
-    """Check names and types, add what may be missing (with a note), and return the names of the inputs."""
+def _read_csv(path: Path, ids: str) -> pd.DataFrame:
+    """Run names stay the text that they are ("001", "NA"); a row with more fields than the header is an error, not a shift of all columns."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pd.errors.ParserWarning)
+        return pd.read_csv(path, converters={ids: str}, index_col=False, float_precision="round_trip", low_memory=False)
+
+
+def _rename(table: pd.DataFrame, columns: dict[str, str], where: Path) -> pd.DataFrame:
+    for theirs, ours in columns.items():
+        if theirs not in table:
+            raise unknown_name(f"column of {where.name} in [columns] of dataset.toml:", theirs, map(str, table.columns))
+        if ours not in _KNOWN:
+            raise unknown_name(f"signal for '{theirs}' in [columns] of dataset.toml:", ours, _KNOWN)
+    table = table.rename(columns=columns)
+    names = list(table.columns)
+    for name in _KNOWN:
+        if names.count(name) > 1 or (name in names and f"{name}.1" in names):  # pandas calls a header's second "x" "x.1"
+            raise InputError(f"{where}: two columns are '{name}'; accepted: one. Remove one, or correct [columns] in dataset.toml.")
+    return table
+
+
+def _check_columns(table: pd.DataFrame, where: Path) -> None:
+    """Required columns are there, run names are whole blocks of rows, and every signal is numeric (then float)."""
     for column in ("trajectory", "t", *_MOTION):
         if column not in table:
-            raise unknown_name(f"column '{column}' is required in {where.name} but it has: {', '.join(map(str, table.columns))}; column", column, table.columns)
+            near = difflib.get_close_matches(column.lower(), [str(c) for c in table.columns], n=1, cutoff=0.5)
+            hint = f" Did you mean '{near[0]}'? Then write [columns] {near[0]} = \"{column}\" in dataset.toml." if near else ""
+            raise InputError(f"{where}: column '{column}' is missing.{hint} Found: {', '.join(map(str, table.columns))}.")
+    nameless = (table["trajectory"].isna() | (table["trajectory"].astype(str).str.strip() == "")).to_numpy()
+    if nameless.any():
+        row = int(np.argmax(nameless)) + 2
+        raise InputError(f"{where}: row {row} has no run name in 'trajectory' ({nameless.sum()} such rows); every row needs one.")
     table["trajectory"] = table["trajectory"].astype(str)
+    block = (table["trajectory"] != table["trajectory"].shift()).cumsum()
+    starts = table["trajectory"].groupby(block).first()
+    if starts.duplicated().any():
+        name = starts[starts.duplicated()].iloc[0]
+        raise InputError(
+            f"{where}: the rows of run '{name}' are in {int((starts == name).sum())} places; accepted: each run's rows together, in order of t. "
+            "Sort the rows by trajectory and t, or give the second run its own name."
+        )
+    for column in ("t", *(c for c in _SIGNALS if c in table)):
+        if not pd.api.types.is_numeric_dtype(table[column]):
+            bad = (pd.to_numeric(table[column], errors="coerce").isna() & table[column].notna()).to_numpy()
+            row = int(np.argmax(bad))
+            value = table[column].iloc[row]
+            raise InputError(f"{where}, row {row + 2}: {column} is '{value}', not a number. Accepted: decimal numbers with a point.")
+        table[column] = table[column].astype(float)
+
+
+def _complete_columns(table: pd.DataFrame, notes: list[str]) -> tuple[str, ...]:
+    """Add what may be missing (with a note), and return the names of the inputs."""
     for actuator, command in zip(_ACTUATORS, COMMANDS, strict=True):
         if actuator not in table and command not in table:
             table[actuator] = 0.0
@@ -105,21 +163,14 @@ def _complete_columns(table: pd.DataFrame, where: Path, notes: list[str]) -> tup
         if command not in table:
             table[command] = table[actuator]
             notes.append(f"{command} is not recorded: taken as {actuator}")
-    for column in ("t", *STATES, *COMMANDS, *(c for c in ENVIRONMENT if c in table)):
-        if not pd.api.types.is_numeric_dtype(table[column]):
-            bad = pd.to_numeric(table[column], errors="coerce").isna()
-            row = int(np.argmax(bad.to_numpy()))
-            raise InputError(f"{where}, row {row + 2}: {column} is '{table[column].iloc[row]}', not a number. Accepted: decimal numbers with a point.")
-        table[column] = table[column].astype(float)
     return (*COMMANDS, *(c for c in ENVIRONMENT if c in table))
 
 
 def _convert(table: pd.DataFrame, description: _Description) -> None:
-    known = (*STATES, *COMMANDS, *ENVIRONMENT)
     for entries, factor in ((description.units, unit_factor), (description.signs, sign_factor)):
         for signal, word in entries.items():
-            if signal not in known:
-                raise unknown_name("signal in [units] or [signs]", signal, known)
+            if signal not in _SIGNALS:
+                raise unknown_name("signal in [units] or [signs]", signal, _SIGNALS)
             command = signal + "_c"
             targets = [signal, *([command] if command in COMMANDS and command not in entries else [])]
             for target in targets:
@@ -140,7 +191,7 @@ def _run(name: str, group: pd.DataFrame, inputs: tuple[str, ...], description: _
             "Time must be uniform inside a run and its rows in order: resample, or split the run at the gap."
         )
     states = group[list(STATES)].to_numpy()
-    if np.isfinite(states[:, 2]).all():
+    if np.isfinite(states[:, 2]).all() and (np.abs(np.diff(states[:, 2])) > np.pi).any():  # a continuous heading keeps its bits
         states[:, 2] = np.unwrap(states[:, 2])
     return Run(name, t, states, group[list(inputs)].to_numpy(), inputs, dict(description.runs.get(name, {})))
 
@@ -149,8 +200,10 @@ def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz"
     """Write the three files; `read_dataset` gives back the same samples, bit for bit.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: the folder cannot be written, or metadata cannot be expressed in TOML.
     """
+    if (name := f"trajectories.{format}") not in _TABLES:
+        raise InputError(f"format = '{format}'; accepted: csv.gz, csv or parquet.")
     folder = Path(folder)
     frames = []
     for run in dataset.runs:
@@ -164,15 +217,22 @@ def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz"
         "runs": {run.id: run.meta for run in dataset.runs if run.meta},
     }  # fmt: skip
     try:
+        texts = {"dataset.toml": tomli_w.dumps(description), "ship.toml": dataset.ship.to_toml()}
+    except TypeError as error:
+        accepted = "Metadata may hold text, numbers, booleans, lists and tables."
+        raise InputError(f"data set '{dataset.name}' cannot be written: {error}. {accepted}") from None
+    try:
         folder.mkdir(parents=True, exist_ok=True)
         fresh = folder / f".trajectories.tmp.{format}"
         if format == "parquet":
             table.to_parquet(fresh, index=False)
         else:
             table.to_csv(fresh, index=False)
-        os.replace(fresh, folder / f"trajectories.{format}")
-        for name, text in (("dataset.toml", tomli_w.dumps(description)), ("ship.toml", dataset.ship.to_toml())):
-            (folder / f".{name}.tmp").write_text(text)
-            os.replace(folder / f".{name}.tmp", folder / name)
+        os.replace(fresh, folder / name)
+        for file, text in texts.items():
+            (folder / f".{file}.tmp").write_text(text, encoding="utf-8")
+            os.replace(folder / f".{file}.tmp", folder / file)
+        for other in set(_TABLES) - {name}:  # an earlier table in another format would contradict this one
+            (folder / other).unlink(missing_ok=True)
     except OSError as error:
         raise InputError(f"cannot write the data set to {folder}: {error.strerror}. Give a folder that can be written.") from None

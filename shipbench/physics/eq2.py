@@ -64,22 +64,23 @@ class Coefficients:
 def coefficients(ship: Particulars) -> Coefficients:
     """Left side of eq. (2) for a ship.
 
-    Source: Clarke et al. (1983) for added masses and linear derivatives, Inoue et al. (1981) for the nonlinear ones, Soeding (1982) for the surge added
-    mass, X_vr = -0.28 m_y from KCS (physics reference 3.2), a_H and x_H of Yoshimura & Masumoto (2012).
+    Source: Inoue et al. (1981) for the derivatives, whose structure eq. (2) is; Clarke et al. (1983) for the added masses in sway and yaw, Soeding (1982) for
+    surge, X_vr = -0.28 m_y from KCS (physics reference 3.2), a_H and x_H of Yoshimura & Masumoto (2012).
     """
     L, B, T, rho = ship.L, ship.B, ship.T, ship.rho
-    lin, non = regressions.clarke_1983(L, B, T, ship.Cb), regressions.inoue_nonlinear(L, B, T, ship.Cb)
+    form = (L, B, T, ship.Cb)
+    mass, lin, non = regressions.clarke_1983(*form), regressions.inoue_linear(*form), regressions.inoue_nonlinear(*form)
     q2, qd = 0.5 * rho * L**2, 0.5 * rho * L * T
     m_x = regressions.surge_added_mass(ship.mass / rho, L, rho)
-    m_y = -lin.Y_vd * q2 * L
-    Y_rd, N_vd, N_rd = lin.Y_rd * q2 * L**2, lin.N_vd * q2 * L**2, lin.N_rd * q2 * L**3
+    m_y = -mass.Y_vd * q2 * L
+    Y_rd, N_vd, N_rd = mass.Y_rd * q2 * L**2, mass.N_vd * q2 * L**2, mass.N_rd * q2 * L**3
     a_H, x_H = regressions.hull_rudder_interaction(L, B, ship.Cb)
     X_vr = -0.28 * m_y
     return Coefficients(
         m=ship.mass, x_G=ship.xG, m_x=m_x,
         m11=ship.mass + m_y, m12_Y=ship.mass * ship.xG - Y_rd, m12_N=ship.mass * ship.xG - N_vd,
         m22=ship.Izz + ship.mass * ship.xG**2 - N_rd,
-        Y_v=lin.Y_v * q2, Y_r=lin.Y_r * q2 * L, N_v=lin.N_v * q2 * L, N_r=lin.N_r * q2 * L**2,
+        Y_v=lin.Y_v * qd, Y_r=lin.Y_r * qd * L, N_v=lin.N_v * qd * L, N_r=lin.N_r * qd * L**2,
         X_vr=m_y + X_vr + ship.mass, X_rr=ship.mass * ship.xG - Y_rd,
         Y_vv=non.Y_vv * qd, Y_vr=non.Y_vr * qd * L, Y_rr=non.Y_rr * qd * L**2,
         N_rr=non.N_rr * qd * L**3, N_vvr=non.N_vvr * qd * L**2, N_vrr=non.N_vrr * qd * L**3, max_drift=min(0.5, 0.8 * abs(non.N_rr / non.N_vrr)),

@@ -41,6 +41,24 @@ def clarke_1983(L: float, B: float, T: float, Cb: float) -> Clarke:
     )
 
 
+class InoueLinear(NamedTuple):
+    """MMG-normalised linear derivatives."""
+
+    Y_v: float
+    Y_r: float
+    N_v: float
+    N_r: float
+
+
+def inoue_linear(L: float, B: float, T: float, Cb: float) -> InoueLinear:
+    """Linear derivatives (MMG normalisation), level trim: -(pi k/2 + 1.4 a), pi k/4, -k, -(0.54 k - k^2) with k = 2T/L, a = Cb B/L.
+
+    Source: Inoue, Hirano & Kijima (1981). Y_r and N_v are totals: they hold the added-mass Coriolis part.
+    """
+    k, a = 2.0 * T / L, Cb * B / L
+    return InoueLinear(-(0.5 * math.pi * k + 1.4 * a), 0.25 * math.pi * k, -k, -(0.54 * k - k * k))
+
+
 class InoueNonlinear(NamedTuple):
     """MMG-normalised nonlinear derivatives of the Inoue structure."""
 

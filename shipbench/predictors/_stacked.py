@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -134,7 +135,7 @@ class StackedMLP(nn.Module):
     def __init__(self, sizes: Sequence[int], draw: Sequence[torch.Generator], activation: Any = torch.relu, zero_last: bool = False) -> None:
         super().__init__()
         last = len(sizes) - 2
-        pairs = list(zip(sizes[:-1], sizes[1:], strict=True))
+        pairs = list(pairwise(sizes))
         self.layers = nn.ModuleList(StackedLinear(a, b, draw, zero=zero_last and i == last) for i, (a, b) in enumerate(pairs))
         self.activation = activation
 
@@ -219,3 +220,9 @@ def random_windows(counts: Sequence[int], starts: int, batch: int, draw: Sequenc
 def position_score(pose: Tensor, truth: Tensor, weight: Tensor) -> Tensor:
     """Mean position error of each member [m]: pose and truth (members, runs, steps, >= 2), weight (members, runs) summing to 1."""
     return (torch.linalg.vector_norm(pose[..., :2] - truth[..., :2], dim=-1).mean(2) * weight).sum(1)
+
+
+def shares_of(total: int, shares: Sequence[float]) -> list[int]:
+    """`total` cut into whole numbers in the proportion of `shares` (which sum to 1)."""
+    edges = [round(total * share) for share in np.cumsum(shares)]
+    return [int(b - a) for a, b in pairwise([0, *edges])]

@@ -29,6 +29,7 @@ from ._stacked import (
     padded,
     position_score,
     random_windows,
+    shares_of,
     trapezoid_pose,
     with_valid,
 )
@@ -89,18 +90,19 @@ class _Network(nn.Module):
 
 
 class Stage(NamedTuple):
-    """Part of the training: rollout length [model steps], windows per minibatch, number of minibatches, longest history [steps]."""
+    """Part of the training: rollout length [model steps], windows per minibatch, number of epochs, longest history [steps]."""
 
     steps: int
     batch: int
-    minibatches: int
+    epochs: int
     history: int
 
 
 class _Rollouts(StackedTask):
     """Free-running rollouts from random starts of random runs; the score is the mean position error of whole validation windows [m]."""
 
-    CHUNK = 10
+    MINIBATCHES = 10
+    """Per epoch."""
 
     def __init__(self, net: _Network, training: StackedRuns, validation: StackedRuns, stages: Sequence[Stage], draw: Sequence[torch.Generator],
                  dt: float, pose_weight: float) -> None:  # fmt: skip
@@ -113,30 +115,29 @@ class _Rollouts(StackedTask):
     @property
     def num_chunks(self) -> int:
         """How often it is validated."""
-        return sum(-(-s.minibatches // self.CHUNK) for s in self.stages)
+        return sum(s.epochs for s in self.stages)
 
-    def _windows(self, stage: Stage, history: int) -> Tensor:
-        """Rows (members, batch, history + steps + 1) into the flattened samples: one random window per random run."""
-        samples, steps = self.training_runs.steps + 1, history + stage.steps
-        runs, starts = random_windows(self.training_runs.counts, samples - steps, stage.batch, self.draw)
-        return (runs * samples + starts)[..., None] + torch.arange(steps + 1)
+    def _windows(self, stage: Stage, history: int) -> tuple[Tensor, Tensor]:
+        """Runs (members, batch) and their samples (members, batch, history + steps + 1): one random window per random run."""
+        length = history + stage.steps
+        runs, starts = random_windows(self.training_runs.counts, self.training_runs.steps + 1 - length, stage.batch, self.draw)
+        return runs, starts[..., None] + torch.arange(length + 1)
 
     def chunks(self) -> Iterator[Chunk]:
         everyone = torch.ones(self.members, dtype=torch.bool)
         for stage in self.stages:
-            for done in range(0, stage.minibatches, self.CHUNK):
-                numbers = range(done, min(done + self.CHUNK, stage.minibatches))
+            for epoch in range(stage.epochs):
+                numbers = range(epoch * self.MINIBATCHES, (epoch + 1) * self.MINIBATCHES)
                 # Every other minibatch has a history, of a length that goes through its range: the same for all members.
                 lengths = [0 if i % 2 == 0 or not stage.history else 1 + (i * 7) % stage.history for i in numbers]
                 yield Chunk([(self._windows(stage, length), length, stage.steps) for length in lengths], everyone)
 
-    def losses(self, minibatch: tuple[Tensor, int, int]) -> Tensor:
+    def losses(self, minibatch: tuple[tuple[Tensor, Tensor], int, int]) -> Tensor:
         rows, history, steps = minibatch
-        device = self.net.cell.weight.device
-        S = self.training_runs.S.flatten(0, 1)[rows].to(device)
-        # The row after a run's last input is never used: windows end at the last sample.
-        held = self.training_runs.U[rows // (self.training_runs.steps + 1), (rows % (self.training_runs.steps + 1)).clamp(max=self.training_runs.steps - 1)]
-        held = held.to(device)[:, :, :-1]
+        device = self.device
+        run, sample = rows
+        S = self.training_runs.S[run[..., None], sample].to(device)
+        held = self.training_runs.U[run[..., None], sample[..., :-1]].to(device)
         start, truth = S[:, :, history], S[:, :, history + 1 :]
         y = self.net.rollout((S[:, :, :history], held[:, :, :history]), start, held[:, :, history:], self.dt)
         error = (y - truth[..., CHANNELS]) / self.net.scale_y.std[:, None]
@@ -146,7 +147,7 @@ class _Rollouts(StackedTask):
         return error.square().mean((1, 2, 3)) + self.pose_weight * far.mean((1, 2))
 
     def scores(self) -> Tensor:
-        device = self.net.cell.weight.device
+        device = self.device
         index, weight = padded(self.validation.counts)
         S, held = self.validation.S[index].to(device), self.validation.U[index].to(device)
         start = S[:, :, 0]
@@ -166,7 +167,8 @@ class LSTM(PredictorBase):
 
     Args:
         hidden: width of the memory and of the head.
-        lr, minibatches: Adam's first step size and the number of minibatches (a cosine takes the step size down to a hundredth).
+        lr: Adam's first step size; a cosine takes it down to a hundredth.
+        epochs: number of validations, each after 10 minibatches.
         pose_weight: weight of the pose error (in units of the error of kept velocities) against the error of standardised y.
         device: where to train.
     """
@@ -174,12 +176,12 @@ class LSTM(PredictorBase):
     name: ClassVar[str] = "lstm"
     hidden: int = 64
     lr: float = 4e-3
-    minibatches: int = 600
+    epochs: int = 120
     pose_weight: float = 1.0
     device: str = "cpu"
 
     def __post_init__(self) -> None:
-        for key in ("hidden", "minibatches"):
+        for key in ("hidden", "epochs"):
             if getattr(self, key) < 1:
                 raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
         self._weights: dict[str, np.ndarray] = {}
@@ -192,12 +194,10 @@ class LSTM(PredictorBase):
 
     def _stages(self, steps: int) -> list[Stage]:
         """Short windows first: they are cheap and their gradients tame."""
-        n = self.minibatches
-        s, m = max(1, steps // 12), max(1, steps // 4)
+        plan = ((10, 128, 0.5), (30, 64, 0.25), (80, 48, 0.25))
+        epochs = shares_of(self.epochs, [share for _, _, share in plan])
         return [
-            Stage(s, 128, max(1, n // 2), min(10, steps - s)),
-            Stage(m, 64, max(1, n // 4), min(20, steps - m)),
-            Stage(max(1, steps * 2 // 3), 48, max(1, n // 4), min(30, steps - max(1, steps * 2 // 3))),
+            Stage(min(s, steps), batch, n, min(max(10, s // 2), steps - min(s, steps))) for (s, batch, _), n in zip(plan, epochs, strict=True) if n
         ]
 
     @classmethod
@@ -228,8 +228,8 @@ class LSTM(PredictorBase):
         if not self._weights:
             raise InputError("lstm: predict was called before fit; fit or load the model first.")
         w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
-        scalers = tuple(Scaler(w[f"scale_{k}.mean"], w[f"scale_{k}.std"]) for k in ("y", "u", "dy"))
-        net = _Network(InputFeatures(self.inputs), self.hidden, scalers, generators([0])).double()
+        y, u, dy = (Scaler(w[f"scale_{k}.mean"], w[f"scale_{k}.std"]) for k in ("y", "u", "dy"))
+        net = _Network(InputFeatures(self.inputs), self.hidden, (y, u, dy), generators([0])).double()
         net.load_state_dict(w)
         return net
 
@@ -239,7 +239,8 @@ class LSTM(PredictorBase):
         start, held = torch.as_tensor(s0)[None], torch.as_tensor(U[:, ::d])[None]
         past = (torch.empty(1, len(s0), 0, s0.shape[1], dtype=torch.float64), held[:, :, :0])
         if history is not None and len(history[0][0]) >= d:
-            past = tuple(torch.as_tensor(np.ascontiguousarray(a[:, ::-1][:, d - 1 :: d][:, ::-1]), dtype=torch.float64)[None] for a in history)
+            first = len(history[0][0]) % d  # the samples d, 2 d, .. steps before s0
+            past = (torch.as_tensor(history[0][:, first::d])[None].double(), torch.as_tensor(history[1][:, first::d])[None].double())
         y = net.rollout(past, start, held, d * self._dt)[0]
         if d > 1:
             y = _between(start[0, :, CHANNELS], y, d)[:, :K]

@@ -60,7 +60,7 @@ class _OneStep(StackedTask):
         return torch.cat(x), torch.cat(z)
 
     def chunks(self) -> Iterator[Chunk]:
-        device = self.net.layers[0].weight.device
+        device = self.device
         x, z = (part.to(device) for part in self.data)
         first = torch.tensor([0, *np.cumsum(self.counts)[:-1].tolist()])
         for index, ended in epochs_of_samples(self.counts, self.batch, self.epochs, self.draw):
@@ -74,7 +74,7 @@ class _OneStep(StackedTask):
         return (self.net(x) - z).square().mean((1, 2))
 
     def scores(self) -> Tensor:
-        device = self.net.layers[0].weight.device
+        device = self.device
         x, z = (part.to(device) for part in self.valid)
         rows, weight = (part.to(device) for part in self.valid_rows)
         return ((self.net(x[rows]) - z[rows]).square().mean(2) * weight).sum(1)

@@ -20,7 +20,19 @@ from ..physics import eq2
 from ..physics.wind import apparent_wind
 from ..records import Dataset
 from ..signals import ACTUATORS, MOTION, PSI, R, U, V
-from ._stacked import CHANNELS, Scaler, StackedMLP, generators, hold_error, padded, position_score, random_windows, trapezoid_pose, with_valid
+from ._stacked import (
+    CHANNELS,
+    Scaler,
+    StackedMLP,
+    generators,
+    hold_error,
+    padded,
+    position_score,
+    random_windows,
+    shares_of,
+    trapezoid_pose,
+    with_valid,
+)
 from .base import History, PredictorBase
 from .physics import Physics
 from .training import Chunk, Recipe, StackedTask, train
@@ -52,20 +64,23 @@ class Residual(nn.Module):
         """Residual accelerations (members, batch, 3); arguments (members, batch)."""
         return self.net(self.scale_in(torch.stack([u, v, r, *actuators], dim=-1))) * self.scale_out
 
-    def forward(self, psi: Tensor | None, u: Tensor, v: Tensor, r: Tensor, actuators: Sequence[Tensor], air: Air | None) -> tuple[Tensor, Tensor, Tensor]:
+    def forward(
+        self, psi: Tensor | None, u: Tensor, v: Tensor, r: Tensor, actuators: Sequence[Tensor], air: Air | None
+    ) -> tuple[Tensor, Tensor, Tensor]:
         """(du, dv, dr), each (members, batch); `air` is true wind speed and direction."""
         apparent = None if air is None or psi is None else apparent_wind(psi, u, v, *air)
-        du, dv, dr = eq2.accelerations(u, v, r, *actuators, apparent, self.c, self.p.unbind(0))
+        n, delta, F_b, F_s = actuators
+        du, dv, dr = eq2.accelerations(u, v, r, n, delta, F_b, F_s, apparent, self.c, self.p.unbind(0))
         more = self.learned(u, v, r, actuators).unbind(-1)
         return du + more[0], dv + more[1], dr + more[2]
 
 
 class Stage(NamedTuple):
-    """Part of the training: window length [knots], windows per minibatch, number of minibatches."""
+    """Part of the training: window length [knots], windows per minibatch, number of epochs."""
 
     steps: int
     batch: int
-    minibatches: int
+    epochs: int
 
 
 class Grid(NamedTuple):
@@ -145,7 +160,8 @@ def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step
 class _Windows(StackedTask):
     """Windows from random starts; the score is the mean position error of the validation rollouts over their full length [m]."""
 
-    CHUNK = 20
+    MINIBATCHES = 20
+    """Per epoch."""
 
     def __init__(self, model: Residual, training: Drive, validation: Drive, grid: Grid, stages: Sequence[Stage], draw: Sequence[torch.Generator],
                  penalty: float) -> None:  # fmt: skip
@@ -158,16 +174,16 @@ class _Windows(StackedTask):
     @property
     def num_chunks(self) -> int:
         """How often it is validated."""
-        return 1 + sum(-(-s.minibatches // self.CHUNK) for s in self.stages)
+        return 1 + sum(s.epochs for s in self.stages)
 
     def chunks(self) -> Iterator[Chunk]:
         everyone = torch.ones(self.members, dtype=torch.bool)
         yield Chunk([], everyone)  # the physics as it is: what any training has to beat
         knots = self.training_runs.S.shape[1] - 1
         for stage in self.stages:
-            for done in range(0, stage.minibatches, self.CHUNK):
-                size = min(self.CHUNK, stage.minibatches - done)
-                picks = (random_windows(self.training_runs.counts, knots - stage.steps + 1, stage.batch, self.draw) for _ in range(size))
+            for _ in range(stage.epochs):
+                starts = knots - stage.steps + 1
+                picks = (random_windows(self.training_runs.counts, starts, stage.batch, self.draw) for _ in range(self.MINIBATCHES))
                 yield Chunk([(runs, starts, stage.steps) for runs, starts in picks], everyone)
 
     def _roll(self, drive: Drive, runs: Tensor, starts: Tensor, steps: int) -> tuple[Tensor, Tensor, Tensor]:
@@ -183,7 +199,8 @@ class _Windows(StackedTask):
         velocity, pose, truth = self._roll(self.training_runs, *minibatch)
         scale = self.scale[minibatch[2]].to(truth.device)[:, None, None]
         error = ((velocity - truth[..., U : R + 1]) / scale[..., :3]).square().sum(-1)
-        error = error + (pose[..., :2] - truth[..., :2]).square().sum(-1) / scale[..., 3].square() + ((pose[..., 2] - truth[..., 2]) / scale[..., 4]).square()
+        error = error + ((pose[..., :2] - truth[..., :2]) / scale[..., 3:4]).square().sum(-1)
+        error = error + ((pose[..., 2] - truth[..., 2]) / scale[..., 4]).square()
         small = self.model.net(self.model.scale_in(truth[:, :, -1, CHANNELS])).square().sum(-1)
         return error.mean((1, 2)) + self.penalty * small.mean(1)
 
@@ -200,7 +217,7 @@ class NeuralODE(PredictorBase):
     Args:
         hidden: width of the two hidden layers.
         lr: Adam's first step size (a cosine takes it to a fiftieth).
-        effort: scales the number of minibatches of every stage.
+        epochs: number of validations, each after 20 minibatches.
         penalty: weight of the squared residual, in units of the accelerations that occur.
         weight_decay: of AdamW.
         device: where to train.
@@ -209,14 +226,15 @@ class NeuralODE(PredictorBase):
     name: ClassVar[str] = "neural_ode"
     hidden: int = 32
     lr: float = 5e-3
-    effort: float = 1.0
+    epochs: int = 40
     penalty: float = 1e-4
     weight_decay: float = 1e-3
     device: str = "cpu"
 
     def __post_init__(self) -> None:
-        if self.hidden < 1 or self.effort <= 0:
-            raise ValueError(f"hidden = {self.hidden}, effort = {self.effort}; accepted: hidden 1 or more, effort above 0")
+        for key in ("hidden", "epochs"):
+            if getattr(self, key) < 1:
+                raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
         self.physics = Physics()
         self._weights: dict[str, np.ndarray] = {}
         self.improved = False
@@ -229,8 +247,9 @@ class NeuralODE(PredictorBase):
 
     def _stages(self, knots: int) -> list[Stage]:
         """Short windows first, in large batches: cheap, and their gradients are tame; long ones decide."""
-        lengths = ((1, 1024, 400), (10, 384, 200), (40, 128, 200), (100, 64, 40))
-        return [Stage(min(steps, knots), batch, max(1, round(self.effort * number))) for steps, batch, number in lengths]
+        plan = ((1, 1024, 0.4), (10, 384, 0.25), (30, 192, 0.3), (100, 64, 0.05))
+        epochs = shares_of(self.epochs, [share for _, _, share in plan])
+        return [Stage(min(steps, knots), batch, n) for (steps, batch, _), n in zip(plan, epochs, strict=True) if n]
 
     @classmethod
     def fit_group(cls, models: Sequence[NeuralODE], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]) -> None:
@@ -302,7 +321,8 @@ def _typical_accelerations(physics: Sequence[Physics], drive: Drive) -> Tensor:
     """Root mean square (members, 1, 3) of the physics' accelerations in still air along the measured states."""
     sizes = []
     for model, S in zip(physics, drive.S.double().split(drive.counts), strict=True):
-        found = eq2.accelerations(*S[..., CHANNELS].movedim(-1, 0).numpy(), None, model.c, model.p)
+        u, v, r, n, delta, F_b, F_s = S[..., CHANNELS].movedim(-1, 0).numpy()
+        found = eq2.accelerations(u, v, r, n, delta, F_b, F_s, None, model.c, list(model.p))
         sizes.append([float(np.sqrt(np.mean(np.square(a)))) for a in found])
     return torch.tensor(sizes, dtype=torch.float32)[:, None]
 

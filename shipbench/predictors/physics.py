@@ -129,7 +129,7 @@ class Physics(PredictorBase):
     def describe(self) -> str:
         """The fitted equations with units and 95 % confidence intervals (clustered over runs), and what was estimated of the ship."""
         lines = [
-            f"physics of {self.ship.name}: eq. (2) to (8), left side from Clarke (1983), Inoue (1981) and Soeding (1982)",
+            f"physics of {self.ship.name}: eq. (2) to (8), left side from Inoue (1981), Clarke (1983) and Soeding (1982)",
             f"  surge  {self.c.m + self.c.m_x:.4g} du = {self.c.X_vr:.4g} v r + {self.c.X_rr:.4g} r^2 + X_n + X_delta + X_e - R",
             f"  sway   {self.c.m11:.4g} dv + {self.c.m12_Y:.4g} dr = {self.c.Y_v:.4g} U v + ({self.c.Y_r:.4g} U - {self.c.m:.4g} u) r "
             f"+ {self.c.Y_vv:.4g} v|v| + {self.c.Y_vr:.4g} v|r| + {self.c.Y_rr:.4g} r|r| + Y_n + Y_delta + Y_e",

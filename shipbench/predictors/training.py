@@ -39,6 +39,11 @@ class StackedTask(nn.Module, ABC):
 
     members: int
 
+    @property
+    def device(self) -> torch.device:
+        """Where the parameters are."""
+        return next(self.parameters()).device
+
     @abstractmethod
     def chunks(self) -> Iterator[Chunk]:
         """The training, cut at the validations."""
@@ -122,9 +127,10 @@ class _Training(lightning.LightningModule):
         self.watch: BestWeights | None = None
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
-        kind = torch.optim.AdamW if self.recipe.weight_decay else torch.optim.Adam
-        kwargs = {"weight_decay": self.recipe.weight_decay} if self.recipe.weight_decay else {}
-        return kind(self.task.parameters(), lr=self.recipe.lr, fused=self.recipe.device.split(":")[0] in ("cpu", "cuda"), **kwargs)
+        fused = self.recipe.device.partition(":")[0] in ("cpu", "cuda")
+        if self.recipe.weight_decay:
+            return torch.optim.AdamW(self.task.parameters(), lr=self.recipe.lr, weight_decay=self.recipe.weight_decay, fused=fused)
+        return torch.optim.Adam(self.task.parameters(), lr=self.recipe.lr, fused=fused)
 
     def on_fit_start(self) -> None:
         self.watch = BestWeights(self.task, self.recipe.patience, self.recipe.min_delta)
@@ -198,8 +204,12 @@ def train(task: StackedTask, recipe: Recipe) -> BestWeights:
     with _quiet():
         module = _Training(task, recipe)
         trainer = lightning.Trainer(
-            accelerator="gpu" if kind == "cuda" else kind, devices=[int(number)] if number else 1, max_epochs=1, barebones=True, use_distributed_sampler=False
-        )  # fmt: skip
+            accelerator="gpu" if kind == "cuda" else kind,
+            devices=[int(number)] if number else 1,
+            max_epochs=1,
+            barebones=True,
+            use_distributed_sampler=False,
+        )
         trainer.fit(module, train_dataloaders=_Chunks(task))
     watch = module.watch
     if watch is None or not torch.isfinite(watch.score).all():

@@ -108,6 +108,11 @@ def test_the_published_split_is_one_fold_and_its_validation_runs_come_from_train
     assert len(valid) == 2
 
 
+def test_a_group_on_both_sides_of_the_published_split_is_told(toy):
+    data = toy(4, meta=lambda i: {"split": "test" if i == 3 else "train", "group": f"log{i // 2}"})
+    assert select_runs(data, task(split="published"))[1] == ("the published split has pieces of 'log1' both in training and in test",)
+
+
 @pytest.mark.parametrize(
     ("changes", "meta", "message"),
     [

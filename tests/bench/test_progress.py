@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from shipbench.bench.progress import Lines, Silent, duration, make_progress
+from shipbench.bench.progress import Bar, Lines, Silent, duration, make_progress
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(0.4, "0 s"), (59.2, "59 s"), (185, "3 min 05 s"), (4330, "1 h 12 min")])
@@ -28,3 +28,15 @@ def test_lines_count_and_tell_the_remaining_time(monkeypatch):
 def test_quiet_means_silent_and_a_pipe_gets_lines():
     assert isinstance(make_progress(quiet=True), Silent)
     assert isinstance(make_progress(), Lines)
+
+
+def test_the_bar_prints_a_line_only_for_what_went_wrong(monkeypatch):
+    bar, printed = Bar(), []
+    monkeypatch.setattr(bar.progress.console, "print", lambda *parts, **_: printed.extend(p for p in parts if isinstance(p, str)))
+    bar.start(2)
+    bar.working("a")
+    bar.done("a", "ok, 18 runs, fit 1.0 s")
+    bar.done("b", "failed, 2 of 2 runs: no")
+    bar.finish()
+    assert printed == ["b: failed, 2 of 2 runs: no"]
+    assert bar.progress.finished
