@@ -123,8 +123,7 @@ def run(
     tasks = load_tasks(config, overrides)
     folder = out or Path("runs") / (Path(config).stem if config else slug(Path(tasks[0].dataset).name))
     outcome = run_tasks(tasks, folder, resume=resume, progress=make_progress(quiet), command=str(ctx.obj))
-    results = _results_of(outcome)
-    written = _write_boards(results, folder, str(ctx.obj))
+    written = _write_boards(outcome.results, folder, str(ctx.obj))
     if as_json:
         boards = {board.dataset: board.as_json() for board, _ in written}
         _print_json({"out": str(folder), "leaderboards": boards, "failed": outcome.failed})
@@ -136,12 +135,6 @@ def run(
         for line in outcome.failed:
             typer.echo(f"  {line}", err=True)
         raise typer.Exit(1)
-
-
-def _results_of(outcome: Any) -> Results:
-    from .bench.results import Results
-
-    return Results(outcome.rows, outcome.summaries, [outcome.out] * len(outcome.summaries))
 
 
 def _write_boards(results: Results, folder: Path, command: str, plots: bool = True) -> list[tuple[Board, Path]]:

@@ -21,7 +21,7 @@ from ..specs import Spec, parse_spec
 from .folds import Fold, make_folds, select_runs
 from .progress import Progress, Silent
 from .provenance import code_version, machine
-from .results import PROTOCOL, Cell, Frame, assemble, read_summary, write_cell, write_json, write_truth
+from .results import PROTOCOL, Cell, Frame, Results, assemble, read_summary, write_cell, write_json, write_truth
 from .scoring import columns, divergence, measure
 from .task import Task
 
@@ -34,6 +34,11 @@ class Outcome:
     rows: Frame
     summaries: list[dict[str, Any]]
     failed: list[str]
+
+    @property
+    def results(self) -> Results:
+        """As `read_results` would read them back."""
+        return Results(self.rows, self.summaries, [self.out] * len(self.summaries))
 
 
 @dataclass(frozen=True, eq=False)
