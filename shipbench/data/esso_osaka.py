@@ -73,7 +73,9 @@ def make(path: str | None = None, dt: float = 0.5, wind: bool = True) -> Dataset
     number = isinstance(dt, (int, float)) and not isinstance(dt, bool) and math.isfinite(dt)
     every = round(dt / _SAMPLE) if number else 0
     if every < 1 or abs(every * _SAMPLE - dt) > 1e-9:
-        raise InputError(f"esso_osaka: dt = {dt!r} s; the files are sampled at 0.1 s, so dt must be a positive multiple of 0.1, as 'esso_osaka[dt=0.5]'.")
+        raise InputError(
+            f"esso_osaka: dt = {dt!r} s; the files are sampled at 0.1 s, so dt must be a positive multiple of 0.1, as 'esso_osaka[dt=0.5]'."
+        )
     folder = find_copy(None if path is None else str(path))
     try:
         index = pd.read_csv(folder / "runs.csv")[["file", "kind", "wakita2022"]]
@@ -81,11 +83,11 @@ def make(path: str | None = None, dt: float = 0.5, wind: bool = True) -> Dataset
         reason = " ".join(str(error).split())[:160]
         raise InputError(f"{folder / 'runs.csv'} cannot be read: {reason}. It needs the columns file, kind, wakita2022.") from None
     runs = []
-    for row in index.itertuples():
-        stem = Path(str(row.file)).name.removesuffix(".csv.gz")
+    for file, kind, split in zip(index["file"], index["kind"], index["wakita2022"], strict=True):
+        stem = Path(str(file)).name.removesuffix(".csv.gz")
         if stem in _CUT_COPIES:
             continue
-        runs.append(_read_run(folder / str(row.file), stem, every, wind, str(row.kind), "test" in str(row.wakita2022)))
+        runs.append(_read_run(folder / str(file), stem, every, wind, str(kind), "test" in str(split)))
     return Dataset(
         name="esso_osaka" if wind else "esso_osaka_no_wind", ship=SHIP, dt=every * _SAMPLE, runs=tuple(runs), actuators="commanded",
         source="github.com/NAOE-5thLab/FRT-DS-ESSO, Osaka University (Wakita et al. 2022; Miyauchi et al. 2022)", licence="CC BY-NC-SA 4.0",
@@ -102,7 +104,7 @@ def _read_run(file: Path, stem: str, every: int, wind: bool, kind: str, test: bo
         raw = table[["t [s]", *_COLUMNS.values(), _RPS, _RUDDER, _WIND_SPEED, _WIND_FROM]].to_numpy(float)
     except (OSError, ValueError, KeyError, EOFError, zlib.error) as error:
         raise InputError(f"{file} cannot be read: {' '.join(str(error).split())[:160]}. Take a fresh copy of the public data.") from None
-    finite = np.isfinite(raw).all(axis=1)
+    finite = np.atleast_1d(np.isfinite(raw).all(axis=1))
     whole = int(finite.cumprod().sum())
     if whole < 2 or finite[whole:].any():
         missing = f"{int((~finite).sum())} of {len(raw)} rows lack values, the first is row {whole + 2}"

@@ -25,6 +25,8 @@ _ACTUATORS = STATES[ACTUATORS]
 _MOTION = STATES[: ACTUATORS.start]
 _SIGNALS = (*STATES, *COMMANDS, *ENVIRONMENT)
 _KNOWN = ("trajectory", "t", *_SIGNALS)
+_EMPTY = ["", "NA", "N/A", "NaN", "nan", "NAN", "null", "NULL", "None", "#N/A"]
+"""What stands for a missing number; in the column of run names it is a name like any other."""
 
 
 class _Description(BaseModel):
@@ -105,7 +107,8 @@ def _read_csv(path: Path, ids: str) -> pd.DataFrame:
     """Run names stay the text that they are ("001", "NA"); a row with more fields than the header is an error, not a shift of all columns."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)
-        return pd.read_csv(path, converters={ids: str}, index_col=False, float_precision="round_trip", low_memory=False)
+        empty = {column: _EMPTY for column in pd.read_csv(path, nrows=0, index_col=False).columns if column != ids}
+        return pd.read_csv(path, dtype={ids: str}, keep_default_na=False, na_values=empty, index_col=False, low_memory=False)
 
 
 def _rename(table: pd.DataFrame, columns: dict[str, str], where: Path) -> pd.DataFrame:
@@ -136,16 +139,17 @@ def _check_columns(table: pd.DataFrame, where: Path) -> None:
     table["trajectory"] = table["trajectory"].astype(str)
     block = (table["trajectory"] != table["trajectory"].shift()).cumsum()
     starts = table["trajectory"].groupby(block).first()
-    if starts.duplicated().any():
-        name = starts[starts.duplicated()].iloc[0]
+    twice = starts[starts.duplicated()].tolist()
+    if twice:
+        name = twice[0]
         raise InputError(
             f"{where}: the rows of run '{name}' are in {int((starts == name).sum())} places; accepted: each run's rows together, in order of t. "
             "Sort the rows by trajectory and t, or give the second run its own name."
         )
     for column in ("t", *(c for c in _SIGNALS if c in table)):
         if not pd.api.types.is_numeric_dtype(table[column]):
-            bad = (pd.to_numeric(table[column], errors="coerce").isna() & table[column].notna()).to_numpy()
-            row = int(np.argmax(bad))
+            unread = np.isnan(np.asarray(pd.to_numeric(table[column], errors="coerce"), dtype=float))
+            row = int(np.argmax(unread & table[column].notna().to_numpy()))
             value = table[column].iloc[row]
             raise InputError(f"{where}, row {row + 2}: {column} is '{value}', not a number. Accepted: decimal numbers with a point.")
         table[column] = table[column].astype(float)

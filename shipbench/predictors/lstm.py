@@ -16,7 +16,7 @@ from torch import Tensor, nn
 
 from ..errors import InputError
 from ..records import Dataset
-from ..signals import PSI
+from ..signals import COMMANDS, PSI
 from ._stacked import (
     CHANNELS,
     InputFeatures,
@@ -43,9 +43,11 @@ _MOST_STEPS = 150
 class _Network(nn.Module):
     """Cell, head and initial memory of all members, with their scalers."""
 
-    def __init__(self, features: InputFeatures, hidden: int, scalers: tuple[Scaler, Scaler, Scaler], draw: Sequence[torch.Generator]) -> None:
+    def __init__(
+        self, features: InputFeatures, hidden: int, scalers: tuple[Scaler, Scaler, Scaler], draw: Sequence[torch.Generator], commanded: bool
+    ) -> None:
         super().__init__()
-        self.features = features
+        self.features, self.commanded = features, commanded
         self.scale_y, self.scale_u, self.scale_dy = scalers
         width = _Y + features.count
         self.initial = StackedMLP([_Y, hidden, 2 * hidden], draw, torch.tanh)
@@ -65,7 +67,10 @@ class _Network(nn.Module):
         keep, write, show, new = gates.chunk(4, dim=-1)
         c = torch.sigmoid(keep + 1.0) * c + torch.sigmoid(write) * torch.tanh(new)  # + 1: remembers to begin with
         h = torch.sigmoid(show) * torch.tanh(c)
-        return y + self.scale_dy.inverse(self.head(torch.cat([x, h], dim=-1))), (h, c)
+        after = y + self.scale_dy.inverse(self.head(torch.cat([x, h], dim=-1)))
+        if self.commanded:  # what stands for the actuators then is the command, which is known
+            after = torch.cat([after[..., :3], held[..., : len(COMMANDS)]], dim=-1)
+        return after, (h, c)
 
     def rollout(self, past: tuple[Tensor, Tensor], start: Tensor, held: Tensor, dt: float) -> Tensor:
         """y (members, batch, steps, 7) from states start (members, batch, 10).
@@ -185,7 +190,7 @@ class LSTM(PredictorBase):
             if getattr(self, key) < 1:
                 raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
         self._weights: dict[str, np.ndarray] = {}
-        self._dt, self._stride = 0.0, 1
+        self._dt, self._stride, self._commanded = 0.0, 1, False
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Train on windows of `train`; `valid` chooses the weights that are kept."""
@@ -196,9 +201,11 @@ class LSTM(PredictorBase):
         """Short windows first: they are cheap and their gradients tame."""
         plan = ((10, 128, 0.5), (30, 64, 0.25), (80, 48, 0.25))
         epochs = shares_of(self.epochs, [share for _, _, share in plan])
-        return [
-            Stage(min(s, steps), batch, n, min(max(10, s // 2), steps - min(s, steps))) for (s, batch, _), n in zip(plan, epochs, strict=True) if n
-        ]
+        stages = []
+        for (length, batch, _), number in zip(plan, epochs, strict=True):
+            length = min(length, steps)
+            stages.append(Stage(length, batch, number, history=min(max(10, length // 2), steps - length)))
+        return [s for s in stages if s.epochs]
 
     @classmethod
     def fit_group(cls, models: Sequence[LSTM], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]) -> None:
@@ -215,12 +222,13 @@ class LSTM(PredictorBase):
             Scaler.fit([features(held, S[:, :-1, PSI]) for S, held in parts]),
             Scaler.fit([S[:, 1:, CHANNELS] - S[:, :-1, CHANNELS] for S, _ in parts], centred=False),
         )
-        net = _Network(features, lead.hidden, scalers, draw)
+        commanded = trains[0].actuators == "commanded"
+        net = _Network(features, lead.hidden, scalers, draw, commanded)
         task = _Rollouts(net, training, validation, lead._stages(training.steps), draw, dt * stride, lead.pose_weight)
         train(task, Recipe(lr=lead.lr, lr_end=0.01, chunks=task.num_chunks, clip=1.0, device=lead.device))
         state = {k: v.detach().cpu().numpy() for k, v in net.state_dict().items()}
         for m, model in enumerate(models):
-            model.inputs, model._dt, model._stride = names, dt, stride
+            model.inputs, model._dt, model._stride, model._commanded = names, dt, stride, commanded
             model._weights = {k: v[m : m + 1].copy() for k, v in state.items()}
 
     def _network(self) -> _Network:
@@ -229,7 +237,7 @@ class LSTM(PredictorBase):
             raise InputError("lstm: predict was called before fit; fit or load the model first.")
         w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
         y, u, dy = (Scaler(w[f"scale_{k}.mean"], w[f"scale_{k}.std"]) for k in ("y", "u", "dy"))
-        net = _Network(InputFeatures(self.inputs), self.hidden, (y, u, dy), generators([0])).double()
+        net = _Network(InputFeatures(self.inputs), self.hidden, (y, u, dy), generators([0]), self._commanded).double()
         net.load_state_dict(w)
         return net
 
@@ -250,10 +258,11 @@ class LSTM(PredictorBase):
         return self._weights
 
     def _meta(self) -> dict[str, Any]:
-        return {"dt": self._dt, "stride": self._stride}
+        return {"dt": self._dt, "stride": self._stride, "commanded": self._commanded}
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
-        self._weights, self._dt, self._stride = arrays, float(meta["dt"]), int(meta["stride"])
+        self._weights, self._dt = arrays, float(meta["dt"])
+        self._stride, self._commanded = int(meta["stride"]), bool(meta["commanded"])
 
 
 def _between(y0: Tensor, y: Tensor, stride: int) -> Tensor:

@@ -67,6 +67,7 @@ class Recipe:
         clip: greatest gradient norm of a member, if set.
         weight_decay: decoupled (AdamW), 0 for plain Adam.
         device: "cpu", "cuda", "cuda:1", "mps".
+        threads: of torch while it trains; None leaves them.
     """
 
     lr: float = 1e-3
@@ -77,6 +78,7 @@ class Recipe:
     chunks: int | None = None
     lr_end: float = 1.0
     device: str = "cpu"
+    threads: int | None = None
 
 
 class BestWeights:
@@ -194,6 +196,16 @@ def _quiet() -> Iterator[None]:
             logger.setLevel(level)
 
 
+@contextmanager
+def _threads(number: int | None) -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(number or before)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
 def train(task: StackedTask, recipe: Recipe) -> BestWeights:
     """Train `task` in place and leave each member with its best weights, on the CPU. Writes no files, draws no global random number.
 
@@ -201,7 +213,7 @@ def train(task: StackedTask, recipe: Recipe) -> BestWeights:
         WorkError: a member never had a finite validation score.
     """
     kind, _, number = recipe.device.partition(":")
-    with _quiet():
+    with _quiet(), _threads(recipe.threads):
         module = _Training(task, recipe)
         trainer = lightning.Trainer(
             accelerator="gpu" if kind == "cuda" else kind,

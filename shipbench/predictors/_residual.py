@@ -1,0 +1,138 @@
+"""Physics plus a learned residual acceleration, for all members at once, and its solution by torchdiffeq over windows of measured runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from ..physics import eq2
+from ..physics.wind import apparent_wind
+from ..records import Dataset
+from ..signals import PSI, R, U, V
+from ._stacked import CHANNELS, Scaler, StackedMLP
+from .physics import Physics
+
+Air = tuple[Tensor, Tensor]
+
+
+class Residual(nn.Module):
+    """Accelerations of all members: physics plus network.
+
+    Args:
+        physics: the fitted models, one per member.
+        hidden: width of the two hidden layers.
+        scale_in: of (u, v, r, n, delta, F_b, F_s); scale_out (members, 1, 3): size of the accelerations.
+    """
+
+    p: Tensor
+    scale_out: Tensor
+
+    def __init__(self, physics: Sequence[Physics], hidden: int, scale_in: Scaler, scale_out: Tensor, draw: Sequence[torch.Generator]) -> None:
+        super().__init__()
+        self.c = physics[0].c
+        self.register_buffer("p", torch.as_tensor(np.stack([m.p for m in physics]), dtype=scale_out.dtype).T[..., None].contiguous())
+        self.register_buffer("scale_out", scale_out)
+        self.scale_in = scale_in
+        self.net = StackedMLP([7, hidden, hidden, 3], draw, torch.tanh, zero_last=True)
+
+    def learned(self, u: Tensor, v: Tensor, r: Tensor, actuators: Sequence[Tensor]) -> Tensor:
+        """Residual accelerations (members, batch, 3); arguments (members, batch)."""
+        return self.net(self.scale_in(torch.stack([u, v, r, *actuators], dim=-1))) * self.scale_out
+
+    def forward(
+        self, psi: Tensor | None, u: Tensor, v: Tensor, r: Tensor, actuators: Sequence[Tensor], air: Air | None
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """(du, dv, dr), each (members, batch); `air` is true wind speed and direction."""
+        apparent = None if air is None or psi is None else apparent_wind(psi, u, v, *air)
+        n, delta, F_b, F_s = actuators
+        du, dv, dr = eq2.accelerations(u, v, r, n, delta, F_b, F_s, apparent, self.c, self.p.unbind(0))
+        more = self.learned(u, v, r, actuators).unbind(-1)
+        return du + more[0], dv + more[1], dr + more[2]
+
+
+class Grid(NamedTuple):
+    """How the training integrates: a knot every `stride` samples, `per_knot` midpoint steps of `step` seconds between knots."""
+
+    stride: int
+    per_knot: int
+    step: float
+
+    @classmethod
+    def of(cls, physics: Physics) -> Grid:
+        """Steps of about a second for 100 m (the time scale of a ship goes with sqrt(L)), never across a change of the inputs that it misses."""
+        if physics.substeps > 1:
+            return cls(1, physics.substeps, physics.dt / physics.substeps)
+        stride = max(1, int(0.1 * np.sqrt(physics.c.L) / physics.dt))
+        return cls(stride, 1, stride * physics.dt)
+
+
+class Drive(NamedTuple):
+    """What is known ahead of the rollouts of all members' runs.
+
+    Args:
+        S: (runs, knots + 1, 10) measured states.
+        path: (runs, steps, 2, 4) actuators at the beginning and in the middle of every integration step.
+        air: (runs, steps, 2) true wind, or None.
+        counts: runs of each member.
+    """
+
+    S: Tensor
+    path: Tensor
+    air: Tensor | None
+    counts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, physics: Sequence[Physics], datasets: Sequence[Dataset], grid: Grid) -> Drive:
+        """Actuators do not depend on the hull's motion, so that their path is known before the rollout."""
+        parts, counts, d = [], [], grid.stride
+        for model, data in zip(physics, datasets, strict=True):
+            batch = data.batch()
+            knots = batch.U.shape[1] // d
+            S = np.concatenate([batch.s0[:, None], batch.truth], axis=1)[:, : knots * d + 1 : d]
+            full = model.actuator_path(batch.s0, batch.U)
+            begin, middle = full[:, 0 : knots * d * grid.per_knot : d, 0], full[:, d // 2 :: d, d % 2][:, : knots * grid.per_knot]
+            air = model._wind(batch.U)
+            wind = np.zeros((len(S), 0, 2)) if air is None else np.repeat(air[:, : knots * d : d], grid.per_knot, axis=1)
+            parts.append((S, np.stack([begin, middle], axis=2), wind))
+            counts.append(len(S))
+        S, path, wind = (torch.as_tensor(np.concatenate(p), dtype=torch.float32) for p in zip(*parts, strict=True))
+        return cls(S, path, wind if wind.shape[1] else None, tuple(counts))
+
+
+def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step: float) -> Tensor:
+    """u, v, r at the ends of the steps by torchdiffeq's midpoint rule (members, batch, steps, 3).
+
+    Args:
+        start: (members, batch, 10).
+        path: (members, batch, steps, 2, 4); air: (members, batch, steps, 2) or None.
+        step: [s].
+    """
+    from torchdiffeq import odeint
+
+    stages = path.permute(2, 3, 4, 0, 1).contiguous()  # time first: one step is then a contiguous block
+    wind = None if air is None else air.permute(2, 3, 0, 1).contiguous()
+
+    def rate(t: Tensor, y: Tensor) -> Tensor:
+        j, half = divmod(round(2.0 * float(t)), 2)  # time in steps: the rule asks at j and j + 1/2
+        u, v, r = y[0], y[1], y[2]
+        psi, now = (None, None) if wind is None else (y[3], (wind[j, 0], wind[j, 1]))
+        rates = model(psi, u, v, r, stages[j, half].unbind(0), now)
+        return step * torch.stack(rates if wind is None else (*rates, r))
+
+    first = start[..., [U, V, R] if wind is None else [U, V, R, PSI]].movedim(-1, 0)
+    times = torch.arange(path.shape[2] + 1, dtype=start.dtype)
+    return odeint(rate, first, times, method="midpoint")[1:, :3].permute(2, 3, 0, 1)  # pyright: ignore[reportIndexIssue, reportCallIssue, reportArgumentType]
+
+
+def typical_accelerations(physics: Sequence[Physics], drive: Drive) -> Tensor:
+    """Root mean square (members, 1, 3) of the physics' accelerations in still air along the measured states."""
+    sizes = []
+    for model, S in zip(physics, drive.S.double().split(drive.counts), strict=True):
+        u, v, r, n, delta, F_b, F_s = S[..., CHANNELS].movedim(-1, 0).numpy()
+        found = eq2.accelerations(u, v, r, n, delta, F_b, F_s, None, model.c, list(model.p))
+        sizes.append([float(np.sqrt(np.mean(np.square(a)))) for a in found])
+    return torch.tensor(sizes, dtype=torch.float32)[:, None]
