@@ -12,7 +12,7 @@ import numpy as np
 
 from .errors import InputError
 from .ship import Ship
-from .signals import COMMANDS, ENVIRONMENT, STATES
+from .signals import COMMANDS, STATES
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +132,7 @@ class Dataset:
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 (first 16 digits) over every sample, the run names, dt, the inputs and the ship."""
-        digest = hashlib.sha256(repr((self.dt, self.inputs, self.actuators, self.ship.model_dump_json())).encode())
+        digest = hashlib.sha256(repr((float(self.dt), self.inputs, self.actuators, self.ship.model_dump_json())).encode())
         for run in self.runs:
             digest.update(run.id.encode())
             for array in (run.t, run.states, run.inputs):

@@ -50,8 +50,7 @@ class Registry:
         files, plugins = self._files(), self._entry_points()
         for name in files.keys() & plugins.keys():
             raise InputError(
-                f"{self.kind} '{name}' is defined twice: in shipbench and in the plug-in {plugins[name].value}. "
-                "Rename the plug-in's entry point."
+                f"{self.kind} '{name}' is defined twice: in shipbench and in the plug-in {plugins[name].value}. Rename the plug-in's entry point."
             )
         return sorted(files.keys() | plugins.keys())
 

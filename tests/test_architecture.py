@@ -13,8 +13,8 @@ ROOT = Path(__file__).parent.parent / "shipbench"
 FILES = sorted(ROOT.rglob("*.py"))
 
 LAYERS = {
-    "errors": 0, "ops": 0, "signals": 0, "registry": 1, "specs": 1, "integrate": 1, "ship": 1, "records": 2, "physics": 2, "metrics": 2.5, "simulate": 3,
-    "predictors": 3.5, "data": 4, "bench": 5, "cli": 6, "__init__": 7,
+    "errors": 0, "ops": 0, "signals": 0, "registry": 1, "specs": 1, "integrate": 1, "ship": 1, "records": 2, "physics": 2, "metrics": 2.5,
+    "simulate": 3, "predictors": 3.5, "data": 4, "bench": 5, "cli": 6, "__init__": 7,
 }  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """The model that is fitted to data: equations (2) to (8) of the source paper, in the reading of the physics reference, section 3.2.
 
-The left side (masses, hull derivatives) comes from published regressions on the main dimensions; the right side holds p0..p10. Its structure (quadratic
+The left side (masses, hull derivatives) comes from published regressions on the main dimensions; the right side holds p0..p10. Its
+structure (quadratic
 hull, lift and drag polynomials of the rudder) differs from the MMG simulator's on purpose.
 """
 
@@ -64,7 +65,8 @@ class Coefficients:
 def coefficients(ship: Particulars) -> Coefficients:
     """Left side of eq. (2) for a ship.
 
-    Source: Inoue et al. (1981) for the derivatives, whose structure eq. (2) is; Clarke et al. (1983) for the added masses in sway and yaw, Soeding (1982) for
+    Source: Inoue et al. (1981) for the derivatives, whose structure eq. (2) is; Clarke et al. (1983) for the added masses in sway and yaw,
+    Soeding (1982) for
     surge, X_vr = -0.28 m_y from KCS (physics reference 3.2), a_H and x_H of Yoshimura & Masumoto (2012).
     """
     L, B, T, rho = ship.L, ship.B, ship.T, ship.rho
@@ -100,7 +102,8 @@ def propulsion(u: Array, n: Array, c: Coefficients) -> tuple[Array, Array]:
 def rudder(u: Array, v: Array, r: Array, delta: Array, race: Array, c: Coefficients, p: Sequence[Array]) -> tuple[Array, Array, Array]:
     """Rudder force (X, Y, N) from lift and drag, c_L = p4 + p5 a + p6 a^2 + p7 a^3, c_D = p8 + p9 a + p10 a^2 (eq. 7, 8).
 
-    Inflow: the share eta = D_P/H_R of the blade stands in the race, the rest in the wake; sideways 0.364 v + 0.66 x_R r (Kose/Brix flow straightening).
+    Inflow: the share eta = D_P/H_R of the blade stands in the race, the rest in the wake; sideways 0.364 v + 0.66 x_R r (Kose/Brix flow
+    straightening).
     Angle of attack a = delta + atan2(w_R, u_R). Lift acts across the inflow, to port for a > 0; drag along it.
     """
     V_A = u - c.w_P0 * maximum(u, 0.0)
@@ -122,10 +125,12 @@ def accelerations(
 ) -> tuple[Array, Array, Array]:
     """(du, dv, dr) of eq. (2) [m/s^2, m/s^2, rad/s^2].
 
-    n in rpm, delta in rad, F_b and F_s in N; `air` is the ship's velocity relative to the air in body axes (`wind.apparent_wind`) or None without wind;
+    n in rpm, delta in rad, F_b and F_s in N; `air` is the ship's velocity relative to the air in body axes (`wind.apparent_wind`) or None
+    without wind;
     p holds p0..p10: p0 lateral over axial propeller force [1], p1..p3 resistance [N s/m, N s^2/m^2, N s^3/m^3], p4..p10 rudder [1].
 
-    The two cubic yaw terms are divided by U; their v/U is held at 0.5 (30 deg of drift, the end of the charts) or where N_vrr v r^2/U would exceed the yaw damping
+    The two cubic yaw terms are divided by U; their v/U is held at 0.5 (30 deg of drift, the end of the charts) or where N_vrr v r^2/U
+    would exceed the yaw damping
     N_rr r|r|: beyond, a ship set sideways by wind at low speed would spin up without limit.
 
     X_e, Y_e, N_e are thrusters and measured wind. R(u) = -(p1 u + p2 u|u| + p3 u^3): it opposes the motion on both tacks of u.

@@ -42,7 +42,8 @@ def thrust_quadratic(n: Array, V_A: Array, D: float, kt: tuple[float, float, flo
 def thrust_four_quadrant(n: Array, V_A: Array, D: float, rho: float) -> Array:
     """Thrust of a B4-70 screw, P/D = 0.8, in all four quadrants.
 
-    beta = atan2(V_A, 0.7 pi n D); T = rho/2 (V_A^2 + (0.7 pi n D)^2) pi/4 D^2 C_T(beta), 100 C_T = sum_k A_k cos(k beta) + B_k sin(k beta), k = 0..20.
+    beta = atan2(V_A, 0.7 pi n D); T = rho/2 (V_A^2 + (0.7 pi n D)^2) pi/4 D^2 C_T(beta), 100 C_T = sum_k A_k cos(k beta) + B_k sin(k
+    beta), k = 0..20.
 
     Source: Roddy, Hess & Faller (2006). Limit: 0 at rest with n = 0.
     """

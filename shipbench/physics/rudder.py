@@ -35,9 +35,11 @@ def inflow_speed(u: Array, n: Array, thrust: Array, w_P: Array, c: MMGRudder, D:
     """Longitudinal inflow at the rudder [m/s] in the propeller race, without division by the advance ratio.
 
     n >= 0: u_R = eps sqrt(eta [u_P + kappa (sqrt(u_P^2 + 8 T/(rho pi D^2)) - u_P)]^2 + (1 - eta) u_P^2), u_P = (1 - w_P) u, eta = D/H_R.
-    n < 0:  Kitagawa's form u_R = sign(s) sqrt|s|, s = eta sign(a) a^2 + (1 - eta) b^2 + c_pr u^2, a = b - k_xr sqrt(8|T|/(rho pi D^2)), b = eps (1 - w_P) u.
+    n < 0:  Kitagawa's form u_R = sign(s) sqrt|s|, s = eta sign(a) a^2 + (1 - eta) b^2 + c_pr u^2, a = b - k_xr sqrt(8|T|/(rho pi D^2)), b
+    = eps (1 - w_P) u.
 
-    Source: Yasukawa & Yoshimura (2015), eq. 38 in the Osaka low-speed writing; Kitagawa et al. for n < 0 (physics reference 2.6). Limits: eps kappa sqrt(eta)
+    Source: Yasukawa & Yoshimura (2015), eq. 38 in the Osaka low-speed writing; Kitagawa et al. for n < 0 (physics reference 2.6). Limits:
+    eps kappa sqrt(eta)
     times the race speed at u = 0; close to zero when backing with headway. Going astern with n < 0 it is u.
     """
     eta = min(D / c.H_R, 1.0)

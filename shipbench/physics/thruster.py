@@ -21,7 +21,8 @@ class Tunnels:
 def tunnel_thrusters(u: Array, F_b: Array, F_s: Array, c: Tunnels) -> tuple[Array, Array]:
     """Side force [N] and moment [N m] about midship of thruster forces F_b, F_s [N, pushing the hull to starboard].
 
-    Y = k_Y (F_b + F_s), N = k_N (x_bow F_b + x_stern F_s), k = 1 - loss q exp(1 - q), q = (u/u_loss)^2. The jet's suction on the hull takes more of the
+    Y = k_Y (F_b + F_s), N = k_N (x_bow F_b + x_stern F_s), k = 1 - loss q exp(1 - q), q = (u/u_loss)^2. The jet's suction on the hull
+    takes more of the
     moment than of the force; the loss is worst near 4 kn (2.1 m/s) and gone at 15 kn.
 
     Source: shape after the 60 000 DWT tanker tests of Int. Shipbuild. Progress 1967 (doi 10.3233/ISP-1967-1415601): moment down to 50 % at 4 kn.

@@ -37,7 +37,8 @@ def blendermann(u_rw: Array, v_rw: Array, A_F: float, A_L: float, L: float) -> t
 def harmonic(u_rw: Array, v_rw: Array, A_F: float, A_L: float, L: float) -> tuple[Array, Array, Array]:
     """Wind force (X, Y, N) about midship from the lowest harmonics, for a ship whose superstructure is not known.
 
-    C_X = -0.9 cos(gamma), C_Y = 0.95 sin(gamma), C_N = 0.2 sin(2 gamma), gamma as in `blendermann`. Written in velocities: nothing is undefined in still air.
+    C_X = -0.9 cos(gamma), C_Y = 0.95 sin(gamma), C_N = 0.2 sin(2 gamma), gamma as in `blendermann`. Written in velocities: nothing is
+    undefined in still air.
 
     Source: simplified form in nikpau/mmgdynamics (physics reference, E03 d).
     """

@@ -1,6 +1,7 @@
 """Constrained nonlinear least squares over full rollouts (eq. 9): Gauss-Newton steps whose constrained subproblems IPOPT solves.
 
-CasADi differentiates one integration step; the sensitivities are carried along all runs at once. IPOPT then meets a problem of 11 unknowns with the bounds and the nonlinear
+CasADi differentiates one integration step; the sensitivities are carried along all runs at once. IPOPT then meets a problem of 11 unknowns
+with the bounds and the nonlinear
 constraints exact, so a step costs milliseconds, and the rollouts are evaluated once per step instead of once per barrier iteration.
 """
 
@@ -8,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 import casadi as ca
 import numpy as np
@@ -86,7 +87,7 @@ def _subproblem(low: np.ndarray, high: np.ndarray, scale: np.ndarray) -> ca.Func
     d = q - q0
     problem: dict[str, Any] = {"x": q, "p": ca.veccat(q0, grad, H), "f": ca.dot(grad, d) + 0.5 * ca.bilin(H, d, d), "g": _constraints(q * scale)}
     options = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-9, "ipopt.max_iter": 200}
-    return ca.nlpsol("step", "ipopt", problem, options)
+    return ca.nlpsol("step", "ipopt", cast(Any, problem), options)  # casadi's stub forgets that a problem mixes vectors and matrices
 
 
 def fit_parameters(

@@ -143,7 +143,10 @@ class Physics(PredictorBase):
         if self.commanded:
             lines.append("  actuators: the data record commands only; no dynamics between command and actuator")
         else:
-            lines += [f"  {symbol:10s} = {value:10.4g} {unit:6s} {meaning}" for (symbol, meaning, unit), value in zip(ACTUATOR_PARAMETERS, self.actuator_params, strict=True)]
+            lines += [
+                f"  {symbol:10s} = {value:10.4g} {unit:6s} {meaning}"
+                for (symbol, meaning, unit), value in zip(ACTUATOR_PARAMETERS, self.actuator_params, strict=True)
+            ]
         return "\n".join(lines + [f"  note: {n}" for n in self.particulars.notes])
 
     def _arrays(self) -> dict[str, np.ndarray]:

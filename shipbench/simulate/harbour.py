@@ -44,7 +44,9 @@ def draw_plan(rng: np.random.Generator, num: int, L: float, horizon: float, warm
     """Draw the intentions of `num` runs: winding channels, speed orders every 20 to 60 s, a few stops, a few thruster assists."""
     speed = np.clip(np.where(rng.random(num) < 0.66, rng.normal(4.02, 0.18, num), rng.normal(5.3, 0.32, num)), 2.4, 6.3)
     course = rng.uniform(-np.pi, np.pi, num)
-    turns = np.deg2rad(-4.0) + np.deg2rad(np.where(rng.random(num) < 0.08, 85.0, rng.uniform(0.0, 34.0, num)))[:, None] * rng.standard_normal((num, _LEGS))
+    turns = np.deg2rad(-4.0) + np.deg2rad(np.where(rng.random(num) < 0.08, 85.0, rng.uniform(0.0, 34.0, num)))[:, None] * rng.standard_normal(
+        (num, _LEGS)
+    )
     turns[:, 0] = 0.0
     courses = course[:, None] + np.cumsum(np.clip(turns, -1.6, 1.6), axis=1)
     legs = rng.uniform(1.5, 3.0, (num, _LEGS)) * L

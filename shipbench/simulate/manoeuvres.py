@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import WorkError
-from ..signals import N, PSI, R, U, V, X, Y
+from ..signals import PSI, N, R, U, V, X, Y
 from .simulator import Simulator
 
 
@@ -37,7 +37,7 @@ def turning_circle(sim: Simulator, speed: float, rpm: float, delta_deg: float, d
     Raises:
         WorkError: 180 degrees of heading change are not reached within `duration` [s].
     """
-    steps = int(round(duration / dt))
+    steps = round(duration / dt)
     command = np.zeros((1, steps, 4))
     command[..., 0], command[..., 1] = rpm, np.deg2rad(delta_deg)
     s0 = straight_state(speed, rpm)
@@ -70,7 +70,7 @@ def zigzag_overshoots(sim: Simulator, speed: float, rpm: float, amplitude_deg: f
     command[0, 0] = rpm
     switches: list[int] = []
     heading = [0.0]
-    for k in range(int(round(duration / dt))):
+    for k in range(round(duration / dt)):
         side = sign * (-1) ** len(switches)  # heading side on which the rudder is reversed next
         if side * state[0, PSI] >= amplitude:
             switches.append(k)

@@ -24,7 +24,9 @@ _ZIGZAG = {
 _KT_POLYNOMIAL = {0.0: 0.354, 0.2: 0.291, 0.4: 0.212, 0.6: 0.123, 0.8: 0.028}
 
 
-def _row(ship: str, quantity: str, computed: float, published: float, unit: str, tolerance: float | None, relative: bool, source: str) -> dict[str, Any]:
+def _row(
+    ship: str, quantity: str, computed: float, published: float, unit: str, tolerance: float | None, relative: bool, source: str
+) -> dict[str, Any]:
     error = abs(computed - published) / (abs(published) if relative else 1.0)
     return {
         "ship": ship, "quantity": quantity, "computed": computed, "published": published, "unit": unit,
@@ -69,7 +71,9 @@ def table() -> list[dict[str, Any]]:
         _row("kvlcc2_l7", "advance, -35 deg", turn.advance, 3.36, "L", None, True, "reference's own run"),
         _row("kvlcc2_l7", "tactical diameter, -35 deg", turn.tactical_diameter, 3.34, "L", None, True, "reference's own run"),
     ]
-    rows.append(_row("kcs", "self-propulsion at 24 kn", self_propulsion_rpm(kcs, KCS_SPEED), KCS_RPM, "rpm", 0.005, True, "SIMMAN study of KVLCC and KCS"))
+    rows.append(
+        _row("kcs", "self-propulsion at 24 kn", self_propulsion_rpm(kcs, KCS_SPEED), KCS_RPM, "rpm", 0.005, True, "SIMMAN study of KVLCC and KCS")
+    )
     for sign, advance, diameter in ((1, 3.36, 3.59), (-1, 3.24, 3.36)):
         turn = turning_circle(kcs, KCS_SPEED, KCS_RPM, 35.0 * sign, 0.5, 600.0)
         rows += [
@@ -77,7 +81,9 @@ def table() -> list[dict[str, Any]]:
             _row("kcs", f"tactical diameter, {35 * sign:+d} deg", turn.tactical_diameter, diameter, "L", None, True, "reference's own run"),
         ]
     for (name, angle), published in _ZIGZAG.items():
-        sim, speed, rpm, dt, duration = (model, KVLCC2_SPEED, KVLCC2_RPM, 0.1, 200.0) if name == "kvlcc2_l7" else (kcs, KCS_SPEED, KCS_RPM, 0.5, 900.0)
+        sim, speed, rpm, dt, duration = (
+            (model, KVLCC2_SPEED, KVLCC2_RPM, 0.1, 200.0) if name == "kvlcc2_l7" else (kcs, KCS_SPEED, KCS_RPM, 0.5, 900.0)
+        )
         for label, computed, value in zip(("1st", "2nd"), zigzag_overshoots(sim, speed, rpm, angle, dt, duration), published, strict=True):
             rows.append(_row(name, f"zig-zag {angle:+d}/{angle:+d}, {label} overshoot", computed, value, "deg", None, True, "reference's own run"))
     for J, value in _KT_POLYNOMIAL.items():

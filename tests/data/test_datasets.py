@@ -104,7 +104,12 @@ def test_noise_and_gusts_change_what_is_measured(harbour90):
 
 @pytest.mark.parametrize(
     ("spec", "expected"),
-    [("harbor90", "Did you mean 'harbour90'"), ("harbour90[sead=3]", "sead"), ("esso_osaka[path=/nowhere]", "FRT-DS-ESSO"), ("no/such/folder", "folder")],
+    [
+        ("harbor90", "Did you mean 'harbour90'"),
+        ("harbour90[sead=3]", "sead"),
+        ("esso_osaka[path=/nowhere]", "FRT-DS-ESSO"),
+        ("no/such/folder", "folder"),
+    ],
 )
 def test_bad_names_are_named(spec, expected):
     with pytest.raises(InputError, match=expected):

@@ -310,4 +310,6 @@ def test_a_ship_drifting_with_the_current_feels_no_water():
     env = mmg.Environment(current_speed=0.5, current_to=0.7)
     psi = 0.2
     u, v = 0.5 * np.cos(0.5), 0.5 * np.sin(0.5)
-    assert np.allclose(mmg.accelerations(SHIP, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, replace(env, wind_speed=0.5, wind_from=0.7 + np.pi)), 0.0, atol=1e-9)
+    assert np.allclose(
+        mmg.accelerations(SHIP, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, replace(env, wind_speed=0.5, wind_from=0.7 + np.pi)), 0.0, atol=1e-9
+    )

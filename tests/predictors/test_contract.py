@@ -96,5 +96,5 @@ def test_bad_input_is_named(model, batch, fault):
         U[0, 5, 1] = np.nan
     else:
         U = U[:, :0]
-    with pytest.raises(InputError, match="accepted|finite"):
+    with pytest.raises(InputError, match=r"accepted|finite"):
         model.predict(s0, U)
