@@ -26,12 +26,14 @@ class Registry:
         folder: sub-package whose modules are the parts ("predictors").
         attribute: the name that each module defines ("PREDICTOR").
         helpers: modules of the folder that are not parts.
+        group: entry-point group `shipbench.<group>` for outside packages; the folder's name unless given.
     """
 
     kind: str
     folder: str
     attribute: str
     helpers: frozenset[str] = frozenset()
+    group: str = ""
 
     def _files(self) -> dict[str, str]:
         root = Path(__file__).parent / self.folder
@@ -39,7 +41,7 @@ class Registry:
         return {s: f"{_PACKAGE}.{self.folder}.{s}" for s in stems if not s.startswith("_") and s not in self.helpers}
 
     def _entry_points(self) -> dict[str, Any]:
-        return {e.name: e for e in entry_points(group=f"shipbench.{self.folder}")}
+        return {e.name: e for e in entry_points(group=f"shipbench.{self.group or self.folder}")}
 
     def names(self) -> list[str]:
         """All registered names, sorted, without importing any part.

@@ -20,7 +20,7 @@ from ..registry import Registry
 from ..specs import parse_spec
 from .files import read_dataset, write_dataset
 
-DATASETS = Registry("data set", "data", "DATASET", helpers=frozenset({"base", "files", "describe", "units"}))
+DATASETS = Registry("data set", "data", "DATASET", helpers=frozenset({"base", "files", "describe", "units"}), group="datasets")
 
 _log = logging.getLogger(__name__)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, cast
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -86,8 +86,8 @@ def _subproblem(low: np.ndarray, high: np.ndarray, scale: np.ndarray) -> ca.Func
     q, q0, grad, H = ca.SX.sym("q", _P), ca.SX.sym("q0", _P), ca.SX.sym("g", _P), ca.SX.sym("H", _P, _P)
     d = q - q0
     problem: dict[str, Any] = {"x": q, "p": ca.veccat(q0, grad, H), "f": ca.dot(grad, d) + 0.5 * ca.bilin(H, d, d), "g": _constraints(q * scale)}
-    options = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-9, "ipopt.max_iter": 200}
-    return ca.nlpsol("step", "ipopt", cast(Any, problem), options)  # casadi's stub forgets that a problem mixes vectors and matrices
+    options: dict[str, Any] = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-9, "ipopt.max_iter": 200}
+    return ca.nlpsol("step", "ipopt", problem, options)
 
 
 def fit_parameters(

@@ -99,8 +99,8 @@ class Drive(NamedTuple):
             wind = np.zeros((len(S), 0, 2)) if air is None else np.repeat(air[:, : knots * d : d], grid.per_knot, axis=1)
             parts.append((S, np.stack([begin, middle], axis=2), wind))
             counts.append(len(S))
-        S, path, wind = (torch.as_tensor(np.concatenate(p), dtype=torch.float32) for p in zip(*parts, strict=True))
-        return cls(S, path, wind if wind.shape[1] else None, tuple(counts))
+        states, path, held = (torch.as_tensor(np.concatenate(p), dtype=torch.float32) for p in zip(*parts, strict=True))
+        return cls(states, path, held if held.shape[1] else None, tuple(counts))
 
 
 def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step: float) -> Tensor:

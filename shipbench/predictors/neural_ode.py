@@ -137,11 +137,11 @@ class NeuralODE(PredictorBase):
             model.physics = Physics().fit(training, validation, seed=seed)
         physics = [m.physics for m in models]
         grid = Grid.of(physics[0])
-        training, validation = (Drive.of(physics, part, grid) for part in zip(*pairs, strict=True))
+        learn, check = (Drive.of(physics, part, grid) for part in zip(*pairs, strict=True))
         draw = generators(seeds)
-        scale_in = Scaler.fit([S[..., CHANNELS] for S in training.S.split(training.counts)])
-        residual = Residual(physics, lead.hidden, scale_in, typical_accelerations(physics, training), draw)
-        task = _Windows(residual, training, validation, grid, lead._stages(training.S.shape[1] - 1), draw, lead.penalty)
+        scale_in = Scaler.fit([S[..., CHANNELS] for S in learn.S.split(learn.counts)])
+        residual = Residual(physics, lead.hidden, scale_in, typical_accelerations(physics, learn), draw)
+        task = _Windows(residual, learn, check, grid, lead._stages(learn.S.shape[1] - 1), draw, lead.penalty)
         # Many small elementwise operations: a second thread only costs.
         recipe = Recipe(lead.lr, clip=1.0, weight_decay=lead.weight_decay, chunks=task.num_chunks, lr_end=0.02, device=lead.device, threads=1)
         train(task, recipe)

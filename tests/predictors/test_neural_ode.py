@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from shipbench.errors import InputError
+from shipbench.predictors._residual import Drive, Grid, Residual, solve, typical_accelerations
+from shipbench.predictors._stacked import CHANNELS, Scaler, generators
+from shipbench.predictors.neural_ode import NeuralODE
+from shipbench.predictors.physics import Physics
+from shipbench.signals import MOTION, VELOCITY
+
+
+@pytest.fixture(scope="module")
+def parts(harbour):
+    return harbour.subset(range(12)), harbour.subset(range(12, 14)), harbour.subset(range(14, 16))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def weak_resistance():
+    """Every fitted physics loses half of its resistance, so that there is something to learn on so few runs."""
+    fit = Physics.fit
+
+    def spoiled(self, train, valid=None, *, seed=0):
+        fit(self, train, valid, seed=seed)
+        self.p = self.p * np.where(np.isin(np.arange(11), (1, 2, 3)), 0.5, 1.0)
+        return self
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Physics, "fit", spoiled)
+        yield
+
+
+@pytest.fixture(scope="module")
+def physics(parts, weak_resistance):
+    return Physics().fit(parts[0], parts[1])
+
+
+@pytest.fixture(scope="module")
+def model(parts, weak_resistance):
+    return NeuralODE(epochs=6, hidden=16).fit(parts[0], parts[1], seed=0)
+
+
+def position_error(model, data):
+    batch = data.batch()
+    return np.hypot(*(model.predict(batch.s0, batch.U) - batch.truth)[..., :2].transpose(2, 0, 1)).mean()
+
+
+def test_with_a_zero_residual_it_is_the_physics(parts, physics, model):
+    batch = parts[2].batch()
+    plain = NeuralODE(hidden=16)
+    weights = {k: np.zeros_like(v) if "layers.2" in k else v for k, v in model._weights.items()}
+    plain.physics, plain._weights, plain.improved = physics, weights, True
+    np.testing.assert_allclose(plain.predict(batch.s0, batch.U), physics.predict(batch.s0, batch.U), rtol=1e-9, atol=1e-9)
+
+
+def test_training_halves_the_error_of_the_physics(parts, physics, model):
+    assert model.improved
+    unseen = parts[1].merged(parts[2])  # validation chose among the epochs, nothing was fitted to it
+    assert position_error(model, unseen) < 0.5 * position_error(physics, unseen)
+
+
+def test_where_validation_does_not_improve_the_physics_itself_is_kept(parts, physics):
+    useless = NeuralODE(epochs=1, lr=30.0, penalty=0.0).fit(parts[0], parts[1], seed=0)
+    batch = parts[2].batch()
+    assert not useless.improved
+    np.testing.assert_array_equal(useless.predict(batch.s0, batch.U), useless.physics.predict(batch.s0, batch.U))
+    np.testing.assert_allclose(useless.physics.p, physics.p)
+
+
+def test_the_training_solver_agrees_with_the_rollout(parts, physics):
+    train = parts[0]
+    grid = Grid.of(physics)
+    drive = Drive.of([physics], [train], grid)
+    residual = Residual([physics], 8, Scaler.fit([drive.S[..., CHANNELS]]), typical_accelerations([physics], drive), generators([0]))
+    with torch.no_grad():
+        found = solve(residual, drive.S[None, :, 0], drive.path[None], None, grid.step)[0].numpy()
+    batch = train.batch()
+    truth = physics.predict(batch.s0, batch.U)[..., VELOCITY]
+    assert np.abs(found - truth).max(axis=(0, 1)) == pytest.approx(np.zeros(3), abs=2e-3)
+
+
+def test_members_of_a_group_come_out_as_they_would_alone(parts, model):
+    train, valid, test = parts
+    batch = test.batch()
+    group = [NeuralODE(epochs=6, hidden=16), NeuralODE(epochs=6, hidden=16)]
+    NeuralODE.fit_group(group, [train, train.subset(range(9))], [valid, None], [0, 1])
+    assert group[0].improved
+    assert group[1].improved
+    np.testing.assert_allclose(group[0].predict(batch.s0, batch.U)[..., MOTION], model.predict(batch.s0, batch.U)[..., MOTION], rtol=1e-3, atol=1e-2)
+
+
+def test_a_saved_model_keeps_its_physics(parts, model, tmp_path):
+    batch = parts[2].batch()
+    model.save(tmp_path / "m")
+    loaded = NeuralODE.load(tmp_path / "m")
+    np.testing.assert_array_equal(loaded.predict(batch.s0, batch.U), model.predict(batch.s0, batch.U))
+    np.testing.assert_array_equal(loaded.physics.p, model.physics.p)
+
+
+def test_coarse_and_fine_samples_get_steps_that_fit_the_ship(physics):
+    assert Grid.of(physics) == (1, 1, 1.0)
+    physics_fine = Physics()
+    physics_fine._set_ship(physics.ship, physics.inputs, 0.1, False)
+    assert Grid.of(physics_fine) == (11, 1, pytest.approx(1.1))
+    physics_coarse = Physics()
+    physics_coarse._set_ship(physics.ship, physics.inputs, 4.0, False)
+    assert Grid.of(physics_coarse) == (1, physics_coarse.substeps, 4.0 / physics_coarse.substeps)
+    assert physics_coarse.substeps > 1
+
+
+@pytest.mark.parametrize(("stride", "first", "middle"), [(1, 0.0, 0.5), (2, 0.0, 1.0), (3, 0.0, 1.5)])
+def test_actuators_are_taken_at_the_beginning_and_the_middle_of_a_step(parts, physics, stride, first, middle):
+    """The path of a shaft that is ramped by 1 rpm a second shows the time at which it is taken."""
+
+    class Ramp(Physics):
+        def actuator_path(self, s0, U):
+            t = np.arange(U.shape[1])[:, None] + np.array([0.0, 0.5, 1.0])
+            return np.broadcast_to(t[None, :, :, None], (len(s0), *t.shape, 4))
+
+    ramp = Ramp()
+    ramp._set_ship(physics.ship, physics.inputs, 1.0, False)
+    drive = Drive.of([ramp], [parts[0]], Grid(stride, 1, float(stride)))
+    np.testing.assert_allclose(drive.path[0, :2, :, 0], [[first, middle], [stride + first, stride + middle]])
+    assert drive.S.shape[1] == 40 // stride + 1
+
+
+def test_wrong_settings_and_use_before_fit_are_refused(parts):
+    with pytest.raises(ValueError, match="hidden = 0"):
+        NeuralODE(hidden=0)
+    batch = parts[2].batch()
+    with pytest.raises(InputError, match="before fit"):
+        NeuralODE().predict(batch.s0, batch.U)

@@ -1,0 +1,117 @@
+"""Signals, records, registry, specs, ship: the parts everything stands on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipbench.errors import InputError
+from shipbench.integrate import rk4_step
+from shipbench.records import Dataset, Run
+from shipbench.registry import Registry
+from shipbench.ship import Ship, complete
+from shipbench.signals import COMMANDS, STATES, UNITS, wrap_angle
+from shipbench.specs import parse_spec
+
+
+def _run(name: str = "a", samples: int = 11, dt: float = 1.0, **meta) -> Run:
+    t = np.arange(samples) * dt
+    states = np.arange(samples)[:, None] + np.zeros((samples, 10))
+    return Run(name, t, states, np.zeros((samples, 4)), COMMANDS, meta)
+
+
+SHIP = Ship(name="s", L=100.0, B=16.0, T=6.0, displacement=6000.0)
+
+
+def test_wrap_angle_maps_to_the_half_open_circle():
+    np.testing.assert_allclose(wrap_angle([np.pi, -np.pi, 3 * np.pi, 0.1 - 2 * np.pi]), [np.pi, np.pi, np.pi, 0.1])
+
+
+def test_every_signal_has_a_unit():
+    assert set(STATES) | set(COMMANDS) <= set(UNITS)
+
+
+@pytest.mark.parametrize(("steps", "windows"), [(10, 1), (11, 0), (5, 2), (4, 2)])
+def test_the_number_of_windows_at_the_boundary(steps, windows):
+    data = Dataset("d", SHIP, 1.0, (_run(),))
+    if windows == 0:
+        with pytest.raises(InputError, match="as long as the horizon"):
+            data.windows(steps)
+    else:
+        assert len(data.windows(steps)) == windows
+
+
+def test_windows_keep_their_metadata_and_name_their_parent():
+    windows = Dataset("d", SHIP, 1.0, (_run(group="log1", split="test"),)).windows(5)
+    assert [w.meta for w in windows.runs] == [{"group": "log1", "split": "test", "parent": "a"}] * 2
+    assert windows.runs[1].t[0] == 5.0
+
+
+def test_a_batch_gives_s0_then_the_samples_after_it():
+    batch = Dataset("d", SHIP, 1.0, (_run(),)).batch(history=3)
+    assert batch.s0[0, 0] == 3.0
+    np.testing.assert_array_equal(batch.truth[0, :, 0], np.arange(4.0, 11.0))
+    assert batch.U.shape == (1, 7, 4)
+    assert batch.history is not None
+    np.testing.assert_array_equal(batch.history[0][0, :, 0], [0.0, 1.0, 2.0])
+
+
+def test_a_sample_that_is_not_finite_is_named():
+    states = np.zeros((5, 10))
+    states[3, 4] = np.inf
+    with pytest.raises(InputError, match=r"run 'x', t = 3 s: v is inf"):
+        Run("x", np.arange(5.0), states, np.zeros((5, 4)))
+
+
+@pytest.mark.parametrize("runs", [(), (_run("a"), _run("a")), (_run("a", dt=2.0),)])
+def test_an_inconsistent_data_set_is_refused(runs):
+    with pytest.raises(InputError, match=r"no runs|not unique|sampled at"):
+        Dataset("d", SHIP, 1.0, runs)
+
+
+def test_the_fingerprint_sees_every_sample():
+    a, b = _run(), _run()
+    b.states[7, 3] += 1e-12
+    assert Dataset("d", SHIP, 1.0, (a,)).fingerprint != Dataset("d", SHIP, 1.0, (b,)).fingerprint
+    assert Dataset("d", SHIP, 1.0, (a,)).fingerprint == Dataset("other", SHIP, 1, (_run(),)).fingerprint
+
+
+def test_specs_of_every_form_are_read(tmp_path):
+    assert parse_spec("mlp[hidden=64,seed=3]").params == {"hidden": 64, "seed": 3}
+    assert parse_spec("physics+current+wind").effects == ("current", "wind")
+    assert parse_spec("a/b.py:Model[x=true]").class_name == "Model"
+    with pytest.raises(InputError, match="no value"):
+        parse_spec("mlp[hidden]")
+    with pytest.raises(InputError, match="cannot be read"):
+        parse_spec("mlp[")
+
+
+def test_listing_a_registry_imports_nothing_and_a_misspelling_is_met_with_a_suggestion():
+    registry = Registry("predictor", "predictors", "PREDICTOR", frozenset({"base", "training"}))
+    assert "lstm" in registry.names()
+    assert "base" not in registry.names()
+    with pytest.raises(InputError, match="Did you mean 'lstm'"):
+        registry.get("lstn")
+
+
+def test_what_a_ship_file_leaves_out_is_estimated_and_said_so():
+    known = complete(SHIP)
+    assert known.mass == 6000.0 * 1025.0
+    assert known.Cb == pytest.approx(0.625)
+    assert len(known.notes) >= 6
+    assert all("from" in note for note in known.notes)
+
+
+def test_a_ship_that_contradicts_itself_is_refused():
+    with pytest.raises(InputError, match="block coefficient"):
+        complete(SHIP.model_copy(update={"Cb": 0.9}))
+
+
+def test_rk4_is_of_fourth_order_on_an_oscillator():
+    def error(h: float) -> float:
+        state = (1.0, 0.0)
+        for _ in range(round(1.0 / h)):
+            state = rk4_step(lambda s, _: (s[1], -s[0]), state, h)
+        return abs(state[0] - np.cos(1.0))
+
+    assert np.log2(error(0.1) / error(0.05)) == pytest.approx(4.0, abs=0.2)
