@@ -138,7 +138,8 @@ def test_esso_osaka_is_read_in_our_units_and_signs(esso):
     assert sum(r.meta["split"] == "test" for r in esso.runs) == 6
     stacked = np.concatenate([r.states for r in esso.runs])
     assert np.abs(stacked[:, 6]).max() == pytest.approx(1200.0)
-    turns = [r for r in esso.runs if r.meta["manoeuvre"] == "turning"]
+    turns = [r for r in esso.runs if r.meta["manoeuvre"] == "turn"]
+    assert len(turns) == 12
     for run in turns:
         end = run.states[len(run) // 2 : -40]
         assert np.sign(np.median(end[:, 5])) == np.sign(np.median(end[:, 7])), "positive rudder turns to starboard"
