@@ -130,6 +130,8 @@ def run(
     elif not quiet:
         _show_boards(written)
         typer.echo(f"Results in {folder}; leaderboard: {', '.join(str(path) for _, path in written)}")
+        if equations := sorted(folder.glob("cells/*/*/*/equations.txt")):
+            typer.echo(f"Fitted equations of {len(equations)} models beside their predictions, e.g. {equations[0]}")
     if outcome.failed:
         typer.echo(f"{len(outcome.failed)} of {len(outcome.summaries)} fits failed:", err=True)
         for line in outcome.failed:

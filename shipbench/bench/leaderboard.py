@@ -98,7 +98,10 @@ def _shares(rows: Frame) -> dict[str, tuple[int, int]]:
 
 def _fold_means(rows: Frame, column: str) -> Frame:
     """By model: statistics over the runs of a fold, then their mean over folds and seeds (sigma: n - 1; IQR: linear quantiles)."""
-    scored = rows[rows["status"] == "ok"].groupby(["model", "fold", "seed"])[column]
+    ok = rows[rows["status"] == "ok"]
+    if ok.empty:  # nothing to take quartiles of; every model keeps its row, without figures
+        return ok.set_index("model").reindex(columns=list(STATISTICS))
+    scored = ok.groupby(["model", "fold", "seed"])[column]
     quartiles = scored.quantile([0.25, 0.75]).unstack()
     statistics = scored.agg(["mean", "median", "std"])
     statistics["iqr"] = quartiles[0.75] - quartiles[0.25]

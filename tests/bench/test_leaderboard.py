@@ -89,6 +89,13 @@ def test_reasons_of_runs_without_a_score_are_printed():
     assert any("`m` diverged in 1 rows (fold 0, run r01): u is nan at t = 3 s." in note for note in status.notes)
 
 
+def test_a_table_without_any_scored_run_keeps_its_rows():
+    board = build_board(results({"m": [[None, None], [None, None]]}), "toy")
+    assert board.ranking == ["m"]
+    assert np.isnan(first_table(board)["m"]["ed_mean"])
+    assert "0/4" in board.tables[0].markdown()
+
+
 def test_undefined_scores_are_counted():
     found = results({"m": [[1, 2]]})
     found.rows.loc[0, "cvdm"] = np.nan
