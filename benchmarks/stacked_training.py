@@ -16,7 +16,7 @@ from shipbench.data.harbour90 import make
 from shipbench.predictors.base import make_predictor, parse_spec
 from shipbench.records import Dataset
 
-SPECS = {"mlp": "mlp[epochs=30,patience=1000]", "lstm": "lstm[epochs=24]", "neural_ode": "neural_ode[epochs=10]"}
+SPECS = {"mlp": "mlp[epochs=30,patience=1000]", "lstm": "lstm[epochs=40]", "neural_ode": "neural_ode[epochs=20]"}
 
 
 def folds(data: Dataset, number: int = 5, valid: int = 8) -> list[tuple[Dataset, Dataset]]:

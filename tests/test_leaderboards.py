@@ -41,3 +41,22 @@ def test_every_figure_of_the_page_comes_from_the_rows(results):
 def test_pages_name_the_command_that_made_them(results):
     for dataset in results.rows["dataset"].unique():
         assert "shipbench run --config configs/" in (FOLDER / f"{dataset}.md").read_text()
+
+
+def readme_table(results_folder: Path, dataset: str) -> list[str]:
+    """Lines of the README's short table of a data set."""
+    board = build_board(read_results([results_folder]), dataset)
+    rows = {row["model"]: row for row in board.tables[0].rows if not row.get("_reference")}
+    rest = {row["model"]: row for row in board.tables[1 + (dataset == "harbour90")].rows}
+    lines = []
+    for model in board.ranking:
+        row, more = rows[model], rest[model]
+        figures = (row["ed_mean"], row["ed_std"], row["edh_mean"], row["cvdm_mean"], more["position_rmse"])
+        lines.append(f"| `{model}` | " + " | ".join(f"{x:.2f}" for x in figures) + " |")
+    return lines
+
+
+@pytest.mark.parametrize(("study", "dataset"), [("paper", "harbour90"), ("paper", "harbour90_noisy"), ("esso_osaka", "esso_osaka")])
+def test_the_readmes_tables_are_the_committed_rows(study, dataset):
+    readme = (FOLDER.parent / "README.md").read_text()
+    assert "\n".join(readme_table(FOLDER / "results" / study, dataset)) in readme
