@@ -21,7 +21,10 @@ ALPHA_MAX = 1.2
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Dimensional left side and geometry (SI), from `coefficients`."""
+    """Dimensional left side and geometry (SI), from `coefficients`.
+
+    X_vr and X_rr are the whole factors of v r and r^2 in surge: mass and added mass are in them.
+    """
 
     m: float
     x_G: float
