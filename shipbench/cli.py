@@ -252,6 +252,7 @@ def data_make(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Registered name, with parameters in brackets.")],
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Also write it as a folder of the common format.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Make it anew even if it is in the cache.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Make a data set (or take it from the cache)."""
     from .data.base import cache_folder, load_dataset
@@ -260,7 +261,8 @@ def data_make(
     dataset = load_dataset(name, remake=force)
     if out is not None:
         write_dataset(dataset, out)
-    typer.echo(f"{dataset.name}: {len(dataset)} runs, fingerprint {dataset.fingerprint}, in {out or cache_folder()}")
+    if not quiet:
+        typer.echo(f"{dataset.name}: {len(dataset)} runs, fingerprint {dataset.fingerprint}, in {out or cache_folder()}")
 
 
 @data_app.command("check")

@@ -20,14 +20,9 @@ UNITS = {
 }  # fmt: skip
 
 X, Y, PSI, U, V, R, N, DELTA, F_B, F_S = range(len(STATES))
-POSE = slice(0, 3)
 VELOCITY = slice(3, 6)
 ACTUATORS = slice(6, 10)
 MOTION = slice(0, 6)
-
-# Reflection in the ship's centre plane: east, heading, sway, yaw rate, rudder and thrusters change sign.
-MIRROR_STATE = np.array([1.0, -1, -1, 1, -1, -1, 1, -1, -1, -1])
-MIRROR_COMMAND = np.array([1.0, -1, -1, -1])
 
 
 def wrap_angle(angle):

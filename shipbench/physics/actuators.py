@@ -18,8 +18,3 @@ def lag_with_rate_limit(value: Array, command: Array, dt: float, T: Array, rate:
     moving = clip(dt - t_limited, 0.0, dt)
     left = maximum(size - rate * dt, linear * exp(-moving / T))
     return command - sign(error) * left
-
-
-def first_order(value: Array, command: Array, dt: float, T: Array) -> Array:
-    """The actuator after `dt` seconds of a held command: command + (value - command) exp(-dt/T), T [s] positive."""
-    return command + (value - command) * exp(-dt / T)

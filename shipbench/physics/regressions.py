@@ -11,20 +11,16 @@ from typing import NamedTuple
 
 
 class Clarke(NamedTuple):
-    """Prime-I derivatives."""
+    """Prime-I acceleration derivatives."""
 
     Y_vd: float
     Y_rd: float
     N_vd: float
     N_rd: float
-    Y_v: float
-    Y_r: float
-    N_v: float
-    N_r: float
 
 
 def clarke_1983(L: float, B: float, T: float, Cb: float) -> Clarke:
-    """Linear derivatives and added masses in sway and yaw (prime-I).
+    """Added masses in sway and yaw (prime-I).
 
     Source: Clarke, Gedling & Hine (1983), regression equations; N'_rd with 0.33 B/L as in the original.
     """
@@ -34,10 +30,6 @@ def clarke_1983(L: float, B: float, T: float, Cb: float) -> Clarke:
         Y_rd=k * (0.67 * B / L - 0.0033 * (B / T) ** 2),
         N_vd=k * (1.1 * B / L - 0.041 * B / T),
         N_rd=k * (1.0 / 12.0 + 0.017 * Cb * B / T - 0.33 * B / L),
-        Y_v=k * (1.0 + 0.40 * Cb * B / T),
-        Y_r=k * (-0.5 + 2.2 * B / L - 0.080 * B / T),
-        N_v=k * (0.5 + 2.4 * T / L),
-        N_r=k * (0.25 + 0.039 * B / T - 0.56 * B / L),
     )
 
 

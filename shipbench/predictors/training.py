@@ -4,8 +4,8 @@ The loss is the sum over members of each member's own loss and Adam works elemen
 would reach alone; what is drawn for a member comes from its own generator. Early stopping is per member: the best weights of each are
 kept, and training goes on until the last member stops.
 
-Lightning's loop costs about a millisecond per batch, as much as a whole stacked step. One Lightning batch is therefore a chunk: all
-minibatches up to the next validation, stepped through with manual optimisation.
+One Lightning batch is a chunk: all minibatches up to the next validation, stepped through with manual optimisation. What Lightning does
+around a batch is then paid once per validation, not once per minibatch of a small network.
 """
 
 from __future__ import annotations
