@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numpy as np
+
 from ..ops import Array, absolute, clip, exp, maximum, minimum, sign
 
 
@@ -18,3 +22,42 @@ def lag_with_rate_limit(value: Array, command: Array, dt: float, T: Array, rate:
     moving = clip(dt - t_limited, 0.0, dt)
     left = maximum(size - rate * dt, linear * exp(-moving / T))
     return command - sign(error) * left
+
+
+@dataclass(frozen=True)
+class Gear:
+    """What lies between a command and its actuator: transport delay [s], time constant T [s], rate limit, deadband of the controller and play
+    (backlash) of the transmission, the last three in the actuator's units (and per second)."""
+
+    T: float
+    rate: float
+    delay: float = 0.0
+    deadband: float = 0.0
+    backlash: float = 0.0
+
+
+def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, substeps: int = 1) -> np.ndarray:
+    """The actuator (runs, samples * substeps + 1) that follows held commands (runs, samples) from `start` (runs,).
+
+    The controller sees the command `delay` seconds late (the first command held before) and rests while |command - position| < deadband; the motor
+    moves with lag and rate limit; the actuator follows the motor once the play is taken up (it starts in the middle of it).
+    """
+    runs, samples = command.shape
+    h = dt / substeps
+    motor, out = start.copy(), np.empty((runs, samples * substeps + 1))
+    out[:, 0] = start
+    position = start.copy()
+    shift = gear.delay / h
+    whole = int(np.floor(shift))
+    part = shift - whole
+    held = np.repeat(command, substeps, axis=1)
+    for j in range(samples * substeps):
+        now, before = held[:, max(j - whole, 0)], held[:, max(j - whole - 1, 0)]
+        for wanted, time in ((before, part * h), (now, (1.0 - part) * h)):
+            if time <= 0.0:
+                continue
+            target = np.where(np.abs(wanted - motor) < gear.deadband, motor, wanted) if gear.deadband else wanted
+            motor = lag_with_rate_limit(motor, target, time, gear.T, gear.rate)
+        position = np.clip(position, motor - 0.5 * gear.backlash, motor + 0.5 * gear.backlash) if gear.backlash else motor
+        out[:, j + 1] = position
+    return out

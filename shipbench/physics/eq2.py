@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ..ops import Array, absolute, arctan2, clip, cos, maximum, sin, sqrt
 from ..ship import Particulars
 from . import propeller, regressions, thruster, wind
+from .modifiers import Modifiers, is_number
 
 NUM_PARAMETERS = 11
 ALPHA_MAX = 1.2
@@ -33,6 +35,9 @@ class Coefficients:
     m12_Y: float
     m12_N: float
     m22: float
+    m_y: float
+    I_zz: float
+    J_z: float
     Y_v: float
     Y_r: float
     N_v: float
@@ -84,7 +89,7 @@ def coefficients(ship: Particulars) -> Coefficients:
     return Coefficients(
         m=ship.mass, x_G=ship.xG, m_x=m_x,
         m11=ship.mass + m_y, m12_Y=ship.mass * ship.xG - Y_rd, m12_N=ship.mass * ship.xG - N_vd,
-        m22=ship.Izz + ship.mass * ship.xG**2 - N_rd,
+        m22=ship.Izz + ship.mass * ship.xG**2 - N_rd, m_y=m_y, I_zz=ship.Izz, J_z=-N_rd,
         Y_v=lin.Y_v * qd, Y_r=lin.Y_r * qd * L, N_v=lin.N_v * qd * L, N_r=lin.N_r * qd * L**2,
         X_vr=m_y + X_vr + ship.mass, X_rr=ship.mass * ship.xG - Y_rd,
         Y_vv=non.Y_vv * qd, Y_vr=non.Y_vr * qd * L, Y_rr=non.Y_rr * qd * L**2,
@@ -95,62 +100,107 @@ def coefficients(ship: Particulars) -> Coefficients:
     )  # fmt: skip
 
 
-def propulsion(u: Array, n: Array, c: Coefficients) -> tuple[Array, Array]:
-    """(X_n, race): thrust on the ship (1 - t) T [N] and axial speed of the propeller race [m/s]; n in rpm."""
-    V_A = u - c.w_P0 * maximum(u, 0.0)  # no wake going astern: the propeller then leads
-    thrust = propeller.thrust_quadratic(n / 60.0, V_A, c.D_P, c.kt, c.rho)
-    return (1.0 - c.t_P) * thrust, propeller.race_speed(V_A, maximum(thrust, 0.0), c.D_P, c.rho)
+def propulsion(u: Array, n: Array, c: Coefficients, e: Modifiers | None = None) -> tuple[Array, Array, Array]:
+    """(X_n, V_A, race): thrust on the ship (1 - t) T [N], axial speed at the propeller and of its race [m/s]; n in rpm."""
+    e = e or Modifiers()
+    V_A = u - (c.w_P0 + e.wake) * maximum(u, 0.0)  # no wake going astern: the propeller then leads
+    thrust = propeller.thrust_quadratic(n / 60.0, V_A, c.D_P, c.kt, c.rho) * e.thrust
+    race = propeller.race_speed(V_A, maximum(thrust, 0.0), c.D_P, c.rho)
+    return (1.0 - c.t_P) * thrust, V_A, race if is_number(e.race) else V_A + e.race * (race - V_A)
 
 
-def rudder(u: Array, v: Array, r: Array, delta: Array, race: Array, c: Coefficients, p: Sequence[Array]) -> tuple[Array, Array, Array]:
+def rudder(
+    v: Array, r: Array, delta: Array, V_A: Array, race: Array, c: Coefficients, p: Sequence[Array], e: Modifiers | None = None
+) -> tuple[Array, Array, Array]:
     """Rudder force (X, Y, N) from lift and drag, c_L = p4 + p5 a + p6 a^2 + p7 a^3, c_D = p8 + p9 a + p10 a^2 (eq. 7, 8).
 
     Inflow: the share eta = D_P/H_R of the blade stands in the race, the rest in the wake; sideways 0.364 v + 0.66 x_R r (Kose/Brix flow
-    straightening).
-    Angle of attack a = delta + atan2(w_R, u_R). Lift acts across the inflow, to port for a > 0; drag along it.
+    straightening). Angle of attack a = delta + atan2(w_R, u_R). Lift acts across the inflow, to port for a > 0; drag along it.
     """
-    V_A = u - c.w_P0 * maximum(u, 0.0)
+    e = e or Modifiers()
     u2 = c.eta * race * race + (1.0 - c.eta) * V_A * V_A
     u_R = sqrt(u2 + 1e-6)
     w_R = 0.364 * v + 0.66 * c.x_R * r
     beta = arctan2(w_R, u_R)
-    a = clip(delta + beta, -ALPHA_MAX, ALPHA_MAX)
+    a = clip(delta + e.delta + beta, -ALPHA_MAX, ALPHA_MAX)
     q = 0.5 * c.rho * c.A_R * (u2 + w_R * w_R)
-    lift = q * (p[4] + a * (p[5] + a * (p[6] + a * p[7])))
+    lift = q * (p[4] + a * (p[5] + a * (p[6] + a * p[7]))) * e.lift_factor(a)
     drag = q * (p[8] + a * (p[9] + a * p[10]))
     cb, sb = cos(beta), sin(beta)
     side = -(lift * cb + drag * sb)
     return lift * sb - drag * cb, (1.0 + c.a_H) * side, (c.x_R + c.a_H * c.x_H) * side
 
 
+class _Inertia(NamedTuple):
+    m: Array
+    x_G: Array
+    surge: Array
+    m11: Array
+    m12_Y: Array
+    m12_N: Array
+    m22: Array
+    X_vr: Array
+    X_rr: Array
+
+
+def _inertia(c: Coefficients, e: Modifiers) -> _Inertia:
+    """Masses of the left side, with what effects make of them."""
+    if all(map(is_number, (e.mass, e.m_y, e.J_z, e.x_G))):
+        return _Inertia(c.m, c.x_G, c.m + c.m_x, c.m11, c.m12_Y, c.m12_N, c.m22, c.X_vr, c.X_rr)
+    m, x_G = c.m * e.mass, c.x_G + e.x_G
+    moved = m * x_G - c.m * c.x_G
+    added = c.m_y * (e.m_y - 1.0)
+    m22 = c.I_zz * e.mass + m * x_G * x_G + c.J_z * e.J_z
+    return _Inertia(m, x_G, m + c.m_x, m + c.m_y * e.m_y, c.m12_Y + moved, c.m12_N + moved, m22, c.X_vr + 0.72 * added + (m - c.m), c.X_rr + moved)
+
+
 def accelerations(
-    u: Array, v: Array, r: Array, n: Array, delta: Array, F_b: Array, F_s: Array, air: tuple[Array, Array] | None, c: Coefficients, p: Sequence[Array]
+    u: Array,
+    v: Array,
+    r: Array,
+    n: Array,
+    delta: Array,
+    F_b: Array,
+    F_s: Array,
+    air: tuple[Array, Array] | None,
+    c: Coefficients,
+    p: Sequence[Array],
+    mods: Modifiers | None = None,
 ) -> tuple[Array, Array, Array]:
     """(du, dv, dr) of eq. (2) [m/s^2, m/s^2, rad/s^2].
 
     n in rpm, delta in rad, F_b and F_s in N; `air` is the ship's velocity relative to the air in body axes (`wind.apparent_wind`) or None
-    without wind;
-    p holds p0..p10: p0 lateral over axial propeller force [1], p1..p3 resistance [N s/m, N s^2/m^2, N s^3/m^3], p4..p10 rudder [1].
+    without wind; p holds p0..p10: p0 lateral over axial propeller force [1], p1..p3 resistance [N s/m, N s^2/m^2, N s^3/m^3], p4..p10
+    rudder [1]; `mods` carries effects that the plain model leaves out.
 
     The two cubic yaw terms are divided by U; their v/U is held at 0.5 (30 deg of drift, the end of the charts) or where N_vrr v r^2/U
-    would exceed the yaw damping
-    N_rr r|r|: beyond, a ship set sideways by wind at low speed would spin up without limit.
+    would exceed the yaw damping N_rr r|r|: beyond, a ship set sideways by wind at low speed would spin up without limit.
 
     X_e, Y_e, N_e are thrusters and measured wind. R(u) = -(p1 u + p2 u|u| + p3 u^3): it opposes the motion on both tacks of u.
     """
+    e = mods or Modifiers()
+    f = e.hull
+    if air is not None:
+        air = (air[0] - e.air_u, air[1] - e.air_v)
+    moving = not (is_number(e.u_c) and is_number(e.v_c))
+    if moving:
+        u, v = u - e.u_c, v - e.v_c
+    i = _inertia(c, e)
     speed = sqrt(u * u + v * v + c.eps * c.eps)
-    X_n, race = propulsion(u, n, c)
-    X_d, Y_d, N_d = rudder(u, v, r, delta, race, c, p)
-    Y_T, N_T = thruster.tunnel_thrusters(u, F_b, F_s, c.tunnels)
+    X_n, V_A, race = propulsion(u, n, c, e)
+    X_d, Y_d, N_d = rudder(v, r, delta, V_A, race, c, p, e)
+    Y_T, N_T = thruster.tunnel_thrusters(u, F_b * e.bow, F_s * e.stern, c.tunnels, e.loss, e.lever)
     abs_r = absolute(r)
-    X = X_n + X_d - u * (p[1] + p[2] * absolute(u) + p[3] * u * u) + c.X_vr * v * r + c.X_rr * r * r
+    X = X_n + X_d - f.resistance * (u * (p[1] + p[2] * absolute(u) + p[3] * u * u)) + f.X_nonlinear * i.X_vr * v * r + i.X_rr * r * r + e.X
     Y_n = p[0] * X_n
-    Y = Y_n + Y_d + Y_T + c.Y_v * speed * v + (c.Y_r * speed - c.m * u) * r + c.Y_vv * v * absolute(v) + c.Y_vr * v * abs_r + c.Y_rr * r * abs_r
-    N = c.x_P * Y_n + N_d + N_T + c.N_v * speed * v + (c.N_r * speed - c.m * c.x_G * u) * r + c.N_rr * r * abs_r
+    Y = Y_n + Y_d + Y_T + f.Y_v * c.Y_v * speed * v + (f.Y_r * c.Y_r * speed - i.m * u) * r + e.Y
+    Y = Y + f.Y_nonlinear * (c.Y_vv * v * absolute(v) + c.Y_vr * v * abs_r + c.Y_rr * r * abs_r)
+    N = c.x_P * Y_n + N_d + N_T + f.N_v * c.N_v * speed * v + (f.N_r * c.N_r * speed - i.m * i.x_G * u) * r + e.N
     drift = clip(v / speed, -c.max_drift, c.max_drift)
-    N = N + (c.N_vvr * v + c.N_vrr * r) * drift * r
+    N = N + f.N_nonlinear * (c.N_rr * r * abs_r + (c.N_vvr * v + c.N_vrr * r) * drift * r)
     if air is not None:
         X_W, Y_W, N_W = wind.harmonic(*air, c.A_F, c.A_L, c.L)
         X, Y, N = X + X_W, Y + Y_W, N + N_W
-    det = c.m11 * c.m22 - c.m12_Y * c.m12_N
-    return X / (c.m + c.m_x), (c.m22 * Y - c.m12_Y * N) / det, (c.m11 * N - c.m12_N * Y) / det
+    det = i.m11 * i.m22 - i.m12_Y * i.m12_N
+    du, dv, dr = X / i.surge, (i.m22 * Y - i.m12_Y * N) / det, (i.m11 * N - i.m12_N * Y) / det
+    return (du + r * e.v_c, dv - r * e.u_c, dr) if moving else (du, dv, dr)

@@ -5,7 +5,7 @@ Velocities are relative to the water, at midship. Returns (X_H, Y_H, N_H) in N a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -62,14 +62,19 @@ class UnifiedHull:
 
 @dataclass(frozen=True)
 class HullFactors:
-    """Multipliers of the linear derivatives and of the rest (shallow water); arrays per run or floats."""
+    """Multipliers of the linear derivatives, of the nonlinear terms of each axis and of the resistance; arrays per run or floats."""
 
     Y_v: Array = 1.0
     Y_r: Array = 1.0
     N_v: Array = 1.0
     N_r: Array = 1.0
-    nonlinear: Array = 1.0
+    X_nonlinear: Array = 1.0
+    Y_nonlinear: Array = 1.0
+    N_nonlinear: Array = 1.0
     resistance: Array = 1.0
+
+    def __mul__(self, other: HullFactors) -> HullFactors:
+        return HullFactors(**{f.name: getattr(self, f.name) * getattr(other, f.name) for f in fields(self)})
 
 
 DEEP = HullFactors()
@@ -86,12 +91,12 @@ def polynomial(u: Array, v: Array, r: Array, c: PolynomialHull, L: float, T: flo
     speed = sqrt(u * u + v * v + eps * eps)
     vp, rp = v / speed, clip(r * L / speed, -1.5, 1.5)
     force = 0.5 * rho * L * T * speed * speed
-    X = force * f.nonlinear * (c.X_vv * vp**2 + c.X_vr * vp * rp + c.X_rr * rp**2 + c.X_vvvv * vp**4)
+    X = force * f.X_nonlinear * (c.X_vv * vp**2 + c.X_vr * vp * rp + c.X_rr * rp**2 + c.X_vvvv * vp**4)
     X = X - 0.5 * rho * L * T * c.R0 * f.resistance * u * absolute(u)
     Y3 = c.Y_vvv * vp**3 + c.Y_vvr * vp**2 * rp + c.Y_vrr * vp * rp**2 + c.Y_rrr * rp**3
     N3 = c.N_vvv * vp**3 + c.N_vvr * vp**2 * rp + c.N_vrr * vp * rp**2 + c.N_rrr * rp**3
-    Y = force * (f.Y_v * c.Y_v * vp + f.Y_r * c.Y_r * rp + f.nonlinear * Y3)
-    N = force * L * (f.N_v * c.N_v * vp + f.N_r * c.N_r * rp + f.nonlinear * N3)
+    Y = force * (f.Y_v * c.Y_v * vp + f.Y_r * c.Y_r * rp + f.Y_nonlinear * Y3)
+    N = force * L * (f.N_v * c.N_v * vp + f.N_r * c.N_r * rp + f.N_nonlinear * N3)
     return X, Y, N
 
 
@@ -119,7 +124,7 @@ def unified(u: Array, v: Array, r: Array, c: UnifiedHull, L: float, T: float, rh
     drag = c.X0_F + (c.X0_A - c.X0_F) * angle
     IY, IN = cross_flow(v, r, L, c.C_rY, c.C_rN)
     q = 0.5 * rho * L * T
-    X = q * (f.resistance * drag * u * speed + f.nonlinear * ((c.X_vv * v * v + c.X_rr * L**2 * r * r) * u / speed + c.X_vr * L * v * r))
-    Y = q * (f.Y_v * c.Y_v * v * absolute(u) + f.Y_r * c.Y_r * L * r * u - f.nonlinear * c.C_D * IY)
-    N = q * L * (f.N_v * c.N_v * v * u + f.N_r * c.N_r * L * r * absolute(u) - f.nonlinear * c.C_D * IN)
+    X = q * (f.resistance * drag * u * speed + f.X_nonlinear * ((c.X_vv * v * v + c.X_rr * L**2 * r * r) * u / speed + c.X_vr * L * v * r))
+    Y = q * (f.Y_v * c.Y_v * v * absolute(u) + f.Y_r * c.Y_r * L * r * u - f.Y_nonlinear * c.C_D * IY)
+    N = q * L * (f.N_v * c.N_v * v * u + f.N_r * c.N_r * L * r * absolute(u) - f.N_nonlinear * c.C_D * IN)
     return X, Y, N

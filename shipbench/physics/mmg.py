@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, unknown_name
-from ..ops import Array, cos, sin
+from ..ops import Array, cos, sin, where
 from ..ship import Ship, read_toml
 from . import hull, propeller, rudder, shallow_water, thruster, wind
+from .modifiers import Modifiers, is_number
 
 
 @dataclass(frozen=True)
@@ -88,27 +89,41 @@ CALM = Environment()
 
 
 def accelerations(
-    ship: MMGShip, psi: Array, u: Array, v: Array, r: Array, n: Array, delta: Array, F_b: Array, F_s: Array, env: Environment = CALM
+    ship: MMGShip,
+    psi: Array,
+    u: Array,
+    v: Array,
+    r: Array,
+    n: Array,
+    delta: Array,
+    F_b: Array,
+    F_s: Array,
+    env: Environment = CALM,
+    mods: Modifiers | None = None,
 ) -> tuple[Array, Array, Array]:
     """(du, dv, dr) over ground at midship [m/s^2, m/s^2, rad/s^2]; n in rpm, delta in rad, F_b and F_s in N.
 
     (m + m_x) du - (m + m_y) v r - m x_G r^2 = X;  (m + m_y) dv + (m + m_x) u r + m x_G dr = Y;
-    (I_zG + m x_G^2 + J_z) dr + m x_G (dv + u r) = N, all with velocities through the water, to which the turning of a constant current is added.
+    (I_zG + m x_G^2 + J_z) dr + m x_G (dv + u r) = N, all with velocities through the
+    water, to which the turning of a constant current is added. `mods` carries hidden effects.
 
     Source: Yasukawa & Yoshimura (2015), eq. 4; current as in Fossen (2021), section 10.3.
     """
-    u_c, v_c = env.current_speed * cos(env.current_to - psi), env.current_speed * sin(env.current_to - psi)
+    e = mods or Modifiers()
+    u_c = env.current_speed * cos(env.current_to - psi) + e.u_c
+    v_c = env.current_speed * sin(env.current_to - psi) + e.v_c
     u_w, v_w = u - u_c, v - v_c
-    m_x, m_y, J_z, factors = ship.m_x, ship.m_y, ship.J_z, hull.DEEP
+    m_x, m_y, J_z, factors = ship.m_x, ship.m_y * e.m_y, ship.J_z * e.J_z, e.hull
     if env.depth is not None:
         deep = shallow_water.depth_factors(env.depth, ship.L, ship.B, ship.T, ship.Cb)
-        m_y, J_z, factors = m_y * deep.m_y, J_z * deep.J_z, deep.hull
-    X, Y, N = water_forces(ship, u_w, v_w, r, n / 60.0, delta, F_b, F_s, factors)
-    X_W, Y_W, N_W = wind.blendermann(*wind.apparent_wind(psi, u, v, env.wind_speed, env.wind_from), ship.A_F, ship.A_L, ship.L)
-    X, Y, N = X + X_W, Y + Y_W, N + N_W
-    m, x_G = ship.m, ship.x_G
+        m_y, J_z, factors = m_y * deep.m_y, J_z * deep.J_z, factors * deep.hull
+    X, Y, N = water_forces(ship, u_w, v_w, r, n / 60.0, delta, F_b, F_s, factors, e)
+    u_rw, v_rw = wind.apparent_wind(psi, u, v, env.wind_speed, env.wind_from)
+    X_W, Y_W, N_W = wind.blendermann(u_rw - e.air_u, v_rw - e.air_v, ship.A_F, ship.A_L, ship.L)
+    X, Y, N = X + X_W + e.X, Y + Y_W + e.Y, N + N_W + e.N
+    m, x_G = ship.m * e.mass, ship.x_G + e.x_G
     du = (X + (m + m_y) * v_w * r + m * x_G * r * r) / (m + m_x)
-    m11, m12, m22 = m + m_y, m * x_G, ship.I_zG + m * x_G**2 + J_z
+    m11, m12, m22 = m + m_y, m * x_G, ship.I_zG * e.mass + m * x_G**2 + J_z
     f1, f2 = Y - (m + m_x) * u_w * r, N - m * x_G * u_w * r
     det = m11 * m22 - m12 * m12
     dv = (m22 * f1 - m12 * f2) / det
@@ -117,23 +132,34 @@ def accelerations(
 
 
 def water_forces(
-    ship: MMGShip, u: Array, v: Array, r: Array, n: Array, delta: Array, F_b: Array, F_s: Array, factors: hull.HullFactors
+    ship: MMGShip,
+    u: Array,
+    v: Array,
+    r: Array,
+    n: Array,
+    delta: Array,
+    F_b: Array,
+    F_s: Array,
+    factors: hull.HullFactors,
+    e: Modifiers | None = None,
 ) -> tuple[Array, Array, Array]:
     """Sum of hull, propeller, rudder and thruster forces (X, Y, N) about midship; velocities through the water, n in rev/s."""
-    p = ship.propeller
+    p, e = ship.propeller, e or Modifiers()
     if isinstance(ship.hull, hull.PolynomialHull):
         X_H, Y_H, N_H = hull.polynomial(u, v, r, ship.hull, ship.L, ship.T, ship.rho, factors)
     else:
         X_H, Y_H, N_H = hull.unified(u, v, r, ship.hull, ship.L, ship.T, ship.rho, factors)
     w_P = propeller.wake_fraction(u, v, r, p.w_P0, p.x_P, p.C1, p.C2_plus, p.C2_minus)
+    w_P = w_P if is_number(e.wake) else w_P + where(u > 0, e.wake, 0.0 * w_P)
     V_A = (1.0 - w_P) * u
     if p.form == "quadratic":
         thrust = propeller.thrust_quadratic(n, V_A, p.D, p.kt, ship.rho)
     else:
         thrust = propeller.thrust_four_quadrant(n, V_A, p.D, ship.rho)
-    u_R = rudder.inflow_speed(u, n, thrust, w_P, ship.rudder, p.D, ship.rho)
-    X_R, Y_R, N_R = rudder.mmg_rudder(u, v, r, delta, u_R, ship.rudder, ship.L, ship.rho)
-    Y_T, N_T = thruster.tunnel_thrusters(u, F_b, F_s, ship.thrusters)
+    thrust = thrust * e.thrust
+    u_R = rudder.inflow_speed(u, n, thrust, w_P, ship.rudder, p.D, ship.rho, e.race)
+    X_R, Y_R, N_R = rudder.mmg_rudder(u, v, r, delta + e.delta, u_R, ship.rudder, ship.L, ship.rho, e.lift_factor)
+    Y_T, N_T = thruster.tunnel_thrusters(u, F_b * e.bow, F_s * e.stern, ship.thrusters, e.loss, e.lever)
     X = X_H + (1.0 - p.t_P) * thrust + X_R
     Y, N = Y_H + Y_R + Y_T, N_H + N_R + N_T
     if p.side_force_astern:

@@ -6,6 +6,7 @@ A positive rudder angle turns the ship to starboard: Y_R < 0 and N_R > 0 ahead.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..ops import Array, absolute, arctan2, cos, maximum, sign, sin, smoothstep, sqrt, where
@@ -31,7 +32,7 @@ class MMGRudder:
     c_pr: float = -0.176
 
 
-def inflow_speed(u: Array, n: Array, thrust: Array, w_P: Array, c: MMGRudder, D: float, rho: float) -> Array:
+def inflow_speed(u: Array, n: Array, thrust: Array, w_P: Array, c: MMGRudder, D: float, rho: float, race_factor: Array = 1.0) -> Array:
     """Longitudinal inflow at the rudder [m/s] in the propeller race, without division by the advance ratio.
 
     n >= 0: u_R = eps sqrt(eta [u_P + kappa (sqrt(u_P^2 + 8 T/(rho pi D^2)) - u_P)]^2 + (1 - eta) u_P^2), u_P = (1 - w_P) u, eta = D/H_R.
@@ -46,7 +47,7 @@ def inflow_speed(u: Array, n: Array, thrust: Array, w_P: Array, c: MMGRudder, D:
     u_P = (1.0 - w_P) * u
     jet2 = 8.0 * absolute(thrust) / (rho * math.pi * D**2)
     race = sqrt(maximum(u_P * u_P + where(thrust > 0, jet2, -jet2), 1e-8))
-    inner = u_P + c.kappa * (race - u_P)
+    inner = u_P + c.kappa * race_factor * (race - u_P)
     ahead = c.epsilon * sqrt(eta * inner * inner + (1.0 - eta) * u_P * u_P + 1e-10) * where(inner >= 0, 1.0 + 0.0 * inner, -1.0)
     b = c.epsilon * u_P
     a = b - c.k_xr * sqrt(jet2 + 1e-10)
@@ -56,8 +57,10 @@ def inflow_speed(u: Array, n: Array, thrust: Array, w_P: Array, c: MMGRudder, D:
     return where(n >= 0, ahead, backing)
 
 
-def mmg_rudder(u: Array, v: Array, r: Array, delta: Array, u_R: Array, c: MMGRudder, L: float, rho: float) -> tuple[Array, Array, Array]:
-    """Rudder force (X_R, Y_R, N_R) about midship.
+def mmg_rudder(
+    u: Array, v: Array, r: Array, delta: Array, u_R: Array, c: MMGRudder, L: float, rho: float, lift: Callable[[Array], Array] | None = None
+) -> tuple[Array, Array, Array]:
+    """Rudder force (X_R, Y_R, N_R) about midship; `lift(alpha_R)` multiplies F_N where the blade is not as built.
 
     F_N = rho/2 A_R f_alpha U_R^2 sin(alpha_R), alpha_R = delta - atan2(v_R, u_R), v_R = -gamma_R (v + l_R L r);
     X_R = -(1 - t_R) F_N sin(delta), Y_R = -(1 + a_H) F_N cos(delta), N_R = -(x_R + a_H x_H) L F_N cos(delta).
@@ -69,6 +72,8 @@ def mmg_rudder(u: Array, v: Array, r: Array, delta: Array, u_R: Array, c: MMGRud
     flip = where(u_R >= 0, 1.0 + 0.0 * u_R, -1.0)  # reversed flow: the blade works from its trailing edge
     alpha = delta * flip - arctan2(v_R, absolute(u_R) + 1e-9)
     F_N = 0.5 * rho * c.A_R * c.f_alpha * (u_R * u_R + v_R * v_R) * sin(alpha)
+    if lift is not None:
+        F_N = F_N * lift(alpha)
     return (
         -(1.0 - c.t_R) * F_N * sin(delta),
         -(1.0 + c.a_H) * F_N * cos(delta),

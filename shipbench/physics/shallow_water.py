@@ -43,13 +43,16 @@ def depth_factors(depth: Array, L: float, B: float, T: float, Cb: float) -> Dept
     K1 = -0.0643 / H + 0.0724 / H**2 - 0.0113 / H**3 + 0.0000767 / H**5
     K2 = 0.0342 / H if B / T <= 4.0 else 0.137 * T / B / H
     b = Cb * B * (1.0 + B / L) ** 2 / T
+    nonlinear = K0 + K1 * b + K2 * b**2
     return DepthFactors(
         hull=HullFactors(
             Y_v=(1.0 - ratio) ** (-0.4 * Cb * B / T) - ratio,
             Y_r=k_e(0.7) / k,
             N_v=k_e(1.7) / k,
             N_r=(1.0 - ratio) ** (14.28 * T / L - 1.5) - ratio,
-            nonlinear=K0 + K1 * b + K2 * b**2,
+            X_nonlinear=nonlinear,
+            Y_nonlinear=nonlinear,
+            N_nonlinear=nonlinear,
             resistance=1.0 + 0.388 * ratio**2,
         ),
         m_y=K0 + 2.0 / 3.0 * K1 * b + 8.0 / 15.0 * K2 * b**2,

@@ -18,7 +18,7 @@ class Tunnels:
     speed_of_loss: float = 2.1
 
 
-def tunnel_thrusters(u: Array, F_b: Array, F_s: Array, c: Tunnels) -> tuple[Array, Array]:
+def tunnel_thrusters(u: Array, F_b: Array, F_s: Array, c: Tunnels, loss: Array = 0.0, lever: Array = 0.0) -> tuple[Array, Array]:
     """Side force [N] and moment [N m] about midship of thruster forces F_b, F_s [N, pushing the hull to starboard].
 
     Y = k_Y (F_b + F_s), N = k_N (x_bow F_b + x_stern F_s), k = 1 - loss q exp(1 - q), q = (u/u_loss)^2. The jet's suction on the hull
@@ -31,6 +31,6 @@ def tunnel_thrusters(u: Array, F_b: Array, F_s: Array, c: Tunnels) -> tuple[Arra
     q = (u / c.speed_of_loss) ** 2
     bump = q * exp(1.0 - q)
     return (
-        (1.0 - c.loss_force * bump) * (F_b + F_s),
-        (1.0 - c.loss_moment * bump) * (c.x_bow * F_b + c.x_stern * F_s),
+        (1.0 - (c.loss_force + 0.6 * loss) * bump) * (F_b + F_s),
+        (1.0 - (c.loss_moment + loss) * bump) * ((c.x_bow + lever) * F_b + c.x_stern * F_s),
     )

@@ -1,0 +1,24 @@
+"""More resistance than in service before: fouling, damage, a towed body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class AddedResistance(Effect):
+    family = "propulsion"
+    summary = "resistance of the hull"
+    source = "physics reference, section 5, P39"
+    parameters = (Parameter("share", "1", 0.3, -0.6, 3.0),)
+    separate = "coast down with the shaft stopped, from two speeds"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.scale_hull(resistance=1.0 + q[0])
+
+
+EFFECT = AddedResistance()

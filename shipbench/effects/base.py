@@ -1,0 +1,151 @@
+"""What every effect is: one formula, used to hide a cause in simulated data, to test for it in measured data, and to extend a model.
+
+A part is one file of this folder whose instance is bound to `EFFECT`; the file's name is the effect's name. It overrides one of three methods,
+which say where the cause enters: `force` (anything that acts on the hull), `gear` (between command and actuator) or `measure` (the sensors).
+Its values `q` are zero when nothing is missing (or at `absent`), and may be numbers, one per run, or symbols.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from ..errors import InputError, unknown_name
+from ..ops import Array, cos, sin
+from ..physics.actuators import Gear
+from ..physics.modifiers import Flow, Modifiers
+from ..registry import Registry
+from ..ship import Particulars
+
+EFFECTS = Registry("effect", "effects", "EFFECT", helpers=frozenset({"base"}))
+
+_FROUDE = {"1": 0.0, "speed": 0.5, "time": 0.5, "rate": -0.5, "length": 1.0, "area": 2.0, "rpm rate": -1.0}
+_REFERENCE_LENGTH = 130.0
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One value of an effect.
+
+    typical, low, high are for a ship of 130 m; `scaling` says how they go with the length (Froude's law): "1", "speed", "time", "rate", "length".
+    A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes are zero.
+    """
+
+    name: str
+    unit: str
+    typical: float
+    low: float
+    high: float
+    scaling: str = "1"
+    shape: bool = False
+
+    def for_length(self, L: float) -> Parameter:
+        """The same parameter of a ship of length L [m]."""
+        factor = (L / _REFERENCE_LENGTH) ** _FROUDE[self.scaling]
+        return replace(self, typical=self.typical * factor, low=self.low * factor, high=self.high * factor)
+
+
+class Effect:
+    """Base of all effects; see the module's docstring.
+
+    Class attributes: `family` (environment, rudder, propulsion, thruster, hull, sensor, time), `summary`, `source`, `parameters`, `per_run`
+    (every run has its own values), `vector` (names of size and direction that two earth-fixed components are reported as), `separate` (the
+    manoeuvre that tells it from its look-alikes).
+    """
+
+    name: str = ""
+    family: ClassVar[str]
+    summary: ClassVar[str]
+    source: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+    per_run: ClassVar[bool] = False
+    vector: ClassVar[tuple[str, str] | None] = None
+    separate: ClassVar[str] = ""
+
+    def __init_subclass__(cls) -> None:
+        cls.name = cls.__module__.rsplit(".", 1)[-1]
+
+    @property
+    def enters(self) -> str:
+        """Where it enters: "force", "gear" or "sensor"."""
+        cls = type(self)
+        return "gear" if cls.gear is not Effect.gear else "sensor" if cls.measure is not Effect.measure else "force"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        """Write the effect of size `q` into `e`, at the instant `s`."""
+
+    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
+        """Change the gears of `n`, `delta` and `F` (both thrusters)."""
+
+    def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
+        """What the sensors say of the true states S (runs, samples, 10); `q` holds numbers or one value per run."""
+        return S
+
+    def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
+        """Values of the shape parameters to try, given the places (.., 2) that the ship visited."""
+        return [()]
+
+    def sized(self, L: float) -> tuple[Parameter, ...]:
+        """The parameters for a ship of length L [m]."""
+        return tuple(p.for_length(L) for p in self.parameters)
+
+    def public(self, q: Sequence[float]) -> dict[str, float]:
+        """The values under the names that are reported; two earth-fixed components become a size and a direction [rad]."""
+        if self.vector is None:
+            return {p.name: float(v) for p, v in zip(self.parameters, q, strict=True)}
+        north, east = (float(v) for v in q)
+        return {self.vector[0]: math.hypot(north, east), self.vector[1]: math.atan2(east, north) % (2.0 * math.pi)}
+
+    def units(self) -> dict[str, str]:
+        """Units under the names of `public`."""
+        if self.vector is None:
+            return {p.name: p.unit for p in self.parameters}
+        return {self.vector[0]: self.parameters[0].unit, self.vector[1]: "rad"}
+
+    def internal(self, values: Mapping[str, float]) -> tuple[float, ...]:
+        """`q` from values under the reported names.
+
+        Raises:
+            InputError: a name is unknown, or one is missing that has no default (shape parameters do).
+        """
+        known = list(self.units())
+        for key in values:
+            if key not in known:
+                raise unknown_name(f"parameter of effect '{self.name}'", key, known)
+        if self.vector is not None:
+            size, towards = values.get(self.vector[0]), values.get(self.vector[1], 0.0)
+            if size is None:
+                raise InputError(f"effect '{self.name}': {self.vector[0]} is missing; accepted: {', '.join(known)}.")
+            return size * math.cos(towards), size * math.sin(towards)
+        return tuple(float(values.get(p.name, p.typical if p.shape else 0.0)) for p in self.parameters)
+
+
+def body_axes(north: Array, east: Array, psi: Array) -> tuple[Array, Array]:
+    """Forward and starboard components of an earth-fixed vector."""
+    return north * cos(psi) + east * sin(psi), east * cos(psi) - north * sin(psi)
+
+
+def per_run(value: Array) -> Array:
+    """A number, or one value per run as a column that spreads over samples."""
+    return np.asarray(value)[:, None] if np.ndim(value) == 1 else value
+
+
+def delayed(S: np.ndarray, channels: Sequence[int], delay: Array, dt: float) -> np.ndarray:
+    """States (runs, samples, 10) whose `channels` are read `delay` seconds late (a number or one per run); before the run they go on as they began.
+
+    Linear between samples, so that a small delay acts in proportion to its size.
+    """
+    runs, samples = S.shape[:2]
+    shift = np.broadcast_to(np.asarray(delay, dtype=float) / dt, (runs,))
+    at = np.arange(samples)[None, :] - shift[:, None]
+    low = np.clip(np.floor(at).astype(int), 0, samples - 2)
+    part = (at - low)[..., None]
+    rows = np.arange(runs)[:, None]
+    columns = S[:, :, list(channels)]
+    out = S.copy()
+    out[:, :, list(channels)] = columns[rows, low] * (1.0 - part) + columns[rows, low + 1] * part
+    return out

@@ -1,0 +1,24 @@
+"""The centre of gravity lies further forward than the ship file says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class CenterOfGravityShift(Effect):
+    family = "hull"
+    summary = "longitudinal centre of gravity"
+    source = "physics reference, section 5, H50"
+    parameters = (Parameter("shift", "m", 4.0, -15.0, 15.0, scaling="length"),)
+    separate = "rudder reversals and thruster pushes at two positions"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.x_G = e.x_G + q[0]
+
+
+EFFECT = CenterOfGravityShift()

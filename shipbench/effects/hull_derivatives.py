@@ -1,0 +1,36 @@
+"""The hull derivatives and added masses of the published regressions do not fit this ship; each value is a relative change."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class HullDerivatives(Effect):
+    family = "hull"
+    summary = "hull derivatives off the regressions"
+    source = "spread of the regressions: physics reference, section 5, H55"
+    parameters = (
+        Parameter("Y_v", "1", 0.25, -0.9, 3.0),
+        Parameter("Y_r", "1", 0.25, -0.9, 3.0),
+        Parameter("N_v", "1", 0.25, -0.9, 3.0),
+        Parameter("N_r", "1", 0.25, -0.9, 3.0),
+        Parameter("Y_nonlinear", "1", 0.25, -0.9, 3.0),
+        Parameter("N_nonlinear", "1", 0.25, -0.9, 3.0),
+        Parameter("X_nonlinear", "1", 0.25, -0.9, 3.0),
+        Parameter("m_y", "1", 0.25, -0.9, 3.0),
+        Parameter("J_z", "1", 0.25, -0.9, 3.0),
+    )
+    separate = "steady turns and zig-zags at several rudder angles"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        names = ("Y_v", "Y_r", "N_v", "N_r", "Y_nonlinear", "N_nonlinear", "X_nonlinear")
+        e.scale_hull(**{k: 1.0 + v for k, v in zip(names, q[:7], strict=True)})
+        e.m_y, e.J_z = e.m_y * (1.0 + q[7]), e.J_z * (1.0 + q[8])
+
+
+EFFECT = HullDerivatives()

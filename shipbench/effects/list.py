@@ -1,0 +1,25 @@
+"""A list: the heeled hull is unsymmetrical and has a side force and a moment ahead. N = rho/2 L^2 T u|u| 0.008 phi, Y = -0.5 N/L."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array, absolute
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class List(Effect):
+    family = "hull"
+    summary = "heel angle"
+    source = "N'_phi of physics reference, section 5, H51"
+    parameters = (Parameter("heel", "rad", 0.06981317007977318, -0.35, 0.35),)
+    separate = "vary the revolutions at one speed: a list acts with the ship's speed alone"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        N = 0.5 * ship.rho * ship.L**2 * ship.T * s.u * absolute(s.u) * 0.008 * q[0]
+        e.push(0.0, -0.5 * N / ship.L, N)
+
+
+EFFECT = List()

@@ -1,0 +1,24 @@
+"""Another mass than the ship file says (loading), with its moment of inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class MassChange(Effect):
+    family = "hull"
+    summary = "mass of the ship"
+    source = "physics reference, section 5, H47"
+    parameters = (Parameter("share", "1", 0.15, -0.5, 1.0),)
+    separate = "pushes of a force of known size: thrusters, a bollard"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.mass = e.mass * (1.0 + q[0])
+
+
+EFFECT = MassChange()

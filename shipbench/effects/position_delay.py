@@ -1,0 +1,25 @@
+"""The recorded position is old."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..ops import Array
+from ..signals import X, Y
+from .base import Effect, Parameter, delayed
+
+
+class PositionDelay(Effect):
+    family = "sensor"
+    summary = "latency of the position"
+    source = "physics reference, section 5, S64"
+    parameters = (Parameter("delay", "s", 2.0, -10.0, 10.0, scaling="time"),)
+    separate = "changes of speed and course"
+
+    def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
+        return delayed(S, (X, Y), q[0], dt)
+
+
+EFFECT = PositionDelay()

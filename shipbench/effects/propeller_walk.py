@@ -1,0 +1,28 @@
+"""A side force of the turning propeller, in proportion to its thrust ahead, at the propeller."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array, maximum
+from ..physics.modifiers import Flow, Modifiers
+from ..physics.propeller import thrust_quadratic
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class PropellerWalk(Effect):
+    family = "propulsion"
+    summary = "side force of the propeller ahead"
+    source = "physics reference, section 5, P36; the form of p0 in eq. (6)"
+    parameters = (Parameter("share", "1", 0.05, -0.3, 0.3),)
+    separate = "straight runs at one speed with the revolutions up and down"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        V_A = (1.0 - ship.w_P0) * maximum(s.u, 0.0)
+        thrust = thrust_quadratic(maximum(s.n, 0.0) / 60.0, V_A, ship.D_P, ship.kt, ship.rho)
+        Y = q[0] * (1.0 - ship.t_P) * maximum(thrust, 0.0)
+        e.push(0.0, Y, ship.x_P * Y)
+
+
+EFFECT = PropellerWalk()

@@ -1,0 +1,26 @@
+"""The side force of a screw turning astern: a right-handed one throws the stern to port."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..physics.propeller import side_force_astern
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class PropellerWalkAstern(Effect):
+    family = "propulsion"
+    summary = "side force of the propeller astern"
+    source = "Hachii form, Esso Osaka values (physics reference, section 5, P36)"
+    parameters = (Parameter("size", "1", 1.0, -4.0, 4.0),)
+    separate = "astern revolutions at rest"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        Y, N = side_force_astern(s.n / 60.0, s.u, ship.D_P, ship.L, ship.T, ship.rho)
+        e.push(0.0, q[0] * Y, q[0] * N)
+
+
+EFFECT = PropellerWalkAstern()

@@ -1,0 +1,24 @@
+"""The propeller's race reaches the rudder faster or slower than momentum theory says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class RaceGain(Effect):
+    family = "rudder"
+    summary = "speed of the propeller race at the rudder"
+    source = "physics reference, section 5, R16"
+    parameters = (Parameter("gain", "1", 0.3, -0.9, 1.5),)
+    separate = "turns at low and high revolutions from one speed"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.race = e.race * (1.0 + q[0])
+
+
+EFFECT = RaceGain()

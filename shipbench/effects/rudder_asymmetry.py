@@ -1,0 +1,24 @@
+"""The rudder gives more lift to one side than to the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class RudderAsymmetry(Effect):
+    family = "rudder"
+    summary = "unequal lift to port and starboard"
+    source = "physics reference, section 5, R19"
+    parameters = (Parameter("asymmetry", "1", 0.2, -0.8, 0.8),)
+    separate = "turns of equal amplitude to both sides, small and large: an offset matters most at small angles"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.rudder_asymmetry = e.rudder_asymmetry + q[0]
+
+
+EFFECT = RudderAsymmetry()

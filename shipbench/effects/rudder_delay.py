@@ -1,0 +1,23 @@
+"""The rudder follows its command (or its record) late by a fixed time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..physics.actuators import Gear
+from .base import Effect, Parameter
+
+
+class RudderDelay(Effect):
+    family = "rudder"
+    summary = "transport delay of the steering gear or of its record"
+    source = "physics reference, section 5, A26"
+    parameters = (Parameter("delay", "s", 1.5, -5.0, 10.0, scaling="time"),)
+    separate = "quick rudder reversals, sampled faster"
+
+    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
+        gears["delta"] = replace(gears["delta"], delay=gears["delta"].delay + q[0])
+
+
+EFFECT = RudderDelay()

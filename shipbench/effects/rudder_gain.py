@@ -1,0 +1,24 @@
+"""The rudder gives more or less lift than its size says, at all speeds and loadings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class RudderGain(Effect):
+    family = "rudder"
+    summary = "lift of the rudder"
+    source = "physics reference, section 5, R14"
+    parameters = (Parameter("gain", "1", 0.25, -0.7, 1.0),)
+    separate = "kick ahead at zero speed with the rudder over: it isolates the rudder from the hull"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.rudder = e.rudder * (1.0 + q[0])
+
+
+EFFECT = RudderGain()

@@ -1,0 +1,23 @@
+"""The rudder follows its command with a longer time constant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..physics.actuators import Gear
+from .base import Effect, Parameter
+
+
+class RudderLag(Effect):
+    family = "rudder"
+    summary = "slow first-order steering gear"
+    source = "physics reference, section 5, A22"
+    parameters = (Parameter("lag", "s", 3.0, 0.0, 30.0, scaling="time"),)
+    separate = "small and large rudder steps: a lag takes the same time for both"
+
+    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
+        gears["delta"] = replace(gears["delta"], T=gears["delta"].T + q[0])
+
+
+EFFECT = RudderLag()

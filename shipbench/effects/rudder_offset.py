@@ -1,0 +1,24 @@
+"""The rudder stands at another angle than recorded (zero error of the gear or its sensor)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class RudderOffset(Effect):
+    family = "rudder"
+    summary = "zero error of the rudder angle"
+    source = "physics reference, section 5, R15"
+    parameters = (Parameter("offset", "rad", 0.03490658503988659, -0.15, 0.15),)
+    separate = "vary the revolutions at one speed: the offset acts with the race, propeller walk with the thrust, wind with neither"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.delta = e.delta + q[0]
+
+
+EFFECT = RudderOffset()

@@ -1,0 +1,29 @@
+"""The rudder loses lift beyond an angle of attack."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class RudderStall(Effect):
+    family = "rudder"
+    summary = "stall of the rudder at large angles"
+    source = "physics reference, section 5, R18"
+    parameters = (Parameter("lost_share", "1", 0.5, -0.8, 0.95), Parameter("angle", "rad", 0.3, 0.1, 0.7, shape=True))
+    separate = "turns at 10, 20, 30 and 35 deg of rudder"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.stall, e.stall_angle = q[0], q[1]
+
+    def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
+        return [(0.2,), (0.35,)]
+
+
+EFFECT = RudderStall()

@@ -1,0 +1,23 @@
+"""The shaft follows its order with a longer time constant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..physics.actuators import Gear
+from .base import Effect, Parameter
+
+
+class ShaftLag(Effect):
+    family = "propulsion"
+    summary = "slow first-order shaft"
+    source = "physics reference, section 5, P31"
+    parameters = (Parameter("lag", "s", 10.0, 0.0, 120.0, scaling="time"),)
+    separate = "small and large steps of the revolutions"
+
+    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
+        gears["n"] = replace(gears["n"], T=gears["n"].T + q[0])
+
+
+EFFECT = ShaftLag()

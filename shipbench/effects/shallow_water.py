@@ -1,0 +1,27 @@
+"""Finite water depth: hull derivatives, added masses and resistance grow with draught over depth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array, maximum
+from ..physics.modifiers import Flow, Modifiers
+from ..physics.shallow_water import depth_factors
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class ShallowWater(Effect):
+    family = "environment"
+    summary = "finite water depth"
+    source = "Kijima, Tang, Ankudinov and Furukawa as collected in physics reference, section 5, E07"
+    parameters = (Parameter("draught_to_depth", "1", 0.6, 0.0, 0.85),)
+    separate = "the same steady turn at two depths: drift over yaw rate changes with depth and not with rudder force"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        deep = depth_factors(ship.T / maximum(q[0], 1e-3), ship.L, ship.B, ship.T, ship.Cb)
+        e.hull = e.hull * deep.hull
+        e.m_y, e.J_z = e.m_y * deep.m_y, e.J_z * deep.J_z
+
+
+EFFECT = ShallowWater()

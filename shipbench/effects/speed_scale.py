@@ -1,0 +1,28 @@
+"""The recorded speeds (surge and sway) are too large by a constant share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..ops import Array
+from ..signals import U, V
+from .base import Effect, Parameter, per_run
+
+
+class SpeedScale(Effect):
+    family = "sensor"
+    summary = "scale of the speed log"
+    source = "physics reference, section 5, S62"
+    parameters = (Parameter("scale", "1", 0.05, -0.5, 0.5),)
+    separate = "straight runs on reciprocal courses"
+
+    def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
+        out = S.copy()
+        out[..., U] *= 1.0 + per_run(q[0])
+        out[..., V] *= 1.0 + per_run(q[0])
+        return out
+
+
+EFFECT = SpeedScale()

@@ -1,0 +1,24 @@
+"""The propeller gives more or less thrust than its open-water curve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class ThrustGain(Effect):
+    family = "propulsion"
+    summary = "thrust of the propeller"
+    source = "physics reference, section 5, P33"
+    parameters = (Parameter("gain", "1", 0.15, -0.6, 1.0),)
+    separate = "acceleration from rest, or a bollard pull"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.thrust = e.thrust * (1.0 + q[0])
+
+
+EFFECT = ThrustGain()

@@ -1,0 +1,23 @@
+"""The thrusters follow their order with a longer time constant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..physics.actuators import Gear
+from .base import Effect, Parameter
+
+
+class ThrusterLag(Effect):
+    family = "thruster"
+    summary = "slow thrusters"
+    source = "physics reference, section 5, T43"
+    parameters = (Parameter("lag", "s", 6.0, 0.0, 60.0, scaling="time"),)
+    separate = "steps of the thruster order"
+
+    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
+        gears["F"] = replace(gears["F"], T=gears["F"].T + q[0])
+
+
+EFFECT = ThrusterLag()

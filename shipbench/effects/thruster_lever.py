@@ -1,0 +1,24 @@
+"""The bow thruster stands elsewhere than the ship file says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class ThrusterLever(Effect):
+    family = "thruster"
+    summary = "lever of the bow thruster"
+    source = "physics reference, section 5, T44"
+    parameters = (Parameter("shift", "m", -20.0, -60.0, 60.0, scaling="length"),)
+    separate = "bow and stern thruster alone, at rest"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.lever = e.lever + q[0]
+
+
+EFFECT = ThrusterLever()

@@ -1,0 +1,32 @@
+"""Mean drift force of waves: along their direction, nearly independent of the ship's speed.
+
+The components are amplitude squared times the direction of travel; X = rho g B a_u, Y = rho g L a_v |a_v|/|a| (each times 1/2, X reduced to 0.3),
+N = -0.1 L Y a_u/|a|."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array, absolute, sqrt
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter, body_axes
+
+
+class WaveDrift(Effect):
+    family = "environment"
+    summary = "mean drift force of waves"
+    source = "short-wave limit after Faltinsen et al. (1980), as simplified in physics reference, section 5, E05"
+    parameters = (Parameter("north", "m^2", 0.12, -2.0, 2.0, scaling="area"), Parameter("east", "m^2", 0.12, -2.0, 2.0, scaling="area"))
+    vector = ("amplitude_squared", "to")
+    separate = "an anemometer or a wave buoy: wind and waves from one side push alike"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        a_u, a_v = body_axes(q[0], q[1], s.psi)
+        size = sqrt(a_u * a_u + a_v * a_v + 1e-12)
+        unit = 0.5 * ship.rho * 9.81
+        Y = unit * ship.L * a_v * absolute(a_v) / size
+        e.push(0.3 * unit * ship.B * a_u, Y, -0.1 * ship.L * Y * a_u / size)
+
+
+EFFECT = WaveDrift()

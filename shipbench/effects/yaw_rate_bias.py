@@ -1,0 +1,27 @@
+"""The rate gyro reads too much by a constant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..ops import Array
+from ..signals import R
+from .base import Effect, Parameter, per_run
+
+
+class YawRateBias(Effect):
+    family = "sensor"
+    summary = "offset of the rate gyro"
+    source = "physics reference, section 5, S60"
+    parameters = (Parameter("bias", "rad/s", 0.0017453292519943296, -0.1, 0.1, scaling="rate"),)
+    separate = "any straight run: heading and integrated yaw rate part"
+
+    def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
+        out = S.copy()
+        out[..., R] += per_run(q[0])
+        return out
+
+
+EFFECT = YawRateBias()

@@ -1,0 +1,89 @@
+"""Where a cause that the plain model leaves out enters it: one list of places, read by the simulated ship and by the fitted one alike.
+
+An effect (`shipbench.effects`) writes its formula once, as changes of these fields; what each ship makes of a field (its own rudder, hull and
+propeller) stays its own. That keeps hidden cause and named cause the same physics in two different structures.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from ..ops import Array, absolute, smoothstep, tanh
+from .hull import DEEP, HullFactors
+
+
+class Flow(NamedTuple):
+    """What an effect may look at, at one instant: place [m], time since the run began [s], motion over ground, actuators [rpm, rad, N, N]."""
+
+    x: Array
+    y: Array
+    t: Array
+    psi: Array
+    u: Array
+    v: Array
+    r: Array
+    n: Array
+    delta: Array
+    F_b: Array
+    F_s: Array
+
+
+@dataclass
+class Modifiers:
+    """Neutral as constructed: nothing is missing.
+
+    u_c, v_c: velocity of the water in body axes [m/s]. air_u, air_v: velocity of the air beyond the measured wind, body axes [m/s].
+    delta: rudder angle to add [rad]; rudder: factor of the rudder's lift; rudder_asymmetry a: factor 1 + a to starboard and 1 - a to port;
+    stall: share of the lift lost beyond `stall_angle` [rad]. race, thrust: factors of the race's excess speed and of the thrust; wake: added to the
+    wake fraction. bow, stern: factors of the thrusters; lever: shift of the bow thruster [m]; loss: share of side force and moment lost at speed.
+    mass, m_y, J_z: factors of the ship's mass (with its inertia), of added mass in sway and of added inertia in yaw; x_G: shift of the centre
+    of gravity [m]. hull: factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship [N m] to add.
+    """
+
+    u_c: Array = 0.0
+    v_c: Array = 0.0
+    air_u: Array = 0.0
+    air_v: Array = 0.0
+    delta: Array = 0.0
+    rudder: Array = 1.0
+    rudder_asymmetry: Array = 0.0
+    stall: Array = 0.0
+    stall_angle: Array = 0.4
+    race: Array = 1.0
+    thrust: Array = 1.0
+    wake: Array = 0.0
+    bow: Array = 1.0
+    stern: Array = 1.0
+    lever: Array = 0.0
+    loss: Array = 0.0
+    mass: Array = 1.0
+    m_y: Array = 1.0
+    J_z: Array = 1.0
+    x_G: Array = 0.0
+    hull: HullFactors = field(default=DEEP)
+    X: Array = 0.0
+    Y: Array = 0.0
+    N: Array = 0.0
+
+    def scale_hull(self, **factors: Array) -> None:
+        """Multiply factors of the hull, such as `Y_v=1.2`."""
+        self.hull = replace(self.hull, **{k: getattr(self.hull, k) * f for k, f in factors.items()})
+
+    def push(self, X: Array = 0.0, Y: Array = 0.0, N: Array = 0.0) -> None:
+        """Add a force [N] and a moment [N m] about midship."""
+        self.X, self.Y, self.N = self.X + X, self.Y + Y, self.N + N
+
+    def lift_factor(self, alpha: Array) -> Array:
+        """Factor of the rudder's lift at the angle of attack `alpha` [rad, positive turns to starboard]."""
+        factor = self.rudder
+        if not is_number(self.rudder_asymmetry):
+            factor = factor * (1.0 + self.rudder_asymmetry * tanh(alpha / 0.05))
+        if not is_number(self.stall):
+            factor = factor * (1.0 - self.stall * smoothstep(absolute(alpha) - self.stall_angle, 0.0, 0.35))
+        return factor
+
+
+def is_number(value: Array) -> bool:
+    """Whether a field is still the plain 0 or 1 of a neutral `Modifiers`: its term can then be left out."""
+    return isinstance(value, float) and value in (0.0, 1.0)

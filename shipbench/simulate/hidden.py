@@ -1,0 +1,85 @@
+"""Sailing the MMG ship with causes hidden in it: effects on the hull, in the gears and in the sensors, under gusts that nobody records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effects.base import Effect
+from ..integrate import kinematics, rk4_step
+from ..ops import Array
+from ..physics.actuators import Gear, gear_path
+from ..physics.mmg import CALM, Environment, MMGShip, accelerations
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import complete
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """An effect and its values `q`: numbers, or one per run."""
+
+    effect: Effect
+    q: tuple[Array, ...]
+
+
+def gears_of(ship: MMGShip, hidden: Sequence[Hidden]) -> dict[str, Gear]:
+    """Gears of shaft [rpm], rudder [rad] and thrusters [N], as built and then as the hidden effects leave them."""
+    a = ship.actuators
+    gears = {"n": Gear(a.T_n, 60.0 * a.rate_n), "delta": Gear(a.T_delta, a.rate_delta), "F": Gear(a.T_F, a.rate_F)}
+    for h in hidden:
+        h.effect.gear(gears, h.q)
+    return gears
+
+
+def sail(
+    ship: MMGShip, s0: np.ndarray, U: np.ndarray, dt: float, hidden: Sequence[Hidden] = (), wind: np.ndarray | None = None, max_step: float = 0.25
+) -> np.ndarray:
+    """True states (runs, K + 1, 10) from `s0` (runs, 10) under commands U (runs, K, 4), `s0` included.
+
+    Args:
+        wind: true wind as (speed [m/s], from [rad]) per run and step, (runs, K, 2).
+        max_step: greatest integration step [s]; shorter ships need steps shorter by sqrt(L).
+    """
+    num = max(1, int(np.ceil(dt / max_step - 1e-9)))
+    h, (runs, K) = dt / num, U.shape[:2]
+    gears, limit = gears_of(ship, hidden), ship.particulars.thrusters.max_force if ship.particulars.thrusters else 0.0
+    command = [U[..., 0], np.clip(U[..., 1], -ship.actuators.delta_max, ship.actuators.delta_max)]
+    command += [np.clip(U[..., i], -limit, limit) for i in (2, 3)]
+    kinds = ("n", "delta", "F", "F")
+    actuators = np.stack([gear_path(s0[:, 6 + i], command[i], dt, gears[k], 2 * num) for i, k in enumerate(kinds)], axis=-1)
+    particulars = complete(ship.particulars)
+    motion = tuple(s0[:, :6].T)
+    S = np.empty((runs, K + 1, 10))
+    S[:, 0], S[:, :, 6:] = s0, actuators[:, :: 2 * num]
+    with np.errstate(all="ignore"):  # a run that leaves the finite numbers stays non-finite
+        for j in range(K * num):
+            k = j // num
+            env = CALM if wind is None else Environment(wind_speed=wind[:, k, 0], wind_from=wind[:, k, 1])
+
+            def rhs(state: tuple[Array, ...], stage: int, j: int = j, env: Environment = env) -> tuple[Array, ...]:
+                x, y, psi, u, v, r = state
+                n, delta, F_b, F_s = actuators[:, 2 * j + stage].T
+                e = Modifiers()
+                flow = Flow(x, y, (j + 0.5 * stage) * h, psi, u, v, r, n, delta, F_b, F_s)
+                for item in hidden:
+                    item.effect.force(e, flow, item.q, particulars)
+                return (*kinematics(psi, u, v, r), *accelerations(ship, psi, u, v, r, n, delta, F_b, F_s, env, e))
+
+            motion = rk4_step(rhs, motion, h)
+            if (j + 1) % num == 0:
+                S[:, k + 1, :6] = np.stack(motion, axis=-1)
+    return S
+
+
+def record(S: np.ndarray, dt: float, hidden: Sequence[Hidden], noise: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """What the sensors write down of the true states S (runs, samples, 10): faults of the sensors, then white noise.
+
+    `noise` (10,) are standard deviations; those of the thruster forces are relative to the reading.
+    """
+    for item in hidden:
+        S = item.effect.measure(S, item.q, dt)
+    scale = np.broadcast_to(noise, S.shape).copy()
+    scale[..., 8:] *= np.abs(S[..., 8:])
+    return S + scale * rng.standard_normal(S.shape)

@@ -1,0 +1,107 @@
+"""Sea trials to diagnose: runs of mixed manoeuvres (steps, zig-zags, turns, engine orders, thruster pushes), on any MMG ship."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..physics.mmg import MMGShip
+from ..records import Dataset, Run
+from ..signals import COMMANDS
+from .hidden import Hidden, record, sail
+from .manoeuvres import self_propulsion_rpm
+from .simulator import Simulator
+
+NOISE = np.array([0.5, 0.5, np.deg2rad(0.3), 0.05, 0.05, np.deg2rad(0.05), 0.5, np.deg2rad(0.2), 0.01, 0.01])
+"""Standard deviations on a 130 m ship: 0.5 m, 0.3 deg, 0.05 m/s, 0.05 deg/s, 0.5 rpm, 0.2 deg, 1 % of the thruster force."""
+
+_FROUDE = np.array([1.0, 1.0, 0.0, 0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0])
+_WARM_UP = 60
+
+
+@dataclass(frozen=True)
+class Trials:
+    """What is sailed: number of runs, samples after the first, gusts (standard deviation per axis [m/s] on a 130 m ship; 0: calm), noise factor,
+    and whether runs go astern and use thrusters."""
+
+    runs: int = 24
+    samples: int = 120
+    gusts: float = 1.5
+    noise: float = 1.0
+    astern: bool = True
+    thrusters: bool = True
+
+
+def draw_commands(rng: np.random.Generator, ship: MMGShip, speed: np.ndarray, rpm: np.ndarray, steps: int, dt: float, plan: Trials) -> np.ndarray:
+    """Commands (runs, steps, 4): a third of the runs zig-zags by the clock, a third turns, a third random steps; engine orders in half of them."""
+    num, scale = len(speed), (ship.L / 130.0) ** 0.5
+    U, t = np.zeros((num, steps, 4)), np.arange(steps) * dt / scale
+    force = ship.particulars.thrusters.max_force if ship.particulars.thrusters else 0.0
+    for i in range(num):
+        amplitude = np.deg2rad(rng.choice([5.0, 10.0, 15.0, 20.0, 30.0, 35.0]))
+        side = rng.choice([-1.0, 1.0])
+        start = rng.uniform(0.0, 25.0)
+        if i % 3 == 0:
+            wave = np.floor((t - start) / rng.uniform(18.0, 40.0))
+            U[i, :, 1] = np.where(t < start, 0.0, side * amplitude * np.where(wave % 2 == 0, 1.0, -1.0))
+        elif i % 3 == 1:
+            stop = rng.uniform(60.0, 200.0)
+            U[i, :, 1] = np.where((t > start) & (t < stop), side * amplitude, 0.0)
+        else:
+            edges = np.cumsum(rng.uniform(6.0, 30.0, 60))
+            U[i, :, 1] = np.deg2rad(rng.uniform(-25.0, 25.0, 61))[np.searchsorted(edges, t)] * (t > start)
+        orders = rng.choice([0.5, 0.8, 1.0, 1.25, 1.5], 61) if rng.random() < 0.5 else np.ones(61)
+        U[i, :, 0] = rpm[i] * orders[np.searchsorted(np.cumsum(rng.uniform(25.0, 60.0, 60)), t)]
+        if plan.astern and i % 8 == 5:
+            U[i, t > rng.uniform(20.0, 60.0), 0] = -0.8 * rpm[i]
+        if plan.thrusters and force and i % 4 == 2:
+            pulse = rng.uniform(10.0, 60.0)
+            U[i, (t > pulse) & (t < pulse + 45.0), 2] = side * rng.uniform(0.4, 1.0) * force
+            if i % 8 == 2:
+                U[i, (t > pulse + 20.0) & (t < pulse + 60.0), 3] = -side * rng.uniform(0.4, 1.0) * force
+    return U
+
+
+def gusts(rng: np.random.Generator, num: int, steps: int, dt: float, sigma: float, tau: float) -> np.ndarray:
+    """Ornstein-Uhlenbeck wind vectors as (speed, from), (num, steps, 2)."""
+    keep = np.exp(-dt / tau)
+    wind = np.empty((num, steps, 2))
+    wind[:, 0] = sigma * rng.standard_normal((num, 2))
+    for k in range(1, steps):
+        wind[:, k] = keep * wind[:, k - 1] + sigma * np.sqrt(1.0 - keep * keep) * rng.standard_normal((num, 2))
+    return np.stack([np.hypot(wind[..., 0], wind[..., 1]), np.arctan2(wind[..., 1], wind[..., 0])], axis=-1)
+
+
+def sea_trials(ship: MMGShip, seed: int, hidden: Sequence[Hidden] = (), plan: Trials | None = None, name: str = "trials") -> Dataset:
+    """Sail and record a set of runs with `hidden` causes; one sample per second at 130 m, scaled with sqrt(L) for other ships.
+
+    The runs begin after a warm-up under the same causes, so that currents and winds have had their time.
+    """
+    plan = plan or Trials()
+    rng = np.random.default_rng(seed)
+    scale = (ship.L / 130.0) ** 0.5
+    dt = float(f"{scale:.2g}") if scale < 0.5 else 1.0
+    cruise = 4.5 * scale
+    base = self_propulsion_rpm(Simulator(ship), cruise)
+    ratio = rng.uniform(0.45, 1.25, plan.runs)
+    s0 = np.zeros((plan.runs, 10))
+    s0[:, :2] = rng.uniform(-600.0, 600.0, (plan.runs, 2)) * ship.L / 130.0
+    s0[:, 2], s0[:, 3], s0[:, 6] = rng.uniform(-np.pi, np.pi, plan.runs), cruise * ratio, base * ratio
+    steps = plan.samples + _WARM_UP
+    U = np.zeros((plan.runs, steps, 4))
+    U[..., 0] = (base * ratio)[:, None]
+    U[:, _WARM_UP:] = draw_commands(rng, ship, s0[:, 3], base * ratio, plan.samples, dt, plan)
+    # in the warm-up a pilot keeps the heading roughly: small random helm
+    U[:, :_WARM_UP, 1] = np.repeat(np.deg2rad(rng.uniform(-4.0, 4.0, (plan.runs, _WARM_UP // 15))), 15, axis=1)
+    wind = gusts(rng, plan.runs, steps, dt, plan.gusts * scale, 20.0 * scale) if plan.gusts else None
+    S = sail(ship, s0, U, dt, hidden, wind, max_step=0.5 * min(1.0, scale))
+    noise = plan.noise * NOISE * (ship.L / 130.0) ** _FROUDE
+    S = record(S[:, _WARM_UP:], dt, hidden, noise, rng)
+    U, t = U[:, _WARM_UP:], np.arange(plan.samples + 1) * dt
+    U = np.concatenate([U, U[:, -1:]], axis=1)
+    runs = tuple(Run(f"run{i:02d}", t, S[i], U[i], COMMANDS) for i in range(plan.runs))
+    return Dataset(
+        name=name, ship=ship.particulars, dt=dt, runs=runs, actuators="measured", source=f"shipbench sea trials of {ship.name}, seed {seed}"
+    )
