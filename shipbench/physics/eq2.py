@@ -120,7 +120,7 @@ def rudder(
     e = e or Modifiers()
     u2 = c.eta * race * race + (1.0 - c.eta) * V_A * V_A
     u_R = sqrt(u2 + 1e-6)
-    w_R = 0.364 * v + 0.66 * c.x_R * r
+    w_R = e.sideways(0.364 * v + 0.66 * c.x_R * r)
     beta = arctan2(w_R, u_R)
     a = clip(delta + e.delta + beta, -ALPHA_MAX, ALPHA_MAX)
     q = 0.5 * c.rho * c.A_R * (u2 + w_R * w_R)

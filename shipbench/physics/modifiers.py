@@ -35,7 +35,8 @@ class Modifiers:
 
     u_c, v_c: velocity of the water in body axes [m/s]. air_u, air_v: velocity of the air beyond the measured wind, body axes [m/s].
     delta: rudder angle to add [rad]; rudder: factor of the rudder's lift; rudder_asymmetry a: factor 1 + a to starboard and 1 - a to port;
-    stall: share of the lift lost beyond `stall_angle` [rad]. race, thrust: factors of the race's excess speed and of the thrust; wake: added to the
+    stall: share of the lift lost beyond `stall_angle` [rad]. race, thrust: factors of the race's excess speed and of the thrust; straightening: factor of the
+    sideways flow at the rudder, 1 + its asymmetry where it comes from port (positive) and 1 - where from starboard; wake: added to the
     wake fraction. bow, stern: factors of the thrusters; lever: shift of the bow thruster [m]; loss: share of side force and moment lost at speed.
     mass, m_y, J_z: factors of the ship's mass (with its inertia), of added mass in sway and of added inertia in yaw; x_G: shift of the centre
     of gravity [m]. hull: factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship [N m] to add.
@@ -51,6 +52,8 @@ class Modifiers:
     stall: Array = 0.0
     stall_angle: Array = 0.4
     race: Array = 1.0
+    straightening: Array = 1.0
+    straightening_asymmetry: Array = 0.0
     thrust: Array = 1.0
     wake: Array = 0.0
     bow: Array = 1.0
@@ -73,6 +76,12 @@ class Modifiers:
     def push(self, X: Array = 0.0, Y: Array = 0.0, N: Array = 0.0) -> None:
         """Add a force [N] and a moment [N m] about midship."""
         self.X, self.Y, self.N = self.X + X, self.Y + Y, self.N + N
+
+    def sideways(self, w_R: Array) -> Array:
+        """Sideways flow at the rudder [m/s] after straightening by hull and propeller; a single screw straightens the two sides unequally."""
+        if is_number(self.straightening) and is_number(self.straightening_asymmetry):
+            return w_R
+        return self.straightening * (w_R + self.straightening_asymmetry * absolute(w_R))
 
     def lift_factor(self, alpha: Array) -> Array:
         """Factor of the rudder's lift at the angle of attack `alpha` [rad, positive turns to starboard]."""

@@ -1,0 +1,214 @@
+"""The joint fit: base parameters, effects, initial states and the latent force, with the variances of force and noise (an iterated smoother)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .gram import Gram, Hyper, Prior, Products, Reduced, Solution, background, solve, update_force, update_noise
+from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, Term, predict
+from .plant import NUM_HULL, Plant
+
+_EM_STEPS = 4
+_LOG_FLOOR = np.log(0.1**2)
+"""A channel is never taken for better than a tenth of an ordinary sensor, else the latent force follows its noise."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """Structure: terms, and how far the hull may lie from the regressions and the other parameters from their centres (factors of the prior
+    standard deviations)."""
+
+    terms: tuple[Term, ...] = ()
+    hull: float = 1.0
+    base: float = 1.0
+
+    def prior(self, log_tau2: dict[int, float]) -> Prior:
+        """Columns in the order base, own terms; candidates stay outside."""
+        at, shared, precision, random, tau = NUM_BASE, list(range(NUM_BASE)), base_precision(self), [], []
+        weights = list(precision)
+        for i, term in enumerate(self.terms):
+            columns = list(range(at, at + term.size))
+            at += term.size
+            if term.per_run:
+                random += columns
+                tau += [log_tau2.get(i, 0.0)] * term.size
+            else:
+                shared += columns
+                weights += [1.0] * term.size
+        return Prior(np.array(shared), np.array(weights), np.array(random, dtype=int), np.array(tau))
+
+
+def base_precision(model: Model) -> np.ndarray:
+    """Prior precisions of the base parameters in units of their spreads."""
+    return np.repeat([model.base**-2, model.hull**-2, model.base**-2], [len(FREE), NUM_HULL, NUM_BASE - len(FREE) - NUM_HULL])
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model and its linearisation. solution: of `prior` on `gram`; estimate, cov: of [eta, w] per segment."""
+
+    plant: Plant
+    scales: Scales
+    model: Model
+    point: Point
+    hyper: Hyper
+    log_tau2: dict[int, float]
+    prior: Prior
+    columns: Columns
+    candidates: tuple[Term, ...]
+    products: Products
+    gram: Gram
+    reduced: Reduced
+    solution: Solution
+    estimate: np.ndarray
+    cov: np.ndarray
+
+    @property
+    def evidence(self) -> float:
+        """Log evidence, without constants; variances of random effects cost as much as a coefficient."""
+        randoms = sum(t.per_run for t in self.model.terms)
+        return self.solution.log_evidence - 0.5 * randoms * float(np.log(self.plant.seg.runs))
+
+    def columns_of(self, index: int) -> np.ndarray:
+        """Shared columns of the model's index-th term."""
+        at = NUM_BASE + sum(t.size for t in self.model.terms[:index])
+        return np.arange(at, at + self.model.terms[index].size)
+
+
+def products_of(plant: Plant, scales: Scales, point: Point, columns: Columns, extra: Sequence[np.ndarray] = ()) -> Products:
+    """Products of [eta, w, base, own, candidates, extra, e]; e is the residual with everything linear added back, so that all of it competes anew."""
+    B, noise = len(point.eta), np.tile(scales.noise, plant.steps + 1)
+    e = (plant.seg.states[..., :6] - columns.predicted).reshape(B, -1)
+    e = e + np.einsum("btz,bz->bt", columns.eta, point.eta)
+    e = e + np.einsum("btz,bz->bt", columns.w, np.moveaxis(point.w, -1, 1).reshape(B, -1)) + columns.base @ point.base
+    for term, value, own in zip(point.terms, point.values, columns.own, strict=True):
+        e = e + np.einsum("bta,ba->bt", own, value[plant.seg.run] if term.per_run else np.broadcast_to(value, (B, term.size)))
+    Z = np.concatenate([columns.eta, columns.w, columns.base, *columns.own, *columns.candidates, *extra, e[..., None]], axis=-1)
+    Z = np.nan_to_num(Z / noise[None, :, None], nan=0.0, posinf=0.0, neginf=0.0)
+    return Products.of(Z, plant.seg.mask, plant.knots, plant.knot_time, plant.seg.run, plant.seg.runs)
+
+
+def point_from(model: Model, point: Point, solution: Solution, prior: Prior, estimate: np.ndarray) -> Point:
+    """The point that a solution describes."""
+    knots = point.w.shape[1]
+    values, at, at_random = [], NUM_BASE, 0
+    for term in model.terms:
+        if term.per_run:
+            values.append(solution.means[:, at_random : at_random + term.size])
+            at_random += term.size
+        else:
+            values.append(solution.mean[at : at + term.size])
+            at += term.size
+    w = np.moveaxis(estimate[:, 6:].reshape(len(estimate), 3, knots), 1, 2)
+    return Point(solution.mean[:NUM_BASE], estimate[:, :6], w, model.terms, tuple(values))
+
+
+def between(a: Point, b: Point, share: float) -> Point:
+    """a + share (b - a); terms that `a` lacks start from zero."""
+
+    def mix(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+        return p + share * (q - p)
+
+    old = [a.values[i] if i < len(a.values) else np.zeros_like(v) for i, v in enumerate(b.values)]
+    return Point(mix(a.base, b.base), mix(a.eta, b.eta), mix(a.w, b.w), b.terms, tuple(mix(p, q) for p, q in zip(old, b.values, strict=True)))
+
+
+def within_bounds(plant: Plant, scales: Scales, point: Point) -> Point:
+    """Amplitudes held inside the bounds of their effects."""
+    values = []
+    for term, value in zip(point.terms, point.values, strict=True):
+        unit = scales.amplitudes(term, plant.c.L)
+        sized = [p for p in term.effect.sized(plant.c.L) if not p.shape]
+        values.append(np.clip(value, [p.low / s for p, s in zip(sized, unit, strict=True)], [p.high / s for p, s in zip(sized, unit, strict=True)]))
+    return replace(point, values=tuple(values))
+
+
+def objective(plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float], gram: Gram) -> float:
+    """Twice the negative log posterior of a point, without constants."""
+    error = (plant.seg.states[..., :6] - predict(plant, scales, point)) / scales.noise
+    error = np.where(plant.seg.mask[..., None], error, 0.0)
+    cost = float(np.sum(error**2 * np.exp(-hyper.log_noise))) + float(np.sum(base_precision(model) * point.base**2))
+    w = np.moveaxis(point.w, -1, 1)
+    cost += float(np.sum(np.einsum("bji,ik,bjk->j", w, gram.K_inv, w) * np.exp(-hyper.log_force)))
+    for i, (term, value) in enumerate(zip(point.terms, point.values, strict=True)):
+        cost += float(np.sum(value**2)) * (np.exp(-log_tau2.get(i, 0.0)) if term.per_run else 1.0)
+    return cost if np.isfinite(cost) else np.inf
+
+
+def start(plant: Plant) -> tuple[Point, Hyper]:
+    """Regressions, no effect, no latent force."""
+    B = len(plant.seg.run)
+    hyper = Hyper(np.zeros(3), np.zeros(6), 12.0 * (plant.c.L / 130.0) ** 0.5)
+    return Point(np.zeros(NUM_BASE), np.zeros((B, 6)), np.zeros((B, plant.knots, 3))), hyper
+
+
+def fit(
+    plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 8,
+    tolerance: float = 0.5, candidates: Sequence[Term] = (),
+) -> Fit:  # fmt: skip
+    """Gauss-Newton from `point` (which may lack the last terms of `model`: they start at zero), with EM for the variances.
+
+    It ends when twice the negative log posterior changes by less than `tolerance`; `candidates` get columns at the last point.
+    """
+    log_tau2 = dict(log_tau2 or {})
+    if len(point.terms) < len(model.terms):
+        new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
+        point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
+    for _ in range(iterations):
+        found = settle(plant, scales, model, point, hyper, log_tau2, Linearisation(plant, scales, point).columns())
+        hyper, log_tau2 = found.hyper, found.log_tau2
+        target = within_bounds(plant, scales, point_from(model, point, found.solution, found.prior, found.estimate))
+        at = objective(plant, scales, model, point, hyper, log_tau2, found.gram)
+        share, trial = 1.0, target
+        while (cost := objective(plant, scales, model, trial, hyper, log_tau2, found.gram)) > at and share > 0.1:
+            share *= 0.5
+            trial = between(point, target, share)
+        if cost > at:
+            break
+        point = trial
+        if at - cost < tolerance:
+            break
+    return settle(plant, scales, model, point, hyper, log_tau2, Linearisation(plant, scales, point).columns(candidates), candidates)
+
+
+def track(plant: Plant, scales: Scales, point: Point, hyper: Hyper) -> tuple[Point, Hyper]:
+    """Put the trajectories on the measured ones by the latent force alone: Gauss-Newton is then nearly linear in everything else."""
+    still = Model(hull=1e-4, base=1e-4)
+    found = settle(plant, scales, still, point, hyper, {}, Linearisation(plant, scales, point).columns())
+    return point_from(still, point, found.solution, found.prior, found.estimate), found.hyper
+
+
+def settle(
+    plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float], columns: Columns,
+    candidates: Sequence[Term] = (), steps: int = _EM_STEPS,
+) -> Fit:  # fmt: skip
+    """Variances and posterior on one linearisation."""
+    products = products_of(plant, scales, point, columns)
+    log_tau2 = dict(log_tau2)
+    for step in range(steps + 1):
+        gram = products.weigh(hyper)
+        reduced = gram.reduce(hyper.log_force)
+        prior = model.prior(log_tau2)
+        solution = solve(reduced, prior)
+        estimate, cov = background(gram, reduced, prior, solution)
+        if step == steps:
+            break
+        hyper = Hyper(update_force(gram, estimate, cov), update_noise(products, gram, reduced, prior, solution, estimate, _LOG_FLOOR), hyper.tau)
+        update_random(model, solution, log_tau2)
+    return Fit(
+        plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), products, gram, reduced, solution, estimate, cov
+    )
+
+
+def update_random(model: Model, solution: Solution, log_tau2: dict[int, float]) -> None:
+    """One EM step for the variance of each random effect, in place."""
+    at = 0
+    for i, term in enumerate(model.terms):
+        if term.per_run:
+            sel = slice(at, at + term.size)
+            at += term.size
+            second = np.mean(solution.means[:, sel] ** 2) + np.mean(np.diagonal(solution.covs[:, sel, sel], axis1=1, axis2=2))
+            log_tau2[i] = float(np.log(second))

@@ -1,0 +1,219 @@
+"""Linear Gaussian algebra on the sensitivities: evidence, estimates and variances of the background, without another simulation.
+
+Model of a segment: e = S_eta eta + S_w w + S_g g + noise, with w ~ N(0, sigma_j^2 K) per axis (stationary, Ornstein-Uhlenbeck), a weak prior of the
+initial state eta, and shared coefficients g: base parameters and effects, each with a zero-mean prior; or one set per run (random effects).
+Source: model discrepancy of Kennedy & O'Hagan (2001) put on the force side as in Hooker (2009).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+ETA_PRECISION = 1e-4
+"""Weak: an initial state may lie 100 units of noise away from its first sample."""
+
+
+@dataclass(frozen=True)
+class Hyper:
+    """Variances: log_force (3,) of the latent acceleration in units of its scales; log_noise (6,) of the samples, likewise; tau [s] of the force."""
+
+    log_force: np.ndarray
+    log_noise: np.ndarray
+    tau: float
+
+
+@dataclass(frozen=True)
+class Products:
+    """Products of columns [eta, w, shared, e] per channel and segment, (6, B, Z + G + 1, Z + G + 1), before the noise is known.
+
+    run (B,): the segment's run; samples (B,): of real samples.
+    """
+
+    P: np.ndarray
+    knots: int
+    spacing: float
+    run: np.ndarray
+    runs: int
+    samples: np.ndarray
+
+    @classmethod
+    def of(cls, Z: np.ndarray, mask: np.ndarray, knots: int, spacing: float, run: np.ndarray, runs: int) -> Products:
+        """From columns Z (B, T, Z + G + 1), T = 6 (K + 1), channel last; `mask` (B, K + 1) of real samples."""
+        Z = Z * np.repeat(mask, 6, axis=1)[..., None]
+        P = np.stack([np.swapaxes(Z[:, c::6], 1, 2) @ Z[:, c::6] for c in range(6)])
+        return cls(P, knots, spacing, run, runs, mask.sum(axis=1))
+
+    @property
+    def latent(self) -> int:
+        return 6 + 3 * self.knots
+
+    @property
+    def shared(self) -> int:
+        return self.P.shape[-1] - self.latent - 1
+
+    def take(self, rows: np.ndarray, runs: np.ndarray) -> Products:
+        """Some segments; `runs` are the numbers of the runs that are kept, which are numbered anew."""
+        new = np.searchsorted(runs, self.run[rows])
+        return replace(self, P=self.P[:, rows], run=new, runs=len(runs), samples=self.samples[rows])
+
+    def weigh(self, hyper: Hyper) -> Gram:
+        """The Gram under given noise."""
+        G = np.einsum("cbij,c->bij", self.P, np.exp(-hyper.log_noise))
+        K_inv, K_logdet = ornstein_uhlenbeck(self.knots, self.spacing, hyper.tau)
+        return Gram(G, self.knots, K_inv, K_logdet, self.samples * float(np.sum(hyper.log_noise)), self.run, self.runs)
+
+
+def ornstein_uhlenbeck(knots: int, spacing: float, tau: float) -> tuple[np.ndarray, float]:
+    """Inverse and log determinant of the correlation exp(-|t - s|/tau) on `knots` equally spaced times."""
+    K = np.exp(-np.abs(np.subtract.outer(np.arange(knots), np.arange(knots))) * spacing / tau) + 1e-9 * np.eye(knots)
+    return np.linalg.inv(K), float(np.linalg.slogdet(K)[1])
+
+
+@dataclass(frozen=True)
+class Gram:
+    """Whitened products per segment, (B, Z + G + 1, Z + G + 1); log_noise (B,): sums of log variances of the samples."""
+
+    G: np.ndarray
+    knots: int
+    K_inv: np.ndarray
+    K_logdet: float
+    log_noise: np.ndarray
+    run: np.ndarray
+    runs: int
+
+    @property
+    def latent(self) -> int:
+        return 6 + 3 * self.knots
+
+    def precision(self, log_force: np.ndarray) -> np.ndarray:
+        """Prior precision of [eta, w]."""
+        P = np.zeros((self.latent, self.latent))
+        P[:6, :6] = ETA_PRECISION * np.eye(6)
+        for j in range(3):
+            at = slice(6 + j * self.knots, 6 + (j + 1) * self.knots)
+            P[at, at] = self.K_inv * np.exp(-log_force[j])
+        return P
+
+    def reduce(self, log_force: np.ndarray) -> Reduced:
+        """Integrate eta and w out of every segment and sum over the segments of a run."""
+        Z = self.latent
+        A = self.G[:, :Z, :Z] + self.precision(log_force)
+        inverse = np.linalg.inv(A)
+        solved = inverse @ self.G[:, :Z, Z:]
+        S = self.G[:, Z:, Z:] - np.swapaxes(self.G[:, :Z, Z:], 1, 2) @ solved
+        logdet = np.linalg.slogdet(A)[1] + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
+        per_run = np.zeros((self.runs, *S.shape[1:]))
+        np.add.at(per_run, self.run, S)
+        sums = np.zeros(self.runs)
+        np.add.at(sums, self.run, logdet)
+        return Reduced(per_run, sums, inverse, solved)
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Per run, with eta and w integrated out: S (N, G + 1, G + 1) of [shared, e] and logdet (N,); inverse, solved per segment for going back."""
+
+    S: np.ndarray
+    logdet: np.ndarray
+    inverse: np.ndarray
+    solved: np.ndarray
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Which shared columns are in the model: `shared` with prior precisions (one value for all runs), `random` with variances log_tau2 (one per run)."""
+
+    shared: np.ndarray
+    precision: np.ndarray
+    random: np.ndarray
+    log_tau2: np.ndarray
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Posterior of the coefficients. log_evidence without constants; mean, cov of `prior.shared`; means (N, R), covs (N, R, R) of `prior.random`;
+    per_run (N,): share of each run in the log evidence given the mean."""
+
+    log_evidence: float
+    mean: np.ndarray
+    cov: np.ndarray
+    means: np.ndarray
+    covs: np.ndarray
+    per_run: np.ndarray
+
+
+def solve(reduced: Reduced, prior: Prior) -> Solution:
+    """Integrate the random effects and the shared coefficients out."""
+    last = reduced.S.shape[1] - 1
+    keep = np.append(prior.shared, last)
+    S, logdet = reduced.S[:, keep][:, :, keep], reduced.logdet
+    back = None
+    if len(prior.random):
+        A = reduced.S[:, prior.random][:, :, prior.random] + np.diag(np.exp(-prior.log_tau2))
+        covs = np.linalg.inv(A)
+        right = reduced.S[:, prior.random][:, :, keep]
+        back = covs @ right
+        S = S - np.swapaxes(right, 1, 2) @ back
+        logdet = logdet + np.linalg.slogdet(A)[1] + np.sum(prior.log_tau2)
+    total = S.sum(axis=0)
+    A = total[:-1, :-1] + np.diag(prior.precision)
+    cov = np.linalg.inv(A)
+    mean = cov @ total[:-1, -1]
+    quad = total[-1, -1] - total[:-1, -1] @ mean
+    log_evidence = -0.5 * (quad + np.sum(logdet) + np.linalg.slogdet(A)[1] - np.sum(np.log(prior.precision)))
+    fitted = np.append(-mean, 1.0)
+    per_run = -0.5 * (np.einsum("nij,i,j->n", S, fitted, fitted) + logdet)
+    if back is None:
+        return Solution(float(log_evidence), mean, cov, np.zeros((len(S), 0)), np.zeros((len(S), 0, 0)), per_run)
+    means = back @ fitted
+    spread = back[:, :, :-1] @ cov @ np.swapaxes(back[:, :, :-1], 1, 2)
+    return Solution(float(log_evidence), mean, cov, means, covs + spread, per_run)
+
+
+def background(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Estimates (B, Z) of [eta, w] and their covariances (B, Z, Z), with the uncertainty of the shared coefficients."""
+    B, G = len(reduced.solved), reduced.S.shape[1] - 1
+    coefficients = np.zeros((B, G))
+    coefficients[:, prior.shared] = solution.mean
+    coefficients[:, prior.random] = solution.means[gram.run]
+    estimate = reduced.solved[:, :, -1] - np.einsum("bzg,bg->bz", reduced.solved[:, :, :-1], coefficients)
+    J = reduced.solved[:, :, prior.shared]
+    cov = reduced.inverse + J @ solution.cov @ np.swapaxes(J, 1, 2)
+    if len(prior.random):
+        R = reduced.solved[:, :, prior.random]
+        cov = cov + R @ solution.covs[gram.run] @ np.swapaxes(R, 1, 2)
+    return estimate, cov
+
+
+def update_force(gram: Gram, estimate: np.ndarray, cov: np.ndarray) -> np.ndarray:
+    """One EM step for the variances of the latent force, log (3,)."""
+    log_force = np.empty(3)
+    for j in range(3):
+        at = slice(6 + j * gram.knots, 6 + (j + 1) * gram.knots)
+        w = estimate[:, at]
+        quad = np.einsum("bi,ij,bj->", w, gram.K_inv, w) + np.einsum("ij,bji->", gram.K_inv, cov[:, at, at])
+        log_force[j] = np.log(quad / (len(w) * gram.knots))
+    return log_force
+
+
+def coefficients_of(gram: Gram, prior: Prior, solution: Solution, estimate: np.ndarray, size: int) -> np.ndarray:
+    """All columns' coefficients per segment, (B, size), with -1 for e: what the products are to be contracted with."""
+    theta = np.zeros((len(estimate), size))
+    theta[:, : gram.latent] = estimate
+    theta[:, gram.latent + prior.shared] = solution.mean
+    theta[:, gram.latent + prior.random] = solution.means[gram.run]
+    theta[:, -1] = -1.0
+    return theta
+
+
+def update_noise(products: Products, gram: Gram, reduced: Reduced, prior: Prior, solution: Solution, estimate: np.ndarray, floor: float) -> np.ndarray:
+    """One EM step for the variances of the noise, log (6,).
+
+    Given the shared coefficients: theirs are few beside the samples, and their errors are cancelled by those of the force that they cause.
+    """
+    theta = coefficients_of(gram, prior, solution, estimate, products.P.shape[-1])
+    Z = gram.latent
+    squares = np.einsum("cbij,bi,bj->c", products.P, theta, theta) + np.einsum("cbij,bji->c", products.P[:, :, :Z, :Z], reduced.inverse)
+    return np.maximum(np.log(squares / np.sum(products.samples)), floor)

@@ -1,0 +1,141 @@
+"""What a diagnosis found, as plain data: the verdict of the contract (section 6) and what the report shows beside it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A size with its 95 % interval, in `unit`."""
+
+    value: float
+    unit: str
+    ci95: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Error of open-loop rollouts on runs that were not fitted, before and after the model is extended.
+
+    relative: 1 - after/before of the means; ci95: its interval, clustered by run; runs_better: such as "19/24".
+    """
+
+    metric: str
+    before: float
+    after: float
+    relative: float
+    ci95: tuple[float, float]
+    runs_better: str
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A named cause. score: twice the gain in log evidence; p_value: of the greatest score of all candidates under the null."""
+
+    effect: str
+    rank: int
+    score: float
+    p_value: float
+    parameters: dict[str, Estimate]
+    confused_with: tuple[str, ...] = ()
+    separating_manoeuvre: str = ""
+    gain: Gain | None = None
+    evidence: str = ""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A candidate and why it was not named. detectable: smallest size that would have been seen, per parameter name; NaN where none would."""
+
+    effect: str
+    score: float
+    p_value: float
+    rejected_because: str
+    estimate: dict[str, float] = field(default_factory=dict)
+    detectable: dict[str, float] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    family: str = ""
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """One line of "what is wrong". depends_on: variable that the unexplained force or error follows ("" when none); when: in words."""
+
+    channel: str
+    share_of_error: float
+    depends_on: str
+    when: str
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What the plots are drawn from, per segment of a run (padded with NaN).
+
+    run (B,) index of the run, names: of the runs. start (B,) [s]. t (K + 1,) [s]. measured, before, after (B, K + 1, 6): x y psi u v r recorded,
+    rolled out open-loop by the plain model, and by the extended one (held out where `held_out`; equal to `before` when nothing was named).
+    inputs (B, K + 1, 4): n delta F_b F_s. knots (J,) [s]; force (B, J, 3), force_sd (B, J, 3): latent acceleration in surge, sway [m/s^2],
+    yaw [rad/s^2], that the plain model needs to follow the measurement; force_after: the same for the extended model. white (B, K + 1, 6): residuals of
+    the smoothed plain model over the noise.
+    """
+
+    run: np.ndarray
+    names: tuple[str, ...]
+    start: np.ndarray
+    t: np.ndarray
+    measured: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    inputs: np.ndarray
+    knots: np.ndarray
+    force: np.ndarray
+    force_sd: np.ndarray
+    force_after: np.ndarray
+    white: np.ndarray
+    held_out: bool = True
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The verdict and its evidence; `document` is what `diagnosis.json` holds."""
+
+    dataset: str
+    verdict: str
+    causes: tuple[Cause, ...]
+    candidates: tuple[Candidate, ...]
+    what_is_wrong: tuple[Wrong, ...]
+    unexplained_after: dict[str, Any]
+    extended_model: str
+    fingerprint: str
+    seconds: float
+    warnings: tuple[str, ...] = ()
+    gain: Gain | None = None
+    unknown: dict[str, Any] | None = None
+    gain_per_run: tuple[tuple[str, float, float], ...] = ()
+    trace: Trace | None = None
+
+    def document(self) -> dict[str, Any]:
+        """The contract's JSON, plus `warnings`, the gain of all causes together, and `unknown` (channel and variable) where that is the verdict."""
+        return {
+            "schema": SCHEMA, "dataset": self.dataset, "base_model": "physics", "verdict": self.verdict,
+            "causes": [_plain(asdict(c)) for c in self.causes], "candidates": [_plain(asdict(c)) for c in self.candidates],
+            "what_is_wrong": [_plain(asdict(w)) for w in self.what_is_wrong], "unexplained_after": _plain(self.unexplained_after),
+            "extended_model": self.extended_model, "fingerprint": self.fingerprint, "seconds": round(self.seconds, 2),
+            "gain": None if self.gain is None else _plain(asdict(self.gain)), "unknown": _plain(self.unknown), "warnings": list(self.warnings),
+        }  # fmt: skip
+
+
+def _plain(value: Any) -> Any:
+    """JSON has no NaN and no tuples."""
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, float | np.floating):
+        return float(f"{value:.6g}") if np.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,0 +1,210 @@
+"""The fitted model as the diagnosis sees it: batches of segments, rolled out with a latent force, for many changed directions at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ..effects.base import Effect
+from ..effects.hull_derivatives import EFFECT as HULL
+from ..integrate import kinematics, rk4_step
+from ..ops import Array
+from ..physics import eq2
+from ..physics.actuators import Gear, gear_path
+from ..physics.modifiers import Flow, Modifiers
+from ..physics.wind import apparent_wind
+from ..predictors._actuator_fit import DEFAULT_ACTUATORS
+from ..records import Dataset
+from ..ship import Particulars, complete
+from ..signals import ACTUATORS, MOTION
+
+NUM_HULL = len(HULL.parameters)
+NO_GEAR = Gear(1e-3, 1e12)
+SEGMENT = 60.0
+
+
+def ordinary_gears(L: float) -> dict[str, Gear]:
+    """Shaft [rpm], steering gear [rad] and thrusters [N] of an ordinary ship of length L, where no actuator is recorded: time constants and rates of
+    `predictors._actuator_fit.DEFAULT_ACTUATORS`, Froude-scaled."""
+    T_n, rate_n, T_delta, rate_delta, T_F, _ = (float(v) for v in DEFAULT_ACTUATORS)
+    scale = (L / 130.0) ** 0.5
+    return {"n": Gear(T_n * scale, rate_n / scale**2), "delta": Gear(T_delta * scale, rate_delta / scale), "F": Gear(T_F * scale, 1e12)}
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Pieces of runs of at most `steps` transitions, padded to equal length.
+
+    Shapes: states (B, K + 1, 10), commands (B, K + 1, 4), wind (B, K + 1, 2) or None, mask (B, K + 1) of real samples, run (B,) index of the run,
+    start (B,) time since the run began [s].
+    """
+
+    dt: float
+    commanded: bool
+    states: np.ndarray
+    commands: np.ndarray
+    wind: np.ndarray | None
+    mask: np.ndarray
+    run: np.ndarray
+    start: np.ndarray
+    runs: int
+
+    def take(self, runs: Sequence[int]) -> Segments:
+        """The segments of some runs, which are numbered anew."""
+        rows = np.concatenate([np.flatnonzero(self.run == r) for r in runs])
+        new = np.concatenate([np.full(int(np.sum(self.run == r)), i) for i, r in enumerate(runs)])
+        wind = None if self.wind is None else self.wind[rows]
+        return replace(
+            self, states=self.states[rows], commands=self.commands[rows], wind=wind, mask=self.mask[rows], run=new, start=self.start[rows],
+            runs=len(runs),
+        )  # fmt: skip
+
+
+def cut(dataset: Dataset, steps: int) -> Segments:
+    """Cut every run into equal pieces of at most `steps` transitions; neighbours share the sample between them."""
+    pieces = []
+    for index, run in enumerate(dataset.runs):
+        num = max(1, int(np.ceil((len(run) - 1) / steps)))
+        edges = np.linspace(0, len(run) - 1, num + 1).round().astype(int)
+        pieces += [(index, run, a, b) for a, b in pairwise(edges)]
+    K = max(b - a for _, _, a, b in pieces)
+    wind_columns = [dataset.inputs.index(n) for n in ("wind_speed", "wind_from")] if {"wind_speed", "wind_from"} <= set(dataset.inputs) else None
+    at = [np.minimum(np.arange(a, a + K + 1), b) for _, _, a, b in pieces]
+    states = np.stack([run.states[i] for (_, run, _, _), i in zip(pieces, at, strict=True)])
+    inputs = np.stack([run.inputs[i] for (_, run, _, _), i in zip(pieces, at, strict=True)])
+    return Segments(
+        dt=dataset.dt, commanded=dataset.actuators == "commanded", states=states, commands=inputs[..., :4],
+        wind=None if wind_columns is None else inputs[..., wind_columns], mask=np.stack([np.arange(K + 1) <= b - a for _, _, a, b in pieces]),
+        run=np.array([p[0] for p in pieces]), start=np.array([p[2] * dataset.dt for p in pieces]), runs=len(dataset),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Active:
+    """An effect in the model and its values: arrays that spread over (directions, segments)."""
+
+    effect: Effect
+    q: tuple[Array, ...]
+
+
+class Plant:
+    """Rollouts of eq. (2) over all segments.
+
+    State arrays have the shape (D, B): D changed directions of B segments. The motion is driven by the recorded actuators (interpolated), so that
+    what happens between command and actuator cannot be mistaken for a force; where only commands are recorded, by the held commands.
+    """
+
+    def __init__(self, dataset_ship: Particulars, segments: Segments) -> None:
+        self.ship, self.seg = dataset_ship, segments
+        self.c = eq2.coefficients(dataset_ship)
+        self.substeps = max(1, int(np.ceil(segments.dt / (0.15 * np.sqrt(self.c.L)) - 1e-9)))
+        self.h = segments.dt / self.substeps
+        self.steps = segments.states.shape[1] - 1
+        self.knot_time = 5.0 * (self.c.L / 130.0) ** 0.5
+        self.knots = int(np.ceil(self.steps * segments.dt / self.knot_time)) + 1
+        self.ordinary = ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR)
+        self.path = np.stack([self._stages(i, self.ordinary[k]) for i, k in enumerate(("n", "delta", "F", "F"))], axis=-1)
+
+    @classmethod
+    def of(cls, dataset: Dataset) -> Plant:
+        """The plant of a data set, cut into segments of about 60 s at 130 m (Froude-scaled): over longer ones the motion is far from linear in its
+        parameters, and little is learnt from the place where the next one begins."""
+        ship = complete(dataset.ship)
+        return cls(ship, cut(dataset, max(20, round(SEGMENT * (ship.L / 130.0) ** 0.5 / dataset.dt))))
+
+    def with_runs(self, runs: Sequence[int]) -> Plant:
+        """The plant of some of the runs."""
+        return Plant(self.ship, self.seg.take(runs))
+
+    def path_of(self, active: Sequence[Active]) -> np.ndarray:
+        """Actuators at the three stages of every integration step, (B, steps * substeps, 3, 4): n, delta, F_b, F_s.
+
+        Recorded actuators are interpolated and pass through what gear effects add; where only commands are recorded, these pass through
+        ordinary gears as well.
+        """
+        gears = dict(self.ordinary)
+        for a in active:
+            if a.effect.enters == "gear":
+                a.effect.gear(gears, a.q)
+        if gears == self.ordinary:
+            return self.path
+        path = self.path.copy()
+        for i, name in enumerate(("n", "delta", "F", "F")):
+            if gears[name] != self.ordinary[name]:
+                path[..., i] = self._stages(i, gears[name])
+        return path
+
+    def _stages(self, i: int, gear: Gear) -> np.ndarray:
+        """One actuator behind a gear, (B, steps * substeps, 3). A negative delay means that the record is late."""
+        seg, n = self.seg, 2 * self.substeps
+        fine = np.arange(self.steps * n + 1) / n
+        if seg.commanded:
+            at = np.clip(np.floor(fine - min(gear.delay, 0.0) / seg.dt + 1e-9).astype(int), 0, self.steps - 1)
+            values = seg.commands[:, at, i]
+        else:
+            at = np.clip(fine - min(gear.delay, 0.0) / seg.dt, 0, self.steps)
+            low = np.minimum(at.astype(int), self.steps - 1)
+            values = seg.states[:, low, 6 + i] * (1.0 - (at - low)) + seg.states[:, low + 1, 6 + i] * (at - low)
+        if gear != NO_GEAR and not (gear.delay < 0 and replace(gear, delay=0.0) == NO_GEAR):
+            follow = replace(gear, delay=max(gear.delay, 0.0))
+            # recorded actuators: the value at the end of the step is what the gear follows; commands are held from its beginning
+            wanted = values[:, :-1] if seg.commanded else values[:, 1:]
+            values = gear_path(seg.states[:, 0, 6 + i] if seg.commanded else values[:, 0], wanted, seg.dt / n, follow)
+        return np.stack([values[:, stage : stage + n * self.steps - 1 : 2] for stage in range(3)], axis=-1)
+
+    def roll(
+        self, x0: np.ndarray, p: Sequence[Array], active: Sequence[Active], w: np.ndarray | None = None, path: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Motion (D, B, K + 1, 6) from x0 (D, B, 6) or (B, 6), with parameters p0..p10 (each (D, 1) or a number), effects, and a latent
+        acceleration w (D, B, knots, 3) or (B, knots, 3), linear between knots."""
+        path = self.path if path is None else path
+        seg, c, sub = self.seg, self.c, self.substeps
+        x = tuple(np.moveaxis(x0, -1, 0))
+        changed = [*(np.shape(v) for v in p), *(np.shape(v) for a in active for v in a.q)]
+        shape = np.broadcast_shapes(x[0].shape, *changed, () if w is None else w.shape[:-2])
+        out = np.empty((*shape, self.steps + 1, 6))
+        out[..., 0, :] = x0
+        x = tuple(np.broadcast_to(v, shape) for v in x)
+        with np.errstate(all="ignore"):
+            for j in range(self.steps * sub):
+                k = j // sub
+
+                def rhs(state: tuple[Array, ...], stage: int, j: int = j, k: int = k) -> tuple[Array, ...]:
+                    px, py, psi, u, v, r = state
+                    n, delta, F_b, F_s = path[:, j, stage].T
+                    time = (j + 0.5 * stage) * self.h
+                    air = (u, v) if seg.wind is None else apparent_wind(psi, u, v, seg.wind[:, k, 0], seg.wind[:, k, 1])
+                    e = None
+                    if active:
+                        e = Modifiers()
+                        flow = Flow(px, py, seg.start + time, psi, u, v, r, n, delta, F_b, F_s)
+                        for a in active:
+                            a.effect.force(e, flow, a.q, self.ship)
+                    du, dv, dr = eq2.accelerations(u, v, r, n, delta, F_b, F_s, air, c, p, e)
+                    if w is not None:
+                        at = time / self.knot_time
+                        i = min(int(at), self.knots - 2)
+                        force = (1.0 - (at - i)) * w[..., i, :] + (at - i) * w[..., i + 1, :]
+                        du, dv, dr = du + force[..., 0], dv + force[..., 1], dr + force[..., 2]
+                    return (*kinematics(psi, u, v, r), du, dv, dr)
+
+                x = rk4_step(rhs, x, self.h)
+                if (j + 1) % sub == 0:
+                    for i in range(6):
+                        out[..., k + 1, i] = x[i]
+        return out
+
+    def measured(self, motion: np.ndarray, active: Sequence[Active]) -> np.ndarray:
+        """What the sensors would have recorded of `motion` (..., B, K + 1, 6)."""
+        sensors = [a for a in active if a.effect.enters == "sensor"]
+        if not sensors:
+            return motion
+        flat = np.zeros((*motion.shape[:-1], 10)).reshape(-1, motion.shape[-2], 10)
+        flat[..., MOTION] = motion.reshape(-1, *motion.shape[-2:])
+        for a in sensors:
+            q = tuple(np.broadcast_to(v, motion.shape[:-2]).reshape(-1) for v in a.q)
+            flat = a.effect.measure(flat, q, self.seg.dt)
+        return flat[..., MOTION].reshape(motion.shape)

@@ -1,0 +1,92 @@
+"""The screening: every candidate's evidence on one linearisation, without another simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .fit import Fit
+from .gram import Gram, Prior, Reduced, background, solve, update_force
+from .model import Term
+
+_TAUS = np.log(np.array([0.03, 0.1, 0.3, 1.0, 3.0]) ** 2)
+_EM_STEPS = 4
+
+
+@dataclass(frozen=True)
+class Score:
+    """A candidate beside a fitted model. score: twice the gain in log evidence (2 log Bayes factor with a prior of typical size); estimate, sd (size,) in
+    units of the typical size (for a random effect: root mean square over runs, and NaN); information (size, size): precision of the estimate that the
+    data give, nuisances integrated out; per_run (N,): gain in log likelihood by run; log_tau2: of a random effect."""
+
+    term: Term
+    score: float
+    estimate: np.ndarray
+    sd: np.ndarray
+    information: np.ndarray
+    per_run: np.ndarray
+    log_tau2: float = 0.0
+
+
+def only(gram: Gram, columns: np.ndarray) -> Gram:
+    """The Gram of some shared columns (the residual is kept)."""
+    keep = np.concatenate([np.arange(gram.latent), gram.latent + columns, [gram.G.shape[-1] - 1]])
+    return replace(gram, G=gram.G[:, keep][:, :, keep])
+
+
+def with_columns(prior: Prior, at: np.ndarray, term: Term, log_tau2: float, width: float = 1.0) -> Prior:
+    """The prior of a model that holds the columns `at` as well."""
+    if term.per_run:
+        return replace(prior, random=np.append(prior.random, at), log_tau2=np.append(prior.log_tau2, np.full(len(at), log_tau2)))
+    return replace(prior, shared=np.append(prior.shared, at), precision=np.append(prior.precision, np.full(len(at), width**-2)))
+
+
+def evidence(gram: Gram, prior: Prior, log_force: np.ndarray, steps: int = _EM_STEPS) -> tuple[float, np.ndarray]:
+    """Log evidence with the variances of the force re-estimated, and these variances."""
+    for step in range(steps + 1):
+        reduced = gram.reduce(log_force)
+        solution = solve(reduced, prior)
+        if step == steps:
+            break
+        log_force = update_force(gram, *background(gram, reduced, prior, solution))
+    return solution.log_evidence, log_force
+
+
+def screen(fit: Fit, refine: int = 12) -> list[Score]:
+    """Scores of the candidates that `fit` was given, best first; the variances of the force are re-estimated for the best `refine`."""
+    candidates = fit.candidates
+    gram, at = fit.gram, fit.reduced.S.shape[1] - 1 - sum(t.size for t in candidates)
+    columns = []
+    for term in candidates:
+        columns.append(np.arange(at, at + term.size))
+        at += term.size
+    null = solve(fit.reduced, fit.prior)
+    scores = [_score(fit, term, cols, null.log_evidence, null.per_run, fit.reduced) for term, cols in zip(candidates, columns, strict=True)]
+    order = sorted(range(len(scores)), key=lambda i: -scores[i].score)
+    base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
+    renumbered = replace(fit.prior, shared=np.arange(len(fit.prior.shared)), random=np.arange(len(fit.prior.shared), len(base)))
+    lean = only(gram, base)
+    before, log_force = evidence(lean, renumbered, fit.hyper.log_force, 2 * _EM_STEPS)
+    for i in order[:refine]:
+        term = candidates[i]
+        prior = with_columns(renumbered, len(base) + np.arange(term.size), term, scores[i].log_tau2)
+        after, _ = evidence(only(gram, np.append(base, columns[i])), prior, log_force)
+        scores[i] = replace(scores[i], score=2.0 * (after - before))
+    return sorted(scores, key=lambda s: -s.score)
+
+
+def _score(fit: Fit, term: Term, at: np.ndarray, null: float, null_runs: np.ndarray, reduced: Reduced) -> Score:
+    """The score under the variances of the null."""
+    if term.per_run:
+        tries = [(solve(reduced, with_columns(fit.prior, at, term, tau)), tau) for tau in _TAUS]
+        best, tau = max(tries, key=lambda pair: pair[0].log_evidence)
+        values = best.means[:, -term.size :]
+        rms = np.sqrt(np.mean(values**2, axis=0))
+        penalty = np.log(fit.plant.seg.runs)
+        score = 2.0 * (best.log_evidence - null) - penalty
+        return Score(term, score, rms, np.full(term.size, np.nan), np.zeros((term.size, term.size)), best.per_run - null_runs, tau)
+    found = solve(reduced, with_columns(fit.prior, at, term, 0.0))
+    cov = found.cov[-term.size :, -term.size :]
+    information = np.linalg.inv(cov) - np.eye(term.size)
+    return Score(term, 2.0 * (found.log_evidence - null), found.mean[-term.size :], np.sqrt(np.diag(cov)), information, found.per_run - null_runs)

@@ -1,0 +1,144 @@
+"""Which causes: forward selection with nonlinear refits of the best candidates, and a backward pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..effects.base import EFFECTS
+from .fit import Fit, Model, fit, start, track
+from .gram import solve
+from .model import Scales, Term
+from .plant import Plant
+from .screen import Score, screen
+
+NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error")
+"""Found by their own tests: prior width of the hull, gated columns, kinematics."""
+AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft_rate_limit", "shaft_lag", "thruster_lag", "rudder_lag")
+"""Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
+MOST_EFFECTS = 4
+_REFITS = 3
+_REFIT_ITERATIONS = 5
+_WORTH_A_REFIT = 0.3
+
+
+@dataclass(frozen=True)
+class Step:
+    """A candidate that was refitted in a round, and its score at its own optimum (2 log evidence over the model before)."""
+
+    round: int
+    term: Term
+    score: float
+
+
+@dataclass(frozen=True)
+class Selection:
+    """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final model."""
+
+    null: Fit
+    final: Fit
+    first: list[Score]
+    last: list[Score]
+    steps: list[Step]
+
+
+def candidates_for(plant: Plant, names: Sequence[str] | None = None) -> list[Term]:
+    """Every effect that could act on these data, once per shape setting."""
+    found = []
+    for name in names if names is not None else EFFECTS.names():
+        if name in NOT_SCREENED or (not plant.seg.commanded and name in AS_RECORDED):
+            continue
+        if plant.seg.wind is not None and name in ("wind", "wind_per_run"):
+            continue
+        effect = EFFECTS.get(name)
+        if effect.family == "thruster" and not np.any(plant.seg.states[..., 8:]):
+            continue
+        found += [Term(effect, setting, effect.per_run) for setting in effect.settings(plant.seg.states[..., :2], plant.ship)]
+    return found
+
+
+def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
+    """The plain model, fitted from the regressions."""
+    point, hyper = track(plant, scales, *start(plant))
+    return fit(plant, scales, Model(), point, hyper, candidates=candidates)
+
+
+def with_term(before: Fit, score: Score, candidates: Sequence[Term] = ()) -> Fit:
+    """`before` with one more term, refitted from its one-step estimate."""
+    term = score.term
+    index = len(before.model.terms)
+    model = replace(before.model, terms=(*before.model.terms, term))
+    value = np.zeros((before.plant.seg.runs, term.size)) if term.per_run else np.clip(score.estimate, -2.0, 2.0)
+    point = before.point.with_term(term, value)
+    log_tau2 = before.log_tau2 | ({index: score.log_tau2} if term.per_run else {})
+    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=_REFIT_ITERATIONS, candidates=candidates)
+
+
+def without(before: Fit, index: int) -> Fit:
+    """`before` without one of its terms, refitted."""
+    terms = tuple(t for i, t in enumerate(before.model.terms) if i != index)
+    values = tuple(v for i, v in enumerate(before.point.values) if i != index)
+    log_tau2 = {i - (i > index): v for i, v in before.log_tau2.items() if i != index}
+    model, point = replace(before.model, terms=terms), replace(before.point, terms=terms, values=values)
+    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=_REFIT_ITERATIONS)
+
+
+def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selection:
+    """Add the best candidate while it gains more than `threshold`; drop what a later one has made needless.
+
+    `null` must carry the candidates. Candidates are refitted if their linear score is among the best, or the best of their family.
+    """
+    candidates, first = null.candidates, screen(null)
+    now, scores, steps = null, first, []
+    for round_ in range(most):
+        tried = []
+        for score in _worth_a_refit(scores, now, threshold):
+            found = with_term(now, score)
+            gain = 2.0 * (found.evidence - now.evidence)
+            steps.append(Step(round_, score.term, gain))
+            tried.append((gain, found))
+        if not tried:
+            break
+        gain, best = max(tried, key=lambda pair: pair[0])
+        if gain < threshold:
+            break
+        now = _backward(best, threshold)
+        now = fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, iterations=2, candidates=candidates)
+        scores = screen(now)
+    return Selection(null, now, first, scores, steps)
+
+
+def _worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[Score]:
+    present = {t.label for t in now.model.terms}
+    free = [s for s in scores if s.term.label not in present and s.score > _WORTH_A_REFIT * threshold]
+    chosen, seen, families = [], set(), set()
+    for s in free:
+        new = s.term.label not in seen
+        if new and (len(chosen) < _REFITS or (s.term.effect.family not in families and s.score > threshold)):
+            chosen.append(s)
+        seen.add(s.term.label)
+        families.add(s.term.effect.family)
+    return chosen
+
+
+def _backward(found: Fit, threshold: float) -> Fit:
+    """Drop earlier terms that are no longer worth the threshold, judged on the linearisation, then by a refit."""
+    index = 0
+    while index < len(found.model.terms) - 1:
+        if 2.0 * (found.evidence - _evidence_without(found, index)) < threshold:
+            less = without(found, index)
+            if 2.0 * (found.evidence - less.evidence) < threshold:
+                found = less
+                continue
+        index += 1
+    return found
+
+
+def _evidence_without(found: Fit, index: int) -> float:
+    columns = found.columns_of(index)
+    prior = found.prior
+    keep, keep_random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
+    less = replace(prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random])
+    return solve(found.reduced, less).log_evidence
