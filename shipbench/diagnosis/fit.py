@@ -7,11 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import WorkError
 from .gram import Gram, Hyper, Prior, Products, Reduced, Solution, background, solve, update_force, update_noise
-from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, Term, predict
+from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, Term
 from .plant import NUM_HULL, Plant
 
 _EM_STEPS = 4
+_EM_RANDOM = 5
+_MAY_RISE, _WORTH_A_STEP = 1.1, 1.0
 _LOG_FLOOR = np.log(0.1**2)
 """A channel is never taken for better than a tenth of an ordinary sensor, else the latent force follows its noise."""
 
@@ -126,11 +129,12 @@ def within_bounds(plant: Plant, scales: Scales, point: Point) -> Point:
     return replace(point, values=tuple(values))
 
 
-def objective(plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float], gram: Gram) -> float:
+def objective(lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], gram: Gram) -> float:
     """Twice the negative log posterior of a point, without constants."""
-    error = (plant.seg.states[..., :6] - predict(plant, scales, point)) / scales.noise
-    error = np.where(plant.seg.mask[..., None], error, 0.0)
-    cost = float(np.sum(error**2 * np.exp(-hyper.log_noise))) + float(np.sum(base_precision(model) * point.base**2))
+    plant, point = lin.plant, lin.point
+    error = np.where(plant.seg.mask[..., None], (plant.seg.states[..., :6] - lin.predicted) / lin.scales.noise, 0.0)
+    with np.errstate(over="ignore"):
+        cost = float(np.sum(error**2 * np.exp(-hyper.log_noise))) + float(np.sum(base_precision(model) * point.base**2))
     w = np.moveaxis(point.w, -1, 1)
     cost += float(np.sum(np.einsum("bji,ik,bjk->j", w, gram.K_inv, w) * np.exp(-hyper.log_force)))
     for i, (term, value) in enumerate(zip(point.terms, point.values, strict=True)):
@@ -146,46 +150,51 @@ def start(plant: Plant) -> tuple[Point, Hyper]:
 
 
 def fit(
-    plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 8,
-    tolerance: float = 0.5, candidates: Sequence[Term] = (),
+    plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 20,
+    candidates: Sequence[Term] = (),
 ) -> Fit:  # fmt: skip
-    """Gauss-Newton from `point` (which may lack the last terms of `model`: they start at zero), with EM for the variances.
+    """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), to the best evidence found.
 
-    It ends when twice the negative log posterior changes by less than `tolerance`; `candidates` get columns at the last point.
+    A step is halved only where the cost explodes: the cost of a step that is right for the parameters rises at first, until the latent force has
+    followed, and the path would else end where parameters compensate each other. `candidates` get columns at the last point.
     """
     log_tau2 = dict(log_tau2 or {})
     if len(point.terms) < len(model.terms):
         new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
         point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
+    lin, best, idle = Linearisation(plant, scales, point), None, 0
     for _ in range(iterations):
-        found = settle(plant, scales, model, point, hyper, log_tau2, Linearisation(plant, scales, point).columns())
+        found = settle(lin, model, hyper, log_tau2)
+        if best is None or found.evidence > best[0].evidence + _WORTH_A_STEP:
+            best, idle = (found, lin), 0
+        else:
+            idle += 1
+            if idle == 2:
+                break
         hyper, log_tau2 = found.hyper, found.log_tau2
-        target = within_bounds(plant, scales, point_from(model, point, found.solution, found.prior, found.estimate))
-        at = objective(plant, scales, model, point, hyper, log_tau2, found.gram)
-        share, trial = 1.0, target
-        while (cost := objective(plant, scales, model, trial, hyper, log_tau2, found.gram)) > at and share > 0.1:
+        target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
+        at, share, trial = objective(lin, model, hyper, log_tau2, found.gram), 1.0, Linearisation(plant, scales, target)
+        while objective(trial, model, hyper, log_tau2, found.gram) > _MAY_RISE * at and share > 0.1:
             share *= 0.5
-            trial = between(point, target, share)
-        if cost > at:
-            break
-        point = trial
-        if at - cost < tolerance:
-            break
-    return settle(plant, scales, model, point, hyper, log_tau2, Linearisation(plant, scales, point).columns(candidates), candidates)
+            trial = Linearisation(plant, scales, between(lin.point, target, share))
+        lin = trial
+    if best is None:
+        raise WorkError("the diagnosis made no step of its fit; give at least one iteration.")
+    if not candidates:
+        return best[0]
+    return settle(best[1], model, best[0].hyper, best[0].log_tau2, candidates)
 
 
 def track(plant: Plant, scales: Scales, point: Point, hyper: Hyper) -> tuple[Point, Hyper]:
     """Put the trajectories on the measured ones by the latent force alone: Gauss-Newton is then nearly linear in everything else."""
     still = Model(hull=1e-4, base=1e-4)
-    found = settle(plant, scales, still, point, hyper, {}, Linearisation(plant, scales, point).columns())
+    found = settle(Linearisation(plant, scales, point), still, hyper, {})
     return point_from(still, point, found.solution, found.prior, found.estimate), found.hyper
 
 
-def settle(
-    plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float], columns: Columns,
-    candidates: Sequence[Term] = (), steps: int = _EM_STEPS,
-) -> Fit:  # fmt: skip
+def settle(lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (), steps: int = _EM_STEPS) -> Fit:
     """Variances and posterior on one linearisation."""
+    plant, scales, point, columns = lin.plant, lin.scales, lin.point, lin.columns(candidates)
     products = products_of(plant, scales, point, columns)
     log_tau2 = dict(log_tau2)
     for step in range(steps + 1):
@@ -197,7 +206,9 @@ def settle(
         if step == steps:
             break
         hyper = Hyper(update_force(gram, estimate, cov), update_noise(products, gram, reduced, prior, solution, estimate, _LOG_FLOOR), hyper.tau)
-        update_random(model, solution, log_tau2)
+        for _ in range(_EM_RANDOM if any(t.per_run for t in model.terms) else 0):  # slow where the effect is clear, and cheap
+            update_random(model, solution, log_tau2)
+            solution = solve(reduced, model.prior(log_tau2))
     return Fit(
         plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), products, gram, reduced, solution, estimate, cov
     )

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..effects.base import Effect, Parameter
+from ..effects.cross_flow_drag import EFFECT as CROSS_FLOW
+from ..effects.propeller_walk_astern import EFFECT as ASTERN
 from ..effects.race_gain import EFFECT as RACE
 from ..effects.thruster_gain import EFFECT as THRUSTERS
 from ..effects.thruster_speed_loss import EFFECT as LOSS
@@ -31,7 +33,8 @@ class Structure(Effect):
     """What differs between one ordinary ship and another beyond hull and rudder lift: race at the rudder, wake in turns, thrusters at speed.
 
     Without it every ship's own race or thruster tunnel would be reported as missing physics. Centres and spreads: kappa 0.3 to 0.8 (physics
-    reference, R16), C_2 - 1 of the wake 0.1 to 0.6 (Yasukawa & Yoshimura 2015), loss of the thrusters' moment up to 50 % (T41),
+    reference, R16), C_2 - 1 of the wake 0 to 0.6 (Yasukawa & Yoshimura 2015), loss of the thrusters' moment up to 50 % (T41),
+    cross-flow drag of a hull whose regressions lack it (H52), side force of a propeller going astern (P37),
     gamma_R 0.4 to 0.64, by side (Yasukawa & Yoshimura 2015, table 3).
     """
 
@@ -40,18 +43,20 @@ class Structure(Effect):
     source = "see above"
     parameters = (
         Parameter("race", "1", 0.2, -0.9, 1.0),
-        Parameter("wake_variation", "1", 0.25, -1.0, 2.0),
+        Parameter("wake_variation", "1", 0.3, -1.0, 2.0),
         Parameter("thruster_loss", "1", 0.25, -0.5, 1.2),
         Parameter("thruster_gain", "1", 0.1, -0.5, 0.5),
+        Parameter("cross_flow", "1", 0.3, -1.0, 1.0),
+        Parameter("walk_astern", "1", 0.4, -2.0, 2.0),
         Parameter("straightening", "1", 0.3, -0.9, 1.0),
         Parameter("straightening_asymmetry", "1", 0.25, -0.9, 0.9),
     )
-    parts = ((RACE, -0.45), (WAKE, 0.35), (LOSS, 0.25), (THRUSTERS, 0.0))
+    parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        for (effect, centre), value in zip(self.parts, q[:4], strict=True):
+        for (effect, centre), value in zip(self.parts, q[:6], strict=True):
             effect.force(e, s, (centre + value,), ship)
-        e.straightening, e.straightening_asymmetry = 1.0 + q[4], q[5]
+        e.straightening, e.straightening_asymmetry = 1.0 + q[6], q[7]
 
 
 STRUCTURE = Structure()
@@ -121,13 +126,9 @@ def parameters(scales: Scales, base: np.ndarray) -> tuple[list[np.ndarray | floa
     return p, [Active(HULL, hull), Active(STRUCTURE, structure)]
 
 
-def predict(plant: Plant, scales: Scales, point: Point, extra: Sequence[Active] = ()) -> np.ndarray:
+def predict(plant: Plant, scales: Scales, point: Point) -> np.ndarray:
     """What the sensors would have recorded at `point`, (B, K + 1, 6)."""
-    p, hull = parameters(scales, point.base)
-    active = [*hull, *actives(plant, scales, point), *extra]
-    x0 = plant.seg.states[:, 0, :6] + scales.eta * point.eta
-    forces = [a for a in active if a.effect.enters == "force"]
-    return plant.measured(plant.roll(x0, p, forces, scales.w * point.w, plant.path_of(active)), active)
+    return Linearisation(plant, scales, point).predicted
 
 
 def actives(plant: Plant, scales: Scales, point: Point) -> list[Active]:
@@ -153,84 +154,116 @@ class Columns:
     candidates: tuple[np.ndarray, ...]
 
 
-_STEP, _OWN_STEP, CANDIDATE_STEP = 1e-3, 0.02, 0.25
+_STEP, _OWN_STEP, CANDIDATE_STEP = 1e-4, 0.02, 0.5
 """Steps in units of the scales. A candidate's is finite: some (wind, deadband) act with the square of their size or not at all below one."""
 
 
 class Linearisation:
-    """Forward differences about a point; all force-side directions of one kind share one rollout."""
+    """A trajectory and its sensitivities: forward differences of all single steps at once, chained by the steps' Jacobians."""
 
     def __init__(self, plant: Plant, scales: Scales, point: Point) -> None:
         self.plant, self.scales, self.point = plant, scales, point
         self.now = actives(plant, scales, point)
-        self.p, self.hull = parameters(scales, point.base)
+        self.p, self.ship = parameters(scales, point.base)
         self.forces = [a for a in self.now if a.effect.enters == "force"]
         self.path = plant.path_of(self.now)
-        self.x0, self.w = plant.seg.states[:, 0, :6] + scales.eta * point.eta, scales.w * point.w
-        self.motion = plant.roll(self.x0, self.p, [*self.hull, *self.forces], self.w, self.path)
+        w = plant.hat @ (scales.w * point.w)
+        self.motion = plant.roll(plant.seg.states[:, 0, :6] + scales.eta * point.eta, self.p, [*self.ship, *self.forces], w, self.path)
         self.predicted = plant.measured(self.motion, self.now)
-
-    def _columns(self, moved: np.ndarray, step: float) -> np.ndarray:
-        """Measured (D, B, K + 1, 6) -> (B, T, D)."""
-        return np.moveaxis(((moved - self.predicted) / step).reshape(len(moved), len(self.x0), -1), 0, -1)
-
-    def _moved(self, x0: np.ndarray, p: Sequence, hull: Sequence[Active], w: np.ndarray) -> np.ndarray:
-        return self.plant.measured(self.plant.roll(x0, p, [*hull, *self.forces], w, self.path), self.now)
+        w = np.swapaxes(w, 0, 1)
+        self.push = (w[:-1], w[1:])
+        self.states = np.swapaxes(self.motion[:, :-1], 0, 1)[None]
 
     def columns(self, candidates: Sequence[Term] = ()) -> Columns:
         """All sensitivities."""
-        knots, scales = self.plant.knots, self.scales
-        eta = self._moved(self.x0 + _STEP * np.eye(6)[:, None, :] * scales.eta, self.p, self.hull, self.w)
-        pulses = np.zeros((3 * knots, 1, knots, 3))
-        for j in range(3):
-            pulses[j * knots + np.arange(knots), 0, np.arange(knots), j] = _STEP * scales.w[j]
-        latent = self._moved(self.x0, self.p, self.hull, self.w + pulses)
-        p, hull = parameters(scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, :])
-        base = self._moved(self.x0, p, hull, self.w)
+        scales = self.scales
+        self.here = self._steps()[0]
+        moved = self._steps(states=self.states + _STEP * np.eye(6)[:, None, None, :] * scales.eta) - self.here
+        self.jacobian = np.moveaxis(moved, 0, -1) / (_STEP * scales.eta)  # (K, B, 6, 6)
+        p, ship = parameters(scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, None, :])
+        base = (self._steps(p=p, ship=ship) - self.here) / _STEP
+        first = np.broadcast_to(np.eye(6)[:, None, :] * scales.eta, (6, self.here.shape[1], 6))
+        eta = self._chained(np.zeros((6, *self.here.shape)), first)
         own = [self._of_term(i, term) for i, term in enumerate(self.point.terms)]
-        return Columns(self.predicted, self._columns(eta, _STEP), self._columns(latent, _STEP), self._columns(base, _STEP), tuple(own),
-                       tuple(self.of_candidates(candidates)))  # fmt: skip
+        return Columns(self.predicted, eta, self._chained(self._pulses()), self._chained(base), tuple(own), tuple(self._of_candidates(candidates)))
+
+    def _steps(
+        self,
+        states: np.ndarray | None = None,
+        p: Sequence[Array] | None = None,
+        ship: Sequence[Active] | None = None,
+        forces: Sequence[Active] | None = None,
+        push: tuple[np.ndarray, np.ndarray] | None = None,
+        path: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Ends of all single steps (D, K, B, 6) with something changed."""
+        active = [*(self.ship if ship is None else ship), *(self.forces if forces is None else forces)]
+        return self.plant.steps_from(
+            self.states if states is None else states, self.p if p is None else p, active, push or self.push, self.path if path is None else path
+        )
+
+    def _pulses(self) -> np.ndarray:
+        """Change of each step's end by each knot of the latent acceleration, (3 knots, K, B, 6)."""
+        hat, knots = self.plant.hat, self.plant.knots
+        unit = _STEP * (np.eye(3) * self.scales.w)[:, None, None, :]
+        start = (self._steps(push=(self.push[0] + unit, self.push[1])) - self.here) / _STEP
+        end = (self._steps(push=(self.push[0], self.push[1] + unit)) - self.here) / _STEP
+        sources = start[:, None] * hat[:-1].T[None, :, :, None, None] + end[:, None] * hat[1:].T[None, :, :, None, None]
+        return sources.reshape(3 * knots, *self.here.shape)
+
+    def _chained(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
+        """Columns (B, T, D) of the measurement from changes of the steps' ends (D, K, B, 6) and of the initial states (D, B, 6)."""
+        D, K, B, _ = sources.shape
+        S = np.zeros((K + 1, B, 6, D))
+        if first is not None:
+            S[0] = np.moveaxis(first, 0, -1)
+        flow = np.moveaxis(sources, 0, -1)
+        with np.errstate(all="ignore"):
+            for k in range(K):
+                S[k + 1] = self.jacobian[k] @ S[k] + flow[k]
+        S = np.swapaxes(S, 0, 1)
+        if any(a.effect.enters == "sensor" for a in self.now):
+            moved = self.plant.measured(self.motion + _STEP * np.moveaxis(S, -1, 0), self.now)
+            S = np.moveaxis((moved - self.predicted) / _STEP, 0, -1)
+        return S.reshape(B, 6 * (K + 1), D)
 
     def _of_term(self, index: int, term: Term) -> np.ndarray:
         """Columns of a term that is in the model."""
-        unit = self.scales.amplitudes(term, self.plant.c.L)
-        steps = _OWN_STEP * unit
-        found = []
-        for a in range(term.size):
-            q = list(self.now[index].q)
-            q[a] = q[a] + steps[a]
-            found.append(self._measured_with([*self.now[:index], Active(term.effect, tuple(q)), *self.now[index + 1 :]], term.effect.enters))
-        return self._columns(np.stack(found), _OWN_STEP)
+        steps = _OWN_STEP * self.scales.amplitudes(term, self.plant.c.L)
+        return self._moved(index, term, steps, _OWN_STEP)
 
-    def of_candidates(self, candidates: Sequence[Term]) -> list[np.ndarray]:
-        """Columns (B, T, size) of terms that are not in the model."""
+    def _of_candidates(self, candidates: Sequence[Term]) -> list[np.ndarray]:
+        """Columns (B, T, size) of terms that are not in the model; those that act as forces share one batch."""
         found: dict[int, np.ndarray] = {}
-        batch: list[tuple[int, int, float]] = []
+        sources = []
         for i, term in enumerate(candidates):
             unit = CANDIDATE_STEP * self.scales.amplitudes(term, self.plant.c.L)
-            if term.effect.enters == "force":
-                batch += [(i, a, unit[a]) for a in range(term.size)]
+            if term.effect.enters != "force":
+                found[i] = self._moved(None, term, unit, CANDIDATE_STEP)
                 continue
-            moved = []
-            for a in range(term.size):
-                q = (*(unit[a] if k == a else 0.0 for k in range(term.size)), *term.setting)
-                moved.append(self._measured_with([*self.now, Active(term.effect, q)], term.effect.enters))
-            found[i] = self._columns(np.stack(moved), CANDIDATE_STEP)
-        if batch:
-            acts = [*self.hull, *self.forces]
-            for i in sorted({i for i, _, _ in batch}):
-                term = candidates[i]
-                q = [np.array([[unit if (j, k) == (i, a) else 0.0] for j, k, unit in batch]) for a in range(term.size)]
-                acts.append(Active(term.effect, (*q, *term.setting)))
-            columns = self._columns(self.plant.measured(self.plant.roll(self.x0, self.p, acts, self.w, self.path), self.now), CANDIDATE_STEP)
-            for i in {i for i, _, _ in batch}:
-                found[i] = columns[..., [k for k, item in enumerate(batch) if item[0] == i]]
+            q = [np.where(np.arange(term.size) == a, unit[a], 0.0)[:, None, None] for a in range(term.size)]
+            sources.append((self._steps(forces=[*self.forces, Active(term.effect, (*q, *term.setting))]) - self.here) / CANDIDATE_STEP)
+        if sources:
+            columns = self._chained(np.concatenate(sources))
+            at = 0
+            for i, term in enumerate(candidates):
+                if i not in found:
+                    found[i] = columns[..., at : at + term.size]
+                    at += term.size
         return [found[i] for i in range(len(candidates))]
 
-    def _measured_with(self, active: Sequence[Active], enters: str) -> np.ndarray:
-        """The measurement under other effects; the motion is rolled out again only where they touch it."""
-        if enters == "sensor":
-            return self.plant.measured(self.motion, active)
-        forces = [a for a in active if a.effect.enters == "force"]
-        path = self.plant.path_of(active)
-        return self.plant.measured(self.plant.roll(self.x0, self.p, [*self.hull, *forces], self.w, path), active)
+    def _moved(self, index: int | None, term: Term, steps: np.ndarray, unit: float) -> np.ndarray:
+        """Columns (B, T, size) of one term: the index-th of the model, or one that is not in it."""
+        columns = []
+        for a in range(term.size):
+            old = (*(0.0 for _ in range(term.size)), *term.setting) if index is None else self.now[index].q
+            active = Active(term.effect, tuple(v + steps[a] if i == a else v for i, v in enumerate(old)))
+            changed = [*self.now, active] if index is None else [*self.now[:index], active, *self.now[index + 1 :]]
+            if term.effect.enters == "sensor":
+                moved = self.plant.measured(self.motion, changed) - self.predicted
+                columns.append((moved / unit).reshape(len(moved), -1, 1))
+                continue
+            forces = [x for x in changed if x.effect.enters == "force"]
+            ends = self._steps(forces=forces, path=self.plant.path_of(changed))
+            columns.append(self._chained((ends - self.here) / unit))
+        return np.concatenate(columns, axis=-1)

@@ -93,7 +93,7 @@ class Active:
 class Plant:
     """Rollouts of eq. (2) over all segments.
 
-    State arrays have the shape (D, B): D changed directions of B segments. The motion is driven by the recorded actuators (interpolated), so that
+    The motion is driven by the recorded actuators (interpolated), so that
     what happens between command and actuator cannot be mistaken for a force; where only commands are recorded, by the held commands.
     """
 
@@ -105,6 +105,9 @@ class Plant:
         self.steps = segments.states.shape[1] - 1
         self.knot_time = 5.0 * (self.c.L / 130.0) ** 0.5
         self.knots = int(np.ceil(self.steps * segments.dt / self.knot_time)) + 1
+        at = np.minimum(np.arange(self.steps + 1) * segments.dt / self.knot_time, self.knots - 1 - 1e-9)
+        self.hat = np.maximum(1.0 - np.abs(at[:, None] - np.arange(self.knots)), 0.0)
+        """(K + 1, knots): the latent acceleration at the samples from its knots, linear between them."""
         self.ordinary = ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR)
         self.path = np.stack([self._stages(i, self.ordinary[k]) for i, k in enumerate(("n", "delta", "F", "F"))], axis=-1)
 
@@ -155,47 +158,56 @@ class Plant:
             values = gear_path(seg.states[:, 0, 6 + i] if seg.commanded else values[:, 0], wanted, seg.dt / n, follow)
         return np.stack([values[:, stage : stage + n * self.steps - 1 : 2] for stage in range(3)], axis=-1)
 
-    def roll(
-        self, x0: np.ndarray, p: Sequence[Array], active: Sequence[Active], w: np.ndarray | None = None, path: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Motion (D, B, K + 1, 6) from x0 (D, B, 6) or (B, 6), with parameters p0..p10 (each (D, 1) or a number), effects, and a latent
-        acceleration w (D, B, knots, 3) or (B, knots, 3), linear between knots."""
+    def roll(self, x0: np.ndarray, p: Sequence[Array], active: Sequence[Active], w: np.ndarray, path: np.ndarray | None = None) -> np.ndarray:
+        """Motion (B, K + 1, 6) from x0 (B, 6), with parameters p0..p10, effects, and a latent acceleration w (B, K + 1, 3) at the samples."""
         path = self.path if path is None else path
-        seg, c, sub = self.seg, self.c, self.substeps
-        x = tuple(np.moveaxis(x0, -1, 0))
-        changed = [*(np.shape(v) for v in p), *(np.shape(v) for a in active for v in a.q)]
-        shape = np.broadcast_shapes(x[0].shape, *changed, () if w is None else w.shape[:-2])
-        out = np.empty((*shape, self.steps + 1, 6))
-        out[..., 0, :] = x0
-        x = tuple(np.broadcast_to(v, shape) for v in x)
+        x, n = tuple(x0.T), self.substeps
+        out = np.empty((len(x0), self.steps + 1, 6))
+        out[:, 0] = x0
         with np.errstate(all="ignore"):
-            for j in range(self.steps * sub):
-                k = j // sub
-
-                def rhs(state: tuple[Array, ...], stage: int, j: int = j, k: int = k) -> tuple[Array, ...]:
-                    px, py, psi, u, v, r = state
-                    n, delta, F_b, F_s = path[:, j, stage].T
-                    time = (j + 0.5 * stage) * self.h
-                    air = (u, v) if seg.wind is None else apparent_wind(psi, u, v, seg.wind[:, k, 0], seg.wind[:, k, 1])
-                    e = None
-                    if active:
-                        e = Modifiers()
-                        flow = Flow(px, py, seg.start + time, psi, u, v, r, n, delta, F_b, F_s)
-                        for a in active:
-                            a.effect.force(e, flow, a.q, self.ship)
-                    du, dv, dr = eq2.accelerations(u, v, r, n, delta, F_b, F_s, air, c, p, e)
-                    if w is not None:
-                        at = time / self.knot_time
-                        i = min(int(at), self.knots - 2)
-                        force = (1.0 - (at - i)) * w[..., i, :] + (at - i) * w[..., i + 1, :]
-                        du, dv, dr = du + force[..., 0], dv + force[..., 1], dr + force[..., 2]
-                    return (*kinematics(psi, u, v, r), du, dv, dr)
-
-                x = rk4_step(rhs, x, self.h)
-                if (j + 1) % sub == 0:
-                    for i in range(6):
-                        out[..., k + 1, i] = x[i]
+            for k in range(self.steps):
+                x = self._step(x, p, active, (w[:, k], w[:, k + 1]), path[:, k * n : (k + 1) * n], np.array(k))
+                out[:, k + 1] = np.stack(x, axis=-1)
         return out
+
+    def steps_from(
+        self, states: np.ndarray, p: Sequence[Array], active: Sequence[Active], push: tuple[np.ndarray, np.ndarray], path: np.ndarray | None = None
+    ) -> np.ndarray:
+        """One sample ahead of every state at once: (D, K, B, 6) from states (D or 1, K, B, 6) and accelerations at both ends of the step (.., K, B, 3).
+
+        Along a known trajectory this replaces the loop over time: the sensitivities of the single steps are chained afterwards.
+        """
+        path = self.path if path is None else path
+        stages = np.moveaxis(path.reshape(len(path), self.steps, self.substeps, 3, 4), 1, 0)
+        with np.errstate(all="ignore"):
+            moved = self._step(tuple(np.moveaxis(states, -1, 0)), p, active, push, stages, np.arange(self.steps)[:, None])
+        return np.stack(np.broadcast_arrays(*moved), axis=-1)
+
+    def _step(
+        self, x: tuple[Array, ...], p: Sequence[Array], active: Sequence[Active], push: tuple[np.ndarray, np.ndarray], path: np.ndarray, k: np.ndarray
+    ) -> tuple[Array, ...]:
+        """One sample from x, the k-th of each segment; path (.., substeps, 3, 4). Shapes broadcast over (D, K, B)."""
+        seg, n = self.seg, self.substeps
+        wind = None if seg.wind is None else (seg.wind[:, int(k)] if k.ndim == 0 else np.swapaxes(seg.wind[:, :-1], 0, 1))
+        for sub in range(n):
+
+            def rhs(state: tuple[Array, ...], stage: int, sub: int = sub) -> tuple[Array, ...]:
+                px, py, psi, u, v, r = state
+                act = np.moveaxis(path[..., sub, stage, :], -1, 0)
+                part = (sub + 0.5 * stage) / n
+                air = (u, v) if wind is None else apparent_wind(psi, u, v, wind[..., 0], wind[..., 1])
+                e = None
+                if active:
+                    e = Modifiers()
+                    flow = Flow(px, py, seg.start + (k + part) * seg.dt, psi, u, v, r, act[0], act[1], act[2], act[3])
+                    for a in active:
+                        a.effect.force(e, flow, a.q, self.ship)
+                du, dv, dr = eq2.accelerations(u, v, r, act[0], act[1], act[2], act[3], air, self.c, p, e)
+                force = (1.0 - part) * push[0] + part * push[1]
+                return (*kinematics(psi, u, v, r), du + force[..., 0], dv + force[..., 1], dr + force[..., 2])
+
+            x = rk4_step(rhs, x, self.h)
+        return x
 
     def measured(self, motion: np.ndarray, active: Sequence[Active]) -> np.ndarray:
         """What the sensors would have recorded of `motion` (..., B, K + 1, 6)."""

@@ -90,3 +90,29 @@ def _score(fit: Fit, term: Term, at: np.ndarray, null: float, null_runs: np.ndar
     cov = found.cov[-term.size :, -term.size :]
     information = np.linalg.inv(cov) - np.eye(term.size)
     return Score(term, 2.0 * (found.log_evidence - null), found.mean[-term.size :], np.sqrt(np.diag(cov)), information, found.per_run - null_runs)
+
+
+def overlap(fit: Fit, term: Term, value: np.ndarray) -> dict[str, float]:
+    """How much of the evidence for a candidate of size `value` each other candidate could take over: 1 - gap/total, the best of its settings.
+
+    gap is the expected log likelihood ratio left between the two (diagnosis methods, A6); base parameters are projected out of both.
+    """
+    columns, at = {}, fit.reduced.S.shape[1] - 1 - sum(t.size for t in fit.candidates)
+    for candidate in fit.candidates:
+        columns[candidate] = np.arange(at, at + candidate.size)
+        at += candidate.size
+    S = fit.reduced.S.sum(axis=0)
+    base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
+    P = np.concatenate([fit.prior.precision, np.exp(-fit.prior.log_tau2)])
+    rest = np.arange(len(S) - 1)
+    V = S[rest][:, rest] - S[rest][:, base] @ np.linalg.solve(S[np.ix_(base, base)] + np.diag(P), S[base][:, rest])
+    own = columns[term]
+    total = float(value @ V[np.ix_(own, own)] @ value)
+    shares: dict[str, float] = {}
+    for candidate, cols in columns.items():
+        if candidate.label == term.label or total <= 0.0:
+            continue
+        cross = V[np.ix_(cols, own)] @ value
+        taken = float(cross @ np.linalg.solve(V[np.ix_(cols, cols)] + 1e-6 * np.eye(len(cols)), cross))
+        shares[candidate.label] = max(shares.get(candidate.label, 0.0), taken / total)
+    return shares

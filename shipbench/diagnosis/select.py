@@ -12,7 +12,7 @@ from .fit import Fit, Model, fit, start, track
 from .gram import solve
 from .model import Scales, Term
 from .plant import Plant
-from .screen import Score, screen
+from .screen import Score, overlap, screen
 
 NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error")
 """Found by their own tests: prior width of the hull, gated columns, kinematics."""
@@ -20,8 +20,9 @@ AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft
 """Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
 MOST_EFFECTS = 4
 _REFITS = 3
-_REFIT_ITERATIONS = 5
-_WORTH_A_REFIT = 0.3
+_REFIT_ITERATIONS = 8
+_WORTH_A_REFIT = 0.5
+_RIVAL, _RIVALS = 0.25, 4
 
 
 @dataclass(frozen=True)
@@ -105,22 +106,33 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         if gain < threshold:
             break
         now = _backward(best, threshold)
-        now = fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, iterations=2, candidates=candidates)
+        now = fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates)
         scores = screen(now)
     return Selection(null, now, first, scores, steps)
 
 
 def _worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[Score]:
+    """The best, the best of each family, and whatever could stand in for the best: one line each per effect."""
     present = {t.label for t in now.model.terms}
-    free = [s for s in scores if s.term.label not in present and s.score > _WORTH_A_REFIT * threshold]
-    chosen, seen, families = [], set(), set()
-    for s in free:
-        new = s.term.label not in seen
-        if new and (len(chosen) < _REFITS or (s.term.effect.family not in families and s.score > threshold)):
+    best: dict[str, Score] = {}
+    for s in scores:
+        if s.term.label not in present:
+            best.setdefault(s.term.label, s)
+    ranked = sorted(best.values(), key=lambda s: -s.score)
+    if not ranked or ranked[0].score < _WORTH_A_REFIT * threshold:
+        return []
+    chosen = [s for s in ranked[:_REFITS] if s.score > _WORTH_A_REFIT * threshold]
+    families = {s.term.effect.family for s in chosen}
+    for s in ranked[_REFITS:]:
+        if s.score > threshold and s.term.effect.family not in families:
             chosen.append(s)
-        seen.add(s.term.label)
-        families.add(s.term.effect.family)
-    return chosen
+            families.add(s.term.effect.family)
+    best_of_all = ranked[0].term.effect
+    rivals = overlap(now, ranked[0].term, ranked[0].estimate)
+    if best_of_all.vector or best_of_all.per_run:  # their sensitivities depend on the size too much for the linear overlap
+        rivals |= {s.term.label: 1.0 for s in ranked if s.term.effect.vector or s.term.effect.per_run}
+    near = sorted((s for s in ranked if rivals.get(s.term.label, 0.0) > _RIVAL and s not in chosen), key=lambda s: -rivals[s.term.label])
+    return chosen + near[:_RIVALS]
 
 
 def _backward(found: Fit, threshold: float) -> Fit:

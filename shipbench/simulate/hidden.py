@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +33,35 @@ def gears_of(ship: MMGShip, hidden: Sequence[Hidden]) -> dict[str, Gear]:
     return gears
 
 
+def actuator_paths(ship: MMGShip, s0: np.ndarray, U: np.ndarray, dt: float, num: int, hidden: Sequence[Hidden] = ()) -> np.ndarray:
+    """Actuators (runs, 2 K num + 1, 4) under commands U (runs, K, 4), at the ends and the middle of `num` integration steps per sample."""
+    gears, limit = gears_of(ship, hidden), ship.particulars.thrusters.max_force if ship.particulars.thrusters else 0.0
+    command = [U[..., 0], np.clip(U[..., 1], -ship.actuators.delta_max, ship.actuators.delta_max)]
+    command += [np.clip(U[..., i], -limit, limit) for i in (2, 3)]
+    kinds = ("n", "delta", "F", "F")
+    return np.stack([gear_path(s0[:, 6 + i], command[i], dt, gears[k], 2 * num) for i, k in enumerate(kinds)], axis=-1)
+
+
+def integrate(acceleration: Callable[[Flow, int], tuple[Array, ...]], s0: np.ndarray, actuators: np.ndarray, dt: float, num: int) -> np.ndarray:
+    """States (runs, K + 1, 10) from `s0` (runs, 10) along `actuators` (of `actuator_paths`); `acceleration(flow, k)` gives (du, dv, dr) in step k."""
+    h, K = dt / num, (actuators.shape[1] - 1) // (2 * num)
+    motion = tuple(s0[:, :6].T)
+    S = np.empty((len(s0), K + 1, 10))
+    S[:, 0], S[:, :, 6:] = s0, actuators[:, :: 2 * num]
+    with np.errstate(all="ignore"):  # a run that leaves the finite numbers stays non-finite
+        for j in range(K * num):
+
+            def rhs(state: tuple[Array, ...], stage: int, j: int = j) -> tuple[Array, ...]:
+                x, y, psi, u, v, r = state
+                flow = Flow(x, y, (j + 0.5 * stage) * h, psi, u, v, r, *actuators[:, 2 * j + stage].T)
+                return (*kinematics(psi, u, v, r), *acceleration(flow, j // num))
+
+            motion = rk4_step(rhs, motion, h)
+            if (j + 1) % num == 0:
+                S[:, (j + 1) // num, :6] = np.stack(motion, axis=-1)
+    return S
+
+
 def sail(
     ship: MMGShip, s0: np.ndarray, U: np.ndarray, dt: float, hidden: Sequence[Hidden] = (), wind: np.ndarray | None = None, max_step: float = 0.25
 ) -> np.ndarray:
@@ -43,34 +72,16 @@ def sail(
         max_step: greatest integration step [s]; shorter ships need steps shorter by sqrt(L).
     """
     num = max(1, int(np.ceil(dt / max_step - 1e-9)))
-    h, (runs, K) = dt / num, U.shape[:2]
-    gears, limit = gears_of(ship, hidden), ship.particulars.thrusters.max_force if ship.particulars.thrusters else 0.0
-    command = [U[..., 0], np.clip(U[..., 1], -ship.actuators.delta_max, ship.actuators.delta_max)]
-    command += [np.clip(U[..., i], -limit, limit) for i in (2, 3)]
-    kinds = ("n", "delta", "F", "F")
-    actuators = np.stack([gear_path(s0[:, 6 + i], command[i], dt, gears[k], 2 * num) for i, k in enumerate(kinds)], axis=-1)
     particulars = complete(ship.particulars)
-    motion = tuple(s0[:, :6].T)
-    S = np.empty((runs, K + 1, 10))
-    S[:, 0], S[:, :, 6:] = s0, actuators[:, :: 2 * num]
-    with np.errstate(all="ignore"):  # a run that leaves the finite numbers stays non-finite
-        for j in range(K * num):
-            k = j // num
-            env = CALM if wind is None else Environment(wind_speed=wind[:, k, 0], wind_from=wind[:, k, 1])
 
-            def rhs(state: tuple[Array, ...], stage: int, j: int = j, env: Environment = env) -> tuple[Array, ...]:
-                x, y, psi, u, v, r = state
-                n, delta, F_b, F_s = actuators[:, 2 * j + stage].T
-                e = Modifiers()
-                flow = Flow(x, y, (j + 0.5 * stage) * h, psi, u, v, r, n, delta, F_b, F_s)
-                for item in hidden:
-                    item.effect.force(e, flow, item.q, particulars)
-                return (*kinematics(psi, u, v, r), *accelerations(ship, psi, u, v, r, n, delta, F_b, F_s, env, e))
+    def acceleration(s: Flow, k: int) -> tuple[Array, ...]:
+        env = CALM if wind is None else Environment(wind_speed=wind[:, k, 0], wind_from=wind[:, k, 1])
+        e = Modifiers()
+        for item in hidden:
+            item.effect.force(e, s, item.q, particulars)
+        return accelerations(ship, s.psi, s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, env, e)
 
-            motion = rk4_step(rhs, motion, h)
-            if (j + 1) % num == 0:
-                S[:, k + 1, :6] = np.stack(motion, axis=-1)
-    return S
+    return integrate(acceleration, s0, actuator_paths(ship, s0, U, dt, num, hidden), dt, num)
 
 
 def record(S: np.ndarray, dt: float, hidden: Sequence[Hidden], noise: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -19,6 +19,8 @@ NOISE = np.array([0.5, 0.5, np.deg2rad(0.3), 0.05, 0.05, np.deg2rad(0.05), 0.5, 
 
 _FROUDE = np.array([1.0, 1.0, 0.0, 0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0])
 _WARM_UP = 60
+CRUISE = 4.5
+"""Speed [m/s] of the trials on a 130 m ship, where one is needed for orientation; runs begin at 0.45 to 1.25 of it."""
 
 
 @dataclass(frozen=True)
@@ -74,34 +76,62 @@ def gusts(rng: np.random.Generator, num: int, steps: int, dt: float, sigma: floa
     return np.stack([np.hypot(wind[..., 0], wind[..., 1]), np.arctan2(wind[..., 1], wind[..., 0])], axis=-1)
 
 
+@dataclass(frozen=True)
+class Sailing:
+    """One set of trials as ordered, warm-up included: scale is sqrt(L/130), s0 (runs, 10), U (runs, steps, 4), max_step [s]."""
+
+    scale: float
+    dt: float
+    s0: np.ndarray
+    U: np.ndarray
+
+    @property
+    def max_step(self) -> float:
+        return 0.5 * min(1.0, self.scale)
+
+
+def draw_sailing(rng: np.random.Generator, ship: MMGShip, plan: Trials, rpm: float | None = None) -> Sailing:
+    """Places, speeds and commands of `plan`; `rpm` holds the cruising speed 4.5 m/s (at 130 m; default: that of the MMG ship).
+
+    One sample per second at 130 m, less for much smaller ships.
+    """
+    scale = (ship.L / 130.0) ** 0.5
+    dt = float(f"{scale:.2g}") if scale < 0.5 else 1.0
+    cruise = CRUISE * scale
+    base = self_propulsion_rpm(Simulator(ship), cruise) if rpm is None else rpm
+    ratio = rng.uniform(0.45, 1.25, plan.runs)
+    s0 = np.zeros((plan.runs, 10))
+    s0[:, :2] = rng.uniform(-600.0, 600.0, (plan.runs, 2)) * ship.L / 130.0
+    s0[:, 2], s0[:, 3], s0[:, 6] = rng.uniform(-np.pi, np.pi, plan.runs), cruise * ratio, base * ratio
+    U = np.zeros((plan.runs, plan.samples + _WARM_UP, 4))
+    U[..., 0] = (base * ratio)[:, None]
+    U[:, _WARM_UP:] = draw_commands(rng, ship, s0[:, 3], base * ratio, plan.samples, dt, plan)
+    # in the warm-up a pilot keeps the heading roughly: small random helm
+    U[:, :_WARM_UP, 1] = np.repeat(np.deg2rad(rng.uniform(-4.0, 4.0, (plan.runs, _WARM_UP // 15))), 15, axis=1)
+    return Sailing(scale, dt, s0, U)
+
+
+def write_down(
+    ship: MMGShip, sailing: Sailing, S: np.ndarray, hidden: Sequence[Hidden], plan: Trials, rng: np.random.Generator, name: str, source: str
+) -> Dataset:
+    """The data set of the true states S (runs, steps + 1, 10): the warm-up cut off, the sensors' faults and noise added."""
+    noise = plan.noise * NOISE * (ship.L / 130.0) ** _FROUDE
+    S = record(S[:, _WARM_UP:], sailing.dt, hidden, noise, rng)
+    U, t = sailing.U[:, _WARM_UP:], np.arange(plan.samples + 1) * sailing.dt
+    U = np.concatenate([U, U[:, -1:]], axis=1)
+    runs = tuple(Run(f"run{i:02d}", t, S[i], U[i], COMMANDS) for i in range(plan.runs))
+    return Dataset(name=name, ship=ship.particulars, dt=sailing.dt, runs=runs, actuators="measured", source=source)
+
+
 def sea_trials(ship: MMGShip, seed: int, hidden: Sequence[Hidden] = (), plan: Trials | None = None, name: str = "trials") -> Dataset:
-    """Sail and record a set of runs with `hidden` causes; one sample per second at 130 m, scaled with sqrt(L) for other ships.
+    """Sail and record a set of runs with `hidden` causes; one sample per second at 130 m, scaled with sqrt(L) for much smaller ships.
 
     The runs begin after a warm-up under the same causes, so that currents and winds have had their time.
     """
     plan = plan or Trials()
     rng = np.random.default_rng(seed)
-    scale = (ship.L / 130.0) ** 0.5
-    dt = float(f"{scale:.2g}") if scale < 0.5 else 1.0
-    cruise = 4.5 * scale
-    base = self_propulsion_rpm(Simulator(ship), cruise)
-    ratio = rng.uniform(0.45, 1.25, plan.runs)
-    s0 = np.zeros((plan.runs, 10))
-    s0[:, :2] = rng.uniform(-600.0, 600.0, (plan.runs, 2)) * ship.L / 130.0
-    s0[:, 2], s0[:, 3], s0[:, 6] = rng.uniform(-np.pi, np.pi, plan.runs), cruise * ratio, base * ratio
-    steps = plan.samples + _WARM_UP
-    U = np.zeros((plan.runs, steps, 4))
-    U[..., 0] = (base * ratio)[:, None]
-    U[:, _WARM_UP:] = draw_commands(rng, ship, s0[:, 3], base * ratio, plan.samples, dt, plan)
-    # in the warm-up a pilot keeps the heading roughly: small random helm
-    U[:, :_WARM_UP, 1] = np.repeat(np.deg2rad(rng.uniform(-4.0, 4.0, (plan.runs, _WARM_UP // 15))), 15, axis=1)
-    wind = gusts(rng, plan.runs, steps, dt, plan.gusts * scale, 20.0 * scale) if plan.gusts else None
-    S = sail(ship, s0, U, dt, hidden, wind, max_step=0.5 * min(1.0, scale))
-    noise = plan.noise * NOISE * (ship.L / 130.0) ** _FROUDE
-    S = record(S[:, _WARM_UP:], dt, hidden, noise, rng)
-    U, t = U[:, _WARM_UP:], np.arange(plan.samples + 1) * dt
-    U = np.concatenate([U, U[:, -1:]], axis=1)
-    runs = tuple(Run(f"run{i:02d}", t, S[i], U[i], COMMANDS) for i in range(plan.runs))
-    return Dataset(
-        name=name, ship=ship.particulars, dt=dt, runs=runs, actuators="measured", source=f"shipbench sea trials of {ship.name}, seed {seed}"
-    )
+    sailing = draw_sailing(rng, ship, plan)
+    scale, dt = sailing.scale, sailing.dt
+    wind = gusts(rng, plan.runs, sailing.U.shape[1], dt, plan.gusts * scale, 20.0 * scale) if plan.gusts else None
+    S = sail(ship, sailing.s0, sailing.U, dt, hidden, wind, max_step=sailing.max_step)
+    return write_down(ship, sailing, S, hidden, plan, rng, name, f"shipbench sea trials of {ship.name}, seed {seed}")
