@@ -37,6 +37,8 @@ class GearFinding:
     value: float
     ci95: tuple[float, float]
     per_run: np.ndarray
+    actuator: str
+    gear: Gear
 
 
 @dataclass(frozen=True)
@@ -72,32 +74,38 @@ def _kinds(actuator: str, scale: float, span: float, ordinary: Gear) -> list[_Ki
     ]
 
 
-def find_in_gears(plant: Plant) -> list[GearFinding]:
-    """Findings of every actuator that moves, best first; empty where only commands are recorded."""
+def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear]]:
+    """Findings of every actuator that moves, best first, and the best ordinary gears; nothing where only commands are recorded."""
+    gears = ordinary_gears(plant.c.L)
     if plant.seg.commanded:
-        return []
-    found = []
+        return [], gears
+    found: list[GearFinding] = []
     for name, channels in _ACTUATORS.items():
         rows = range(len(plant.seg.run))
         picked = [(b, c) for c in channels for b in rows if np.ptp(plant.seg.commands[b, plant.seg.mask[b], c]) > 0]
         if len({plant.seg.run[b] for b, _ in picked}) > 1:
-            found += _of_actuator(plant, name, np.array(picked))
-    return sorted(found, key=lambda f: -f.score)
+            some, gears[name] = _of_actuator(plant, name, np.array(picked))
+            found += some
+    return sorted(found, key=lambda f: -f.score), gears
 
 
-def _of_actuator(plant: Plant, name: str, picked: np.ndarray) -> list[GearFinding]:
+def _of_actuator(plant: Plant, name: str, picked: np.ndarray) -> tuple[list[GearFinding], Gear]:
     seg, scale, (b, c) = plant.seg, (plant.c.L / 130.0) ** 0.5, picked.T
     command, measured, mask, run = seg.commands[b, :-1, c], seg.states[b, :, 6 + c], seg.mask[b, 1:], seg.run[b]
     span = float(np.percentile(np.abs(command), 98))
     rate = max(ORDINARY[name].rate / scale ** _RATE_POWER[name], 0.01 * span / seg.dt)
     low, high = np.log([0.02 * scale, rate]), np.log([ORDINARY[name].T * scale, max(10.0 * span / seg.dt, 2.0 * rate)])
 
-    def residual(z: np.ndarray, kind: _Kind | None = None) -> np.ndarray:
+    def gear_of(z: np.ndarray, kind: _Kind | None) -> Gear:
         gear = Gear(float(np.exp(z[0])), float(np.exp(z[1])))
-        path = gear_path(measured[:, 0], command, seg.dt, gear if kind is None else replace(gear, **{kind.field: float(np.exp(z[kind.at]))}))
+        return gear if kind is None else replace(gear, **{kind.field: float(np.exp(z[kind.at]))})
+
+    def residual(z: np.ndarray, kind: _Kind | None = None) -> np.ndarray:
+        path = gear_path(measured[:, 0], command, seg.dt, gear_of(z, kind))
         return np.where(mask, (measured - path)[:, 1:], 0.0)
 
-    plain = residual(_least(lambda z: float(np.sum(residual(z) ** 2)), low, high))
+    ordinary = _least(lambda z: float(np.sum(residual(z) ** 2)), low, high)
+    plain = residual(ordinary)
     found = []
     for kind in _kinds(name, scale, span, ordinary_gears(plant.c.L)[name]):
         lows, highs = np.resize(low, max(2, kind.at + 1)), np.resize(high, max(2, kind.at + 1))
@@ -114,8 +122,8 @@ def _of_actuator(plant: Plant, name: str, picked: np.ndarray) -> list[GearFindin
         slope = (residual(z + step, kind) - residual(z - step, kind)) / 0.04
         spread = 1.96 * np.exp(z[kind.at]) * (variance / max(discount * float(np.sum(slope**2)), 1e-300)) ** 0.5
         value = float(np.exp(z[kind.at])) - kind.beyond
-        found.append(GearFinding(kind.effect, float(score), value, (value - spread, value + spread), per_run))
-    return found
+        found.append(GearFinding(kind.effect, float(score), value, (value - spread, value + spread), per_run, name, gear_of(z, kind)))
+    return found, gear_of(ordinary, None)
 
 
 def _least(cost: Callable[[np.ndarray], float], low: np.ndarray, high: np.ndarray) -> np.ndarray:

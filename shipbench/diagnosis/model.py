@@ -14,7 +14,7 @@ from ..effects.race_gain import EFFECT as RACE
 from ..effects.thruster_gain import EFFECT as THRUSTERS
 from ..effects.thruster_speed_loss import EFFECT as LOSS
 from ..effects.wake_variation import EFFECT as WAKE
-from ..ops import Array
+from ..ops import Array, absolute, arctan2, exp, maximum, tanh
 from ..physics.modifiers import Flow, Modifiers
 from ..predictors._physics_fit import parameter_scale
 from ..ship import Particulars
@@ -33,9 +33,9 @@ class Structure(Effect):
     """What differs between one ordinary ship and another beyond hull and rudder lift: race at the rudder, wake in turns, thrusters at speed.
 
     Without it every ship's own race or thruster tunnel would be reported as missing physics. Centres and spreads: kappa 0.3 to 0.8 (physics
-    reference, R16), C_2 - 1 of the wake 0 to 0.6 (Yasukawa & Yoshimura 2015), loss of the thrusters' moment up to 50 % (T41),
+    reference, R16), C_2 - 1 of the wake 0 to 0.6, by side (Yasukawa & Yoshimura 2015), loss of the thrusters' moment up to 50 % (T41),
     cross-flow drag of a hull whose regressions lack it (H52), side force of a propeller going astern (P37),
-    gamma_R 0.4 to 0.64, by side (Yasukawa & Yoshimura 2015, table 3).
+    gamma_R 0.4 to 0.64, by side (Yasukawa & Yoshimura 2015, table 3), X'_vv and X'_rr that eq. (2) lacks (same table: -0.040, 0.011).
     """
 
     family = "hull"
@@ -46,17 +46,29 @@ class Structure(Effect):
         Parameter("wake_variation", "1", 0.3, -1.0, 2.0),
         Parameter("thruster_loss", "1", 0.25, -0.5, 1.2),
         Parameter("thruster_gain", "1", 0.1, -0.5, 0.5),
-        Parameter("cross_flow", "1", 0.3, -1.0, 1.0),
+        Parameter("cross_flow", "1", 0.6, -1.0, 2.0),
         Parameter("walk_astern", "1", 0.4, -2.0, 2.0),
         Parameter("straightening", "1", 0.3, -0.9, 1.0),
         Parameter("straightening_asymmetry", "1", 0.25, -0.9, 0.9),
+        Parameter("X_vv", "1", 0.05, -0.5, 0.5),
+        Parameter("X_rr", "1", 0.03, -0.5, 0.5),
+        Parameter("wake_asymmetry", "1", 0.25, -1.0, 1.0),
     )
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
+
+    def plain(self) -> np.ndarray:
+        """Values, in units of their spreads, at which it adds nothing to eq. (2)."""
+        centres = [c for _, c in self.parts] + [0.0] * (len(self.parameters) - len(self.parts))
+        return np.array([-c / p.typical for c, p in zip(centres, self.parameters, strict=True)])
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         for (effect, centre), value in zip(self.parts, q[:6], strict=True):
             effect.force(e, s, (centre + value,), ship)
         e.straightening, e.straightening_asymmetry = 1.0 + q[6], q[7]
+        unit = 0.5 * ship.rho * ship.L * ship.T
+        e.push(unit * (q[8] * s.v * s.v + q[9] * ship.L**2 * s.r * s.r))
+        beta_P = arctan2(-(s.v + ship.x_P * s.r), maximum(s.u, 0.0) + 0.1)
+        e.wake = e.wake - q[10] * (1.0 - ship.w_P0) * (1.0 - exp(-2.0 * absolute(beta_P))) * tanh(beta_P / 0.05)
 
 
 STRUCTURE = Structure()
@@ -65,11 +77,12 @@ NUM_BASE = len(FREE) + NUM_HULL + len(STRUCTURE.parameters)
 
 @dataclass(frozen=True)
 class Term:
-    """An effect in the model: shape parameters fixed, amplitudes free; one set of amplitudes, or one per run."""
+    """An effect in the model: shape parameters fixed, amplitudes free; one set of amplitudes, or one per run; `since`: absent before that run."""
 
     effect: Effect
     setting: tuple[float, ...] = ()
     per_run: bool = False
+    since: int | None = None
 
     @property
     def size(self) -> int:
@@ -136,9 +149,13 @@ def actives(plant: Plant, scales: Scales, point: Point) -> list[Active]:
     found = []
     for term, value in zip(point.terms, point.values, strict=True):
         amplitude = scales.amplitudes(term, plant.c.L) * value
-        q = tuple(amplitude[plant.seg.run, i] if term.per_run else amplitude[i] for i in range(term.size))
+        q = tuple(amplitude[plant.seg.run, i] if term.per_run else _since(plant, term, amplitude[i]) for i in range(term.size))
         found.append(Active(term.effect, (*q, *term.setting)))
     return found
+
+
+def _since(plant: Plant, term: Term, value: float) -> float | np.ndarray:
+    return value if term.since is None else np.where(plant.seg.run >= term.since, value, 0.0)
 
 
 @dataclass(frozen=True)
@@ -257,7 +274,7 @@ class Linearisation:
         columns = []
         for a in range(term.size):
             old = (*(0.0 for _ in range(term.size)), *term.setting) if index is None else self.now[index].q
-            active = Active(term.effect, tuple(v + steps[a] if i == a else v for i, v in enumerate(old)))
+            active = Active(term.effect, tuple(v + _since(self.plant, term, steps[a]) if i == a else v for i, v in enumerate(old)))
             changed = [*self.now, active] if index is None else [*self.now[:index], active, *self.now[index + 1 :]]
             if term.effect.enters == "sensor":
                 moved = self.plant.measured(self.motion, changed) - self.predicted

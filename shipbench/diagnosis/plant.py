@@ -108,8 +108,13 @@ class Plant:
         at = np.minimum(np.arange(self.steps + 1) * segments.dt / self.knot_time, self.knots - 1 - 1e-9)
         self.hat = np.maximum(1.0 - np.abs(at[:, None] - np.arange(self.knots)), 0.0)
         """(K + 1, knots): the latent acceleration at the samples from its knots, linear between them."""
-        self.ordinary = ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR)
-        self.path = np.stack([self._stages(i, self.ordinary[k]) for i, k in enumerate(("n", "delta", "F", "F"))], axis=-1)
+        self.ordinary: dict[str, Gear] = {}
+        self.drive(ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR))
+
+    def drive(self, gears: dict[str, Gear]) -> None:
+        """Take these gears for the ordinary ones between the commands and the actuators."""
+        self.ordinary = gears
+        self.path = np.stack([self._stages(i, gears[k]) for i, k in enumerate(("n", "delta", "F", "F"))], axis=-1)
 
     @classmethod
     def of(cls, dataset: Dataset) -> Plant:

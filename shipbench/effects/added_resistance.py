@@ -1,4 +1,4 @@
-"""More resistance than in service before: fouling, damage, a towed body."""
+"""More resistance than the model has (fouling, damage, a towed body): that of the hull times 1 + share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The recorded position is that of an antenna, ahead and to starboard of midship."""
+"""The recorded position is that of an antenna, ahead and to starboard of midship: p + R(psi) (forward, starboard)."""
 
 from __future__ import annotations
 

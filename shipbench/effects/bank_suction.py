@@ -1,6 +1,8 @@
-"""A straight bank: suction towards it and a moment that turns the bow away, falling with distance.
+"""A straight bank: suction towards it, and a moment that turns the leading end away, falling with distance.
 
-Y = rho/2 L T u|u| c phi towards the bank, N = -0.2 L Y away from it, phi = (B/2)/d, d the distance from the bank (at least B/2)."""
+The bank is the line x cos(bearing) + y sin(bearing) = line; d is the distance from it (at least B/2), phi = (B/2)/d, s = sin(bearing - psi) its side
+(1: to starboard). Y = rho/2 L T u^2 c phi s, N = -0.2 L rho/2 L T u|u| c phi s: the pressure falls with the square of the speed either way,
+the bow wave stands at the leading end."""
 
 from __future__ import annotations
 
@@ -21,17 +23,16 @@ class BankSuction(Effect):
     source = "form of Norrbin (1974) as in physics reference, section 5, E10"
     parameters = (
         Parameter("strength", "1", 0.3, -2.0, 2.0),
-        Parameter("bearing", "rad", 1.5707963, 0.0, 6.2831853, shape=True),
-        Parameter("line", "m", 200.0, -1000000.0, 1000000.0, shape=True),
+        Parameter("bearing", "rad", 0.5 * math.pi, 0.0, 2.0 * math.pi, shape=True),
+        Parameter("line", "m", 200.0, -1e6, 1e6, scaling="length", shape=True),
     )
     separate = "pass the same place at another distance and speed"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         along = s.x * cos(q[1]) + s.y * sin(q[1])
         distance = maximum(q[2] - along, 0.5 * ship.B)
-        Y = 0.5 * ship.rho * ship.L * ship.T * s.u * absolute(s.u) * q[0] * 0.5 * ship.B / distance
-        side = sin(q[1] - s.psi)
-        e.push(0.0, Y * side, -0.2 * ship.L * Y * side)
+        unit = 0.5 * ship.rho * ship.L * ship.T * q[0] * (0.5 * ship.B / distance) * sin(q[1] - s.psi)
+        e.push(0.0, unit * s.u * s.u, -0.2 * ship.L * unit * s.u * absolute(s.u))
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
         """Banks on four sides, each two breadths beyond the outermost place visited."""

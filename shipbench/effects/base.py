@@ -2,7 +2,7 @@
 
 A part is one file of this folder whose instance is bound to `EFFECT`; the file's name is the effect's name. It overrides one of three methods,
 which say where the cause enters: `force` (anything that acts on the hull), `gear` (between command and actuator) or `measure` (the sensors).
-Its values `q` are zero when nothing is missing (or at `absent`), and may be numbers, one per run, or symbols.
+Its values `q` are zero when nothing is missing, and may be numbers, one per run, or symbols (force only).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _REFERENCE_LENGTH = 130.0
 class Parameter:
     """One value of an effect.
 
-    typical, low, high are for a ship of 130 m; `scaling` says how they go with the length (Froude's law): "1", "speed", "time", "rate", "length".
+    typical, low, high are for a ship of 130 m; `scaling` says how they go with the length (Froude's law): a key of `_FROUDE`.
     A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes are zero.
     """
 
@@ -78,8 +78,8 @@ class Effect:
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         """Write the effect of size `q` into `e`, at the instant `s`."""
 
-    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
-        """Change the gears of `n`, `delta` and `F` (both thrusters)."""
+    def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
+        """Change the gears of `n`, `delta` and `F` (both thrusters); `q` holds numbers or one value per run."""
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
         """What the sensors say of the true states S (runs, samples, 10); `q` holds numbers or one value per run."""
@@ -107,10 +107,10 @@ class Effect:
         return {self.vector[0]: self.parameters[0].unit, self.vector[1]: "rad"}
 
     def internal(self, values: Mapping[str, float]) -> tuple[float, ...]:
-        """`q` from values under the reported names.
+        """`q` from values under the reported names; those not given are zero, shape parameters typical, a vector's direction north.
 
         Raises:
-            InputError: a name is unknown, or one is missing that has no default (shape parameters do).
+            InputError: a name is unknown, or a vector's size is missing.
         """
         known = list(self.units())
         for key in values:

@@ -1,4 +1,4 @@
-"""The centre of gravity lies further forward than the ship file says."""
+"""The centre of gravity lies elsewhere than the ship file says: x_G + shift, forward positive; mass and inertia about it stay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""A uniform, steady current: the water moves over the ground, and the hull, propeller and rudder see the velocity through it."""
+"""A uniform, steady current: the water moves over the ground, and the hull, propeller and rudder see the velocity through it.
+
+The components, north and east, say where it flows to; u_c = north cos(psi) + east sin(psi), v_c = east cos(psi) - north sin(psi)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A uniform current that is steady within a run and differs from run to run."""
+"""A uniform current that is steady within a run and differs from run to run; signs as in `current`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""The compass reads too much by a constant."""
+"""The compass reads too much by a constant: psi recorded = psi + bias."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,7 +16,7 @@ class HeadingBias(Effect):
     family = "sensor"
     summary = "compass error"
     source = "physics reference, section 5, S58"
-    parameters = (Parameter("bias", "rad", 0.03490658503988659, -0.3, 0.3),)
+    parameters = (Parameter("bias", "rad", math.radians(2.0), -0.3, 0.3),)
     separate = "straight runs on one course at two speeds"
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The hull derivatives and added masses of the published regressions do not fit this ship; each value is a relative change."""
+"""The hull derivatives and added masses of the published regressions do not fit this ship: each times 1 + its value."""
 
 from __future__ import annotations
 

@@ -1,7 +1,10 @@
-"""A list: the heeled hull is unsymmetrical and has a side force and a moment ahead. N = rho/2 L^2 T u|u| 0.008 phi, Y = -0.5 N/L."""
+"""A list: the heeled hull is unsymmetrical and turns away from its low side.
+
+N = -0.008 phi rho/2 L^2 T u|u|, Y = -0.5 N/L; heel phi positive to starboard. At rest there is no force."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from ..ops import Array, absolute
@@ -14,11 +17,11 @@ class List(Effect):
     family = "hull"
     summary = "heel angle"
     source = "N'_phi of physics reference, section 5, H51"
-    parameters = (Parameter("heel", "rad", 0.06981317007977318, -0.35, 0.35),)
+    parameters = (Parameter("heel", "rad", math.radians(4.0), -0.35, 0.35),)
     separate = "vary the revolutions at one speed: a list acts with the ship's speed alone"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        N = 0.5 * ship.rho * ship.L**2 * ship.T * s.u * absolute(s.u) * 0.008 * q[0]
+        N = -0.008 * 0.5 * ship.rho * ship.L**2 * ship.T * s.u * absolute(s.u) * q[0]
         e.push(0.0, -0.5 * N / ship.L, N)
 
 

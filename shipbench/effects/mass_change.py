@@ -1,4 +1,4 @@
-"""Another mass than the ship file says (loading), with its moment of inertia."""
+"""Another mass than the ship file says (loading): mass and moment of inertia times 1 + share, added masses as they were."""
 
 from __future__ import annotations
 

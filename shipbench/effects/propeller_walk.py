@@ -1,4 +1,6 @@
-"""A side force of the turning propeller, in proportion to its thrust ahead, at the propeller."""
+"""A side force of the turning propeller, in proportion to its thrust ahead: Y = c (1 - t_P) T, N = x_P Y, none astern.
+
+c > 0 pushes the stern to starboard (bow to port), as a right-handed screw does."""
 
 from __future__ import annotations
 

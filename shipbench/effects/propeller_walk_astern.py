@@ -1,4 +1,6 @@
-"""The side force of a screw turning astern: a right-handed one throws the stern to port."""
+"""The side force of a screw turning astern: Y = c Y_P, N = c N_P of `physics.propeller.side_force_astern`; none ahead.
+
+c = 1 is the right-handed screw of Esso Osaka, which throws the stern to port; a left-handed one has c < 0."""
 
 from __future__ import annotations
 

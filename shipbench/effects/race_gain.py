@@ -1,4 +1,4 @@
-"""The propeller's race reaches the rudder faster or slower than momentum theory says."""
+"""The propeller's race reaches the rudder faster or slower: its speed beyond the wake's, times 1 + gain."""
 
 from __future__ import annotations
 

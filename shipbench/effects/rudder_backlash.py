@@ -1,10 +1,12 @@
-"""Play between steering gear and rudder: the rudder stays behind after each reversal."""
+"""Play between steering gear and rudder: after each reversal the rudder stays until the play is taken up; half of it on either side."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..ops import Array
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
 
@@ -13,10 +15,10 @@ class RudderBacklash(Effect):
     family = "rudder"
     summary = "play of the steering gear"
     source = "physics reference, section 5, A24"
-    parameters = (Parameter("play", "rad", 0.03490658503988659, 0.0, 0.15),)
+    parameters = (Parameter("play", "rad", math.radians(2.0), 0.0, 0.15),)
     separate = "slow rudder reversals: play leaves a constant difference, a lag none"
 
-    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
+    def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
         gears["delta"] = replace(gears["delta"], backlash=gears["delta"].backlash + q[0])
 
 

@@ -1,10 +1,12 @@
-"""The steering gear rests while the rudder is within a band of its command."""
+"""The steering gear rests while |command - rudder| is below a band."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..ops import Array
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
 
@@ -13,10 +15,10 @@ class RudderDeadband(Effect):
     family = "rudder"
     summary = "deadband of the steering gear"
     source = "physics reference, section 5, A23"
-    parameters = (Parameter("band", "rad", 0.026179938779914945, 0.0, 0.12),)
+    parameters = (Parameter("band", "rad", math.radians(1.5), 0.0, 0.12),)
     separate = "rudder steps smaller than the suspected band"
 
-    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
+    def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
         gears["delta"] = replace(gears["delta"], deadband=gears["delta"].deadband + q[0])
 
 

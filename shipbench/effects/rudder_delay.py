@@ -1,10 +1,11 @@
-"""The rudder follows its command (or its record) late by a fixed time."""
+"""The rudder follows its command late by a fixed time; a negative delay means that its record is late."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..ops import Array
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
 
@@ -16,7 +17,7 @@ class RudderDelay(Effect):
     parameters = (Parameter("delay", "s", 1.5, -5.0, 10.0, scaling="time"),)
     separate = "quick rudder reversals, sampled faster"
 
-    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
+    def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
         gears["delta"] = replace(gears["delta"], delay=gears["delta"].delay + q[0])
 
 

@@ -1,4 +1,4 @@
-"""The rudder gives more or less lift than its size says, at all speeds and loadings."""
+"""The rudder gives more or less lift than its size says, at all speeds and loadings: times 1 + gain."""
 
 from __future__ import annotations
 

@@ -1,10 +1,11 @@
-"""The rudder follows its command with a longer time constant."""
+"""The rudder follows its command with a longer time constant: T + lag."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..ops import Array
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
 
@@ -16,7 +17,7 @@ class RudderLag(Effect):
     parameters = (Parameter("lag", "s", 3.0, 0.0, 30.0, scaling="time"),)
     separate = "small and large rudder steps: a lag takes the same time for both"
 
-    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
+    def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
         gears["delta"] = replace(gears["delta"], T=gears["delta"].T + q[0])
 
 

@@ -1,7 +1,8 @@
-"""The rudder stands at another angle than recorded (zero error of the gear or its sensor)."""
+"""The rudder stands at another angle than recorded (zero error of the gear or its sensor): delta + offset, positive to starboard."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from ..ops import Array
@@ -14,7 +15,7 @@ class RudderOffset(Effect):
     family = "rudder"
     summary = "zero error of the rudder angle"
     source = "physics reference, section 5, R15"
-    parameters = (Parameter("offset", "rad", 0.03490658503988659, -0.15, 0.15),)
+    parameters = (Parameter("offset", "rad", math.radians(2.0), -0.15, 0.15),)
     separate = "vary the revolutions at one speed: the offset acts with the race, propeller walk with the thrust, wind with neither"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

@@ -1,11 +1,12 @@
-"""The rudder turns no faster than a limit below the 2.3 deg/s that SOLAS asks for."""
+"""The rudder turns no faster than a limit below the 2.3 deg/s that SOLAS asks for: rate = min(rate of the gear, limit); zero means no limit."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..ops import minimum
+from ..ops import Array, minimum, where
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
 
@@ -14,11 +15,11 @@ class RudderRateLimit(Effect):
     family = "rudder"
     summary = "slow steering gear: rate limit"
     source = "physics reference, section 5, A21; SOLAS II-1 reg. 29 (65 deg in 28 s)"
-    parameters = (Parameter("rate", "rad/s", 0.020943951023931952, 0.0017, 0.2, scaling="rate"),)
+    parameters = (Parameter("rate", "rad/s", math.radians(1.2), 0.0017, 0.2, scaling="rate"),)
     separate = "small and large rudder steps: a rate limit takes longer for the large one"
 
-    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
-        gears["delta"] = replace(gears["delta"], rate=minimum(gears["delta"].rate, q[0]))
+    def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
+        gears["delta"] = replace(gears["delta"], rate=where(q[0] > 0.0, minimum(gears["delta"].rate, q[0]), gears["delta"].rate))
 
 
 EFFECT = RudderRateLimit()

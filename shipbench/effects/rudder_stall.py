@@ -1,4 +1,4 @@
-"""The rudder loses lift beyond an angle of attack."""
+"""The rudder loses lift beyond an angle of attack: the lost share is reached 0.35 rad (20 deg) above `angle`, on a smooth step."""
 
 from __future__ import annotations
 

@@ -1,10 +1,11 @@
-"""The shaft follows its order with a longer time constant."""
+"""The shaft follows its order with a longer time constant: T + lag."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..ops import Array
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
 
@@ -16,7 +17,7 @@ class ShaftLag(Effect):
     parameters = (Parameter("lag", "s", 10.0, 0.0, 120.0, scaling="time"),)
     separate = "small and large steps of the revolutions"
 
-    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
+    def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
         gears["n"] = replace(gears["n"], T=gears["n"].T + q[0])
 
 

@@ -1,11 +1,11 @@
-"""The shaft gains revolutions no faster than a limit (load-up programme)."""
+"""The shaft gains revolutions no faster than a limit (load-up programme): rate = min(rate of the shaft, limit); zero means no limit."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..ops import minimum
+from ..ops import Array, minimum, where
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
 
@@ -17,8 +17,8 @@ class ShaftRateLimit(Effect):
     parameters = (Parameter("rate", "rpm/s", 1.0, 0.02, 60.0, scaling="rpm rate"),)
     separate = "small and large steps of the revolutions"
 
-    def gear(self, gears: dict[str, Gear], q: Sequence[float]) -> None:
-        gears["n"] = replace(gears["n"], rate=minimum(gears["n"].rate, q[0]))
+    def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
+        gears["n"] = replace(gears["n"], rate=where(q[0] > 0.0, minimum(gears["n"].rate, q[0]), gears["n"].rate))
 
 
 EFFECT = ShaftRateLimit()

@@ -1,4 +1,4 @@
-"""Finite water depth: hull derivatives, added masses and resistance grow with draught over depth."""
+"""Finite water depth: hull derivatives, added masses and resistance grow with T/h (`physics.shallow_water`); zero is deep water."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class ShallowWater(Effect):
     separate = "the same steady turn at two depths: drift over yaw rate changes with depth and not with rudder force"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        deep = depth_factors(ship.T / maximum(q[0], 1e-3), ship.L, ship.B, ship.T, ship.Cb)
+        deep = depth_factors(ship.T / maximum(q[0], 1e-30), ship.L, ship.B, ship.T, ship.Cb)
         e.hull = e.hull * deep.hull
         e.m_y, e.J_z = e.m_y * deep.m_y, e.J_z * deep.J_z
 

@@ -1,4 +1,4 @@
-"""The recorded speeds (surge and sway) are too large by a constant share."""
+"""The recorded speeds, surge and sway, are too large by a constant share: u and v times 1 + scale."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The propeller gives more or less thrust than its open-water curve."""
+"""The propeller gives more or less thrust than its open-water curve: times 1 + gain, in its race as well."""
 
 from __future__ import annotations
 

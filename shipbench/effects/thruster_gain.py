@@ -1,4 +1,4 @@
-"""Both thrusters push more or less than recorded."""
+"""Both thrusters push more or less than recorded: times 1 + gain."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bow thruster stands elsewhere than the ship file says."""
+"""The bow thruster stands elsewhere than the ship file says: its lever + shift, forward positive."""
 
 from __future__ import annotations
 

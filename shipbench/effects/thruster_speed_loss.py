@@ -1,4 +1,6 @@
-"""The thrusters lose force, and more of their moment, at forward speed."""
+"""The thrusters lose force at forward speed: moment times 1 - loss q exp(1 - q), force with 0.6 of the loss, q = (u/2.1 m/s)^2.
+
+The worst speed is that of the ship's own tunnels (`physics.thruster`)."""
 
 from __future__ import annotations
 

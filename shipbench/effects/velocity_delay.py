@@ -1,4 +1,4 @@
-"""The recorded surge and sway velocities are old (a slow filter acts alike)."""
+"""The recorded surge and sway velocities are old (a slow filter acts alike): u and v at t - delay."""
 
 from __future__ import annotations
 

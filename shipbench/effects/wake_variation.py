@@ -1,4 +1,6 @@
-"""The wake at the propeller falls while the ship drifts and turns: w = w_P0 - c (1 - w_P0)(1 - exp(-2|beta_P|))."""
+"""The wake at the propeller falls while the ship drifts and turns: w = w_P0 - c (1 - w_P0)(1 - exp(-2|beta_P|)).
+
+beta_P = atan2(-(v + x_P r), u); 0.1 m/s (at 130 m) is added to u, and u held at or above zero, so that it stays smooth at rest."""
 
 from __future__ import annotations
 
@@ -18,7 +20,7 @@ class WakeVariation(Effect):
     separate = "the same turn with the shaft stopped"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        beta_P = arctan2(-(s.v + ship.x_P * s.r), maximum(s.u, 0.0) + 0.1)
+        beta_P = arctan2(-(s.v + ship.x_P * s.r), maximum(s.u, 0.0) + 0.1 * (ship.L / 130.0) ** 0.5)
         e.wake = e.wake - q[0] * (1.0 - ship.w_P0) * (1.0 - exp(-2.0 * absolute(beta_P)))
 
 

@@ -1,7 +1,7 @@
 """Mean drift force of waves: along their direction, nearly independent of the ship's speed.
 
-The components are amplitude squared times the direction of travel; X = rho g B a_u, Y = rho g L a_v |a_v|/|a| (each times 1/2, X reduced to 0.3),
-N = -0.1 L Y a_u/|a|."""
+The components, north and east, are the amplitude squared times the direction of travel; in body axes (a_u, a_v), of size a:
+X = 0.3 rho g/2 B a_u, Y = rho g/2 L a_v |a_v|/a, N = -0.1 L Y a_u/a, which turns the ship beam on."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""The rate gyro reads too much by a constant."""
+"""The rate gyro reads too much by a constant: r recorded = r + bias."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,7 +16,7 @@ class YawRateBias(Effect):
     family = "sensor"
     summary = "offset of the rate gyro"
     source = "physics reference, section 5, S60"
-    parameters = (Parameter("bias", "rad/s", 0.0017453292519943296, -0.1, 0.1, scaling="rate"),)
+    parameters = (Parameter("bias", "rad/s", math.radians(0.1), -0.1, 0.1, scaling="rate"),)
     separate = "any straight run: heading and integrated yaw rate part"
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:

@@ -29,18 +29,19 @@ class Gear:
     """What lies between a command and its actuator: transport delay [s], time constant T [s], rate limit, deadband of the controller and play
     (backlash) of the transmission, the last three in the actuator's units (and per second)."""
 
-    T: float
-    rate: float
-    delay: float = 0.0
-    deadband: float = 0.0
-    backlash: float = 0.0
+    T: Array
+    rate: Array
+    delay: Array = 0.0
+    deadband: Array = 0.0
+    backlash: Array = 0.0
 
 
 def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, substeps: int = 1) -> np.ndarray:
     """The actuator (runs, samples * substeps + 1) that follows held commands (runs, samples) from `start` (runs,).
 
     The controller sees the command `delay` seconds late (the first command held before) and rests while |command - position| < deadband; the motor
-    moves with lag and rate limit; the actuator follows the motor once the play is taken up (it starts in the middle of it).
+    moves with lag and rate limit; the actuator follows the motor once the play is taken up (it starts in the middle of it). Each value of the gear
+    may be one per run.
     """
     runs, samples = command.shape
     h = dt / substeps
@@ -48,16 +49,17 @@ def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, sub
     out[:, 0] = start
     position = start.copy()
     shift = gear.delay / h
-    whole = int(np.floor(shift))
+    whole = np.floor(shift).astype(int)
     part = shift - whole
-    held = np.repeat(command, substeps, axis=1)
-    for j in range(samples * substeps):
-        now, before = held[:, max(j - whole, 0)], held[:, max(j - whole - 1, 0)]
+    held, rows = np.repeat(command, substeps, axis=1), np.arange(runs)
+    last = samples * substeps - 1
+    for j in range(last + 1):
+        now, before = held[rows, np.clip(j - whole, 0, last)], held[rows, np.clip(j - whole - 1, 0, last)]
         for wanted, time in ((before, part * h), (now, (1.0 - part) * h)):
-            if time <= 0.0:
+            if np.all(time <= 0.0):
                 continue
-            target = np.where(np.abs(wanted - motor) < gear.deadband, motor, wanted) if gear.deadband else wanted
+            target = np.where(np.abs(wanted - motor) < gear.deadband, motor, wanted) if np.any(gear.deadband) else wanted
             motor = lag_with_rate_limit(motor, target, time, gear.T, gear.rate)
-        position = np.clip(position, motor - 0.5 * gear.backlash, motor + 0.5 * gear.backlash) if gear.backlash else motor
+        position = np.clip(position, motor - 0.5 * gear.backlash, motor + 0.5 * gear.backlash) if np.any(gear.backlash) else motor
         out[:, j + 1] = position
     return out

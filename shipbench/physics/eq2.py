@@ -14,7 +14,7 @@ from typing import NamedTuple
 from ..ops import Array, absolute, arctan2, clip, cos, maximum, sin, sqrt
 from ..ship import Particulars
 from . import propeller, regressions, thruster, wind
-from .modifiers import Modifiers, is_number
+from .modifiers import Modifiers, is_neutral
 
 NUM_PARAMETERS = 11
 ALPHA_MAX = 1.2
@@ -106,7 +106,7 @@ def propulsion(u: Array, n: Array, c: Coefficients, e: Modifiers | None = None) 
     V_A = u - (c.w_P0 + e.wake) * maximum(u, 0.0)  # no wake going astern: the propeller then leads
     thrust = propeller.thrust_quadratic(n / 60.0, V_A, c.D_P, c.kt, c.rho) * e.thrust
     race = propeller.race_speed(V_A, maximum(thrust, 0.0), c.D_P, c.rho)
-    return (1.0 - c.t_P) * thrust, V_A, race if is_number(e.race) else V_A + e.race * (race - V_A)
+    return (1.0 - c.t_P) * thrust, V_A, race if is_neutral(e.race, 1.0) else V_A + e.race * (race - V_A)
 
 
 def rudder(
@@ -145,7 +145,7 @@ class _Inertia(NamedTuple):
 
 def _inertia(c: Coefficients, e: Modifiers) -> _Inertia:
     """Masses of the left side, with what effects make of them."""
-    if all(map(is_number, (e.mass, e.m_y, e.J_z, e.x_G))):
+    if all(is_neutral(field, 1.0) for field in (e.mass, e.m_y, e.J_z)) and is_neutral(e.x_G, 0.0):
         return _Inertia(c.m, c.x_G, c.m + c.m_x, c.m11, c.m12_Y, c.m12_N, c.m22, c.X_vr, c.X_rr)
     m, x_G = c.m * e.mass, c.x_G + e.x_G
     moved = m * x_G - c.m * c.x_G
@@ -182,7 +182,7 @@ def accelerations(
     f = e.hull
     if air is not None:
         air = (air[0] - e.air_u, air[1] - e.air_v)
-    moving = not (is_number(e.u_c) and is_number(e.v_c))
+    moving = not (is_neutral(e.u_c, 0.0) and is_neutral(e.v_c, 0.0))
     if moving:
         u, v = u - e.u_c, v - e.v_c
     i = _inertia(c, e)

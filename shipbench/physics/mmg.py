@@ -13,7 +13,7 @@ from ..errors import InputError, unknown_name
 from ..ops import Array, cos, sin, where
 from ..ship import Ship, read_toml
 from . import hull, propeller, rudder, shallow_water, thruster, wind
-from .modifiers import Modifiers, is_number
+from .modifiers import Modifiers, is_neutral
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def water_forces(
     else:
         X_H, Y_H, N_H = hull.unified(u, v, r, ship.hull, ship.L, ship.T, ship.rho, factors)
     w_P = propeller.wake_fraction(u, v, r, p.w_P0, p.x_P, p.C1, p.C2_plus, p.C2_minus)
-    w_P = w_P if is_number(e.wake) else w_P + where(u > 0, e.wake, 0.0 * w_P)
+    w_P = w_P if is_neutral(e.wake, 0.0) else w_P + where(u > 0, e.wake, 0.0 * w_P)
     V_A = (1.0 - w_P) * u
     if p.form == "quadratic":
         thrust = propeller.thrust_quadratic(n, V_A, p.D, p.kt, ship.rho)

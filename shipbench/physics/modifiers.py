@@ -35,8 +35,8 @@ class Modifiers:
 
     u_c, v_c: velocity of the water in body axes [m/s]. air_u, air_v: velocity of the air beyond the measured wind, body axes [m/s].
     delta: rudder angle to add [rad]; rudder: factor of the rudder's lift; rudder_asymmetry a: factor 1 + a to starboard and 1 - a to port;
-    stall: share of the lift lost beyond `stall_angle` [rad]. race, thrust: factors of the race's excess speed and of the thrust; straightening: factor of the
-    sideways flow at the rudder, 1 + its asymmetry where it comes from port (positive) and 1 - where from starboard; wake: added to the
+    stall: share of the lift lost beyond `stall_angle` [rad]. race, thrust: factors of the race's excess speed and of the thrust; straightening:
+    factor of the sideways flow at the rudder, 1 + its asymmetry where it comes from port (positive) and 1 - where from starboard; wake: added to the
     wake fraction. bow, stern: factors of the thrusters; lever: shift of the bow thruster [m]; loss: share of side force and moment lost at speed.
     mass, m_y, J_z: factors of the ship's mass (with its inertia), of added mass in sway and of added inertia in yaw; x_G: shift of the centre
     of gravity [m]. hull: factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship [N m] to add.
@@ -79,20 +79,20 @@ class Modifiers:
 
     def sideways(self, w_R: Array) -> Array:
         """Sideways flow at the rudder [m/s] after straightening by hull and propeller; a single screw straightens the two sides unequally."""
-        if is_number(self.straightening) and is_number(self.straightening_asymmetry):
+        if is_neutral(self.straightening, 1.0) and is_neutral(self.straightening_asymmetry, 0.0):
             return w_R
         return self.straightening * (w_R + self.straightening_asymmetry * absolute(w_R))
 
     def lift_factor(self, alpha: Array) -> Array:
         """Factor of the rudder's lift at the angle of attack `alpha` [rad, positive turns to starboard]."""
         factor = self.rudder
-        if not is_number(self.rudder_asymmetry):
+        if not is_neutral(self.rudder_asymmetry, 0.0):
             factor = factor * (1.0 + self.rudder_asymmetry * tanh(alpha / 0.05))
-        if not is_number(self.stall):
+        if not is_neutral(self.stall, 0.0):
             factor = factor * (1.0 - self.stall * smoothstep(absolute(alpha) - self.stall_angle, 0.0, 0.35))
         return factor
 
 
-def is_number(value: Array) -> bool:
-    """Whether a field is still the plain 0 or 1 of a neutral `Modifiers`: its term can then be left out."""
-    return isinstance(value, float) and value in (0.0, 1.0)
+def is_neutral(value: Array, neutral: float) -> bool:
+    """Whether a field is still the plain number of a neutral `Modifiers`: its term can then be left out."""
+    return isinstance(value, float) and value == neutral

@@ -1,0 +1,114 @@
+"""The second library: what an unexplained force depends on, where no named cause fits. It needs no simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .fit import Fit
+from .gram import Gram, Reduced, solve, update_force
+from .gram import background as background_of
+from .plant import Plant
+
+AXES = ("surge", "sway", "yaw")
+_PRIOR_SD = 0.5
+"""Of a feature's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m)."""
+_EM_STEPS = 3
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """The latent force of one axis follows one variable. score: 2 log Bayes factor; share: of the variance of that axis's latent force that it takes."""
+
+    variable: str
+    axis: str
+    score: float
+    share: float
+
+
+def features(plant: Plant) -> dict[str, np.ndarray]:
+    """Features (B, knots, F) of every variable at the knots of the latent force, of order one and without mean."""
+    seg, froude = plant.seg, (plant.c.L / 130.0) ** 0.5
+    at = np.clip(np.round(np.arange(plant.knots) * plant.knot_time / seg.dt).astype(int), 0, plant.steps)
+    psi, u, v, r, n, delta, F_b, F_s = np.moveaxis(seg.states[:, at, 2:], -1, 0)
+    t = seg.start[:, None] + at[None, :] * seg.dt
+
+    def unit(x: np.ndarray) -> np.ndarray:
+        return x / max(float(np.sqrt(np.mean(x**2))), 1e-12)
+
+    u1, v1, r1, n1, d1 = unit(u), unit(v), unit(r), unit(n), unit(delta)
+    minute = 2.0 * np.pi * t / (60.0 * froude)
+    order = np.broadcast_to((seg.run / max(seg.runs - 1, 1))[:, None], t.shape)
+    found = {
+        "heading": [f(k * psi) for k in (1, 2, 3) for f in (np.cos, np.sin)],
+        "speed": [u1, u1 * np.abs(u1)],
+        "sway velocity": [v1, v1 * np.abs(v1), np.abs(v1)],
+        "yaw rate": [r1, r1 * np.abs(r1), np.abs(r1)],
+        "rudder": [d1, np.abs(d1), d1 * np.abs(d1), d1**3],
+        "revolutions": [n1, n1 * np.abs(n1)],
+        "revolutions and yaw rate": [n1 * r1],
+        "revolutions and sway velocity": [n1 * v1],
+        "revolutions and rudder": [n1 * d1, n1 * np.abs(d1), n1 * np.abs(n1) * d1 * d1],
+        "speed and rudder": [u1 * d1, u1 * u1 * np.abs(d1)],
+        "time": [t / t.max(), (t / t.max()) ** 2, *(f(k * minute) for k in (0.5, 1.0, 2.0) for f in (np.cos, np.sin))],
+        "run": [order, order**2],
+    }
+    if np.any(F_b) or np.any(F_s):
+        F1, F2 = unit(F_b), unit(F_s)
+        found["thrusters"] = [F1, F2, F1 * u1, F2 * u1]
+    return {k: _centred(np.stack(np.broadcast_arrays(*v), axis=-1)) for k, v in found.items()}
+
+
+def _centred(x: np.ndarray) -> np.ndarray:
+    x = x - x.mean(axis=(0, 1))
+    return x / np.maximum(np.sqrt(np.mean(x**2, axis=(0, 1))), 1e-9)
+
+
+def dependences(fit: Fit) -> list[Dependence]:
+    """Every variable on every axis, best first; judged beside the model of `fit`."""
+    base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
+    prior = replace(fit.prior, shared=np.arange(len(fit.prior.shared)), random=np.arange(len(fit.prior.shared), len(base)))
+    lean = _columns(fit.gram, base)
+    null = solve(lean.reduce(fit.hyper.log_force), prior).log_evidence
+    found = []
+    for variable, phi in features(fit.plant).items():
+        for j, axis in enumerate(AXES):
+            gram = _with_features(lean, phi, j)
+            more = replace(
+                prior, shared=np.append(prior.shared, len(base) + np.arange(phi.shape[-1])),
+                precision=np.append(prior.precision, np.full(phi.shape[-1], _PRIOR_SD**-2)),
+            )  # fmt: skip
+            quick = solve(gram.reduce(fit.hyper.log_force), more).log_evidence
+            log_force, score = fit.hyper.log_force, quick
+            if quick - null > 5.0:
+                for _ in range(_EM_STEPS):
+                    reduced: Reduced = gram.reduce(log_force)
+                    solution = solve(reduced, more)
+                    log_force = update_force(gram, *background_of(gram, reduced, more, solution))
+                score = solve(gram.reduce(log_force), more).log_evidence
+            share = 1.0 - float(np.exp(log_force[j] - fit.hyper.log_force[j]))
+            found.append(Dependence(variable, axis, 2.0 * (score - null), share))
+    return sorted(found, key=lambda d: -d.score)
+
+
+def _columns(gram: Gram, columns: np.ndarray) -> Gram:
+    keep = np.concatenate([np.arange(gram.latent), gram.latent + columns, [gram.G.shape[-1] - 1]])
+    return replace(gram, G=np.ascontiguousarray(gram.G[:, keep][:, :, keep]))
+
+
+def _with_features(gram: Gram, phi: np.ndarray, axis: int) -> Gram:
+    """The Gram with the columns S_w phi before the residual: linear combinations of columns that it has."""
+    at = slice(6 + axis * gram.knots, 6 + (axis + 1) * gram.knots)
+    rows = np.swapaxes(phi, 1, 2) @ gram.G[:, at]  # (B, F, Z + G + 1)
+    corner = rows[:, :, at] @ phi
+    last = gram.G.shape[-1] - 1
+    F = phi.shape[-1]
+    G = np.zeros((len(phi), last + F + 1, last + F + 1))
+    G[:, :last, :last] = gram.G[:, :last, :last]
+    G[:, last : last + F, :last], G[:, :last, last : last + F] = rows[:, :, :last], np.swapaxes(rows[:, :, :last], 1, 2)
+    G[:, last : last + F, last : last + F] = corner
+    G[:, -1, :last], G[:, :last, -1] = gram.G[:, -1, :last], gram.G[:, :last, -1]
+    G[:, -1, last : last + F] = G[:, last : last + F, -1] = rows[:, :, last]
+    G[:, -1, -1] = gram.G[:, -1, -1]
+    return replace(gram, G=G)
