@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -146,25 +146,36 @@ def distance(plant: Plant, scales: Scales, model: Rollout) -> tuple[np.ndarray, 
     return total / np.maximum(count, 1), lin.predicted
 
 
-Diagnoser = Callable[[Dataset], tuple[Extension, dict[str, Gear]]]
+@dataclass(frozen=True)
+class FoldGain:
+    """ED [m] of the test runs: by the plain model, with the causes, and with the hull's derivatives fitted as well; what the training runs led to."""
+
+    test: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    with_hull: np.ndarray
+    names: tuple[str, ...]
 
 
-def fold_gain(dataset: Dataset, train: Sequence[int], test: Sequence[int], diagnoser: Diagnoser) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
-    """ED of the test runs before and after, and the names that the training runs led to."""
-    part, rest = dataset.with_runs([dataset.runs[i] for i in train]), dataset.with_runs([dataset.runs[i] for i in test])
-    extension, plain = diagnoser(part)
-    plant = rollout_plant(part, plain)
+def fold_gain(dataset: Dataset, test: np.ndarray, extension: Extension, plain: dict[str, Gear], hull: bool) -> FoldGain:
+    """Fit the plain model, the extended one (and that with the hull) to the training runs alone, and roll all out on the test runs."""
+    inside = set(test.tolist())
+    part = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i not in inside])
+    rest = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i in inside])
+    plant, held = rollout_plant(part, plain), rollout_plant(rest, plain)
     scales = Scales(plant)
-    before = fit_rollout(plant, scales, Extension())
-    held = rollout_plant(rest, plain)
-    ed_before, _ = distance(held, scales, before)
-    names = (*(t.label for t in extension.terms), *(["hull_derivatives"] if extension.hull else []))
-    if not names and extension.gears is None:
-        return ed_before, ed_before, names
-    gears = plain | (extension.gears or {})
-    after = fit_rollout(rollout_plant(part, gears), scales, extension)
-    ed_after, _ = distance(rollout_plant(rest, gears), scales, after)
-    return ed_before, ed_after, names
+    before, _ = distance(held, scales, fit_rollout(plant, scales, Extension()))
+    names = tuple(t.label for t in extension.terms)
+    after, driven, goal = before, plant, held
+    if extension.gears:
+        gears = plain | extension.gears
+        driven, goal = rollout_plant(part, gears), rollout_plant(rest, gears)
+    if names or extension.gears:
+        after, _ = distance(goal, scales, fit_rollout(driven, scales, extension))
+    with_hull = after
+    if hull:
+        with_hull, _ = distance(goal, scales, fit_rollout(driven, scales, replace(extension, hull=True)))
+    return FoldGain(test, before, after, with_hull, names)
 
 
 def summarise(before: np.ndarray, after: np.ndarray, seed: int) -> Gain:

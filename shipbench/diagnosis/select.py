@@ -20,7 +20,7 @@ AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft
 """Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
 MOST_EFFECTS = 4
 _REFITS = 3
-_REFIT_ITERATIONS = 8
+_FIRST_ITERATIONS, _FINALISTS, _REFIT_ITERATIONS = 3, 2, 10
 _WORTH_A_REFIT = 0.5
 _RIVAL, _RIVALS = 0.25, 4
 
@@ -66,15 +66,15 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
     return fit(plant, scales, Model(), point, hyper, candidates=candidates)
 
 
-def with_term(before: Fit, score: Score, candidates: Sequence[Term] = ()) -> Fit:
-    """`before` with one more term, refitted from its one-step estimate."""
+def with_term(before: Fit, score: Score) -> Fit:
+    """`before` with one more term, its first steps from the one-step estimate."""
     term = score.term
     index = len(before.model.terms)
     model = replace(before.model, terms=(*before.model.terms, term))
     value = np.zeros((before.plant.seg.runs, term.size)) if term.per_run else np.clip(score.estimate, -2.0, 2.0)
     point = before.point.with_term(term, value)
     log_tau2 = before.log_tau2 | ({index: score.log_tau2} if term.per_run else {})
-    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=_REFIT_ITERATIONS, candidates=candidates)
+    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=_FIRST_ITERATIONS)
 
 
 def without(before: Fit, index: int) -> Fit:
@@ -94,16 +94,12 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     candidates, first = null.candidates, screen(null)
     now, scores, steps = null, first, []
     for round_ in range(most):
-        tried = []
-        for score in _worth_a_refit(scores, now, threshold):
-            found = with_term(now, score)
-            gain = 2.0 * (found.evidence - now.evidence)
-            steps.append(Step(round_, score.term, gain))
-            tried.append((gain, found))
-        if not tried:
-            break
-        gain, best = max(tried, key=lambda pair: pair[0])
-        if gain < threshold:
+        tried = [with_term(now, score) for score in _worth_a_refit(scores, now, threshold)]
+        tried.sort(key=lambda f: -f.evidence)
+        tried[:_FINALISTS] = [fit(f.plant, f.scales, f.model, f.point, f.hyper, f.log_tau2, iterations=_REFIT_ITERATIONS) for f in tried[:_FINALISTS]]
+        steps += [Step(round_, f.model.terms[-1], 2.0 * (f.evidence - now.evidence)) for f in tried]
+        best = max(tried, key=lambda f: f.evidence, default=None)
+        if best is None or 2.0 * (best.evidence - now.evidence) < threshold:
             break
         now = _backward(best, threshold)
         now = fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates)

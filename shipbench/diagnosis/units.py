@@ -3,8 +3,8 @@
 Increments over windows of some seconds are compared with integrals, never with differences of neighbours. Track against heading and
 speeds, heading against yaw rate: every combination of units and signs is tried with the ordinary faults of sensors left free (a scale of 15 %, a
 compass error, an antenna away from midship, a delay, a drift), and one is believed if it leaves a quarter or less of the plain reading's
-squares. Of combinations that explain the same (a mirrored track with mirrored sway is a mirrored heading), that with the fewest errors is
-taken, the rudder's side included.
+squares; of the small sway alone, three quarters, if that is beyond chance and better than no sway at all. Of combinations that explain the
+same (a mirrored track with mirrored sway is a mirrored heading), that with the fewest errors is taken, the rudder's side included.
 """
 
 from __future__ import annotations
@@ -15,15 +15,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.unit_or_sign_error import FACTORS, in_words
+from ..effects.unit_or_sign_error import FACTORS
 from ..records import Dataset, Run
 from ..signals import COMMANDS, DELTA, F_B, F_S, PSI, STATES, N, R, U, V, X, Y
 
 BETTER = 4.0
 """How much larger the plain reading's sum of squares must be than that of the reading believed."""
-_ALIKE = 1.5
+_SWAY_BETTER, _LOG_ODDS = 1.3, 60.0
+"""The same for a reading that changes the sway alone, which is a small part of the way; and least twice the log likelihood ratio of it."""
+_ALIKE = 1.1
 _WINDOW, _RUDDER_WINDOW = 15.0, 6.0
 """Seconds at 130 m, Froude-scaled."""
+_LAGS = (0.0, 2.0, 5.0, 10.0)
+"""Seconds by which an actuator may follow its command."""
 _MOST_WINDOWS, _FEWEST_WINDOWS = 1500, 12
 _POOR = 0.15
 _SWAPPED = "exchanged with y"
@@ -57,15 +61,14 @@ def check_units(dataset: Dataset) -> list[UnitFinding]:
     findings += motion.findings(chosen)
     if side.sign * np.sign(chosen.r) < 0:
         findings.append(UnitFinding("delta", "sign", -1.0, side.evidence))
-    return _merged(findings + _commands(runs, findings))
+    return _merged(findings + _commands(runs, dataset.dt, findings))
 
 
 def corrected(dataset: Dataset, findings: Sequence[UnitFinding]) -> Dataset:
     """The data set with the findings taken out: channels divided by their factors, x and y exchanged back."""
     if not findings:
         return dataset
-    notes = tuple(f"{f.channel} recorded {_words(f)}; corrected. {f.evidence}" for f in findings)
-    columns = list(dataset.inputs)
+    notes = tuple(f"{f.channel} was recorded otherwise ({f.kind}) and is corrected. {f.evidence}" for f in findings)
     runs = []
     for run in dataset.runs:
         states, inputs = run.states.copy(), run.inputs.copy()
@@ -75,27 +78,15 @@ def corrected(dataset: Dataset, findings: Sequence[UnitFinding]) -> Dataset:
             elif f.channel in STATES:
                 states[:, STATES.index(f.channel)] /= f.factor
             else:
-                inputs[:, columns.index(f.channel)] /= f.factor
+                inputs[:, dataset.inputs.index(f.channel)] /= f.factor
         runs.append(replace(run, states=states, inputs=inputs))
     return replace(dataset, runs=tuple(runs), notes=(*dataset.notes, *notes))
 
 
-def _words(f: UnitFinding) -> str:
-    return f.kind if f.kind == _SWAPPED else in_words(_state_of(f.channel), f.factor)
-
-
-def _state_of(channel: str) -> str:
-    return channel.removesuffix("_c")
-
-
-def _kind(channel: str, factor: float) -> str:
-    units = FACTORS.get(_state_of(channel), {})
-    near = [name for name, size in units.items() if abs(abs(factor) / size - 1.0) < 0.02]
-    return ", ".join([*near, *(["sign"] if factor < 0.0 else [])])
-
-
 def _finding(channel: str, factor: float, evidence: str) -> UnitFinding:
-    return UnitFinding(channel, _kind(channel, factor), factor, evidence)
+    units = FACTORS.get(channel.removesuffix("_c"), {})
+    near = [name for name, size in units.items() if abs(abs(factor) / size - 1.0) < 0.02]
+    return UnitFinding(channel, ", ".join([*near, *(["sign"] if factor < 0.0 else [])]), factor, evidence)
 
 
 def _merged(findings: Sequence[UnitFinding]) -> list[UnitFinding]:
@@ -105,9 +96,6 @@ def _merged(findings: Sequence[UnitFinding]) -> list[UnitFinding]:
         old = found.get(f.channel)
         found[f.channel] = f if old is None or f.kind == _SWAPPED else _finding(f.channel, f.factor * old.factor, f"{old.evidence} {f.evidence}")
     return list(found.values())
-
-
-# --- track, heading and speeds ---------------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -151,21 +139,26 @@ class _Motion:
     def choose(self, side: _Side) -> _Reading:
         """The reading with the fewest errors among those that explain the data as well as any; the plain one unless it fails by far."""
         plain = _Reading()
-        readings = self.track or {replace(plain, psi=psi): 0.0 for psi in _signed("psi")}
-        best = min(readings.values())
-        suits = [plain] if readings[plain] <= BETTER * best or best > _POOR else [k for k, s in readings.items() if s <= _ALIKE * best]
-        if not self.track and self.yaw and not self._fails(1.0):
-            suits = [plain]
-        elif not self.track:
-            suits = list(readings)
-        options = [(replace(k, r=r), readings[k]) for k in suits for r in self._rates(k.psi)]
-        if not options:
-            return plain
+        suits = self._tracks(plain) if self.track else [replace(plain, psi=psi) for psi in self._headings()]
+        options = [(replace(k, r=r), self.track.get(k, 0.0)) for k in suits for r in self._rates(k.psi)]
         return min(options, key=lambda o: (o[0].errors + (side.sign * np.sign(o[0].r) < 0), o[1]))[0]
 
-    def _fails(self, psi: float) -> bool:
-        best = min(self.yaw.values())
-        return self.yaw[psi, 1.0] > BETTER * best and best < _POOR
+    def _tracks(self, plain: _Reading) -> list[_Reading]:
+        """Readings of the track that suit."""
+        sane = {k: s for k, s in self.track.items() if k.v in (1.0, k.u) or _SWAY_BETTER * s < self.track[replace(k, v=np.inf)]}
+        best, as_read = min(sane.values()), self.track[plain]
+        if as_read > BETTER * best and best < _POOR:
+            return [k for k, s in sane.items() if s <= _ALIKE * best]
+        sway = min((k for k in sane if k == replace(plain, v=k.v)), key=lambda k: sane[k])
+        better = as_read / sane[sway]
+        return [sway] if better > _SWAY_BETTER and 2.0 * self.windows * np.log(better) > _LOG_ODDS and sane[sway] < _POOR else [plain]
+
+    def _headings(self) -> list[float]:
+        """Readings of psi that suit, without a track."""
+        best = min(self.yaw.values(), default=np.inf)
+        if best > _POOR or self.yaw[1.0, 1.0] <= BETTER * best:
+            return [1.0]
+        return sorted({psi for (psi, _), s in self.yaw.items() if s <= BETTER * best})
 
     def _rates(self, psi: float) -> list[float]:
         """Readings of r that suit a reading of psi."""
@@ -180,19 +173,20 @@ class _Motion:
     def findings(self, chosen: _Reading) -> list[UnitFinding]:
         """What is wrong under the reading chosen."""
         found = []
-        track = f"over {self.windows} windows of {self.window:.3g} s"
+        text = "Yaw rate and heading agree only if it is read so."
         if self.track:
-            plain, left = self.track[_Reading()], self.track[replace(chosen, r=1.0)]
-            track = f"The track departs from heading and speeds by {plain**0.5:.0%} of its length as read, {left**0.5:.1%} so read ({track})."
+            plain, left = self.track[_Reading()] ** 0.5, self.track[replace(chosen, r=1.0)] ** 0.5
+            text = f"The track departs from heading and speeds by {plain:.1%} of its length as recorded, by {left:.1%} read so"
+            text += f" ({self.windows} windows of {self.window:.3g} s)."
         if chosen.frame != "plain":
             channel, kind = ("x", _SWAPPED) if chosen.frame == _SWAPPED else (chosen.frame[0], "sign")
-            found.append(UnitFinding(channel, kind, 1.0 if kind == _SWAPPED else -1.0, track))
+            found.append(UnitFinding(channel, kind, 1.0 if kind == _SWAPPED else -1.0, text))
         for channel, factor in (("psi", chosen.psi), ("u", chosen.u), ("v", chosen.v)):
             if factor != 1.0:
-                found.append(_finding(channel, factor, track if self.track else "Yaw rate and heading agree only if it is read so."))
+                found.append(_finding(channel, factor, text))
         if chosen.r != 1.0:
             plain, left = self.yaw[chosen.psi, 1.0], self.yaw[chosen.psi, chosen.r]
-            text = f"The heading departs from the integrated yaw rate by {plain**0.5:.0%} as read, {left**0.5:.1%} so read."
+            text = f"The heading departs from the integrated yaw rate by {plain**0.5:.1%} of it as recorded, by {left**0.5:.1%} read so."
             found.append(_finding("r", chosen.r, text))
         return found
 
@@ -211,7 +205,7 @@ def _motion(dataset: Dataset, runs: Sequence[Run]) -> _Motion:
     track: dict[_Reading, float] = {}
     whole = float(np.sum(moved**2))
     if whole > len(S) * (0.02 * L) ** 2:
-        floor = 2.0 * len(S) * (0.003 * L) ** 2
+        floor = 2.0 * len(S) * (0.001 * L) ** 2
         for psi in _signed("psi"):
             parts = _track_parts(S, psi, dt)
             for frame, matrix in _FRAMES.items():
@@ -221,7 +215,7 @@ def _motion(dataset: Dataset, runs: Sequence[Run]) -> _Motion:
     rate, jump = np.trapezoid(S[:, :, R], dx=dt, axis=1), S[:, -1, R] - S[:, 0, R]
     for psi, r in itertools.product(_signed("psi"), _signed("r")) if np.sum(turned**2) > len(S) * 0.01**2 else ():
         columns = np.stack([rate / r, np.full(len(S), width * dt), jump / r], axis=-1)
-        left = _bounded_squares(turned / psi - rate / r, columns[None], np.array([0.15, 0.1 / froude, limits[4]]))[0]
+        left = _bounded_squares((turned / psi - rate / r)[None], columns[None], np.array([0.15, 0.1 / froude, limits[4]]))[0]
         yaw[psi, r] = (float(left) + len(S) * 0.003**2) / float(np.sum((turned / psi) ** 2))
     return _Motion(track, yaw, width * dt, len(S))
 
@@ -239,31 +233,26 @@ def _track_parts(S: np.ndarray, psi: float, dt: float) -> dict[str, np.ndarray]:
 
 def _track_squares(moved: np.ndarray, parts: dict[str, np.ndarray], span: float, limits: np.ndarray) -> dict[tuple[float, float], float]:
     """Squares left of the ways `moved` (W, 2) for every reading of u and v."""
-    pairs = list(itertools.product(_signed("u"), _signed("v")))
-    found: dict[tuple[float, float], float] = {}
-    drift = np.zeros((2, *moved.shape))
-    drift[0, :, 0] = drift[1, :, 1] = span
-    for u, v in pairs:
-        way, change = parts["u"] / u + parts["v"] / v, parts["du"] / u + parts["dv"] / v
-        across = np.stack([-way[:, 1], way[:, 0]], axis=-1)
-        columns = np.stack([way, across, parts["ahead"], parts["abeam"], change, drift[0], drift[1]], axis=-1)
-        found[u, v] = float(_bounded_squares((moved - way).reshape(-1), columns.reshape(1, -1, len(limits)), limits)[0])
-    return found
+    pairs = list(itertools.product(_signed("u"), [*_signed("v"), np.inf]))
+    u, v = (np.array(values)[:, None, None] for values in zip(*pairs, strict=True))
+    way, change = parts["u"] / u + parts["v"] / v, parts["du"] / u + parts["dv"] / v
+    across = np.stack([-way[..., 1], way[..., 0]], axis=-1)
+    drift = span * np.eye(2)[:, None, :]
+    shared = np.broadcast_arrays(way, across, parts["ahead"], parts["abeam"], change, drift[0], drift[1])
+    columns = np.stack(shared, axis=-1).reshape(len(pairs), -1, len(limits))
+    return dict(zip(pairs, _bounded_squares((moved - way).reshape(len(pairs), -1), columns, limits).tolist(), strict=True))
 
 
 def _bounded_squares(target: np.ndarray, columns: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """Least sums of squares (H,) of target (T,) less columns (H, T, P) times coefficients within +-limits (P,): coordinate descent."""
+    """Least sums of squares (H,) of target (H, T) less columns (H, T, P) times coefficients within +-limits (P,): coordinate descent."""
     scaled = columns * limits
-    G, b = np.swapaxes(scaled, 1, 2) @ scaled, np.swapaxes(scaled, 1, 2) @ target
+    G, b = np.swapaxes(scaled, 1, 2) @ scaled, np.einsum("htp,ht->hp", scaled, target)
     x = np.zeros(b.shape)
     for _ in range(40):
         for i in range(b.shape[1]):
             slope = b[:, i] - np.einsum("hp,hp->h", G[:, i], x) + G[:, i, i] * x[:, i]
             x[:, i] = np.clip(slope / np.maximum(G[:, i, i], 1e-30), -1.0, 1.0)
     return np.sum((target - np.einsum("htp,hp->ht", scaled, x)) ** 2, axis=1)
-
-
-# --- rudder, shaft, thrusters ----------------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -334,15 +323,22 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
     return found
 
 
-def _commands(runs: Sequence[Run], findings: Sequence[UnitFinding]) -> list[UnitFinding]:
+def _lagged(runs: Sequence[Run], i: int, lag: int) -> tuple[float, np.ndarray, np.ndarray]:
+    """Likeness (cosine) of a command and its actuator `lag` samples later, and both."""
+    wanted = np.concatenate([r.inputs[: max(len(r) - lag, 0), i] for r in runs])
+    is_ = np.concatenate([r.states[lag:, N + i] for r in runs])
+    size = float(np.sqrt(np.sum(wanted**2) * np.sum(is_**2)))
+    return (float(wanted @ is_) / size if size else 0.0), wanted, is_
+
+
+def _commands(runs: Sequence[Run], dt: float, findings: Sequence[UnitFinding]) -> list[UnitFinding]:
     """Commands that share their actuator's error, or have one of their own."""
     own = {f.channel: f.factor for f in _merged(findings)}
     found = []
     for i, command in enumerate(COMMANDS):
-        actuator = _state_of(command)
-        wanted, is_ = np.concatenate([r.inputs[:, i] for r in runs]), np.concatenate([r.states[:, N + i] for r in runs])
-        size = float(np.sqrt(np.sum(wanted**2) * np.sum(is_**2)))
-        if size == 0.0 or abs(float(wanted @ is_)) < 0.7 * size:
+        actuator = command.removesuffix("_c")
+        like, wanted, is_ = max((_lagged(runs, i, round(lag / dt)) for lag in _LAGS), key=lambda found: abs(found[0]))
+        if abs(like) < 0.7:
             continue
         ratio = float(wanted @ is_) / float(is_ @ is_) * own.get(actuator, 1.0)
         near = min(_signed(actuator), key=lambda f: abs(np.log(abs(f / ratio))) + 10.0 * (f * ratio < 0.0))

@@ -1,0 +1,142 @@
+"""One diagnosis of one set of runs, without its gain: causes, their order, and what stays unexplained."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..physics.actuators import Gear
+from .fit import Fit, settle
+from .gain import Extension
+from .gears import GearFinding, find_in_gears
+from .generic import Dependence, dependences
+from .model import Linearisation, Scales
+from .plant import Plant
+from .select import Selection, candidates_for, null_fit, select
+
+THRESHOLD = 14.0
+"""Least gain of a named cause, 2 log Bayes factor. From nulls on the development ships, whose structure differs from the model's; the bootstrap of each
+diagnosis may raise it."""
+HULL_THRESHOLD = 30.0
+GENERIC_THRESHOLD = 30.0
+_GENERIC_OWN = {"revolutions and rudder": 45.0, "heading": 18.0, "time": 18.0, "run": 18.0}
+"""Race and rudder together are where ordinary ships differ most from eq. (2); no ship's structure depends on heading, time or number of the run."""
+GENERIC_MARGIN = 10.0
+_NARROW = 0.1
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What was found in one set of runs. threshold: that was used; hull: 2 log evidence that the hull is off the regressions, or 0; unknown: the dependence
+    that no named cause covers; gears: named findings; plain_gears: the ordinary gears that fit best."""
+
+    selection: Selection
+    threshold: float
+    null_draws: np.ndarray
+    hull: float
+    gears: tuple[GearFinding, ...]
+    all_gears: tuple[GearFinding, ...]
+    plain_gears: dict[str, Gear]
+    generic: tuple[Dependence, ...]
+    unknown: Dependence | None
+
+    @property
+    def final(self) -> Fit:
+        return self.selection.final
+
+    def extension(self, name_hull: bool) -> Extension:
+        """What the diagnosis adds to the plain model."""
+        if self.unknown is not None:
+            return Extension()
+        point = self.final.point
+        gears = {g.actuator: g.gear for g in self.gears} or None
+        return Extension(point.terms, point.values, name_hull and self.hull > HULL_THRESHOLD, gears)
+
+
+def causes_of(plant: Plant, threshold: float, only: Sequence[str] | None = None) -> tuple[Extension, dict[str, Gear]]:
+    """What one training part alone leads to, by the same selection, with the threshold of the whole; and the best ordinary gears."""
+    selection = select(null_fit(plant, Scales(plant), candidates_for(plant, only)), threshold)
+    findings, plain = find_in_gears(plant)
+    gears = {g.actuator: g.gear for g in _named_gears(findings, threshold, only)}
+    return Extension(selection.final.point.terms, selection.final.point.values, False, gears or None), plain
+
+
+def _named_gears(findings: Sequence[GearFinding], threshold: float, only: Sequence[str] | None) -> list[GearFinding]:
+    """The best finding of every actuator, if it is worth the threshold."""
+    named: dict[str, GearFinding] = {}
+    for g in findings:
+        if (only is None or g.effect in only) and g.score > threshold:
+            named.setdefault(g.actuator, g)
+    return list(named.values())
+
+
+def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, cautious: bool = False) -> Analysis:
+    """Fit the plain model, look for causes in the motion and in the gears, and for dependences that no cause explains.
+
+    Args:
+        only: restrict the candidates to these effects (for an oracle that knows the truth).
+        cautious: name nothing (too little data), but rank everything.
+    """
+    scales = Scales(plant)
+    null = null_fit(plant, scales, candidates_for(plant, only))
+    draws = null_maxima(null, seed)
+    threshold = max(THRESHOLD, float(np.quantile(draws, 0.95))) if only is None else 0.0
+    selection = select(null, np.inf if cautious else threshold)
+    findings, plain = find_in_gears(plant)
+    gears = [] if cautious else _named_gears(findings, threshold, only)
+    hull = 0.0 if only is not None and "hull_derivatives" not in only else hull_evidence(selection.final)
+    generic = tuple(dependences(selection.final))
+    unknown = None
+    if only is None and not cautious:
+        unknown = _unknown(selection, gears, generic, null)
+    return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown)
+
+
+def _unknown(selection: Selection, gears: Sequence[GearFinding], after: Sequence[Dependence], null: Fit) -> Dependence | None:
+    """The dependence that beats every named cause, if one does."""
+    terms = selection.final.model.terms
+    best = max([*(s.score for s in selection.steps if s.round == 0), *(g.score for g in gears)], default=-np.inf)
+    left = [d for d in after if d.score > _GENERIC_OWN.get(d.variable, GENERIC_THRESHOLD)]
+    if not terms and not gears:
+        return left[0] if left else None
+    first = [d for d in dependences(null) if d.score > _GENERIC_OWN.get(d.variable, GENERIC_THRESHOLD)]
+    if left and first and first[0].score > best + GENERIC_MARGIN:
+        return first[0]
+    return None
+
+
+def hull_evidence(fit: Fit) -> float:
+    """2 log evidence for a hull that lies off the regressions by the usual 30 %, against one that lies within 3 %."""
+    lin = Linearisation(fit.plant, fit.scales, fit.point)
+    wide = settle(lin, fit.model, fit.hyper, fit.log_tau2)
+    narrow = settle(lin, replace(fit.model, hull=_NARROW), fit.hyper, fit.log_tau2, steps=8)
+    return 2.0 * (wide.evidence - narrow.evidence)
+
+
+def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:
+    """Greatest score of all candidates under the fitted null (parametric bootstrap on the fixed linearisation), sorted.
+
+    The reduced right-hand side is Gaussian with the reduced normal matrix as covariance; random effects are left out (their null is narrower).
+    """
+    candidates, at = null.candidates, null.reduced.S.shape[1] - 1 - sum(t.size for t in null.candidates)
+    base = null.prior.shared
+    S = null.reduced.S.sum(axis=0)[:-1, :-1]
+    rng = np.random.default_rng(seed)
+    values, vectors = np.linalg.eigh(S)
+    z = (vectors * np.sqrt(np.maximum(values, 0.0))) @ rng.standard_normal((len(S), draws))
+    solved = np.linalg.solve(S[np.ix_(base, base)] + np.diag(null.prior.precision), np.column_stack([S[base], z[base]]))
+    V, s = S - S[:, base] @ solved[:, : len(S)], z - S[:, base] @ solved[:, len(S) :]
+    best = np.full(draws, -np.inf)
+    for term in candidates:
+        cols = np.arange(at, at + term.size)
+        at += term.size
+        if term.per_run:
+            continue
+        A = V[np.ix_(cols, cols)] + np.eye(len(cols))
+        score = np.einsum("cd,cd->d", s[cols], np.linalg.solve(A, s[cols])) - np.linalg.slogdet(A)[1]
+        best = np.maximum(best, score)
+    return np.sort(best)
+
+

@@ -1,0 +1,274 @@
+"""From an analysis to the lines of the verdict: causes with sizes and intervals, candidates with the reason they were rejected."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..effects.base import EFFECTS, Effect
+from .analysis import HULL_THRESHOLD, Analysis
+from .fit import Fit
+from .gears import GearFinding
+from .gram import solve
+from .model import Term
+from .outcome import Candidate, Cause, Estimate, Gain
+from .screen import Score
+from .select import AS_RECORDED
+from .units import UnitFinding
+
+_TIE = 10.0
+"""Candidates within this of the winner's score (2 log Bayes factor) are called confused with it."""
+
+
+def describe_causes(found: Analysis, units: Sequence[UnitFinding], gain: Gain | None, hull: bool) -> list[Cause]:
+    """Named causes: faults of units first, then by score; the hull last, because it is off the regressions on most ships."""
+    causes = [_unit_cause(i + 1, u) for i, u in enumerate(units)]
+    if found.unknown is not None:
+        return causes
+    named: list[Cause] = []
+    for index, term in enumerate(found.final.model.terms):
+        named.append(_term_cause(found, index, term, gain))
+    named += [_gear_cause(found, g, gain) for g in found.gears]
+    named.sort(key=lambda c: -c.score)
+    if hull and found.hull > HULL_THRESHOLD:
+        named.append(_hull_cause(found, gain))
+    from dataclasses import replace
+
+    return causes + [replace(c, rank=len(causes) + i + 1) for i, c in enumerate(named)]
+
+
+def _p(found: Analysis, score: float) -> float:
+    return float((1 + np.sum(found.null_draws >= score)) / (1 + len(found.null_draws)))
+
+
+def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None) -> Cause:
+    fit, effect = found.final, term.effect
+    score = 2.0 * (fit.evidence - _without(fit, index))
+    rivals = rivals_of(found, term)
+    evidence = f"adds {0.5 * score:.0f} to the log evidence beside the other causes; {_supporters(fit, index)} of {fit.plant.seg.runs} runs support it"
+    if term.since is not None:
+        evidence += f"; {effect.name} begins with run {term.since}"
+    name = effect.name if term.since is None else "change_point"
+    parameters = _parameters(fit, index, term)
+    if term.since is not None:
+        parameters = {"from_run": Estimate(float(term.since), "1", (float(term.since), float(term.since)))} | parameters
+    return Cause(name, 0, score, _p(found, score), parameters, rivals, effect.separate if rivals else "", gain, evidence)
+
+
+def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
+    """Effects that were refitted in its place and came within `_TIE` of it."""
+    rounds = {s.round: s for s in sorted(found.selection.steps, key=lambda s: s.score) if s.term.label == term.label}
+    near = []
+    for number, own in rounds.items():
+        near += [s.term.label for s in found.selection.steps if s.round == number and s.term.label != term.label and s.score > own.score - _TIE]
+    present = {t.label for t in found.final.model.terms}
+    return tuple(dict.fromkeys(n for n in near if n not in present))
+
+
+def _without(fit: Fit, index: int) -> float:
+    from dataclasses import replace
+
+    columns, prior = fit.columns_of(index), fit.prior
+    keep, keep_random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
+    less = replace(prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random])
+    return solve(fit.reduced, less).log_evidence
+
+
+def _supporters(fit: Fit, index: int) -> int:
+    """Runs whose own likelihood is better with the term than without."""
+    from dataclasses import replace
+
+    columns, prior = fit.columns_of(index), fit.prior
+    keep, keep_random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
+    less = replace(prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random])
+    return int(np.sum(fit.solution.per_run > solve(fit.reduced, less).per_run))
+
+
+def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
+    """Sizes with 95 % intervals: the wider of the model's and of the sandwich clustered by run."""
+    from scipy.stats import chi2, t
+
+    effect = term.effect
+    unit = fit.scales.amplitudes(term, fit.plant.c.L)
+    value = fit.point.values[index] * unit
+    num = fit.plant.seg.runs
+    if term.per_run:
+        rms = np.sqrt(np.mean(value**2, axis=0))
+        low, high = np.sqrt(num / chi2.ppf(0.975, num)), np.sqrt(num / chi2.ppf(0.025, num))
+        names = [p.name for p in effect.parameters if not p.shape]
+        return {f"{n}_rms": Estimate(float(r), effect.parameters[0].unit, (float(r * low), float(r * high))) for n, r in zip(names, rms, strict=True)}
+    columns = fit.columns_of(index)
+    at = np.flatnonzero(np.isin(fit.prior.shared, columns))
+    cov = np.maximum(1.0, _inflation(fit, at))[:, None] ** 0.5 * fit.solution.cov[np.ix_(at, at)] * np.maximum(1.0, _inflation(fit, at))[None, :] ** 0.5
+    cov = cov * np.outer(unit, unit)
+    half = float(t.ppf(0.975, max(num - 1, 1)))
+    q = (*value, *term.setting)
+    reported, units = effect.public(q), effect.units()
+    found = {}
+    for name, shown in reported.items():
+        shape = [p for p in effect.parameters if p.name == name and p.shape]
+        spread = 0.0 if shape else half * _spread(effect, q, name, cov, len(value))
+        found[name] = Estimate(shown, units[name], (shown - spread, shown + spread))
+    return found
+
+
+def _spread(effect: Effect, q: Sequence[float], name: str, cov: np.ndarray, num: int) -> float:
+    """Standard deviation of a reported value by the delta method (angles on the circle)."""
+    slopes = np.empty(num)
+    for i in range(num):
+        step = 1e-4 * max(cov[i, i] ** 0.5, 1e-12)
+        moved = list(q)
+        moved[i] += step
+        change = effect.public(moved)[name] - effect.public(q)[name]
+        if effect.vector and name == effect.vector[1]:
+            change = (change + np.pi) % (2.0 * np.pi) - np.pi
+        slopes[i] = change / step
+    return float(np.sqrt(max(slopes @ cov @ slopes, 0.0)))
+
+
+def _inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
+    """Clustered over model variance of some coefficients."""
+    S, mean = fit.reduced.S[:, :, :], fit.solution.mean
+    keep = fit.prior.shared
+    scores = S[:, keep, -1] - np.einsum("nij,j->ni", S[np.ix_(range(len(S)), keep, keep)], mean)
+    bread = fit.solution.cov
+    num = len(S)
+    sandwich = bread @ (scores.T @ scores * num / max(num - 1, 1)) @ bread
+    return np.diag(sandwich)[at] / np.diag(bread)[at]
+
+
+def _gear_cause(found: Analysis, g: GearFinding, gain: Gain | None) -> Cause:
+    effect = EFFECTS.get(g.effect)
+    parameter = effect.parameters[0]
+    near = tuple(x.effect for x in found.all_gears if x.actuator == g.actuator and x.effect != g.effect and x.score > g.score - _TIE)
+    runs = int(np.sum(g.per_run > 0))
+    return Cause(
+        g.effect, 0, g.score, _p(found, g.score), {parameter.name: Estimate(g.value, parameter.unit, g.ci95)}, near, effect.separate if near else "", gain,
+        f"seen between command and record of the actuator, without the ship's motion; {runs} of {len(g.per_run)} runs support it",
+    )  # fmt: skip
+
+
+def _hull_cause(found: Analysis, gain: Gain | None) -> Cause:
+    from scipy.stats import t
+
+    from .model import FREE, HULL_SPREAD
+    from .plant import HULL, NUM_HULL
+
+    fit = found.final
+    at = np.arange(len(FREE), len(FREE) + NUM_HULL)
+    half = float(t.ppf(0.975, max(fit.plant.seg.runs - 1, 1)))
+    inflation = np.maximum(1.0, _inflation(fit, at)) ** 0.5
+    values, sd = HULL_SPREAD * fit.solution.mean[at], HULL_SPREAD * np.sqrt(np.diag(fit.solution.cov)[at]) * inflation
+    parameters = {
+        p.name: Estimate(float(v), p.unit, (float(v - half * s), float(v + half * s))) for p, v, s in zip(HULL.parameters, values, sd, strict=True)
+    }
+    evidence = "a hull within 30 % of the regressions explains the runs better than one within 3 %; values are relative changes of the derivatives"
+    return Cause("hull_derivatives", 0, found.hull, _p(found, found.hull), parameters, (), "", gain, evidence)
+
+
+def _unit_cause(rank: int, u: UnitFinding) -> Cause:
+    parameters = {f"{u.channel}_factor": Estimate(float(u.factor), "1", (float(u.factor), float(u.factor)))}
+    return Cause("unit_or_sign_error", rank, np.inf, 0.0, parameters, (), "", None, f"{u.channel}: {u.kind}. {u.evidence}")
+
+
+def describe_candidates(found: Analysis, named: Sequence[str]) -> list[Candidate]:
+    """Every effect of the library once, best first, with why it was not named and the smallest size that would have been."""
+    lines: dict[str, Candidate] = {}
+    last = {s.term.label: s for s in reversed(found.selection.last)}
+    refits = {s.term.label: s.score for s in sorted(found.selection.steps, key=lambda s: s.score)}
+    for s in found.selection.first:
+        label = s.term.label
+        if label in lines:
+            continue
+        score = max(s.score, refits.get(label, -np.inf))
+        lines[label] = Candidate(
+            label, float(score), _p(found, score), _reason(found, s, score, last.get(label), named), _shown(s, found.selection.null), _detectable(found, s),
+            s.term.effect.units(), s.term.effect.family,
+        )  # fmt: skip
+    for g in found.all_gears:
+        effect = EFFECTS.get(g.effect)
+        if g.effect not in lines or g.score > lines[g.effect].score:
+            reason = "named" if g.effect in named else f"score {g.score:.0f} below the threshold {found.threshold:.0f}"
+            if g.effect not in named and g.score > found.threshold:
+                best = next(x for x in found.all_gears if x.actuator == g.actuator)
+                reason = f"{best.effect} explains the same actuator better ({best.score:.0f} against {g.score:.0f})"
+            name = effect.parameters[0].name
+            lines[g.effect] = Candidate(g.effect, g.score, _p(found, g.score), reason, {name: g.value}, {}, {name: effect.parameters[0].unit}, effect.family)
+    for name in EFFECTS.names():
+        if name not in lines:
+            lines[name] = _not_screened(found, name, named)
+    return sorted(lines.values(), key=lambda c: -c.score if np.isfinite(c.score) else np.inf)
+
+
+def _reason(found: Analysis, s: Score, score: float, last: Score | None, named: Sequence[str]) -> str:
+    label, threshold = s.term.label, found.threshold
+    if label in named:
+        return "named"
+    if found.unknown is not None and score > threshold:
+        return f"a dependence on {found.unknown.variable} explains more ({found.unknown.score:.0f} against {score:.0f})"
+    if not s.term.per_run and float(np.trace(s.information)) < 1.0:
+        return "cannot be told from the fitted coefficients with these data"
+    if score <= threshold:
+        return f"score {score:.1f} below the threshold {threshold:.0f}"
+    left = f", {last.score:.0f} beside it" if last is not None else ""
+    first = named[0] if named else "a stronger cause"
+    return f"explained by {first} ({score:.0f} alone{left})"
+
+
+def _shown(s: Score, fit: Fit) -> dict[str, float]:
+    unit = fit.scales.amplitudes(s.term, fit.plant.c.L)
+    return s.term.effect.public((*(s.estimate * unit), *s.term.setting)) if not s.term.per_run else {}
+
+
+def _detectable(found: Analysis, s: Score) -> dict[str, float]:
+    """Size whose expected score is the threshold, along each amplitude: x^2 V - log(1 + V) = T."""
+    unit = found.selection.null.scales.amplitudes(s.term, found.selection.null.plant.c.L)
+    if s.term.per_run:
+        return {}
+    names = [p.name for p in s.term.effect.parameters if not p.shape]
+    values = {}
+    for i, name in enumerate(names):
+        V = float(s.information[i, i])
+        values[name] = float(unit[i] * np.sqrt((found.threshold + np.log1p(max(V, 0.0))) / V)) if V > 1e-6 else float("nan")
+    return values
+
+
+def _not_screened(found: Analysis, name: str, named: Sequence[str]) -> Candidate:
+    effect, plant = EFFECTS.get(name), found.final.plant
+    if name in named:
+        reason = "named"
+    elif name == "hull_derivatives":
+        reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}"
+    elif name in ("wind", "wind_per_run"):
+        reason = "the wind is measured and in the model already"
+    elif name in ("change_point", "unit_or_sign_error"):
+        reason = "no sign of it"
+    elif effect.family == "thruster":
+        reason = "the thrusters are not used in these runs"
+    elif not plant.seg.commanded and name in AS_RECORDED:
+        reason = "this actuator is not commanded in these runs"
+    else:
+        reason = "not considered"
+    score = found.hull if name == "hull_derivatives" else float("nan")
+    return Candidate(name, score, float("nan"), reason, family=effect.family)
+
+
+def remaining(found: Analysis) -> dict[str, Any]:
+    """How much of the latent force the causes took away, and what the rest depends on."""
+    null, final = found.selection.null, found.final
+    share = 1.0 - np.exp(final.hyper.log_force - null.hyper.log_force)
+    force = np.exp(0.5 * final.hyper.log_force) * null.scales.w
+    best = found.generic[0] if found.generic else None
+    return {
+        "force_variance_explained": {a: float(v) for a, v in zip(("surge", "sway", "yaw"), share, strict=True)},
+        "force_sd": {a: float(v) for a, v in zip(("surge [m/s^2]", "sway [m/s^2]", "yaw [rad/s^2]"), force, strict=True)},
+        "best_dependence": None if best is None else {"axis": best.axis, "variable": best.variable, "score": best.score, "share": best.share},
+    }
+
+
+def unknown_part(found: Analysis) -> dict[str, Any] | None:
+    """Axis and variable of the dependence that no named cause covers."""
+    d = found.unknown
+    return None if d is None else {"axis": d.axis, "variable": d.variable, "score": d.score, "share": d.share}

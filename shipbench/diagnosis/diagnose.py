@@ -1,0 +1,136 @@
+"""The diagnosis: from a data set to a verdict with its evidence, its size and what it is worth."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+
+import numpy as np
+
+from ..errors import InputError
+from ..records import Dataset
+from .analysis import HULL_THRESHOLD, Analysis, analyse, causes_of
+from .causes import describe_candidates, describe_causes, remaining, unknown_part
+from .gain import FoldGain, fold_gain, summarise
+from .outcome import Diagnosis, Gain
+from .plant import Plant
+from .trace import trace_of
+from .units import check_units, corrected
+from .wrong import what_is_wrong
+
+FOLDS = 5
+FEW_RUNS, FEW_SAMPLES = 5, 300
+
+
+def diagnose(dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequence[str] | None = None, workers: int = 1) -> Diagnosis:
+    """Show what the plain physics model gets wrong on measured runs, name the causes, and measure what naming them is worth.
+
+    Args:
+        gain: cross-validate (everything is repeated on every training part); without, gains are None, and the hull is not named: that it lies off
+            the regressions is named only where fitting it pays on runs that were not fitted.
+        seed: of the bootstrap and of the folds.
+        only: effects to consider (an oracle that knows what is hidden); default all.
+        workers: processes for the folds.
+
+    Raises:
+        InputError: the ship never moves, or there are too few samples for any fit.
+    """
+    began = time.perf_counter()
+    warnings = _check(dataset)
+    units = check_units(dataset) if only is None else []
+    dataset = corrected(dataset, units)
+    plant = Plant.of(dataset)
+    cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
+    found = analyse(plant, only=only, seed=seed, cautious=cautious)
+    warnings += _doubts(found)
+    worth = _cross_validated(dataset, found, only, seed, workers) if gain and not cautious else Worth()
+    causes = describe_causes(found, units, worth.gain, worth.hull)
+    trace = trace_of(dataset, found, worth.hull)
+    verdict = "unknown" if found.unknown is not None and not units else "found" if causes else "none"
+    names = [c.effect for c in causes if c.effect != "unit_or_sign_error"]
+    return Diagnosis(
+        dataset=dataset.name, verdict=verdict, causes=tuple(causes), candidates=tuple(describe_candidates(found, [c.effect for c in causes])),
+        what_is_wrong=what_is_wrong(trace), unexplained_after=remaining(found), extended_model="+".join(["physics", *names]),
+        fingerprint=dataset.fingerprint, seconds=time.perf_counter() - began, warnings=tuple(warnings), gain=worth.gain if causes else None,
+        unknown=unknown_part(found), gain_per_run=worth.per_run if causes else (), trace=trace,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Worth:
+    """Held-out gain, ED of every run before and after [m], and whether the hull's derivatives are worth naming."""
+
+    gain: Gain | None = None
+    per_run: tuple[tuple[str, float, float], ...] = ()
+    hull: bool = False
+
+
+def _check(dataset: Dataset) -> list[str]:
+    """Refuse what cannot be fitted; warn of what cannot be trusted."""
+    samples = sum(len(r) for r in dataset.runs)
+    if samples < 20:
+        raise InputError(f"data set '{dataset.name}' has {samples} samples in {len(dataset)} runs; a diagnosis needs at least 20, better 24 runs of 120 s.")
+    states = np.concatenate([r.states for r in dataset.runs])
+    L = dataset.ship.L
+    if np.max(np.hypot(states[:, 3], states[:, 4])) < 0.01 * L**0.5:
+        raise InputError(f"data set '{dataset.name}': the ship never moves faster than {0.01 * L**0.5:.2f} m/s; check the columns u and v and their units.")
+    warnings = []
+    if len(dataset) < FEW_RUNS or samples < FEW_SAMPLES:
+        warnings.append(
+            f"{len(dataset)} runs and {samples} samples are too few to name a cause (at least {FEW_RUNS} runs and {FEW_SAMPLES} samples): "
+            "candidates are ranked, none is named."
+        )
+    if np.std(states[:, 7]) < 1e-3 and np.std(states[:, 5]) < 1e-5:
+        warnings.append("the rudder is never used and the ship never turns: nothing can be said about rudder and hull.")
+    return warnings
+
+
+def _doubts(found: Analysis) -> list[str]:
+    """Signs that the model does not belong to the data at all."""
+    base = found.selection.null.solution.mean
+    worst = float(np.max(np.abs(base)))
+    if worst > 6.0:
+        return [
+            f"the fit moves a parameter by {worst:.0f} times its ordinary spread: is the ship file that of this ship (L, B, T, displacement, rudder)? "
+            "Names are not to be trusted until that is sure."
+        ]
+    return []
+
+
+def _one_fold(fold: int, dataset: Dataset, seed: int, only: Sequence[str] | None, threshold: float, hull: bool) -> FoldGain:
+    """Selection and fits on the training part of one fold."""
+    test = _folds(len(dataset), seed)[fold]
+    train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
+    plant = Plant.of(dataset.with_runs(train))
+    extension, plain = causes_of(plant, threshold, only)
+    return fold_gain(dataset, test, extension, plain, hull)
+
+
+def _folds(num: int, seed: int) -> list[np.ndarray]:
+    return [np.sort(part) for part in np.array_split(np.random.default_rng(seed).permutation(num), min(FOLDS, num))]
+
+
+def _cross_validated(dataset: Dataset, found: Analysis, only: Sequence[str] | None, seed: int, workers: int) -> Worth:
+    """Held-out gain of the causes, and of the hull's derivatives beside them."""
+    hull = found.hull > HULL_THRESHOLD
+    if not (found.final.model.terms or found.gears or hull) or found.unknown is not None:
+        return Worth()
+    work = partial(_one_fold, dataset=dataset, seed=seed, only=only, threshold=found.threshold, hull=hull)
+    folds = range(len(_folds(len(dataset), seed)))
+    if workers > 1:
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            parts = list(pool.map(work, folds))
+    else:
+        parts = [work(k) for k in folds]
+    before, after, with_hull = (np.zeros(len(dataset)) for _ in range(3))
+    for part in parts:
+        before[part.test], after[part.test], with_hull[part.test] = part.before, part.after, part.with_hull
+    name_hull = hull and summarise(after, with_hull, seed).ci95[0] > 0.0
+    if name_hull:
+        after = with_hull
+    rows = tuple((run.id, float(b), float(a)) for run, b, a in zip(dataset.runs, before, after, strict=True))
+    return Worth(summarise(before, after, seed), rows, name_hull)

@@ -1,0 +1,323 @@
+"""Every effect of the contract: present, described, neutral at zero, felt at its typical size, symmetric, the same on every back end and per run."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from shipbench.effects.base import EFFECTS, Effect
+from shipbench.errors import InputError
+from shipbench.physics import eq2, mmg
+from shipbench.physics.actuators import gear_path
+from shipbench.physics.modifiers import Flow, Modifiers
+from shipbench.ship import complete
+from shipbench.signals import STATES
+from shipbench.simulate.hidden import Hidden, actuator_paths, gears_of, sail
+
+CONTRACT = (
+    "current", "current_per_run", "wind", "wind_per_run", "wave_drift", "shallow_water", "bank_suction",
+    "rudder_offset", "rudder_gain", "race_gain", "rudder_stall", "rudder_asymmetry", "rudder_delay", "rudder_lag", "rudder_rate_limit",
+    "rudder_deadband", "rudder_backlash", "thrust_gain", "added_resistance", "propeller_walk", "propeller_walk_astern", "wake_variation", "shaft_lag",
+    "shaft_rate_limit", "thruster_gain", "thruster_speed_loss", "thruster_lag", "thruster_lever", "cross_flow_drag", "mass_change",
+    "center_of_gravity_shift", "hull_derivatives", "list", "heading_bias", "yaw_rate_bias", "antenna_offset", "speed_scale", "position_delay",
+    "velocity_delay", "unit_or_sign_error", "change_point",
+)  # fmt: skip
+FAMILIES = {"environment", "rudder", "propulsion", "thruster", "hull", "sensor", "time"}
+NAMES = [name for name in EFFECTS.names() if name != "change_point"]  # it has no values of its own: see test_change_point
+
+MIRROR: dict[str, tuple[int, ...]] = {
+    "current": (1,), "current_per_run": (1,), "wind": (1,), "wind_per_run": (1,), "wave_drift": (1,),  # the east component, at psi -> -psi
+    "bank_suction": (1,),  # the bearing
+    "rudder_offset": (0,), "rudder_asymmetry": (0,), "propeller_walk": (0,), "propeller_walk_astern": (0,), "list": (0,),
+    "heading_bias": (0,), "yaw_rate_bias": (0,), "antenna_offset": (1,),
+}  # fmt: skip
+"""Indices of the values that change sign in a mirror that exchanges port and starboard; none for the others."""
+
+FLIPPED_STATES = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0, -1.0])
+CONTAINER = mmg.load_mmg_ship("container130")
+PARTICULARS = complete(CONTAINER.particulars)
+C = eq2.coefficients(PARTICULARS)
+P = np.array([0.0, 2e4, 1e4, 1e3, 0.0, 3.0, 0.0, -1.5, 0.03, 0.0, 1.2])
+
+
+def get(name: str) -> Effect:
+    return EFFECTS.get(name)
+
+
+def of(enters: str) -> list[str]:
+    return [name for name in NAMES if get(name).enters == enters]
+
+
+def typical(effect: Effect, L: float = 130.0) -> tuple[float, ...]:
+    return tuple(p.typical for p in effect.sized(L))
+
+
+def nothing(effect: Effect) -> tuple[float, ...]:
+    """No amplitude; shape parameters as usual."""
+    return tuple(p.typical if p.shape else 0.0 for p in effect.parameters)
+
+
+@cache
+def flow() -> Flow:
+    """Motion at twelve instants, ahead and astern, with large rudder angles, both thrusters and reversed screws among them."""
+    rng = np.random.default_rng(12)
+    n = 12
+    u, back = rng.uniform(1.0, 6.0, n), np.arange(n) >= 9
+    return Flow(
+        x=rng.uniform(-200, 150, n), y=rng.uniform(-200, 150, n), t=np.zeros(n), psi=rng.uniform(-3, 3, n), u=np.where(back, -0.4 * u, u),
+        v=rng.uniform(-1, 1, n), r=rng.uniform(-0.015, 0.015, n), n=np.where(back, -1.0, 1.0) * rng.uniform(60, 120, n),
+        delta=rng.uniform(-0.6, 0.6, n), F_b=rng.uniform(-4e4, 4e4, n), F_s=rng.uniform(-4e4, 4e4, n),
+    )  # fmt: skip
+
+
+def mirrored(s: Flow) -> Flow:
+    odd = ("y", "psi", "v", "r", "delta", "F_b", "F_s")
+    return s._replace(**{key: -getattr(s, key) for key in odd})
+
+
+def on_eq2(s: Flow, effect: Effect | None, q=()) -> tuple:
+    e = Modifiers()
+    if effect is not None:
+        effect.force(e, s, q, PARTICULARS)
+    return eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, (s.u, s.v), C, list(P), e)
+
+
+def on_mmg(s: Flow, effect: Effect | None, q=()) -> tuple:
+    e = Modifiers()
+    if effect is not None:
+        effect.force(e, s, q, PARTICULARS)
+    return mmg.accelerations(CONTAINER, s.psi, s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, mods=e)
+
+
+SHIPS = {"eq2": on_eq2, "mmg": on_mmg}
+
+
+@cache
+def record() -> np.ndarray:
+    """Three recorded turns, (3, 30, 10)."""
+    s0 = np.zeros((3, 10))
+    s0[:, 3], s0[:, 6], s0[:, 2] = 4.5, 90.0, (0.3, -2.0, 1.0)
+    U = np.zeros((3, 29, 4))
+    U[..., 0], U[..., 1] = 90.0, np.array([0.3, -0.2, 0.1])[:, None]
+    U[:, 10:, 1] *= -1.0
+    U[:, 5:20, 2] = 3e4
+    return sail(CONTAINER, s0, U, 1.0)
+
+
+def commands() -> np.ndarray:
+    U = np.zeros((2, 60, 4))
+    U[:, :30] = (60.0, 0.5, 3e4, 2e4)
+    U[:, 30:] = (110.0, -0.3, -2e4, 1e4)
+    U[1] *= 0.7
+    return U
+
+
+def actuators(hidden: list[Hidden]) -> np.ndarray:
+    return actuator_paths(CONTAINER, np.zeros((2, 10)), commands(), 1.0, 2, hidden)
+
+
+# --- what every effect says of itself
+
+
+def test_every_name_of_the_contract_has_its_file():
+    assert set(EFFECTS.names()) >= set(CONTRACT)
+
+
+@pytest.mark.parametrize("name", EFFECTS.names())
+def test_an_effect_is_named_after_its_file_and_described(name: str):
+    effect = get(name)
+    assert effect.name == name
+    assert effect.family in FAMILIES
+    assert all(isinstance(text, str) and len(text) > 3 for text in (effect.summary, effect.source, effect.separate))
+    module = __import__(type(effect).__module__, fromlist=["EFFECT"])
+    assert len(module.__doc__ or "") > 30
+    assert len({p.name for p in effect.parameters}) == len(effect.parameters)
+    for p in effect.parameters:
+        assert p.unit, p.name
+        assert p.low < p.high, p.name
+        assert p.low <= p.typical <= p.high, p.name
+        assert p.shape or p.low <= 0.0 or name.endswith("rate_limit"), p.name
+    assert len(effect.parameters) > 0 or name == "change_point"  # whose values are those of the effect that changes
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_reported_value_has_a_unit(name: str):
+    assert set(get(name).units()) == set(get(name).public(typical(get(name))))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_sizes_follow_froude(name: str):
+    powers = {"1": 0.0, "m/s": 0.5, "s": 0.5, "rad/s": -0.5, "m": 1.0, "m^2": 2.0, "rpm/s": -1.0, "rad": 0.0}
+    effect = get(name)
+    for large, small in zip(effect.parameters, effect.sized(130.0 / 4.0), strict=True):
+        factor = 4.0 ** -powers[large.unit]
+        assert (small.typical, small.low, small.high) == pytest.approx((large.typical * factor, large.low * factor, large.high * factor))
+    assert effect.sized(130.0) == effect.parameters
+
+
+# --- neutral at zero, felt at a typical size
+
+
+@pytest.mark.parametrize("ship", SHIPS)
+@pytest.mark.parametrize("name", of("force"))
+def test_no_size_is_exactly_the_plain_ship(name: str, ship: str):
+    effect = get(name)
+    for plain, same in zip(SHIPS[ship](flow(), None), SHIPS[ship](flow(), effect, nothing(effect)), strict=True):
+        np.testing.assert_allclose(same, plain, rtol=1e-13, atol=1e-18)
+
+
+@pytest.mark.parametrize("name", of("gear"))
+def test_no_size_leaves_the_gears_as_built(name: str):
+    assert gears_of(CONTAINER, [Hidden(get(name), (0.0,))]) == gears_of(CONTAINER, [])
+
+
+@pytest.mark.parametrize("name", of("sensor"))
+def test_no_size_leaves_the_record_as_it_is(name: str):
+    effect = get(name)
+    np.testing.assert_array_equal(effect.measure(record(), nothing(effect), 1.0), record())
+
+
+@pytest.mark.parametrize("ship", SHIPS)
+@pytest.mark.parametrize("name", of("force"))
+def test_a_typical_size_is_felt(name: str, ship: str):
+    effect = get(name)
+    plain, moved = np.array(SHIPS[ship](flow(), None)), np.array(SHIPS[ship](flow(), effect, typical(effect)))
+    assert np.max(np.abs(moved - plain) / np.max(np.abs(plain), axis=1, keepdims=True)) > 1e-3
+
+
+@pytest.mark.parametrize("name", of("gear"))
+def test_a_typical_size_changes_the_path_of_the_actuator(name: str):
+    effect = get(name)
+    plain, moved = actuators([]), actuators([Hidden(effect, typical(effect))])
+    assert np.max(np.abs(moved - plain) / np.max(np.abs(plain), axis=(0, 1))) > 0.01
+
+
+@pytest.mark.parametrize("name", of("sensor"))
+def test_a_typical_size_changes_the_record(name: str):
+    effect = get(name)
+    assert np.max(np.abs(effect.measure(record(), typical(effect), 1.0) - record())) > 1e-3
+
+
+@pytest.mark.parametrize("value", [1.0, 1])
+@pytest.mark.parametrize(("name", "ship"), [("current", "eq2"), ("current", "mmg"), ("center_of_gravity_shift", "eq2"), ("rudder_asymmetry", "mmg")])
+def test_a_size_of_one_is_not_taken_for_nothing(name: str, ship: str, value: float):
+    effect, s = get(name), flow()._replace(psi=0.0)
+    q = (value, 0.0)[: len(effect.parameters)]
+    assert np.max(np.abs(np.array(SHIPS[ship](s, effect, q)) - np.array(SHIPS[ship](s, None)))) > 1e-6
+
+
+# --- mirror
+
+
+def mirrored_values(name: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    q = tuple(0.8 * v for v in typical(get(name)))
+    odd = MIRROR.get(name, ())
+    return q, tuple(-v if i in odd else v for i, v in enumerate(q))
+
+
+@pytest.mark.parametrize("name", of("force"))
+def test_port_and_starboard_are_mirror_images(name: str):
+    q, image = mirrored_values(name)
+    s = flow()
+    du, dv, dr = on_eq2(s, get(name), q)
+    mu, mv, mr = on_eq2(mirrored(s), get(name), image)
+    np.testing.assert_allclose(mu, du, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(mv, -dv, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(mr, -dr, rtol=1e-9, atol=1e-17)
+
+
+@pytest.mark.parametrize("name", of("sensor"))
+def test_sensors_see_mirror_images(name: str):
+    q, image = mirrored_values(name)
+    seen = get(name).measure(record() * FLIPPED_STATES, image, 1.0)
+    np.testing.assert_allclose(seen * FLIPPED_STATES, get(name).measure(record(), q, 1.0), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", of("gear"))
+def test_gears_treat_both_sides_alike(name: str):
+    gear = gears_of(CONTAINER, [Hidden(get(name), typical(get(name)))])["delta"]
+    side = commands()[..., 1]
+    np.testing.assert_allclose(gear_path(np.zeros(2), -side, 1.0, gear, 4), -gear_path(np.zeros(2), side, 1.0, gear, 4), atol=1e-15)
+
+
+# --- back ends and values per run
+
+
+@pytest.mark.parametrize("name", of("force"))
+def test_numpy_torch_and_casadi_agree(name: str):
+    torch, casadi = pytest.importorskip("torch"), pytest.importorskip("casadi")
+    effect, s = get(name), flow()
+    q = typical(effect)
+    wanted = np.array(on_eq2(s, effect, q))
+    tensors = Flow(*(torch.tensor(v, dtype=torch.float64) for v in s))
+    sizes = [torch.tensor(v, dtype=torch.float64) for v in q]
+    np.testing.assert_allclose(torch.stack(on_eq2(tensors, effect, sizes)).numpy(), wanted, rtol=1e-9, atol=1e-15)
+    state, size = casadi.SX.sym("s", len(s)), casadi.SX.sym("q", len(q))
+    found = on_eq2(Flow(*casadi.vertsplit(state)), effect, casadi.vertsplit(size))
+    f = casadi.Function("f", [state, size], [casadi.vertcat(*found)])
+    np.testing.assert_allclose(np.array(f.map(len(s.u))(np.array(s), np.tile(np.array(q)[:, None], len(s.u)))), wanted, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("ship", SHIPS)
+@pytest.mark.parametrize("name", of("force"))
+def test_forces_of_values_per_run_are_those_of_each_run(name: str, ship: str):
+    effect, s = get(name), flow()
+    share = np.linspace(0.2, 1.0, len(s.u))
+    together = np.array(SHIPS[ship](s, effect, tuple(v * share for v in typical(effect))))
+    for i, part in enumerate(share):
+        alone = SHIPS[ship](Flow(*(v[i] for v in s)), effect, tuple(v * part for v in typical(effect)))
+        np.testing.assert_allclose(together[:, i], np.array(alone, dtype=float), rtol=1e-10, atol=1e-16)
+
+
+@pytest.mark.parametrize("name", of("sensor"))
+def test_records_with_values_per_run_are_those_of_each_run(name: str):
+    effect, share = get(name), np.array([0.3, 0.6, 1.0])
+    q = tuple(p.typical * np.where(p.shape, 1.0, share) for p in effect.parameters)
+    together = effect.measure(record(), q, 1.0)
+    for i in range(3):
+        np.testing.assert_allclose(
+            together[i : i + 1], effect.measure(record()[i : i + 1], tuple(float(v[i]) for v in q), 1.0), rtol=1e-12, atol=1e-12
+        )
+
+
+@pytest.mark.parametrize("name", of("gear"))
+def test_gears_with_values_per_run_are_those_of_each_run(name: str):
+    effect, share = get(name), np.array([0.0, 0.8])
+    value = effect.parameters[0].typical
+    together = actuators([Hidden(effect, (value * share,))])
+    for i in range(2):
+        alone = actuators([Hidden(effect, (float(value * share[i]),))])
+        np.testing.assert_allclose(together[i], alone[i], rtol=1e-10, atol=1e-9)
+
+
+# --- reported values
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_reported_values_lead_back_to_the_size(name: str):
+    effect = get(name)
+    q = tuple(0.7 * v for v in typical(effect)) if name != "unit_or_sign_error" else (-2.0, 5.0)
+    assert effect.internal(effect.public(q)) == pytest.approx(q, rel=1e-12)
+    with pytest.raises(InputError, match=f"unknown parameter of effect '{name}' 'sise'"):
+        effect.internal({"sise": 1.0})
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if get(name).vector])
+def test_a_vector_is_reported_as_size_and_direction(name: str):
+    effect = get(name)
+    size, direction = effect.vector
+    assert effect.public((0.0, -2.0)) == pytest.approx({size: 2.0, direction: 1.5 * np.pi})
+    assert effect.units() == {size: effect.parameters[0].unit, direction: "rad"}
+    with pytest.raises(InputError, match=f"{size} is missing"):
+        effect.internal({direction: 1.0})
+
+
+def test_values_not_given_are_zero_and_shapes_typical():
+    assert get("rudder_stall").internal({"lost_share": 0.2}) == (0.2, 0.3)
+    assert get("hull_derivatives").internal({"N_r": 0.1}) == (0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def test_the_states_stand_in_the_order_that_the_mirror_assumes():
+    assert [s for s, f in zip(STATES, FLIPPED_STATES, strict=True) if f < 0] == ["y", "psi", "v", "r", "delta", "F_b", "F_s"]
