@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from . import cli_diagnosis
+from .cli_common import DatasetArgument, Json, Quiet, console_for_tables, print_json
 from .errors import InputError, ShipbenchError
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from .bench.leaderboard import Board
     from .bench.results import Results
 
@@ -50,10 +49,7 @@ app = typer.Typer(
 )  # fmt: skip
 data_app = typer.Typer(help="Data sets: list, make, check, describe.", **_SETTINGS)
 app.add_typer(data_app, name="data")
-
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document to stdout and nothing else.")]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No progress.")]
-DatasetArgument = Annotated[str, typer.Argument(metavar="DATASET", help="Registered name or folder.")]
+cli_diagnosis.register(app)
 
 
 def _show_version(wanted: bool) -> None:
@@ -69,18 +65,6 @@ def _main(
     version: Annotated[bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")] = False,
 ) -> None:
     pass
-
-
-def _print_json(data: Any) -> None:
-    typer.echo(json.dumps(data, indent=1, default=str, allow_nan=False))
-
-
-def _console() -> Console:
-    """A console for tables; wide enough for Table III where the output is a file or a pipe."""
-    from rich.console import Console
-
-    console = Console(highlight=False, soft_wrap=False)
-    return console if console.is_terminal else Console(highlight=False, width=160)
 
 
 def _seeds(text: str | None) -> tuple[int, ...] | None:
@@ -126,7 +110,7 @@ def run(
     written = _write_boards(outcome.results, folder, str(ctx.obj))
     if as_json:
         boards = {board.dataset: board.as_json() for board, _ in written}
-        _print_json({"out": str(folder), "leaderboards": boards, "failed": outcome.failed})
+        print_json({"out": str(folder), "leaderboards": boards, "failed": outcome.failed})
     elif not quiet:
         _show_boards(written)
         typer.echo(f"Results in {folder}; leaderboard: {', '.join(str(path) for _, path in written)}")
@@ -146,7 +130,7 @@ def _write_boards(results: Results, folder: Path, command: str, plots: bool = Tr
 
 
 def _show_boards(written: list[tuple[Board, Path]]) -> None:
-    console = _console()
+    console = console_for_tables()
     for board, _ in written:
         console.print(f"\nLeaderboard: {board.dataset}", style="bold", markup=False)
         for table in board.tables:
@@ -167,7 +151,7 @@ def leaderboard(
 
     written = _write_boards(read_results(results or [_newest_results()]), out, str(ctx.obj), plots)
     if as_json:
-        _print_json({board.dataset: board.as_json() for board, _ in written})
+        print_json({board.dataset: board.as_json() for board, _ in written})
     elif not quiet:
         _show_boards(written)
         typer.echo(f"Written: {', '.join(str(path) for _, path in written)}")
@@ -188,7 +172,7 @@ def models(as_json: Json = False) -> None:
 
     parts = describe_parts(PREDICTORS)
     if as_json:
-        _print_json(parts)
+        print_json(parts)
         return
     for part in parts:
         typer.echo(f"{part['name']:<12s} {part['summary']}" + ("" if part["from"] == "shipbench" else f"  [{part['from']}]"))
@@ -205,7 +189,7 @@ def validate(as_json: Json = False) -> None:
 
     rows = table()
     if as_json:
-        _print_json(rows)
+        print_json(rows)
     else:
         said = {True: "passed", False: "FAILED", None: ""}
         columns = [
@@ -213,7 +197,7 @@ def validate(as_json: Json = False) -> None:
             TableColumn("published", "published", significant(4)), TableColumn("unit", "unit"), TableColumn("tolerance", "tolerance"),
             TableColumn("", "said"), TableColumn("source", "source"),
         ]  # fmt: skip
-        Table("Simulator against published figures", columns, [row | {"said": said[row["passed"]]} for row in rows]).show(_console())
+        Table("Simulator against published figures", columns, [row | {"said": said[row["passed"]]} for row in rows]).show(console_for_tables())
     if any(row["passed"] is False for row in rows):
         raise typer.Exit(1)  # a figure is outside its tolerance
 
@@ -241,7 +225,7 @@ def data_list(as_json: Json = False) -> None:
 
     parts = [DATASETS.get(name) for name in DATASETS.names()]
     if as_json:
-        _print_json([{"name": p.name, "summary": p.summary, "licence": p.licence} for p in parts])
+        print_json([{"name": p.name, "summary": p.summary, "licence": p.licence} for p in parts])
         return
     for part in parts:
         typer.echo(f"{part.name:<18s} {part.summary} ({part.licence})")
@@ -273,7 +257,7 @@ def data_check(dataset: DatasetArgument, as_json: Json = False) -> None:
 
     facts = dataset_facts(load_dataset(dataset))
     if as_json:
-        _print_json(facts)
+        print_json(facts)
         return
     for key, value in facts.items():
         for line in value if isinstance(value, list) else [value]:
@@ -288,10 +272,10 @@ def data_describe(dataset: DatasetArgument, as_json: Json = False) -> None:
 
     tables = describe_tables(load_dataset(dataset))
     if as_json:
-        _print_json([table.as_json() for table in tables])
+        print_json([table.as_json() for table in tables])
         return
     for table in tables:
-        table.show(_console())
+        table.show(console_for_tables())
 
 
 def main() -> None:

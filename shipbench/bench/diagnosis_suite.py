@@ -203,12 +203,13 @@ def outcome(row: dict[str, Any]) -> str:
 def suite_command(
     *, diagnose: Diagnose, seed: int = 0, per_effect: int = 3, kinds: str | None = None, development: bool = False, out: Path | None = None,
     resume: bool = False, workers: int = 2, page: Path | None = None, baselines: bool = True, plan: Trials | None = None,
-    progress: Progress | None = None, command: str = "shipbench suite diagnosis",
+    progress: Progress | None = None, command: str = "shipbench suite diagnosis", gain: bool = True,
 ) -> tuple[Path, list[dict[str, Any]]]:  # fmt: skip
     """What `shipbench suite diagnosis` does: run, save rows and page.
 
     Args:
         kinds: names separated by commas (default all).
+        gain: with the cross-validated gain of every diagnosis and of the oracle (four times the time).
         out: folder of the rows (default runs/suite_diagnosis, with -development for that).
         page: folder of `diagnosis.md` and `diagnosis.json`; default `leaderboards` for the whole suite on test ships, else `out`.
 
@@ -230,6 +231,8 @@ def suite_command(
         kinds=chosen,
         workers=workers,
         resume=resume,
+        gain=gain,
+        oracle=gain,
         baselines=baselines,
         plan=plan,
         progress=progress,

@@ -109,7 +109,7 @@ def _unknown(selection: Selection, gears: Sequence[GearFinding], after: Sequence
 
 def hull_evidence(fit: Fit) -> float:
     """2 log evidence for a hull that lies off the regressions by the usual 30 %, against one that lies within 3 %."""
-    lin = Linearisation(fit.plant, fit.scales, fit.point)
+    lin = Linearisation(fit.plant, fit.scales, fit.point, fit.motion)
     wide = settle(lin, fit.model, fit.hyper, fit.log_tau2)
     narrow = settle(lin, replace(fit.model, hull=_NARROW), fit.hyper, fit.log_tau2, steps=8)
     return 2.0 * (wide.evidence - narrow.evidence)
@@ -138,5 +138,3 @@ def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:
         score = np.einsum("cd,cd->d", s[cols], np.linalg.solve(A, s[cols])) - np.linalg.slogdet(A)[1]
         best = np.maximum(best, score)
     return np.sort(best)
-
-

@@ -47,7 +47,9 @@ def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None) -> C
     fit, effect = found.final, term.effect
     score = 2.0 * (fit.evidence - _without(fit, index))
     rivals = rivals_of(found, term)
-    evidence = f"adds {0.5 * score:.0f} to the log evidence beside the other causes; {_supporters(fit, index)} of {fit.plant.seg.runs} runs support it"
+    evidence = (
+        f"adds {0.5 * score:.0f} to the log evidence beside the other causes; {_supporters(fit, index)} of {fit.plant.seg.runs} runs support it"
+    )
     if term.since is not None:
         evidence += f"; {effect.name} begins with run {term.since}"
     name = effect.name if term.since is None else "change_point"
@@ -72,7 +74,9 @@ def _without(fit: Fit, index: int) -> float:
 
     columns, prior = fit.columns_of(index), fit.prior
     keep, keep_random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
-    less = replace(prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random])
+    less = replace(
+        prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random]
+    )
     return solve(fit.reduced, less).log_evidence
 
 
@@ -82,7 +86,9 @@ def _supporters(fit: Fit, index: int) -> int:
 
     columns, prior = fit.columns_of(index), fit.prior
     keep, keep_random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
-    less = replace(prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random])
+    less = replace(
+        prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random]
+    )
     return int(np.sum(fit.solution.per_run > solve(fit.reduced, less).per_run))
 
 
@@ -101,7 +107,9 @@ def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
         return {f"{n}_rms": Estimate(float(r), effect.parameters[0].unit, (float(r * low), float(r * high))) for n, r in zip(names, rms, strict=True)}
     columns = fit.columns_of(index)
     at = np.flatnonzero(np.isin(fit.prior.shared, columns))
-    cov = np.maximum(1.0, _inflation(fit, at))[:, None] ** 0.5 * fit.solution.cov[np.ix_(at, at)] * np.maximum(1.0, _inflation(fit, at))[None, :] ** 0.5
+    cov = (
+        np.maximum(1.0, _inflation(fit, at))[:, None] ** 0.5 * fit.solution.cov[np.ix_(at, at)] * np.maximum(1.0, _inflation(fit, at))[None, :] ** 0.5
+    )
     cov = cov * np.outer(unit, unit)
     half = float(t.ppf(0.975, max(num - 1, 1)))
     q = (*value, *term.setting)
@@ -195,7 +203,9 @@ def describe_candidates(found: Analysis, named: Sequence[str]) -> list[Candidate
                 best = next(x for x in found.all_gears if x.actuator == g.actuator)
                 reason = f"{best.effect} explains the same actuator better ({best.score:.0f} against {g.score:.0f})"
             name = effect.parameters[0].name
-            lines[g.effect] = Candidate(g.effect, g.score, _p(found, g.score), reason, {name: g.value}, {}, {name: effect.parameters[0].unit}, effect.family)
+            lines[g.effect] = Candidate(
+                g.effect, g.score, _p(found, g.score), reason, {name: g.value}, {}, {name: effect.parameters[0].unit}, effect.family
+            )
     for name in EFFECTS.names():
         if name not in lines:
             lines[name] = _not_screened(found, name, named)

@@ -73,11 +73,15 @@ def _check(dataset: Dataset) -> list[str]:
     """Refuse what cannot be fitted; warn of what cannot be trusted."""
     samples = sum(len(r) for r in dataset.runs)
     if samples < 20:
-        raise InputError(f"data set '{dataset.name}' has {samples} samples in {len(dataset)} runs; a diagnosis needs at least 20, better 24 runs of 120 s.")
+        raise InputError(
+            f"data set '{dataset.name}' has {samples} samples in {len(dataset)} runs; a diagnosis needs at least 20, better 24 runs of 120 s."
+        )
     states = np.concatenate([r.states for r in dataset.runs])
     L = dataset.ship.L
     if np.max(np.hypot(states[:, 3], states[:, 4])) < 0.01 * L**0.5:
-        raise InputError(f"data set '{dataset.name}': the ship never moves faster than {0.01 * L**0.5:.2f} m/s; check the columns u and v and their units.")
+        raise InputError(
+            f"data set '{dataset.name}': the ship never moves faster than {0.01 * L**0.5:.2f} m/s; check the columns u and v and their units."
+        )
     warnings = []
     if len(dataset) < FEW_RUNS or samples < FEW_SAMPLES:
         warnings.append(

@@ -51,7 +51,7 @@ def base_precision(model: Model) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted model and its linearisation. solution: of `prior` on `gram`; estimate, cov: of [eta, w] per segment."""
+    """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate, cov: of [eta, w] per segment."""
 
     plant: Plant
     scales: Scales
@@ -62,6 +62,7 @@ class Fit:
     prior: Prior
     columns: Columns
     candidates: tuple[Term, ...]
+    motion: np.ndarray
     products: Products
     gram: Gram
     reduced: Reduced
@@ -151,7 +152,7 @@ def start(plant: Plant) -> tuple[Point, Hyper]:
 
 def fit(
     plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 20,
-    candidates: Sequence[Term] = (),
+    candidates: Sequence[Term] = (), guess: np.ndarray | None = None,
 ) -> Fit:  # fmt: skip
     """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), to the best evidence found.
 
@@ -162,7 +163,7 @@ def fit(
     if len(point.terms) < len(model.terms):
         new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
         point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
-    lin, best, idle = Linearisation(plant, scales, point), None, 0
+    lin, best, idle = Linearisation(plant, scales, point, guess), None, 0
     for _ in range(iterations):
         found = settle(lin, model, hyper, log_tau2)
         if best is None or found.evidence > best[0].evidence + _WORTH_A_STEP:
@@ -173,10 +174,12 @@ def fit(
                 break
         hyper, log_tau2 = found.hyper, found.log_tau2
         target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
-        at, share, trial = objective(lin, model, hyper, log_tau2, found.gram), 1.0, Linearisation(plant, scales, target)
+        at, share = objective(lin, model, hyper, log_tau2, found.gram), 1.0
+        trial = Linearisation(plant, scales, target, lin.towards(target))
         while objective(trial, model, hyper, log_tau2, found.gram) > _MAY_RISE * at and share > 0.1:
             share *= 0.5
-            trial = Linearisation(plant, scales, between(lin.point, target, share))
+            part = between(lin.point, target, share)
+            trial = Linearisation(plant, scales, part, lin.towards(part))
         lin = trial
     if best is None:
         raise WorkError("the diagnosis made no step of its fit; give at least one iteration.")
@@ -185,14 +188,18 @@ def fit(
     return settle(best[1], model, best[0].hyper, best[0].log_tau2, candidates)
 
 
-def track(plant: Plant, scales: Scales, point: Point, hyper: Hyper) -> tuple[Point, Hyper]:
+def track(plant: Plant, scales: Scales, point: Point, hyper: Hyper) -> tuple[Point, Hyper, np.ndarray]:
     """Put the trajectories on the measured ones by the latent force alone: Gauss-Newton is then nearly linear in everything else."""
     still = Model(hull=1e-4, base=1e-4)
-    found = settle(Linearisation(plant, scales, point), still, hyper, {})
-    return point_from(still, point, found.solution, found.prior, found.estimate), found.hyper
+    lin = Linearisation(plant, scales, point, plant.seg.states[..., :6].copy())
+    found = settle(lin, still, hyper, {})
+    tracked = point_from(still, point, found.solution, found.prior, found.estimate)
+    return tracked, found.hyper, lin.towards(tracked)
 
 
-def settle(lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (), steps: int = _EM_STEPS) -> Fit:
+def settle(
+    lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (), steps: int = _EM_STEPS
+) -> Fit:
     """Variances and posterior on one linearisation."""
     plant, scales, point, columns = lin.plant, lin.scales, lin.point, lin.columns(candidates)
     products = products_of(plant, scales, point, columns)
@@ -210,7 +217,7 @@ def settle(lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, f
             update_random(model, solution, log_tau2)
             solution = solve(reduced, model.prior(log_tau2))
     return Fit(
-        plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), products, gram, reduced, solution, estimate, cov
+        plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), lin.motion, products, gram, reduced, solution, estimate, cov
     )
 
 

@@ -78,7 +78,9 @@ def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
         ok = np.isfinite(J).all(axis=(1, 2)) & np.isfinite(e).all(axis=1)
         at = np.concatenate([lin.point.base[free], *lin.point.values]) if terms else lin.point.base[free]
         prior = np.ones(len(at))
-        step = np.linalg.solve(np.einsum("bti,btj->ij", J[ok], J[ok]) + np.diag(prior), np.einsum("bti,bt->i", J[ok], e[ok]) - prior * (at - _centre(free, terms)))
+        step = np.linalg.solve(
+            np.einsum("bti,btj->ij", J[ok], J[ok]) + np.diag(prior), np.einsum("bti,bt->i", J[ok], e[ok]) - prior * (at - _centre(free, terms))
+        )
         share, old = 1.0, _cost(lin, weights)
         while True:
             trial = _lin(plant, scales, _moved(lin.point, free, terms, at + share * step))

@@ -176,33 +176,59 @@ _STEP, _OWN_STEP, CANDIDATE_STEP = 1e-4, 0.02, 0.5
 
 
 class Linearisation:
-    """A trajectory and its sensitivities: forward differences of all single steps at once, chained by the steps' Jacobians."""
+    """A trajectory and its sensitivities: forward differences of all single steps at once, chained by the steps' Jacobians.
 
-    def __init__(self, plant: Plant, scales: Scales, point: Point) -> None:
+    The trajectory may be a guess whose steps do not quite meet (lifted Newton, multiple shooting): the gaps are chained into `predicted`, and close
+    as the iterations converge. Without a guess the model is rolled out.
+    """
+
+    def __init__(self, plant: Plant, scales: Scales, point: Point, guess: np.ndarray | None = None) -> None:
         self.plant, self.scales, self.point = plant, scales, point
         self.now = actives(plant, scales, point)
         self.p, self.ship = parameters(scales, point.base)
         self.forces = [a for a in self.now if a.effect.enters == "force"]
         self.path = plant.path_of(self.now)
         w = plant.hat @ (scales.w * point.w)
-        self.motion = plant.roll(plant.seg.states[:, 0, :6] + scales.eta * point.eta, self.p, [*self.ship, *self.forces], w, self.path)
-        self.predicted = plant.measured(self.motion, self.now)
+        x0 = plant.seg.states[:, 0, :6] + scales.eta * point.eta
+        self.motion = plant.roll(x0, self.p, [*self.ship, *self.forces], w, self.path) if guess is None else guess
         w = np.swapaxes(w, 0, 1)
         self.push = (w[:-1], w[1:])
         self.states = np.swapaxes(self.motion[:, :-1], 0, 1)[None]
+        self.here = self._steps()[0]
+        moved = self._steps(states=self.states + _STEP * np.eye(6)[:, None, None, :] * scales.eta) - self.here
+        self.jacobian = np.moveaxis(moved, 0, -1) / (_STEP * scales.eta)  # (K, B, 6, 6)
+        self.gaps = self.here - np.swapaxes(self.motion[:, 1:], 0, 1)
+        self.predicted = plant.measured(self.motion, self.now)
+        if guess is not None:
+            closed = self._chain(self.gaps[None], (x0 - guess[:, 0])[None])[..., 0]
+            self.predicted = plant.measured(self.motion + closed, self.now)
 
     def columns(self, candidates: Sequence[Term] = ()) -> Columns:
         """All sensitivities."""
         scales = self.scales
-        self.here = self._steps()[0]
-        moved = self._steps(states=self.states + _STEP * np.eye(6)[:, None, None, :] * scales.eta) - self.here
-        self.jacobian = np.moveaxis(moved, 0, -1) / (_STEP * scales.eta)  # (K, B, 6, 6)
         p, ship = parameters(scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, None, :])
-        base = (self._steps(p=p, ship=ship) - self.here) / _STEP
+        self.base_sources = (self._steps(p=p, ship=ship) - self.here) / _STEP
+        self.pulses = self._pulses()
         first = np.broadcast_to(np.eye(6)[:, None, :] * scales.eta, (6, self.here.shape[1], 6))
         eta = self._chained(np.zeros((6, *self.here.shape)), first)
+        self.own_sources: list[np.ndarray | None] = []
         own = [self._of_term(i, term) for i, term in enumerate(self.point.terms)]
-        return Columns(self.predicted, eta, self._chained(self._pulses()), self._chained(base), tuple(own), tuple(self._of_candidates(candidates)))
+        base, latent = self._chained(self.base_sources), self._chained(self.pulses)
+        return Columns(self.predicted, eta, latent, base, tuple(own), tuple(self._of_candidates(candidates)))
+
+    def towards(self, target: Point) -> np.ndarray:
+        """The trajectory that the linear model expects at another point, gaps closed: the guess for the next iteration. After `columns`."""
+        here = self.point
+        w = np.moveaxis(target.w - here.w, -1, 1).reshape(len(here.w), -1)
+        sources = self.gaps + np.einsum("dkbi,d->kbi", self.base_sources, target.base - here.base) + np.einsum("dkbi,bd->kbi", self.pulses, w)
+        run = self.plant.seg.run
+        for i, source in enumerate(self.own_sources):
+            if source is not None:
+                change = target.values[i] - here.values[i]
+                change = change[run] if here.terms[i].per_run else np.broadcast_to(change, (len(run), len(change)))
+                sources = sources + np.einsum("dkbi,bd->kbi", source, change)
+        x0 = self.plant.seg.states[:, 0, :6] + self.scales.eta * target.eta
+        return self.motion + self._chain(sources[None], (x0 - self.motion[:, 0])[None])[..., 0]
 
     def _steps(
         self,
@@ -228,8 +254,8 @@ class Linearisation:
         sources = start[:, None] * hat[:-1].T[None, :, :, None, None] + end[:, None] * hat[1:].T[None, :, :, None, None]
         return sources.reshape(3 * knots, *self.here.shape)
 
-    def _chained(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
-        """Columns (B, T, D) of the measurement from changes of the steps' ends (D, K, B, 6) and of the initial states (D, B, 6)."""
+    def _chain(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
+        """Change of the motion (B, K + 1, 6, D) from changes of the steps' ends (D, K, B, 6) and of the initial states (D, B, 6)."""
         D, K, B, _ = sources.shape
         S = np.zeros((K + 1, B, 6, D))
         if first is not None:
@@ -238,16 +264,22 @@ class Linearisation:
         with np.errstate(all="ignore"):
             for k in range(K):
                 S[k + 1] = self.jacobian[k] @ S[k] + flow[k]
-        S = np.swapaxes(S, 0, 1)
+        return np.swapaxes(S, 0, 1)
+
+    def _chained(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
+        """Columns (B, T, D) of the measurement, of the same changes."""
+        S = self._chain(sources, first)
         if any(a.effect.enters == "sensor" for a in self.now):
             moved = self.plant.measured(self.motion + _STEP * np.moveaxis(S, -1, 0), self.now)
-            S = np.moveaxis((moved - self.predicted) / _STEP, 0, -1)
-        return S.reshape(B, 6 * (K + 1), D)
+            S = np.moveaxis((moved - self.plant.measured(self.motion, self.now)) / _STEP, 0, -1)
+        return S.reshape(len(S), -1, S.shape[-1])
 
     def _of_term(self, index: int, term: Term) -> np.ndarray:
         """Columns of a term that is in the model."""
         steps = _OWN_STEP * self.scales.amplitudes(term, self.plant.c.L)
-        return self._moved(index, term, steps, _OWN_STEP)
+        columns, sources = self._moved(index, term, steps, _OWN_STEP)
+        self.own_sources.append(sources)
+        return columns
 
     def _of_candidates(self, candidates: Sequence[Term]) -> list[np.ndarray]:
         """Columns (B, T, size) of terms that are not in the model; those that act as forces share one batch."""
@@ -256,7 +288,7 @@ class Linearisation:
         for i, term in enumerate(candidates):
             unit = CANDIDATE_STEP * self.scales.amplitudes(term, self.plant.c.L)
             if term.effect.enters != "force":
-                found[i] = self._moved(None, term, unit, CANDIDATE_STEP)
+                found[i], _ = self._moved(None, term, unit, CANDIDATE_STEP)
                 continue
             q = [np.where(np.arange(term.size) == a, unit[a], 0.0)[:, None, None] for a in range(term.size)]
             sources.append((self._steps(forces=[*self.forces, Active(term.effect, (*q, *term.setting))]) - self.here) / CANDIDATE_STEP)
@@ -269,18 +301,20 @@ class Linearisation:
                     at += term.size
         return [found[i] for i in range(len(candidates))]
 
-    def _moved(self, index: int | None, term: Term, steps: np.ndarray, unit: float) -> np.ndarray:
-        """Columns (B, T, size) of one term: the index-th of the model, or one that is not in it."""
-        columns = []
+    def _moved(self, index: int | None, term: Term, steps: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray | None]:
+        """Columns (B, T, size) of one term, the index-th of the model or one that is not in it, and its sources where it touches the motion."""
+        columns, sources = [], []
+        seen = self.plant.measured(self.motion, self.now)
         for a in range(term.size):
             old = (*(0.0 for _ in range(term.size)), *term.setting) if index is None else self.now[index].q
             active = Active(term.effect, tuple(v + _since(self.plant, term, steps[a]) if i == a else v for i, v in enumerate(old)))
             changed = [*self.now, active] if index is None else [*self.now[:index], active, *self.now[index + 1 :]]
             if term.effect.enters == "sensor":
-                moved = self.plant.measured(self.motion, changed) - self.predicted
+                moved = self.plant.measured(self.motion, changed) - seen
                 columns.append((moved / unit).reshape(len(moved), -1, 1))
                 continue
             forces = [x for x in changed if x.effect.enters == "force"]
             ends = self._steps(forces=forces, path=self.plant.path_of(changed))
-            columns.append(self._chained((ends - self.here) / unit))
-        return np.concatenate(columns, axis=-1)
+            sources.append((ends - self.here) / unit)
+            columns.append(self._chained(sources[-1]))
+        return np.concatenate(columns, axis=-1), np.concatenate(sources) if sources else None

@@ -19,18 +19,26 @@ from ..physics.wind import apparent_wind
 from ..predictors._actuator_fit import DEFAULT_ACTUATORS
 from ..records import Dataset
 from ..ship import Particulars, complete
-from ..signals import ACTUATORS, MOTION
+from ..signals import MOTION
 
 NUM_HULL = len(HULL.parameters)
 NO_GEAR = Gear(1e-3, 1e12)
 SEGMENT = 60.0
+MOST_STEPS = 12_000
+"""Of all segments together, per stage: more runs than this teach little and cost minutes."""
+
+
+def gear_scale(L: float) -> float:
+    """Factor of an ordinary gear's times beside 130 m: Froude's law for models and long ships; full-scale gears under 130 m are no faster (SOLAS)."""
+    scale = (L / 130.0) ** 0.5
+    return scale if L < 20.0 else max(scale, 1.0)
 
 
 def ordinary_gears(L: float) -> dict[str, Gear]:
     """Shaft [rpm], steering gear [rad] and thrusters [N] of an ordinary ship of length L, where no actuator is recorded: time constants and rates of
     `predictors._actuator_fit.DEFAULT_ACTUATORS`, Froude-scaled."""
     T_n, rate_n, T_delta, rate_delta, T_F, _ = (float(v) for v in DEFAULT_ACTUATORS)
-    scale = (L / 130.0) ** 0.5
+    scale = gear_scale(L)
     return {"n": Gear(T_n * scale, rate_n / scale**2), "delta": Gear(T_delta * scale, rate_delta / scale), "F": Gear(T_F * scale, 1e12)}
 
 
@@ -52,15 +60,17 @@ class Segments:
     start: np.ndarray
     runs: int
 
-    def take(self, runs: Sequence[int]) -> Segments:
-        """The segments of some runs, which are numbered anew."""
-        rows = np.concatenate([np.flatnonzero(self.run == r) for r in runs])
-        new = np.concatenate([np.full(int(np.sum(self.run == r)), i) for i, r in enumerate(runs)])
+    def thinned(self, most: int) -> Segments:
+        """At most `most` segments, evenly spread; every run keeps at least one."""
+        if len(self.run) <= most:
+            return self
+        first = np.flatnonzero(np.diff(self.run, prepend=-1))
+        spread = np.linspace(0, len(self.run) - 1, max(most - len(first), 1)).round().astype(int)
+        rows = np.unique(np.concatenate([first, spread]))
         wind = None if self.wind is None else self.wind[rows]
         return replace(
-            self, states=self.states[rows], commands=self.commands[rows], wind=wind, mask=self.mask[rows], run=new, start=self.start[rows],
-            runs=len(runs),
-        )  # fmt: skip
+            self, states=self.states[rows], commands=self.commands[rows], wind=wind, mask=self.mask[rows], run=self.run[rows], start=self.start[rows]
+        )
 
 
 def cut(dataset: Dataset, steps: int) -> Segments:
@@ -90,6 +100,10 @@ class Active:
     q: tuple[Array, ...]
 
 
+def _substeps(dt: float, L: float) -> int:
+    return max(1, int(np.ceil(dt / (0.15 * L**0.5) - 1e-9)))
+
+
 class Plant:
     """Rollouts of eq. (2) over all segments.
 
@@ -100,7 +114,7 @@ class Plant:
     def __init__(self, dataset_ship: Particulars, segments: Segments) -> None:
         self.ship, self.seg = dataset_ship, segments
         self.c = eq2.coefficients(dataset_ship)
-        self.substeps = max(1, int(np.ceil(segments.dt / (0.15 * np.sqrt(self.c.L)) - 1e-9)))
+        self.substeps = _substeps(segments.dt, self.c.L)
         self.h = segments.dt / self.substeps
         self.steps = segments.states.shape[1] - 1
         self.knot_time = 5.0 * (self.c.L / 130.0) ** 0.5
@@ -119,13 +133,11 @@ class Plant:
     @classmethod
     def of(cls, dataset: Dataset) -> Plant:
         """The plant of a data set, cut into segments of about 60 s at 130 m (Froude-scaled): over longer ones the motion is far from linear in its
-        parameters, and little is learnt from the place where the next one begins."""
+        parameters, and little is learnt from the place where the next one begins. Long data are thinned to `MOST_STEPS` integration steps."""
         ship = complete(dataset.ship)
-        return cls(ship, cut(dataset, max(20, round(SEGMENT * (ship.L / 130.0) ** 0.5 / dataset.dt))))
-
-    def with_runs(self, runs: Sequence[int]) -> Plant:
-        """The plant of some of the runs."""
-        return Plant(self.ship, self.seg.take(runs))
+        segments = cut(dataset, max(20, round(SEGMENT * (ship.L / 130.0) ** 0.5 / dataset.dt)))
+        steps = (segments.states.shape[1] - 1) * _substeps(segments.dt, ship.L)
+        return cls(ship, segments.thinned(max(len(dataset), MOST_STEPS // steps)))
 
     def path_of(self, active: Sequence[Active]) -> np.ndarray:
         """Actuators at the three stages of every integration step, (B, steps * substeps, 3, 4): n, delta, F_b, F_s.

@@ -116,3 +116,45 @@ def overlap(fit: Fit, term: Term, value: np.ndarray) -> dict[str, float]:
         taken = float(cross @ np.linalg.solve(V[np.ix_(cols, cols)] + 1e-6 * np.eye(len(cols)), cross))
         shares[candidate.label] = max(shares.get(candidate.label, 0.0), taken / total)
     return shares
+
+
+def changes(fit: Fit) -> list[Score]:
+    """For every candidate with one value for all runs: its best beginning at a run, if that is better than from the first run on; best first.
+
+    Two coefficients, one for all runs and one from run k on, are free; the score is that of the second beside the first, less 2 log N for the choice
+    of k. The order of the runs is taken for their order in time.
+    """
+    S = fit.reduced.S
+    N = len(S)
+    after = np.cumsum(S[::-1], axis=0)[::-1]
+    total, last = S.sum(axis=0), S.shape[1] - 1
+    base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
+    prior = np.concatenate([fit.prior.precision, np.exp(-fit.prior.log_tau2)])
+    at = last - sum(t.size for t in fit.candidates)
+    found = []
+    for term in fit.candidates:
+        cols = np.arange(at, at + term.size)
+        at += term.size
+        if term.per_run or term.effect.enters == "gear" or N < 8:
+            continue
+        keep = np.concatenate([base, cols])
+        precision = np.append(prior, np.ones(len(cols)))
+        plain = _explained(total[np.ix_(keep, keep)] + np.diag(precision), total[keep, last]) + np.sum(np.log(precision))
+        best: Score | None = None
+        for k in range(3, N - 2):
+            gated = after[k]
+            A = np.block([[total[np.ix_(keep, keep)], gated[np.ix_(keep, cols)]], [gated[np.ix_(cols, keep)], gated[np.ix_(cols, cols)]]])
+            b = np.append(total[keep, last], gated[cols, last])
+            more = np.append(precision, np.ones(len(cols)))
+            score = _explained(A + np.diag(more), b) + np.sum(np.log(more)) - plain - 2.0 * np.log(N)
+            if best is None or score > best.score:
+                mean = np.linalg.solve(A + np.diag(more), b)[-term.size :]
+                nan = np.full(term.size, np.nan)
+                best = Score(replace(term, since=k), float(score), mean, nan, np.zeros((term.size, term.size)), np.zeros(N))
+        if best is not None:
+            found.append(best)
+    return sorted(found, key=lambda s: -s.score)
+
+
+def _explained(A: np.ndarray, b: np.ndarray) -> float:
+    return float(b @ np.linalg.solve(A, b) - np.linalg.slogdet(A)[1])

@@ -12,7 +12,7 @@ from .fit import Fit, Model, fit, start, track
 from .gram import solve
 from .model import Scales, Term
 from .plant import Plant
-from .screen import Score, overlap, screen
+from .screen import Score, changes, overlap, screen
 
 NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error")
 """Found by their own tests: prior width of the hull, gated columns, kinematics."""
@@ -62,8 +62,8 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None) -> list[Ter
 
 def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
     """The plain model, fitted from the regressions."""
-    point, hyper = track(plant, scales, *start(plant))
-    return fit(plant, scales, Model(), point, hyper, candidates=candidates)
+    point, hyper, guess = track(plant, scales, *start(plant))
+    return fit(plant, scales, Model(), point, hyper, candidates=candidates, guess=guess)
 
 
 def with_term(before: Fit, score: Score) -> Fit:
@@ -74,7 +74,7 @@ def with_term(before: Fit, score: Score) -> Fit:
     value = np.zeros((before.plant.seg.runs, term.size)) if term.per_run else np.clip(score.estimate, -2.0, 2.0)
     point = before.point.with_term(term, value)
     log_tau2 = before.log_tau2 | ({index: score.log_tau2} if term.per_run else {})
-    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=_FIRST_ITERATIONS)
+    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=_FIRST_ITERATIONS, guess=before.motion)
 
 
 def without(before: Fit, index: int) -> Fit:
@@ -83,7 +83,7 @@ def without(before: Fit, index: int) -> Fit:
     values = tuple(v for i, v in enumerate(before.point.values) if i != index)
     log_tau2 = {i - (i > index): v for i, v in before.log_tau2.items() if i != index}
     model, point = replace(before.model, terms=terms), replace(before.point, terms=terms, values=values)
-    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=_REFIT_ITERATIONS)
+    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=_REFIT_ITERATIONS, guess=before.motion)
 
 
 def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selection:
@@ -96,15 +96,38 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     for round_ in range(most):
         tried = [with_term(now, score) for score in _worth_a_refit(scores, now, threshold)]
         tried.sort(key=lambda f: -f.evidence)
-        tried[:_FINALISTS] = [fit(f.plant, f.scales, f.model, f.point, f.hyper, f.log_tau2, iterations=_REFIT_ITERATIONS) for f in tried[:_FINALISTS]]
+        tried[:_FINALISTS] = [
+            fit(f.plant, f.scales, f.model, f.point, f.hyper, f.log_tau2, iterations=_REFIT_ITERATIONS, guess=f.motion) for f in tried[:_FINALISTS]
+        ]
         steps += [Step(round_, f.model.terms[-1], 2.0 * (f.evidence - now.evidence)) for f in tried]
         best = max(tried, key=lambda f: f.evidence, default=None)
+        best = _or_change(now, best, threshold)
         if best is None or 2.0 * (best.evidence - now.evidence) < threshold:
             break
         now = _backward(best, threshold)
-        now = fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates)
+        now = fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates, guess=now.motion)
+        scores = screen(now)
+    pruned = _backward(now, threshold, spare_last=False)
+    if pruned is not now:
+        now = fit(pruned.plant, pruned.scales, pruned.model, pruned.point, pruned.hyper, pruned.log_tau2, candidates=candidates, guess=pruned.motion)
         scores = screen(now)
     return Selection(null, now, first, scores, steps)
+
+
+def _or_change(now: Fit, best: Fit | None, threshold: float) -> Fit | None:
+    """The best candidate, or one that begins at a later run, where that explains the runs better by the threshold."""
+    if any(t.since is not None for t in now.model.terms):
+        return best
+    late = [s for s in changes(now)[:_FINALISTS] if s.score > threshold]
+    gain = 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
+    for score in late:
+        found = with_term(now, score)
+        if 2.0 * (found.evidence - now.evidence) - 2.0 * np.log(now.plant.seg.runs) > gain + threshold:
+            found = fit(
+                found.plant, found.scales, found.model, found.point, found.hyper, found.log_tau2, iterations=_REFIT_ITERATIONS, guess=found.motion
+            )
+            best, gain = found, 2.0 * (found.evidence - now.evidence)
+    return best
 
 
 def _worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[Score]:
@@ -131,10 +154,10 @@ def _worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[
     return chosen + near[:_RIVALS]
 
 
-def _backward(found: Fit, threshold: float) -> Fit:
-    """Drop earlier terms that are no longer worth the threshold, judged on the linearisation, then by a refit."""
+def _backward(found: Fit, threshold: float, spare_last: bool = True) -> Fit:
+    """Drop terms that are no longer worth the threshold, judged on the linearisation, then by a refit."""
     index = 0
-    while index < len(found.model.terms) - 1:
+    while index < len(found.model.terms) - spare_last:
         if 2.0 * (found.evidence - _evidence_without(found, index)) < threshold:
             less = without(found, index)
             if 2.0 * (found.evidence - less.evidence) < threshold:
@@ -148,5 +171,7 @@ def _evidence_without(found: Fit, index: int) -> float:
     columns = found.columns_of(index)
     prior = found.prior
     keep, keep_random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
-    less = replace(prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random])
+    less = replace(
+        prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random]
+    )
     return solve(found.reduced, less).log_evidence

@@ -310,10 +310,11 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
     noise = float(np.median(np.abs(np.concatenate([np.diff(run.states[:, N]) for run in runs]))))
     if len(turning) and np.median(np.abs(turning[:, N])) > 20.0 * noise:
         advance = float(np.median(np.hypot(turning[:, U], turning[:, V]) * 60.0 / (np.abs(turning[:, N]) * diameter)))
-        for unit, low, high in (("rad/s", 3.5, 12.0), ("rev/s", 12.0, 150.0)):
-            if low < advance <= high:
-                text = f"At its highest revolutions the ship advances {advance:.3g} diameters per turn if n is in rpm; a screw gives way below 1.5."
-                found.append(_finding("n", FACTORS["n"][unit], text))
+        if advance > 3.5:
+            # a turning rate of rev/s x sqrt(D) is 1 to 7 on ships of any size (Froude), 2 pi times that in rad/s
+            unit = "rev/s" if advance > 12.0 or np.median(np.abs(turning[:, N])) * diameter**0.5 < 7.0 else "rad/s"
+            text = f"At its highest revolutions the ship advances {advance:.3g} diameters per turn if n is in rpm; a screw gives way below 1.5."
+            found.append(_finding("n", FACTORS["n"][unit], text))
     greatest = ship.thrusters.max_force if ship.thrusters else 0.0
     for channel in (F_B, F_S):
         push = float(np.max(np.abs(S[:, channel])))

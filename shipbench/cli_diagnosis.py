@@ -1,0 +1,88 @@
+"""The commands of the diagnosis: `diagnose`, `effects`, `suite`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .cli_common import DatasetArgument, Json, Quiet, print_json
+
+
+def diagnose(
+    dataset: DatasetArgument,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for diagnosis.json, report.html, summary.txt (default diagnoses/NAME).")
+    ] = None,
+    gain: Annotated[bool, typer.Option(help="Measure the gain on held-out runs (most of the time).")] = True,
+    seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
+    workers: Annotated[int, typer.Option(help="Processes for the folds.")] = 2,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Show what the physics model gets wrong on a data set, name the cause, and measure what naming it is worth."""
+    from .bench.diagnosis_report import write_diagnosis
+    from .bench.diagnosis_text import summary_lines
+    from .bench.results import slug
+    from .data.base import load_dataset
+    from .diagnosis.diagnose import diagnose as run
+
+    data = load_dataset(dataset)
+    found = run(data, gain=gain, seed=seed, workers=workers)
+    written = write_diagnosis(found, out or Path("diagnoses") / slug(Path(data.name).name))
+    if as_json:
+        print_json(found.document())
+        return
+    if not quiet:
+        for line in summary_lines(found):
+            typer.echo(line)
+    typer.echo(f"Written: {', '.join(str(p) for p in written)}")
+
+
+def effects(as_json: Json = False) -> None:
+    """List the effects that a diagnosis can name and a model spec can add (physics+current)."""
+    from .bench.listing import describe_effects
+
+    parts = describe_effects()
+    if as_json:
+        print_json(parts)
+        return
+    for part in parts:
+        typer.echo(f"{part['name']:<26s}{part['family']:<13s}{part['summary']}")
+        for p in part["parameters"]:
+            typer.echo(" " * 26 + f"{p['name']} [{p['unit']}], typical {p['typical']:.3g}, {p['low']:.3g} to {p['high']:.3g}")
+    typer.echo("\nSizes are for a ship of 130 m and go with the length by Froude's law. Add one to the physics: --model physics+current.")
+
+
+suite_app = typer.Typer(help="Test suites of the framework itself.", no_args_is_help=True)
+
+
+@suite_app.command("diagnosis")
+def suite_diagnosis(
+    ctx: typer.Context,
+    seed: Annotated[int, typer.Option(help="Everything is drawn from it.")] = 0,
+    per_effect: Annotated[int, typer.Option(help="Sets per effect and size.")] = 3,
+    kinds: Annotated[str | None, typer.Option(help="single,pair,none-same,none-other,outside,change,unit (default all).")] = None,
+    development: Annotated[bool, typer.Option("--development", help="The ships on which thresholds are set.")] = False,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the rows.")] = Path("runs/suite-diagnosis"),
+    gain: Annotated[bool, typer.Option(help="Also the held-out gain of every diagnosis and of the oracle (four times the time).")] = True,
+    resume: Annotated[bool, typer.Option(help="Keep what the same code has finished before.")] = True,
+    workers: Annotated[int, typer.Option(help="Processes.")] = 2,
+) -> None:
+    """Hide causes in simulated runs, diagnose them, and score the diagnosis: leaderboards/diagnosis.md."""
+    from .bench.diagnosis_suite import suite_command
+    from .diagnosis.diagnose import diagnose as run
+
+    page, rows = suite_command(
+        diagnose=run, seed=seed, per_effect=per_effect, kinds=kinds, development=development, out=out, resume=resume, workers=workers,
+        gain=gain, command=str(ctx.obj),
+    )  # fmt: skip
+    typer.echo(f"Written: {page} ({len(rows)} sets)")
+
+
+def register(app: typer.Typer) -> None:
+    """Add these commands to the command line."""
+    app.command()(diagnose)
+    app.command()(effects)
+    app.add_typer(suite_app, name="suite")
