@@ -1,24 +1,38 @@
-"""Specs: one string names a part and sets its parameters, `mlp[hidden=64,seed=3]`, `physics+current`, `path.py:Class` (contract, section 2)."""
+"""Specs: one string names a part and sets its parameters, `mlp[hidden=64,seed=3]`, `physics+current[speed=0.3,to=1.0]`, `path.py:Class`
+(contract, section 2)."""
 
 from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from .errors import InputError
 
+_PARAMS = r"\[[^\[\]]*\]"
+_TAIL = rf"(?P<tail>(\+[^\[\]+]+({_PARAMS})?)*)"
+_FILE = re.compile(rf"(?P<base>[^\[\]]+\.py:\w+)(?P<params>{_PARAMS})?{_TAIL}")
+_NAME = re.compile(rf"(?P<base>[^\[\]+]+)(?P<params>{_PARAMS})?{_TAIL}")
+
+
+@dataclass(frozen=True)
+class EffectSpec:
+    """An effect that a spec adds, `current[speed=0.3,to=1.0]`, and the values that it sets."""
+
+    name: str
+    params: dict[str, Any] = field(default_factory=dict)
+
 
 @dataclass(frozen=True)
 class Spec:
-    """A model spec taken apart: `physics+current[..]` -> name "physics", effects ("current",)."""
+    """A model spec taken apart: `physics+current[..]` -> name "physics", effects (EffectSpec("current", {..}),)."""
 
     text: str
     name: str
     params: dict[str, Any]
-    effects: tuple[str, ...] = ()
+    effects: tuple[EffectSpec, ...] = ()
     path: Path | None = None
     class_name: str | None = None
 
@@ -35,26 +49,38 @@ def _value(text: str) -> Any:
         return text
 
 
-def parse_spec(text: str) -> Spec:
-    """Take a model spec apart (contract, section 2).
-
-    Raises:
-        InputError: the text has none of the accepted forms.
-    """
-    match = re.fullmatch(r"(?P<base>[^\[\]]+?)(\[(?P<params>[^\[\]]*)\])?(?P<tail>(\+[\w.]+)*)", text.strip())
-    if match is None:
-        raise InputError(f"model spec '{text}' cannot be read; accepted: name, name[key=value,...], physics+effect, path.py:Class, a saved folder.")
+def _params(text: str, bracket: str | None) -> dict[str, Any]:
+    """What stands in a bracket, `[key=value,key=value]`."""
     params: dict[str, Any] = {}
-    for item in filter(None, (match["params"] or "").split(",")):
+    for item in filter(None, (bracket or "[]")[1:-1].split(",")):
         key, sep, value = item.partition("=")
         if not sep or not key.strip():
             raise InputError(f"model spec '{text}': parameter '{item}' has no value; write name[key=value,key=value].")
         params[key.strip()] = _value(value.strip())
-    base = match["base"]
-    file, colon, class_name = base.rpartition(":")
-    if colon and file.endswith(".py"):
-        return Spec(text, class_name, params, path=Path(file), class_name=class_name)
+    return params
+
+
+def parse_spec(text: str) -> Spec:
+    """Take a model spec apart (contract, section 2); a folder that holds a saved model is taken as it is, whatever its name.
+
+    Raises:
+        InputError: the text has none of the accepted forms.
+    """
+    wanted = text.strip()
+    if Path(wanted, "model.json").is_file():
+        return Spec(text, wanted, {}, path=Path(wanted))
+    match = _FILE.fullmatch(wanted) or _NAME.fullmatch(wanted)
+    if match is None:
+        raise InputError(
+            f"model spec '{text}' cannot be read; accepted: name, name[key=value,...], physics+effect, physics+effect[key=value,...], path.py:Class, "
+            "a saved folder."
+        )
+    base, params = match["base"], _params(text, match["params"])
+    added = re.findall(rf"\+([^\[\]+]+)({_PARAMS})?", match["tail"])
+    effects = tuple(EffectSpec(name.strip(), _params(text, bracket or None)) for name, bracket in added)
+    if match.re is _FILE:
+        file, _, class_name = base.rpartition(":")
+        return Spec(text, class_name, params, effects, path=Path(file), class_name=class_name)
     if Path(base, "model.json").is_file():
-        return Spec(text, base, params, path=Path(base))
-    name, *effects = (base + (match["tail"] or "")).split("+")
-    return Spec(text, name, params, tuple(effects))
+        return Spec(text, base, params, effects, path=Path(base))
+    return Spec(text, base.strip(), params, effects)

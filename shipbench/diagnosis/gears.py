@@ -12,7 +12,7 @@ from .plant import Plant, gear_scale, ordinary_gears
 
 _ACTUATORS = {"n": (0,), "delta": (1,), "F": (2, 3)}
 _RATE_POWER = {"n": 2, "delta": 1, "F": 0}
-_EVALUATIONS = 150
+_EVALUATIONS, _SCAN = 200, 30
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def _of_actuator(plant: Plant, name: str, picked: np.ndarray) -> tuple[list[Gear
     for kind in _kinds(name, scale, span, ordinary_gears(plant.c.L)[name]):
         lows, highs = np.resize(low, max(2, kind.at + 1)), np.resize(high, max(2, kind.at + 1))
         lows[kind.at], highs[kind.at] = np.log(kind.low), np.log(kind.high)
-        z = _least(lambda z, kind=kind: float(np.sum(residual(z, kind) ** 2)), lows, highs)
+        z = _least(lambda z, kind=kind: float(np.sum(residual(z, kind) ** 2)), lows, highs, ordinary if kind.at == 2 else None)
         rest = residual(z, kind)
         variance, samples = max(float(np.sum(rest**2)) / mask.sum(), 1e-300), float(mask.sum())
         rho = min(max(float(np.sum(rest[:, 1:] * rest[:, :-1]) / np.sum(rest**2)), 0.0), 0.98) if np.any(rest) else 0.0
@@ -126,13 +126,18 @@ def _of_actuator(plant: Plant, name: str, picked: np.ndarray) -> tuple[list[Gear
     return found, gear_of(ordinary, None)
 
 
-def _least(cost: Callable[[np.ndarray], float], low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Minimum inside a box of logarithms, from the best of a few starts."""
+def _least(cost: Callable[[np.ndarray], float], low: np.ndarray, high: np.ndarray, plain: np.ndarray | None = None) -> np.ndarray:
+    """Minimum inside a box of logarithms of (time constant, rate[, value]).
+
+    The valley is narrow in the rate: it is scanned closely first. With `plain`, the best gear without the value, only the value is scanned.
+    """
     from scipy.optimize import minimize
 
-    shares = np.linspace(0.04, 0.96, 7 if len(low) == 2 else 5)
-    grid = np.stack(np.meshgrid(*[shares] * len(low)), axis=-1).reshape(-1, len(low))
-    start = min((low + f * (high - low) for f in grid), key=cost)
-    simplex = np.clip(start + np.vstack([np.zeros(len(low)), 0.08 * np.diag(high - low)]), low, high)
+    if plain is None:
+        grid = [np.array([a, b]) for a in np.linspace(low[0], high[0], 5)[1:4] for b in np.linspace(low[1], high[1], _SCAN)]
+    else:
+        grid = [np.append(np.clip(plain, low[:2], high[:2]), c) for c in np.linspace(low[2], high[2], _SCAN)]
+    start = min(grid, key=cost)
+    simplex = np.clip(start + np.vstack([np.zeros(len(low)), np.diag(np.where(start < 0.5 * (low + high), 0.1, -0.1) * np.ones(len(low)))]), low, high)
     options = {"maxfev": _EVALUATIONS, "xatol": 1e-3, "fatol": 1e-9, "initial_simplex": simplex}
     return minimize(cost, start, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)), options=options).x

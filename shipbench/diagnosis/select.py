@@ -18,11 +18,13 @@ NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error")
 """Found by their own tests: prior width of the hull, gated columns, kinematics."""
 AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft_rate_limit", "shaft_lag", "thruster_lag", "rudder_lag")
 """Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
-MOST_EFFECTS = 4
+MOST_EFFECTS = 6
 _REFITS = 3
 _FIRST_ITERATIONS, _FINALISTS, _REFIT_ITERATIONS = 3, 2, 10
 _WORTH_A_REFIT = 0.5
 _RIVAL, _RIVALS = 0.25, 4
+_CHANGE_MARGIN = 30.0
+"""A beginning is chosen among all runs and all effects: it must beat the same without by far."""
 
 
 @dataclass(frozen=True)
@@ -118,11 +120,12 @@ def _or_change(now: Fit, best: Fit | None, threshold: float) -> Fit | None:
     """The best candidate, or one that begins at a later run, where that explains the runs better by the threshold."""
     if any(t.since is not None for t in now.model.terms):
         return best
-    late = [s for s in changes(now)[:_FINALISTS] if s.score > threshold]
+    present = {t.label for t in now.model.terms}
+    late = [s for s in changes(now) if s.score > _CHANGE_MARGIN and s.term.label not in present][:_FINALISTS]
     gain = 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
     for score in late:
         found = with_term(now, score)
-        if 2.0 * (found.evidence - now.evidence) - 2.0 * np.log(now.plant.seg.runs) > gain + threshold:
+        if 2.0 * (found.evidence - now.evidence) - 2.0 * np.log(now.plant.seg.runs) > gain + _CHANGE_MARGIN:
             found = fit(
                 found.plant, found.scales, found.model, found.point, found.hyper, found.log_tau2, iterations=_REFIT_ITERATIONS, guess=found.motion
             )
