@@ -50,9 +50,8 @@ class Analysis:
         """What the diagnosis adds to the plain model."""
         if self.unknown is not None:
             return Extension()
-        point = self.final.point
         gears = {g.actuator: g.gear for g in self.gears} or None
-        return Extension(point.terms, point.values, name_hull and self.hull > HULL_THRESHOLD, gears)
+        return Extension(self.final.model.terms, self.final.values, name_hull and self.hull > HULL_THRESHOLD, gears)
 
 
 def causes_of(plant: Plant, threshold: float, only: Sequence[str] | None = None) -> tuple[Extension, dict[str, Gear]]:
@@ -60,7 +59,7 @@ def causes_of(plant: Plant, threshold: float, only: Sequence[str] | None = None)
     selection = select(null_fit(plant, Scales(plant), candidates_for(plant, only)), threshold)
     findings, plain = find_in_gears(plant)
     gears = {g.actuator: g.gear for g in _named_gears(findings, threshold, only)}
-    return Extension(selection.final.point.terms, selection.final.point.values, False, gears or None), plain
+    return Extension(selection.final.model.terms, selection.final.values, False, gears or None), plain
 
 
 def _named_gears(findings: Sequence[GearFinding], threshold: float, only: Sequence[str] | None) -> list[GearFinding]:

@@ -98,7 +98,7 @@ def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
 
     effect = term.effect
     unit = fit.scales.amplitudes(term, fit.plant.c.L)
-    value = fit.point.values[index] * unit
+    value = fit.values[index] * unit
     num = fit.plant.seg.runs
     if term.per_run:
         rms = np.sqrt(np.mean(value**2, axis=0))

@@ -76,6 +76,11 @@ class Fit:
         randoms = sum(t.per_run for t in self.model.terms)
         return self.solution.log_evidence - 0.5 * randoms * float(np.log(self.plant.seg.runs))
 
+    @property
+    def values(self) -> tuple[np.ndarray, ...]:
+        """Estimates of the terms' amplitudes, in units of their typical sizes: (size,), or (runs, size) of a random effect."""
+        return point_from(self.model, self.point, self.solution, self.prior, self.estimate).values
+
     def columns_of(self, index: int) -> np.ndarray:
         """Shared columns of the model's index-th term."""
         at = NUM_BASE + sum(t.size for t in self.model.terms[:index])

@@ -1,12 +1,13 @@
 """Constrained nonlinear least squares over full rollouts (eq. 9): Gauss-Newton steps whose constrained subproblems IPOPT solves.
 
-CasADi differentiates one integration step; the sensitivities are carried along all runs at once. IPOPT then meets a problem of 11 unknowns
-with the bounds and the nonlinear
-constraints exact, so a step costs milliseconds, and the rollouts are evaluated once per step instead of once per barrier iteration.
+CasADi differentiates one integration step; the sensitivities are carried along all runs at once. IPOPT then meets a problem of 11 unknowns (and
+the values of effects) with the bounds and the nonlinear constraints exact, so a step costs milliseconds, and the rollouts are evaluated once per
+step instead of once per barrier iteration.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -14,14 +15,21 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ..integrate import motion_rhs, rk4_step
+from ..effects.base import Effect
+from ..integrate import kinematics, rk4_step
+from ..ops import Array
 from ..physics import eq2
-from ..physics.wind import apparent_wind
+from ..physics.modifiers import Flow
 from ..records import Batch
+from ..ship import Particulars
 from ..signals import COMMANDS, MOTION
+from ._physics_effects import accelerations
 from .hold import Hold
 
 _P = eq2.NUM_PARAMETERS
+_START = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, -0.8, 1.0, 0.0, 1.0])
+Forces = tuple[tuple[Effect, tuple[float | None, ...]], ...]
+"""Force effects and their values; None where the value is a symbol."""
 
 
 @dataclass(frozen=True)
@@ -35,17 +43,27 @@ class Fit:
 
 
 @lru_cache(maxsize=8)
-def _rollout_function(c: eq2.Coefficients, steps: int, runs: int, h: float, wind: bool, sensitivities: bool) -> ca.Function:
-    """Rollout of `runs` runs: (x0, S0, w, p) -> (X, S), or (x0, w, p) -> X without sensitivities."""
-    x, S, p = ca.SX.sym("x", 6), ca.SX.sym("S", 6, _P), ca.SX.sym("p", _P)
-    w = ca.SX.sym("w", 14 if wind else 12)
+def rollout_function(
+    c: eq2.Coefficients, steps: int, runs: int, h: float, wind: bool, sensitivities: bool, forces: Forces = (), ship: Particulars | None = None
+) -> ca.Function:
+    """Rollout of `runs` runs: (x0, S0, w, p) -> (X, S), or (x0, w, p) -> X without sensitivities.
 
-    def acc(psi, u, v, r, stage):
-        air = apparent_wind(psi, u, v, w[12], w[13]) if wind else None
-        n, delta, F_b, F_s = (w[4 * stage + i] for i in range(4))
-        return eq2.accelerations(u, v, r, n, delta, F_b, F_s, air, c, [p[i] for i in range(_P)])
+    p holds p0..p10 and then the values of `forces` that are None; the last row of w is the time at the beginning of the step, if there are forces.
+    """
+    num = _P + sum(v is None for _, q in forces for v in q)
+    x, S, p = ca.SX.sym("x", 6), ca.SX.sym("S", 6, num), ca.SX.sym("p", num)
+    w = ca.SX.sym("w", (14 if wind else 12) + bool(forces))
+    free = iter([p[i] for i in range(_P, num)])
+    active = [(effect, tuple(next(free) if v is None else v for v in q)) for effect, q in forces]
 
-    x_next = ca.vertcat(*rk4_step(motion_rhs(acc), tuple(x[i] for i in range(6)), h))
+    def rhs(state: tuple[Array, ...], stage: int) -> tuple[Array, ...]:
+        px, py, psi, u, v, r = state
+        t = w[w.numel() - 1] + 0.5 * stage * h if forces else 0.0
+        flow = Flow(px, py, t, psi, u, v, r, *(w[4 * stage + i] for i in range(4)))
+        air = (w[12], w[13]) if wind else None
+        return (*kinematics(psi, u, v, r), *accelerations(active, flow, air, c, [p[i] for i in range(_P)], ship))
+
+    x_next = ca.vertcat(*rk4_step(rhs, tuple(x[i] for i in range(6)), h))
     if not sensitivities:
         return ca.Function("step", [x, w, p], [x_next], {"cse": True}).mapaccum("roll", steps).map(runs)
     S_next = ca.jacobian(x_next, x) @ S + ca.jacobian(x_next, p)
@@ -60,7 +78,7 @@ def parameter_scale(c: eq2.Coefficients) -> np.ndarray:
     return np.array([0.05, 0.01 * area * speed, 0.015 * area, 0.005 * area / speed, 0.05, 2.5, 0.5, 2.0, 0.03, 0.1, 1.5])
 
 
-def _bounds(scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def bounds(scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Box of p (physics reference, section 3.5, in units of the scale)."""
     low = np.array([-0.3, 0.0, 0.0, 0.0, -0.15, 0.5, -2.0, -8.0, 0.0, -0.5, 0.0])
     high = np.array([0.3, 5.0 * scale[1], 3.0 * scale[2], 20.0 * scale[3], 0.15, 6.0, 2.0, 0.0, 0.3, 0.5, 6.0])
@@ -81,13 +99,61 @@ def _constraints(p: ca.SX) -> ca.SX:
     )
 
 
-def _subproblem(low: np.ndarray, high: np.ndarray, scale: np.ndarray) -> ca.Function:
-    """IPOPT solver of min_q g'(q - q0) + (q - q0)' H (q - q0)/2 over q = p/scale with the constraints of the paper's eq. (9)."""
-    q, q0, grad, H = ca.SX.sym("q", _P), ca.SX.sym("q0", _P), ca.SX.sym("g", _P), ca.SX.sym("H", _P, _P)
+def subproblem(num: int, scale: np.ndarray) -> ca.Function:
+    """IPOPT solver of min_q g'(q - q0) + (q - q0)' H (q - q0)/2 over `num` values q, of which the first 11 are p/scale, with the constraints of the
+    paper's eq. (9)."""
+    q, q0, grad, H = ca.SX.sym("q", num), ca.SX.sym("q0", num), ca.SX.sym("g", num), ca.SX.sym("H", num, num)
     d = q - q0
-    problem: dict[str, Any] = {"x": q, "p": ca.veccat(q0, grad, H), "f": ca.dot(grad, d) + 0.5 * ca.bilin(H, d, d), "g": _constraints(q * scale)}
+    constraints = _constraints(q[:_P] * scale)
+    problem: dict[str, Any] = {"x": q, "p": ca.veccat(q0, grad, H), "f": ca.dot(grad, d) + 0.5 * ca.bilin(H, d, d), "g": constraints}
     options: dict[str, Any] = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-9, "ipopt.max_iter": 200}
     return ca.nlpsol("step", "ipopt", problem, options)
+
+
+@dataclass(frozen=True)
+class Data:
+    """What is fitted. path: actuators at the stages of every substep (batch, K * substeps, 3, 4); wind: (batch, K, 2) speed and direction, or None;
+    dt: sample time [s]."""
+
+    c: eq2.Coefficients
+    batch: Batch
+    path: np.ndarray
+    wind: np.ndarray | None
+    dt: float
+    substeps: int
+
+    @property
+    def truth(self) -> np.ndarray:
+        return self.batch.truth[:, :, MOTION]
+
+    def weight(self) -> np.ndarray:
+        """Per signal, the inverse root mean square of how far holding s0's velocities errs: the size of what there is to predict."""
+        runs, samples = self.batch.truth.shape[:2]
+        return 1.0 / (_hold_error(self.batch, self.dt) * np.sqrt(runs * samples * 6.0))
+
+    def columns(self, path: np.ndarray, with_time: bool = False) -> np.ndarray:
+        """Inputs of the rollout function, (rows, runs * steps)."""
+        runs, steps = path.shape[:2]
+        w = path.reshape(runs, steps, 12)
+        if self.wind is not None:
+            w = np.concatenate([w, np.repeat(self.wind, self.substeps, axis=1)], axis=2)
+        if with_time:
+            t = np.arange(steps) * self.dt / self.substeps
+            w = np.concatenate([w, np.broadcast_to(t[:, None], (runs, steps, 1))], axis=2)
+        return w.reshape(runs * steps, -1).T
+
+    def samples(self, X: ca.DM) -> np.ndarray:
+        """(runs, K, 6) at the samples, from the rollout function's (6, runs * steps)."""
+        runs, steps = self.path.shape[:2]
+        return np.asarray(X).T.reshape(runs, steps, 6)[:, self.substeps - 1 :: self.substeps]
+
+    def sensitivities(self, S: ca.DM, num: int) -> np.ndarray:
+        """(runs, K, 6, num) at the samples."""
+        runs, steps = self.path.shape[:2]
+        return np.asarray(S).reshape(6, runs, steps, num)[:, :, self.substeps - 1 :: self.substeps].transpose(1, 2, 0, 3)
+
+
+Linearise = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def fit_parameters(
@@ -95,64 +161,63 @@ def fit_parameters(
 ) -> Fit:
     """Minimise the mean over runs of the weighted squared trajectory error of x, y, psi, u, v, r.
 
-    W holds, per signal, the inverse mean square of how far holding s0's velocities errs: the size of what there is to predict.
-
     Args:
         c: left side.
         batch: runs of equal length.
-        path: actuators at the stages of every substep (batch, K * substeps, 3, 4).
-        wind: (batch, K, 2) wind speed and direction, or None.
-        dt: sample time [s].
-        substeps: integration steps per sample.
+        path, wind, dt, substeps: as in `Data`.
         iterations, tolerance: stop after so many steps, or when the cost falls by less than this share.
     """
+    data = Data(c, batch, path, wind, dt, substeps)
     runs, steps = path.shape[:2]
-    w: np.ndarray = path.reshape(runs, steps, 12)
-    if wind is not None:
-        w = np.concatenate([w, np.repeat(wind, substeps, axis=1)], axis=2)
-    w = w.reshape(runs * steps, -1).T
-    x0 = batch.s0[:, MOTION].T
-    truth = batch.truth[:, :, MOTION]
-    weight = 1.0 / (_hold_error(batch, dt) * np.sqrt(truth.shape[0] * truth.shape[1] * 6.0))
+    w, x0, truth, weight = data.columns(path), batch.s0[:, MOTION].T, data.truth, data.weight()
     args = (c, steps, runs, dt / substeps, wind is not None)
-    full, plain = _rollout_function(*args, True), _rollout_function(*args, False)
-
-    def residuals(X: ca.DM) -> np.ndarray:
-        at = np.asarray(X).T.reshape(runs, steps, 6)[:, substeps - 1 :: substeps]
-        with np.errstate(all="ignore"):  # a diverging trial comes back non-finite and is refused
-            return (at - truth) * weight
-
+    full, plain = rollout_function(*args, True), rollout_function(*args, False)
     scale = parameter_scale(c)
-    low, high = (b / scale for b in _bounds(scale))
-    solver = _subproblem(low, high, scale)
-    q = np.clip(np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, -0.8, 1.0, 0.0, 1.0]), low, high)
+    low, high = (b / scale for b in bounds(scale))
+
+    def residuals(q: np.ndarray) -> np.ndarray:
+        with np.errstate(all="ignore"):  # a diverging trial comes back non-finite and is refused
+            return (data.samples(plain(x0, w, q * scale)) - truth) * weight
 
     def linearise(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         X, S = full(x0, np.zeros((6, _P * runs)), w, q * scale)
-        jac = np.asarray(S).reshape(6, runs, steps, _P)[:, :, substeps - 1 :: substeps].transpose(1, 2, 0, 3)
-        return residuals(X), jac * weight[:, None] * scale
+        with np.errstate(all="ignore"):
+            e = (data.samples(X) - truth) * weight
+        return e, data.sensitivities(S, _P) * weight[:, None] * scale
 
+    solver = subproblem(_P, scale)
+    q, e, J, cost, taken = descend(linearise, residuals, solver, np.clip(_START, low, high), low, high, np.zeros(_P), iterations, tolerance)
+    if not np.isfinite(cost):
+        return Fit(q * scale, np.full((_P, 2), np.nan), cost, taken)
+    return Fit(q * scale, intervals(q, e, J, low, high) * scale[:, None], cost, taken)
+
+
+def descend(
+    linearise: Linearise, residuals: Callable[[np.ndarray], np.ndarray], solver: ca.Function, q: np.ndarray, low: np.ndarray, high: np.ndarray,
+    ridge: np.ndarray, iterations: int, tolerance: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, int]:  # fmt: skip
+    """Damped Gauss-Newton from q: minimise sum e(q)^2 + sum ridge q^2; returns q, e, J, the cost and the steps taken."""
     e, J = linearise(q)
-    cost, damping, taken = float(np.sum(e * e)), 1e-3, 0
+    cost, damping, taken = float(np.sum(e * e) + np.sum(ridge * q * q)), 1e-3, 0
     while taken < iterations and damping < 1e6 and np.isfinite(cost):
         taken += 1
-        grad, H = np.einsum("bksp,bks->p", J, e), np.einsum("bksp,bksq->pq", J, J)
+        grad = np.einsum("bksp,bks->p", J, e) + ridge * q
+        H = np.einsum("bksp,bksq->pq", J, J) + np.diag(ridge)
         damped = H + damping * np.diag(np.maximum(np.diag(H), 1e-9 * np.trace(H)))
         trial = np.asarray(solver(x0=q, p=ca.veccat(q, grad, damped), lbx=low, ubx=high, lbg=-np.inf, ubg=0.0)["x"]).ravel()
         trial = np.clip(trial, low, high)
-        new = float(np.sum(residuals(plain(x0, w, trial * scale)) ** 2))
+        with np.errstate(all="ignore"):
+            new = float(np.sum(residuals(trial) ** 2) + np.sum(ridge * trial * trial))
         if np.isfinite(new) and new < cost:
             done = cost - new < tolerance * cost
             q, damping = trial, max(damping * 0.1, 1e-8)
             e, J = linearise(q)
-            cost = float(np.sum(e * e))
+            cost = float(np.sum(e * e) + np.sum(ridge * q * q))
             if done:
                 break
         else:
             damping *= 10.0
-    if not np.isfinite(cost):
-        return Fit(q * scale, np.full((_P, 2), np.nan), cost, taken)
-    return Fit(q * scale, _intervals(q, e, J, low, high) * scale[:, None], cost, taken)
+    return q, e, J, cost, taken
 
 
 def _hold_error(batch: Batch, dt: float) -> np.ndarray:
@@ -165,12 +230,12 @@ def _hold_error(batch: Batch, dt: float) -> np.ndarray:
     return np.maximum(size, 1e-9)
 
 
-def _intervals(q: np.ndarray, e: np.ndarray, J: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """95 % intervals (11, 2) of the scaled parameters: sandwich covariance clustered over runs, Student's t; NaN at a bound."""
+def intervals(q: np.ndarray, e: np.ndarray, J: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """95 % intervals (num, 2) of the scaled parameters: sandwich covariance clustered over runs, Student's t; NaN at a bound."""
     from scipy.stats import t
 
     free = (q > low + 1e-6) & (q < high - 1e-6)
-    interval = np.full((_P, 2), np.nan)
+    interval = np.full((len(q), 2), np.nan)
     runs = len(e)
     if runs < 2 or not free.any():
         return interval

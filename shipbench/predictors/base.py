@@ -151,6 +151,13 @@ def _class_from_file(path: Path, class_name: str) -> Any:
     return getattr(module, class_name)
 
 
+def _no_effects(spec: Spec) -> InputError:
+    added = ", ".join(e.name for e in spec.effects)
+    return InputError(
+        f"model spec '{spec.text}': effects extend 'physics' only, and '{spec.name}' cannot take {added}. Write physics+{added.replace(', ', '+')}."
+    )
+
+
 def make_predictor(spec: Spec) -> Any:
     """The unfitted predictor of a spec (or the fitted one, for a saved folder).
 
@@ -158,18 +165,21 @@ def make_predictor(spec: Spec) -> Any:
         InputError: unknown name or parameter, or a value that the class refuses.
     """
     if spec.path is not None and spec.class_name is None:
+        if spec.effects:
+            raise _no_effects(spec)
         kind = json.loads((spec.path / "model.json").read_text()).get("predictor", "?")
         return PREDICTORS.get(kind).load(spec.path)
     cls = _class_from_file(spec.path, str(spec.class_name)) if spec.path is not None else PREDICTORS.get(spec.name)
-    if spec.effects:
-        raise InputError(f"model spec '{spec.text}': no effect is available in this version; use '{spec.name}' alone.")
+    if spec.effects and not hasattr(cls, "extend"):
+        raise _no_effects(spec)
     params = {k: v for k, v in spec.params.items() if k != "seed"}
     if is_dataclass(cls):
         for key in params:
             if key not in {f.name for f in fields(cls)}:
                 raise unknown_name(f"parameter of '{spec.name}'", key, [f.name for f in fields(cls)] + ["seed"])
     try:
-        return cls(**params)
+        model = cls(**params)
+        return model.extend(spec.effects) if spec.effects else model
     except (TypeError, ValueError) as error:
         raise InputError(f"model spec '{spec.text}': {error}. See `shipbench models` for the parameters.") from None
 

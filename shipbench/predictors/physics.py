@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from ..errors import WorkError
-from ..integrate import motion_rhs, rk4_step
 from ..physics import eq2
 from ..physics.actuators import lag_with_rate_limit
-from ..physics.wind import apparent_wind
-from ..records import Dataset
+from ..records import Batch, Dataset
 from ..ship import Ship, complete
 from ..signals import ACTUATORS, COMMANDS, MOTION
+from ..specs import EffectSpec
 from ._actuator_fit import DEFAULT_ACTUATORS, fit_actuators
+from ._physics_effects import NO_GEAR, Extension, extension_of, geared, measured, roll, true_start
+from ._physics_gears import fit_gears, gears_of
 from .base import History, PredictorBase
+
+if TYPE_CHECKING:
+    from ._physics_fit import Fit
 
 PARAMETERS = (
     ("p0", "lateral over axial propeller force", "1"),
@@ -51,6 +57,23 @@ class Physics(PredictorBase):
     tolerance: float = 1e-4
     name: ClassVar[str] = "physics"
 
+    def __post_init__(self) -> None:
+        self.extension: Extension | None = None
+        self.held: dict[int, str] = {}
+
+    def extend(self, effects: Sequence[EffectSpec]) -> Self:
+        """Add effects to what is fitted (`physics+current`): their formulas are those of `shipbench.effects`.
+
+        Values that the spec sets are held; the others are fitted with p0..p10, or from command and actuator for effects of a gear where both
+        are recorded. p4 stays zero beside a fitted rudder offset or asymmetry, p0 beside a fitted propeller walk: data cannot tell them apart.
+        Runs begin at t = 0 s, the time of s0.
+
+        Raises:
+            InputError: an effect or a parameter is unknown, or cannot be part of a predictor.
+        """
+        self.extension = extension_of(effects)
+        return self
+
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Fit actuator dynamics, then p0..p10, over full rollouts of all runs of `train` and `valid` (nothing is tuned on `valid`).
 
@@ -62,15 +85,47 @@ class Physics(PredictorBase):
         data = train.merged(valid)
         self._set_ship(data.ship, data.inputs, data.dt, data.actuators == "commanded")
         batch = data.batch()
+        asked, self.extension = self.extension, None
         if not self.commanded:
             self.actuator_params = fit_actuators(batch, self.dt)
         result = fit_parameters(
             self.c, batch, self.actuator_path(batch.s0, batch.U), self._wind(batch.U), self.dt, self.substeps, self.iterations, self.tolerance
         )
+        self.extension = asked
+        if asked is not None and np.isfinite(result.cost):
+            result = self._fit_effects(batch, result, asked)
         if not np.isfinite(result.cost):
             raise WorkError(f"the physics fit of '{data.name}' found no finite rollouts; check units and signs with `shipbench data check`.")
         self.p, self.ci95, self.cost = result.p, result.ci95, result.cost
         return self
+
+    def _fit_effects(self, batch: Batch, base: Fit, asked: Extension) -> Fit:
+        """Gears first where they are recorded, then everything else together, once for every setting of open shape parameters; the best is kept."""
+        from ._physics_effects_fit import fit_extension
+        from ._physics_fit import Data
+
+        asked = Extension(asked.terms)  # a second fit starts afresh
+        if not self.commanded:
+            self.actuator_params, asked = fit_gears(batch, self.dt, self.substeps, asked, self.actuator_params, self.particulars)
+        self.held = asked.held()
+        best: tuple[Fit, Extension] | None = None
+        for choice in asked.settings(batch.truth[:, :, :2], self.particulars):
+            data = Data(self.c, batch, self._path_under(choice, batch), self._wind(batch.U), self.dt, self.substeps)
+
+            def repath(extension: Extension) -> np.ndarray:
+                return self._path_under(extension, batch)
+
+            found = fit_extension(data, base, choice, self.particulars, repath, self.commanded, self.iterations, self.tolerance)
+            if best is None or found[0].cost < best[0].cost:
+                best = found
+        if best is None:
+            return base
+        self.extension = best[1]
+        return best[0]
+
+    def _path_under(self, extension: Extension, batch: Batch) -> np.ndarray:
+        self.extension = extension
+        return self.actuator_path(batch.s0, batch.U)
 
     def _set_ship(self, ship: Ship, inputs: tuple[str, ...], dt: float, commanded: bool) -> None:
         self.ship, self.inputs, self.dt, self.commanded = ship, inputs, dt, commanded
@@ -99,7 +154,11 @@ class Physics(PredictorBase):
             path[:, j, 1] = self.actuators_after(now, command, 0.5 * h)
             now = self.actuators_after(now, command, h)
             path[:, j, 2] = now
-        return path
+        gears = [] if self.extension is None else self.extension.active("gear")
+        if not gears:
+            return path
+        base = dict.fromkeys(("n", "delta", "F"), NO_GEAR) if self.commanded else gears_of(self.actuator_params)
+        return geared(path, s0, U, base, gears, self.dt, self.substeps)
 
     def _wind(self, U: np.ndarray) -> np.ndarray | None:
         """Measured wind speed and direction (batch, K, 2), or None."""
@@ -108,23 +167,13 @@ class Physics(PredictorBase):
         return U[..., [self.inputs.index("wind_speed"), self.inputs.index("wind_from")]]
 
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
-        path, air = self.actuator_path(s0, U), self._wind(U)
-        S = np.empty((len(s0), U.shape[1], s0.shape[1]))
-        motion = tuple(s0[:, MOTION].T)
-        h = self.dt / self.substeps
-        with np.errstate(all="ignore"):  # a diverged run becomes non-finite and is reported as such by the runner
-            for j in range(path.shape[1]):
-                k = j // self.substeps
-
-                def acc(psi, u, v, r, stage, j=j, k=k):
-                    wind = None if air is None else apparent_wind(psi, u, v, air[:, k, 0], air[:, k, 1])
-                    n, delta, F_b, F_s = path[:, j, stage].T
-                    return eq2.accelerations(u, v, r, n, delta, F_b, F_s, wind, self.c, list(self.p))
-
-                motion = rk4_step(motion_rhs(acc), motion, h)
-                S[:, k, MOTION] = np.stack(motion, axis=-1)
-        S[:, :, ACTUATORS] = path[:, self.substeps - 1 :: self.substeps, 2]
-        return S
+        forces, sensors = ([], []) if self.extension is None else (self.extension.active("force"), self.extension.active("sensor"))
+        start, path = true_start(s0, sensors, self.dt), self.actuator_path(s0, U)
+        S = np.empty((len(s0), U.shape[1] + 1, s0.shape[1]))
+        S[:, 0] = start
+        S[:, 1:, MOTION] = roll(forces, start, path, self._wind(U), self.dt / self.substeps, self.substeps, self.c, list(self.p), self.particulars)
+        S[:, 1:, ACTUATORS] = U[..., : len(COMMANDS)] if self.commanded else path[:, self.substeps - 1 :: self.substeps, 2]
+        return measured(S, sensors, self.dt)[:, 1:]
 
     def describe(self) -> str:
         """The fitted equations with units and 95 % confidence intervals (clustered over runs), and what was estimated of the ship."""
@@ -137,8 +186,8 @@ class Physics(PredictorBase):
             f"+ {self.c.N_rr:.4g} r|r| + {self.c.N_vvr:.4g} v^2 r/U + {self.c.N_vrr:.4g} v r^2/U + N_n + N_delta + N_e   [SI]",
             "  Y_n = p0 X_n; R = p1 u + p2 u|u| + p3 u^3; c_L = p4 + p5 a + p6 a^2 + p7 a^3; c_D = p8 + p9 a + p10 a^2 [a in rad]",
         ]
-        for (symbol, meaning, unit), value, (low, high) in zip(PARAMETERS, self.p, self.ci95, strict=True):
-            interval = "at its bound" if np.isnan(low) else f"[{low:.4g}, {high:.4g}]"
+        for i, ((symbol, meaning, unit), value, (low, high)) in enumerate(zip(PARAMETERS, self.p, self.ci95, strict=True)):
+            interval = f"zero: {self.held[i]}" if i in self.held else "at its bound" if np.isnan(low) else f"[{low:.4g}, {high:.4g}]"
             lines.append(f"  {symbol:4s} = {value:11.4g} {unit:12s} {interval:28s} {meaning}")
         if self.commanded:
             lines.append("  actuators: the data record commands only; no dynamics between command and actuator")
@@ -147,17 +196,29 @@ class Physics(PredictorBase):
                 f"  {symbol:10s} = {value:10.4g} {unit:6s} {meaning}"
                 for (symbol, meaning, unit), value in zip(ACTUATOR_PARAMETERS, self.actuator_params, strict=True)
             ]
+        lines += self.extension.describe() if self.extension is not None else []
         return "\n".join(lines + [f"  note: {n}" for n in self.particulars.notes])
 
     def _arrays(self) -> dict[str, np.ndarray]:
-        return {"p": self.p, "ci95": self.ci95, "actuators": self.actuator_params}
+        arrays = {"p": self.p, "ci95": self.ci95, "actuators": self.actuator_params}
+        if self.extension is not None:
+            arrays |= {"effect_values": np.concatenate([*map(np.array, self.extension.values)]), "effect_ci95": self.extension.ci95}
+        return arrays
 
     def _meta(self) -> dict[str, Any]:
-        return {"ship": self.ship.model_dump(exclude_none=True), "dt": self.dt, "commanded": self.commanded, "cost": float(self.cost)}
+        meta = {"ship": self.ship.model_dump(exclude_none=True), "dt": self.dt, "commanded": self.commanded, "cost": float(self.cost)}
+        if self.extension is not None:
+            meta["effects"] = [{"name": t.spec.name, "params": t.spec.params} for t in self.extension.terms]
+        return meta
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
         self._set_ship(Ship.from_dict(meta["ship"], "saved model"), self.inputs, float(meta["dt"]), bool(meta["commanded"]))
         self.p, self.ci95, self.actuator_params, self.cost = arrays["p"], arrays["ci95"], arrays["actuators"], float(meta["cost"])
+        if "effects" in meta:
+            asked = extension_of([EffectSpec(e["name"], e["params"]) for e in meta["effects"]])
+            at = np.cumsum([0, *(len(t.given) for t in asked.terms)])
+            values = [tuple(float(v) for v in arrays["effect_values"][a:b]) for a, b in pairwise(at)]
+            self.extension, self.held = Extension(asked.terms, values, arrays["effect_ci95"]), asked.held()
 
 
 PREDICTOR = Physics
