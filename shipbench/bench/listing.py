@@ -27,6 +27,21 @@ def describe_parts(registry: Registry) -> list[dict[str, Any]]:
     return parts
 
 
+def describe_effects() -> list[dict[str, Any]]:
+    """For each effect its family, one line on it, its source and its parameters at 130 m."""
+    from ..effects.base import EFFECTS
+
+    parts = []
+    for name in EFFECTS.names():
+        effect = EFFECTS.get(name)
+        parameters = [{"name": p.name, "unit": p.unit, "typical": p.typical, "low": p.low, "high": p.high} for p in effect.parameters]
+        parts.append({
+            "name": name, "family": effect.family, "summary": effect.summary, "source": effect.source, "per_run": effect.per_run,
+            "parameters": parameters,
+        })  # fmt: skip
+    return parts
+
+
 def _source(entry: str) -> Path | None:
     """The file of an entry point's module, or None where it cannot be found."""
     try:

@@ -17,7 +17,8 @@ from .plant import Plant
 from .select import Selection, candidates_for, null_fit, select
 
 THRESHOLD = 14.0
-"""Least gain of a named cause, 2 log Bayes factor. From nulls on the development ships, whose structure differs from the model's; the bootstrap of each
+"""Least gain of a named cause, 2 log Bayes factor. From nulls on the development ships, whose structure differs from the model's; the bootstrap
+of each
 diagnosis may raise it."""
 HULL_THRESHOLD = 30.0
 GENERIC_THRESHOLD = 30.0
@@ -29,7 +30,8 @@ _NARROW = 0.1
 
 @dataclass(frozen=True)
 class Analysis:
-    """What was found in one set of runs. threshold: that was used; hull: 2 log evidence that the hull is off the regressions, or 0; unknown: the dependence
+    """What was found in one set of runs. threshold: that was used; hull: 2 log evidence that the hull is off the regressions, or 0; unknown: the
+    dependence
     that no named cause covers; gears: named findings; plain_gears: the ordinary gears that fit best."""
 
     selection: Selection

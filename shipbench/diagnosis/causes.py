@@ -138,9 +138,9 @@ def _spread(effect: Effect, q: Sequence[float], name: str, cov: np.ndarray, num:
 
 def _inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
     """Clustered over model variance of some coefficients."""
-    S, mean = fit.reduced.S[:, :, :], fit.solution.mean
+    S, mean = fit.reduced.S, fit.solution.mean
     keep = fit.prior.shared
-    scores = S[:, keep, -1] - np.einsum("nij,j->ni", S[np.ix_(range(len(S)), keep, keep)], mean)
+    scores = S[:, keep, -1] - np.einsum("nij,j->ni", S[:, keep][:, :, keep], mean)
     bread = fit.solution.cov
     num = len(S)
     sandwich = bread @ (scores.T @ scores * num / max(num - 1, 1)) @ bread
@@ -153,7 +153,8 @@ def _gear_cause(found: Analysis, g: GearFinding, gain: Gain | None) -> Cause:
     near = tuple(x.effect for x in found.all_gears if x.actuator == g.actuator and x.effect != g.effect and x.score > g.score - _TIE)
     runs = int(np.sum(g.per_run > 0))
     return Cause(
-        g.effect, 0, g.score, _p(found, g.score), {parameter.name: Estimate(g.value, parameter.unit, g.ci95)}, near, effect.separate if near else "", gain,
+        g.effect, 0, g.score, _p(found, g.score), {parameter.name: Estimate(g.value, parameter.unit, g.ci95)}, near, effect.separate if near else
+        "", gain,
         f"seen between command and record of the actuator, without the ship's motion; {runs} of {len(g.per_run)} runs support it",
     )  # fmt: skip
 
@@ -192,7 +193,8 @@ def describe_candidates(found: Analysis, named: Sequence[str]) -> list[Candidate
             continue
         score = max(s.score, refits.get(label, -np.inf))
         lines[label] = Candidate(
-            label, float(score), _p(found, score), _reason(found, s, score, last.get(label), named), _shown(s, found.selection.null), _detectable(found, s),
+            label, float(score), _p(found, score), _reason(found, s, score, last.get(label), named), _shown(s, found.selection.null),
+            _detectable(found, s),
             s.term.effect.units(), s.term.effect.family,
         )  # fmt: skip
     for g in found.all_gears:
@@ -250,7 +252,8 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str]) -> Candidate
     if name in named:
         reason = "named"
     elif name == "hull_derivatives":
-        reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}"
+        below = found.hull <= HULL_THRESHOLD
+        reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}" if below else "fitting it does not pay on held-out runs"
     elif name in ("wind", "wind_per_run"):
         reason = "the wind is measured and in the model already"
     elif name in ("change_point", "unit_or_sign_error"):

@@ -99,8 +99,8 @@ def _doubts(found: Analysis) -> list[str]:
     worst = float(np.max(np.abs(base)))
     if worst > 6.0:
         return [
-            f"the fit moves a parameter by {worst:.0f} times its ordinary spread: is the ship file that of this ship (L, B, T, displacement, rudder)? "
-            "Names are not to be trusted until that is sure."
+            f"the fit moves a parameter by {worst:.0f} times its ordinary spread: is the ship file that of this ship (L, B, T, displacement, "
+            "rudder)? Names are not to be trusted until that is sure."
         ]
     return []
 

@@ -159,7 +159,8 @@ def fit(
     plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 20,
     candidates: Sequence[Term] = (), guess: np.ndarray | None = None,
 ) -> Fit:  # fmt: skip
-    """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), to the best evidence found.
+    """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), to the best evidence
+    found.
 
     A step is halved only where the cost explodes: the cost of a step that is right for the parameters rises at first, until the latent force has
     followed, and the path would else end where parameters compensate each other. `candidates` get columns at the last point.

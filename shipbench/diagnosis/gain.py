@@ -1,9 +1,10 @@
-"""What naming a cause is worth: open-loop rollouts of runs that were not fitted, before and after, with everything repeated on every training part."""
+"""What naming a cause is worth: open-loop rollouts of runs that were not fitted, with everything repeated on every training part."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ..records import Dataset
 from ..ship import complete
 from .model import FREE, NUM_BASE, STRUCTURE, Linearisation, Point, Scales, Term
 from .outcome import Gain
-from .plant import NUM_HULL, Active, Plant, cut
+from .plant import NUM_HULL, Plant, cut
 
 HORIZON = 120.0
 _STEPS = 8
@@ -101,7 +102,7 @@ def _moved(point: Point, free: Sequence[int], terms: Sequence[Term], at: np.ndar
     base = point.base.copy()
     base[list(free)] = at[: len(free)]
     sizes = np.cumsum([len(free), *(t.size for t in terms)])
-    return Rollout(base, tuple(terms), tuple(at[a:b] for a, b in zip(sizes[:-1], sizes[1:], strict=True)))
+    return Rollout(base, tuple(terms), tuple(at[a:b] for a, b in pairwise(sizes)))
 
 
 def _lin(plant: Plant, scales: Scales, model: Rollout) -> Linearisation:

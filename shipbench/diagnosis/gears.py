@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -104,13 +105,16 @@ def _of_actuator(plant: Plant, name: str, picked: np.ndarray) -> tuple[list[Gear
         path = gear_path(measured[:, 0], command, seg.dt, gear_of(z, kind))
         return np.where(mask, (measured - path)[:, 1:], 0.0)
 
-    ordinary = _least(lambda z: float(np.sum(residual(z) ** 2)), low, high)
+    def cost(z: np.ndarray, kind: _Kind | None = None) -> float:
+        return float(np.sum(residual(z, kind) ** 2))
+
+    ordinary = _least(cost, low, high)
     plain = residual(ordinary)
     found = []
     for kind in _kinds(name, scale, span, ordinary_gears(plant.c.L)[name]):
         lows, highs = np.resize(low, max(2, kind.at + 1)), np.resize(high, max(2, kind.at + 1))
         lows[kind.at], highs[kind.at] = np.log(kind.low), np.log(kind.high)
-        z = _least(lambda z, kind=kind: float(np.sum(residual(z, kind) ** 2)), lows, highs, ordinary if kind.at == 2 else None)
+        z = _least(partial(cost, kind=kind), lows, highs, ordinary if kind.at == 2 else None)
         rest = residual(z, kind)
         variance, samples = max(float(np.sum(rest**2)) / mask.sum(), 1e-300), float(mask.sum())
         rho = min(max(float(np.sum(rest[:, 1:] * rest[:, :-1]) / np.sum(rest**2)), 0.0), 0.98) if np.any(rest) else 0.0
@@ -138,6 +142,8 @@ def _least(cost: Callable[[np.ndarray], float], low: np.ndarray, high: np.ndarra
     else:
         grid = [np.append(np.clip(plain, low[:2], high[:2]), c) for c in np.linspace(low[2], high[2], _SCAN)]
     start = min(grid, key=cost)
-    simplex = np.clip(start + np.vstack([np.zeros(len(low)), np.diag(np.where(start < 0.5 * (low + high), 0.1, -0.1) * np.ones(len(low)))]), low, high)
+    simplex = np.clip(
+        start + np.vstack([np.zeros(len(low)), np.diag(np.where(start < 0.5 * (low + high), 0.1, -0.1) * np.ones(len(low)))]), low, high
+    )
     options = {"maxfev": _EVALUATIONS, "xatol": 1e-3, "fatol": 1e-9, "initial_simplex": simplex}
     return minimize(cost, start, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)), options=options).x

@@ -19,7 +19,8 @@ _EM_STEPS = 3
 
 @dataclass(frozen=True)
 class Dependence:
-    """The latent force of one axis follows one variable. score: 2 log Bayes factor; share: of the variance of that axis's latent force that it takes."""
+    """The latent force of one axis follows one variable. score: 2 log Bayes factor; share: of the variance of that axis's latent force that it
+    takes."""
 
     variable: str
     axis: str

@@ -124,7 +124,8 @@ class Reduced:
 
 @dataclass(frozen=True)
 class Prior:
-    """Which shared columns are in the model: `shared` with prior precisions (one value for all runs), `random` with variances log_tau2 (one per run)."""
+    """Which shared columns are in the model: `shared` with prior precisions (one value for all runs), `random` with variances log_tau2 (one per
+    run)."""
 
     shared: np.ndarray
     precision: np.ndarray

@@ -129,7 +129,8 @@ class Scales:
 
 
 def parameters(scales: Scales, base: np.ndarray) -> tuple[list[np.ndarray | float], list[Active]]:
-    """p0..p10, and the changes of the hull and of the structure, from `base` (..., 15); leading axes are kept, so that (D, 1) spreads over segments."""
+    """p0..p10, and the changes of the hull and of the structure, from `base` (..., 15); leading axes are kept, so that (D, 1) spreads over
+    segments."""
     p: list[np.ndarray | float] = [0.0] * 11
     for i, index in enumerate(FREE):
         p[index] = (_CENTRE[i] + _SPREAD[i] * base[..., i]) * scales.p[index]

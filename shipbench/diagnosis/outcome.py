@@ -80,7 +80,8 @@ class Trace:
     run (B,) index of the run, names: of the runs. start (B,) [s]. t (K + 1,) [s]. measured, before, after (B, K + 1, 6): x y psi u v r recorded,
     rolled out open-loop by the plain model, and by the extended one (held out where `held_out`; equal to `before` when nothing was named).
     inputs (B, K + 1, 4): n delta F_b F_s. knots (J,) [s]; force (B, J, 3), force_sd (B, J, 3): latent acceleration in surge, sway [m/s^2],
-    yaw [rad/s^2], that the plain model needs to follow the measurement; force_after: the same for the extended model. white (B, K + 1, 6): residuals of
+    yaw [rad/s^2], that the plain model needs to follow the measurement; force_after: the same for the extended model. white (B, K + 1, 6):
+    residuals of
     the smoothed plain model over the noise.
     """
 

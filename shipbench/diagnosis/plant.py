@@ -190,7 +190,8 @@ class Plant:
     def steps_from(
         self, states: np.ndarray, p: Sequence[Array], active: Sequence[Active], push: tuple[np.ndarray, np.ndarray], path: np.ndarray | None = None
     ) -> np.ndarray:
-        """One sample ahead of every state at once: (D, K, B, 6) from states (D or 1, K, B, 6) and accelerations at both ends of the step (.., K, B, 3).
+        """One sample ahead of every state at once: (D, K, B, 6) from states (D or 1, K, B, 6) and accelerations at both ends of the step (.., K,
+        B, 3).
 
         Along a known trajectory this replaces the loop over time: the sensitivities of the single steps are chained afterwards.
         """

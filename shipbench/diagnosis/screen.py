@@ -16,7 +16,8 @@ _EM_STEPS = 4
 
 @dataclass(frozen=True)
 class Score:
-    """A candidate beside a fitted model. score: twice the gain in log evidence (2 log Bayes factor with a prior of typical size); estimate, sd (size,) in
+    """A candidate beside a fitted model. score: twice the gain in log evidence (2 log Bayes factor with a prior of typical size); estimate, sd
+    (size,) in
     units of the typical size (for a random effect: root mean square over runs, and NaN); information (size, size): precision of the estimate that the
     data give, nuisances integrated out; per_run (N,): gain in log likelihood by run; log_tau2: of a random effect."""
 

@@ -24,7 +24,8 @@ class ErrorTables:
     """The figures behind the lines.
 
     share: of the normalised squared error per channel. by: variable -> list of (from, to, root mean square of the normalised error, samples).
-    follows: per axis of the force, (variable, R^2, p) best first. white: channel -> (Ljung-Box statistic over its 95 % limit). inputs: (channel, input) ->
+    follows: per axis of the force, (variable, R^2, p) best first. white: channel -> (Ljung-Box statistic over its 95 % limit). inputs: (channel,
+    input) ->
     greatest cross-correlation over its 95 % bound.
     """
 

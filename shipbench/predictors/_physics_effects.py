@@ -183,9 +183,7 @@ def _given(effect: Effect, params: dict[str, Any]) -> tuple[float | None, ...]:
     if effect.vector is None:
         return tuple(float(params[p.name]) if p.name in params else None for p in effect.parameters)
     if params and len(params) < len(known):
-        raise InputError(
-            f"effect '{effect.name}': only {', '.join(params)} is given; give both {' and '.join(known)}, or neither."
-        )
+        raise InputError(f"effect '{effect.name}': only {', '.join(params)} is given; give both {' and '.join(known)}, or neither.")
     return effect.internal(params) if params else (None,) * len(effect.parameters)
 
 
