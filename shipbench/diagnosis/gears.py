@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ..physics.actuators import Gear, gear_path
-from .plant import Plant, gear_scale, ordinary_gears
+from .plant import Plant, ordinary_gears
 
 _ACTUATORS = {"n": (0,), "delta": (1,), "F": (2, 3)}
 _RATE_POWER = {"n": 2, "delta": 1, "F": 0}
@@ -58,9 +58,16 @@ class _Kind:
         return {"T": 0, "rate": 1}.get(self.field, 2)
 
 
+def _least_rate(actuator: str, scale: float) -> float:
+    """Least rate of an ordinary gear, by Froude's law; a full-scale rudder under 130 m need be no faster (SOLAS)."""
+    if actuator == "delta" and scale > 0.4:
+        scale = max(scale, 1.0)
+    return ORDINARY[actuator].rate / scale ** _RATE_POWER[actuator]
+
+
 def _kinds(actuator: str, scale: float, span: float, ordinary: Gear) -> list[_Kind]:
     """What may be wrong with an actuator; `span` is the range of its commands. Nothing smaller than a fiftieth of it is looked for."""
-    T, rate = ORDINARY[actuator].T * scale, ORDINARY[actuator].rate / scale ** _RATE_POWER[actuator]
+    T, rate = ORDINARY[actuator].T * scale, _least_rate(actuator, scale)
     lag = _Kind({"n": "shaft_lag", "delta": "rudder_lag", "F": "thruster_lag"}[actuator], "T", T, 60.0 * scale, ordinary.T)
     if actuator == "n":
         return [lag, _Kind("shaft_rate_limit", "rate", 0.02 * rate, rate)]
@@ -91,10 +98,10 @@ def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear]]:
 
 
 def _of_actuator(plant: Plant, name: str, picked: np.ndarray) -> tuple[list[GearFinding], Gear]:
-    seg, scale, (b, c) = plant.seg, gear_scale(plant.c.L), picked.T
+    seg, scale, (b, c) = plant.seg, (plant.c.L / 130.0) ** 0.5, picked.T
     command, measured, mask, run = seg.commands[b, :-1, c], seg.states[b, :, 6 + c], seg.mask[b, 1:], seg.run[b]
     span = float(np.percentile(np.abs(command), 98))
-    rate = max(ORDINARY[name].rate / scale ** _RATE_POWER[name], 0.01 * span / seg.dt)
+    rate = max(_least_rate(name, scale), 0.01 * span / seg.dt)
     low, high = np.log([0.02 * scale, rate]), np.log([ORDINARY[name].T * scale, max(10.0 * span / seg.dt, 2.0 * rate)])
 
     def gear_of(z: np.ndarray, kind: _Kind | None) -> Gear:

@@ -28,17 +28,11 @@ MOST_STEPS = 12_000
 """Of all segments together, per stage: more runs than this teach little and cost minutes."""
 
 
-def gear_scale(L: float) -> float:
-    """Factor of an ordinary gear's times beside 130 m: Froude's law for models and long ships; full-scale gears under 130 m are no faster (SOLAS)."""
-    scale = (L / 130.0) ** 0.5
-    return scale if L < 20.0 else max(scale, 1.0)
-
-
 def ordinary_gears(L: float) -> dict[str, Gear]:
     """Shaft [rpm], steering gear [rad] and thrusters [N] of an ordinary ship of length L, where no actuator is recorded: time constants and rates of
     `predictors._actuator_fit.DEFAULT_ACTUATORS`, Froude-scaled."""
     T_n, rate_n, T_delta, rate_delta, T_F, _ = (float(v) for v in DEFAULT_ACTUATORS)
-    scale = gear_scale(L)
+    scale = (L / 130.0) ** 0.5
     return {"n": Gear(T_n * scale, rate_n / scale**2), "delta": Gear(T_delta * scale, rate_delta / scale), "F": Gear(T_F * scale, 1e12)}
 
 

@@ -105,8 +105,15 @@ class Extension:
             self.ci95[starts[slot.term] + slot.at] = interval
 
     def held(self) -> dict[int, str]:
-        """Indices of p that stay at zero, and the fitted effect that does their work: data cannot tell the two apart."""
-        return {_IN_PLACE_OF[t.name]: t.name for t in self.terms if t.name in _IN_PLACE_OF and None in t.given}
+        """Indices of p that stay at zero, and the fitted effect that does their work: data cannot tell the two apart.
+
+        With the hull's derivatives free, p0 and a rudder offset push the stern alike wherever the revolutions follow the speed; p0 stays zero then.
+        """
+        fitted = [t.name for t in self.terms if None in t.given]
+        held = {_IN_PLACE_OF[name]: name for name in fitted if name in _IN_PLACE_OF}
+        if {"rudder_offset", "hull_derivatives"} <= set(fitted):
+            held.setdefault(0, "rudder_offset")
+        return held
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[Extension]:
         """One copy per choice of the shape parameters that the spec leaves open, given the places (.., 2) that the ship visited."""

@@ -65,7 +65,8 @@ class Physics(PredictorBase):
         """Add effects to what is fitted (`physics+current`): their formulas are those of `shipbench.effects`.
 
         Values that the spec sets are held; the others are fitted with p0..p10, or from command and actuator for effects of a gear where both
-        are recorded. p4 stays zero beside a fitted rudder offset or asymmetry, p0 beside a fitted propeller walk: data cannot tell them apart.
+        are recorded. p4 stays zero beside a fitted rudder offset or asymmetry, p0 beside a fitted propeller walk (and beside a rudder offset where
+        hull derivatives are fitted too): data cannot tell them apart.
         Runs begin at t = 0 s, the time of s0.
 
         Raises:
