@@ -29,8 +29,6 @@ from ..specs import EffectSpec
 Active = tuple[Effect, tuple[Array, ...]]
 """An effect and its values."""
 
-NO_GEAR = Gear(1e-3, 1e12)
-"""What lies between command and actuator where only commands are recorded: nothing."""
 
 ACTUATOR_OF = ("n", "delta", "F", "F")
 _IN_PLACE_OF = {"rudder_offset": 4, "rudder_asymmetry": 4, "propeller_walk": 0}
@@ -102,7 +100,7 @@ class Extension:
     def set_intervals(self, slots: Sequence[Slot], ci95: np.ndarray) -> None:
         starts = np.cumsum([0, *map(len, self.values)])
         for slot, interval in zip(slots, ci95, strict=True):
-            self.ci95[starts[slot.term] + slot.at] = interval
+            self.ci95[starts[slot.term] + slot.at] = interval if interval[1] > interval[0] else np.nan  # no width: the data say nothing of it
 
     def held(self) -> dict[int, str]:
         """Indices of p that stay at zero, and the fitted effect that does their work: data cannot tell the two apart.
@@ -201,6 +199,7 @@ def accelerations(
     e = Modifiers()
     for effect, q in active:
         effect.force(e, flow, q, ship)
+    air: tuple[Array, Array] | None
     if wind is not None:
         air = apparent_wind(flow.psi, flow.u, flow.v, *wind)
     else:
@@ -254,6 +253,14 @@ def true_start(s0: np.ndarray, sensors: Sequence[Active], dt: float) -> np.ndarr
         ahead[:, X], ahead[:, Y], ahead[:, PSI] = x[:, X] + dt * dx, x[:, Y] + dt * dy, x[:, PSI] + dt * dpsi
         x = x + (s0 - measured(np.stack([x, ahead], axis=1), sensors, dt)[:, 0])
     return x
+
+
+def no_gear(h: float) -> Gear:
+    """What lies between command and actuator where only commands are recorded: next to nothing, a lag of a quarter of the integration step `h` [s].
+
+    Without it the actuator would jump, and no small change of a delay would show.
+    """
+    return Gear(0.25 * h, 1e12)
 
 
 def geared(path: np.ndarray, s0: np.ndarray, U: np.ndarray, base: dict[str, Gear], active: Sequence[Active], dt: float, substeps: int) -> np.ndarray:

@@ -30,8 +30,8 @@ def fit_extension(
 ) -> tuple[Fit, Extension]:  # fmt: skip
     """p0..p10 and the effects' values together, from the plain fit `base` on; effects' shape parameters stay as they are in `extension`.
 
-    A value has a zero-mean prior of ten typical sizes, whose weight against the rollouts counts every run as one observation. p4 stays zero
-    beside a fitted rudder offset or asymmetry, p0 beside a fitted propeller walk.
+    A value has a zero-mean prior of ten typical sizes, whose weight against the rollouts counts every run as one observation.
+    What `Extension.held` names stays zero.
 
     Args:
         repath: the actuators' path under an extension's gears; asked again at every step where only commands are recorded.
@@ -47,7 +47,7 @@ def fit_extension(
         return Fit(q[:_P] * model.p_scale, np.full((_P, 2), np.nan), cost, taken), fitted
     half = intervals(q, e, J, model.low, model.high)
     fitted.set_intervals(model.slots, half[_P:] * model.q_scale[:, None])
-    return Fit(q[:_P] * model.p_scale, half[:_P] * model.p_scale[:, None], cost, taken), fitted
+    return Fit(q[:_P] * model.p_scale, half[:_P] * model.p_scale[:, None], float(np.sum(e * e)), taken), fitted
 
 
 class _Extended:

@@ -21,7 +21,6 @@ from ..ops import Array
 from ..physics import eq2
 from ..physics.modifiers import Flow
 from ..records import Batch
-from ..ship import Particulars
 from ..signals import COMMANDS, MOTION
 from ._physics_effects import accelerations
 from .hold import Hold
@@ -44,11 +43,12 @@ class Fit:
 
 @lru_cache(maxsize=8)
 def rollout_function(
-    c: eq2.Coefficients, steps: int, runs: int, h: float, wind: bool, sensitivities: bool, forces: Forces = (), ship: Particulars | None = None
+    c: eq2.Coefficients, steps: int, runs: int, h: float, wind: bool, sensitivities: bool, forces: Forces = (), ship: Any = None
 ) -> ca.Function:
     """Rollout of `runs` runs: (x0, S0, w, p) -> (X, S), or (x0, w, p) -> X without sensitivities.
 
     p holds p0..p10 and then the values of `forces` that are None; the last row of w is the time at the beginning of the step, if there are forces.
+    `ship` (Particulars) is what effects know of the ship.
     """
     num = _P + sum(v is None for _, q in forces for v in q)
     x, S, p = ca.SX.sym("x", 6), ca.SX.sym("S", 6, num), ca.SX.sym("p", num)

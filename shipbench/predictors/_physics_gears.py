@@ -44,9 +44,8 @@ def fit_gears(batch: Batch, dt: float, substeps: int, extension: Extension, actu
         if given or slots:
             problem = _Actuator(batch, dt, substeps, extension, slots, name, channels)
             if problem.moves:
-                actuators[2 * g : 2 * g + 2], extension = problem.fit(
-                    actuators[2 * g : 2 * g + 2], DEFAULT_ACTUATORS[2 * g] * (ship.L / 130.0) ** 0.5
-                )
+                pair = slice(2 * g, 2 * g + 2)
+                actuators[pair], extension = problem.fit(actuators[pair], DEFAULT_ACTUATORS[2 * g] * (ship.L / 130.0) ** 0.5)
             else:
                 extension = extension.with_values(slots, [max(s.parameter.low, 0.0) for s in slots])
     return actuators, extension
@@ -124,7 +123,7 @@ class _Actuator:
             )
             if 2.0 * found.cost < np.sum(self.residual(z) ** 2):
                 z = whole(found.x)
-        extension = self.extension.with_values(self.slots, z[2:])
+        extension = self.extension.with_values(self.slots, [float(v) for v in z[2:]])
         step = 1e-3 * (high - low)
         J = np.stack([(self.residual(z + d) - self.residual(z - d)) / (2.0 * max(d.sum(), 1e-300)) for d in np.diag(step)], axis=-1)
         shape = (self.channels, self.runs, -1)

@@ -17,7 +17,7 @@ from ..ship import Ship, complete
 from ..signals import ACTUATORS, COMMANDS, MOTION
 from ..specs import EffectSpec
 from ._actuator_fit import DEFAULT_ACTUATORS, fit_actuators
-from ._physics_effects import NO_GEAR, Extension, extension_of, geared, measured, roll, true_start
+from ._physics_effects import Extension, extension_of, geared, measured, no_gear, roll, true_start
 from ._physics_gears import fit_gears, gears_of
 from .base import History, PredictorBase
 
@@ -158,7 +158,7 @@ class Physics(PredictorBase):
         gears = [] if self.extension is None else self.extension.active("gear")
         if not gears:
             return path
-        base = dict.fromkeys(("n", "delta", "F"), NO_GEAR) if self.commanded else gears_of(self.actuator_params)
+        base = dict.fromkeys(("n", "delta", "F"), no_gear(h)) if self.commanded else gears_of(self.actuator_params)
         return geared(path, s0, U, base, gears, self.dt, self.substeps)
 
     def _wind(self, U: np.ndarray) -> np.ndarray | None:

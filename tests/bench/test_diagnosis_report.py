@@ -1,0 +1,87 @@
+"""The report holds what the diagnosis holds, and needs no network."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from shipbench.bench.diagnosis_report import write_diagnosis
+from shipbench.bench.diagnosis_text import WIDTH, summary_lines
+from shipbench.diagnosis.outcome import Candidate, Cause, Diagnosis, Estimate, Gain, Wrong
+from tests.diagnosis.test_wrong import make_trace
+
+GAIN = Gain("ED", 21.3, 9.8, 0.54, (0.4, 0.66), "24/24")
+CAUSE = Cause(
+    "current", 1, 120.0, 0.001, {"speed": Estimate(0.31, "m/s", (0.28, 0.34)), "to": Estimate(2.5, "rad", (2.4, 2.6))}, ("wind",),
+    "reciprocal courses", GAIN, "24 of 24 runs support it",
+)  # fmt: skip
+CANDIDATES = (
+    Candidate("current", 120.0, 0.001, "named", {"north": 0.2}, {"north": 0.05, "east": float("nan")}, {"speed": "m/s", "to": "rad"}, "environment"),
+    Candidate("heading_bias", float("nan"), float("nan"), "score below the threshold", {}, {"bias": 0.002}, {"bias": "rad"}, "sensor"),
+)
+
+
+def make_diagnosis(verdict: str = "found", name: str = "trial") -> Diagnosis:
+    found = verdict == "found"
+    unknown = {"axis": "yaw", "variable": "heading", "score": 44.0, "share": 0.5} if verdict == "unknown" else None
+    return Diagnosis(
+        dataset=name, verdict=verdict, causes=(CAUSE,) if found else (), candidates=CANDIDATES,
+        what_is_wrong=(Wrong("sway", 0.6, "heading", "worst at 90 to 135 deg"),), unexplained_after={"force_sd": {"surge": 0.001}},
+        extended_model="physics+current" if found else "physics", fingerprint="abc", seconds=12.0, warnings=("few runs",),
+        gain=GAIN if found else None, unknown=unknown, gain_per_run=(("a", 20.0, 9.0), ("b", 22.0, 10.6)) if found else (), trace=make_trace(4),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("verdict", ["found", "none", "unknown"])
+def test_the_page_stands_alone_and_names_every_candidate(tmp_path, verdict):
+    paths = {p.name: p for p in write_diagnosis(make_diagnosis(verdict), tmp_path)}
+    text = paths["report.html"].read_text()
+    assert not re.search(r"(src|href)=.https?:|<script|@import|url\(http", text)
+    assert all(c.effect in text for c in CANDIDATES) and "prefers-color-scheme" in text
+    assert len(text) < 5e6 and ("Gain per run" in text) == (verdict == "found")
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_names_from_the_data_are_escaped(tmp_path):
+    write_diagnosis(make_diagnosis(name="<script>alert(1)</script>"), tmp_path)
+    text = (tmp_path / "report.html").read_text()
+    assert "<script>" not in text and "&lt;script&gt;" in text
+
+
+def test_the_document_has_the_contracts_keys_and_no_nan(tmp_path):
+    write_diagnosis(make_diagnosis(), tmp_path)
+    document = json.loads((tmp_path / "diagnosis.json").read_text())
+    keys = {"schema", "dataset", "base_model", "verdict", "causes", "candidates", "what_is_wrong", "unexplained_after", "extended_model",
+            "fingerprint", "seconds"}  # fmt: skip
+    assert keys <= set(document) and document["schema"] == 1
+    cause = document["causes"][0]
+    assert cause["parameters"]["speed"] == {"value": 0.31, "unit": "m/s", "ci95": [0.28, 0.34]} and cause["gain"]["runs_better"] == "24/24"
+    assert document["candidates"][1]["score"] is None and document["candidates"][0]["rejected_because"] == "named"
+
+
+def test_the_summary_says_the_verdict_with_sizes_and_the_next_command():
+    lines = summary_lines(make_diagnosis())
+    text = "\n".join(lines)
+    assert max(map(len, lines)) <= WIDTH + 2
+    assert "current" in text and "143 deg" in text and "21.3 -> 9.8 m" in text and "24/24 runs better" in text
+    assert "shipbench run --model physics --model physics+current" in text and "reciprocal courses" in text and "WARNING: few runs" in text
+
+
+def test_none_comes_with_the_sizes_that_would_have_been_seen():
+    text = "\n".join(summary_lines(make_diagnosis("none")))
+    assert "Nothing found" in text and "0.115 deg" in text and "physics+" not in text
+
+
+def test_unknown_names_axis_and_variable():
+    assert "a force in yaw that depends on heading" in " ".join("\n".join(summary_lines(make_diagnosis("unknown"))).split())
+
+
+def test_infinite_scores_do_not_reach_the_json(tmp_path):
+    d = make_diagnosis()
+    from dataclasses import replace
+
+    write_diagnosis(replace(d, causes=(replace(CAUSE, score=np.inf),)), tmp_path)
+    assert json.loads((tmp_path / "diagnosis.json").read_text())["causes"][0]["score"] is None

@@ -1,0 +1,88 @@
+"""The algebra of the diagnosis against direct computation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipbench.diagnosis.fit import Model, fit, settle, start, track
+from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, ornstein_uhlenbeck, solve
+from shipbench.diagnosis.model import Linearisation, Scales, Term, predict
+from shipbench.diagnosis.plant import Plant
+from shipbench.effects.base import EFFECTS
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.simulate.trials import Trials, sea_trials
+
+
+@pytest.fixture(scope="module")
+def plant() -> Plant:
+    return Plant.of(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=4, samples=60)))
+
+
+def test_the_evidence_is_that_of_the_joint_gaussian():
+    rng = np.random.default_rng(0)
+    knots, G, T = 3, 2, 6 * 5
+    Z = rng.standard_normal((2, T, 6 + 3 * knots + G + 1))
+    hyper = Hyper(np.array([0.1, -0.3, 0.2]), rng.normal(0.0, 0.2, 6), 2.0)
+    gram = Products.of(Z, np.ones((2, 5), dtype=bool), knots, 1.0, np.array([0, 1]), 2).weigh(hyper)
+    prior = Prior(np.array([0]), np.array([0.7]), np.array([1]), np.array([0.4]))
+    found = solve(gram.reduce(hyper.log_force), prior).log_evidence
+    K = np.linalg.inv(ornstein_uhlenbeck(knots, 1.0, 2.0)[0])
+    noise = np.diag(np.tile(np.exp(hyper.log_noise), 5))
+    C = np.zeros((2 * T, 2 * T))
+    for b in range(2):
+        S_eta, S_w, own = Z[b, :, :6], Z[b, :, 6 : 6 + 3 * knots], Z[b, :, -2:-1]
+        W = np.kron(np.diag(np.exp(hyper.log_force)), K)
+        at = slice(b * T, (b + 1) * T)
+        C[at, at] = noise + S_eta @ S_eta.T / ETA_PRECISION + S_w @ W @ S_w.T + np.exp(0.4) * own @ own.T
+    shared = Z[:, :, -3].reshape(-1, 1)
+    C += shared @ shared.T / 0.7
+    e = Z[:, :, -1].ravel()
+    expected = -0.5 * (e @ np.linalg.solve(C, e) + np.linalg.slogdet(C)[1])
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_sensitivities_are_those_of_the_rollout(plant):
+    scales = Scales(plant)
+    point, _ = start(plant)
+    columns = Linearisation(plant, scales, point).columns()
+    step = 1e-4
+    for i in (0, 3, 8, 16):
+        moved = replace(point, base=point.base + step * np.eye(len(point.base))[i])
+        slope = (predict(plant, scales, moved) - columns.predicted) / step
+        got = columns.base[..., i].reshape(slope.shape)
+        assert np.abs(got - slope).max() < 0.02 * np.abs(slope).max() + 1e-9
+    moved = replace(point, w=point.w + step * np.eye(plant.knots)[4][None, :, None] * np.array([0.0, 1.0, 0.0]))
+    slope = (predict(plant, scales, moved) - columns.predicted) / step
+    assert np.abs(columns.w[..., plant.knots + 4].reshape(slope.shape) - slope).max() < 0.02 * np.abs(slope).max()
+
+
+def test_a_guess_whose_gaps_are_chained_gives_the_rollout_of_a_linear_change(plant):
+    scales = Scales(plant)
+    point, _ = start(plant)
+    lin = Linearisation(plant, scales, point)
+    lin.columns()
+    near = replace(point, base=point.base + 1e-3)
+    lifted = Linearisation(plant, scales, near, lin.towards(near)).predicted
+    assert np.abs(lifted - predict(plant, scales, near)).max() < 1e-3
+
+
+def test_the_latent_force_puts_the_model_on_the_measurement(plant):
+    scales = Scales(plant)
+    point, hyper, guess = track(plant, scales, *start(plant))
+    found = fit(plant, scales, Model(), point, hyper, guess=guess)
+    noise = np.exp(0.5 * found.hyper.log_noise) * scales.noise
+    assert noise[0] == pytest.approx(0.5 * plant.c.L / 130.0, rel=0.3)  # the simulated position noise is found again
+    rest = (plant.seg.states[..., :6] - found.columns.predicted) / noise
+    assert np.sqrt(np.mean(rest[plant.seg.mask] ** 2)) < 1.5
+
+
+def test_an_effect_with_one_value_per_run_has_its_own_columns_in_every_run(plant):
+    scales = Scales(plant)
+    point, hyper = start(plant)
+    term = Term(EFFECTS.get("current_per_run"), per_run=True)
+    point = point.with_term(term, np.zeros((plant.seg.runs, 2)))
+    settled = settle(Linearisation(plant, scales, point), Model((term,)), hyper, {})
+    assert settled.values[0].shape == (plant.seg.runs, 2) and np.isfinite(settled.evidence)

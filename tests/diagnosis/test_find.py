@@ -1,0 +1,96 @@
+"""Effects are hidden in runs of the MMG ships, on hulls that the fit does not know, and must be found. Draws are fresh: the seed is in the message, and
+`SHIPBENCH_SEED=n` sets it."""
+
+from __future__ import annotations
+
+import os
+import secrets
+
+import numpy as np
+import pytest
+
+from shipbench.diagnosis.cases import draw_case, singles
+from shipbench.diagnosis.diagnose import diagnose
+from shipbench.effects.base import EFFECTS
+from shipbench.errors import InputError
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.records import Dataset
+from shipbench.simulate.hidden import Hidden
+from shipbench.simulate.trials import Trials, sea_trials
+
+SEED = int(os.environ.get("SHIPBENCH_SEED", secrets.randbelow(10_000)))
+CLEAR = ("current", "heading_bias", "yaw_rate_bias", "speed_scale", "antenna_offset", "velocity_delay")
+GEARS = ("rudder_lag", "rudder_backlash", "shaft_rate_limit")
+
+
+def _trials(*hidden: Hidden, runs: int = 12, samples: int = 90, seed: int = 3) -> Dataset:
+    return sea_trials(load_mmg_ship("kcs"), seed, hidden, Trials(runs=runs, samples=samples))
+
+
+@pytest.mark.parametrize("names", [CLEAR[:3], CLEAR[3:], GEARS])
+def test_fresh_draws_of_clear_effects_at_their_typical_size_are_named_first(names):
+    found = {}
+    for index in [i for i, name in enumerate(singles()) if name in names]:
+        case = draw_case("single", index, SEED, "test")
+        assert case.size == (1.0,)
+        verdict = diagnose(case.dataset(), gain=False)
+        found[case.truth[0]] = [c.effect for c in verdict.causes]
+    wrong = {truth: named for truth, named in found.items() if named[:1] != [truth]}
+    assert len(found) == len(names) and len(wrong) <= 1, f"seed {SEED}: {wrong}"
+
+
+def test_nothing_is_named_on_most_fresh_ships_without_a_hidden_effect():
+    named = {}
+    for kind in ("none-same", "none-other"):
+        for index in (0, 1):
+            verdict = diagnose(draw_case(kind, index, SEED, "test").dataset(), gain=False)
+            named[f"{kind} {index}"] = [c.effect for c in verdict.causes]
+    assert sum(bool(n) for n in named.values()) <= 1, f"seed {SEED}: {named}"
+
+
+def test_a_hidden_current_is_sized_and_pays_on_runs_that_were_not_fitted():
+    verdict = diagnose(_trials(Hidden(EFFECTS.get("current"), (0.25, -0.2))), workers=1)
+    cause = verdict.causes[0]
+    assert verdict.verdict == "found" and cause.effect == "current" and verdict.extended_model.startswith("physics+current")
+    assert cause.parameters["speed"].value == pytest.approx(np.hypot(0.25, 0.2), rel=0.15)
+    assert np.sin(cause.parameters["to"].value - np.arctan2(-0.2, 0.25)) == pytest.approx(0.0, abs=0.15)
+    assert verdict.gain is not None and verdict.gain.relative > 0.2 and verdict.gain.ci95[0] > 0.0
+    assert {c.effect for c in verdict.candidates} == set(EFFECTS.names())
+    assert any(w.depends_on == "heading" for w in verdict.what_is_wrong)
+
+
+def test_two_effects_at_once_are_both_named():
+    hidden = [Hidden(EFFECTS.get("heading_bias"), (0.03,)), Hidden(EFFECTS.get("current"), (-0.2, 0.2))]
+    named = [c.effect for c in diagnose(_trials(*hidden), gain=False).causes]
+    assert set(named) == {"heading_bias", "current"}
+
+
+def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
+    values = np.where(np.arange(12) >= 6, 0.04, 0.0)
+    cause = diagnose(_trials(Hidden(EFFECTS.get("heading_bias"), (values,))), gain=False).causes[0]
+    assert cause.effect == "change_point" and "heading_bias" in cause.evidence and abs(cause.parameters["from_run"].value - 6) <= 1
+
+
+def test_a_force_that_follows_no_known_cause_is_called_unknown_with_its_variable():
+    case = draw_case("outside", 1, 3, "development")  # a slow force in time
+    verdict = diagnose(case.dataset(), gain=False)
+    assert verdict.verdict == "unknown" and not verdict.causes
+    assert verdict.unknown is not None and verdict.unknown["variable"] in case.variables
+
+
+def test_too_few_runs_rank_candidates_but_name_none():
+    verdict = diagnose(_trials(Hidden(EFFECTS.get("heading_bias"), (0.05,)), runs=1), gain=False)
+    assert verdict.verdict == "none" and not verdict.causes and "too few" in verdict.warnings[0]
+
+
+def test_a_ship_that_never_moves_is_refused():
+    data = _trials(runs=6, samples=40)
+    states = [r.states * np.array([1, 1, 1, 0, 0, 0, 1, 1, 1, 1]) for r in data.runs]
+    still = data.with_runs([type(r)(r.id, r.t, s, r.inputs, r.inputs_names) for r, s in zip(data.runs, states, strict=True)])
+    with pytest.raises(InputError, match="never moves"):
+        diagnose(still)
+
+
+def test_twenty_samples_are_refused_or_name_nothing():
+    with pytest.raises(InputError, match="at least 20"):
+        diagnose(_trials(runs=1, samples=12))
