@@ -15,7 +15,7 @@ from shipbench.records import Dataset, Run
 from shipbench.registry import Registry
 from shipbench.ship import Ship, complete
 from shipbench.signals import COMMANDS, STATES, UNITS, wrap_angle
-from shipbench.specs import parse_spec
+from shipbench.specs import EffectSpec, parse_spec
 
 
 def _run(name: str = "a", samples: int = 11, dt: float = 1.0, **meta) -> Run:
@@ -82,8 +82,16 @@ def test_the_fingerprint_sees_every_sample():
 
 def test_specs_of_every_form_are_read(tmp_path):
     assert parse_spec("mlp[hidden=64,seed=3]").params == {"hidden": 64, "seed": 3}
-    assert parse_spec("physics+current+wind").effects == ("current", "wind")
+    assert [e.name for e in parse_spec("physics+current+wind").effects] == ["current", "wind"]
+    several = parse_spec("physics[iterations=3]+current[speed=0.3,to=1.0]+bank_suction[line=1e+3]")
+    assert several.params == {"iterations": 3}
+    assert several.effects == (EffectSpec("current", {"speed": 0.3, "to": 1.0}), EffectSpec("bank_suction", {"line": 1000.0}))
     assert parse_spec("a/b.py:Model[x=true]").class_name == "Model"
+    assert parse_spec("a+c/b.py:Model+current").effects == (EffectSpec("current"),)
+    saved = tmp_path / "physics+current[speed=0.3,to=1.0]"
+    saved.mkdir()
+    (saved / "model.json").write_text("{}")
+    assert parse_spec(str(saved)).path == saved
     with pytest.raises(InputError, match="no value"):
         parse_spec("mlp[hidden]")
     with pytest.raises(InputError, match="cannot be read"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,9 @@ from ..effects.base import EFFECTS, Effect
 from .analysis import HULL_THRESHOLD, Analysis
 from .fit import Fit
 from .gears import GearFinding
-from .gram import solve
-from .model import Term
+from .model import FREE, HULL_SPREAD, Term
 from .outcome import Candidate, Cause, Estimate, Gain
+from .plant import HULL, NUM_HULL
 from .screen import Score
 from .select import AS_RECORDED
 from .units import UnitFinding
@@ -34,8 +35,6 @@ def describe_causes(found: Analysis, units: Sequence[UnitFinding], gain: Gain | 
     named.sort(key=lambda c: -c.score)
     if hull and found.hull > HULL_THRESHOLD:
         named.append(_hull_cause(found, gain))
-    from dataclasses import replace
-
     return causes + [replace(c, rank=len(causes) + i + 1) for i, c in enumerate(named)]
 
 
@@ -45,11 +44,10 @@ def _p(found: Analysis, score: float) -> float:
 
 def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None) -> Cause:
     fit, effect = found.final, term.effect
-    score = 2.0 * (fit.evidence - _without(fit, index))
+    score = fit.worth(index)
+    supporters = int(np.sum(fit.solution.per_run > fit.solution_without(index).per_run))
     rivals = rivals_of(found, term)
-    evidence = (
-        f"adds {0.5 * score:.0f} to the log evidence beside the other causes; {_supporters(fit, index)} of {fit.plant.seg.runs} runs support it"
-    )
+    evidence = f"adds {0.5 * score:.0f} to the log evidence beside the other causes; {supporters} of {fit.plant.seg.runs} runs support it"
     if term.since is not None:
         evidence += f"; {effect.name} begins with run {term.since}"
     name = effect.name if term.since is None else "change_point"
@@ -67,29 +65,6 @@ def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
         near += [s.term.label for s in found.selection.steps if s.round == number and s.term.label != term.label and s.score > own.score - _TIE]
     present = {t.label for t in found.final.model.terms}
     return tuple(dict.fromkeys(n for n in near if n not in present))
-
-
-def _without(fit: Fit, index: int) -> float:
-    from dataclasses import replace
-
-    columns, prior = fit.columns_of(index), fit.prior
-    keep, keep_random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
-    less = replace(
-        prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random]
-    )
-    return solve(fit.reduced, less).log_evidence
-
-
-def _supporters(fit: Fit, index: int) -> int:
-    """Runs whose own likelihood is better with the term than without."""
-    from dataclasses import replace
-
-    columns, prior = fit.columns_of(index), fit.prior
-    keep, keep_random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
-    less = replace(
-        prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random]
-    )
-    return int(np.sum(fit.solution.per_run > solve(fit.reduced, less).per_run))
 
 
 def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
@@ -161,9 +136,6 @@ def _gear_cause(found: Analysis, g: GearFinding, gain: Gain | None) -> Cause:
 
 def _hull_cause(found: Analysis, gain: Gain | None) -> Cause:
     from scipy.stats import t
-
-    from .model import FREE, HULL_SPREAD
-    from .plant import HULL, NUM_HULL
 
     fit = found.final
     at = np.arange(len(FREE), len(FREE) + NUM_HULL)

@@ -81,6 +81,17 @@ class Fit:
         """Estimates of the terms' amplitudes, in units of their typical sizes: (size,), or (runs, size) of a random effect."""
         return point_from(self.model, self.point, self.solution, self.prior, self.estimate).values
 
+    def solution_without(self, index: int) -> Solution:
+        """The posterior on the same linearisation with the model's index-th term left out."""
+        columns, prior = self.columns_of(index), self.prior
+        keep, random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
+        return solve(self.reduced, Prior(prior.shared[keep], prior.precision[keep], prior.random[random], prior.log_tau2[random]))
+
+    def worth(self, index: int) -> float:
+        """Twice the log evidence that the index-th term adds on this linearisation, its cost as a random effect taken off."""
+        cost = np.log(self.plant.seg.runs) if self.model.terms[index].per_run else 0.0
+        return 2.0 * (self.solution.log_evidence - self.solution_without(index).log_evidence) - float(cost)
+
     def columns_of(self, index: int) -> np.ndarray:
         """Shared columns of the model's index-th term."""
         at = NUM_BASE + sum(t.size for t in self.model.terms[:index])

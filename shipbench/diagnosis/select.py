@@ -9,7 +9,6 @@ import numpy as np
 
 from ..effects.base import EFFECTS
 from .fit import Fit, Model, fit, start, track
-from .gram import solve
 from .model import Scales, Term
 from .plant import Plant
 from .screen import Score, changes, overlap, screen
@@ -161,20 +160,10 @@ def _backward(found: Fit, threshold: float, spare_last: bool = True) -> Fit:
     """Drop terms that are no longer worth the threshold, judged on the linearisation, then by a refit."""
     index = 0
     while index < len(found.model.terms) - spare_last:
-        if 2.0 * (found.evidence - _evidence_without(found, index)) < threshold:
+        if found.worth(index) < threshold:
             less = without(found, index)
             if 2.0 * (found.evidence - less.evidence) < threshold:
                 found = less
                 continue
         index += 1
     return found
-
-
-def _evidence_without(found: Fit, index: int) -> float:
-    columns = found.columns_of(index)
-    prior = found.prior
-    keep, keep_random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
-    less = replace(
-        prior, shared=prior.shared[keep], precision=prior.precision[keep], random=prior.random[keep_random], log_tau2=prior.log_tau2[keep_random]
-    )
-    return solve(found.reduced, less).log_evidence

@@ -117,7 +117,7 @@ class Physics(PredictorBase):
                 return self._path_under(extension, batch)
 
             found = fit_extension(data, base, choice, self.particulars, repath, self.commanded, self.iterations, self.tolerance)
-            if best is None or found[0].cost < best[0].cost:
+            if best is None or not best[0].cost <= found[0].cost:  # also where the best so far diverged
                 best = found
         if best is None:
             return base

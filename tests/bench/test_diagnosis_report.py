@@ -40,15 +40,18 @@ def test_the_page_stands_alone_and_names_every_candidate(tmp_path, verdict):
     paths = {p.name: p for p in write_diagnosis(make_diagnosis(verdict), tmp_path)}
     text = paths["report.html"].read_text()
     assert not re.search(r"(src|href)=.https?:|<script|@import|url\(http", text)
-    assert all(c.effect in text for c in CANDIDATES) and "prefers-color-scheme" in text
-    assert len(text) < 5e6 and ("Gain per run" in text) == (verdict == "found")
+    assert all(c.effect in text for c in CANDIDATES)
+    assert "prefers-color-scheme" in text
+    assert len(text) < 5e6
+    assert ("Gain per run" in text) == (verdict == "found")
     assert not list(tmp_path.glob(".*"))
 
 
 def test_names_from_the_data_are_escaped(tmp_path):
     write_diagnosis(make_diagnosis(name="<script>alert(1)</script>"), tmp_path)
     text = (tmp_path / "report.html").read_text()
-    assert "<script>" not in text and "&lt;script&gt;" in text
+    assert "<script>" not in text
+    assert "&lt;script&gt;" in text
 
 
 def test_the_document_has_the_contracts_keys_and_no_nan(tmp_path):
@@ -56,23 +59,33 @@ def test_the_document_has_the_contracts_keys_and_no_nan(tmp_path):
     document = json.loads((tmp_path / "diagnosis.json").read_text())
     keys = {"schema", "dataset", "base_model", "verdict", "causes", "candidates", "what_is_wrong", "unexplained_after", "extended_model",
             "fingerprint", "seconds"}  # fmt: skip
-    assert keys <= set(document) and document["schema"] == 1
+    assert keys <= set(document)
+    assert document["schema"] == 1
     cause = document["causes"][0]
-    assert cause["parameters"]["speed"] == {"value": 0.31, "unit": "m/s", "ci95": [0.28, 0.34]} and cause["gain"]["runs_better"] == "24/24"
-    assert document["candidates"][1]["score"] is None and document["candidates"][0]["rejected_because"] == "named"
+    assert cause["parameters"]["speed"] == {"value": 0.31, "unit": "m/s", "ci95": [0.28, 0.34]}
+    assert cause["gain"]["runs_better"] == "24/24"
+    assert document["candidates"][1]["score"] is None
+    assert document["candidates"][0]["rejected_because"] == "named"
 
 
 def test_the_summary_says_the_verdict_with_sizes_and_the_next_command():
     lines = summary_lines(make_diagnosis())
     text = "\n".join(lines)
     assert max(map(len, lines)) <= WIDTH + 2
-    assert "current" in text and "143 deg" in text and "21.3 -> 9.8 m" in text and "24/24 runs better" in text
-    assert "shipbench run --model physics --model physics+current" in text and "reciprocal courses" in text and "WARNING: few runs" in text
+    assert "current" in text
+    assert "143 deg" in text
+    assert "21.3 -> 9.8 m" in text
+    assert "24/24 runs better" in text
+    assert "shipbench run --model physics --model physics+current" in text
+    assert "reciprocal courses" in text
+    assert "WARNING: few runs" in text
 
 
 def test_none_comes_with_the_sizes_that_would_have_been_seen():
     text = "\n".join(summary_lines(make_diagnosis("none")))
-    assert "Nothing found" in text and "0.115 deg" in text and "physics+" not in text
+    assert "Nothing found" in text
+    assert "0.115 deg" in text
+    assert "physics+" not in text
 
 
 def test_unknown_names_axis_and_variable():

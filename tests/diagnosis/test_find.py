@@ -1,5 +1,7 @@
-"""Effects are hidden in runs of the MMG ships, on hulls that the fit does not know, and must be found. Draws are fresh: the seed is in the message, and
-`SHIPBENCH_SEED=n` sets it."""
+"""Effects are hidden in runs of the MMG ships, on hulls that the fit does not know, and must be found.
+
+Draws are fresh: the seed is in the message, and `SHIPBENCH_SEED=n` sets it.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,8 @@ def test_fresh_draws_of_clear_effects_at_their_typical_size_are_named_first(name
         verdict = diagnose(case.dataset(), gain=False)
         found[case.truth[0]] = [c.effect for c in verdict.causes]
     wrong = {truth: named for truth, named in found.items() if named[:1] != [truth]}
-    assert len(found) == len(names) and len(wrong) <= 1, f"seed {SEED}: {wrong}"
+    assert len(found) == len(names)
+    assert len(wrong) <= 1, f"seed {SEED}: {wrong}"
 
 
 def test_nothing_is_named_on_most_fresh_ships_without_a_hidden_effect():
@@ -51,10 +54,14 @@ def test_nothing_is_named_on_most_fresh_ships_without_a_hidden_effect():
 def test_a_hidden_current_is_sized_and_pays_on_runs_that_were_not_fitted():
     verdict = diagnose(_trials(Hidden(EFFECTS.get("current"), (0.25, -0.2))), workers=1)
     cause = verdict.causes[0]
-    assert verdict.verdict == "found" and cause.effect == "current" and verdict.extended_model.startswith("physics+current")
+    assert verdict.verdict == "found"
+    assert cause.effect == "current"
+    assert verdict.extended_model.startswith("physics+current")
     assert cause.parameters["speed"].value == pytest.approx(np.hypot(0.25, 0.2), rel=0.15)
     assert np.sin(cause.parameters["to"].value - np.arctan2(-0.2, 0.25)) == pytest.approx(0.0, abs=0.15)
-    assert verdict.gain is not None and verdict.gain.relative > 0.2 and verdict.gain.ci95[0] > 0.0
+    assert verdict.gain is not None
+    assert verdict.gain.relative > 0.2
+    assert verdict.gain.ci95[0] > 0.0
     assert {c.effect for c in verdict.candidates} == set(EFFECTS.names())
     assert any(w.depends_on == "heading" for w in verdict.what_is_wrong)
 
@@ -68,19 +75,25 @@ def test_two_effects_at_once_are_both_named():
 def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
     values = np.where(np.arange(12) >= 6, 0.04, 0.0)
     cause = diagnose(_trials(Hidden(EFFECTS.get("heading_bias"), (values,))), gain=False).causes[0]
-    assert cause.effect == "change_point" and "heading_bias" in cause.evidence and abs(cause.parameters["from_run"].value - 6) <= 1
+    assert cause.effect == "change_point"
+    assert "heading_bias" in cause.evidence
+    assert abs(cause.parameters["from_run"].value - 6) <= 1
 
 
 def test_a_force_that_follows_no_known_cause_is_called_unknown_with_its_variable():
     case = draw_case("outside", 1, 3, "development")  # a slow force in time
     verdict = diagnose(case.dataset(), gain=False)
-    assert verdict.verdict == "unknown" and not verdict.causes
-    assert verdict.unknown is not None and verdict.unknown["variable"] in case.variables
+    assert verdict.verdict == "unknown"
+    assert not verdict.causes
+    assert verdict.unknown is not None
+    assert verdict.unknown["variable"] in case.variables
 
 
 def test_too_few_runs_rank_candidates_but_name_none():
     verdict = diagnose(_trials(Hidden(EFFECTS.get("heading_bias"), (0.05,)), runs=1), gain=False)
-    assert verdict.verdict == "none" and not verdict.causes and "too few" in verdict.warnings[0]
+    assert verdict.verdict == "none"
+    assert not verdict.causes
+    assert "too few" in verdict.warnings[0]
 
 
 def test_a_ship_that_never_moves_is_refused():

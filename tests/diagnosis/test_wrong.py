@@ -35,7 +35,8 @@ def test_a_force_that_follows_the_heading_is_said_to():
     trace = make_trace()
     trace.force[..., 1] += 3e-3 * np.cos(trace.measured[:, ::5, 2])
     line = next(w for w in what_is_wrong(trace) if w.channel == "sway")
-    assert line.depends_on == "heading" and "heading" in line.when
+    assert line.depends_on == "heading"
+    assert "heading" in line.when
 
 
 def test_a_force_that_follows_the_rudder_is_said_to():
@@ -51,7 +52,8 @@ def test_a_force_without_cause_follows_nothing():
 
 def test_the_shares_are_those_of_the_planted_channel():
     lines = what_is_wrong(make_trace())
-    assert lines[0].channel == "sway" and lines[0].share_of_error == pytest.approx(1.0, abs=1e-6)
+    assert lines[0].channel == "sway"
+    assert lines[0].share_of_error == pytest.approx(1.0, abs=1e-6)
     assert "grows" in lines[0].when
 
 
