@@ -23,14 +23,14 @@ _TIE = 10.0
 """Candidates within this of the winner's score (2 log Bayes factor) are called confused with it."""
 
 
-def describe_causes(found: Analysis, units: Sequence[UnitFinding], gain: Gain | None, hull: bool) -> list[Cause]:
-    """Named causes: faults of units first, then by score; the hull last, because it is off the regressions on most ships."""
+def describe_causes(found: Analysis, units: Sequence[UnitFinding], gain: Gain | None, hull: bool, runs: Sequence[str]) -> list[Cause]:
+    """Named causes: faults of units first, then by score; the hull last, because it is off the regressions on most ships. `runs` are their names."""
     causes = [_unit_cause(i + 1, u) for i, u in enumerate(units)]
     if found.unknown is not None:
         return causes
     named: list[Cause] = []
     for index, term in enumerate(found.final.model.terms):
-        named.append(_term_cause(found, index, term, gain))
+        named.append(_term_cause(found, index, term, gain, runs))
     named += [_gear_cause(found, g, gain) for g in found.gears]
     named.sort(key=lambda c: -c.score)
     if hull and found.hull > HULL_THRESHOLD:
@@ -42,14 +42,14 @@ def _p(found: Analysis, score: float) -> float:
     return float((1 + np.sum(found.null_draws >= score)) / (1 + len(found.null_draws)))
 
 
-def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None) -> Cause:
+def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs: Sequence[str]) -> Cause:
     fit, effect = found.final, term.effect
     score = fit.worth(index)
     supporters = int(np.sum(fit.solution.per_run > fit.solution_without(index).per_run))
     rivals = rivals_of(found, term)
     evidence = f"adds {0.5 * score:.0f} to the log evidence beside the other causes; {supporters} of {fit.plant.seg.runs} runs support it"
     if term.since is not None:
-        evidence += f"; {effect.name} begins with run {term.since}"
+        evidence += f"; {effect.name} begins with run {runs[term.since]} (number {term.since}, the first is 0)"
     name = effect.name if term.since is None else "change_point"
     parameters = _parameters(fit, index, term)
     if term.since is not None:

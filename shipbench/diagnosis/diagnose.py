@@ -24,6 +24,8 @@ from .wrong import what_is_wrong
 
 FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
+NOT_A_MODEL = ("unit_or_sign_error", "change_point")
+"""They describe the data, not the ship: correct the data, or fit the runs before and after the change apart."""
 
 
 def diagnose(dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequence[str] | None = None, workers: int = 1) -> Diagnosis:
@@ -48,10 +50,11 @@ def diagnose(dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequen
     found = analyse(plant, only=only, seed=seed, cautious=cautious)
     warnings += _doubts(found)
     worth = _cross_validated(dataset, found, only, seed, workers) if gain and not cautious else Worth()
-    causes = describe_causes(found, units, worth.gain, worth.hull)
+    causes = describe_causes(found, units, worth.gain, worth.hull, [r.id for r in dataset.runs])
+    warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)
     verdict = "unknown" if found.unknown is not None and not units else "found" if causes else "none"
-    names = [c.effect for c in causes if c.effect != "unit_or_sign_error"]
+    names = [c.effect for c in causes if c.effect not in NOT_A_MODEL]
     return Diagnosis(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes), candidates=tuple(describe_candidates(found, [c.effect for c in causes])),
         what_is_wrong=what_is_wrong(trace), unexplained_after=remaining(found), extended_model="+".join(["physics", *names]),
