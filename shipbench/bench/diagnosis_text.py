@@ -51,6 +51,8 @@ def headline(d: Diagnosis) -> str:
             f"Something is missing that is not in the library: a force in {d.unknown['axis']} that depends on {d.unknown['variable']} "
             f"(score {d.unknown['score']:.0f}; no named effect explains as much)."
         )
+    if d.verdict == "unknown":
+        return "Nothing is named: the plain model does not seem to belong to these data. See the warnings."
     return "Nothing found: no effect of the library, and no unexplained dependence, is worth naming. See below what would have been seen."
 
 

@@ -24,6 +24,8 @@ from .wrong import what_is_wrong
 
 FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
+STRANGE, STRANGE_SUM, STRANGE_SIZE = 5.0, 90.0, 3.0
+"""Of the plain fit's parameters in units of their ordinary spreads, their sum of squares, and the size of a cause in typical sizes."""
 NOT_A_MODEL = ("unit_or_sign_error", "change_point")
 """They describe the data, not the ship: correct the data, or fit the runs before and after the change apart."""
 
@@ -48,12 +50,13 @@ def diagnose(dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequen
     plant = Plant.of(dataset)
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     found = analyse(plant, only=only, seed=seed, cautious=cautious)
-    warnings += _doubts(found)
-    worth = _cross_validated(dataset, found, only, seed, workers) if gain and not cautious else Worth()
-    causes = describe_causes(found, units, worth.gain, worth.hull, [r.id for r in dataset.runs])
+    doubts = _doubts(found) if only is None else []
+    warnings += doubts
+    worth = _cross_validated(dataset, found, only, seed, workers) if gain and not cautious and not doubts else Worth()
+    causes = [] if doubts else describe_causes(found, units, worth.gain, worth.hull, [r.id for r in dataset.runs])
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)
-    verdict = "unknown" if found.unknown is not None and not units else "found" if causes else "none"
+    verdict = "unknown" if doubts or (found.unknown is not None and not units) else "found" if causes else "none"
     names = [c.effect for c in causes if c.effect not in NOT_A_MODEL]
     return Diagnosis(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes), candidates=tuple(describe_candidates(found, [c.effect for c in causes])),
@@ -97,15 +100,21 @@ def _check(dataset: Dataset) -> list[str]:
 
 
 def _doubts(found: Analysis) -> list[str]:
-    """Signs that the model does not belong to the data at all."""
-    base = found.selection.null.solution.mean
-    worst = float(np.max(np.abs(base)))
-    if worst > 6.0:
-        return [
-            f"the fit moves a parameter by {worst:.0f} times its ordinary spread: is the ship file that of this ship (L, B, T, displacement, "
-            "rudder)? Names are not to be trusted until that is sure."
-        ]
-    return []
+    """Signs that the model does not belong to the data: the plain fit leaves what is ordinary, or hull or propeller would be another ship's."""
+    z = found.selection.null.solution.mean
+    signs = []
+    if np.max(np.abs(z)) > STRANGE or np.sum(z**2) > STRANGE_SUM:
+        signs.append(f"the fit moves a parameter by {np.max(np.abs(z)):.1f} times its ordinary spread (all together {np.sum(z**2) ** 0.5:.0f} times)")
+    for term, value in zip(found.final.model.terms, found.final.values, strict=True):
+        if term.effect.family in ("hull", "propulsion") and np.max(np.abs(value)) > STRANGE_SIZE:
+            signs.append(f"{term.label} would have to be {np.max(np.abs(value)):.1f} times its typical size")
+    if not signs:
+        return []
+    text = "; ".join(signs)
+    return [
+        f"{text}. Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)? Nothing is named until that is sure; "
+        "the candidates below are ranked as if it were."
+    ]
 
 
 def _one_fold(fold: int, dataset: Dataset, seed: int, only: Sequence[str] | None, threshold: float, hull: bool) -> FoldGain:

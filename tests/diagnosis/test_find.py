@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import secrets
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -87,6 +88,13 @@ def test_a_force_that_follows_no_known_cause_is_called_unknown_with_its_variable
     assert not verdict.causes
     assert verdict.unknown is not None
     assert verdict.unknown["variable"] in case.variables
+
+
+def test_a_ship_file_of_another_ship_names_nothing():
+    data = replace(_trials(), ship=load_mmg_ship("container130").particulars)
+    verdict = diagnose(data, gain=False)
+    assert not verdict.causes
+    assert verdict.verdict == "unknown"
 
 
 def test_too_few_runs_rank_candidates_but_name_none():
