@@ -7,37 +7,55 @@ import shlex
 import textwrap
 
 from ..diagnosis.outcome import Candidate, Cause, Diagnosis, Estimate, Gain
+from .tables import display_unit
 
 _SHOWN = 10
 WIDTH = 118
+_NO_MODEL = ("unit_or_sign_error", "change_point")
 
 
-def quantity(value: float, unit: str) -> str:
-    """A value with its unit; angles in degrees."""
+def figure(value: float) -> str:
+    """Three significant digits, powers of ten only for what is very small or large."""
+    if abs(value) < 1e-12:
+        return "0"
+    if not 1e-3 <= abs(value) < 1e5:
+        return f"{value:.3g}"
+    return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"
+
+
+def quantity(value: float | None, unit: str) -> str:
+    """A value with its unit as people read it: angles in degrees, forces in kN."""
     if value is None or not math.isfinite(value):
         return "-"
-    if unit in ("rad", "rad/s"):
-        return f"{math.degrees(value):.3g} {unit.replace('rad', 'deg')}"
-    return f"{value:.3g}" + ("" if unit == "1" else f" {unit}")
+    shown, factor = display_unit(unit)
+    return figure(factor * value) + ("" if shown == "1" else f" {shown}")
+
+
+def interval(e: Estimate) -> str:
+    """Such as `0.31 m/s [0.28, 0.34]`; without interval where there is none."""
+    factor = display_unit(e.unit)[1]
+    known = all(v is not None and math.isfinite(v) for v in e.ci95) and e.ci95[0] != e.ci95[1]
+    return quantity(e.value, e.unit) + (f" [{figure(factor * e.ci95[0])}, {figure(factor * e.ci95[1])}]" if known else "")
 
 
 def estimate(name: str, e: Estimate) -> str:
     """Such as `speed 0.31 m/s [0.28, 0.34]`."""
-    factor = math.degrees(1.0) if e.unit.startswith("rad") else 1.0
-    low, high = (f"{factor * v:.3g}" for v in e.ci95)
-    interval = "" if e.ci95[0] == e.ci95[1] else f" [{low}, {high}]"
-    return f"{name} {quantity(e.value, e.unit)}{interval}"
+    return f"{name.replace('_', ' ')} {interval(e)}"
+
+
+def _change(relative: float) -> str:
+    return f"{100.0 * abs(relative):.0f} % {'less' if relative >= 0 else 'more'}"
 
 
 def gain_words(g: Gain | None) -> str:
-    """What the extension is worth."""
+    """What the extension is worth on runs that were not fitted."""
     if g is None:
         return "The gain on held-out runs was not measured."
-    low, high = (100.0 * v for v in g.ci95)
-    change = "less" if g.relative >= 0 else "MORE"
+    low, high = g.ci95
+    doubt = "" if low > 0 else "; this may be no gain at all" if high > 0 else "; the extended model is worse"
     return (
-        f"Held-out {g.metric} {g.before:.3g} -> {g.after:.3g} m ({100 * abs(g.relative):.0f} % {change} [{low:.0f}, {high:.0f}]), "
-        f"{g.runs_better} runs better."
+        f"Held-out {g.metric} {figure(g.before)} -> {figure(g.after)} m: {_change(g.relative)} (95 %: {_change(low)} to {_change(high)}), "
+        f"{g.runs_better} runs better{doubt}."
     )
 
 
@@ -51,66 +69,98 @@ def headline(d: Diagnosis) -> str:
             f"Something is missing that is not in the library: a force in {d.unknown['axis']} that depends on {d.unknown['variable']} "
             f"(score {d.unknown['score']:.0f}; no named effect explains as much)."
         )
-    if d.verdict == "unknown":
-        return "Nothing is named: the plain model does not seem to belong to these data. See the warnings."
+    if d.warnings:
+        return "Nothing is named, with the warnings below. See what would have been seen, and how the candidates rank."
     return "Nothing found: no effect of the library, and no unexplained dependence, is worth naming. See below what would have been seen."
 
 
 def next_command(d: Diagnosis) -> str:
     """The command that compares the plain model with the extended one."""
-    inside = [c.effect for c in d.causes if c.effect not in ("unit_or_sign_error", "change_point")]
+    inside = [c.effect for c in d.causes if c.effect not in _NO_MODEL]
     model = "+".join(["physics", *inside])
     return f"shipbench run --model physics --model {shlex.quote(model)} --dataset {shlex.quote(d.dataset)}" if inside else ""
 
 
 def detectable(c: Candidate) -> str:
-    """Smallest size that would have been named, per amplitude."""
-    parts = [f"{name} {quantity(v, _unit(c, name))}" for name, v in c.detectable.items() if v is not None and math.isfinite(v)]
+    """Smallest size that would have been named, per amplitude; the unit once where it is the same."""
+    known = [(name, v, _unit(c, name)) for name, v in c.detectable.items() if v is not None and math.isfinite(v)]
+    parts = []
+    for i, (name, v, unit) in enumerate(known):
+        follows = i + 1 < len(known) and known[i + 1][2] == unit
+        parts.append(f"{name} {figure(display_unit(unit)[1] * v) if follows else quantity(v, unit)}")
     return ", ".join(parts) or "-"
 
 
 def _unit(c: Candidate, name: str) -> str:
+    """Components of a vector are in the unit of its size."""
     if name in c.units:
         return c.units[name]
     return next((u for u in c.units.values() if u != "rad"), "1")
 
 
+def strength(c: Cause) -> str:
+    """Score and p."""
+    return f"score {c.score:.0f}, p {c.p_value:.2g}" if math.isfinite(c.score) else "by kinematics"
+
+
 def cause_lines(c: Cause) -> list[str]:
     """A cause with sizes, evidence and confusions."""
-    strength = f"score {c.score:.0f}, p {c.p_value:.2g}" if math.isfinite(c.score) else "by kinematics"
-    lines = [f"  {c.rank}. {c.effect} ({strength})"]
+    lines = [f"  {c.rank}. {c.effect} ({strength(c)})"]
     lines += [f"       {estimate(k, e)}" for k, e in c.parameters.items()]
-    lines += textwrap.wrap(c.evidence + ".", WIDTH, initial_indent="       ", subsequent_indent="       ") if c.evidence else []
+    texts = [c.evidence.rstrip(".") + "."] if c.evidence else []
     if c.confused_with:
-        lines.append(f"       cannot be told from {', '.join(c.confused_with)} with these data")
-        lines += textwrap.wrap(f"to separate them: {c.separating_manoeuvre}", WIDTH, initial_indent="       ", subsequent_indent="       ")
+        texts.append(f"Cannot be told from {', '.join(c.confused_with)} with these data.")
+        texts += [f"To separate them: {c.separating_manoeuvre}"] if c.separating_manoeuvre else []
+    for text in texts:
+        lines += textwrap.wrap(text, WIDTH, initial_indent=" " * 7, subsequent_indent=" " * 7)
     return lines
 
 
+def _candidate_lines(d: Diagnosis) -> list[str]:
+    shown = d.candidates[:_SHOWN]
+    if not shown:
+        return []
+    wide = max(len(c.effect) for c in shown)
+    lines = [f"Candidates (best {len(shown)} of {len(d.candidates)}):", f"  {'effect':<{wide}s}     score  why it was or was not named"]
+    for c in shown:
+        score = f"{c.score:8.1f}" if math.isfinite(c.score) else "       -"
+        lines += textwrap.wrap(f"{c.effect:<{wide}s}  {score}  {c.rejected_because}", WIDTH, initial_indent="  ", subsequent_indent=" " * (wide + 14))
+    return [*lines, ""]
+
+
+def _detectable_lines(d: Diagnosis) -> list[str]:
+    """Everything where nothing was found; else the best candidates that were not named."""
+    kept = sorted(d.candidates, key=lambda c: c.effect) if d.verdict == "none" else [c for c in d.candidates[:_SHOWN] if c.rejected_because != "named"]
+    kept = [c for c in kept if detectable(c) != "-"]
+    if not kept:
+        return []
+    wide = max(len(c.effect) for c in kept)
+    lines = ["Smallest size of each effect that would have been named:"]
+    for c in kept:
+        lines += textwrap.wrap(f"{c.effect:<{wide}s}  {detectable(c)}", WIDTH, initial_indent="  ", subsequent_indent=" " * (wide + 4))
+    return [*lines, ""]
+
+
 def summary_lines(d: Diagnosis) -> list[str]:
-    """The whole diagnosis as plain lines of at most 120 columns."""
+    """The whole diagnosis as plain lines of at most `WIDTH` columns (a long name or command may stand out)."""
     lines = [f"Diagnosis of {d.dataset} ({d.seconds:.0f} s)", "", *textwrap.wrap(headline(d), WIDTH), ""]
     for warning in d.warnings:
-        lines += textwrap.wrap(f"WARNING: {warning}", WIDTH)
-    if d.what_is_wrong:
-        lines.append("What the plain physics model gets wrong:")
-        for w in d.what_is_wrong:
-            depends = f"its force follows {w.depends_on}" if w.depends_on else "its force follows no single variable"
-            lines += textwrap.wrap(f"{w.channel}: {100 * w.share_of_error:.0f} % of the error; {depends}; {w.when}", WIDTH, initial_indent="  ",
-                                   subsequent_indent="      ")  # fmt: skip
+        lines += textwrap.wrap(f"WARNING: {warning}", WIDTH, subsequent_indent="         ")
+    if d.warnings:
         lines.append("")
     if d.causes:
         lines.append("Causes:")
         for c in d.causes:
             lines += cause_lines(c)
         lines.append("")
-    lines.append(f"Candidates (best {_SHOWN} of {len(d.candidates)}; the smallest size that would have been named):")
-    for x in d.candidates[:_SHOWN]:
-        score = f"{x.score:9.1f}" if math.isfinite(x.score) else "        -"
-        lines.append(f"  {x.effect:<24s}{score}  {x.rejected_because}"[:WIDTH])
-    if d.verdict == "none":
-        lines += ["", "Smallest size of each effect that would have been seen:"]
-        lines += [f"  {x.effect:<24s}{detectable(x)}" for x in sorted(d.candidates, key=lambda x: x.effect) if detectable(x) != "-"]
+    if d.what_is_wrong:
+        lines.append("What the plain physics model gets wrong:")
+        for w in d.what_is_wrong:
+            when = w.when if w.depends_on else f"{w.when}; its missing force follows no single variable".removeprefix("; ")
+            lines += textwrap.wrap(f"{w.channel}, {100 * w.share_of_error:.0f} % of the error: {when}", WIDTH, initial_indent="  ",
+                                   subsequent_indent="      ")  # fmt: skip
+        lines.append("")
+    lines += _candidate_lines(d) + _detectable_lines(d)
     if command := next_command(d):
-        lines += ["", f"Extended model: {d.extended_model}", f"  {command}"]
+        lines += [f"Extended model: {d.extended_model}", f"  {command}"]
     return lines

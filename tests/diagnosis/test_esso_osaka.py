@@ -1,0 +1,87 @@
+"""Known faults put into real measured runs must stand out by name and size. Runs only where a copy of the data is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipbench.data.base import load_dataset
+from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.screen import screen
+from shipbench.diagnosis.select import candidates_for, null_fit
+from shipbench.errors import InputError
+from shipbench.records import Dataset, Run
+
+
+@pytest.fixture(scope="module")
+def runs() -> Dataset:
+    """Every third run, wind columns withheld."""
+    try:
+        data = load_dataset("esso_osaka[wind=false]")
+    except InputError as error:
+        pytest.skip(str(error))
+    return data.with_runs(data.runs[::3])
+
+
+def _with(data: Dataset, fault: Callable[[np.ndarray], None]) -> Dataset:
+    changed = []
+    for run in data.runs:
+        states = run.states.copy()
+        fault(states)
+        changed.append(Run(run.id, run.t, states, run.inputs, run.inputs_names, run.meta))
+    return replace(data, runs=tuple(changed))
+
+
+def _scores(data: Dataset) -> dict[str, tuple[float, float]]:
+    """Score and size of every candidate beside the plain model."""
+    plant = Plant.of(data)
+    scales = Scales(plant)
+    scores = screen(null_fit(plant, scales, candidates_for(plant)))
+    return {s.term.label: (s.score, float(s.estimate[0] * scales.amplitudes(s.term, plant.c.L)[0])) for s in reversed(scores)}
+
+
+@pytest.fixture(scope="module")
+def untouched(runs) -> dict[str, tuple[float, float]]:
+    return _scores(runs)
+
+
+def _turn(states: np.ndarray) -> None:
+    states[:, 2] += np.deg2rad(2.0)
+
+
+def _scale(states: np.ndarray) -> None:
+    states[:, 3:5] *= 1.04
+
+
+def _bias(states: np.ndarray) -> None:
+    states[:, 5] += np.deg2rad(0.3)
+
+
+def _arm(states: np.ndarray) -> None:
+    states[:, 0] += 0.3 * np.cos(states[:, 2])
+    states[:, 1] += 0.3 * np.sin(states[:, 2])
+
+
+@pytest.mark.parametrize(
+    ("effect", "fault", "size"),
+    [
+        ("heading_bias", _turn, np.deg2rad(2.0)),
+        ("speed_scale", _scale, 0.04),
+        ("yaw_rate_bias", _bias, np.deg2rad(0.3)),
+        ("antenna_offset", _arm, 0.3),
+    ],
+)
+def test_a_fault_put_into_real_runs_stands_out_with_its_size(runs, untouched, effect, fault, size):
+    faulty = _scores(_with(runs, fault))
+    assert faulty[effect][0] > untouched[effect][0] + 300.0
+    assert faulty[effect][1] - untouched[effect][1] == pytest.approx(size, rel=0.15)
+
+
+def test_the_lead_of_the_positions_that_the_data_are_known_for_is_found(untouched):
+    score, delay = untouched["position_delay"]
+    assert score > 300.0
+    assert -1.5 < delay < -0.3  # the data's own description: velocities lag the positions by about 0.6 s
