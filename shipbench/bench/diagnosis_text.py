@@ -130,7 +130,9 @@ def _candidate_lines(d: Diagnosis) -> list[str]:
 
 def _detectable_lines(d: Diagnosis) -> list[str]:
     """Everything where nothing was found; else the best candidates that were not named."""
-    kept = sorted(d.candidates, key=lambda c: c.effect) if d.verdict == "none" else [c for c in d.candidates[:_SHOWN] if c.rejected_because != "named"]
+    kept = (
+        sorted(d.candidates, key=lambda c: c.effect) if d.verdict == "none" else [c for c in d.candidates[:_SHOWN] if c.rejected_because != "named"]
+    )
     kept = [c for c in kept if detectable(c) != "-"]
     if not kept:
         return []

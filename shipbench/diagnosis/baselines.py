@@ -19,8 +19,8 @@ from ..physics.wind import apparent_wind
 from ..records import Dataset
 from .cases import singles
 from .fit import between, start
-from .model import NUM_BASE, Columns, Linearisation, Point, Scales, Term, parameters, predict
-from .plant import Active, Plant
+from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, Term, parameters, predict
+from .plant import NUM_HULL, Active, Plant
 
 _ITERATIONS = 6
 _WINDOW = 9
@@ -89,7 +89,8 @@ def derivative_regression(dataset: Dataset, names: Sequence[str] | None = None) 
     target = rows.defect((), np.zeros(NUM_BASE))
     used = np.isfinite(target)
     step = 1e-2
-    base = [(target - rows.defect((), step * unit)) / step for unit in np.eye(NUM_BASE)]
+    # of what differs between ships only resistance, rudder and hull: with all of it free, without priors, nothing is left to be named
+    base = [(target - rows.defect((), step * unit)) / step for unit in np.eye(NUM_BASE)[: len(FREE) + NUM_HULL]]
     weight = 1.0 / np.std(target[used.all(axis=-1)], axis=0)
     y, X = (weight * target)[used], np.stack([(weight * column)[used] for column in base], axis=-1)
     run = np.broadcast_to(plant.seg.run[:, None, None], target.shape)[used]
