@@ -5,119 +5,204 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
 
-from ..diagnosis.outcome import Diagnosis
-from .diagnosis_text import cause_lines, detectable, estimate, gain_words, headline, next_command, summary_lines
+from ..diagnosis.outcome import Cause, Diagnosis
+from .diagnosis_text import detectable, figure, gain_words, headline, interval, next_command, strength, summary_lines
 
 _STYLE = """
-:root { color-scheme: light dark; --ink: #1c2733; --paper: #ffffff; --soft: #eef2f5; --line: #d5dde3; --accent: #00798c; --warn: #a15c00; }
-@media (prefers-color-scheme: dark) { :root { --ink: #e4e9ee; --paper: #12181e; --soft: #1d262e; --line: #34424e; --accent: #4fc3d4; --warn:
-#f0b14a; } }
-body { font: 16px/1.55 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 62rem; margin: 0 auto; padding: 1rem; }
-h1 { font-size: 1.5rem; margin-bottom: .2rem; overflow-wrap: anywhere; } h2 { font-size: 1.15rem; margin-top: 2rem; }
-.verdict { background: var(--soft); border-left: .35rem solid var(--accent); padding: .8rem 1rem; font-size: 1.08rem; }
-.warning { color: var(--warn); font-weight: 600; } .small { font-size: .87rem; opacity: .85; }
-.scroll { overflow-x: auto; } table { border-collapse: collapse; font-size: .87rem; width: 100%; }
-th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid var(--line); vertical-align: top; } td.n { text-align: right;
-white-space: nowrap; }
-figure { margin: .6rem 0; background: #ffffff; border-radius: .3rem; padding: .3rem; } figure svg { width: 100%; height: auto; display: block; }
-pre { background: var(--soft); padding: .6rem; overflow-x: auto; font-size: .85rem; }
+:root { color-scheme: light dark; --ink: #1c2733; --paper: #fff; --soft: #f1f4f6; --line: #d5dde3; --accent: #00707f; --warn: #9a5200;
+  --before: #c4500a; --after: #0069a8; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e2e8ed; --paper: #12181e; --soft: #1c252d; --line: #35434f; --accent: #4fc3d4;
+  --warn: #f0b14a; --before: #f2894a; --after: #5cb8f2; } }
+* { box-sizing: border-box; }
+body { font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; color: var(--ink); background: var(--paper);
+  max-width: 68rem; margin: 0 auto; padding: 1rem 1rem 3rem; }
+h1 { font-size: 1.55rem; line-height: 1.25; margin: .3rem 0 .8rem; overflow-wrap: anywhere; }
+h2 { font-size: 1.2rem; margin: 2.4rem 0 .5rem; padding-top: .6rem; border-top: 1px solid var(--line); }
+h3 { font-size: 1rem; margin: 1.2rem 0 .3rem; } p { max-width: 46rem; margin: .5rem 0; overflow-wrap: anywhere; }
+nav { font-size: .87rem; line-height: 1.9; margin: 1rem 0; } nav a { color: var(--accent); margin-right: .9rem; white-space: nowrap; }
+.verdict { background: var(--soft); border-left: .35rem solid var(--accent); padding: .8rem 1rem; font-size: 1.08rem; max-width: none; }
+.verdict.unknown, .warning { border-left: .35rem solid var(--warn); } .warning { background: var(--soft); padding: .5rem 1rem; max-width: none; }
+.small, figcaption { font-size: .85rem; opacity: .85; } .grid { display: grid; gap: .9rem; grid-template-columns: repeat(auto-fill,
+  minmax(min(100%, 17.5rem), 1fr)); }
+figure { margin: 0; min-width: 0; } figcaption { overflow-wrap: anywhere; line-height: 1.35; padding: 0 .3rem; }
+figure svg { width: 100%; height: auto; display: block; } figure svg text { font-family: inherit !important; }
+.wide { overflow-x: auto; } .wide figure { min-width: 34rem; max-width: 54rem; }
+.key { font-size: .87rem; margin: .4rem 0; } .key span { margin-right: 1.1rem; white-space: nowrap; }
+.key i { display: inline-block; width: 1.5rem; height: .22rem; vertical-align: middle; margin-right: .4rem; }
+.scroll { overflow-x: auto; margin: .5rem 0; } table { border-collapse: collapse; font-size: .87rem; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; padding: .28rem .9rem .28rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
+th { font-weight: 600; white-space: nowrap; } td { min-width: 3.5rem; } td.long { min-width: 15rem; }
+.n { text-align: right; white-space: nowrap; } tr.named td { font-weight: 600; }
+.bar { display: inline-block; height: .65em; background: var(--before); margin-right: .4rem; }
+pre { background: var(--soft); padding: .7rem 1rem; overflow-x: auto; font-size: .85rem; } summary { cursor: pointer; margin: .6rem 0; }
 """
+_MEASURED_KEY = '<span><i style="background:currentColor"></i>measured</span>'
+_BEFORE_KEY = '<span><i style="background:var(--before)"></i>physics (plain)</span>'
+_AFTER_KEY = '<span><i style="background:var(--after)"></i>extended</span>'
 
 
 def write_diagnosis(d: Diagnosis, folder: Path) -> list[Path]:
-    """Write diagnosis.json, summary.txt and report.html, each atomically; the paths."""
-    folder.mkdir(parents=True, exist_ok=True)
-    texts = {
-        "diagnosis.json": json.dumps(d.document(), indent=1, allow_nan=False),
-        "summary.txt": "\n".join(summary_lines(d)) + "\n",
-        "report.html": page(d),
-    }
-    written = []
-    for name, text in texts.items():
-        temporary = folder / f".{name}.tmp"
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, folder / name)
-        written.append(folder / name)
-    return written
+    """Write diagnosis.json, summary.txt and report.html into `folder` (made if missing), each atomically; returns the paths."""
+    document = json.dumps(d.document(), indent=1, allow_nan=False)
+    return [
+        _write(folder / "diagnosis.json", document + "\n"),
+        _write(folder / "summary.txt", "\n".join(summary_lines(d)) + "\n"),
+        write_report(d, folder / "report.html"),
+    ]
+
+
+def write_report(d: Diagnosis, path: Path) -> Path:
+    """Write the page alone; returns `path`."""
+    return _write(path, page(d))
+
+
+def _write(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    # names of runs may hold lone surrogates from badly decoded files
+    temporary.write_text(text, encoding="utf-8", errors="replace")
+    os.replace(temporary, path)
+    return path
 
 
 def page(d: Diagnosis) -> str:
     """The page: everything inline, nothing fetched."""
-    parts = [f"<h1>Diagnosis of {escape(d.dataset)}</h1>", f'<p class="verdict">{escape(headline(d))}</p>']
-    parts += [f'<p class="warning">{escape(w)}</p>' for w in d.warnings]
-    changed = d.verdict == "found"
-    if d.causes:
-        parts.append("<h2>Causes and evidence</h2>")
-        for c in d.causes:
-            rows = [[k, estimate("", e).strip()] for k, e in c.parameters.items()]
-            parts.append(f"<h3>{c.rank}. {escape(c.effect)}</h3>" + _table(["size", "value [95 % interval]"], rows))
-            parts += [f"<p>{escape(line.strip())}</p>" for line in cause_lines(c)[1 + len(c.parameters) :]]
-        parts.append(f"<p>{escape(gain_words(d.gain))}</p>")
-    parts.append(_pictures(d, changed))
-    rows = [[w.channel, f"{100 * w.share_of_error:.0f} %", w.depends_on or "no single variable", w.when] for w in d.what_is_wrong]
-    parts.append("<h2>What is wrong, in words</h2>" + _table(["channel", "share of error", "missing force follows", "when"], rows))
-    if d.gain_per_run:
-        from . import diagnosis_plots as plots
+    from . import diagnosis_pictures as pictures
 
-        parts.append("<h2>Gain per run, held out</h2>" + _figure(plots.gain_per_run(d)))
-    parts.append(_ranking(d))
-    parts.append("<h2>What remains</h2>" + _table(["", ""], _flat(d.unexplained_after)))
-    confused = [c for c in d.causes if c.confused_with]
-    if confused:
-        rows = [[c.effect, ", ".join(c.confused_with), c.separating_manoeuvre] for c in confused]
-        parts.append("<h2>What these data cannot tell apart</h2>" + _table(["named", "could also be", "manoeuvre that would tell"], rows))
-    if command := next_command(d):
-        parts.append(f"<h2>Next</h2><p>Extended model: <code>{escape(d.extended_model)}</code></p><pre>{escape(command)}</pre>")
-    parts.append(_method(d))
-    title = f"<title>Diagnosis of {escape(d.dataset)}</title>"
-    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">{title}<style>{_STYLE}</style>'
-    return f'<!doctype html><html lang="en"><head>{head}</head><body>{"".join(parts)}</body></html>\n'
+    sections: list[tuple[str, str]] = [("Causes and evidence", _causes(d))]
+    sections += pictures.sections(d)
+    sections += [
+        ("Gain per run, held out", _gains(d)), ("All candidates", _ranking(d)), ("Smallest size that would have been named", _smallest(d)),
+        ("What these data cannot tell apart", _confused(d)), ("What remains", _remains(d)), ("Next", _next(d)), ("How this was computed", _method(d)),
+    ]  # fmt: skip
+    sections = [(title, body) for title, body in sections if body]
+    links = "".join(f'<a href="#s{i}">{escape(title)}</a>' for i, (title, _) in enumerate(sections))
+    body = [
+        f"<h1>Diagnosis of {escape(d.dataset)}</h1>", f'<p class="verdict {escape(d.verdict)}">{escape(headline(d))}</p>',
+        *(f'<p class="warning"><b>Warning:</b> {escape(w)}</p>' for w in d.warnings), f"<nav>{links}</nav>",
+        *(f'<section id="s{i}"><h2>{escape(title)}</h2>{text}</section>' for i, (title, text) in enumerate(sections)),
+    ]  # fmt: skip
+    head = (
+        '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>Diagnosis of {escape(d.dataset)}</title><style>{_STYLE}</style>"
+    )
+    return f'<!doctype html><html lang="en"><head>{head}</head><body>{"".join(body)}</body></html>\n'
 
 
-def _pictures(d: Diagnosis, changed: bool) -> str:
-    if d.trace is None:
+def key(changed: bool, measured: bool = False) -> str:
+    """The legend of the pictures below it."""
+    return f'<p class="key">{_MEASURED_KEY if measured else ""}{_BEFORE_KEY}{_AFTER_KEY if changed else ""}</p>'
+
+
+def paragraph(text: str, small: bool = False) -> str:
+    """Escaped text."""
+    return f'<p class="small">{escape(text)}</p>' if small else f"<p>{escape(text)}</p>"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = (), long: Sequence[int] = (), named: str = "") -> str:
+    """A table that scrolls by itself. numbers, long: columns set to the right, and wide; named: first cell of rows to stress with this last cell."""
+
+    def kind(i: int) -> str:
+        return ' class="n"' if i in numbers else ' class="long"' if i in long else ""
+
+    cells = "".join(f"<th{kind(i)}>{escape(h)}</th>" for i, h in enumerate(head))
+    body = ""
+    for row in rows:
+        stress = ' class="named"' if named and row[-1] == named else ""
+        body += f"<tr{stress}>" + "".join(f"<td{kind(i)}>{escape(str(v))}</td>" for i, v in enumerate(row)) + "</tr>"
+    top = f"<thead><tr>{cells}</tr></thead>" if any(head) else ""
+    return f'<div class="scroll"><table>{top}<tbody>{body}</tbody></table></div>'
+
+
+def _causes(d: Diagnosis) -> str:
+    if d.verdict == "unknown" and d.unknown:
+        share = d.unknown.get("share")
+        taken = f" It takes {100 * share:.0f} % of the variance of that force." if isinstance(share, float) and math.isfinite(share) else ""
+        return paragraph(
+            f"No effect of the library explains the runs as well as a free force in {d.unknown['axis']} that depends on {d.unknown['variable']}."
+            f"{taken} The pictures of the missing force below show its shape."
+        )
+    if not d.causes:
+        return paragraph("None is named.")
+    return "".join(_cause(c) for c in d.causes) + paragraph(gain_words(d.gain) + (" All causes together." if len(d.causes) > 1 else ""))
+
+
+def _cause(c: Cause) -> str:
+    rows = [[name, interval(e)] for name, e in c.parameters.items()]
+    text = f"<h3>{c.rank}. {escape(c.effect)} <small>({escape(strength(c))})</small></h3>"
+    text += table(["size", "value [95 % interval]"], rows) if rows else ""
+    text += paragraph(c.evidence[:1].upper() + c.evidence[1:].rstrip(".") + ".") if c.evidence else ""
+    if c.confused_with:
+        text += f'<p class="warning">Cannot be told from {escape(", ".join(c.confused_with))} with these data.</p>'
+    return text
+
+
+def _gains(d: Diagnosis) -> str:
+    if not d.gain_per_run:
         return ""
-    from ..diagnosis.wrong import error_tables
-    from . import diagnosis_plots as plots
+    from .diagnosis_plots import gain_per_run
 
-    tables = error_tables(d.trace)
-    white = [[k, f"{v:.1f}", "white" if v <= 1.0 else "not white"] for k, v in tables.white.items()]
-    against = sorted(((k[0], k[1], f"{v:.1f}") for k, v in tables.inputs.items()), key=lambda r: -float(r[2]))[:8]
-    return "".join([
-        "<h2>Tracks before and after</h2>", _figure(plots.tracks(d.trace, changed)),
-        '<p class="small">The runs where the plain model is worst. Models are fitted to all runs here; the gain above is held out.</p>',
-        "<h2>Growth of the error</h2>", _figure(plots.growth(d.trace, changed)),
-        "<h2>Where the plain model is wrong</h2>", _figure(plots.slices(tables)),
-        '<p class="small">Root mean square of the error, each channel over its own spread in the measurement, summed.</p>',
-        "<h2>The force that the plain model lacks</h2>", _figure(plots.forces(d.trace, tables)),
-        "<h2>Are the residuals of the smoothed plain model white?</h2>",
-        _table(["channel", "Ljung-Box over its 95 % limit", ""], white),
-        "<p>Greatest cross-correlations with past inputs, over their 95 % bound:</p>", _table(["residual", "input", "over bound"], against),
-    ])  # fmt: skip
+    rows = [
+        [name, figure(b), figure(a), f"{100 * (1 - a / b):+.0f} %" if b > 0 else "-"] for name, b, a in sorted(d.gain_per_run, key=lambda r: -r[1])
+    ]
+    listed = table(["run", "before [m]", "after [m]", "less error"], rows, numbers=(1, 2, 3))
+    return (
+        key(True) + f'<div class="wide"><figure>{gain_per_run(d.gain_per_run).svg}</figure></div>'
+        + paragraph("Mean distance of every run, from models that were neither chosen nor fitted with it.", small=True)
+        + f"<details><summary>Every run in figures</summary>{listed}</details>"
+    )  # fmt: skip
+
+
+def _number(value: float, text: str) -> str:
+    return format(value, text) if math.isfinite(value) else "-"
 
 
 def _ranking(d: Diagnosis) -> str:
-    rows = []
-    for c in d.candidates:
-        score = f"{c.score:.1f}" if math.isfinite(c.score) else "-"
-        p = f"{c.p_value:.2g}" if math.isfinite(c.p_value) else "-"
-        rows.append([c.effect, c.family, score, p, c.rejected_because, detectable(c)])
-    return "<h2>All candidates</h2>" + _table(["effect", "family", "score", "p", "why it was not named", "smallest size that would have been"], rows)
+    rows = [[c.effect, c.family, _number(c.score, ".1f"), _number(c.p_value, ".2g"), c.rejected_because] for c in d.candidates]
+    note = "Score: twice the gain in log evidence when this one effect is added to the plain model. p: for the best of all candidates by chance."
+    return table(["effect", "family", "score", "p", "why it was or was not named"], rows, (2, 3), (4,), "named") + paragraph(note, small=True)
+
+
+def _smallest(d: Diagnosis) -> str:
+    rows = [[c.effect, c.family, detectable(c)] for c in sorted(d.candidates, key=lambda c: (c.family, c.effect)) if detectable(c) != "-"]
+    note = (
+        "At this size the expected score reaches the threshold, beside the plain model of these runs. A larger one would probably have been named; "
+        "of a smaller one nothing can be said. Effects that are not listed could not have been named, or are looked for in another way."
+    )
+    body = table(["effect", "family", "smallest size"], rows) + paragraph(note, small=True)
+    return body if d.verdict == "none" else f"<details><summary>Table of {len(rows)} effects</summary>{body}</details>" if rows else ""
+
+
+def _confused(d: Diagnosis) -> str:
+    rows = [[c.effect, ", ".join(c.confused_with), c.separating_manoeuvre or "-"] for c in d.causes if c.confused_with]
+    return table(["named", "could also be", "manoeuvre that would tell"], rows, long=(2,)) if rows else ""
+
+
+def _remains(d: Diagnosis) -> str:
+    return table(["", ""], _flat(d.unexplained_after), long=(0,)) if d.unexplained_after else ""
 
 
 def _flat(tree: dict, prefix: str = "") -> list[list[str]]:
     rows = []
-    for key, value in tree.items():
-        name = f"{prefix}{key}".replace("_", " ")
+    for name, value in tree.items():
+        label = f"{prefix}{name}".replace("_", " ")
         if isinstance(value, dict):
-            rows += _flat(value, f"{name}: ")
+            rows += _flat(value, f"{label}: ")
         else:
-            rows.append([name, f"{value:.3g}" if isinstance(value, float) else str(value)])
+            rows.append([label, "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)])
     return rows
+
+
+def _next(d: Diagnosis) -> str:
+    command = next_command(d)
+    if not command:
+        return ""
+    return f"<p>Extended model: <code>{escape(d.extended_model)}</code>. To compare it with the plain one:</p><pre>{escape(command)}</pre>"
 
 
 _METHOD = """
@@ -131,17 +216,8 @@ looked for in the actuator alone. Gains are measured on runs that neither select
 
 
 def _method(d: Diagnosis) -> str:
+    command = f"shipbench diagnose {shlex.quote(d.dataset)}"
     return (
-        f"<h2>How this was computed</h2><p class='small'>{_METHOD}</p>"
-        f"<p class='small'>Data fingerprint {escape(d.fingerprint)}; {d.seconds:.0f} s.</p>"
+        f"<p>{_METHOD.strip()}</p><pre>{escape(command)}</pre>"
+        f"<p class='small'>Data fingerprint <code>{escape(d.fingerprint)}</code>; {d.seconds:.0f} s.</p>"
     )
-
-
-def _figure(svg: str) -> str:
-    return f"<figure>{svg}</figure>"
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    cells = "".join(f"<th>{escape(h)}</th>" for h in head)
-    body = "".join("<tr>" + "".join(f"<td>{escape(str(v))}</td>" for v in row) + "</tr>" for row in rows)
-    return f'<div class="scroll"><table><thead><tr>{cells}</tr></thead><tbody>{body}</tbody></table></div>'

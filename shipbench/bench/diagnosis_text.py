@@ -40,7 +40,7 @@ def interval(e: Estimate) -> str:
 
 def estimate(name: str, e: Estimate) -> str:
     """Such as `speed 0.31 m/s [0.28, 0.34]`."""
-    return f"{name.replace('_', ' ')} {interval(e)}"
+    return f"{name} {interval(e)}"
 
 
 def _change(relative: float) -> str:
@@ -62,8 +62,7 @@ def gain_words(g: Gain | None) -> str:
 def headline(d: Diagnosis) -> str:
     """The verdict in one or two sentences."""
     if d.verdict == "found":
-        named = ", ".join(f"{c.effect} ({'; '.join(estimate(k, e) for k, e in list(c.parameters.items())[:2])})" for c in d.causes)
-        return f"Found: {named}. {gain_words(d.gain)}"
+        return f"Found: {', '.join(_named(c) for c in d.causes)}. {gain_words(d.gain)}"
     if d.verdict == "unknown" and d.unknown:
         return (
             f"Something is missing that is not in the library: a force in {d.unknown['axis']} that depends on {d.unknown['variable']} "
@@ -72,6 +71,12 @@ def headline(d: Diagnosis) -> str:
     if d.warnings:
         return "Nothing is named, with the warnings below. See what would have been seen, and how the candidates rank."
     return "Nothing found: no effect of the library, and no unexplained dependence, is worth naming. See below what would have been seen."
+
+
+def _named(c: Cause) -> str:
+    """A cause with its first two sizes."""
+    sizes = [estimate(k, e) for k, e in c.parameters.items()]
+    return c.effect + (f" ({'; '.join(sizes[:2])}{'; ...' if len(sizes) > 2 else ''})" if sizes else "")
 
 
 def next_command(d: Diagnosis) -> str:

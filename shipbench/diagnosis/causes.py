@@ -225,7 +225,7 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str]) -> Candidate
         reason = "named"
     elif name == "hull_derivatives":
         below = found.hull <= HULL_THRESHOLD
-        reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}" if below else "fitting it does not pay on held-out runs"
+        reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}" if below else "not shown to pay on held-out runs"
     elif name in ("wind", "wind_per_run"):
         reason = "the wind is measured and in the model already"
     elif name in ("change_point", "unit_or_sign_error"):

@@ -51,7 +51,7 @@ def _along(short: Segments, values: np.ndarray, long: Segments) -> np.ndarray:
     """Values (B, K + 1, C) on short segments, put on long ones of the same runs."""
     first = np.round(short.start / short.dt).astype(int)
     length = int(np.max(first + short.mask.sum(axis=1)))
-    runs = np.zeros((short.runs, length, values.shape[-1]))
+    runs = np.full((short.runs, length, values.shape[-1]), np.nan)  # pieces that thinning left out have no force
     for b, run in enumerate(short.run):
         count = int(short.mask[b].sum())
         runs[run, first[b] : first[b] + count] = values[b, :count]

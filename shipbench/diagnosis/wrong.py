@@ -4,75 +4,140 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
+from .follows import AXES, UNITS, Follows, curve, follows, variables, with_speed
 from .outcome import Trace, Wrong
 
 CHANNELS = ("position", "heading", "surge", "sway", "yaw rate")
-AXES = ("surge", "sway", "yaw")
-_AXES_OF = {"position": (0, 1), "heading": (2,), "surge": (0,), "sway": (1,), "yaw rate": (2,)}
-_UNITS = {"heading": "deg", "speed": "m/s", "drift angle": "deg", "rudder": "deg", "yaw rate": "deg/s", "revolutions": "rpm", "time": "s", "run": ""}
-_PERMUTATIONS = 99
+CHANNEL_UNITS = {"position": ("m", 1.0), "heading": ("deg", 57.29578), "surge": ("m/s", 1.0), "sway": ("m/s", 1.0), "yaw rate": ("deg/s", 57.29578)}
+RESIDUALS = ("x", "y", "heading", "surge", "sway", "yaw rate")
+INPUTS = ("revolutions", "rudder", "bow thruster", "stern thruster")
+FORCE_UNITS = (("mm/s^2", 1e3), ("mm/s^2", 1e3), ("mdeg/s^2", 57.29578e3))
+LAGS = 10
+_AXES_OF = {"position": (0, 1, 2), "heading": (2,), "surge": (0,), "sway": (1,), "yaw rate": (2,)}
 _LEVEL = 0.02
-_LAGS = 10
 _SMALLEST_SHARE = 0.05
+_WORTH_SAYING = 1.3
+_MOST_RUNS = 12
+
+
+class Slice(NamedTuple):
+    """Error inside one range of a variable: root mean square, and number of samples."""
+
+    low: float
+    high: float
+    rms: float
+    samples: int
 
 
 @dataclass(frozen=True)
 class ErrorTables:
     """The figures behind the lines.
 
-    share: of the normalised squared error per channel. by: variable -> list of (from, to, root mean square of the normalised error, samples).
-    follows: per axis of the force, (variable, R^2, p) best first. white: channel -> (Ljung-Box statistic over its 95 % limit). inputs: (channel,
-    input) ->
-    greatest cross-correlation over its 95 % bound.
+    share: of the normalised squared error, per channel. size: root mean square error per channel, in `CHANNEL_UNITS`; scale: what it is divided by.
+    by: variable -> slices of the normalised error of all channels together; by_channel: the same of one channel, in its unit.
+    worst_runs: (name, root mean square of the normalised error), greatest first. follows: see `follows.follows`.
+    white: residual channel -> Ljung-Box statistic over its 95 % limit. inputs: (residual, input) -> greatest correlation over its 95 % bound.
     """
 
     share: dict[str, float]
-    by: dict[str, list[tuple[float, float, float, int]]]
-    follows: dict[str, list[tuple[str, float, float]]]
+    size: dict[str, float]
+    scale: dict[str, float]
+    by: dict[str, list[Slice]]
+    by_channel: dict[tuple[str, str], list[Slice]]
+    worst_runs: list[tuple[str, float]]
+    follows: dict[str, list[Follows]]
     white: dict[str, float]
     inputs: dict[tuple[str, str], float]
 
 
-def variables(trace: Trace) -> dict[str, np.ndarray]:
-    """What errors and forces are held against, (B, K + 1): units m/s, deg, deg/s, rpm, s, number of the run."""
-    psi, u, v, r = np.moveaxis(trace.measured[..., 2:], -1, 0)
-    n, delta = trace.inputs[..., 0], trace.inputs[..., 1]
-    t = np.broadcast_to(trace.start[:, None] + trace.t[None, :], psi.shape)
-    return {
-        "heading": np.rad2deg(psi) % 360.0, "speed": np.hypot(u, v), "drift angle": np.rad2deg(np.arctan2(-v, np.maximum(np.abs(u), 0.05))),
-        "rudder": np.rad2deg(delta), "yaw rate": np.rad2deg(r), "revolutions": n, "time": t,
-        "run": np.broadcast_to(trace.run[:, None].astype(float), psi.shape),
-    }  # fmt: skip
+def squared_error(trace: Trace, predicted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Squared open-loop error (B, K + 1, 5) of `predicted` (B, K + 1, 6) and the scale (5,) that makes channels comparable.
 
-
-def normalised_error(trace: Trace) -> np.ndarray:
-    """Squared error per channel (B, K + 1, 5) over the variance of the channel in the measurement (position: about each run's mean)."""
-    error = trace.before - trace.measured
+    The scale is how much the channel moves inside a run: its root mean square about each segment's own mean, and no less than 1 deg of heading
+    (1 deg in a tenth of the horizon for the yaw rate), 2 % of the speed. So one metre is never added to one degree.
+    """
+    with np.errstate(all="ignore"):
+        error = (predicted - trace.measured) ** 2
+    error = np.where(np.isfinite(error), error, np.nan)
     error[:, 0] = np.nan  # the first sample was given
-    spread = np.nanvar(trace.measured, axis=(0, 1))
-    about = trace.measured[..., :2] - np.nanmean(trace.measured[..., :2], axis=1, keepdims=True)
-    place = max(float(np.nanmean(np.sum(about**2, axis=-1))), 1e-12)
-    squares = [np.sum(error[..., :2] ** 2, axis=-1) / place]
-    squares += [error[..., i] ** 2 / max(float(spread[i]), 1e-12) for i in range(2, 6)]
-    return np.stack(squares, axis=-1)
+    squares = np.concatenate([error[..., :2].sum(axis=-1, keepdims=True), error[..., 2:]], axis=-1)
+    known = np.isfinite(trace.measured)
+    filled = np.where(known, trace.measured, 0.0)
+    about = np.where(known, filled - filled.sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1), 0.0)
+    spread = np.sum(about**2, axis=(0, 1)) / np.maximum(known.sum(axis=(0, 1)), 1)
+    spread = np.append(spread[0] + spread[1], spread[2:])
+    speed2 = float(np.sum(filled[..., 3:5] ** 2) / max(known[..., 3].sum(), 1))
+    least = np.array([1e-12, 1.0, 4e-4 * speed2, 4e-4 * speed2, (10.0 / max(float(trace.t[-1]), 1e-9)) ** 2])
+    least[[1, 4]] *= np.deg2rad(1.0) ** 2
+    return squares, np.sqrt(np.maximum(spread, np.maximum(least, 1e-12)))
 
 
 def error_tables(trace: Trace, seed: int = 0) -> ErrorTables:
-    """All tables; a variable's R^2 is tested by giving the runs each other's force."""
-    squares = normalised_error(trace)
-    total = np.nansum(squares, axis=(0, 1))
-    share = dict(zip(CHANNELS, (total / max(float(total.sum()), 1e-300)).tolist(), strict=True))
-    whole = np.sum(squares, axis=-1)
-    by = {"horizon": _slices(np.broadcast_to(trace.t[None, :], whole.shape), whole, _horizons(trace.t))}
+    """All tables. Padding with NaN, single runs and few samples are taken; what cannot be computed is left out."""
+    squares, scale = squared_error(trace, trace.before)
+    with np.errstate(over="ignore"):
+        normal = squares / scale**2
+        total = np.nansum(normal, axis=(0, 1))
+    whole = np.sum(normal, axis=-1)
+    count = np.maximum(np.isfinite(squares).sum(axis=(0, 1)), 1)
+    units = [CHANNEL_UNITS[c][1] for c in CHANNELS]
+    size = np.sqrt(np.nansum(squares, axis=(0, 1)) / count)
+    by_channel: dict[tuple[str, str], list[Slice]] = {}
+    for name, x, edges in _cuts(trace):
+        for i, channel in enumerate(CHANNELS):
+            by_channel[(channel, name)] = _slices(x, squares[..., i] * units[i] ** 2, edges)
+    runs = []
+    for k in np.unique(trace.run):
+        inside = whole[trace.run == k]
+        if np.isfinite(inside).any():
+            runs.append((trace.names[int(k)], float(np.sqrt(np.nanmean(inside)))))
+    return ErrorTables(
+        share=dict(zip(CHANNELS, (total / max(float(total.sum()), 1e-300)).tolist(), strict=True)),
+        size={c: float(s * u) for c, s, u in zip(CHANNELS, size, units, strict=True)},
+        scale={c: float(s * u) for c, s, u in zip(CHANNELS, scale, units, strict=True)},
+        by=slices(trace, trace.before), by_channel=by_channel, worst_runs=sorted(runs, key=lambda r: -r[1]), follows=follows(trace, seed),
+        white=_whiteness(trace), inputs=_against_inputs(trace),
+    )  # fmt: skip
+
+
+def slices(trace: Trace, predicted: np.ndarray) -> dict[str, list[Slice]]:
+    """Normalised error of all channels together, per variable."""
+    squares, scale = squared_error(trace, predicted)
+    with np.errstate(over="ignore"):
+        whole = np.sum(squares / scale**2, axis=-1)
+    return {name: _slices(x, whole, edges) for name, x, edges in _cuts(trace)}
+
+
+def _cuts(trace: Trace) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Variables (B, K + 1) and the edges of their slices."""
+    horizon = np.broadcast_to(trace.t[None, :], trace.measured.shape[:2])
+    end = float(trace.t[-1])
+    found = [("horizon", horizon, np.array([0.0, *(h for h in (10.0, 30.0, 60.0, 120.0, 300.0) if h < end), end]))]
     for name, x in variables(trace).items():
-        edges = np.arange(0.0, 361.0, 45.0) if name == "heading" else _quantiles(x)
-        by[name] = _slices(x, whole, edges)
-    every = max(1, round(float(trace.knots[1] - trace.knots[0]) / float(trace.t[1] - trace.t[0]))) if len(trace.knots) > 1 else 1
-    follows = _follows(trace, every, np.random.default_rng(seed))
-    return ErrorTables(share, by, follows, _whiteness(trace), _against_inputs(trace))
+        values = x[np.isfinite(x)]
+        if name == "heading":
+            edges = np.arange(0.0, 361.0, 45.0)
+        elif name == "run" and len(trace.names) <= _MOST_RUNS:
+            edges = np.arange(len(trace.names) + 1.0) - 0.5
+        elif name == "run":
+            edges = np.unique(np.linspace(0, len(trace.names), 7).round()) - 0.5
+        else:
+            edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, 6))) if len(values) else np.zeros(1)
+        found.append((name, x, edges))
+    return found
+
+
+def _slices(x: np.ndarray, squares: np.ndarray, edges: np.ndarray) -> list[Slice]:
+    rows = []
+    for i, (a, b) in enumerate(pairwise(edges)):
+        inside = (x >= a) & ((x < b) | ((i == len(edges) - 2) & (x <= b))) & np.isfinite(squares)
+        if inside.any():
+            rows.append(Slice(float(a), float(b), float(np.sqrt(np.mean(squares[inside]))), int(inside.sum())))
+    return rows
 
 
 def what_is_wrong(trace: Trace) -> tuple[Wrong, ...]:
@@ -82,86 +147,57 @@ def what_is_wrong(trace: Trace) -> tuple[Wrong, ...]:
     for channel, share in sorted(tables.share.items(), key=lambda item: -item[1]):
         if share < _SMALLEST_SHARE:
             continue
-        known = [f for axis in _AXES_OF[channel] for f in tables.follows[AXES[axis]] if f[2] <= _LEVEL]
-        depends = max(known, key=lambda f: f[1])[0] if known else ""
-        lines.append(Wrong(channel, float(share), depends, _when(tables, depends)))
+        known = [(f, axis) for axis in _AXES_OF[channel] for f in tables.follows[AXES[axis]] if f.p <= _LEVEL]
+        best, axis = max(known, key=lambda item: item[0].share) if known else (None, 0)
+        text = _error_words(tables, channel, best.variable if best else "")
+        if best is not None:
+            text.append(force_words(trace, axis, best))
+        lines.append(Wrong(channel, float(share), best.variable if best else "", "; ".join(text)))
     return tuple(lines)
 
 
-def _when(tables: ErrorTables, variable: str) -> str:
-    """Where the error is greatest, in words."""
-    growth = tables.by["horizon"]
-    text = []
-    if len(growth) > 1 and growth[0][2] > 0:
-        text.append(f"grows {growth[-1][2] / growth[0][2]:.1f} times from {growth[0][1]:.0f} to {growth[-1][1]:.0f} s of prediction")
-    rows = tables.by.get(variable, [])
-    if len(rows) > 1:
-        worst, least = max(rows, key=lambda r: r[2]), min(rows, key=lambda r: r[2])
-        ratio = worst[2] / max(least[2], 1e-12)
-        where = f"{worst[0]:.3g} to {worst[1]:.3g} {_UNITS[variable]}".strip()
-        text.append(f"worst at {variable} {where} ({ratio:.1f} times the least)")
-    return "; ".join(text)
+def _error_words(tables: ErrorTables, channel: str, variable: str) -> list[str]:
+    """Size of a channel's error, its growth, and where it is greatest."""
+    text = [f"root mean square {tables.size[channel]:.3g} {CHANNEL_UNITS[channel][0]}"]
+    growth = tables.by_channel[(channel, "horizon")]
+    if len(growth) > 1 and growth[-1].rms > _WORTH_SAYING * growth[0].rms > 0.0:
+        text.append(
+            f"grows {growth[-1].rms / growth[0].rms:.2g} times from the first {growth[0].high:.0f} s to {growth[-1].low:.0f} to "
+            f"{growth[-1].high:.0f} s of prediction"
+        )
+    rows = tables.by_channel.get((channel, variable), [])
+    if len(rows) > 1 and variable != "run":
+        worst, least = max(rows, key=lambda r: r.rms), min(rows, key=lambda r: r.rms)
+        if worst.rms > _WORTH_SAYING * least.rms:
+            text.append(f"error worst at {variable} {worst.low:.3g} to {worst.high:.3g} {UNITS[variable]} ({worst.rms / max(least.rms, 1e-12):.1f} "
+                        "times the least)")  # fmt: skip
+    return text
 
 
-def _horizons(t: np.ndarray) -> np.ndarray:
-    known = [h for h in (10.0, 30.0, 60.0, 120.0) if h < t[-1]]
-    return np.array([0.0, *known, float(t[-1]) + 1e-9])
+def force_words(trace: Trace, axis: int, found: Follows) -> str:
+    """Where the missing force of one axis is greatest and smallest along the variable that it follows."""
+    name, share, _ = found
+    fitted = curve(trace, axis, name)
+    what = f"missing {AXES[axis]} force follows {name} ({100 * share:.0f} % of its variance)"
+    if fitted is None:
+        return what
+    unit, factor = FORCE_UNITS[axis]
+    ends = sorted((int(np.argmax(fitted.y)), int(np.argmin(fitted.y))), key=lambda i: fitted.x[i])
+    if name == "run":
+        places = [f"{factor * fitted.y[i]:+.2g} {unit} about run {trace.names[round(float(fitted.x[i]))]}" for i in ends]
+    else:
+        places = [f"{factor * fitted.y[i]:+.2g} {unit} at {fitted.x[i]:.3g} {UNITS[name]}" for i in ends]
+    text = f"{what}: {' and '.join(places)}"
+    times = with_speed(trace, axis, name)
+    if times != 1.0:
+        text += f", {times:.1f} times stronger in the faster half" if times > 1.0 else f", {1 / times:.1f} times stronger in the slower half"
+    return text
 
 
-def _quantiles(x: np.ndarray) -> np.ndarray:
-    values = x[np.isfinite(x)]
-    return np.unique(np.quantile(values, np.linspace(0.0, 1.0, 6))) if len(values) else np.array([0.0, 1.0])
-
-
-def _slices(x: np.ndarray, squares: np.ndarray, edges: np.ndarray) -> list[tuple[float, float, float, int]]:
-    rows = []
-    for i, (a, b) in enumerate(pairwise(edges)):
-        inside = (x >= a) & ((x < b) | (i == len(edges) - 2)) & np.isfinite(squares)
-        if inside.any():
-            rows.append((float(a), float(b), float(np.sqrt(np.mean(squares[inside]))), int(inside.sum())))
-    return rows
-
-
-def _basis(name: str, x: np.ndarray) -> np.ndarray:
-    if name == "heading":
-        psi = np.deg2rad(x)
-        return np.stack([f(k * psi) for k in (1, 2) for f in (np.cos, np.sin)], axis=-1)
-    spread = max(float(np.nanstd(x)), 1e-12)
-    z = (x - np.nanmean(x)) / spread
-    return np.stack([z, z * z, z * np.abs(z)], axis=-1)
-
-
-def _follows(trace: Trace, every: int, rng: np.random.Generator) -> dict[str, list[tuple[str, float, float]]]:
-    """R^2 of the force on each variable, and the share of permutations of the runs that reach it."""
-    found: dict[str, list[tuple[str, float, float]]] = {}
-    B = len(trace.run)
-    orders = [rng.permutation(B) for _ in range(_PERMUTATIONS)]
-    values = {k: v[:, ::every][:, : trace.force.shape[1]] for k, v in variables(trace).items()}
-    for j, axis in enumerate(AXES):
-        force = trace.force[..., j]
-        rows = []
-        for name, x in values.items():
-            if B < 3 and name == "run":
-                continue
-            basis = _basis(name, x)
-            own = _r2(basis, force)
-            shuffled = sum(_r2(basis, force[order]) >= own for order in orders) if B > 2 else _PERMUTATIONS
-            rows.append((name, own, (1 + shuffled) / (1 + _PERMUTATIONS)))
-        found[axis] = sorted(rows, key=lambda r: -r[1])
-    return found
-
-
-def _r2(basis: np.ndarray, y: np.ndarray) -> float:
-    ok = np.isfinite(basis).all(axis=-1) & np.isfinite(y)
-    if ok.sum() < 3 * basis.shape[-1]:
-        return 0.0
-    A, b = basis[ok] - basis[ok].mean(axis=0), y[ok] - y[ok].mean()
-    left = b - A @ np.linalg.lstsq(A, b, rcond=None)[0]
-    return float(1.0 - np.sum(left**2) / max(float(np.sum(b**2)), 1e-300))
-
-
-def _correlation(a: np.ndarray, b: np.ndarray, lag: int) -> tuple[float, int]:
-    """Correlation of a(t + lag) with b(t) inside runs, and the number of pairs."""
+def correlation(a: np.ndarray, b: np.ndarray, lag: int) -> tuple[float, int]:
+    """Correlation of a(t + lag) with b(t) inside runs, and the number of pairs; zero of zero pairs where there are fewer than ten."""
+    if lag >= a.shape[1]:
+        return 0.0, 0
     x, y = a[:, lag:], b[:, : a.shape[1] - lag]
     ok = np.isfinite(x) & np.isfinite(y)
     if ok.sum() < 10:
@@ -170,27 +206,35 @@ def _correlation(a: np.ndarray, b: np.ndarray, lag: int) -> tuple[float, int]:
     return float(np.sum(x * y) / max(float(np.sqrt(np.sum(x**2) * np.sum(y**2))), 1e-300)), int(ok.sum())
 
 
+def correlogram(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Correlations of a(t + lag) with b(t) at lags 0 to `LAGS`, and their 95 % bounds if a is white."""
+    found = [correlation(a, b, lag) for lag in range(LAGS + 1)]
+    return np.array([rho for rho, _ in found]), np.array([1.96 / np.sqrt(max(num, 1)) for _, num in found])
+
+
 def _whiteness(trace: Trace) -> dict[str, float]:
     """Ljung & Box (1978), over its 95 % limit: below one the residual is white as far as can be told."""
     from scipy.stats import chi2
 
     found = {}
-    for i, name in enumerate(("x", "y", "heading", "surge", "sway", "yaw rate")):
-        statistic = 0.0
-        for lag in range(1, _LAGS + 1):
-            rho, num = _correlation(trace.white[..., i], trace.white[..., i], lag)
-            statistic += rho**2 * num
-        found[name] = float(statistic / chi2.ppf(0.95, _LAGS))
+    for i, name in enumerate(RESIDUALS):
+        whole = int(np.isfinite(trace.white[..., i]).sum())
+        terms = [correlation(trace.white[..., i], trace.white[..., i], lag) for lag in range(1, LAGS + 1)]
+        statistic = sum(rho**2 * num * (whole + 2) / max(whole, 1) for rho, num in terms)
+        found[name] = float(statistic / chi2.ppf(0.95, LAGS))
     return found
 
 
 def _against_inputs(trace: Trace) -> dict[tuple[str, str], float]:
-    """Greatest cross-correlation of residuals with past inputs over its 95 % bound (for white residuals)."""
+    """Greatest correlation of residuals with inputs 0 to `LAGS` samples before, over the 95 % bound of the greatest of so many (Bonferroni)."""
+    from scipy.stats import norm
+
+    bound = float(norm.ppf(1.0 - 0.025 / (LAGS + 1)))
     found = {}
-    for i, name in enumerate(("x", "y", "heading", "surge", "sway", "yaw rate")):
-        for j, label in enumerate(("revolutions", "rudder", "bow thruster", "stern thruster")):
+    for i, name in enumerate(RESIDUALS):
+        for j, label in enumerate(INPUTS):
             if not np.any(np.nan_to_num(trace.inputs[..., j])):
                 continue
-            pairs = [_correlation(trace.white[..., i], trace.inputs[..., j], lag) for lag in range(_LAGS)]
-            found[(name, label)] = max(abs(rho) * np.sqrt(max(num, 1)) / 1.96 for rho, num in pairs)
+            pairs = [correlation(trace.white[..., i], trace.inputs[..., j], lag) for lag in range(LAGS + 1)]
+            found[(name, label)] = max(abs(rho) * num**0.5 / bound for rho, num in pairs)
     return found

@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.bench.diagnosis_report import write_diagnosis
-from shipbench.bench.diagnosis_text import WIDTH, summary_lines
+from shipbench.bench.diagnosis_plots import changed, telling
+from shipbench.bench.diagnosis_report import page, write_diagnosis, write_report
+from shipbench.bench.diagnosis_text import WIDTH, gain_words, headline, summary_lines
 from shipbench.diagnosis.outcome import Candidate, Cause, Diagnosis, Estimate, Gain, Wrong
 from tests.diagnosis.test_wrong import make_trace
 
@@ -71,7 +72,7 @@ def test_the_document_has_the_contracts_keys_and_no_nan(tmp_path):
 
 def test_the_summary_says_the_verdict_with_sizes_and_the_next_command():
     lines = summary_lines(make_diagnosis())
-    text = " ".join("\n".join(lines).split())
+    text = " ".join("\n".join(lines).split())  # whatever the lines are broken at
     assert max(map(len, lines)) <= WIDTH + 2
     assert "current" in text
     assert "143 deg" in text
@@ -83,7 +84,7 @@ def test_the_summary_says_the_verdict_with_sizes_and_the_next_command():
 
 
 def test_none_comes_with_the_sizes_that_would_have_been_seen():
-    text = " ".join("\n".join(summary_lines(replace(make_diagnosis("none"), warnings=()))).split())
+    text = "\n".join(summary_lines(replace(make_diagnosis("none"), warnings=())))
     assert "Nothing found" in text
     assert "0.115 deg" in text
     assert "physics+" not in text
@@ -97,3 +98,88 @@ def test_infinite_scores_do_not_reach_the_json(tmp_path):
     d = make_diagnosis()
     write_diagnosis(replace(d, causes=(replace(CAUSE, score=np.inf),)), tmp_path)
     assert json.loads((tmp_path / "diagnosis.json").read_text())["causes"][0]["score"] is None
+
+
+def extended(d: Diagnosis) -> Diagnosis:
+    """With rollouts of an extended model that is right."""
+    return replace(d, trace=replace(d.trace, after=d.trace.measured + 0.01))
+
+
+def test_the_page_tells_why_each_candidate_was_rejected_and_what_would_have_been_seen():
+    for verdict in ("found", "none", "unknown"):
+        text = page(make_diagnosis(verdict))
+        assert all(c.rejected_because in text for c in CANDIDATES)
+        assert "0.115 deg" in text
+        assert "north 0.0500 m/s" in text
+    assert "reciprocal courses" in page(make_diagnosis())
+
+
+def test_only_an_extended_model_is_drawn_beside_the_plain_one():
+    plain, better = make_diagnosis(), extended(make_diagnosis())
+    assert not changed(plain)
+    assert changed(better)
+    assert "var(--after)" in page(better)
+    assert "Tracks before and after" in page(better)
+    assert "Tracks before and after" not in page(plain)
+
+
+def test_the_shown_runs_are_different_runs_and_hold_the_one_that_gains_least():
+    trace = make_trace(12)
+    trace.before[..., 0] += np.arange(12.0)[:, None]
+    trace = replace(trace, after=trace.measured + 0.0)
+    chosen = telling(trace, True)
+    assert chosen[:5] == [11, 10, 9, 8, 7]
+    assert chosen[5] == 0
+    assert telling(trace, False) == [11, 10, 9, 8, 7, 6]
+
+
+def test_names_of_runs_and_warnings_are_escaped_in_whatever_alphabet():
+    d = make_diagnosis()
+    names = ("<img src=x onerror=alert(1)>", "$\\frac{1}{$", "\u8d8a\u91ce", "\udcff")
+    hostile = "<b>&"
+    text = page(replace(extended(d), trace=replace(d.trace, names=names, after=d.trace.measured + 0.01), warnings=(hostile,), gain_per_run=(
+        (names[0], 20.0, 9.0), (names[1], 0.0, 1.0))))  # fmt: skip
+    assert "<img" not in text
+    assert "&lt;img src=x" in text
+    assert "\u8d8a\u91ce" in text
+    assert hostile not in text
+
+
+def test_a_name_that_is_not_text_can_be_written(tmp_path):
+    text = write_report(make_diagnosis(name="bad \udcff name"), tmp_path / "deep" / "r.html").read_text(encoding="utf-8")
+    assert "bad ? name" in text
+
+
+def test_ids_of_the_page_are_unique_and_every_reference_has_its_target():
+    text = page(extended(make_diagnosis()))
+    ids = re.findall(r' id="([^"]*)"', text)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'(?:url\(#|href="#)([^")]+)', text)) <= set(ids)
+
+
+def test_the_page_stays_small_for_ninety_runs():
+    d = make_diagnosis()
+    trace = make_trace(90, 121)
+    rows = tuple((f"run{i}", 20.0, 10.0) for i in range(90))
+    text = page(replace(d, trace=replace(trace, after=trace.measured + 0.01), gain_per_run=rows))
+    assert len(text.encode()) < 2e6
+
+
+def test_a_diagnosis_without_trace_has_a_page_in_words():
+    text = page(replace(make_diagnosis(), trace=None, gain_per_run=()))
+    assert "worst at 90 to 135 deg" in text
+    assert "<svg" not in text
+
+
+def test_the_gain_says_when_it_may_be_none_or_a_loss():
+    assert "no gain" not in gain_words(GAIN)
+    assert "may be no gain" in gain_words(Gain("ED", 10.0, 9.5, 0.05, (-0.1, 0.2), "13/24"))
+    worse = gain_words(Gain("ED", 10.0, 12.0, -0.2, (-0.3, -0.1), "3/24"))
+    assert "20 % more" in worse
+    assert "worse" in worse
+
+
+def test_nothing_named_for_want_of_data_is_not_called_nothing_found():
+    d = make_diagnosis("none")
+    assert "Nothing found" not in headline(d)
+    assert "Nothing found" in headline(replace(d, warnings=()))
