@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from . import cli_diagnosis
-from .cli_common import DatasetArgument, Json, Quiet, console_for_tables, print_json
+from . import cli_data, cli_diagnosis
+from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, print_json
 from .errors import InputError, ShipbenchError
 
 if TYPE_CHECKING:
@@ -42,13 +42,11 @@ class _Group(TyperGroup):
         raise typer.Exit(code)
 
 
-_SETTINGS: dict[str, Any] = {"context_settings": {"help_option_names": ["-h", "--help"]}, "no_args_is_help": True}
 app = typer.Typer(
-    name="shipbench", cls=_Group, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, **_SETTINGS,
+    name="shipbench", cls=_Group, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, **SETTINGS,
     help="Benchmark of ship-motion prediction: every model on the same runs, folds, rollouts and metrics.",
 )  # fmt: skip
-data_app = typer.Typer(help="Data sets: list, make, check, describe.", **_SETTINGS)
-app.add_typer(data_app, name="data")
+cli_data.register(app)
 cli_diagnosis.register(app)
 
 
@@ -216,66 +214,6 @@ def predict(
     predicted = predict_runs(model, load_dataset(dataset), horizon)
     write_csv(predicted, out)
     typer.echo(f"Written: {out} ({len(predicted)} runs)")
-
-
-@data_app.command("list")
-def data_list(as_json: Json = False) -> None:
-    """List the registered data sets."""
-    from .data.base import DATASETS
-
-    parts = [DATASETS.get(name) for name in DATASETS.names()]
-    if as_json:
-        print_json([{"name": p.name, "summary": p.summary, "licence": p.licence} for p in parts])
-        return
-    for part in parts:
-        typer.echo(f"{part.name:<18s} {part.summary} ({part.licence})")
-
-
-@data_app.command("make")
-def data_make(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Registered name, with parameters in brackets.")],
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Also write it as a folder of the common format.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Make it anew even if it is in the cache.")] = False,
-    quiet: Quiet = False,
-) -> None:
-    """Make a data set (or take it from the cache)."""
-    from .data.base import cache_folder, load_dataset
-    from .data.files import write_dataset
-
-    dataset = load_dataset(name, remake=force)
-    if out is not None:
-        write_dataset(dataset, out)
-    if not quiet:
-        typer.echo(f"{dataset.name}: {len(dataset)} runs, fingerprint {dataset.fingerprint}, in {out or cache_folder()}")
-
-
-@data_app.command("check")
-def data_check(dataset: DatasetArgument, as_json: Json = False) -> None:
-    """Load a data set and report what was found."""
-    from .bench.listing import dataset_facts
-    from .data.base import load_dataset
-
-    facts = dataset_facts(load_dataset(dataset))
-    if as_json:
-        print_json(facts)
-        return
-    for key, value in facts.items():
-        for line in value if isinstance(value, list) else [value]:
-            typer.echo(f"{key + ':':<13s}{line}")
-
-
-@data_app.command("describe")
-def data_describe(dataset: DatasetArgument, as_json: Json = False) -> None:
-    """Print a data set's statistics (beside the paper's Table II)."""
-    from .bench.listing import describe_tables
-    from .data.base import load_dataset
-
-    tables = describe_tables(load_dataset(dataset))
-    if as_json:
-        print_json([table.as_json() for table in tables])
-        return
-    for table in tables:
-        table.show(console_for_tables())
 
 
 def main() -> None:

@@ -19,15 +19,16 @@ from ..records import Dataset
 from ..registry import Registry
 from ..specs import parse_spec
 from .files import read_dataset, write_dataset
+from .public import PublicData
 
-DATASETS = Registry("data set", "data", "DATASET", helpers=frozenset({"base", "files", "describe", "units"}), group="datasets")
+DATASETS = Registry("data set", "data", "DATASET", helpers=frozenset({"base", "files", "describe", "units", "public"}), group="datasets")
 
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class DatasetPart:
-    """A named data set: how to make it, under which licence, and whether to keep it in the cache.
+    """A named data set: how to make it, under which licence, whether to keep it in the cache, and where it is downloaded from if it is.
 
     A change that alters the samples of a cached set gets a new `version` (and, once published, a new name).
     """
@@ -38,11 +39,17 @@ class DatasetPart:
     make: Callable[..., Dataset]
     cached: bool
     version: str = "1"
+    public: PublicData | None = None
 
 
 def cache_folder() -> Path:
     """Where made data sets are kept: the environment variable SHIPBENCH_CACHE, else ~/.cache/shipbench."""
     return Path(os.environ.get("SHIPBENCH_CACHE") or Path.home() / ".cache" / "shipbench")
+
+
+def public_folder(name: str) -> Path:
+    """Where the files of a public data set are kept once they are downloaded."""
+    return cache_folder() / "public" / name
 
 
 def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:

@@ -1,4 +1,4 @@
-"""Free-running tests of a 3 m Esso Osaka model: real, measured runs, read from the user's own copy (CC BY-NC-SA 4.0, not distributed here).
+"""Free-running tests of a 3 m Esso Osaka model: real, measured runs (CC BY-NC-SA 4.0, not distributed here: downloaded, or the user's own copy).
 
 Source: github.com/NAOE-5thLab/FRT-DS-ESSO, Osaka University; Wakita et al. (2022), Miyauchi et al. (2022).
 """
@@ -17,7 +17,8 @@ from ..errors import InputError
 from ..records import Dataset, Run
 from ..ship import Propeller, Rudder, Ship, Wind
 from ..signals import COMMANDS, DELTA, PSI, N, R, U, V, X, Y
-from .base import DatasetPart
+from .base import DatasetPart, public_folder
+from .public import PublicData, find
 
 _COLUMNS = {
     X: "x_position_mid [m]", Y: "y_position_mid [m]", PSI: "psi_hat [rad]", U: "u_velo [m/s]", V: "vm_velo [m/s]", R: "r_angvelo [rad/s]",
@@ -27,6 +28,27 @@ _WIND_SPEED, _WIND_FROM = "wind_velo_true [m/s]", "wind_dir_true [rad]"
 _SAMPLE = 0.1
 _CUT_COPIES = ("turn_cut_14-Sep-2020_15_58_08",)
 """Files that are the beginning of another file here: left out, so that no sample stands in training and test at once."""
+
+_PUBLISHED_TEST = (
+    "berthing_12-Nov-2020_11_38_50", "berthing_12-Nov-2020_11_49_21", "berthing_12-Nov-2020_13_21_03", "random_06-Aug-2020_16_24_25_3",
+    "turn_14-Oct-2020_15_06_53", "zigzag_31-Jul-2020_13_42_53",
+)  # fmt: skip
+"""The test files of Wakita et al. (2022), from the table in the source's README."""
+
+PUBLIC = PublicData(
+    name="esso_osaka",
+    url="https://raw.githubusercontent.com/NAOE-5thLab/FRT-DS-ESSO/e694dfd62932bff755f3bc975b5863d649023bc0/data/",
+    licence="CC BY-NC-SA 4.0 (https://creativecommons.org/licenses/by-nc-sa/4.0/)",
+    terms="NON-COMMERCIAL use only. Name the authors, and pass on what you change under the same licence. (The source's README says CC BY-NC 4.0,\n"
+    "its LICENSE file CC BY-NC-SA 4.0; the stricter one is taken.)",
+    citation=(
+        "Wakita et al. (2022), On neural network identification for low-speed ship maneuvering model, J. Mar. Sci. Technol. 27, 772-785, "
+        "doi 10.1007/s00773-021-00867-1",
+        "Miyauchi et al. (2022), System parameter exploration of ship maneuvering model for automatic docking/berthing using CMA-ES, "
+        "J. Mar. Sci. Technol. 27, 1065-1083, doi 10.1007/s00773-022-00889-3",
+    ),
+    registry=Path(__file__).with_name("esso_osaka_files.txt"),
+)  # fmt: skip
 
 SHIP = Ship(
     name="esso_osaka_3m", L=3.0, B=0.48925, T=0.20114, mass=244.6, Cb=0.830, xG=0.09357, rho=998.0,
@@ -38,22 +60,51 @@ SHIP = Ship(
 
 
 def find_copy(path: str | None = None) -> Path:
-    """Folder of the user's copy: `path`, else the environment variable SHIPBENCH_ESSO_OSAKA, else ../shared/data/esso-osaka-frt.
+    """Folder of the files: `path`, else the environment variable SHIPBENCH_ESSO_OSAKA, else what `shipbench data get` fetched, else
+    ../shared/data/esso-osaka-frt.
 
     Raises:
         InputError: there is none.
     """
     shared = Path("..", "shared", "data", "esso-osaka-frt")
     named = path or os.environ.get("SHIPBENCH_ESSO_OSAKA")
-    candidates = [Path(named)] if named else [shared, Path(__file__).resolve().parents[2] / shared]
+    candidates = [Path(named)] if named else [public_folder(PUBLIC.name), shared, Path(__file__).resolve().parents[2] / shared]
     for folder in candidates:
-        if (folder / "runs.csv").is_file():
+        if (folder / "runs.csv").is_file() or not PUBLIC.missing(folder):
             return folder
+    part = len(PUBLIC.checksums) - len(PUBLIC.missing(candidates[0]))
     raise InputError(
-        f"no Esso Osaka data in {', '.join(map(str, candidates))} (a folder with runs.csv and the folders turning, zigzag, random, berthing). "
-        "The data are public, for non-commercial use: github.com/NAOE-5thLab/FRT-DS-ESSO. "
-        "Name your copy: --dataset 'esso_osaka[path=FOLDER]' or SHIPBENCH_ESSO_OSAKA=FOLDER."
-    )
+        f"no Esso Osaka data in {', '.join(map(str, candidates))}" + (f" (only {part} of {len(PUBLIC.checksums)} files)" if part else "")
+        + ". The data are public, for non-commercial use: github.com/NAOE-5thLab/FRT-DS-ESSO. Download them: shipbench data get esso_osaka. "
+        "Without a network, take a copy: shipbench data get esso_osaka --from FOLDER, or name it: --dataset 'esso_osaka[path=FOLDER]' or "
+        "SHIPBENCH_ESSO_OSAKA=FOLDER."
+    )  # fmt: skip
+
+
+def _index(folder: Path) -> pd.DataFrame:
+    """Files, manoeuvres and published split of a copy: its runs.csv, or what the published names say."""
+    if not (folder / "runs.csv").is_file():
+        names = list(PUBLIC.checksums)
+        stems = [Path(name).stem for name in names]
+        kinds, splits = [stem.split("_")[0] for stem in stems], ["test" if stem in _PUBLISHED_TEST else "" for stem in stems]
+        return pd.DataFrame({"file": [find(folder, name) for name in names], "kind": kinds, "wakita2022": splits})
+    try:
+        index = pd.read_csv(folder / "runs.csv")[["file", "kind", "wakita2022"]]
+    except (OSError, ValueError, KeyError) as error:
+        reason = " ".join(str(error).split())[:160]
+        raise InputError(f"{folder / 'runs.csv'} cannot be read: {reason}. It needs the columns file, kind, wakita2022.") from None
+    return index.assign(file=[folder / str(file) for file in index["file"]])
+
+
+def _check_content(folder: Path) -> tuple[str, ...]:
+    """Notes on files that are not the published ones: said of a user's own copy, refused in what was downloaded."""
+    changed = PUBLIC.changed(folder)
+    if not changed:
+        return ()
+    said = f"{len(changed)} of {len(PUBLIC.checksums)} files differ from the published ones by checksum, the first is {changed[0]}"
+    if folder == public_folder(PUBLIC.name):
+        raise InputError(f"{folder}: {said}. Fetch them again: shipbench data get esso_osaka.")
+    return (said,)
 
 
 def make(path: str | None = None, dt: float = 0.5, wind: bool = True) -> Dataset:
@@ -77,23 +128,20 @@ def make(path: str | None = None, dt: float = 0.5, wind: bool = True) -> Dataset
             f"esso_osaka: dt = {dt!r} s; the files are sampled at 0.1 s, so dt must be a positive multiple of 0.1, as 'esso_osaka[dt=0.5]'."
         )
     folder = find_copy(None if path is None else str(path))
-    try:
-        index = pd.read_csv(folder / "runs.csv")[["file", "kind", "wakita2022"]]
-    except (OSError, ValueError, KeyError) as error:
-        reason = " ".join(str(error).split())[:160]
-        raise InputError(f"{folder / 'runs.csv'} cannot be read: {reason}. It needs the columns file, kind, wakita2022.") from None
+    index, remarks = _index(folder), _check_content(folder)
     runs = []
     for file, kind, split in zip(index["file"], index["kind"], index["wakita2022"], strict=True):
-        stem = Path(str(file)).name.removesuffix(".csv.gz")
+        stem = Path(file).name.removesuffix(".gz").removesuffix(".csv")
         if stem in _CUT_COPIES:
             continue
-        runs.append(_read_run(folder / str(file), stem, every, wind, str(kind), "test" in str(split)))
+        runs.append(_read_run(Path(file), stem, every, wind, str(kind), "test" in str(split)))
     return Dataset(
         name="esso_osaka" if wind else "esso_osaka_no_wind", ship=SHIP, dt=every * _SAMPLE, runs=tuple(runs), actuators="commanded",
         source="github.com/NAOE-5thLab/FRT-DS-ESSO, Osaka University (Wakita et al. 2022; Miyauchi et al. 2022)", licence="CC BY-NC-SA 4.0",
         notes=(
             "n and delta are commands, not measured positions; the thrusters are not recorded: taken as zero",
             "the published u and v lag the position by about 0.6 s (the source's own filter); they are used as published",
+            *remarks,
         ),
     )  # fmt: skip
 
@@ -143,5 +191,5 @@ def _read_run(file: Path, stem: str, every: int, wind: bool, kind: str, test: bo
     return Run(stem, t, states, inputs, names, {"manoeuvre": kind, "group": group, "split": "test" if test else "train"})
 
 
-SUMMARY = "measured free-running tests of a 3 m tanker model in wind (your own copy)"
-DATASET = DatasetPart("esso_osaka", SUMMARY, "CC BY-NC-SA 4.0", make, cached=False)
+SUMMARY = "measured free-running tests of a 3 m tanker model in wind (downloaded, or your own copy)"
+DATASET = DatasetPart("esso_osaka", SUMMARY, "CC BY-NC-SA 4.0", make, cached=False, public=PUBLIC)

@@ -1,0 +1,107 @@
+"""The commands below `shipbench data`; other modules add theirs to `data_app`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, print_json
+from .errors import InputError
+
+data_app = typer.Typer(help="Data sets: list, get, make, check, describe, export.", **SETTINGS)
+
+
+@data_app.command("list")
+def data_list(as_json: Json = False) -> None:
+    """List the registered data sets."""
+    from .data.base import DATASETS
+
+    parts = [DATASETS.get(name) for name in DATASETS.names()]
+    if as_json:
+        print_json([{"name": p.name, "summary": p.summary, "licence": p.licence} for p in parts])
+        return
+    for part in parts:
+        typer.echo(f"{part.name:<18s} {part.summary} ({part.licence})")
+
+
+@data_app.command("get")
+def data_get(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Registered name of a public data set.")],
+    source: Annotated[str | None, typer.Option("--from", help="Folder with a copy, or another address of the same files.")] = None,
+    accept: Annotated[bool, typer.Option("--accept-licence", help="Accept the licence that is shown, without being asked.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Download a public data set (or take a copy) after its licence is accepted; every file is checked."""
+    from .data.base import DATASETS, public_folder
+
+    public = DATASETS.get(name).public
+    if public is None:
+        raise InputError(f"data set '{name}' is not downloaded; it is made: shipbench data make {name}.")
+    folder = public_folder(name)
+    if not public.missing(folder) and not public.changed(folder):
+        typer.echo(f"{name}: all {len(public.checksums)} files are in {folder} already, with the published checksums")
+        return
+    typer.echo(public.notice(), err=True)
+    if not accept:
+        if not sys.stdin.isatty():
+            raise InputError("the licence above is not accepted, and there is no terminal to ask on; nothing was fetched. Add --accept-licence.")
+        if not typer.confirm("Do you accept the licence?", err=True):
+            raise InputError("the licence is not accepted; nothing was fetched.")
+    fetched = public.fetch(folder, source, (lambda text: None) if quiet else lambda text: typer.echo(text, err=True))
+    if not quiet:
+        typer.echo(f"{name}: {len(fetched)} files fetched into {folder}, every checksum is right. Use it: shipbench data describe {name}")
+
+
+@data_app.command("make")
+def data_make(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Registered name, with parameters in brackets.")],
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Also write it as a folder of the common format.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Make it anew even if it is in the cache.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make a data set (or take it from the cache)."""
+    from .data.base import cache_folder, load_dataset
+    from .data.files import write_dataset
+
+    dataset = load_dataset(name, remake=force)
+    if out is not None:
+        write_dataset(dataset, out)
+    if not quiet:
+        typer.echo(f"{dataset.name}: {len(dataset)} runs, fingerprint {dataset.fingerprint}, in {out or cache_folder()}")
+
+
+@data_app.command("check")
+def data_check(dataset: DatasetArgument, as_json: Json = False) -> None:
+    """Load a data set and report what was found."""
+    from .bench.listing import dataset_facts
+    from .data.base import load_dataset
+
+    facts = dataset_facts(load_dataset(dataset))
+    if as_json:
+        print_json(facts)
+        return
+    for key, value in facts.items():
+        for line in value if isinstance(value, list) else [value]:
+            typer.echo(f"{key + ':':<13s}{line}")
+
+
+@data_app.command("describe")
+def data_describe(dataset: DatasetArgument, as_json: Json = False) -> None:
+    """Print a data set's statistics (beside the paper's Table II)."""
+    from .bench.listing import describe_tables
+    from .data.base import load_dataset
+
+    tables = describe_tables(load_dataset(dataset))
+    if as_json:
+        print_json([table.as_json() for table in tables])
+        return
+    for table in tables:
+        table.show(console_for_tables())
+
+
+def register(app: typer.Typer) -> None:
+    """Add these commands to the command line."""
+    app.add_typer(data_app, name="data")
