@@ -102,6 +102,24 @@ def data_describe(dataset: DatasetArgument, as_json: Json = False) -> None:
         table.show(console_for_tables())
 
 
+@data_app.command("export")
+def data_export(
+    what: Annotated[str, typer.Argument(metavar="DATASET", help="Registered name or folder; or a result folder of `run`: its predictions.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write, or a file that ends in .mat.")],
+    format: Annotated[str | None, typer.Option("--format", help="csv, parquet or mat (MATLAB; the default for a file .mat).")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Write a data set, or the predictions of a study, as CSV, Parquet or MATLAB file."""
+    from .bench.export import export_predictions, is_results
+    from .data.base import load_dataset
+    from .data.export import check_format, export_dataset
+
+    form = check_format(format, out, what)
+    written = export_predictions(Path(what), out, form) if is_results(Path(what)) else export_dataset(load_dataset(what), out, form)
+    if not quiet:
+        typer.echo(f"Written: {', '.join(map(str, written))}")
+
+
 def register(app: typer.Typer) -> None:
     """Add these commands to the command line."""
     app.add_typer(data_app, name="data")

@@ -87,7 +87,8 @@ def write_truth(out: Path, dataset: str, fold: int, batch: Batch) -> None:
 
 def read_truth(out: Path, dataset: str, fold: int) -> Batch:
     """What `write_truth` saved (without history)."""
-    with np.load(out / "truth" / slug(dataset) / f"fold{fold}.npz") as file:
+    # the file is opened here, since numpy leaves a damaged one open
+    with (out / "truth" / slug(dataset) / f"fold{fold}.npz").open("rb") as opened, np.load(opened) as file:
         return Batch(tuple(file["ids"].tolist()), file["s0"], file["U"], file["truth"])
 
 
@@ -96,7 +97,7 @@ def read_predictions(out: Path, cell: Cell) -> np.ndarray | None:
     path = out / cell.folder / "predictions.npz"
     if not path.is_file():
         return None
-    with np.load(path) as file:
+    with path.open("rb") as opened, np.load(opened) as file:
         return file["S"]
 
 

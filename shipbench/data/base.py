@@ -19,9 +19,11 @@ from ..records import Dataset
 from ..registry import Registry
 from ..specs import parse_spec
 from .files import read_dataset, write_dataset
+from .mat import read_mat
 from .public import PublicData
 
-DATASETS = Registry("data set", "data", "DATASET", helpers=frozenset({"base", "files", "describe", "units", "public"}), group="datasets")
+_HELPERS = frozenset({"base", "describe", "export", "files", "mat", "public", "units"})
+DATASETS = Registry("data set", "data", "DATASET", helpers=_HELPERS, group="datasets")
 
 _log = logging.getLogger(__name__)
 
@@ -53,10 +55,10 @@ def public_folder(name: str) -> Path:
 
 
 def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
-    """A data set by registered name, `name[key=value]`, or the path of a folder in the contract's format.
+    """A data set by registered name, `name[key=value]`, or the path of a folder in the contract's format (or of a .mat file that was exported).
 
     Args:
-        spec: name or folder; a folder is recognised by its dataset.toml.
+        spec: name, folder or .mat file; a folder is recognised by its dataset.toml.
         remake: make a cached set anew.
         options: parameters of a registered set, beside those in the brackets.
 
@@ -64,10 +66,11 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
         InputError: neither a known name nor a data set's folder, an unknown parameter, or faulty files.
     """
     folder = Path(spec)
-    if (folder / "dataset.toml").is_file():
+    exported = folder.suffix == ".mat" and folder.is_file()
+    if exported or (folder / "dataset.toml").is_file():
         if options:
-            raise InputError(f"{folder} is a folder of files and takes no parameters; given: {', '.join(options)}.")
-        return read_dataset(folder)
+            raise InputError(f"{folder} is read from files and takes no parameters; given: {', '.join(options)}.")
+        return read_mat(folder) if exported else read_dataset(folder)
     if folder.is_dir():
         files = "trajectories.csv (or .csv.gz, .parquet), dataset.toml and ship.toml"
         raise InputError(f"folder {folder} holds no dataset.toml; a data set has {files}.")
