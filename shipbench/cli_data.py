@@ -89,17 +89,25 @@ def data_check(dataset: DatasetArgument, as_json: Json = False) -> None:
 
 
 @data_app.command("describe")
-def data_describe(dataset: DatasetArgument, as_json: Json = False) -> None:
-    """Print a data set's statistics (beside the paper's Table II)."""
-    from .bench.listing import describe_tables
+def data_describe(
+    dataset: DatasetArgument,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Write a data card there: card.md and card.html, with plots.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Print a data card: statistics (beside the paper's Table II), durations, noise, what the data cannot identify."""
+    from .bench.data_card import make_card, write_card
     from .data.base import load_dataset
 
-    tables = describe_tables(load_dataset(dataset))
+    data = load_dataset(dataset)
+    card = make_card(data)
+    written = write_card(card, data, out) if out is not None else []
     if as_json:
-        print_json([table.as_json() for table in tables])
+        print_json(card.document())
         return
-    for table in tables:
+    for table in card.tables.values():
         table.show(console_for_tables())
+    if written:
+        typer.echo(f"Written: {', '.join(map(str, written))}")
 
 
 @data_app.command("export")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -80,6 +81,15 @@ class Table:
             lines.append("| " + " | ".join(cells) + " |")
         lines += [""] + [f"{note}  " for note in self.notes]
         return "\n".join(lines).rstrip() + "\n"
+
+    def html(self) -> str:
+        """Heading, table and notes; every text is escaped."""
+        numeric = [' class="number"' if c.format else "" for c in self.columns]
+        head = "".join(f"<th{kind}>{escape(c.header)}</th>" for c, kind in zip(self.columns, numeric, strict=True))
+        rows = ["".join(f"<td{kind}>{escape(c.text(row))}</td>" for c, kind in zip(self.columns, numeric, strict=True)) for row in self.rows]
+        body = "".join(f"<tr>{cells}</tr>" for cells in rows)
+        notes = "".join(f'<p class="note">{escape(note)}</p>' for note in self.notes)
+        return f'<h2>{escape(self.title)}</h2><div class="table"><table><tr>{head}</tr>{body}</table></div>{notes}'
 
     def show(self, console: Console) -> None:
         """Print on a terminal."""

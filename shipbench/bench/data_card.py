@@ -1,0 +1,214 @@
+"""The data card: what a data set holds, how noisy it is, what it covers, and what it cannot identify; as tables, Markdown and one HTML page."""
+
+from __future__ import annotations
+
+import base64
+import os
+import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..data.coverage import NEEDED, Gap, gaps, unit_time
+from ..data.noise import channel_noise
+from ..data.sensitivity import IMITATED, UNFELT, Telling, tellings
+from ..errors import InputError
+from ..records import Dataset
+from ..signals import UNITS
+from .data_card_plots import Picture, pictures
+from .listing import dataset_facts, describe_tables
+from .tables import Table, TableColumn, display_unit, number, significant
+
+_NOISE = (
+    "Noise: standard deviation of what is new in every sample (least of the differences of order 2 to 6, by their median absolute deviation). It "
+    "sees white noise only, some 5 % too small; drifts, biases and filtered noise are not in it, and real gusts are. Step: resolution of the record."
+)
+_FELT = (
+    f"Felt: change of the runs by a typical size, as a share of what holding the speeds gets wrong; below {100 * UNFELT:g} % it is not felt at all. "
+    f"Imitated: share of that change (squared) that the other causes can make together; above {100 * IMITATED:.0f} % (a variance inflation of 10) "
+    "the cause cannot be told apart, whatever the size of the data set. Of a current or wind the direction that is told worst counts."
+)
+
+
+_GAPS = "cannot_identify"
+
+
+@dataclass(frozen=True)
+class Card:
+    """Everything on the card: facts by name, tables by key in the order of a terminal, whose end is read; a page begins with the gaps."""
+
+    name: str
+    facts: dict[str, Any]
+    tables: dict[str, Table]
+
+    def page(self) -> list[Table]:
+        """The tables in the order of a page."""
+        return [self.tables[_GAPS], *(table for key, table in self.tables.items() if key != _GAPS)]
+
+    def document(self) -> dict[str, Any]:
+        """As JSON."""
+        return {"dataset": self.name, "facts": self.facts, **{key: table.as_json() for key, table in self.tables.items()}}
+
+
+def make_card(dataset: Dataset) -> Card:
+    """Statistics, durations, noise, gaps and sensitivities of a data set."""
+    statistics = dict(zip(("statistics", "table_ii", "against_the_paper"), describe_tables(dataset), strict=False))
+    told, how = tellings(dataset)
+    tables = {
+        **statistics, "durations": _durations(dataset), "noise": _noise(dataset), "told_apart": _told_apart(told, how),
+        _GAPS: _gap_table(gaps(dataset) + _alike(told), dataset),
+    }  # fmt: skip
+    return Card(dataset.name, dataset_facts(dataset), tables)
+
+
+def _gap_table(found: Sequence[Gap], dataset: Dataset) -> Table:
+    columns = [TableColumn("cannot be identified", "subject"), TableColumn("because", "because"), TableColumn("what would add it", "manoeuvre")]
+    rows = [{"subject": g.subject, "because": g.because, "manoeuvre": g.manoeuvre} for g in found]
+    unit = unit_time(dataset.ship.L)
+    notes = [
+        f"Times are judged in ship lengths: one takes {unit:.3g} s at a Froude number of 0.1 (10 sqrt(L/g)), {NEEDED:g} of them are needed.",
+        "What is not listed can still be weakly determined: fits print intervals, and `shipbench diagnose` the smallest size that would be seen.",
+    ]
+    return Table("What these data cannot identify", columns, rows, notes if rows else ["Nothing of what is looked for is missing.", *notes])
+
+
+def _alike(told: Sequence[Telling]) -> list[Gap]:
+    """The causes that others imitate; two that do so for each other make one line."""
+    found, done = [], set()
+    twins = {t.subject: t.alike for t in told if t.cosine**2 > IMITATED}
+    for t in told:
+        if t.imitated <= IMITATED or t.subject in done:
+            continue
+        alone = t.subject in twins
+        if twins.get(t.alike) == t.subject:
+            done.add(t.alike)
+        who = f"{t.alike} alone makes {100 * t.cosine**2:.1f} %" if alone else f"most alike: {t.alike} (cosine {t.cosine:.2f})"
+        because = f"{100 * t.imitated:.1f} % of what it does to the runs can be made by other causes, {100 * IMITATED:.0f} % is the limit; {who}"
+        found.append(Gap(f"{t.subject} apart from {t.alike if alone else 'the other causes together'}", because, t.manoeuvre))
+    return found
+
+
+def _durations(dataset: Dataset) -> Table:
+    """Runs, samples and times of every kind of manoeuvre."""
+    kinds: dict[str, list[float]] = {}
+    for run in dataset.runs:
+        kinds.setdefault(str(run.meta.get("manoeuvre", "not given")), []).append((len(run) - 1) * dataset.dt)
+    groups = [*kinds.items(), *([("all", [x for times in kinds.values() for x in times])] if len(kinds) > 1 else [])]
+    rows = [
+        {"kind": kind, "runs": len(times), "least": min(times), "median": float(np.median(times)), "most": max(times), "sum": sum(times) / 3600.0}
+        for kind, times in groups
+    ]
+    columns = [
+        TableColumn("manoeuvre", "kind"), TableColumn("runs", "runs", number(0)), TableColumn("shortest [s]", "least", significant(3)),
+        TableColumn("median [s]", "median", significant(3)), TableColumn("longest [s]", "most", significant(3)),
+        TableColumn("together [h]", "sum", significant(3)),
+    ]  # fmt: skip
+    return Table("Durations", columns, rows, [f"One sample every {dataset.dt:g} s ({1.0 / dataset.dt:g} Hz)."])
+
+
+def _noise(dataset: Dataset) -> Table:
+    rows = []
+    for c in channel_noise(dataset):
+        unit, factor = display_unit(UNITS[c.channel])
+        rows.append({
+            "channel": c.channel, "unit": unit, "noise": factor * c.noise, "greatest": factor * c.greatest, "run": c.run, "step": factor * c.step,
+            "repeated": 100.0 * c.repeated,
+        })  # fmt: skip
+    columns = [
+        TableColumn("channel", "channel"), TableColumn("unit", "unit"), TableColumn("noise, median run", "noise", significant(2)),
+        TableColumn("noisiest run", "greatest", significant(2)), TableColumn("which", "run"), TableColumn("step", "step", significant(3)),
+        TableColumn("repeated samples [%]", "repeated", number(1)),
+    ]  # fmt: skip
+    return Table("Noise of the channels", columns, rows, [_NOISE])
+
+
+def _told_apart(told: Sequence[Telling], how: str) -> Table:
+    rows = []
+    for t in told:
+        felt = t.felt > UNFELT
+        verdict = "not felt" if not felt else "no" if t.imitated > IMITATED else "yes"
+        rows.append({
+            "subject": t.subject, "felt": 100 * t.felt, "imitated": 100 * t.imitated if felt else None, "alike": t.alike,
+            "cosine": t.cosine if felt else None, "verdict": verdict,
+        })  # fmt: skip
+    columns = [
+        TableColumn("cause", "subject"), TableColumn("felt [%]", "felt", significant(2)), TableColumn("imitated [%]", "imitated", number(1)),
+        TableColumn("most alike", "alike"), TableColumn("cosine", "cosine", number(2)), TableColumn("can be told apart", "verdict"),
+    ]  # fmt: skip
+    return Table("What the runs tell apart", columns, rows, [f"How: {how}", *([_FELT] if rows else [])])
+
+
+def write_card(card: Card, dataset: Dataset, out: Path) -> list[Path]:
+    """Write `card.md` with its pictures, and `card.html`, which holds everything in one file; returns the two pages.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    drawn = pictures(dataset)
+    files = {f"{p.name}.png": p.png for p in drawn}
+    files |= {"card.md": markdown(card, drawn).encode(), "card.html": html(card, drawn).encode()}
+    part = None
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix=".card-", dir=out))
+        for name, content in files.items():
+            (part / name).write_bytes(content)
+        for name in files:  # the pages come last, when their pictures are there
+            os.replace(part / name, out / name)
+    except OSError as error:
+        raise InputError(f"cannot write the data card to {out}: {error.strerror}. Give a folder that can be written with --out.") from None
+    finally:
+        if part is not None:
+            shutil.rmtree(part, ignore_errors=True)
+    return [out / "card.md", out / "card.html"]
+
+
+def _lines(facts: dict[str, Any]) -> list[tuple[str, str]]:
+    return [(key, str(line)) for key, value in facts.items() for line in (value if isinstance(value, list) else [value])]
+
+
+def _plain(text: str) -> str:
+    """Text from the data in Markdown: one line, no HTML."""
+    return escape(" ".join(text.split()), quote=False)
+
+
+def markdown(card: Card, drawn: Sequence[Picture]) -> str:
+    """The card as Markdown; pictures are files beside it."""
+    parts = [f"# Data card: {_plain(card.name)}\n", "\n".join(f"- {key}: {_plain(line)}" for key, line in _lines(card.facts)) + "\n"]
+    coverage = "## Coverage\n\n" + "\n\n".join(f"![{p.title}]({p.name}.png)\n\n{p.caption}" for p in drawn) + "\n"
+    texts = [t.markdown().replace("<", "&lt;") for t in card.page()]
+    return "\n".join([*parts, texts[0], coverage, *texts[1:]])
+
+
+_STYLE = """
+:root{color-scheme:light}body{font:16px/1.5 system-ui,sans-serif;color:#1a1a1a;background:#fff;max-width:72rem;margin:0 auto;padding:1rem}
+h1{font-size:1.5rem}h2{font-size:1.15rem;margin:2rem 0 .5rem}dl{display:grid;grid-template-columns:max-content 1fr;gap:.15rem 1rem}
+dt{color:#555}dd{margin:0;overflow-wrap:anywhere}.table{overflow-x:auto}table{border-collapse:collapse;font-size:.9rem}
+th,td{padding:.3rem .6rem;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}th{border-bottom:2px solid #999}
+.number{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}.note{color:#555;font-size:.85rem;max-width:60rem}
+.plots{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(20rem,100%),1fr));gap:1rem}figure{margin:0}
+img{width:100%;height:auto}figcaption{font-size:.85rem;color:#555}
+#gaps td{min-width:11rem}@media(max-width:40rem){dl{grid-template-columns:1fr}dt{margin-top:.3rem}}
+"""
+
+
+def html(card: Card, drawn: Sequence[Picture]) -> str:
+    """The card as one page that needs no network and no other file."""
+    facts = "".join(f"<dt>{escape(key)}</dt><dd>{escape(line)}</dd>" for key, line in _lines(card.facts))
+    figures = "".join(
+        f'<figure><img alt="{escape(p.title)}" src="data:image/png;base64,{base64.b64encode(p.png).decode()}">'
+        f"<figcaption>{escape(p.caption)}</figcaption></figure>"
+        for p in drawn
+    )
+    tables = [t.html() for t in card.page()]
+    title = f"Data card: {escape(card.name)}"
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{title}</title><style>{_STYLE}</style></head><body><h1>{title}</h1><dl>{facts}</dl>"
+        f'<section id="gaps">{tables[0]}</section><h2>Coverage</h2><div class="plots">{figures}</div>{"".join(tables[1:])}</body></html>\n'
+    )

@@ -1,0 +1,111 @@
+"""What the runs of a data set tell apart: sensitivities of the physics model's rollouts to causes, and how far the others can imitate each.
+
+The model is the benchmark's own (`predictors/physics.py`), fitted roughly to windows of the data; the sensitivities are those of its fit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effects.base import EFFECTS
+from ..errors import ShipbenchError
+from ..records import Dataset
+from ..signals import F_B, MOTION
+from .coverage import unit_time
+
+_WINDOW, _MOST_WINDOWS, _FIT_STEPS = 6.0, 24, 3
+IMITATED = 0.9
+"""A share of 0.9 is a variance inflation factor of 10, the usual limit of collinearity (Marquardt 1970; Belsley, Kuh and Welsch 1980)."""
+UNFELT = 1e-3
+"""A typical size that changes the tracks by less than this share of what holding the speeds gets wrong is not felt at all."""
+
+_PARAMETERS = {2: ("resistance", "coast down with the shaft stopped, and speed up from rest"),
+               0: ("propeller walk", "straight runs with the revolutions up and down"),
+               4: ("rudder offset", "vary the revolutions at one speed: the offset acts with the race, propeller walk with the thrust"),
+               5: ("rudder lift", "zig-zags at two speeds"), 10: ("rudder drag", "turns at two rudder angles from one speed")}  # fmt: skip
+_EFFECTS = ("thrust_gain", "race_gain", "rudder_stall", "cross_flow_drag", "propeller_walk_astern", "thruster_gain", "current", "wind")
+
+
+@dataclass(frozen=True)
+class Telling:
+    """One cause: felt is the change that a typical size makes (share of what holding the speeds gets wrong), imitated the share of it (squared) that
+    the others can make together, alike the one that does most and its cosine."""
+
+    subject: str
+    felt: float
+    imitated: float
+    alike: str
+    cosine: float
+    manoeuvre: str
+
+
+def tellings(dataset: Dataset) -> tuple[list[Telling], str]:
+    """Every cause, and a sentence on how it was found (or why not)."""
+    steps = min(round(_WINDOW * unit_time(dataset.ship.L) / dataset.dt), int(np.median([len(r) for r in dataset.runs])) - 1)
+    if steps < 4:
+        return [], f"the runs are too short for rollouts: {steps} steps of {dataset.dt:g} s in the median run."
+    windows = dataset.windows(steps)
+    windows = windows.subset(np.unique(np.linspace(0, len(windows) - 1, _MOST_WINDOWS).astype(int)).tolist())
+    try:
+        columns, names, manoeuvres = _columns(windows)
+    except ShipbenchError as error:
+        return [], f"the physics model cannot be fitted to these runs: {error}"
+    how = f"Rollouts of the fitted physics over {len(windows)} windows of {steps * dataset.dt:.3g} s."
+    unasked = set()
+    if "wind_speed" in dataset.inputs:
+        unasked.add("wind")
+    if dataset.ship.thrusters is None and not any(run.states[:, F_B:].any() for run in dataset.runs):
+        unasked.add("thruster gain")
+    kept = [name not in unasked for name in names]
+    return _compare(columns[:, kept], [name for name in names if name not in unasked], manoeuvres), how
+
+
+def _columns(windows: Dataset) -> tuple[np.ndarray, list[str], dict[str, str]]:
+    """Changes (samples, causes) of the weighted rollouts by typical sizes; columns of one name belong together."""
+    from ..predictors._physics_fit import Data, parameter_scale, rollout_function  # casadi
+    from ..predictors.physics import Physics
+
+    model = Physics(iterations=_FIT_STEPS).fit(windows)
+    batch = windows.batch()
+    data = Data(model.c, batch, model.actuator_path(batch.s0, batch.U), model._wind(batch.U), windows.dt, model.substeps)
+    effects = [EFFECTS.get(name) for name in _EFFECTS]
+    sized = [effect.sized(windows.ship.L) for effect in effects]
+    forces = tuple((e, tuple(p.typical if p.shape else None for p in parameters)) for e, parameters in zip(effects, sized, strict=True))
+    runs, rows = data.path.shape[:2]
+    function = rollout_function(model.c, rows, runs, windows.dt / model.substeps, data.wind is not None, True, forces, model.particulars)
+    free = [(e, p) for e, parameters in zip(effects, sized, strict=True) for p in parameters if not p.shape]
+    p = np.concatenate([model.p, np.zeros(len(free))])
+    _, S = function(batch.s0[:, MOTION].T, np.zeros((6, len(p) * runs)), data.columns(data.path, with_time=True), p)
+    J = data.sensitivities(S, len(p)) * data.weight()[:, None]
+    scale = np.concatenate([parameter_scale(model.c), [abs(parameter.typical) for _, parameter in free]])
+    kept = [*_PARAMETERS, *range(len(model.p), len(p))]
+    Z = (J * scale)[..., kept].reshape(-1, len(kept))
+    names = [*(name for name, _ in _PARAMETERS.values()), *(e.name.replace("_", " ") for e, _ in free)]
+    manoeuvres = {name: text for name, text in _PARAMETERS.values()} | {e.name.replace("_", " "): e.separate for e in effects}
+    return Z[np.isfinite(Z).all(axis=1)], names, manoeuvres
+
+
+def _compare(Z: np.ndarray, names: list[str], manoeuvres: dict[str, str]) -> list[Telling]:
+    """Size and imitation of each cause; of a cause with several columns the direction that is imitated most."""
+    found = []
+    size = np.linalg.norm(Z, axis=0)
+    unit = Z / np.where(size > 0.0, size, 1.0)
+    for subject in dict.fromkeys(names):
+        own = np.array([name == subject for name in names])
+        others = ~own & (size > UNFELT)
+        felt = float(size[own].max(initial=0.0))
+        if felt <= UNFELT or not others.any():
+            found.append(Telling(subject, felt, 0.0, "", 0.0, manoeuvres[subject]))
+            continue
+        mine = np.linalg.qr(unit[:, own])[0]
+
+        def shared(columns: np.ndarray, mine: np.ndarray = mine) -> float:
+            """Cosine of the least angle between the directions of this cause and those of `columns`."""
+            return float(min(np.linalg.svd(mine.T @ np.linalg.qr(unit[:, columns])[0], compute_uv=False)[0], 1.0))
+
+        rivals = dict.fromkeys(name for name, there in zip(names, others, strict=True) if there)
+        cosine, alike = max((shared(np.array([name == rival for name in names]) & others), rival) for rival in rivals)
+        found.append(Telling(subject, felt, shared(others) ** 2, alike, cosine, manoeuvres[subject]))
+    return found
