@@ -18,6 +18,8 @@ from .coverage import unit_time
 _WINDOW, _MOST_WINDOWS, _FIT_STEPS = 6.0, 24, 3
 IMITATED = 0.9
 """A share of 0.9 is a variance inflation factor of 10, the usual limit of collinearity (Marquardt 1970; Belsley, Kuh and Welsch 1980)."""
+_LEAST = 1e-3
+"""Least size of what there is to predict of a channel, in ship lengths, radians and sqrt(gL): in a dead straight run yaw is not nothing."""
 UNFELT = 1e-3
 """A typical size that changes the tracks by less than this share of what holding the speeds gets wrong is not felt at all."""
 
@@ -53,6 +55,8 @@ def tellings(dataset: Dataset) -> tuple[list[Telling], str]:
     except ShipbenchError as error:
         return [], f"the physics model cannot be fitted to these runs: {error}"
     how = f"Rollouts of the fitted physics over {len(windows)} windows of {steps * dataset.dt:.3g} s."
+    if not len(columns):
+        return [], "the rollouts of the fitted physics diverge; check units and signs with `shipbench data check`."
     unasked = set()
     if "wind_speed" in dataset.inputs:
         unasked.add("wind")
@@ -67,7 +71,8 @@ def _columns(windows: Dataset) -> tuple[np.ndarray, list[str], dict[str, str]]:
     from ..predictors._physics_fit import Data, parameter_scale, rollout_function  # casadi
     from ..predictors.physics import Physics
 
-    model = Physics(iterations=_FIT_STEPS).fit(windows)
+    with np.errstate(all="ignore"):  # where nothing moves, the fit's intervals are empty; they are not asked for
+        model = Physics(iterations=_FIT_STEPS).fit(windows)
     batch = windows.batch()
     data = Data(model.c, batch, model.actuator_path(batch.s0, batch.U), model._wind(batch.U), windows.dt, model.substeps)
     effects = [EFFECTS.get(name) for name in _EFFECTS]
@@ -78,13 +83,21 @@ def _columns(windows: Dataset) -> tuple[np.ndarray, list[str], dict[str, str]]:
     free = [(e, p) for e, parameters in zip(effects, sized, strict=True) for p in parameters if not p.shape]
     p = np.concatenate([model.p, np.zeros(len(free))])
     _, S = function(batch.s0[:, MOTION].T, np.zeros((6, len(p) * runs)), data.columns(data.path, with_time=True), p)
-    J = data.sensitivities(S, len(p)) * data.weight()[:, None]
+    root = np.sqrt(runs * data.truth.shape[1] * 6.0)
+    size = np.maximum(1.0 / (data.weight() * root), _LEAST * _froude_units(model.c.L))
+    J = data.sensitivities(S, len(p)) / (size * root)[:, None]
     scale = np.concatenate([parameter_scale(model.c), [abs(parameter.typical) for _, parameter in free]])
     kept = [*_PARAMETERS, *range(len(model.p), len(p))]
     Z = (J * scale)[..., kept].reshape(-1, len(kept))
     names = [*(name for name, _ in _PARAMETERS.values()), *(e.name.replace("_", " ") for e, _ in free)]
     manoeuvres = {name: text for name, text in _PARAMETERS.values()} | {e.name.replace("_", " "): e.separate for e in effects}
     return Z[np.isfinite(Z).all(axis=1)], names, manoeuvres
+
+
+def _froude_units(L: float) -> np.ndarray:
+    """Units (6,) of x, y, psi, u, v, r for a ship of length L [m]: length, radian, sqrt(gL), sqrt(g/L)."""
+    speed = float(np.sqrt(9.81 * L))
+    return np.array([L, L, 1.0, speed, speed, speed / L])
 
 
 def _compare(Z: np.ndarray, names: list[str], manoeuvres: dict[str, str]) -> list[Telling]:

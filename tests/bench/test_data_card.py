@@ -1,0 +1,120 @@
+"""The data card: two pages that say the same, one of them whole in itself."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from toy_ship import toy, toy_folder
+from typer.testing import CliRunner
+
+from shipbench.bench.data_card import make_card, write_card
+from shipbench.bench.data_card_plots import pictures
+from shipbench.cli import app
+from shipbench.data.base import load_dataset
+from shipbench.errors import InputError
+from shipbench.records import Dataset, Run
+
+__all__ = ["toy", "toy_folder"]  # fixtures
+
+SHARED = Path(__file__).parents[3] / "shared" / "data" / "esso-osaka-frt"
+
+
+@pytest.fixture
+def cli(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SHIPBENCH_CACHE", str(tmp_path / "cache"))
+    return lambda *arguments: CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def test_a_card_is_written_printed_and_given_as_json(cli, toy_folder, tmp_path):
+    result = cli("data", "describe", toy_folder(), "--out", "card")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.rstrip().endswith("Written: card/card.md, card/card.html")
+    assert "What these data cannot identify" in result.stdout
+    pictures = {"speed_drift.png", "rudder_rpm.png", "headings.png", "yaw_speed.png"}  # no thrusters, no wind
+    assert {p.name for p in (tmp_path / "card").iterdir()} == {"card.md", "card.html"} | pictures
+    text = (tmp_path / "card/card.md").read_text()
+    assert set(re.findall(r"\]\((\S+?)\)", text)) == pictures
+    for word in ("- licence: MIT", "- source: formula", "One sample every 1 s", "Noise of the channels", "| shallow water | depth is not recorded |"):
+        assert word in text
+    again = cli("data", "describe", "toyset", "--out", "card", "--json")
+    document = json.loads(again.stdout)
+    assert document["dataset"] == "toyset"
+    assert all(row["subject"] in text for row in document["cannot_identify"]["rows"])
+    assert {row["channel"] for row in document["noise"]["rows"]} >= {"x", "psi", "u", "r", "n"}
+    assert document["durations"]["rows"][0]["median"] == 40.0
+    assert text == (tmp_path / "card/card.md").read_text(), "the same data give the same page"
+
+
+def test_the_page_needs_no_network_and_text_from_the_data_stays_text(toy_folder, tmp_path):
+    folder = toy_folder(runs=3)
+    description = folder / "dataset.toml"
+    description.write_text(description.read_text().replace('source = "formula"', 'source = "<script>alert(1)</script> & co"'))
+    data = load_dataset(str(folder))
+    _, page = write_card(make_card(data), data, tmp_path / "card")
+    html = page.read_text()
+    assert "<script" not in html
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; co" in html
+    assert "<script" not in (tmp_path / "card/card.md").read_text()
+    assert not re.search(r'(src|href)="(?!data:image/png;base64,)', html)
+    assert "http" not in re.sub(r"base64,[\w+/=]+", "", html)
+    assert "width=device-width" in html
+    for encoded in re.findall(r"base64,([\w+/=]+)", html):
+        assert base64.b64decode(encoded).startswith(b"\x89PNG")
+    assert html.count("<figure>") == 4
+
+
+def test_thrusters_and_wind_are_drawn_where_there_are_any(harbour):
+    names = (*harbour.inputs, "wind_speed", "wind_from")
+    windy = harbour.with_runs(Run(r.id, r.t, r.states, np.hstack([r.inputs, np.full((len(r), 2), 1.0)]), names) for r in harbour.runs)
+    assert [p.name for p in pictures(windy)][4:] == ["thrusters", "wind"]
+
+
+def test_a_folder_that_cannot_be_written_is_one_message(cli, toy_folder):
+    Path("file").write_text("x")
+    result = cli("data", "describe", toy_folder(), "--out", "file")
+    assert result.exit_code == 2
+    assert "cannot write the data card to file" in result.stderr
+
+
+def test_nothing_half_written_is_left(toy_folder, tmp_path, monkeypatch):
+    data = load_dataset(str(toy_folder(runs=3)))
+    card = make_card(data)
+
+    def full(*arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(InputError, match="No space left"):
+        write_card(card, data, tmp_path / "card")
+    assert list((tmp_path / "card").iterdir()) == []
+
+
+@pytest.mark.parametrize(("samples", "speed"), [(2, 3.0), (2, 0.0), (200, 0.0), (200, 1e-9)])
+def test_data_that_hold_nearly_nothing_get_a_card_too(toy, tmp_path, samples, speed):
+    ship = toy(runs=1).ship
+    S, U = np.zeros((samples, 10)), np.zeros((samples, 4))
+    S[:, 3], S[:, 0] = speed, speed * np.arange(samples)
+    data = Dataset("still", ship, 1.0, (Run("a", np.arange(float(samples)), S, U),))
+    card = make_card(data)
+    json.dumps(card.document(), allow_nan=False, default=str)
+    assert len(card.tables["cannot_identify"].rows) > 8
+    write_card(card, data, tmp_path)
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="no copy of the Esso Osaka data here (not distributed)")
+def test_the_card_of_measured_runs(monkeypatch):
+    monkeypatch.setenv("SHIPBENCH_ESSO_OSAKA", str(SHARED))
+    document = make_card(load_dataset("esso_osaka")).document()
+    named = [row["subject"] for row in document["cannot_identify"]["rows"]]
+    assert named[:2] == ["lag, rate limit, delay and dead band of rudder and shaft", "shallow water"]
+    assert not any("astern" in name or "wind" in name for name in named), "the runs reverse, and their wind is measured"
+    noise = {row["channel"]: row["noise"] for row in document["noise"]["rows"]}
+    assert 0.001 < noise["x"] < 0.006  # the source's scatter about a 1.1 s mean is 3 to 6 mm, slow motion included
+    assert 0.05 < noise["psi"] < 0.21
