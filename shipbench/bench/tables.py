@@ -75,7 +75,7 @@ class Table:
         lines.append("| " + " | ".join(c.header for c in self.columns) + " |")
         lines.append("|" + "|".join("---:" if c.format else ":---" for c in self.columns) + "|")
         for row in self.rows:
-            cells = [c.text(row).replace("|", "\\|") for c in self.columns]
+            cells = [" ".join(c.text(row).split()).replace("|", "\\|") for c in self.columns]
             if row.get("_reference"):
                 cells = [f"*{cell}*" if cell else "" for cell in cells]
             lines.append("| " + " | ".join(cells) + " |")
