@@ -58,8 +58,15 @@ def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, sub
         for wanted, time in ((before, part * h), (now, (1.0 - part) * h)):
             if np.all(time <= 0.0):
                 continue
-            target = np.where(np.abs(wanted - motor) < gear.deadband, motor, wanted) if np.any(gear.deadband) else wanted
-            motor = lag_with_rate_limit(motor, target, time, gear.T, gear.rate)
+            moved = lag_with_rate_limit(motor, wanted, time, gear.T, gear.rate)
+            motor = _stopped_short(motor, moved, wanted, gear.deadband) if np.any(gear.deadband) else moved
         position = np.clip(position, motor - 0.5 * gear.backlash, motor + 0.5 * gear.backlash) if np.any(gear.backlash) else motor
         out[:, j + 1] = position
     return out
+
+
+def _stopped_short(before: np.ndarray, after: np.ndarray, wanted: np.ndarray, deadband: Array) -> np.ndarray:
+    """Where a controller with a deadband leaves the motor that would have moved from `before` to `after`: it stops the moment it is near enough."""
+    side = np.sign(wanted - before)
+    near = np.abs(wanted - before) <= deadband
+    return np.where(near, before, side * np.minimum(side * after, side * wanted - deadband))
