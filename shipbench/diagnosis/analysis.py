@@ -112,7 +112,7 @@ def hull_evidence(fit: Fit) -> float:
     """2 log evidence for a hull that lies off the regressions by the usual 30 %, against one that lies within 3 %."""
     lin = Linearisation(fit.plant, fit.scales, fit.point, fit.motion)
     wide = settle(lin, fit.model, fit.hyper, fit.log_tau2)
-    narrow = settle(lin, replace(fit.model, hull=_NARROW), fit.hyper, fit.log_tau2, steps=8)
+    narrow = settle(lin, replace(fit.model, hull=_NARROW), fit.hyper, fit.log_tau2)
     return 2.0 * (wide.evidence - narrow.evidence)
 
 

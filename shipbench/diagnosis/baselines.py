@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.base import EFFECTS
+from ..effects.base import EFFECTS, flow_first
 from ..ops import Array
 from ..physics import eq2
 from ..physics.modifiers import Flow, Modifiers
@@ -196,7 +196,7 @@ class _Derivatives:
         p, hull = parameters(self.scales, base)
         e = Modifiers()
         t = seg.start[:, None] + seg.dt * np.arange(plant.steps + 1)
-        for a in (*hull, *active):
+        for a in (*flow_first(active), *hull):
             a.effect.force(e, Flow(x, y, t, psi, u, v, r, n, delta, F_b, F_s), a.q, plant.ship)
         air: tuple[Array, Array] = (u, v) if seg.wind is None else apparent_wind(psi, u, v, seg.wind[..., 0], seg.wind[..., 1])
         found = np.stack(np.broadcast_arrays(*eq2.accelerations(u, v, r, n, delta, F_b, F_s, air, plant.c, p, e)), axis=-1)

@@ -16,6 +16,7 @@ from ..records import Dataset
 from .analysis import HULL_THRESHOLD, Analysis, analyse, causes_of
 from .causes import describe_candidates, describe_causes, remaining, unknown_part
 from .gain import FoldGain, fold_gain, summarise
+from .model import NUM_BASE
 from .outcome import Diagnosis, Gain
 from .plant import Plant
 from .trace import trace_of
@@ -24,8 +25,8 @@ from .wrong import what_is_wrong
 
 FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
-STRANGE, STRANGE_SUM, STRANGE_SIZE = 5.0, 90.0, 3.0
-"""Of the plain fit's parameters in units of their ordinary spreads, their sum of squares, and the size of a cause in typical sizes."""
+STRANGE, STRANGE_SUM, STRANGE_SIZE = 6.5, 130.0, 3.0
+"""Of the fit's parameters in units of their ordinary spreads, beside the causes; their sum of squares; and the size of a cause in typical sizes."""
 NOT_A_MODEL = ("unit_or_sign_error", "change_point")
 """They describe the data, not the ship: correct the data, or fit the runs before and after the change apart."""
 
@@ -100,8 +101,8 @@ def _check(dataset: Dataset) -> list[str]:
 
 
 def _doubts(found: Analysis) -> list[str]:
-    """Signs that the model does not belong to the data: the plain fit leaves what is ordinary, or hull or propeller would be another ship's."""
-    z = found.selection.null.solution.mean
+    """Signs that the model does not belong to the data: the fit leaves what is ordinary, or hull or propeller would be another ship's."""
+    z = found.final.solution.mean[:NUM_BASE]
     signs = []
     if np.max(np.abs(z)) > STRANGE or np.sum(z**2) > STRANGE_SUM:
         signs.append(f"the fit moves a parameter by {np.max(np.abs(z)):.1f} times its ordinary spread (all together {np.sum(z**2) ** 0.5:.0f} times)")

@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import WorkError
-from .gram import Gram, Hyper, Prior, Products, Reduced, Solution, background, solve, update_force, update_noise
+from .gram import Gram, Hyper, Prior, Products, Reduced, Solution, accelerated, background, solve, update_force, update_noise
 from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, Term
 from .plant import NUM_HULL, Plant
 
-_EM_STEPS = 4
-_EM_RANDOM = 5
-_MAY_RISE, _WORTH_A_STEP = 1.1, 1.0
+_EM_CYCLES = 3
+_MAY_RISE, _AT_REST, _AT_REST_EVIDENCE = 1.1, 0.03, 0.1
 _LOG_FLOOR = np.log(0.1**2)
 """A channel is never taken for better than a tenth of an ordinary sensor, else the latent force follows its noise."""
 
@@ -170,80 +168,102 @@ def fit(
     plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 20,
     candidates: Sequence[Term] = (), guess: np.ndarray | None = None,
 ) -> Fit:  # fmt: skip
-    """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), to the best evidence
-    found.
+    """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), until it rests.
 
-    A step is halved only where the cost explodes: the cost of a step that is right for the parameters rises at first, until the latent force has
-    followed, and the path would else end where parameters compensate each other. `candidates` get columns at the last point.
+    The evidence of a linearisation is that of the model only where the trajectory is the model's own: on the way it can be far too high. A step is
+    halved only where the cost explodes: the cost of a step that is right for the parameters rises at first, until the latent force has followed, and
+    the path would else end where parameters compensate each other. `candidates` get columns at the last point.
     """
     log_tau2 = dict(log_tau2 or {})
     if len(point.terms) < len(model.terms):
         new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
         point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
-    lin, best, idle = Linearisation(plant, scales, point, guess), None, 0
-    for _ in range(iterations):
+    lin, before, last = Linearisation(plant, scales, point, guess), -np.inf, np.inf
+    for left in reversed(range(iterations)):
         found = settle(lin, model, hyper, log_tau2)
-        if best is None or found.evidence > best[0].evidence + _WORTH_A_STEP:
-            best, idle = (found, lin), 0
-        else:
-            idle += 1
-            if idle == 2:
-                break
         hyper, log_tau2 = found.hyper, found.log_tau2
         target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
+        far = _distance(lin.point, target)
+        if left == 0 or (far < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
+            break
         at, share = objective(lin, model, hyper, log_tau2, found.gram), 1.0
+        if last < far < 1.0:  # it goes to and fro about the optimum
+            share, target = 0.5, between(lin.point, target, 0.5)
+        before, last = found.evidence, far
         trial = Linearisation(plant, scales, target, lin.towards(target))
         while objective(trial, model, hyper, log_tau2, found.gram) > _MAY_RISE * at and share > 0.1:
             share *= 0.5
             part = between(lin.point, target, share)
             trial = Linearisation(plant, scales, part, lin.towards(part))
         lin = trial
-    if best is None:
-        raise WorkError("the diagnosis made no step of its fit; give at least one iteration.")
-    if not candidates:
-        return best[0]
-    return settle(best[1], model, best[0].hyper, best[0].log_tau2, candidates)
+    return settle(lin, model, hyper, log_tau2, candidates) if candidates else found
 
 
-def track(plant: Plant, scales: Scales, point: Point, hyper: Hyper) -> tuple[Point, Hyper, np.ndarray]:
-    """Put the trajectories on the measured ones by the latent force alone: Gauss-Newton is then nearly linear in everything else."""
-    still = Model(hull=1e-4, base=1e-4)
-    lin = Linearisation(plant, scales, point, plant.seg.states[..., :6].copy())
-    found = settle(lin, still, hyper, {})
-    tracked = point_from(still, point, found.solution, found.prior, found.estimate)
-    return tracked, found.hyper, lin.towards(tracked)
+def _distance(a: Point, b: Point) -> float:
+    """Greatest change of a coefficient, in units of its scale."""
+    return max(float(np.max(np.abs(p - q))) for p, q in zip((a.base, *a.values), (b.base, *b.values), strict=True))
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where fits begin: regressions, with trajectories on the measured ones by the latent force alone. Gauss-Newton is nearly linear from there; from
+    another fit it may end where parameters compensate each other."""
+
+    point: Point
+    hyper: Hyper
+    motion: np.ndarray
+
+    @classmethod
+    def of(cls, plant: Plant, scales: Scales) -> Origin:
+        still, (point, hyper) = Model(hull=1e-4, base=1e-4), start(plant)
+        lin = Linearisation(plant, scales, point, plant.seg.states[..., :6].copy())
+        found = settle(lin, still, hyper, {})
+        tracked = point_from(still, point, found.solution, found.prior, found.estimate)
+        return cls(tracked, found.hyper, lin.towards(tracked))
 
 
 def settle(
-    lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (), steps: int = _EM_STEPS
+    lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (), cycles: int = _EM_CYCLES
 ) -> Fit:
     """Variances and posterior on one linearisation."""
     plant, scales, point, columns = lin.plant, lin.scales, lin.point, lin.columns(candidates)
     products = products_of(plant, scales, point, columns)
-    log_tau2 = dict(log_tau2)
-    for step in range(steps + 1):
-        gram = products.weigh(hyper)
-        reduced = gram.reduce(hyper.log_force)
-        prior = model.prior(log_tau2)
-        solution = solve(reduced, prior)
-        estimate, cov = background(gram, reduced, prior, solution)
-        if step == steps:
-            break
-        hyper = Hyper(update_force(gram, estimate, cov), update_noise(products, gram, reduced, prior, solution, estimate, _LOG_FLOOR), hyper.tau)
-        for _ in range(_EM_RANDOM if any(t.per_run for t in model.terms) else 0):  # slow where the effect is clear, and cheap
-            update_random(model, solution, log_tau2)
-            solution = solve(reduced, model.prior(log_tau2))
+    hyper, log_tau2 = _variances(products.without(sum(t.size for t in candidates)), model, hyper, log_tau2, cycles)
+    gram = products.weigh(hyper)
+    reduced = gram.reduce(hyper.log_force)
+    prior = model.prior(log_tau2)
+    solution = solve(reduced, prior)
+    estimate, cov = background(gram, reduced, prior, solution)
     return Fit(
         plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), lin.motion, products, gram, reduced, solution, estimate, cov
     )
 
 
-def update_random(model: Model, solution: Solution, log_tau2: dict[int, float]) -> None:
-    """One EM step for the variance of each random effect, in place."""
-    at = 0
-    for i, term in enumerate(model.terms):
+def _variances(products: Products, model: Model, hyper: Hyper, log_tau2: dict[int, float], cycles: int) -> tuple[Hyper, dict[int, float]]:
+    """Variances of force, noise and random effects on one linearisation."""
+    random = [i for i, term in enumerate(model.terms) if term.per_run]
+
+    def step(theta: np.ndarray) -> tuple[float, np.ndarray]:
+        now, tau2 = Hyper(theta[:3], theta[3:9], hyper.tau), dict(zip(random, theta[9:], strict=True))
+        gram, prior = products.weigh(now), model.prior(tau2)
+        reduced = gram.reduce(now.log_force)
+        solution = solve(reduced, prior)
+        estimate, cov = background(gram, reduced, prior, solution)
+        force, noise = update_force(gram, estimate, cov), update_noise(products, gram, reduced, prior, solution, estimate, _LOG_FLOOR)
+        return solution.log_evidence, np.concatenate([force, noise, _random_variances(model, solution)])
+
+    theta = np.concatenate([hyper.log_force, hyper.log_noise, [log_tau2.get(i, 0.0) for i in random]])
+    theta = accelerated(step, theta, cycles)
+    return Hyper(theta[:3], theta[3:9], hyper.tau), dict(zip(random, (float(v) for v in theta[9:]), strict=True))
+
+
+def _random_variances(model: Model, solution: Solution) -> list[float]:
+    """One EM step for the log variance of each random effect."""
+    at, found = 0, []
+    for term in model.terms:
         if term.per_run:
             sel = slice(at, at + term.size)
             at += term.size
             second = np.mean(solution.means[:, sel] ** 2) + np.mean(np.diagonal(solution.covs[:, sel, sel], axis1=1, axis2=2))
-            log_tau2[i] = float(np.log(second))
+            found.append(float(np.log(second)))
+    return found

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from itertools import product
 
 import numpy as np
 
 from ..physics.actuators import Gear, gear_path
-from .plant import Plant, ordinary_gears
+from .plant import Plant, Segments, ordinary_gears
 
 _ACTUATORS = {"n": (0,), "delta": (1,), "F": (2, 3)}
 _RATE_POWER = {"n": 2, "delta": 1, "F": 0}
-_EVALUATIONS, _SCAN = 200, 30
+_SCAN = (4, 12, 24)
+_ROUNDS, _FINE, _MOST, _STEP = 40, 1e-3, 200, 0.02
+_DELAY = 10.0
+"""Longest delay [s] at 130 m that is looked for."""
+_OWN_SPREAD, _RECORD, _CLOCK = 0.25, 0.01, 0.02
+"""Standard deviations: of an ordinary gear's time constant, relative (a lag is reported beyond it); of the scale of a record, relative; of a time, in
+samples."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,7 @@ def _least_rate(actuator: str, scale: float) -> float:
 
 
 def _kinds(actuator: str, scale: float, span: float, ordinary: Gear) -> list[_Kind]:
-    """What may be wrong with an actuator; `span` is the range of its commands. Nothing smaller than a fiftieth of it is looked for."""
+    """What may be wrong with an actuator; `span` is the range of its commands."""
     T, rate = ORDINARY[actuator].T * scale, _least_rate(actuator, scale)
     lag = _Kind({"n": "shaft_lag", "delta": "rudder_lag", "F": "thruster_lag"}[actuator], "T", T, 60.0 * scale, ordinary.T)
     if actuator == "n":
@@ -76,81 +81,113 @@ def _kinds(actuator: str, scale: float, span: float, ordinary: Gear) -> list[_Ki
     return [
         lag,
         _Kind("rudder_rate_limit", "rate", 0.02 * rate, rate),
-        _Kind("rudder_delay", "delay", 0.15 * scale, 10.0 * scale),
-        _Kind("rudder_deadband", "deadband", 0.02 * span, 0.3 * span),
-        _Kind("rudder_backlash", "backlash", 0.02 * span, 0.3 * span),
+        _Kind("rudder_delay", "delay", 0.15 * scale, _DELAY * scale),
+        _Kind("rudder_deadband", "deadband", 0.004 * span, 0.3 * span),
+        _Kind("rudder_backlash", "backlash", 0.004 * span, 0.3 * span),
     ]
 
 
 def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear]]:
     """Findings of every actuator that moves, best first, and the best ordinary gears; nothing where only commands are recorded."""
-    gears = ordinary_gears(plant.c.L)
-    if plant.seg.commanded:
+    seg, gears = plant.long, ordinary_gears(plant.c.L)
+    if seg.commanded:
         return [], gears
     found: list[GearFinding] = []
     for name, channels in _ACTUATORS.items():
-        rows = range(len(plant.seg.run))
-        picked = [(b, c) for c in channels for b in rows if np.ptp(plant.seg.commands[b, plant.seg.mask[b], c]) > 0]
-        if len({plant.seg.run[b] for b, _ in picked}) > 1:
-            some, gears[name] = _of_actuator(plant, name, np.array(picked))
-            found += some
+        rows = range(len(seg.run))
+        picked = [(b, c) for c in channels for b in rows if np.ptp(seg.commands[b, seg.mask[b], c]) > 0]
+        if len({seg.run[b] for b, _ in picked}) > 1:
+            record = _Record.of(seg, plant.c.L, name, np.array(picked))
+            findings, gears[name] = record.findings(ordinary_gears(plant.c.L)[name])
+            found += findings
     return sorted(found, key=lambda f: -f.score), gears
 
 
-def _of_actuator(plant: Plant, name: str, picked: np.ndarray) -> tuple[list[GearFinding], Gear]:
-    seg, scale, (b, c) = plant.seg, (plant.c.L / 130.0) ** 0.5, picked.T
-    command, measured, mask, run = seg.commands[b, :-1, c], seg.states[b, :, 6 + c], seg.mask[b, 1:], seg.run[b]
-    span = float(np.percentile(np.abs(command), 98))
-    rate = max(_least_rate(name, scale), 0.01 * span / seg.dt)
-    low, high = np.log([0.02 * scale, rate]), np.log([ORDINARY[name].T * scale, max(10.0 * span / seg.dt, 2.0 * rate)])
+@dataclass(frozen=True)
+class _Record:
+    """Commands (P, K) and positions (P, K + 1) of one actuator over P pieces; judged (P, K): real samples, after the longest delay looked for:
+    what was ordered before the record began is not known."""
 
-    def gear_of(z: np.ndarray, kind: _Kind | None) -> Gear:
-        gear = Gear(float(np.exp(z[0])), float(np.exp(z[1])))
-        return gear if kind is None else replace(gear, **{kind.field: float(np.exp(z[kind.at]))})
+    name: str
+    scale: float
+    dt: float
+    command: np.ndarray
+    measured: np.ndarray
+    judged: np.ndarray
+    run: np.ndarray
+    runs: int
 
-    def residual(z: np.ndarray, kind: _Kind | None = None) -> np.ndarray:
-        path = gear_path(measured[:, 0], command, seg.dt, gear_of(z, kind))
-        return np.where(mask, (measured - path)[:, 1:], 0.0)
+    @classmethod
+    def of(cls, seg: Segments, L: float, name: str, picked: np.ndarray) -> _Record:
+        scale, (b, c) = (L / 130.0) ** 0.5, picked.T
+        late = np.arange(seg.states.shape[1] - 1) * seg.dt >= min(_DELAY * scale, 0.25 * seg.states.shape[1] * seg.dt)
+        return cls(name, scale, seg.dt, seg.commands[b, :-1, c], seg.states[b, :, 6 + c], seg.mask[b, 1:] & late, seg.run[b], seg.runs)
 
-    def cost(z: np.ndarray, kind: _Kind | None = None) -> float:
-        return float(np.sum(residual(z, kind) ** 2))
+    def paths(self, z: np.ndarray, kind: _Kind | None) -> np.ndarray:
+        """Positions (M, P, K) that M gears would give; z (M, values): logarithms of time constant, rate[, the value of `kind`]."""
+        tiled = np.repeat(np.exp(z), len(self.command), axis=0).T
+        gear = Gear(tiled[0], tiled[1])
+        if kind is not None:
+            gear = replace(gear, **{kind.field: tiled[kind.at]})
+        path = gear_path(np.tile(self.measured[:, 0], len(z)), np.tile(self.command, (len(z), 1)), self.dt, gear)
+        return path[:, 1:].reshape(len(z), *self.command.shape)
 
-    ordinary = _least(cost, low, high)
-    plain = residual(ordinary)
-    found = []
-    for kind in _kinds(name, scale, span, ordinary_gears(plant.c.L)[name]):
-        lows, highs = np.resize(low, max(2, kind.at + 1)), np.resize(high, max(2, kind.at + 1))
-        lows[kind.at], highs[kind.at] = np.log(kind.low), np.log(kind.high)
-        z = _least(partial(cost, kind=kind), lows, highs, ordinary if kind.at == 2 else None)
-        rest = residual(z, kind)
-        variance, samples = max(float(np.sum(rest**2)) / mask.sum(), 1e-300), float(mask.sum())
+    def errors(self, z: np.ndarray, kind: _Kind | None) -> np.ndarray:
+        """Record less path (M, P, K), zero where it is not judged."""
+        return np.where(self.judged, self.measured[:, 1:] - self.paths(z, kind), 0.0)
+
+    def findings(self, usual: Gear) -> tuple[list[GearFinding], Gear]:
+        """Every effect beside the best ordinary gear, and that gear."""
+        span = float(np.percentile(np.abs(self.command), 98))
+        rate = max(_least_rate(self.name, self.scale), 0.01 * span / self.dt)
+        most = max(10.0 * span / self.dt, 2.0 * rate)
+        low, high = np.log([0.02 * self.scale, rate]), np.log([ORDINARY[self.name].T * self.scale, most])
+        ordinary = self._least(None, low, high)
+        plain = self.errors(ordinary[None], None)[0]
+        found = []
+        for kind in _kinds(self.name, self.scale, span, usual):
+            lows, highs = np.resize(low, max(2, kind.at + 1)), np.resize(high, max(2, kind.at + 1))
+            lows[kind.at], highs[kind.at] = np.log(kind.low), np.log(kind.high)
+            found.append(self._finding(kind, self._least(kind, lows, highs), plain))
+        return found, Gear(*(float(v) for v in np.exp(ordinary)))
+
+    def _finding(self, kind: _Kind, z: np.ndarray, plain: np.ndarray) -> GearFinding:
+        rest = self.errors(z[None], kind)[0]
+        samples = float(self.judged.sum())
+        variance = max(float(np.sum(rest**2)) / samples, 1e-300)
         rho = min(max(float(np.sum(rest[:, 1:] * rest[:, :-1]) / np.sum(rest**2)), 0.0), 0.98) if np.any(rest) else 0.0
         discount = (1.0 - rho) / (1.0 + rho)
-        per_run = np.zeros(seg.runs)
-        np.add.at(per_run, run, discount * np.sum(plain**2 - rest**2, axis=1) / (2.0 * variance))
-        score = samples * discount * np.log(max(float(np.sum(plain**2)), 1e-300) / (variance * samples)) - np.log(10.0 * len(np.unique(run)))
-        step = np.where(np.arange(len(z)) == kind.at, 0.02, 0.0)
-        slope = (residual(z + step, kind) - residual(z - step, kind)) / 0.04
-        spread = 1.96 * np.exp(z[kind.at]) * (variance / max(discount * float(np.sum(slope**2)), 1e-300)) ** 0.5
-        value = float(np.exp(z[kind.at])) - kind.beyond
-        found.append(GearFinding(kind.effect, float(score), value, (value - spread, value + spread), per_run, name, gear_of(z, kind)))
-    return found, gear_of(ordinary, None)
+        per_run = np.zeros(self.runs)
+        np.add.at(per_run, self.run, discount * np.sum(plain**2 - rest**2, axis=1) / (2.0 * variance))
+        gain = np.log(max(float(np.sum(plain**2)), 1e-300) / (variance * samples))
+        score = float(samples * discount * gain - np.log(10.0 * len(np.unique(self.run))))
+        steps = _STEP * np.eye(len(z))
+        slopes = ((self.errors(z + steps, kind) - self.errors(z - steps, kind)) / (2.0 * _STEP)).reshape(len(z), -1)
+        relative = np.linalg.inv(discount / variance * slopes @ slopes.T + np.eye(len(z)))[kind.at, kind.at] ** 0.5
+        size = float(np.exp(z[kind.at]))
+        clock = _CLOCK * self.dt if kind.field in ("T", "delay") else 0.0
+        spread = 1.96 * float(np.sqrt((size * np.hypot(relative, _RECORD)) ** 2 + (_OWN_SPREAD * kind.beyond) ** 2 + clock**2))
+        value = size - kind.beyond
+        gear = replace(Gear(*(float(v) for v in np.exp(z[:2]))), **{kind.field: size})
+        return GearFinding(kind.effect, score, value, (value - spread, value + spread), per_run, self.name, gear)
 
+    def _least(self, kind: _Kind | None, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Minimum of the squared error inside a box: a grid, and a pattern of neighbours of its best point that shrinks when none is better.
 
-def _least(cost: Callable[[np.ndarray], float], low: np.ndarray, high: np.ndarray, plain: np.ndarray | None = None) -> np.ndarray:
-    """Minimum inside a box of logarithms of (time constant, rate[, value]).
-
-    The valley is narrow in the rate: it is scanned closely first. With `plain`, the best gear without the value, only the value is scanned.
-    """
-    from scipy.optimize import minimize
-
-    if plain is None:
-        grid = [np.array([a, b]) for a in np.linspace(low[0], high[0], 5)[1:4] for b in np.linspace(low[1], high[1], _SCAN)]
-    else:
-        grid = [np.append(np.clip(plain, low[:2], high[:2]), c) for c in np.linspace(low[2], high[2], _SCAN)]
-    start = min(grid, key=cost)
-    simplex = np.clip(
-        start + np.vstack([np.zeros(len(low)), np.diag(np.where(start < 0.5 * (low + high), 0.1, -0.1) * np.ones(len(low)))]), low, high
-    )
-    options = {"maxfev": _EVALUATIONS, "xatol": 1e-3, "fatol": 1e-9, "initial_simplex": simplex}
-    return minimize(cost, start, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)), options=options).x
+        Deadband and play leave the cost without a usable slope. The valley is narrow in the rate and in what is
+        looked for: these are scanned closely.
+        """
+        points = np.array(list(product(*(np.linspace(a, b, n) for a, b, n in zip(low, high, _SCAN, strict=False)))))
+        half = (high - low) / np.array(_SCAN[: len(low)])
+        pattern = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(low))))
+        best, center = np.inf, points[0]
+        for _ in range(_ROUNDS):
+            costs = np.concatenate([np.sum(self.errors(part, kind) ** 2, axis=(1, 2)) for part in np.array_split(points, len(points) // _MOST + 1)])
+            if costs.min() < best:
+                best, center = float(costs.min()), points[int(costs.argmin())]
+            else:
+                half = 0.5 * half
+                if np.all(half < _FINE):
+                    break
+            points = np.unique(np.clip(center + half * pattern, low, high), axis=0)
+        return center

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .fit import Fit
-from .gram import Gram, Reduced, solve, update_force
-from .gram import background as background_of
+from .gram import Gram, solve
 from .plant import Plant
+from .screen import evidence
 
 AXES = ("surge", "sway", "yaw")
 _PRIOR_SD = 0.5
 """Of a feature's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m)."""
-_EM_STEPS = 3
+_WORTH_MORE = 2.0
 
 
 @dataclass(frozen=True)
@@ -82,12 +82,8 @@ def dependences(fit: Fit) -> list[Dependence]:
             )  # fmt: skip
             quick = solve(gram.reduce(fit.hyper.log_force), more).log_evidence
             log_force, score = fit.hyper.log_force, quick
-            if quick - null > 5.0:
-                for _ in range(_EM_STEPS):
-                    reduced: Reduced = gram.reduce(log_force)
-                    solution = solve(reduced, more)
-                    log_force = update_force(gram, *background_of(gram, reduced, more, solution))
-                score = solve(gram.reduce(log_force), more).log_evidence
+            if quick - null > _WORTH_MORE:
+                score, log_force, _ = evidence(gram, more, log_force)
             share = 1.0 - float(np.exp(log_force[j] - fit.hyper.log_force[j]))
             found.append(Dependence(variable, axis, 2.0 * (score - null), share))
     return sorted(found, key=lambda d: -d.score)

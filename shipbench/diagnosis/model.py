@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..effects.base import Effect, Parameter
+from ..effects.base import Effect, Parameter, flow_first
 from ..effects.cross_flow_drag import EFFECT as CROSS_FLOW
 from ..effects.propeller_walk_astern import EFFECT as ASTERN
 from ..effects.race_gain import EFFECT as RACE
 from ..effects.thruster_gain import EFFECT as THRUSTERS
 from ..effects.thruster_speed_loss import EFFECT as LOSS
 from ..effects.wake_variation import EFFECT as WAKE
-from ..ops import Array, absolute, arctan2, exp, maximum, tanh
+from ..ops import Array, absolute, arctan2, clip, exp, maximum, sqrt, tanh
 from ..physics.modifiers import Flow, Modifiers
 from ..predictors._physics_fit import parameter_scale
 from ..ship import Particulars
@@ -53,6 +53,11 @@ class Structure(Effect):
         Parameter("X_vv", "1", 0.05, -0.5, 0.5),
         Parameter("X_rr", "1", 0.03, -0.5, 0.5),
         Parameter("wake_asymmetry", "1", 0.25, -1.0, 1.0),
+        Parameter("Y_vr", "1", 0.15, -2.0, 2.0),
+        Parameter("Y_rr", "1", 0.03, -0.5, 0.5),
+        Parameter("N_rr", "1", 0.015, -0.3, 0.3),
+        Parameter("N_vvr", "1", 0.15, -2.0, 2.0),
+        Parameter("N_vrr", "1", 0.06, -1.0, 1.0),
     )
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
 
@@ -66,8 +71,11 @@ class Structure(Effect):
             effect.force(e, s, (centre + value,), ship)
         e.straightening, e.straightening_asymmetry = 1.0 + q[6], q[7]
         unit = 0.5 * ship.rho * ship.L * ship.T
-        e.push(unit * (q[8] * s.v * s.v + q[9] * ship.L**2 * s.r * s.r))
-        beta_P = arctan2(-(s.v + ship.x_P * s.r), maximum(s.u, 0.0) + 0.1)
+        u, v, r = s.u - e.u_c, s.v - e.v_c, s.r * ship.L
+        drift = clip(v / sqrt(u * u + v * v + 1e-3 * ship.L), -0.5, 0.5)
+        X, Y = q[8] * v * v + q[9] * r * r, absolute(r) * (q[11] * v + q[12] * r)
+        e.push(unit * X, unit * Y, unit * ship.L * r * (q[13] * absolute(r) + drift * (q[14] * v + q[15] * r)))
+        beta_P = arctan2(-(v + ship.x_P * s.r), maximum(u, 0.0) + 0.1)
         e.wake = e.wake - q[10] * (1.0 - ship.w_P0) * (1.0 - exp(-2.0 * absolute(beta_P))) * tanh(beta_P / 0.05)
 
 
@@ -172,8 +180,9 @@ class Columns:
     candidates: tuple[np.ndarray, ...]
 
 
-_STEP, _OWN_STEP, CANDIDATE_STEP = 1e-4, 0.02, 0.5
-"""Steps in units of the scales. A candidate's is finite: some (wind, deadband) act with the square of their size or not at all below one."""
+_STEP, _OWN_STEP, CANDIDATE_STEP, VECTOR_STEP = 1e-4, 0.02, 0.5, 1.0
+"""Steps in units of the scales. A candidate's is finite: some (wind, deadband) act with the square of their size or not at all below one; that of a
+vector goes both ways, because its sign differs from heading to heading."""
 
 
 class Linearisation:
@@ -191,13 +200,17 @@ class Linearisation:
         self.path = plant.path_of(self.now)
         w = plant.hat @ (scales.w * point.w)
         x0 = plant.seg.states[:, 0, :6] + scales.eta * point.eta
-        self.motion = plant.roll(x0, self.p, [*self.ship, *self.forces], w, self.path) if guess is None else guess
+        self.motion = plant.roll(x0, self.p, [*flow_first(self.forces), *self.ship], w, self.path) if guess is None else guess
         w = np.swapaxes(w, 0, 1)
         self.push = (w[:-1], w[1:])
         self.states = np.swapaxes(self.motion[:, :-1], 0, 1)[None]
         self.here = self._steps()[0]
         moved = self._steps(states=self.states + _STEP * np.eye(6)[:, None, None, :] * scales.eta) - self.here
         self.jacobian = np.moveaxis(moved, 0, -1) / (_STEP * scales.eta)  # (K, B, 6, 6)
+        half = np.eye(6) + self.jacobian
+        self.reach = 0.5 * plant.seg.dt * half[..., 3:]  # (K, B, 6, 3): end of a step from an acceleration that lasts it
+        self.middle = 0.5 * (self.states + self.here)
+        self.rates = self._rates()
         self.gaps = self.here - np.swapaxes(self.motion[:, 1:], 0, 1)
         self.predicted = plant.measured(self.motion, self.now)
         if guess is not None:
@@ -208,7 +221,7 @@ class Linearisation:
         """All sensitivities."""
         scales = self.scales
         p, ship = parameters(scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, None, :])
-        self.base_sources = (self._steps(p=p, ship=ship) - self.here) / _STEP
+        self.base_sources = self._ends((self._rates(p=p, ship=ship) - self.rates) / _STEP)
         self.pulses = self._pulses()
         first = np.broadcast_to(np.eye(6)[:, None, :] * scales.eta, (6, self.here.shape[1], 6))
         eta = self._chained(np.zeros((6, *self.here.shape)), first)
@@ -231,29 +244,27 @@ class Linearisation:
         x0 = self.plant.seg.states[:, 0, :6] + self.scales.eta * target.eta
         return self.motion + self._chain(sources[None], (x0 - self.motion[:, 0])[None])[..., 0]
 
-    def _steps(
-        self,
-        states: np.ndarray | None = None,
-        p: Sequence[Array] | None = None,
-        ship: Sequence[Active] | None = None,
-        forces: Sequence[Active] | None = None,
-        push: tuple[np.ndarray, np.ndarray] | None = None,
-        path: np.ndarray | None = None,
-    ) -> np.ndarray:
+    def _steps(self, states: np.ndarray | None = None, forces: Sequence[Active] | None = None, path: np.ndarray | None = None) -> np.ndarray:
         """Ends of all single steps (D, K, B, 6) with something changed."""
-        active = [*(self.ship if ship is None else ship), *(self.forces if forces is None else forces)]
-        return self.plant.steps_from(
-            self.states if states is None else states, self.p if p is None else p, active, push or self.push, self.path if path is None else path
-        )
+        active = [*flow_first(self.forces if forces is None else forces), *self.ship]
+        return self.plant.steps_from(self.states if states is None else states, self.p, active, self.push, self.path if path is None else path)
+
+    def _rates(self, p: Sequence[Array] | None = None, ship: Sequence[Active] | None = None, forces: Sequence[Active] | None = None) -> np.ndarray:
+        """Accelerations (D, K, B, 3) in the middle of all single steps with something changed."""
+        active = [*flow_first(self.forces if forces is None else forces), *(self.ship if ship is None else ship)]
+        return self.plant.rates_from(self.middle, self.p if p is None else p, active, self.path)
+
+    def _ends(self, rates: np.ndarray) -> np.ndarray:
+        """Changes of the steps' ends (D, K, B, 6) by changes of the acceleration (D, K, B, 3): one evaluation of the forces instead of the four of a
+        step."""
+        return (self.reach @ rates[..., None])[..., 0]
 
     def _pulses(self) -> np.ndarray:
         """Change of each step's end by each knot of the latent acceleration, (3 knots, K, B, 6)."""
         hat, knots = self.plant.hat, self.plant.knots
-        unit = _STEP * (np.eye(3) * self.scales.w)[:, None, None, :]
-        start = (self._steps(push=(self.push[0] + unit, self.push[1])) - self.here) / _STEP
-        end = (self._steps(push=(self.push[0], self.push[1] + unit)) - self.here) / _STEP
-        sources = start[:, None] * hat[:-1].T[None, :, :, None, None] + end[:, None] * hat[1:].T[None, :, :, None, None]
-        return sources.reshape(3 * knots, *self.here.shape)
+        ends = np.moveaxis(self.reach * self.scales.w, -1, 0)  # (3, K, B, 6)
+        middle = 0.5 * (hat[:-1] + hat[1:]).T
+        return (ends[:, None] * middle[None, :, :, None, None]).reshape(3 * knots, *self.here.shape)
 
     def _chain(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
         """Change of the motion (B, K + 1, 6, D) from changes of the steps' ends (D, K, B, 6) and of the initial states (D, B, 6)."""
@@ -287,12 +298,14 @@ class Linearisation:
         found: dict[int, np.ndarray] = {}
         sources = []
         for i, term in enumerate(candidates):
-            unit = CANDIDATE_STEP * self.scales.amplitudes(term, self.plant.c.L)
+            step = VECTOR_STEP if term.effect.vector else CANDIDATE_STEP
+            unit = step * self.scales.amplitudes(term, self.plant.c.L)
             if term.effect.enters != "force":
-                found[i], _ = self._moved(None, term, unit, CANDIDATE_STEP)
+                found[i], _ = self._moved(None, term, unit, step)
                 continue
             q = [np.where(np.arange(term.size) == a, unit[a], 0.0)[:, None, None] for a in range(term.size)]
-            sources.append((self._steps(forces=[*self.forces, Active(term.effect, (*q, *term.setting))]) - self.here) / CANDIDATE_STEP)
+            change = self._rates_with(term, q, 1.0) - (self._rates_with(term, q, -1.0) if term.effect.vector else self.rates)
+            sources.append(self._ends(change / (2.0 * step if term.effect.vector else step)))
         if sources:
             columns = self._chained(np.concatenate(sources))
             at = 0
@@ -301,6 +314,10 @@ class Linearisation:
                     found[i] = columns[..., at : at + term.size]
                     at += term.size
         return [found[i] for i in range(len(candidates))]
+
+    def _rates_with(self, term: Term, q: Sequence[np.ndarray], side: float) -> np.ndarray:
+        """Accelerations in the middle of all single steps with a force that is not in the model."""
+        return self._rates(forces=[*self.forces, Active(term.effect, (*(side * v for v in q), *term.setting))])
 
     def _moved(self, index: int | None, term: Term, steps: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Columns (B, T, size) of one term, the index-th of the model or one that is not in it, and its sources where it touches the motion."""
@@ -314,8 +331,10 @@ class Linearisation:
                 moved = self.plant.measured(self.motion, changed) - seen
                 columns.append((moved / unit).reshape(len(moved), -1, 1))
                 continue
-            forces = [x for x in changed if x.effect.enters == "force"]
-            ends = self._steps(forces=forces, path=self.plant.path_of(changed))
-            sources.append((ends - self.here) / unit)
+            if term.effect.enters == "gear":
+                sources.append((self._steps(path=self.plant.path_of(changed)) - self.here) / unit)
+            else:
+                rates = self._rates(forces=[x for x in changed if x.effect.enters == "force"])
+                sources.append(self._ends((rates - self.rates) / unit))
             columns.append(self._chained(sources[-1]))
         return np.concatenate(columns, axis=-1), np.concatenate(sources) if sources else None

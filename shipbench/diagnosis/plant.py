@@ -24,6 +24,7 @@ from ..signals import MOTION
 NUM_HULL = len(HULL.parameters)
 NO_GEAR = Gear(1e-3, 1e12)
 SEGMENT = 60.0
+_LONG = 5
 MOST_STEPS = 12_000
 """Of all segments together, per stage: more runs than this teach little and cost minutes."""
 
@@ -105,8 +106,8 @@ class Plant:
     what happens between command and actuator cannot be mistaken for a force; where only commands are recorded, by the held commands.
     """
 
-    def __init__(self, dataset_ship: Particulars, segments: Segments) -> None:
-        self.ship, self.seg = dataset_ship, segments
+    def __init__(self, dataset_ship: Particulars, segments: Segments, long: Segments | None = None) -> None:
+        self.ship, self.seg, self.long = dataset_ship, segments, segments if long is None else long
         self.c = eq2.coefficients(dataset_ship)
         self.substeps = _substeps(segments.dt, self.c.L)
         self.h = segments.dt / self.substeps
@@ -127,11 +128,14 @@ class Plant:
     @classmethod
     def of(cls, dataset: Dataset) -> Plant:
         """The plant of a data set, cut into segments of about 60 s at 130 m (Froude-scaled): over longer ones the motion is far from linear in its
-        parameters, and little is learnt from the place where the next one begins. Long data are thinned to `MOST_STEPS` integration steps."""
+        parameters, and little is learnt from the place where the next one begins. Long data are thinned to `MOST_STEPS` integration steps. `long` are
+        longer pieces for what has no such limit: the gears."""
         ship = complete(dataset.ship)
-        segments = cut(dataset, max(20, round(SEGMENT * (ship.L / 130.0) ** 0.5 / dataset.dt)))
+        samples = max(20, round(SEGMENT * (ship.L / 130.0) ** 0.5 / dataset.dt))
+        segments, long = cut(dataset, samples), cut(dataset, _LONG * samples)
         steps = (segments.states.shape[1] - 1) * _substeps(segments.dt, ship.L)
-        return cls(ship, segments.thinned(max(len(dataset), MOST_STEPS // steps)))
+        most = max(len(dataset), MOST_STEPS // steps)
+        return cls(ship, segments.thinned(most), long.thinned(max(len(dataset), most // _LONG)))
 
     def path_of(self, active: Sequence[Active]) -> np.ndarray:
         """Actuators at the three stages of every integration step, (B, steps * substeps, 3, 4): n, delta, F_b, F_s.
@@ -195,28 +199,45 @@ class Plant:
             moved = self._step(tuple(np.moveaxis(states, -1, 0)), p, active, push, stages, np.arange(self.steps)[:, None])
         return np.stack(np.broadcast_arrays(*moved), axis=-1)
 
+    def rates_from(self, middle: np.ndarray, p: Sequence[Array], active: Sequence[Active], path: np.ndarray | None = None) -> np.ndarray:
+        """Accelerations (D, K, B, 3) that forces give in the middle of every step, from the states there (1, K, B, 6)."""
+        path = (self.path if path is None else path).reshape(len(self.seg.run), self.steps, self.substeps, 3, 4)
+        act = np.moveaxis(path[:, :, self.substeps // 2, self.substeps % 2], 1, 0)
+        with np.errstate(all="ignore"):
+            found = self._accelerations(tuple(np.moveaxis(middle, -1, 0)), p, active, act, np.arange(self.steps)[:, None] + 0.5)
+        return np.stack(np.broadcast_arrays(*found), axis=-1)
+
+    def _accelerations(
+        self, state: Sequence[Array], p: Sequence[Array], active: Sequence[Active], act: np.ndarray, at: np.ndarray
+    ) -> tuple[Array, ...]:
+        """(du, dv, dr) without the latent force; act (.., 4) actuators, `at` the time in samples since the segment began, one or (K, 1)."""
+        seg = self.seg
+        px, py, psi, u, v, r = state
+        n, delta, F_b, F_s = np.moveaxis(act, -1, 0)
+        air = (u, v)
+        if seg.wind is not None:
+            wind = seg.wind[:, int(at)] if at.ndim == 0 else np.swapaxes(seg.wind[:, :-1], 0, 1)
+            air = apparent_wind(psi, u, v, wind[..., 0], wind[..., 1])
+        e = None
+        if active:
+            e = Modifiers()
+            flow = Flow(px, py, seg.start + at * seg.dt, psi, u, v, r, n, delta, F_b, F_s)
+            for a in active:
+                a.effect.force(e, flow, a.q, self.ship)
+        return eq2.accelerations(u, v, r, n, delta, F_b, F_s, air, self.c, p, e)
+
     def _step(
         self, x: tuple[Array, ...], p: Sequence[Array], active: Sequence[Active], push: tuple[np.ndarray, np.ndarray], path: np.ndarray, k: np.ndarray
     ) -> tuple[Array, ...]:
         """One sample from x, the k-th of each segment; path (.., substeps, 3, 4). Shapes broadcast over (D, K, B)."""
-        seg, n = self.seg, self.substeps
-        wind = None if seg.wind is None else (seg.wind[:, int(k)] if k.ndim == 0 else np.swapaxes(seg.wind[:, :-1], 0, 1))
+        n = self.substeps
         for sub in range(n):
 
             def rhs(state: tuple[Array, ...], stage: int, sub: int = sub) -> tuple[Array, ...]:
-                px, py, psi, u, v, r = state
-                act = np.moveaxis(path[..., sub, stage, :], -1, 0)
                 part = (sub + 0.5 * stage) / n
-                air = (u, v) if wind is None else apparent_wind(psi, u, v, wind[..., 0], wind[..., 1])
-                e = None
-                if active:
-                    e = Modifiers()
-                    flow = Flow(px, py, seg.start + (k + part) * seg.dt, psi, u, v, r, act[0], act[1], act[2], act[3])
-                    for a in active:
-                        a.effect.force(e, flow, a.q, self.ship)
-                du, dv, dr = eq2.accelerations(u, v, r, act[0], act[1], act[2], act[3], air, self.c, p, e)
+                du, dv, dr = self._accelerations(state, p, active, path[..., sub, stage, :], np.minimum(k + part, k + 1.0 - 1e-9))
                 force = (1.0 - part) * push[0] + part * push[1]
-                return (*kinematics(psi, u, v, r), du + force[..., 0], dv + force[..., 1], dr + force[..., 2])
+                return (*kinematics(state[2], state[3], state[4], state[5]), du + force[..., 0], dv + force[..., 1], dr + force[..., 2])
 
             x = rk4_step(rhs, x, self.h)
         return x

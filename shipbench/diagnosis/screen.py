@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .fit import Fit
-from .gram import Gram, Prior, Reduced, background, solve, update_force
+from .gram import Gram, Prior, Reduced, accelerated, background, solve, update_force
 from .model import Term
 
 _TAUS = np.log(np.array([0.03, 0.1, 0.3, 1.0, 3.0]) ** 2)
-_EM_STEPS = 4
+_CYCLES, _LEAST_START = 6, float(np.log(0.1**2))
 
 
 @dataclass(frozen=True)
@@ -43,19 +43,29 @@ def with_columns(prior: Prior, at: np.ndarray, term: Term, log_tau2: float, widt
     return replace(prior, shared=np.append(prior.shared, at), precision=np.append(prior.precision, np.full(len(at), width**-2)))
 
 
-def evidence(gram: Gram, prior: Prior, log_force: np.ndarray, steps: int = _EM_STEPS) -> tuple[float, np.ndarray]:
-    """Log evidence with the variances of the force re-estimated, and these variances."""
-    for step in range(steps + 1):
-        reduced = gram.reduce(log_force)
-        solution = solve(reduced, prior)
-        if step == steps:
-            break
-        log_force = update_force(gram, *background(gram, reduced, prior, solution))
-    return solution.log_evidence, log_force
+def evidence(gram: Gram, prior: Prior, log_force: np.ndarray, own_random: int = 0) -> tuple[float, np.ndarray, float]:
+    """Log evidence with the variances of the force, and that of the last `own_random` random columns, re-estimated; and these, logarithms."""
+
+    def with_tau(log_tau2: np.ndarray) -> Prior:
+        return replace(prior, log_tau2=np.append(prior.log_tau2[: len(prior.log_tau2) - own_random], np.repeat(log_tau2, own_random)))
+
+    def step(theta: np.ndarray) -> tuple[float, np.ndarray]:
+        reduced, now = gram.reduce(theta[:3]), with_tau(theta[3:])
+        solution = solve(reduced, now)
+        force = update_force(gram, *background(gram, reduced, now, solution))
+        if not own_random:
+            return solution.log_evidence, force
+        own = slice(len(prior.random) - own_random, None)
+        second = np.mean(solution.means[:, own] ** 2) + np.mean(np.diagonal(solution.covs[:, own, own], axis1=1, axis2=2))
+        return solution.log_evidence, np.append(force, np.log(second))
+
+    theta = accelerated(step, np.append(log_force, prior.log_tau2[-1:] if own_random else []), _CYCLES)
+    return step(theta)[0], theta[:3], float(theta[3]) if own_random else 0.0
 
 
 def screen(fit: Fit, refine: int = 12) -> list[Score]:
-    """Scores of the candidates that `fit` was given, best first; the variances of the force are re-estimated for the best `refine`."""
+    """Scores of the candidates that `fit` was given, best first; for the best `refine` and for those with a value per run, the variances are
+    re-estimated: the force of the plain model has absorbed part of whatever is missing."""
     candidates = fit.candidates
     gram, at = fit.gram, fit.reduced.S.shape[1] - 1 - sum(t.size for t in candidates)
     columns = []
@@ -67,13 +77,15 @@ def screen(fit: Fit, refine: int = 12) -> list[Score]:
     order = sorted(range(len(scores)), key=lambda i: -scores[i].score)
     base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
     renumbered = replace(fit.prior, shared=np.arange(len(fit.prior.shared)), random=np.arange(len(fit.prior.shared), len(base)))
-    lean = only(gram, base)
-    before, log_force = evidence(lean, renumbered, fit.hyper.log_force, 2 * _EM_STEPS)
-    for i in order[:refine]:
+    before, log_force, _ = evidence(only(gram, base), renumbered, fit.hyper.log_force)
+    for place, i in enumerate(order):
         term = candidates[i]
-        prior = with_columns(renumbered, len(base) + np.arange(term.size), term, scores[i].log_tau2)
-        after, _ = evidence(only(gram, np.append(base, columns[i])), prior, log_force)
-        scores[i] = replace(scores[i], score=2.0 * (after - before))
+        if place >= refine and not term.per_run:
+            continue
+        own, cost = (term.size, float(np.log(fit.plant.seg.runs))) if term.per_run else (0, 0.0)
+        prior = with_columns(renumbered, len(base) + np.arange(term.size), term, max(scores[i].log_tau2, _LEAST_START))
+        after, _, log_tau2 = evidence(only(gram, np.append(base, columns[i])), prior, log_force, own)
+        scores[i] = replace(scores[i], score=2.0 * (after - before) - cost, log_tau2=log_tau2)
     return sorted(scores, key=lambda s: -s.score)
 
 

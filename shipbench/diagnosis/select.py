@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..effects.base import EFFECTS
-from .fit import Fit, Model, fit, start, track
+from .fit import Fit, Model, Origin, fit
 from .model import Scales, Term
 from .plant import Plant
 from .screen import Score, changes, overlap, screen
@@ -19,11 +19,11 @@ AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft
 """Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
 MOST_EFFECTS = 6
 _REFITS = 3
-_FIRST_ITERATIONS, _FINALISTS, _REFIT_ITERATIONS = 3, 2, 10
+_REFIT_ITERATIONS = 12
 _WORTH_A_REFIT = 0.5
 _RIVAL, _RIVALS = 0.25, 4
-_CHANGE_MARGIN = 30.0
-"""A beginning is chosen among all runs and all effects: it must beat the same without by far."""
+_CHANGES, _CHANGE_MARGIN = 2, 20.0
+"""A beginning is chosen among all runs and all effects: it must beat the best cause without one by this."""
 
 
 @dataclass(frozen=True)
@@ -63,19 +63,18 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None) -> list[Ter
 
 def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
     """The plain model, fitted from the regressions."""
-    point, hyper, guess = track(plant, scales, *start(plant))
-    return fit(plant, scales, Model(), point, hyper, candidates=candidates, guess=guess)
+    origin = Origin.of(plant, scales)
+    return fit(plant, scales, Model(), origin.point, origin.hyper, candidates=candidates, guess=origin.motion)
 
 
-def with_term(before: Fit, score: Score) -> Fit:
-    """`before` with one more term, its first steps from the one-step estimate."""
+def with_term(before: Fit, score: Score, origin: Origin) -> Fit:
+    """`before` with one more term, fitted from `origin` and the one-step estimate."""
     term = score.term
-    index = len(before.model.terms)
     model = replace(before.model, terms=(*before.model.terms, term))
     value = np.zeros((before.plant.seg.runs, term.size)) if term.per_run else np.clip(score.estimate, -2.0, 2.0)
-    point = before.point.with_term(term, value)
-    log_tau2 = before.log_tau2 | ({index: score.log_tau2} if term.per_run else {})
-    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=_FIRST_ITERATIONS, guess=before.motion)
+    point = replace(origin.point, terms=model.terms, values=(*before.values, value))
+    log_tau2 = before.log_tau2 | ({len(before.model.terms): score.log_tau2} if term.per_run else {})
+    return fit(before.plant, before.scales, model, point, origin.hyper, log_tau2, iterations=_REFIT_ITERATIONS, guess=origin.motion)
 
 
 def without(before: Fit, index: int) -> Fit:
@@ -93,16 +92,12 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     `null` must carry the candidates. Candidates are refitted if their linear score is among the best, or the best of their family.
     """
     candidates, first = null.candidates, screen(null)
-    now, scores, steps = null, first, []
+    now, scores, steps, origin = null, first, [], Origin.of(null.plant, null.scales)
     for round_ in range(most):
-        tried = [with_term(now, score) for score in _worth_a_refit(scores, now, threshold)]
-        tried.sort(key=lambda f: -f.evidence)
-        tried[:_FINALISTS] = [
-            fit(f.plant, f.scales, f.model, f.point, f.hyper, f.log_tau2, iterations=_REFIT_ITERATIONS, guess=f.motion) for f in tried[:_FINALISTS]
-        ]
+        tried = [with_term(now, score, origin) for score in _worth_a_refit(scores, now, threshold)]
         steps += [Step(round_, f.model.terms[-1], 2.0 * (f.evidence - now.evidence)) for f in tried]
         best = max(tried, key=lambda f: f.evidence, default=None)
-        best = _or_change(now, best, threshold)
+        best = _or_change(now, best, origin)
         if best is None or 2.0 * (best.evidence - now.evidence) < threshold:
             break
         now = _backward(best, threshold)
@@ -115,19 +110,16 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     return Selection(null, now, first, scores, steps)
 
 
-def _or_change(now: Fit, best: Fit | None, threshold: float) -> Fit | None:
+def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
     """The best candidate, or one that begins at a later run, where that explains the runs better by the threshold."""
     if any(t.since is not None for t in now.model.terms):
         return best
     present = {t.label for t in now.model.terms}
-    late = [s for s in changes(now) if s.score > _CHANGE_MARGIN and s.term.label not in present][:_FINALISTS]
+    late = [s for s in changes(now) if s.score > _CHANGE_MARGIN and s.term.label not in present][:_CHANGES]
     gain = 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
     for score in late:
-        found = with_term(now, score)
+        found = with_term(now, score, origin)
         if 2.0 * (found.evidence - now.evidence) - 2.0 * np.log(now.plant.seg.runs) > gain + _CHANGE_MARGIN:
-            found = fit(
-                found.plant, found.scales, found.model, found.point, found.hyper, found.log_tau2, iterations=_REFIT_ITERATIONS, guess=found.motion
-            )
             best, gain = found, 2.0 * (found.evidence - now.evidence)
     return best
 

@@ -32,7 +32,8 @@ class BankSuction(Effect):
         along = s.x * cos(q[1]) + s.y * sin(q[1])
         distance = maximum(q[2] - along, 0.5 * ship.B)
         unit = 0.5 * ship.rho * ship.L * ship.T * q[0] * (0.5 * ship.B / distance) * sin(q[1] - s.psi)
-        e.push(0.0, unit * s.u * s.u, -0.2 * ship.L * unit * s.u * absolute(s.u))
+        u = s.u - e.u_c
+        e.push(0.0, unit * u * u, -0.2 * ship.L * unit * u * absolute(u))
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
         """Banks on four sides, each two breadths beyond the outermost place visited."""

@@ -8,9 +8,9 @@ Its values `q` are zero when nothing is missing, and may be numbers, one per run
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -122,6 +122,21 @@ class Effect:
                 raise InputError(f"effect '{self.name}': {self.vector[0]} is missing; accepted: {', '.join(known)}.")
             return size * math.cos(towards), size * math.sin(towards)
         return tuple(float(values.get(p.name, p.typical if p.shape else 0.0)) for p in self.parameters)
+
+
+class Holder(Protocol):
+    """Whatever carries an effect: with its values, in a simulator or in a fitted model."""
+
+    @property
+    def effect(self) -> Effect: ...
+
+
+H = TypeVar("H", bound=Holder)
+
+
+def flow_first(items: Iterable[H]) -> list[H]:
+    """Effects that set water and air in motion before those whose forces follow the flow (`Modifiers.u_c`, ...)."""
+    return sorted(items, key=lambda item: item.effect.family != "environment")
 
 
 def body_axes(north: Array, east: Array, psi: Array) -> tuple[Array, Array]:

@@ -21,7 +21,8 @@ class List(Effect):
     separate = "vary the revolutions at one speed: a list acts with the ship's speed alone"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        N = -0.008 * 0.5 * ship.rho * ship.L**2 * ship.T * s.u * absolute(s.u) * q[0]
+        u = s.u - e.u_c
+        N = -0.008 * 0.5 * ship.rho * ship.L**2 * ship.T * u * absolute(u) * q[0]
         e.push(0.0, -0.5 * N / ship.L, N)
 
 

@@ -21,7 +21,7 @@ class PropellerWalk(Effect):
     separate = "straight runs at one speed with the revolutions up and down"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        V_A = (1.0 - ship.w_P0) * maximum(s.u, 0.0)
+        V_A = (1.0 - ship.w_P0) * maximum(s.u - e.u_c, 0.0)
         thrust = thrust_quadratic(maximum(s.n, 0.0) / 60.0, V_A, ship.D_P, ship.kt, ship.rho)
         Y = q[0] * (1.0 - ship.t_P) * maximum(thrust, 0.0)
         e.push(0.0, Y, ship.x_P * Y)

@@ -21,7 +21,7 @@ class PropellerWalkAstern(Effect):
     separate = "astern revolutions at rest"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        Y, N = side_force_astern(s.n / 60.0, s.u, ship.D_P, ship.L, ship.T, ship.rho)
+        Y, N = side_force_astern(s.n / 60.0, s.u - e.u_c, ship.D_P, ship.L, ship.T, ship.rho)
         e.push(0.0, q[0] * Y, q[0] * N)
 
 

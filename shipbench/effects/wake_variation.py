@@ -20,7 +20,7 @@ class WakeVariation(Effect):
     separate = "the same turn with the shaft stopped"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        beta_P = arctan2(-(s.v + ship.x_P * s.r), maximum(s.u, 0.0) + 0.1 * (ship.L / 130.0) ** 0.5)
+        beta_P = arctan2(-(s.v - e.v_c + ship.x_P * s.r), maximum(s.u - e.u_c, 0.0) + 0.1 * (ship.L / 130.0) ** 0.5)
         e.wake = e.wake - q[0] * (1.0 - ship.w_P0) * (1.0 - exp(-2.0 * absolute(beta_P)))
 
 

@@ -10,11 +10,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..effects.base import EFFECTS, Effect, Parameter
+from ..effects.base import EFFECTS, Effect, Parameter, flow_first
 from ..errors import InputError, unknown_name
 from ..integrate import kinematics, rk4_step
 from ..ops import Array
@@ -26,8 +26,12 @@ from ..ship import Particulars
 from ..signals import MOTION, PSI, R, X, Y
 from ..specs import EffectSpec
 
-Active = tuple[Effect, tuple[Array, ...]]
-"""An effect and its values."""
+
+class Active(NamedTuple):
+    """An effect and its values."""
+
+    effect: Effect
+    q: tuple[Array, ...]
 
 
 ACTUATOR_OF = ("n", "delta", "F", "F")
@@ -79,7 +83,7 @@ class Extension:
             self.ci95 = np.full((sum(map(len, self.values)), 2), np.nan)
 
     def active(self, enters: str) -> list[Active]:
-        return [(t.effect, q) for t, q in zip(self.terms, self.values, strict=True) if t.effect.enters == enters]
+        return [Active(t.effect, q) for t, q in zip(self.terms, self.values, strict=True) if t.effect.enters == enters]
 
     def slots(self, L: float, *enters: str) -> list[Slot]:
         """What is fitted of the effects that enter there, for a ship of length L [m]."""
@@ -197,7 +201,7 @@ def accelerations(
 ) -> tuple[Array, Array, Array]:
     """(du, dv, dr) of eq. (2) with the force effects `active`; `wind` is the measured wind (speed, from) or None. Numbers or symbols."""
     e = Modifiers()
-    for effect, q in active:
+    for effect, q in flow_first(active):
         effect.force(e, flow, q, ship)
     air: tuple[Array, Array] | None
     if wind is not None:

@@ -22,7 +22,7 @@ from ..physics import eq2
 from ..physics.modifiers import Flow
 from ..records import Batch
 from ..signals import COMMANDS, MOTION
-from ._physics_effects import accelerations
+from ._physics_effects import Active, accelerations
 from .hold import Hold
 
 _P = eq2.NUM_PARAMETERS
@@ -54,7 +54,7 @@ def rollout_function(
     x, S, p = ca.SX.sym("x", 6), ca.SX.sym("S", 6, num), ca.SX.sym("p", num)
     w = ca.SX.sym("w", (14 if wind else 12) + bool(forces))
     free = iter([p[i] for i in range(_P, num)])
-    active = [(effect, tuple(next(free) if v is None else v for v in q)) for effect, q in forces]
+    active = [Active(effect, tuple(next(free) if v is None else v for v in q)) for effect, q in forces]
 
     def rhs(state: tuple[Array, ...], stage: int) -> tuple[Array, ...]:
         px, py, psi, u, v, r = state

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effects.base import Effect
+from ..effects.base import Effect, flow_first
 from ..integrate import kinematics, rk4_step
 from ..ops import Array
 from ..physics.actuators import Gear, gear_path
@@ -72,12 +72,12 @@ def sail(
         max_step: greatest integration step [s]; shorter ships need steps shorter by sqrt(L).
     """
     num = max(1, int(np.ceil(dt / max_step - 1e-9)))
-    particulars = complete(ship.particulars)
+    particulars, forces = complete(ship.particulars), flow_first(hidden)
 
     def acceleration(s: Flow, k: int) -> tuple[Array, ...]:
         env = CALM if wind is None else Environment(wind_speed=wind[:, k, 0], wind_from=wind[:, k, 1])
         e = Modifiers()
-        for item in hidden:
+        for item in forces:
             item.effect.force(e, s, item.q, particulars)
         return accelerations(ship, s.psi, s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, env, e)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.fit import Model, fit, settle, start, track
+from shipbench.diagnosis.fit import Model, Origin, fit, settle, start
 from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, ornstein_uhlenbeck, solve
 from shipbench.diagnosis.model import Linearisation, Scales, Term, predict
 from shipbench.diagnosis.plant import Plant
@@ -71,8 +71,8 @@ def test_a_guess_whose_gaps_are_chained_gives_the_rollout_of_a_linear_change(pla
 
 def test_the_latent_force_puts_the_model_on_the_measurement(plant):
     scales = Scales(plant)
-    point, hyper, guess = track(plant, scales, *start(plant))
-    found = fit(plant, scales, Model(), point, hyper, guess=guess)
+    origin = Origin.of(plant, scales)
+    found = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion)
     noise = np.exp(0.5 * found.hyper.log_noise) * scales.noise
     assert noise[0] == pytest.approx(0.5 * plant.c.L / 130.0, rel=0.3)  # the simulated position noise is found again
     rest = (plant.seg.states[..., :6] - found.columns.predicted) / noise
