@@ -27,7 +27,8 @@ def tables(rows: Sequence[Row]) -> list[Table]:
     other = [c for c in columns if c.key not in ("target", "met")]
     effects = [
         TableColumn("hidden", "effect"), TableColumn("right, 1x", "right_1"), TableColumn("class, 1x", "class_1"),
-        TableColumn("right, 0.3x", "right_0.3"), TableColumn("class, 0.3x", "class_0.3"), TableColumn("named instead", "instead"),
+        TableColumn("right, 0.3x", "right_0.3"), TableColumn("class, 0.3x", "class_0.3"), TableColumn("oracle", "oracle"),
+        TableColumn("named instead", "instead"),
         TableColumn("size error", "error", two),
         TableColumn("covered", "covered"), TableColumn("note", "note"),
     ]  # fmt: skip

@@ -165,8 +165,10 @@ def figures(rows: Sequence[Row]) -> list[Row]:
         lines.append(rate(f"right class of all causes, {label}", part, right_class, "hull_derivatives counted"))
         lines.append(rate(f"anything found beside the hull, {label}", part, lambda r: ok(r) and alarm(r, True), "detection power"))
         lines.append(rate(f"true cause among those named, {label}", part, lambda r: bool(set(named(r)) & set(r.get("truth", ())))))
+        lines.append(oracle_power(f"oracle test detects it, {label}", part))
     lines.append(rate("two effects, exact pair, hull counted", pairs, lambda r: exact_pair(r, False), "hull_derivatives counted"))
     lines.append(rate("two effects, both among those named", pairs, lambda r: set(r.get("truth", ("?",))) <= set(named(r))))
+    lines.append(oracle_power("oracle test detects both of two", pairs))
     lines.append(rate("two effects, one at least", pairs, lambda r: bool(set(r.get("truth", ())) & set(named(r)))))
     lines.append(rate("false alarms with the hull, same structure", same, alarm, "its hull differs by N(0, 0.2): naming it is right"))
     lines.append(rate("false alarms with the hull, other structure", other, alarm, "its hull truly differs: naming it is right"))
@@ -185,6 +187,13 @@ def oracle_share(rows: Sequence[Row]) -> Row:
     return _line("share of the oracle's gain", value, math.nan, math.nan, len(both), "where the oracle gains 2 % or more")
 
 
+def oracle_power(figure: str, rows: Sequence[Row]) -> Row:
+    """Mean power of the likelihood-ratio test that knows effect, size, noise and background, at 5 % false alarms of its own."""
+    powers = [r["bound"] for r in rows if ok(r) and r.get("bound") is not None]
+    value = float(np.mean(powers)) if powers else math.nan
+    return _line(figure, value, math.nan, math.nan, len(powers), "likelihood ratio, 5 % false alarms for this effect alone")
+
+
 def per_effect(rows: Sequence[Row]) -> list[Row]:
     """One line per hidden effect: right at both sizes, what was named instead, size error and coverage."""
     table = []
@@ -198,6 +207,7 @@ def per_effect(rows: Sequence[Row]) -> list[Row]:
             line[f"class_{label}"] = f"{sum(right_class(r, True) for r in part)}/{len(part)}"
         wrong = Counter(first(r, True) for r in own if not right(r, True))
         errors, covered = size_errors([r for r in own if right(r, True)], comparable=False)
+        line["oracle"] = " / ".join(f"{oracle_power('', [r for r in own if r['size'] == [size]])['value']:.2f}" for size in (1.0, 0.3))
         line["instead"] = ", ".join(f"{name} {n}" for name, n in wrong.most_common(4))
         line["error"] = float(np.median(errors)) if errors else math.nan
         line["covered"] = f"{sum(covered)}/{len(covered)}" if covered else "-"

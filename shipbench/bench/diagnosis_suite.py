@@ -66,6 +66,8 @@ def run_case(job: Job) -> dict[str, Any]:
         row |= _found_row(found) | {"status": "ok", "reason": ""}
         if job.oracle and job.gain and case.truth and case.kind in ("single", "pair"):
             row["oracle_gain"] = _oracle_gain(job, dataset, case.truth)
+        if case.truth and case.kind in ("single", "pair"):
+            row["bound"] = _bound(case, dataset)
         if job.baselines:
             row["baselines"] = _baselines(dataset)
     except _FAILURES as error:
@@ -97,6 +99,13 @@ def _oracle_gain(job: Job, dataset: Dataset, truth: tuple[str, ...]) -> float | 
         return None
     found = job.diagnose(dataset, gain=True, seed=job.seed, only=truth)
     return None if found.gain is None else found.gain.relative
+
+
+def _bound(case: Case, dataset: Dataset) -> float:
+    """Power of the likelihood-ratio test that knows everything but whether the effect is there."""
+    from ..diagnosis.bound import bound
+
+    return bound(dataset, [(item.effect, item.q) for item in case.effects])
 
 
 def _baselines(dataset: Dataset) -> dict[str, Any]:
