@@ -13,7 +13,7 @@ from .plant import Plant, Segments, ordinary_gears
 _ACTUATORS = {"n": (0,), "delta": (1,), "F": (2, 3)}
 _RATE_POWER = {"n": 2, "delta": 1, "F": 0}
 _SCAN = (4, 12, 24)
-_ROUNDS, _FINE, _MOST, _STEP = 40, 1e-3, 200, 0.02
+_ROUNDS, _FINE, _WORTH_A_MOVE, _MOST, _STEP = 150, 1e-3, 3e-5, 200, 0.02
 _DELAY = 10.0
 """Longest delay [s] at 130 m that is looked for."""
 _OWN_SPREAD, _RECORD, _CLOCK = 0.25, 0.01, 0.02
@@ -172,7 +172,8 @@ class _Record:
         return GearFinding(kind.effect, score, value, (value - spread, value + spread), per_run, self.name, gear)
 
     def _least(self, kind: _Kind | None, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Minimum of the squared error inside a box: a grid, and a pattern of neighbours of its best point that shrinks when none is better.
+        """Minimum of the squared error inside a box: a grid, and a pattern of neighbours of its best point that shrinks when none is much better
+        (else it creeps along a valley where the time constant hardly matters).
 
         Deadband and play leave the cost without a usable slope. The valley is narrow in the rate and in what is
         looked for: these are scanned closely.
@@ -183,9 +184,10 @@ class _Record:
         best, center = np.inf, points[0]
         for _ in range(_ROUNDS):
             costs = np.concatenate([np.sum(self.errors(part, kind) ** 2, axis=(1, 2)) for part in np.array_split(points, len(points) // _MOST + 1)])
-            if costs.min() < best:
-                best, center = float(costs.min()), points[int(costs.argmin())]
-            else:
+            least, before = float(costs.min()), best
+            if least < best:
+                best, center = least, points[int(costs.argmin())]
+            if least > (1.0 - _WORTH_A_MOVE) * before:
                 half = 0.5 * half
                 if np.all(half < _FINE):
                     break

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.fit import Model, Origin, fit, settle, start
-from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, ornstein_uhlenbeck, solve
+from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, ornstein_uhlenbeck, solve
 from shipbench.diagnosis.model import Linearisation, Scales, Term, predict
 from shipbench.diagnosis.plant import Plant
-from shipbench.effects.base import EFFECTS
+from shipbench.effects.base import EFFECTS, flow_first
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.trials import Trials, sea_trials
 
@@ -87,3 +87,38 @@ def test_an_effect_with_one_value_per_run_has_its_own_columns_in_every_run(plant
     settled = settle(Linearisation(plant, scales, point), Model((term,)), hyper, {})
     assert settled.values[0].shape == (plant.seg.runs, 2)
     assert np.isfinite(settled.evidence)
+
+
+def test_accelerated_steps_reach_the_rest_of_a_creeping_iteration():
+    """Steps that close 2 % of the distance: as many plain ones would be 60 % short."""
+    rest = np.array([1.0, -3.0])
+
+    def step(theta: np.ndarray) -> tuple[float, np.ndarray]:
+        return -float(np.sum((theta - rest) ** 2)), theta + np.array([0.02, 0.05]) * (rest - theta)
+
+    assert np.abs(accelerated(step, np.zeros(2), 8) - rest).max() < 0.15
+
+
+def test_a_leap_that_loses_evidence_is_not_taken():
+    """Two linear stretches: extrapolated over the bend, the leap would land far beyond it."""
+
+    def step(theta: np.ndarray) -> tuple[float, np.ndarray]:
+        return -abs(float(theta[0]) - 1.0), np.minimum(theta + np.array([0.3]), 1.0)
+
+    assert accelerated(step, np.array([-0.1]), 3) == pytest.approx(1.0)
+
+
+def test_a_refit_ends_where_another_start_does(plant):
+    """The evidence belongs to the model, not to the path of the fit."""
+    scales = Scales(plant)
+    origin = Origin.of(plant, scales)
+    one = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion)
+    far = replace(origin.point, base=origin.point.base + 0.5 * np.cos(np.arange(len(origin.point.base))))
+    other = fit(plant, scales, Model(), far, origin.hyper, guess=origin.motion)
+    assert other.evidence == pytest.approx(one.evidence, abs=0.5)
+
+
+def test_environment_comes_before_the_forces_that_follow_the_flow():
+    """A current beside a cross-flow drag, named in either order, is the same model."""
+    items = [Term(EFFECTS.get(name), ()) for name in ("cross_flow_drag", "current")]
+    assert [i.effect.name for i in flow_first(items)] == ["current", "cross_flow_drag"] == [i.effect.name for i in flow_first(items[::-1])]

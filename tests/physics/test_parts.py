@@ -217,6 +217,14 @@ def _scaled(ship: mmg.MMGShip, s: float) -> mmg.MMGShip:
     )  # fmt: skip
 
 
+def test_an_actuator_stops_at_the_edge_of_its_deadband_whatever_the_step():
+    command = np.repeat([[0.3, 0.29, -0.2, -0.21, 0.0]], 12, axis=1)
+    gear = actuators.Gear(T=1.5, rate=0.05, deadband=0.02)
+    coarse, fine = (actuators.gear_path(np.zeros(1), command, 1.0, gear, k)[:, ::k] for k in (1, 40))
+    np.testing.assert_allclose(coarse, fine, atol=1e-12)
+    assert coarse[0, 24] == pytest.approx(0.3 - 0.02)  # on its way up it stops within the band and stays, whatever the command does inside it
+
+
 def test_a_froude_scaled_ship_moves_alike():
     s = 0.04
     ship = _scaled(SHIP, 1.0)
