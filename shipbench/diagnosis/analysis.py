@@ -16,13 +16,12 @@ from .model import Linearisation, Scales
 from .plant import Plant
 from .select import Selection, candidates_for, null_fit, select
 
-THRESHOLD = 14.0
-"""Least gain of a named cause, 2 log Bayes factor. From nulls on the development ships, whose structure differs from the model's; the bootstrap
-of each
-diagnosis may raise it."""
+THRESHOLD = 10.0
+"""Least gain of a named cause, 2 log Bayes factor. From nulls on the development ships, whose structure differs from the model's; the bootstrap of
+each diagnosis may raise it."""
 HULL_THRESHOLD = 30.0
 GENERIC_THRESHOLD = 30.0
-_GENERIC_OWN = {"revolutions and rudder": 45.0, "heading": 18.0, "time": 18.0, "run": 18.0}
+_GENERIC_OWN = {"revolutions and rudder": 55.0, "heading": 18.0, "time": 18.0, "run": 18.0}
 """Race and rudder together are where ordinary ships differ most from eq. (2); no ship's structure depends on heading, time or number of the run."""
 GENERIC_MARGIN = 10.0
 _NARROW = 0.1
@@ -136,6 +135,6 @@ def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:
         if term.per_run:
             continue
         A = V[np.ix_(cols, cols)] + np.eye(len(cols))
-        score = np.einsum("cd,cd->d", s[cols], np.linalg.solve(A, s[cols])) - np.linalg.slogdet(A)[1]
+        score = np.einsum("cd,cd->d", s[cols], np.linalg.solve(A, s[cols])) - np.linalg.slogdet(A)[1] - term.cost(null.plant.seg.runs)
         best = np.maximum(best, score)
     return np.sort(best)

@@ -207,15 +207,15 @@ def _shown(s: Score, fit: Fit) -> dict[str, float]:
 
 
 def _detectable(found: Analysis, s: Score) -> dict[str, float]:
-    """Size whose expected score is the threshold, along each amplitude: x^2 V - log(1 + V) = T."""
+    """Size whose expected score is the threshold, along each amplitude: x^2 V - log(1 + V) - cost = T."""
     unit = found.selection.null.scales.amplitudes(s.term, found.selection.null.plant.c.L)
     if s.term.per_run:
         return {}
     names = [p.name for p in s.term.effect.parameters if not p.shape]
-    values = {}
+    values, needed = {}, found.threshold + s.term.cost(found.selection.null.plant.seg.runs)
     for i, name in enumerate(names):
         V = float(s.information[i, i])
-        values[name] = float(unit[i] * np.sqrt((found.threshold + np.log1p(max(V, 0.0))) / V)) if V > 1e-6 else float("nan")
+        values[name] = float(unit[i] * np.sqrt((needed + np.log1p(max(V, 0.0))) / V)) if V > 1e-6 else float("nan")
     return values
 
 

@@ -70,9 +70,8 @@ class Fit:
 
     @property
     def evidence(self) -> float:
-        """Log evidence, without constants; variances of random effects cost as much as a coefficient."""
-        randoms = sum(t.per_run for t in self.model.terms)
-        return self.solution.log_evidence - 0.5 * randoms * float(np.log(self.plant.seg.runs))
+        """Log evidence, without constants, less the costs of the terms."""
+        return self.solution.log_evidence - 0.5 * sum(t.cost(self.plant.seg.runs) for t in self.model.terms)
 
     @property
     def values(self) -> tuple[np.ndarray, ...]:
@@ -86,9 +85,9 @@ class Fit:
         return solve(self.reduced, Prior(prior.shared[keep], prior.precision[keep], prior.random[random], prior.log_tau2[random]))
 
     def worth(self, index: int) -> float:
-        """Twice the log evidence that the index-th term adds on this linearisation, its cost as a random effect taken off."""
-        cost = np.log(self.plant.seg.runs) if self.model.terms[index].per_run else 0.0
-        return 2.0 * (self.solution.log_evidence - self.solution_without(index).log_evidence) - float(cost)
+        """Twice the log evidence that the index-th term adds on this linearisation, its cost taken off."""
+        gain = 2.0 * (self.solution.log_evidence - self.solution_without(index).log_evidence)
+        return gain - self.model.terms[index].cost(self.plant.seg.runs)
 
     def columns_of(self, index: int) -> np.ndarray:
         """Shared columns of the model's index-th term."""

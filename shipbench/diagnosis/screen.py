@@ -16,10 +16,12 @@ _CYCLES, _LEAST_START = 6, float(np.log(0.1**2))
 
 @dataclass(frozen=True)
 class Score:
-    """A candidate beside a fitted model. score: twice the gain in log evidence (2 log Bayes factor with a prior of typical size); estimate, sd
-    (size,) in
-    units of the typical size (for a random effect: root mean square over runs, and NaN); information (size, size): precision of the estimate that the
-    data give, nuisances integrated out; per_run (N,): gain in log likelihood by run; log_tau2: of a random effect."""
+    """A candidate beside a fitted model.
+
+    score: twice the gain in log evidence (2 log Bayes factor with a prior of typical size), less the term's cost; estimate, sd (size,) in units of
+    the typical size (for a random effect: root mean square over runs, and NaN); information (size, size): precision of the estimate that the data
+    give, nuisances integrated out; per_run (N,): gain in log likelihood by run; log_tau2: of a random effect.
+    """
 
     term: Term
     score: float
@@ -82,10 +84,10 @@ def screen(fit: Fit, refine: int = 12) -> list[Score]:
         term = candidates[i]
         if place >= refine and not term.per_run:
             continue
-        own, cost = (term.size, float(np.log(fit.plant.seg.runs))) if term.per_run else (0, 0.0)
+        own = term.size if term.per_run else 0
         prior = with_columns(renumbered, len(base) + np.arange(term.size), term, max(scores[i].log_tau2, _LEAST_START))
         after, _, log_tau2 = evidence(only(gram, np.append(base, columns[i])), prior, log_force, own)
-        scores[i] = replace(scores[i], score=2.0 * (after - before) - cost, log_tau2=log_tau2)
+        scores[i] = replace(scores[i], score=2.0 * (after - before) - term.cost(fit.plant.seg.runs), log_tau2=log_tau2)
     return sorted(scores, key=lambda s: -s.score)
 
 
@@ -96,13 +98,13 @@ def _score(fit: Fit, term: Term, at: np.ndarray, null: float, null_runs: np.ndar
         best, tau = max(tries, key=lambda pair: pair[0].log_evidence)
         values = best.means[:, -term.size :]
         rms = np.sqrt(np.mean(values**2, axis=0))
-        penalty = np.log(fit.plant.seg.runs)
-        score = 2.0 * (best.log_evidence - null) - penalty
+        score = 2.0 * (best.log_evidence - null) - term.cost(fit.plant.seg.runs)
         return Score(term, score, rms, np.full(term.size, np.nan), np.zeros((term.size, term.size)), best.per_run - null_runs, tau)
     found = solve(reduced, with_columns(fit.prior, at, term, 0.0))
     cov = found.cov[-term.size :, -term.size :]
     information = np.linalg.inv(cov) - np.eye(term.size)
-    return Score(term, 2.0 * (found.log_evidence - null), found.mean[-term.size :], np.sqrt(np.diag(cov)), information, found.per_run - null_runs)
+    score = 2.0 * (found.log_evidence - null) - term.cost(fit.plant.seg.runs)
+    return Score(term, score, found.mean[-term.size :], np.sqrt(np.diag(cov)), information, found.per_run - null_runs)
 
 
 def overlap(fit: Fit, term: Term, value: np.ndarray) -> dict[str, float]:

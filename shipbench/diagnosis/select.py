@@ -22,8 +22,10 @@ _REFITS = 3
 _REFIT_ITERATIONS = 12
 _WORTH_A_REFIT = 0.5
 _RIVAL, _RIVALS = 0.25, 4
-_CHANGES, _CHANGE_MARGIN = 2, 20.0
-"""A beginning is chosen among all runs and all effects: it must beat the best cause without one by this."""
+_CHANGES, _CHANGE_MARGIN = 2, 14.0
+"""A beginning is chosen among all effects: it must beat the best cause without one by this."""
+_OF_THE_SHAPE = ("cross_flow_drag", "wake_variation", "race_gain", "rudder_stall", "rudder_asymmetry", "propeller_walk", "propeller_walk_astern")
+"""Hull, rudder and propeller keep their shape during trials: these do not begin with a run."""
 
 
 @dataclass(frozen=True)
@@ -115,11 +117,11 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
     if any(t.since is not None for t in now.model.terms):
         return best
     present = {t.label for t in now.model.terms}
-    late = [s for s in changes(now) if s.score > _CHANGE_MARGIN and s.term.label not in present][:_CHANGES]
+    late = [s for s in changes(now) if s.score > _CHANGE_MARGIN and s.term.label not in (*present, *_OF_THE_SHAPE)][:_CHANGES]
     gain = 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
     for score in late:
         found = with_term(now, score, origin)
-        if 2.0 * (found.evidence - now.evidence) - 2.0 * np.log(now.plant.seg.runs) > gain + _CHANGE_MARGIN:
+        if 2.0 * (found.evidence - now.evidence) > gain + _CHANGE_MARGIN:
             best, gain = found, 2.0 * (found.evidence - now.evidence)
     return best
 

@@ -83,7 +83,7 @@ def test_an_effect_with_one_value_per_run_has_its_own_columns_in_every_run(plant
     scales = Scales(plant)
     point, hyper = start(plant)
     term = Term(EFFECTS.get("current_per_run"), per_run=True)
-    point = point.with_term(term, np.zeros((plant.seg.runs, 2)))
+    point = replace(point, terms=(term,), values=(np.zeros((plant.seg.runs, 2)),))
     settled = settle(Linearisation(plant, scales, point), Model((term,)), hyper, {})
     assert settled.values[0].shape == (plant.seg.runs, 2)
     assert np.isfinite(settled.evidence)
