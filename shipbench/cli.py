@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from . import cli_data, cli_diagnosis
+from . import cli_data, cli_diagnosis, cli_import
 from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, print_json
 from .errors import InputError, ShipbenchError
 
@@ -47,6 +47,7 @@ app = typer.Typer(
     help="Benchmark of ship-motion prediction: every model on the same runs, folds, rollouts and metrics.",
 )  # fmt: skip
 cli_data.register(app)
+cli_import.register(cli_data.data_app)
 cli_diagnosis.register(app)
 
 

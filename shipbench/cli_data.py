@@ -11,7 +11,7 @@ import typer
 from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, print_json
 from .errors import InputError
 
-data_app = typer.Typer(help="Data sets: list, get, make, check, describe, export.", **SETTINGS)
+data_app = typer.Typer(help="Data sets: list, get, make, check, describe, export, import.", **SETTINGS)
 
 
 @data_app.command("list")

@@ -20,7 +20,7 @@ from ..ship import Ship, read_toml
 from ..signals import ACTUATORS, COMMANDS, ENVIRONMENT, STATES
 from .units import sign_factor, unit_factor
 
-_TABLES = ("trajectories.parquet", "trajectories.csv.gz", "trajectories.csv")
+TABLES = ("trajectories.parquet", "trajectories.csv.gz", "trajectories.csv")
 _ACTUATORS = STATES[ACTUATORS]
 _MOTION = STATES[: ACTUATORS.start]
 _SIGNALS = (*STATES, *COMMANDS, *ENVIRONMENT)
@@ -86,9 +86,9 @@ def _describe(path: Path) -> _Description:
 
 def _read_table(folder: Path, description: _Description) -> tuple[pd.DataFrame, Path]:
     """The table under our column names, and its path."""
-    found = [folder / name for name in _TABLES if (folder / name).is_file()]
+    found = [folder / name for name in TABLES if (folder / name).is_file()]
     if not found:
-        raise InputError(f"folder {folder} has no trajectories; accepted: {', '.join(_TABLES)}.")
+        raise InputError(f"folder {folder} has no trajectories; accepted: {', '.join(TABLES)}.")
     if len(found) > 1:
         raise InputError(f"folder {folder} has {' and '.join(p.name for p in found)}; accepted: one table. Remove the others.")
     path = found[0]
@@ -206,7 +206,7 @@ def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz"
     Raises:
         InputError: the folder cannot be written, or metadata cannot be expressed in TOML.
     """
-    if (name := f"trajectories.{format}") not in _TABLES:
+    if (name := f"trajectories.{format}") not in TABLES:
         raise InputError(f"format = '{format}'; accepted: csv.gz, csv or parquet.")
     folder = Path(folder)
     frames = []
@@ -236,7 +236,7 @@ def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz"
         for file, text in texts.items():
             (folder / f".{file}.tmp").write_text(text, encoding="utf-8")
             os.replace(folder / f".{file}.tmp", folder / file)
-        for other in set(_TABLES) - {name}:  # an earlier table in another format would contradict this one
+        for other in set(TABLES) - {name}:  # an earlier table in another format would contradict this one
             (folder / other).unlink(missing_ok=True)
     except OSError as error:
         raise InputError(f"cannot write the data set to {folder}: {error.strerror}. Give a folder that can be written.") from None

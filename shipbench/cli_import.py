@@ -1,0 +1,66 @@
+"""The command `data import`: a log of a sea trial becomes a data set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .cli_common import Json, Quiet, print_json
+from .errors import InputError
+
+
+def data_import(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="CSV (also .gz), Parquet, MATLAB .mat (-v7) or Excel .xlsx files.")],
+    mapping: Annotated[Path | None, typer.Option("-m", "--map", help="mapping.toml: their columns, units, signs and clock.")] = None,
+    ship: Annotated[Path | None, typer.Option("--ship", help="ship.toml of the vessel.")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder of the data set (default: the mapping's name).")] = None,
+    propose: Annotated[Path | None, typer.Option("--propose", help="Write a draft of mapping.toml for these logs, and do nothing else.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Name of the data set instead of the mapping's.")] = None,
+    dt: Annotated[float | None, typer.Option("--dt", help="Sample time [s] instead of the mapping's.")] = None,
+    window: Annotated[float | None, typer.Option("--window", help="Cut into windows of that many seconds.")] = None,
+    shortest: Annotated[float | None, typer.Option("--shortest", help="Leave out shorter pieces [s].")] = None,
+    still: Annotated[float | None, typer.Option("--still", help="Cut where the ship lies still: slower than that [m/s].")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the data set in --out (or the draft of --propose).")] = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Import logs of a trial: resample, derive what is missing, split into runs, write a data set.
+
+    First `shipbench data import LOG --propose mapping.toml`; read and correct the draft; then
+    `shipbench data import LOG --map mapping.toml --ship ship.toml --out FOLDER`.
+    """
+    if propose is not None:
+        from .importing.propose import write_proposal
+
+        lines = write_proposal(logs, propose, force)
+        if as_json:
+            print_json({"mapping": str(propose), "remarks": lines})
+        elif not quiet:
+            for line in lines:
+                typer.echo(line)
+        return
+    if mapping is None or ship is None:
+        raise InputError(
+            f"{'--map' if mapping is None else '--ship'} is missing; needed: --map mapping.toml and --ship ship.toml. "
+            "`shipbench data import LOG --propose mapping.toml` writes a draft of the mapping."
+        )
+    from .importing.importer import import_logs
+    from .importing.mapping import load_mapping
+    from .ship import Ship
+
+    plan = load_mapping(mapping, name=name, dt=dt, window=window, shortest=shortest, still_speed=still)
+    folder = out or Path(plan.name)
+    summary = import_logs(logs, plan, Ship.load(ship), folder, force=force, tell=lambda line: None if quiet else typer.echo(line, err=True))
+    if as_json:
+        print_json(summary.document())
+    elif not quiet:
+        for line in summary.lines():
+            typer.echo(line)
+        typer.echo(f"Written: {folder} ({summary.table.name}, dataset.toml, ship.toml). Next: shipbench data check {folder}")
+
+
+def register(data_app: typer.Typer) -> None:
+    """Add the command to `shipbench data`."""
+    data_app.command("import")(data_import)

@@ -1,0 +1,87 @@
+"""Excel workbooks (.xlsx) through openpyxl, row by row; needs the extra `shipbench[excel]`."""
+
+from __future__ import annotations
+
+import datetime
+import itertools
+import zipfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from ..errors import InputError
+from .mapping import Layout
+from .tables import MOST_COLUMNS, Table, as_batch
+
+_LARGEST = 1_000_000_000
+_ROWS = 20_000
+
+
+def open_excel(path: Path, layout: Layout) -> Table:
+    """The sheet named in the mapping, else the only one.
+
+    Raises:
+        InputError: openpyxl is not installed, or the file is no workbook, holds more than 1 GB, or has several sheets and none is named.
+    """
+    try:
+        import openpyxl
+        from openpyxl.utils.exceptions import InvalidFileException
+    except ImportError:
+        raise InputError(
+            f"{path}: reading .xlsx needs openpyxl. Install it with `pip install 'shipbench[excel]'`, or save the sheet as CSV."
+        ) from None
+    if not zipfile.is_zipfile(path):
+        raise InputError(f"{path} is no Excel workbook or is cut short. Save it anew as .xlsx, or as CSV.")
+    with zipfile.ZipFile(path) as packed:
+        size = sum(part.file_size for part in packed.infolist())
+    if size > _LARGEST:
+        raise InputError(
+            f"{path} holds {size / 1e6:.0f} MB unpacked; accepted: up to {_LARGEST / 1e6:.0f} MB. Save the sheet as CSV, which is streamed."
+        )
+
+    def rows() -> Iterator[tuple[Any, ...]]:
+        try:
+            book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        except (InvalidFileException, KeyError, SyntaxError, zipfile.BadZipFile, TypeError, AttributeError) as error:
+            raise ValueError(f"damaged workbook ({type(error).__name__}: {error})") from None  # tables.reading makes the message
+        try:
+            if layout.sheet is None and len(book.sheetnames) > 1:
+                raise InputError(f'{path} has the sheets {", ".join(book.sheetnames)}. Name one: [file] sheet = "..." in the mapping.')
+            if layout.sheet is not None and layout.sheet not in book.sheetnames:
+                raise InputError(f"{path} has no sheet '{layout.sheet}'; it has {', '.join(book.sheetnames)}.")
+            yield from book[layout.sheet or book.sheetnames[0]].iter_rows(values_only=True)
+        except (KeyError, SyntaxError, zipfile.BadZipFile, TypeError, AttributeError) as error:
+            raise ValueError(f"damaged workbook ({type(error).__name__}: {error})") from None
+        finally:
+            book.close()
+
+    header = next(itertools.islice(rows(), layout.header - 1, None), None)
+    if header is None or all(cell is None for cell in header):
+        raise InputError(f"{path}: row {layout.header} holds no header ([file] header = {layout.header}). Set the number of the row with the names.")
+    columns = tuple("" if cell is None else str(cell).strip() for cell in header)
+    if len(columns) > MOST_COLUMNS:
+        raise InputError(f"{path} has {len(columns)} columns; accepted: up to {MOST_COLUMNS}.")
+
+    def stream(wanted: Sequence[str]) -> Iterator[pa.RecordBatch]:
+        places = [columns.index(name) for name in wanted]
+        body = itertools.islice(rows(), layout.header + layout.skip, None)
+        empty = True
+        while block := list(itertools.islice(body, _ROWS)):
+            empty = False
+            yield as_batch({name: [_cell(row[i]) if i < len(row) else None for row in block] for name, i in zip(wanted, places, strict=True)})
+        if empty:
+            raise InputError(f"{path} has a header and no rows. Give a log with one row per sample.")
+
+    return Table(path, columns, stream, layout.header + layout.skip + 1, "Excel")
+
+
+def _cell(value: Any) -> Any:
+    """Dates and times as ISO text; a date without a time of day as a date alone, so that a time column can follow it."""
+    if isinstance(value, datetime.datetime):
+        whole_day = value.time() == datetime.time() and value.tzinfo is None
+        return value.date().isoformat() if whole_day else value.isoformat(sep=" ")
+    if isinstance(value, datetime.date | datetime.time):
+        return value.isoformat()
+    return value

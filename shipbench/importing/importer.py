@@ -1,0 +1,184 @@
+"""`import_logs`: logs and a mapping in, a data set's folder and a summary out, with memory that does not grow with the logs."""
+
+from __future__ import annotations
+
+import fnmatch
+import itertools
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..ship import Ship
+from ..signals import COMMANDS
+from .channels import Block, Counts, all_channels, in_order, read_blocks
+from .clock import is_absolute
+from .mapping import Mapping, Source
+from .runs import Piece, check_finite, on_grid, shortest_run, windows, without_standing
+from .stretches import Feed, Stretches
+from .summary import Summary
+from .writer import FolderWriter, run_name
+
+_CONTEXT = 20
+"""Samples of the grid that filter and smoother may see beyond the ends of a part."""
+
+
+@dataclass
+class _Log:
+    """One recording: its name and a stream for each source."""
+
+    name: str
+    files: str
+    feeds: dict[str, Iterator[Block]] = field(default_factory=dict)
+
+
+def import_logs(
+    logs: Sequence[Path], mapping: Mapping, ship: Ship, out: Path, *, force: bool = False, tell: Callable[[str], None] = lambda line: None
+) -> Summary:  # fmt: skip
+    """Write `out/{trajectories.*, dataset.toml, ship.toml}` from logs.
+
+    With one source every file is a recording of its own. With several, the files of a source follow one another, and the sources are merged on time.
+
+    Args:
+        logs: files, in the order of time where a source has several.
+        mapping: which column is what.
+        ship: the vessel's particulars.
+        out: folder to write; it appears when everything is done.
+        force: replace a data set that is there.
+        tell: called with one line on each recording that is done.
+
+    Raises:
+        InputError: whatever is wrong with the files, the mapping or the folder; nothing is written then.
+    """
+    met, summary = Counts(), Summary(mapping)
+    for path in logs:
+        if not path.exists():
+            raise InputError(f"cannot read {path}: no such file. Give the path of an existing log.")
+    if inside := [str(p) for p in logs if out.resolve() in p.resolve().parents]:
+        raise InputError(f"{inside[0]} lies in the folder that --out names ({out}). Give another --out.")
+    taken: Counter[str] = Counter()
+    with FolderWriter(out, force) as writer:
+        for log in _recordings(logs, mapping, met):
+            before = len(summary.runs)
+            for name, group, piece, zero in _named(log, mapping, ship, summary):
+                run = _free(name, taken)
+                check_finite(piece, run)
+                writer.add(run, np.round(piece.t - zero, 9), piece.columns)
+                summary.add(run, log.files, piece, None if group is None else f"{log.name}_{group}")
+            tell(f"{log.name}: {len(summary.runs) - before} runs")
+        summary.complete(met)
+        if not summary.runs:
+            raise InputError(summary.no_runs())
+        summary.table = writer.finish(summary.description(), ship)
+    return summary
+
+
+def _free(name: str, taken: Counter[str]) -> str:
+    """`name`, or with a number where it is taken."""
+    candidate = name
+    while taken[candidate]:
+        taken[name] += 1
+        candidate = f"{name}_{taken[name]}"
+    taken[candidate] = 1
+    return candidate
+
+
+def _recordings(logs: Sequence[Path], mapping: Mapping, met: Counts) -> Iterator[_Log]:
+    if len(mapping.sources) == 1:
+        ((source_name, source),) = mapping.sources.items()
+        for path in logs:
+            # groupby shares the stream: a run's blocks are read before those of the next.
+            for name, blocks in itertools.groupby(read_blocks(path, source, met), key=lambda item: item[0]):
+                stream = in_order((block for _, block in blocks), source, str(path), met)
+                yield _Log(run_name(name if name is not None else _stem(path)), path.name, {source_name: stream})
+        return
+    kinds = {is_absolute(s.time) for s in mapping.sources.values()}
+    if len(kinds) > 1:
+        told = ", ".join(f"{n} '{s.time.format}'" for n, s in mapping.sources.items())
+        raise InputError(f"the sources' clocks cannot be merged: {told}. Accepted: time stamps in all of them, or counted seconds in all of them.")
+    files = _share_out(logs, mapping.sources)
+    feeds = {}
+    for name, source in mapping.sources.items():
+        chained = (block for path in files[name] for _, block in read_blocks(path, source, met))
+        feeds[name] = in_order(chained, source, ", ".join(map(str, files[name])), met)
+    yield _Log(run_name(mapping.name), ", ".join(p.name for p in logs), feeds)
+
+
+def _share_out(logs: Sequence[Path], sources: dict[str, Source]) -> dict[str, list[Path]]:
+    """The files of each source, by the patterns of the mapping."""
+    files = {name: [p for p in logs if fnmatch.fnmatch(p.name, source.files)] for name, source in sources.items()}
+    for name, found in files.items():
+        if not found:
+            told = ", ".join(p.name for p in logs)
+            raise InputError(f"no log for the source '{name}' (files = \"{sources[name].files}\"). Given: {told}. Give it, or mend `files`.")
+    unused = [p for p in logs if not any(p in found for found in files.values())]
+    if unused:
+        told = ", ".join(f'{n} "{s.files}"' for n, s in sources.items())
+        raise InputError(f"{unused[0]} belongs to no source; their files: {told}. Leave it out, or mend `files` in the mapping.")
+    return files
+
+
+def _stem(path: Path) -> str:
+    name = path.name
+    for suffix in (".gz", ".bz2", ".xz"):
+        name = name.removesuffix(suffix)
+    return Path(name).stem
+
+
+def _named(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator[tuple[str, str | None, Piece, float]]:
+    """(run name, group or None, samples, zero of its time) for each run of a recording; one run alone keeps the recording's name."""
+    waiting: tuple[str, str | None, Piece, float] | None = None
+    count = 0
+    for count, item in enumerate(_runs(log, mapping, ship, summary), start=1):
+        if waiting is not None:
+            yield waiting
+        group, piece, zero = item
+        waiting = (f"{log.name}_{count:03d}", group, piece, zero)
+    if waiting is not None:
+        yield (log.name if count == 1 else waiting[0], *waiting[1:])
+
+
+def _runs(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator[tuple[str | None, Piece, float]]:
+    channels, dt = all_channels(mapping), mapping.dt
+    feeds = [Feed(blocks, tuple(mapping.sources[name].channels)) for name, blocks in log.feeds.items()]
+    gaps = {name: mapping.gap(name) for name in channels}
+    longest = max(math.floor(mapping.split.longest / dt + 1e-6), 1) * dt
+    stretches = Stretches(feeds, gaps, frozenset(COMMANDS), longest, dt, _CONTEXT * dt)
+    absolute = is_absolute(next(iter(mapping.sources.values())).time)
+    number = 0
+    for stretch in stretches:
+        zero = stretches.start if absolute else 0.0
+        number += stretch.part == 0
+        group = f"{number:03d}" if not (stretch.last and stretch.part == 0) else None
+        if stretch.end - stretch.start < dt:
+            summary.cut("shorter than dt", stretch.end - stretch.start)
+            continue
+        whole = on_grid(stretch, mapping, ship)
+        for moving in _told(without_standing(whole, mapping), len(whole.t), mapping, summary):
+            for piece in windows(moving, mapping):
+                length = (len(piece.t) - 1) * dt
+                if length < shortest_run(mapping) * (1 - 1e-9):
+                    summary.cut(f"shorter than {shortest_run(mapping):g} s", length)
+                else:
+                    yield None if mapping.split.window else group, piece, zero
+    if math.isnan(stretches.start):
+        return
+    summary.steps |= stretches.steps
+    summary.span(stretches.end - stretches.start, stretches.longest if stretches.longest < longest else None)
+    for cut in stretches.cuts:
+        if cut.end - cut.start > dt * (1 + 1e-6):
+            summary.gap(cut)
+
+
+def _told(pieces: Iterator[Piece], samples: int, mapping: Mapping, summary: Summary) -> Iterator[Piece]:
+    """The pieces; what standing still cost goes to the summary."""
+    kept = 0
+    for piece in pieces:
+        kept += len(piece.t)
+        yield piece
+    if samples > kept:
+        summary.cut(f"standing still (below {mapping.split.still_speed:g} m/s)", (samples - kept) * mapping.dt)

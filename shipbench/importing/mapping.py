@@ -1,0 +1,260 @@
+"""mapping.toml: which column of a log is which signal, in which unit, sign and clock; and how the log is cut into runs."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ..data.units import sign_factor, unit_factor
+from ..errors import InputError, unknown_name
+from ..ship import read_toml
+from ..signals import COMMANDS, ENVIRONMENT, STATES, UNITS
+
+EXTRA_UNITS = {"lat": "rad", "lon": "rad", "sog": "m/s", "cog": "rad", "apparent_wind_speed": "m/s", "apparent_wind_from": "rad"}
+"""What a log may hold beside our signals: WGS84 position, speed and course over ground (course clockwise from north), and the wind felt on board,
+its direction where it comes from, clockwise from the bow."""
+CHANNELS = (*STATES, *COMMANDS, *ENVIRONMENT, *EXTRA_UNITS)
+ANGLES = ("psi", "cog", "wind_from", "apparent_wind_from")
+"""Angles that wrap around; lon is made a position before anything else."""
+_SIGN_WORDS = {"lat": ("north", "south"), "lon": ("east", "west"), "cog": ("clockwise", "counterclockwise"),
+               "apparent_wind_from": ("clockwise", "counterclockwise")}  # fmt: skip
+_UNITS_LIKE = {"lat": "psi", "lon": "psi", "sog": "u", "cog": "psi", "apparent_wind_speed": "u", "apparent_wind_from": "psi"}
+SOURCE_KEYS = ("files", "time", "file", "channels", "missing", "antenna", "speed_sensor", "run")
+
+
+class _Part(BaseModel):
+    """An unknown key is an error, never ignored."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=True)
+
+
+class Channel(_Part):
+    """One column: ours = sign x unit x factor x (reading + offset). `gap` [s] replaces the mapping's for this channel (inf: logged on change)."""
+
+    column: str
+    unit: str
+    sign: str | None = None
+    offset: float = Field(0.0, allow_inf_nan=False)
+    factor: float = Field(1.0, allow_inf_nan=False)
+    gap: float | None = Field(None, gt=0)
+
+
+class Clock(_Part):
+    """Where time stands. `rate` [Hz] alone serves a log without a time column; `shift` [s] is added to every time."""
+
+    column: str | None = None
+    columns: tuple[str, str] | None = None
+    format: str = "s"
+    zone: str | None = None
+    rate: float | None = Field(None, gt=0, allow_inf_nan=False)
+    shift: float = Field(0.0, allow_inf_nan=False)
+    repeated: Literal["first", "spread"] = "first"
+    backwards: Literal["error", "drop"] = "error"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Columns that hold the time."""
+        return self.columns or ((self.column,) if self.column else ())
+
+
+class Layout(_Part):
+    """How the file is written. `header` is the number of the header's row, `skip` the rows between it and the data (such as a row of units)."""
+
+    delimiter: str | None = Field(None, min_length=1, max_length=1)
+    decimal: Literal[".", ","] = "."
+    encoding: str = "utf-8"
+    header: int = Field(1, ge=1, le=10_000)
+    skip: int = Field(0, ge=0, le=10_000)
+    sheet: str | None = None
+
+
+class Point(_Part):
+    """A place on board [m]: x forward of midship, y to starboard of the centre line."""
+
+    x: float = Field(allow_inf_nan=False)
+    y: float = Field(0.0, allow_inf_nan=False)
+
+
+class Origin(_Part):
+    """Where the local plane touches the earth [deg]."""
+
+    lat: float = Field(ge=-90, le=90)
+    lon: float = Field(ge=-180, le=180)
+
+
+class Source(_Part):
+    """One kind of file. `antenna` is the point that x, y, lat, lon, sog and cog belong to, `speed_sensor` the one of u and v (default: midship)."""
+
+    files: str = "*"
+    time: Clock
+    file: Layout = Layout()
+    channels: dict[str, Channel] = Field(min_length=1)
+    missing: list[str | float] = []
+    antenna: Point | None = None
+    speed_sensor: Point | None = None
+    run: str | None = None
+
+
+class Split(_Part):
+    """How logs become runs; all in s and m/s. `gap`: longer pauses split; `window`: runs of that length; `shortest`: shorter ones are left out;
+    `longest`: longer ones are cut in parts of one group; `still_speed`: stretches slower than that for `still_time` are left out."""
+
+    gap: float = Field(3.0, gt=0)
+    window: float | None = Field(None, gt=0, allow_inf_nan=False)
+    shortest: float | None = Field(None, ge=0, allow_inf_nan=False)
+    longest: float = Field(3600.0, gt=0, allow_inf_nan=False)
+    still_speed: float | None = Field(None, gt=0)
+    still_time: float = Field(60.0, gt=0)
+
+
+class Mapping(_Part):
+    """The whole of mapping.toml. A mapping of one kind of file has the keys of `Source` at the top; of several, tables [sources.NAME]."""
+
+    name: str = Field(min_length=1)
+    dt: float = Field(gt=0, allow_inf_nan=False)
+    actuators: Literal["measured", "commanded"] | None = None
+    source: str = ""
+    licence: str = ""
+    origin: Origin | None = None
+    antialias: bool = True
+    split: Split = Split()
+    sources: dict[str, Source] = Field(min_length=1)
+
+    def has(self, channel: str) -> bool:
+        """Whether any source has the channel."""
+        return any(channel in source.channels for source in self.sources.values())
+
+    def gap(self, channel: str) -> float:
+        """Longest time [s] between two samples of `channel` that is not a gap."""
+        own = next(s.channels[channel].gap for s in self.sources.values() if channel in s.channels)
+        return own or self.split.gap
+
+
+def load_mapping(path: str | Path, **overrides: Any) -> Mapping:
+    """Read and check a mapping.
+
+    Args:
+        path: the TOML file.
+        overrides: `name`, `dt`, and keys of [split], which replace those of the file where they are not None.
+
+    Raises:
+        InputError: not TOML; a missing or unknown key (with the nearest accepted one), channel, unit or sign; channels that make no data set.
+    """
+    data = read_toml(path)
+    for key, value in overrides.items():
+        if value is not None:
+            (data.setdefault("split", {}) if key in Split.model_fields else data)[key] = value
+    single = "sources" not in data
+    if single:  # one kind of file: its keys stand at the top
+        data = {k: v for k, v in data.items() if k not in SOURCE_KEYS} | {"sources": {"log": {k: data[k] for k in SOURCE_KEYS if k in data}}}
+    try:
+        mapping = Mapping.model_validate(data)
+    except ValidationError as error:
+        raise _explained(error, path, single) from None
+    for source in mapping.sources.values():
+        for name, channel in source.channels.items():
+            _check_channel(name, channel, path)
+        _check_clock(source.time, path)
+    _check_together(mapping, path)
+    return mapping
+
+
+def _explained(error: ValidationError, path: str | Path, single: bool) -> InputError:
+    first = error.errors()[0]
+    loc = [str(k) for k in first["loc"]]
+    shown = ".".join(loc[2:] if single and loc[:2] == ["sources", "log"] else loc)
+    more = f" ({error.error_count() - 1} more faults)" if error.error_count() > 1 else ""
+    if first["type"] == "extra_forbidden":
+        accepted = _accepted(loc[:-1], single)
+        near = difflib.get_close_matches(loc[-1], accepted, n=1, cutoff=0.5)
+        hint = f" Did you mean '{near[0]}'?" if near else ""
+        return InputError(f"{path}: unknown key '{shown}'.{hint} Accepted there: {', '.join(accepted)}.{more}")
+    value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:80]})"
+    return InputError(f"{path}: {shown}: {first['msg']}{value}{more}. `shipbench data import LOG --propose mapping.toml` writes a draft.")
+
+
+def _accepted(loc: list[str], single: bool) -> list[str]:
+    """Keys that the table at `loc` may have."""
+    parts: dict[str, type[BaseModel]] = {
+        "time": Clock, "file": Layout, "antenna": Point, "speed_sensor": Point, "origin": Origin, "split": Split,
+    }  # fmt: skip
+    if not loc:
+        keys = [k for k in Mapping.model_fields if not single or k != "sources"]
+        return [*keys, *SOURCE_KEYS] if single else keys
+    model = Source if loc[0] == "sources" and len(loc) == 2 else parts.get(loc[-1], Channel)
+    return list(model.model_fields)
+
+
+def channel_factor(name: str, channel: Channel) -> float:
+    """Factor from (reading + offset) to our unit and sign.
+
+    Raises:
+        InputError: unknown unit or sign.
+    """
+    factor = channel.factor * unit_factor(_UNITS_LIKE.get(name, name), channel.unit)
+    if channel.sign is None:
+        return factor
+    if name in _SIGN_WORDS:
+        if channel.sign not in _SIGN_WORDS[name]:
+            raise unknown_name(f"sign of '{name}'", channel.sign, _SIGN_WORDS[name])
+        return -factor if channel.sign == _SIGN_WORDS[name][1] else factor
+    return factor * sign_factor(name, channel.sign)
+
+
+def _check_channel(name: str, channel: Channel, path: str | Path) -> None:
+    if name not in CHANNELS:
+        raise unknown_name(f"channel in [channels] of {path}:", name, CHANNELS)
+    try:
+        channel_factor(name, channel)
+    except InputError as error:
+        raise InputError(f"{path}: channel '{name}', column '{channel.column}': {error}") from None
+    if channel.factor == 0.0:
+        raise InputError(f"{path}: channel '{name}': factor = 0; accepted: any other number (it multiplies the reading).")
+
+
+def _check_clock(clock: Clock, path: str | Path) -> None:
+    given = [k for k in ("column", "columns", "rate") if getattr(clock, k) is not None]
+    if len(given) != 1:
+        raise InputError(
+            f'{path}: [time] has {" and ".join(given) or "no column"}; accepted: one of column = "...", columns = ["date", "time"], '
+            "or rate = 10.0 [Hz] for a log without a time column."
+        )
+    if clock.zone is not None:
+        from zoneinfo import ZoneInfo
+
+        try:
+            ZoneInfo(clock.zone)
+        except (KeyError, ValueError, OSError):
+            raise InputError(f"{path}: [time] zone = '{clock.zone}'; accepted: names such as 'UTC' or 'Europe/Amsterdam'.") from None
+
+
+def _check_together(mapping: Mapping, path: str | Path) -> None:
+    names = [c for s in mapping.sources.values() for c in s.channels]
+    twice = sorted({c for c in names if names.count(c) > 1})
+    if twice:
+        raise InputError(f"{path}: channel '{twice[0]}' stands in more than one source; accepted: one.")
+    if "psi" not in names:
+        raise InputError(f"{path}: no channel 'psi'; the heading is needed (a course over ground is no heading). Mapped: {', '.join(names)}.")
+    if not {"x", "y"} <= set(names) and not {"lat", "lon"} <= set(names):
+        raise InputError(f"{path}: no position; map both x and y [m], or both lat and lon. Mapped: {', '.join(names)}.")
+    if {"x", "y"} & set(names) and {"lat", "lon"} & set(names):
+        raise InputError(f"{path}: a position as x, y and as lat, lon; accepted: one of them. Mapped: {', '.join(names)}.")
+    for a, b in (("sog", "cog"), ("wind_speed", "wind_from"), ("apparent_wind_speed", "apparent_wind_from"), ("lat", "lon"), ("x", "y")):
+        if (a in names) != (b in names):
+            here, gone = (a, b) if a in names else (b, a)
+            raise InputError(f"{path}: '{here}' is mapped without '{gone}'; accepted: both or neither.")
+        at = [s for s, source in mapping.sources.items() if {a, b} & set(source.channels)]
+        if len(at) > 1:
+            raise InputError(f"{path}: '{a}' and '{b}' stand in the sources {' and '.join(at)}; accepted: both in one, on one clock.")
+    if len(mapping.sources) > 1 and any(s.run for s in mapping.sources.values()):
+        raise InputError(f"{path}: `run` serves a mapping with one source. Split several merged sources by gaps, windows or standing still.")
+    if mapping.split.gap < mapping.dt * 0.5:
+        raise InputError(f"{path}: split.gap = {mapping.split.gap:g} s is below dt = {mapping.dt:g} s; give the longest pause to be bridged.")
+
+
+def unit_of(channel: str) -> str:
+    """Our unit of a channel."""
+    return EXTRA_UNITS.get(channel) or UNITS[channel]

@@ -1,0 +1,74 @@
+"""MATLAB files up to version 7, through scipy: vectors, columns of matrices and fields of structs under names such as `log.gps.lat` or `data(3)`."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from ..errors import InputError
+from .tables import MOST_COLUMNS, Table, as_batch
+
+_LARGEST = 400_000_000
+_ROWS = 50_000
+
+
+def open_matlab(path: Path) -> Table:
+    """Read a .mat file whole (the format cannot be streamed), which is why its size is limited.
+
+    Raises:
+        InputError: version 7.3, too large, damaged, or without numeric vectors.
+    """
+    from scipy.io import loadmat
+
+    if path.stat().st_size > _LARGEST:
+        raise InputError(
+            f"{path} has {path.stat().st_size / 1e6:.0f} MB; .mat files are read whole, accepted: up to {_LARGEST / 1e6:.0f} MB. "
+            "Save it as CSV (writetable) or Parquet (parquetwrite), which are streamed."
+        )
+    if path.open("rb").read(8) == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in path.open("rb").read(128):
+        raise InputError(f"{path} is a MATLAB 7.3 file (HDF5), which is not read. In MATLAB: save('log.mat', ..., '-v7'), or writetable to CSV.")
+    try:
+        content = loadmat(path, squeeze_me=True, struct_as_record=False)
+    except NotImplementedError:
+        raise InputError(f"{path} is of a MATLAB version that is not read. In MATLAB: save('log.mat', ..., '-v7').") from None
+    except (TypeError, KeyError, IndexError, struct.error, AttributeError, OverflowError, RuntimeError) as error:
+        raise ValueError(f"damaged MATLAB file ({type(error).__name__}: {error})") from None  # tables.reading makes the message
+    vectors: dict[str, Any] = {}
+    for name, value in content.items():
+        if not name.startswith("__"):
+            _collect(name, value, vectors, 0)
+    if not vectors:
+        raise InputError(f"{path} holds no vectors of two or more numbers. Accepted: vectors, matrices with a sample per row, and structs of them.")
+    if len(vectors) > MOST_COLUMNS:
+        raise InputError(f"{path} holds {len(vectors)} vectors; accepted: up to {MOST_COLUMNS}.")
+
+    def stream(wanted: Sequence[str]) -> Iterator[pa.RecordBatch]:
+        lengths = {name: len(vectors[name]) for name in wanted}
+        if len(set(lengths.values())) > 1:
+            told = ", ".join(f"{name} {n}" for name, n in lengths.items())
+            raise InputError(f"{path}: vectors of one source differ in length: {told}. Give each rate a [sources.NAME] with its own time column.")
+        for begin in range(0, max(lengths.values()), _ROWS):
+            yield as_batch({name: vectors[name][begin : begin + _ROWS] for name in wanted})
+
+    return Table(path, tuple(vectors), stream, 1, "MATLAB")
+
+
+def _collect(name: str, value: Any, vectors: dict[str, Any], depth: int) -> None:
+    """Put what can serve as a column into `vectors`, under its MATLAB name."""
+    fields = getattr(value, "_fieldnames", None)
+    if fields is not None and depth < 8:
+        for field in fields:
+            _collect(f"{name}.{field}", getattr(value, field), vectors, depth + 1)
+    elif isinstance(value, np.ndarray) and value.ndim == 1 and len(value) > 1:
+        if value.dtype.kind in "fiub":
+            vectors[name] = value.astype(float)
+        elif value.dtype.kind in "US" or all(isinstance(v, str) for v in value):  # text, such as time stamps
+            vectors[name] = [str(v) for v in value]
+    elif isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "fiub" and value.shape[1] <= MOST_COLUMNS:
+        for j in range(value.shape[1]):
+            vectors[f"{name}({j + 1})"] = value[:, j].astype(float)

@@ -1,0 +1,113 @@
+"""The three files of the contract, run by run, in a folder beside the wanted one that takes its name when all is there."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+import tomli_w
+
+from ..data.files import TABLES
+from ..errors import InputError
+from ..ship import Ship
+
+_CSV_ROWS = 200_000
+_OURS = {*TABLES, "dataset.toml", "ship.toml"}
+
+
+class FolderWriter:
+    """A context: `add` runs, then `finish`. Leaving it without `finish` (an error, Ctrl-C) leaves nothing behind.
+
+    Raises:
+        InputError: the folder is there already and `force` is not set, or holds other files than a data set's, or cannot be written.
+    """
+
+    def __init__(self, out: Path, force: bool = False) -> None:
+        self.out, self.rows = out, 0
+        self._table: pa.parquet.ParquetWriter | None = None
+        _check_target(out, force)
+        try:
+            out.absolute().parent.mkdir(parents=True, exist_ok=True)
+            self.fresh = Path(tempfile.mkdtemp(prefix=f".{out.name}.importing-", dir=out.absolute().parent))
+        except OSError as error:
+            raise self._unwritable(error) from None
+
+    def _unwritable(self, error: OSError) -> InputError:
+        return InputError(f"cannot write the data set to {self.out}: {error.strerror}. Give --out a folder that can be written.")
+
+    def add(self, run: str, t: np.ndarray, columns: dict[str, np.ndarray]) -> None:
+        """Write one run."""
+        names = pa.array([run]).dictionary_encode().take(pa.array(np.zeros(len(t), np.int32))).cast(pa.string())
+        table = pa.table({"trajectory": names, "t": t, **columns})
+        try:
+            if self._table is None:
+                self._table = pa.parquet.ParquetWriter(self.fresh / "trajectories.parquet", table.schema)
+            self._table.write_table(table)
+        except OSError as error:
+            raise self._unwritable(error) from None
+        self.rows += len(t)
+
+    def finish(self, description: dict[str, Any], ship: Ship) -> Path:
+        """Write the two descriptions, move the folder into place and return the path of the table."""
+        try:
+            if self._table is not None:
+                self._table.close()
+            table = self.fresh / "trajectories.parquet"
+            if self.rows <= _CSV_ROWS:  # small enough to be opened by people
+                pa.csv.write_csv(pa.parquet.read_table(table), self.fresh / "trajectories.csv", pa.csv.WriteOptions(quoting_style="needed"))
+                table.unlink()
+                table = self.fresh / "trajectories.csv"
+            (self.fresh / "dataset.toml").write_text(tomli_w.dumps(description), encoding="utf-8")
+            (self.fresh / "ship.toml").write_text(ship.to_toml(), encoding="utf-8")
+            self.fresh.chmod(0o755)  # mkdtemp makes it private
+            self._replace()
+        except OSError as error:
+            raise self._unwritable(error) from None
+        return self.out / table.name
+
+    def _replace(self) -> None:
+        if not self.out.is_dir():
+            os.replace(self.fresh, self.out)
+            return
+        old = self.fresh.with_name(self.fresh.name + ".old")
+        os.replace(self.out, old)
+        try:
+            os.replace(self.fresh, self.out)
+        except OSError:
+            os.replace(old, self.out)
+            raise
+        shutil.rmtree(old, ignore_errors=True)
+
+    def __enter__(self) -> FolderWriter:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._table is not None:
+            self._table.close()
+        shutil.rmtree(self.fresh, ignore_errors=True)
+
+
+def _check_target(out: Path, force: bool) -> None:
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out} is a file; give --out a folder that is not there yet.")
+    if not out.is_dir():
+        return
+    held = sorted(p.name for p in out.iterdir())
+    if held and not force:
+        raise InputError(f"folder {out} is there already ({', '.join(held[:4])}). Give another --out, or --force to replace that data set.")
+    if others := [name for name in held if name not in _OURS]:
+        raise InputError(f"folder {out} holds more than a data set ({', '.join(others[:4])}); --force replaces only a data set. Give another --out.")
+
+
+def run_name(text: str) -> str:
+    """Letters, digits, '_', '-', '.' and '@' of a text: safe in paths, TOML and spreadsheets (no name begins like a formula)."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", text).strip("_.-")[:80] or "run"
