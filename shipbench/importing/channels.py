@@ -17,6 +17,7 @@ from .mapping import Channel, Mapping, Source, channel_factor
 from .tables import Table, open_table
 
 _EMPTY = ("", "NA", "N/A", "NaN", "nan", "NAN", "null", "NULL", "None", "#N/A", "NaT")
+_GREATEST = 1e30
 _NUMBERS = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_boolean, pa.types.is_null)
 
 
@@ -98,9 +99,9 @@ class _Cells:
         elif not any(is_kind(array.type) for is_kind in _NUMBERS):
             raise InputError(f"{self.table.path}: column '{column}' holds {array.type}; accepted: numbers.")
         values = pc.fill_null(array.cast(pa.float64(), safe=False), np.nan).to_numpy(zero_copy_only=False).astype(float)
-        endless = np.isinf(values)
-        self.met.what["infinite values, taken as missing"] += int(endless.sum())
-        return np.where(endless | np.isin(values, self.marks), np.nan, values)
+        absurd = np.abs(values) > _GREATEST
+        self.met.what[f"infinite values (above {_GREATEST:g}), taken as missing"] += int(absurd.sum())
+        return np.where(absurd | np.isin(values, self.marks), np.nan, values)
 
     def _parsed(self, column: str, array: pa.Array) -> pa.Array:
         text = pc.utf8_trim_whitespace(array)

@@ -18,7 +18,7 @@ from ..signals import COMMANDS
 from .channels import Block, Counts, all_channels, in_order, read_blocks
 from .clock import is_absolute
 from .mapping import Mapping, Source
-from .runs import Piece, check_finite, on_grid, shortest_run, windows, without_standing
+from .runs import Piece, on_grid, outliers, shortest_run, windows, without_standing
 from .stretches import Feed, Stretches
 from .summary import Summary
 from .writer import FolderWriter, run_name
@@ -66,10 +66,10 @@ def import_logs(
             before = len(summary.runs)
             for name, group, piece, zero in _named(log, mapping, ship, summary):
                 run = _free(name, taken)
-                check_finite(piece, run)
                 writer.add(run, np.round(piece.t - zero, 9), piece.columns)
+                summary.doubtful.update(outliers(piece, ship))
                 summary.add(run, log.files, piece, None if group is None else f"{log.name}_{group}")
-            tell(f"{log.name}: {len(summary.runs) - before} runs")
+            tell(f"{log.name}: {len(summary.runs) - before} run(s)")
         summary.complete(met)
         if not summary.runs:
             raise InputError(summary.no_runs())
@@ -103,9 +103,15 @@ def _recordings(logs: Sequence[Path], mapping: Mapping, met: Counts) -> Iterator
     files = _share_out(logs, mapping.sources)
     feeds = {}
     for name, source in mapping.sources.items():
-        chained = (block for path in files[name] for _, block in read_blocks(path, source, met))
-        feeds[name] = in_order(chained, source, ", ".join(map(str, files[name])), met)
+        feeds[name] = in_order(_chained(files[name], source, met), source, ", ".join(map(str, files[name])), met)
     yield _Log(run_name(mapping.name), ", ".join(p.name for p in logs), feeds)
+
+
+def _chained(paths: list[Path], source: Source, met: Counts) -> Iterator[Block]:
+    """The blocks of one file after another."""
+    for path in paths:
+        for _, block in read_blocks(path, source, met):
+            yield block
 
 
 def _share_out(logs: Sequence[Path], sources: dict[str, Source]) -> dict[str, list[Path]]:

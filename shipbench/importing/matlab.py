@@ -30,7 +30,9 @@ def open_matlab(path: Path) -> Table:
             f"{path} has {path.stat().st_size / 1e6:.0f} MB; .mat files are read whole, accepted: up to {_LARGEST / 1e6:.0f} MB. "
             "Save it as CSV (writetable) or Parquet (parquetwrite), which are streamed."
         )
-    if path.open("rb").read(8) == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in path.open("rb").read(128):
+    with path.open("rb") as file:
+        head = file.read(128)
+    if head.startswith(b"\x89HDF") or b"MATLAB 7.3" in head:
         raise InputError(f"{path} is a MATLAB 7.3 file (HDF5), which is not read. In MATLAB: save('log.mat', ..., '-v7'), or writetable to CSV.")
     try:
         content = loadmat(path, squeeze_me=True, struct_as_record=False)

@@ -260,6 +260,8 @@ def _guess_unit(channel: str, column: _Column) -> tuple[str, str]:
         return known, f"unit from the name, [{column.unit}]"
     size = float(np.nanmax(np.abs(column.values))) if np.isfinite(column.values).any() else 0.0
     what = f"accepted {_ACCEPTED[ours]}"
+    if channel in ("lat", "lon"):
+        return "deg", f"unit as usual for {channel} ({what})"
     if ours == "rad":
         return ("deg" if size > 6.5 else "rad"), f"unit from the values ({what})"
     if ours == "rad/s":

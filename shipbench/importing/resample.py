@@ -42,11 +42,12 @@ def sample(t: np.ndarray, v: np.ndarray, start: float, dt: float, count: int, an
 def interval_means(t: np.ndarray, v: np.ndarray, start: float, dt: float, count: int) -> np.ndarray:
     """Mean (count,) over [t_k, t_k+1) of a signal that holds each value until the next one: a command keeps its impulse.
 
-    The last interval is the mean over what is known of it: up to the last sample and its usual step, at most dt.
+    Of the last interval it is the mean up to the last sample and its usual step, where there are samples in it.
     """
     edges = start + dt * np.arange(count + 1)
     step = usual_step(t)
-    edges[-1] = max(edges[-2] + 1e-9 * dt, min(edges[-1], t[-1] + min(step, dt)))
+    if t[-1] >= edges[-2]:
+        edges[-1] = min(edges[-1], t[-1] + min(step, dt))
     inside = t[(t > edges[0]) & (t < edges[-1])]
     knots = np.unique(np.r_[edges, inside])
     # A sample within rounding of an edge belongs to the interval that begins there.

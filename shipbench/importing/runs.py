@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import InputError
 from ..ship import Ship
 from ..signals import COMMANDS, ENVIRONMENT, STATES
 from .mapping import ANGLES, Mapping, Point
@@ -178,12 +177,9 @@ def windows(piece: Piece, mapping: Mapping) -> Iterator[Piece]:
         yield piece.rows(begin, begin + samples)
 
 
-def check_finite(piece: Piece, run: str) -> None:
-    """Nothing but numbers leaves the import.
-
-    Raises:
-        InputError: a value overflows (a hostile or broken log).
-    """
-    for name, values in piece.columns.items():
-        if not np.isfinite(values).all():
-            raise InputError(f"run '{run}': {name} is not finite after conversion; check unit, factor and offset of its column in the mapping.")
+def outliers(piece: Piece, ship: Ship) -> dict[str, int]:
+    """Samples at which the ship would be faster than sqrt(g L), a Froude number of 1: by its track, and by its u and v."""
+    greatest = math.sqrt(9.81 * ship.L)
+    step = np.hypot(np.diff(piece.columns["x"]), np.diff(piece.columns["y"])) / np.diff(piece.t)
+    speed = np.hypot(piece.columns["u"], piece.columns["v"])
+    return {f"{name} (faster than sqrt(g L) = {greatest:.3g} m/s)": int((v > greatest).sum()) for name, v in (("x, y", step), ("u, v", speed))}

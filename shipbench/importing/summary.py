@@ -33,6 +33,7 @@ class Summary:
         self.times: dict[str, list[float]] = {}  # derived signal -> time constants
         self.scatter: dict[str, list[float]] = {}
         self.met = Counts()
+        self.doubtful: Counter[str] = Counter()
         self.part_length: float | None = None
         self.absolute = is_absolute(next(iter(mapping.sources.values())).time)
 
@@ -86,10 +87,9 @@ class Summary:
         """What no column of the log holds as it is."""
         mapping, lines = self.mapping, []
         if mapping.has("lat"):
-            where = (
-                "of each run's first position (origin in [runs])" if mapping.origin is None else f"at {mapping.origin.lat:g}, {mapping.origin.lon:g}"
-            )
-            lines.append(f"x, y from lat, lon: the plane that touches the WGS84 ellipsoid {where}")
+            fixed = mapping.origin
+            where = "the first position of each stretch (origin in [runs])" if fixed is None else f"{fixed.lat:g}, {fixed.lon:g} deg"
+            lines.append(f"x, y from lat, lon: the plane that touches the WGS84 ellipsoid at {where}")
         for source in mapping.sources.values():
             if source.antenna:
                 lines.append(f"positions moved to midship from an antenna at x = {source.antenna.x:g} m, y = {source.antenna.y:g} m")
@@ -121,6 +121,7 @@ class Summary:
         lines = self.derived()
         if self.mapping.split.window:
             lines.append(f"runs are windows of {self.mapping.split.window:g} s; those of one recording may follow each other without a pause")
+        lines += [f"DOUBTFUL: {count} samples of {what}: outliers, or a wrong unit" for what, count in self.doubtful.items() if count]
         if self.part_length is not None:
             lines.append(f"densely sampled: parts of at most {self.part_length:g} s, to keep memory small")
         return lines
@@ -161,10 +162,9 @@ class Summary:
     def lines(self) -> list[str]:
         """For the terminal."""
         dt, seconds = self.mapping.dt, sum(r["seconds"] for r in self.runs)
-        lines = [
-            f"{self.mapping.name}: {len(self.runs)} runs, {_duration(seconds)} of {_duration(self.seconds)} of log, dt = {dt:g} s, "
-            f"actuators {self.actuators()}"
-        ]
+        runs = f"{len(self.runs)} run{'s' * (len(self.runs) > 1)}"
+        of = f"{_duration(seconds)} of {_duration(self.seconds)} of log"
+        lines = [f"{self.mapping.name}: {runs}, {of}, dt = {dt:g} s, actuators {self.actuators()}"]
         lines += [f"  {r['id']}: {r['seconds']:g} s, {r['from']} to {r['to']}" for r in self.runs[:_SHOWN]]
         if len(self.runs) > _SHOWN:
             lines.append(f"  ... and {len(self.runs) - _SHOWN} more")
@@ -172,7 +172,7 @@ class Summary:
         blocks = {
             "read": [f"{what}: {count} file{'s' * (count > 1)}" for what, count in Counter(self.met.forms.values()).items()],
             "channels": self.converted(),
-            "derived": self.notes(),
+            "notes": self.notes(),
             "left out": self.left_out(),
             "not recorded": [f"{', '.join(missing)}: taken as zero when the data set is loaded"] if missing else [],
         }
@@ -185,4 +185,4 @@ class Summary:
 def _duration(seconds: float) -> str:
     if seconds < 120:
         return f"{seconds:g} s"
-    return f"{seconds / 60:.1f} min" if seconds < 7200 else f"{seconds / 3600:.2f} h"
+    return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.2f} h"

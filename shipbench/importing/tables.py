@@ -24,7 +24,7 @@ from .mapping import Layout
 
 DELIMITERS = (",", ";", "\t", "|")
 MOST_COLUMNS = 10_000
-_HEAD = 1 << 22
+TEXT_BLOCK = 1 << 22
 """Bytes in which the header must stand, and the size of the blocks in which text is read."""
 _ROWS = 50_000
 _UNREADABLE = (ValueError, OSError, EOFError, zlib.error, lzma.LZMAError, pa.ArrowException, MemoryError)
@@ -159,7 +159,7 @@ def _encoding(path: Path, head: bytes, layout: Layout) -> str:
 
 def _open_text(path: Path, layout: Layout, magic: bytes) -> Table:
     with _uncompressed(path, magic) as file:
-        head = file.read(_HEAD)
+        head = file.read(TEXT_BLOCK)
     if not head.strip():
         raise InputError(f"{path} holds no text. Give a log with a header and rows.")
     encoding = _encoding(path, head, layout)
@@ -174,7 +174,7 @@ def _open_text(path: Path, layout: Layout, magic: bytes) -> Table:
     def stream(wanted: Sequence[str]) -> Iterator[pa.RecordBatch]:
         # All as text: numbers are read by channels.py, which can name the row and the cell that is none.
         read = pa.csv.ReadOptions(
-            use_threads=False, block_size=_HEAD, skip_rows=layout.header + layout.skip, column_names=[str(i) for i in range(len(columns))],
+            use_threads=False, block_size=TEXT_BLOCK, skip_rows=layout.header + layout.skip, column_names=[str(i) for i in range(len(columns))],
             encoding="utf-8" if encoding == "utf-8-sig" else encoding,
         )  # fmt: skip
         at = [places[name] for name in wanted]
@@ -183,7 +183,7 @@ def _open_text(path: Path, layout: Layout, magic: bytes) -> Table:
             try:
                 reader = pa.csv.open_csv(raw, read, pa.csv.ParseOptions(delimiter=delimiter), convert)
             except pa.ArrowInvalid as error:
-                if "Empty CSV" in str(error):
+                if "Empty CSV" in str(error) or "Could not skip" in str(error):
                     raise InputError(f"{path} has a header and no rows. Give a log with one row per sample.") from None
                 raise
             for batch in reader:
@@ -206,8 +206,8 @@ def _first_lines(path: Path, head: bytes, encoding: str, number: int) -> list[st
     first = [line.rstrip("\n") for line, _ in zip(lines, range(number), strict=False)]
     if len(first) < number or not first[-1].strip():
         raise InputError(f"{path}: row {number} holds no header ([file] header = {number}). Set the number of the row with the columns' names.")
-    if len(decoded) == len(first[0]) and len(head) >= _HEAD:
-        raise InputError(f"{path}: its first line is longer than {_HEAD >> 20} MB. Accepted: {KINDS}.")
+    if len(decoded) == len(first[0]) and len(head) >= TEXT_BLOCK:
+        raise InputError(f"{path}: its first line is longer than {TEXT_BLOCK >> 20} MB. Accepted: {KINDS}.")
     return first
 
 

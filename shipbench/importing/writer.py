@@ -20,7 +20,7 @@ from ..data.files import TABLES
 from ..errors import InputError
 from ..ship import Ship
 
-_CSV_ROWS = 200_000
+CSV_ROWS = 200_000
 _OURS = {*TABLES, "dataset.toml", "ship.toml"}
 
 
@@ -62,7 +62,7 @@ class FolderWriter:
             if self._table is not None:
                 self._table.close()
             table = self.fresh / "trajectories.parquet"
-            if self.rows <= _CSV_ROWS:  # small enough to be opened by people
+            if self.rows <= CSV_ROWS:  # small enough to be opened by people
                 pa.csv.write_csv(pa.parquet.read_table(table), self.fresh / "trajectories.csv", pa.csv.WriteOptions(quoting_style="needed"))
                 table.unlink()
                 table = self.fresh / "trajectories.csv"

@@ -1,0 +1,124 @@
+"""The draft of a mapping: what it guesses is called a guess, and after a look it imports."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from trial import SHIP, logged, write
+from typer.testing import CliRunner
+
+from shipbench.cli import app
+from shipbench.data.base import load_dataset
+
+
+@pytest.fixture
+def propose(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, "ship.toml", SHIP)
+
+    def run(*logs, options=()):
+        return CliRunner().invoke(app, ["data", "import", *map(str, logs), "--propose", "draft.toml", *options])
+
+    return run
+
+
+def columns(text: str) -> dict[str, tuple[str, str]]:
+    plan = tomllib.loads(text)
+    return {ours: (entry["column"], entry["unit"]) for ours, entry in plan["channels"].items()}
+
+
+def test_the_draft_of_a_clear_log_imports_as_it_is(propose, tmp_path):
+    table = logged(np.arange(0.0, 60.0, 0.5)).rename(columns={
+        "surge": "u_velo [kn]", "sway": "vm_velo [m/s]", "HDG": "HDG (deg)", "ROT": "ROT [deg/min]", "rpm": "shaft speed [rpm]",
+        "rudder": "Rudder Angle [°]", "rudder order": "rudder_cmd [deg]", "time": "t [s]",
+    }).assign(remark="calm")  # fmt: skip
+    result = propose(write(tmp_path, "log.csv", table))
+    assert result.exit_code == 0, result.output
+    text = (tmp_path / "draft.toml").read_text()
+    assert columns(text) == {
+        "x": ("north", "m"), "y": ("east", "m"), "psi": ("HDG (deg)", "deg"), "u": ("u_velo [kn]", "kn"), "v": ("vm_velo [m/s]", "m/s"),
+        "r": ("ROT [deg/min]", "deg/min"), "n": ("shaft speed [rpm]", "rpm"), "delta": ("Rudder Angle [°]", "deg"),
+        "delta_c": ("rudder_cmd [deg]", "deg"),
+    }  # fmt: skip
+    for line in re.findall(r"(?m)^\w+ = \{.*$", text):
+        assert "# GUESS" in line
+    assert "1 columns were not taken: remark" in result.stdout
+    done = CliRunner().invoke(app, ["data", "import", "log.csv", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"])
+    assert done.exit_code == 0, done.output
+    assert len(load_dataset("out")) == 1
+
+
+def test_instruments_become_sources_and_nautical_names_are_known(propose, tmp_path):
+    t = np.arange(0.0, 60.0)
+    stamps = (pd.Timestamp("2024-05-04") + pd.to_timedelta(t, "s")).strftime("%Y-%m-%dT%H:%M:%SZ")
+    gps = pd.DataFrame({"UTC": stamps, "Latitude": 52.0 + t * 1e-5, "Longitude": 4.0 + 0 * t, "SOG": 8.0, "COG": 359.0})
+    gyro = pd.DataFrame({"unixTime": 1.7e9 + t, "Heading": 180.0 + t, "ROT": 30.0})
+    result = propose(write(tmp_path, "gps.csv", gps), write(tmp_path, "gyro.csv", gyro))
+    assert result.exit_code == 0, result.output
+    plan = tomllib.loads((tmp_path / "draft.toml").read_text())
+    first, second = plan["sources"].values()
+    assert (first["files"], first["time"]) == ("gps.csv", {"column": "UTC", "format": "iso"})
+    assert second["time"] == {"column": "unixTime", "format": "unix"}
+    assert {k: v["unit"] for k, v in (first["channels"] | second["channels"]).items()} == {
+        "lat": "deg", "lon": "deg", "sog": "kn", "cog": "deg", "psi": "deg", "r": "deg/min",
+    }  # fmt: skip
+    assert "no rudder angle" in result.stdout
+
+
+def test_decimal_commas_and_german_dates_are_seen(propose, tmp_path):
+    table = logged(np.arange(0.0, 30.0))
+    table["time"] = (pd.Timestamp("2024-05-04") + pd.to_timedelta(table["time"], "s")).dt.strftime("%d.%m.%Y %H:%M:%S")
+    path = tmp_path / "log.csv"
+    table.to_csv(path, index=False, sep=";", decimal=",")
+    propose(path)
+    plan = tomllib.loads((tmp_path / "draft.toml").read_text())
+    assert plan["file"]["decimal"] == ","
+    assert plan["time"]["format"] == "%d.%m.%Y %H:%M:%S"
+    done = CliRunner().invoke(app, ["data", "import", "log.csv", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"])
+    assert done.exit_code == 0, done.output
+
+
+def test_what_is_not_found_is_told_and_never_filled_in(propose, tmp_path):
+    result = propose(write(tmp_path, "log.csv", pd.DataFrame({"a": np.arange(9.0), "b": np.arange(9.0)})))
+    assert result.exit_code == 0
+    for missing in ("for the time", "for psi", "no position"):
+        assert missing in result.stdout
+    done = CliRunner().invoke(app, ["data", "import", "log.csv", "--map", "draft.toml", "--ship", "ship.toml"])
+    assert done.exit_code == 2
+
+
+def test_an_existing_draft_is_kept_unless_forced(propose, tmp_path):
+    log = write(tmp_path, "log.csv", logged(np.arange(9.0)))
+    write(tmp_path, "draft.toml", "mine")
+    assert propose(log).exit_code == 2
+    assert (tmp_path / "draft.toml").read_text() == "mine"
+    assert propose(log, options=["--force"]).exit_code == 0
+
+
+def test_names_with_quotes_and_escapes_stay_valid_toml(propose, tmp_path):
+    table = logged(np.arange(9.0)).rename(columns={"HDG": 'heading "true" \\ [deg]'})
+    assert propose(write(tmp_path, "log.csv", table)).exit_code == 0
+    assert columns((tmp_path / "draft.toml").read_text())["psi"][0] == 'heading "true" \\ [deg]'
+
+
+def test_the_mapping_in_the_readme_imports_a_log(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    (plan,) = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
+    write(tmp_path, "mapping.toml", plan)
+    write(tmp_path, "ship.toml", SHIP)
+    t = np.arange(0.0, 700.0)
+    stamps = (pd.Timestamp("2024-05-04") + pd.to_timedelta(t, "s")).strftime("%Y-%m-%d %H:%M:%S")
+    table = pd.DataFrame({"UTC": stamps, "Latitude": 52 + 4e-5 * t, "Longitude": 4.0, "HDG": 0.0, "shaft [rpm]": 90.0, "rudder": 5.0})
+    table.to_csv("bridge.csv", index=False)
+    done = CliRunner().invoke(app, ["data", "import", "bridge.csv", "--map", "mapping.toml", "--ship", "ship.toml", "--out", "my_trial"])
+    assert done.exit_code == 0, done.output
+    data = load_dataset("my_trial")
+    assert [len(run) for run in data.runs] == [301, 301]
+    np.testing.assert_allclose(data.runs[0].states[:, 3], 4e-5 * 111_270, rtol=1e-3)  # a degree of latitude at 52 north is 111.27 km
+    np.testing.assert_allclose(data.runs[0].states[:, 7], -np.deg2rad(5.0), rtol=1e-9)
