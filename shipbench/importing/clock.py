@@ -42,6 +42,8 @@ def to_seconds(clock: Clock, columns: list[pa.Array], numbers: np.ndarray | None
         InputError: unknown format, unreadable stamps, or stamps of which only some have a zone.
     """
     if pa.types.is_timestamp(columns[0].type):
+        if counts(clock):
+            raise InputError(f"{where}: '{clock.names[0]}' holds time stamps, [time] format = '{clock.format}' counts; accepted for it: 'iso'.")
         return _from_timestamps(columns[0], clock, where) + clock.shift
     if numbers is not None:
         factor, zero = (RELATIVE[clock.format], 0.0) if clock.format in RELATIVE else _ABSOLUTE[clock.format]

@@ -68,7 +68,7 @@ def import_logs(
                 run = _free(name, taken)
                 writer.add(run, np.round(piece.t - zero, 9), piece.columns)
                 summary.doubtful.update(outliers(piece, ship))
-                summary.add(run, log.files, piece, None if group is None else f"{log.name}_{group}")
+                summary.add(run, log.files, piece, None if group is None else f"{log.name}_stretch_{group}")
             tell(f"{log.name}: {len(summary.runs) - before} run(s)")
         summary.complete(met)
         if not summary.runs:

@@ -47,6 +47,8 @@ _TIME_RULE = r"\b(t|time|timestamp|date ?time|utc|datetime|time ?stamp|clock|sec
 _ACCEPTED = {"m": "m, km, ft, nmi", "m/s": "m/s, kn, km/h, ft/s", "rad": "rad, deg", "rad/s": "rad/s, deg/s, deg/min", "rpm": "rpm, rev/s, rad/s",
              "N": "N, kN, MN, tf"}  # fmt: skip
 _ROWS = 4000
+_SLOW = 5.0
+"""Channels with longer steps [s] get a limit of their own, so that theirs does not become that of all."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def write_proposal(logs: Sequence[Path], path: Path, force: bool = False) -> lis
         f"dt = {_guess_dt(drafts):g}  # GUESS: sample time of the data set [s]",
         "",
         "[split]",
-        f"gap = {max(3.0, 3 * max(d.step for d in drafts)):g}  # GUESS: longer pauses between samples [s] split runs; never bridged",
+        f"gap = {max(3.0, *(3 * d.step for d in drafts if d.step <= _SLOW)):g}  # GUESS: longer pauses between samples [s] split runs; never bridged",
         "# window = 300.0       # cut into windows of that length [s]",
         "# still_speed = 0.1    # leave out where the ship lies still: slower than that [m/s] ...",
         "# still_time = 60.0    # ... for that long [s]",
@@ -93,7 +95,11 @@ def write_proposal(logs: Sequence[Path], path: Path, force: bool = False) -> lis
     body: list[str] = []
     for k, draft in enumerate(drafts):
         prefix = "" if len(drafts) == 1 else f"sources.source{k + 1}."
-        body += ["", *draft.toml(prefix, seen)]
+        known = len(seen)
+        lines_of_source = draft.toml(prefix, seen)
+        if prefix and len(seen) == known:  # nothing in it was recognised: for the reader to complete
+            lines_of_source = [f"# {line}".rstrip() for line in lines_of_source]
+        body += ["", *lines_of_source]
         lines += draft.remarks
     lines += _missing(seen)
     text = "\n".join([*head, *body, "", *(f"# {line}" for line in lines)]) + "\n"
@@ -187,7 +193,9 @@ class _Draft:
                 continue
             seen.add(channel)
             unit, why = _guess_unit(channel, column)
-            lines.append(f"{channel} = {{ column = {_quoted(column.name)}, unit = {_quoted(unit)} }}  # GUESS: {why}; {_range(column.values)}")
+            gap = f", gap = {3 * self.step:g}" if self.step > _SLOW else ""
+            entry = f"{channel} = {{ column = {_quoted(column.name)}, unit = {_quoted(unit)}{gap} }}"
+            lines.append(f"{entry}  # GUESS: {why}; {_range(column.values)}")
         if left:
             lines.append(f"# not taken: {', '.join(_quoted(name) for name in left[:40])}{' and more' if len(left) > 40 else ''}")
             self.remarks.append(f"{self.path.name}: {len(left)} columns were not taken: {', '.join(left[:8])}{' ...' if len(left) > 8 else ''}.")
@@ -197,8 +205,10 @@ class _Draft:
 def _draft(path: Path) -> _Draft:
     table = open_table(path, Layout())
     unique = [name for name in dict.fromkeys(table.columns) if name and table.columns.count(name) == 1]
-    batch = _head(table, unique)
-    arrays = {name: batch.column(name) for name in unique}
+    if table.form == "MATLAB":  # vectors of several lengths may stand in one file
+        arrays = {name: _head(table, [name]).column(0) for name in unique}
+    else:
+        arrays = dict(zip(unique, _head(table, unique).columns, strict=True))
     commas = sum(_matches(a, r"^\s*-?\d+,\d+\s*$") for a in arrays.values())
     points = sum(_matches(a, r"^\s*-?\d+\.\d+\s*$") for a in arrays.values())
     decimal = "," if commas > points else "."

@@ -126,6 +126,43 @@ def test_date_and_time_in_two_columns_and_two_decimals_of_a_second(trial_import)
     check_motion(load_dataset("out").runs[0])
 
 
+@pytest.mark.parametrize(
+    ("clock", "stamps", "told"),
+    [
+        ('zone = "Europe/Amsterdam"', ["2024-10-27 02:30:00", "2024-10-27 02:30:01"], "no one meaning"),
+        ('zone = "UTC"', ["2024-10-27 02:30:00Z", "2024-10-27 02:30:01Z"], "zone of their own"),
+        ("", ["2024-10-27 02:30:00Z", "2024-10-27 02:30:01"], "1 of 2 time stamps have a zone"),
+        ("", ["2024-10-27 02:30:00", "yesterday"], "not of the format 'iso'"),
+    ],
+)  # fmt: skip
+def test_time_stamps_that_do_not_name_one_moment_are_refused(trial_import, clock, stamps, told):
+    table = logged(T[:2])
+    table["time"] = stamps
+    result = trial_import(table, mapping(time=f'column = "time"\nformat = "iso"\n{clock}'))
+    assert result.exit_code == 2
+    assert told in result.stderr
+
+
+def test_typed_time_stamps_of_parquet(trial_import, tmp_path):
+    table = logged(T[::5])
+    table["time"] = pd.Timestamp("2024-07-01 12:00:00", tz="Europe/Paris") + pd.to_timedelta(table["time"], "s")
+    table.to_parquet(tmp_path / "log.parquet")
+    assert "accepted for it: 'iso'" in trial_import([tmp_path / "log.parquet"]).stderr
+    result = trial_import([tmp_path / "log.parquet"], mapping(time='column = "time"\nformat = "iso"'))
+    assert result.exit_code == 0, result.output
+    run = load_dataset("out").runs[0]
+    assert run.meta["from"] == "2024-07-01T10:00:00.000Z"
+    check_motion(run)
+
+
+def test_a_header_in_latin_1(trial_import, tmp_path):
+    path = tmp_path / "log.csv"
+    logged(T[::5]).rename(columns={"rudder": "rudder [°]"}).to_csv(path, index=False, encoding="latin-1")
+    plan = mapping(body=channels(delta='{ column = "rudder [°]", unit = "deg" }'))
+    assert "set [file] encoding = 'latin-1'" in trial_import([path], plan).stderr
+    assert trial_import([path], plan.replace("[channels]", '[file]\nencoding = "latin-1"\n[channels]')).exit_code == 0
+
+
 def test_a_gap_splits_and_is_never_bridged(trial_import):
     t = np.r_[np.arange(0, 50, 0.5), np.arange(57.25, 130, 0.5)]
     result = trial_import(logged(t))
@@ -157,7 +194,7 @@ def test_a_run_longer_than_the_longest_comes_in_parts_of_one_group(trial_import)
     trial_import(logged(T), mapping(tables="[split]\nlongest = 40.0"))
     data = load_dataset("out")
     assert [(r.t[0], r.t[-1]) for r in data.runs] == [(0.0, 40.0), (41.0, 81.0), (82.0, 120.0)]
-    assert {r.meta["group"] for r in data.runs} == {"log_001"}
+    assert {r.meta["group"] for r in data.runs} == {"log_stretch_001"}
     for run in data.runs:
         check_motion(run)  # also at the cuts: the filter sees beyond them
 

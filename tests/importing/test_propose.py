@@ -70,6 +70,31 @@ def test_instruments_become_sources_and_nautical_names_are_known(propose, tmp_pa
     assert "no rudder angle" in result.stdout
 
 
+def test_a_slow_source_has_a_gap_of_its_own_and_an_unknown_one_is_left_to_the_reader(propose, tmp_path):
+    t = np.arange(0.0, 100.0)
+    wind = pd.DataFrame({"t [s]": t[::10], "TWS [kn]": 12.0, "TWD [deg]": 200.0})
+    other = pd.DataFrame({"t [s]": t, "cheese": 1.0})
+    propose(*(write(tmp_path, n, d) for n, d in (("ship.csv", logged(t)), ("wind.csv", wind), ("other.csv", other))))
+    plan = tomllib.loads((tmp_path / "draft.toml").read_text())
+    assert plan["split"]["gap"] == 3
+    assert len(plan["sources"]) == 2
+    assert plan["sources"]["source2"]["channels"]["wind_speed"] == {"column": "TWS [kn]", "unit": "kn", "gap": 30}
+    command = ["data", "import", "ship.csv", "wind.csv", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    assert "belongs to no source" in CliRunner().invoke(app, [*command, "other.csv", "--force"]).stderr
+
+
+def test_vectors_of_several_lengths_in_one_matlab_file(propose, tmp_path):
+    from scipy.io import savemat
+
+    savemat(
+        tmp_path / "log.mat",
+        {"gps": {"t": np.arange(20.0), "lat": 52 + np.zeros(20)}, "gyro": {"t": np.arange(0, 20, 0.1), "heading": np.zeros(200)}},
+    )
+    assert propose(tmp_path / "log.mat").exit_code == 0
+    assert {"lat", "psi"} <= set(columns((tmp_path / "draft.toml").read_text()))
+
+
 def test_decimal_commas_and_german_dates_are_seen(propose, tmp_path):
     table = logged(np.arange(0.0, 30.0))
     table["time"] = (pd.Timestamp("2024-05-04") + pd.to_timedelta(table["time"], "s")).dt.strftime("%d.%m.%Y %H:%M:%S")
