@@ -48,10 +48,11 @@ def data_import(
         )
     from .importing.importer import import_logs
     from .importing.mapping import load_mapping
+    from .importing.writer import run_name
     from .ship import Ship
 
     plan = load_mapping(mapping, name=name, dt=dt, window=window, shortest=shortest, still_speed=still)
-    folder = out or Path(plan.name)
+    folder = out or Path(run_name(plan.name))  # a name is no path
     summary = import_logs(logs, plan, Ship.load(ship), folder, force=force, tell=lambda line: None if quiet else typer.echo(line, err=True))
     if as_json:
         print_json(summary.document())

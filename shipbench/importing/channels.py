@@ -12,12 +12,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from ..errors import InputError
-from .clock import check_format, counts, to_seconds
+from .clock import check_format, counts, is_daily, shown, to_seconds
 from .mapping import Channel, Mapping, Source, channel_factor
-from .tables import Table, open_table
+from .tables import Table, open_table, reading
 
 _EMPTY = ("", "NA", "N/A", "NaN", "nan", "NAN", "null", "NULL", "None", "#N/A", "NaT")
 _GREATEST = 1e30
+_TEXTS = (pa.types.is_string, pa.types.is_large_string, pa.types.is_string_view)
 _NUMBERS = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_boolean, pa.types.is_null)
 
 
@@ -56,19 +57,22 @@ def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str |
     done = 0
     for batch in table.batches(columns):
         where = f"{path}, rows from {table.first_row + done}"
-        cells = _Cells(table, batch, source, table.first_row + done, met)
-        values = np.column_stack([f * (cells.numbers(c.column) + c.offset) for f, c in zip(factors, channels, strict=True)])
-        if clock.rate is not None:
-            t = (done + np.arange(batch.num_rows)) / clock.rate + clock.shift
-        else:
-            numbers = cells.numbers(clock.names[0]) if counts(clock) and not pa.types.is_timestamp(batch.column(clock.names[0]).type) else None
-            t = to_seconds(clock, [batch.column(n) for n in clock.names], numbers, where)
+        with reading(path):  # cells may be of any kind and size
+            cells = _Cells(table, batch, source, table.first_row + done, met)
+            values = np.column_stack([f * (cells.numbers(c.column) + c.offset) for f, c in zip(factors, channels, strict=True)])
+            if clock.rate is not None:
+                t = (done + np.arange(batch.num_rows)) / clock.rate + clock.shift
+            else:
+                typed = pa.types.is_timestamp(batch.column(clock.names[0]).type)
+                numbers = cells.numbers(clock.names[0]) if counts(clock) and not typed else None
+                t = to_seconds(clock, [batch.column(n) for n in clock.names], numbers, where)
+            names = cells.names(source.run) if source.run else None
         _check_range(source, values, where)
         done += batch.num_rows
         met.rows += batch.num_rows
         stamped = np.isfinite(t)
         met.what["rows without a time, left out"] += int((~stamped).sum())
-        yield from _by_name(Block(t, values), stamped, cells.names(source.run) if source.run else None, met)
+        yield from _by_name(Block(t, values), stamped, names, met)
     if done == 0:
         raise InputError(f"{path} has a header and no rows. Give a log with one row per sample.")
 
@@ -94,8 +98,8 @@ class _Cells:
         array = self.batch.column(column)
         if pa.types.is_dictionary(array.type):
             array = array.dictionary_decode()
-        if pa.types.is_string(array.type) or pa.types.is_large_string(array.type):
-            array = self._parsed(column, array)
+        if any(is_kind(array.type) for is_kind in _TEXTS):
+            array = self._parsed(column, array.cast(pa.large_string()))
         elif not any(is_kind(array.type) for is_kind in _NUMBERS):
             raise InputError(f"{self.table.path}: column '{column}' holds {array.type}; accepted: numbers.")
         values = pc.fill_null(array.cast(pa.float64(), safe=False), np.nan).to_numpy(zero_copy_only=False).astype(float)
@@ -158,6 +162,8 @@ def in_order(blocks: Iterable[Block], source: Source, where: str, met: Counts) -
         InputError: time goes back, or so many rows repeat a time that the stamps are coarser than the samples.
     """
     last, last_row, rows, repeats = -np.inf, None, 0, 0
+    if is_daily(source.time):
+        blocks = _over_midnight(blocks)
     for block in _spread(blocks) if source.time.repeated == "spread" else blocks:
         if len(block.t) == 0:
             continue
@@ -167,9 +173,9 @@ def in_order(blocks: Iterable[Block], source: Source, where: str, met: Counts) -
             k = int(np.argmax(back))
             if source.time.backwards == "error":
                 raise InputError(
-                    f"{where}: time goes back from {high[k]:.10g} s to {block.t[k]:.10g} s ({int(back.sum())} such rows in one block). "
-                    "Sort the log; or, if "
-                    'it holds several runs, name their column (`run = ...`); or leave such rows out with [time] backwards = "drop".'
+                    f"{where}: time goes back from {shown(source.time, high[k])} to {shown(source.time, block.t[k])} "
+                    f"({int(back.sum())} such rows in one block). Sort the log; or, if it holds several runs, name their column (`run = ...`); "
+                    'or leave such rows out with [time] backwards = "drop".'
                 )
             met.what["rows that go back in time, left out"] += int(back.sum())
             block = block.rows(~back)
@@ -186,6 +192,16 @@ def in_order(blocks: Iterable[Block], source: Source, where: str, met: Counts) -
             'Set [time] repeated = "spread" '
             "to spread such rows evenly until the next stamp, or use a finer time column."
         )
+
+
+def _over_midnight(blocks: Iterable[Block]) -> Iterator[Block]:
+    """Times of day, counted on: a step back by more than half a day is a new day."""
+    last, days = -np.inf, 0
+    for block in blocks:
+        if len(block.t):
+            new = days + np.cumsum(np.diff(block.t, prepend=last) < -43_200.0)
+            last, days = block.t[-1], int(new[-1])
+            yield Block(block.t + 86_400.0 * new, block.values)
 
 
 def _spread(blocks: Iterable[Block]) -> Iterator[Block]:

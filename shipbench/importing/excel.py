@@ -15,7 +15,9 @@ from ..errors import InputError
 from .mapping import Layout
 from .tables import MOST_COLUMNS, Table, as_batch
 
-_LARGEST = 1_000_000_000
+_LARGEST, _LARGEST_WHOLE = 1_000_000_000, 100_000_000
+_DENSEST = 200
+"""Unpacked over packed size of a workbook; those of logs are below 50."""
 _ROWS = 20_000
 
 
@@ -23,7 +25,8 @@ def open_excel(path: Path, layout: Layout) -> Table:
     """The sheet named in the mapping, else the only one.
 
     Raises:
-        InputError: openpyxl is not installed, or the file is no workbook, holds more than 1 GB, or has several sheets and none is named.
+        InputError: openpyxl is not installed, or the file is no workbook, holds more than 1 GB (100 MB of texts), or has several sheets and none
+            is named.
     """
     try:
         import openpyxl
@@ -35,10 +38,13 @@ def open_excel(path: Path, layout: Layout) -> Table:
     if not zipfile.is_zipfile(path):
         raise InputError(f"{path} is no Excel workbook or is cut short. Save it anew as .xlsx, or as CSV.")
     with zipfile.ZipFile(path) as packed:
-        size = sum(part.file_size for part in packed.infolist())
-    if size > _LARGEST:
+        parts = packed.infolist()
+    size, whole = sum(p.file_size for p in parts), sum(p.file_size for p in parts if not p.filename.startswith("xl/worksheets/"))
+    if size > _LARGEST or whole > _LARGEST_WHOLE or size > max(_DENSEST * path.stat().st_size, 10_000_000):
         raise InputError(
-            f"{path} holds {size / 1e6:.0f} MB unpacked; accepted: up to {_LARGEST / 1e6:.0f} MB. Save the sheet as CSV, which is streamed."
+            f"{path} has {path.stat().st_size / 1e6:.1f} MB and holds {size / 1e6:.0f} MB unpacked, {whole / 1e6:.0f} MB of them texts and styles; "
+            f"accepted: up to {_LARGEST / 1e6:.0f} MB, {_LARGEST_WHOLE / 1e6:.0f} MB of texts and styles, and {_DENSEST} times its size. "
+            "Save the sheet as CSV, which is streamed."
         )
 
     def rows() -> Iterator[tuple[Any, ...]]:

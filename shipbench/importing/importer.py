@@ -25,6 +25,7 @@ from .writer import FolderWriter, run_name
 
 _CONTEXT = 20
 """Samples of the grid that filter and smoother may see beyond the ends of a part."""
+_FINEST = 100
 
 
 @dataclass
@@ -58,6 +59,9 @@ def import_logs(
     for path in logs:
         if not path.exists():
             raise InputError(f"cannot read {path}: no such file. Give the path of an existing log.")
+    places = [path.resolve() for path in logs]
+    if twice := [str(path) for k, path in enumerate(logs) if places[k] in places[:k]]:
+        raise InputError(f"{twice[0]} is given twice; a run that stands twice would be on both sides of a fold. Give each log once.")
     if inside := [str(p) for p in logs if out.resolve() in p.resolve().parents]:
         raise InputError(f"{inside[0]} lies in the folder that --out names ({out}). Give another --out.")
     taken: Counter[str] = Counter()
@@ -69,7 +73,8 @@ def import_logs(
                 writer.add(run, np.round(piece.t - zero, 9), piece.columns)
                 summary.doubtful.update(outliers(piece, ship))
                 summary.add(run, log.files, piece, None if group is None else f"{log.name}_stretch_{group}")
-            tell(f"{log.name}: {len(summary.runs) - before} run(s)")
+            if len(summary.runs) > before or len(logs) > 1:
+                tell(f"{log.name}: {len(summary.runs) - before} run(s)")
         summary.complete(met)
         if not summary.runs:
             raise InputError(summary.no_runs())
@@ -163,6 +168,7 @@ def _runs(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator
         if stretch.end - stretch.start < dt:
             summary.cut("shorter than dt", stretch.end - stretch.start)
             continue
+        _check_step(mapping, stretches.steps)
         whole = on_grid(stretch, mapping, ship)
         for moving in _told(without_standing(whole, mapping), len(whole.t), mapping, summary):
             for piece in windows(moving, mapping):
@@ -178,6 +184,15 @@ def _runs(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator
     for cut in stretches.cuts:
         if cut.end - cut.start > dt * (1 + 1e-6):
             summary.gap(cut)
+
+
+def _check_step(mapping: Mapping, steps: dict[str, float]) -> None:
+    finest = min(steps, key=lambda name: steps[name])
+    if mapping.dt < steps[finest] / _FINEST:
+        raise InputError(
+            f"dt = {mapping.dt:g} s is less than 1/{_FINEST} of the time between samples of '{finest}', the fastest channel ({steps[finest]:g} s). "
+            "Accepted: a dt that the log can show. Give a longer one."
+        )
 
 
 def _told(pieces: Iterator[Piece], samples: int, mapping: Mapping, summary: Summary) -> Iterator[Piece]:

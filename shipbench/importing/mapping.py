@@ -251,6 +251,8 @@ def _check_together(mapping: Mapping, path: str | Path) -> None:
             raise InputError(f"{path}: '{a}' and '{b}' stand in the sources {' and '.join(at)}; accepted: both in one, on one clock.")
     if len(mapping.sources) > 1 and any(s.run for s in mapping.sources.values()):
         raise InputError(f"{path}: `run` serves a mapping with one source. Split several merged sources by gaps, windows or standing still.")
+    if mapping.split.window is not None and mapping.split.window < mapping.dt:
+        raise InputError(f"{path}: split.window = {mapping.split.window:g} s is below dt = {mapping.dt:g} s; accepted: two samples or more.")
     if mapping.split.gap < mapping.dt * 0.5:
         raise InputError(f"{path}: split.gap = {mapping.split.gap:g} s is below dt = {mapping.dt:g} s; give the longest pause to be bridged.")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from ..errors import InputError
 from .tables import MOST_COLUMNS, Table, as_batch
 
 _LARGEST = 400_000_000
+_COMPRESSED = 15
 _ROWS = 50_000
 
 
@@ -25,15 +27,15 @@ def open_matlab(path: Path) -> Table:
     """
     from scipy.io import loadmat
 
-    if path.stat().st_size > _LARGEST:
-        raise InputError(
-            f"{path} has {path.stat().st_size / 1e6:.0f} MB; .mat files are read whole, accepted: up to {_LARGEST / 1e6:.0f} MB. "
-            "Save it as CSV (writetable) or Parquet (parquetwrite), which are streamed."
-        )
     with path.open("rb") as file:
         head = file.read(128)
     if head.startswith(b"\x89HDF") or b"MATLAB 7.3" in head:
         raise InputError(f"{path} is a MATLAB 7.3 file (HDF5), which is not read. In MATLAB: save('log.mat', ..., '-v7'), or writetable to CSV.")
+    if _unpacked_size(path) > _LARGEST:
+        raise InputError(
+            f"{path} holds more than {_LARGEST / 1e6:.0f} MB unpacked; .mat files are read whole, so that is the limit. "
+            "Save it as CSV (writetable) or Parquet (parquetwrite), which are streamed."
+        )
     try:
         content = loadmat(path, squeeze_me=True, struct_as_record=False)
     except NotImplementedError:
@@ -55,9 +57,35 @@ def open_matlab(path: Path) -> Table:
             told = ", ".join(f"{name} {n}" for name, n in lengths.items())
             raise InputError(f"{path}: vectors of one source differ in length: {told}. Give each rate a [sources.NAME] with its own time column.")
         for begin in range(0, max(lengths.values()), _ROWS):
-            yield as_batch({name: vectors[name][begin : begin + _ROWS] for name in wanted})
+            yield as_batch({name: _numbers(vectors[name][begin : begin + _ROWS]) for name in wanted})
 
     return Table(path, tuple(vectors), stream, 1, "MATLAB")
+
+
+def _unpacked_size(path: Path) -> int:
+    """Bytes of a file's content without its compression, counted until they are too many; what is no MATLAB file counts as it is."""
+    with path.open("rb") as file:
+        head = file.read(128)
+        order = {b"IM": "<", b"MI": ">"}.get(head[126:128])
+        if order is None:
+            return path.stat().st_size
+        total = 0
+        while total <= _LARGEST and len(tag := file.read(8)) == 8:
+            kind, size = struct.unpack(f"{order}II", tag)
+            if kind != _COMPRESSED:
+                total += size
+                file.seek(size, 1)
+                continue
+            packed = zlib.decompressobj()
+            while size > 0 and total <= _LARGEST and (part := file.read(min(size, 1 << 16))):
+                size -= len(part)
+                total += len(packed.decompress(part))
+    return total
+
+
+def _numbers(values: Any) -> Any:
+    """Numbers as floats, block by block so that small integers stay small in memory; text as it is."""
+    return values.astype(float) if isinstance(values, np.ndarray) else values
 
 
 def _collect(name: str, value: Any, vectors: dict[str, Any], depth: int) -> None:
@@ -68,9 +96,9 @@ def _collect(name: str, value: Any, vectors: dict[str, Any], depth: int) -> None
             _collect(f"{name}.{field}", getattr(value, field), vectors, depth + 1)
     elif isinstance(value, np.ndarray) and value.ndim == 1 and len(value) > 1:
         if value.dtype.kind in "fiub":
-            vectors[name] = value.astype(float)
+            vectors[name] = value
         elif value.dtype.kind in "US" or all(isinstance(v, str) for v in value):  # text, such as time stamps
             vectors[name] = [str(v) for v in value]
     elif isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "fiub" and value.shape[1] <= MOST_COLUMNS:
         for j in range(value.shape[1]):
-            vectors[f"{name}({j + 1})"] = value[:, j].astype(float)
+            vectors[f"{name}({j + 1})"] = value[:, j]

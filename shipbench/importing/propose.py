@@ -151,14 +151,13 @@ class _Draft:
                 kind, factor = _count_of(column.unit, values)
                 steps = np.diff(values)
                 return ([column.name], kind), float(np.median(steps[steps > 0])) * factor if (steps > 0).any() else 1.0
-            if re.match(r"\d{4}-\d\d-\d\d[T ]\d", column.text):
-                return ([column.name], "iso"), 1.0
-            dates = [c for c in columns if re.search(r"\bdate\b", c.words)]
-            if dates and re.match(r"\d{4}-\d\d-\d\d$", dates[0].text):
-                return ([dates[0].name, column.name], "iso"), 1.0
-            if re.match(r"\d{1,2}[/.]\d{1,2}[/.]\d{4} \d", column.text):
-                mark = "." if "." in column.text[:6] else "/"
-                return ([column.name], f"%d{mark}%m{mark}%Y %H:%M:%S" + (".%f" if re.search(r":\d\d\.\d", column.text) else "")), 1.0
+            if (stamp := _pattern(column.text)) is not None:
+                return ([column.name], stamp), 1.0
+            dates = [c for c in columns if re.search(r"\bdate\b", c.words) and c is not column]
+            if dates and (stamp := _pattern(f"{dates[0].text} {column.text}")) is not None:
+                return ([dates[0].name, column.name], stamp), 1.0
+            if (clock := _clock_pattern(column.text)) is not None:
+                return ([column.name], clock), 1.0
         self.remarks.append(f"MISSING: no column of {self.path.name} was taken for the time; write [time] column and format, or rate = 10.0 [Hz].")
         return None, 1.0
 
@@ -258,6 +257,33 @@ def _count_of(unit: str, values: np.ndarray) -> tuple[str, float]:
     if 3e4 < middle < 6e4 and np.median(np.diff(values)) < 0.01:  # days with fractions
         return "excel", 86400.0
     return "s", 1.0
+
+
+def _pattern(text: str) -> str | None:
+    """Format of a date and a time of day, or None; where the day cannot be told from the month, the day is first."""
+    date, _, time = text.partition(" ")
+    if (re.match(r"\d{4}-\d\d-\d\d$", date) and re.match(r"\d\d:\d\d", time)) or re.match(r"\d{4}-\d\d-\d\dT\d\d", text):
+        return "iso"
+    clock, parts = _clock_pattern(time), re.match(r"(\d{1,4})([/.-])(\d{1,2})\2(\d{2,4})$", date)
+    if clock is None or parts is None:
+        return None
+    first, mark, second, last = parts.groups()
+    if len(first) == 4:
+        order = ("%Y", "%m", "%d")
+    else:
+        year = "%Y" if len(last) == 4 else "%y"
+        order = ("%m", "%d", year) if int(second) > 12 else ("%d", "%m", year)
+    return f"{mark.join(order)} {clock}"
+
+
+def _clock_pattern(time: str) -> str | None:
+    """Format of a time of day, or None."""
+    found = re.match(r"\d{1,2}:\d\d(:\d\d)?(\.\d+)?(?: ?([AaPp][Mm]))?$", time.strip())
+    if found is None or (found[2] and not found[1]):
+        return None
+    hours = "%I" if found[3] else "%H"
+    after = (" %p" if " " in time.strip() else "%p") if found[3] else ""
+    return f"{hours}:%M{':%S' if found[1] else ''}{'.%f' if found[2] else ''}{after}"
 
 
 def _guess_unit(channel: str, column: _Column) -> tuple[str, str]:

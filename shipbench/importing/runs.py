@@ -33,10 +33,10 @@ class Piece:
 
 
 def shortest_run(mapping: Mapping) -> float:
-    """Length [s] below which a piece is left out: as the mapping says, else a whole window, else 20 samples."""
+    """Length [s] below which a piece is left out: as the mapping says (two samples at least), else a whole window, else 20 samples."""
     split = mapping.split
     if split.shortest is not None:
-        return split.shortest
+        return max(split.shortest, mapping.dt)
     return round(split.window / mapping.dt) * mapping.dt if split.window else 20 * mapping.dt
 
 

@@ -14,6 +14,8 @@ _SLACK = 1e-6
 """Relative slack of comparisons of times: a gap of just the limit is none."""
 _MOST_VALUES = 2e7
 """Readings of all channels that one part may have: 160 MB."""
+_MOST_SAMPLES = 1_000_000
+"""Samples of the grid that one part may have."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,7 @@ class Stretches:
     def _limit_memory(self) -> None:
         """Shorten the parts of a log that is sampled so densely that the longest part would not fit."""
         rates = [len(f.t) * len(f.channels) / (f.last - f.first) for f in self.feeds if f.last > f.first]
-        steps = max(int(_MOST_VALUES / max(sum(rates), 1e-9) / self.step), 1)
+        steps = min(max(int(_MOST_VALUES / max(sum(rates), 1e-9) / self.step), 1), _MOST_SAMPLES)
         self.longest = min(self.longest, steps * self.step)
 
     def _pieces(self, feed: Feed, channel: str) -> np.ndarray:

@@ -163,10 +163,12 @@ def _open_text(path: Path, layout: Layout, magic: bytes) -> Table:
     if not head.strip():
         raise InputError(f"{path} holds no text. Give a log with a header and rows.")
     encoding = _encoding(path, head, layout)
-    lines = _first_lines(path, head, encoding, layout.header)
-    delimiter = layout.delimiter or max(DELIMITERS, key=lines[-1].count)
-    columns = tuple(name.strip() for name in next(csv.reader([lines[-1]], delimiter=delimiter)))
-    if any(ord(c) < 32 and c != "\t" for c in lines[-1]):
+    header, first = _first_lines(path, head, encoding, layout)
+    delimiter = layout.delimiter or max(DELIMITERS, key=header.count)
+    columns = tuple(name.strip() for name in next(csv.reader([header], delimiter=delimiter)))
+    if first.rstrip().endswith(delimiter) and len(next(csv.reader([first], delimiter=delimiter))) == len(columns) + 1:
+        columns += ("",)  # every row ends with a delimiter that the header lacks
+    if any(ord(c) < 32 and c != "\t" for c in header):
         raise InputError(f"{path}: its header (row {layout.header}) holds control characters: the file is binary. Accepted: {KINDS}.")
     _check_number(path, len(columns))
     places = {name: str(i) for i, name in enumerate(columns)}
@@ -193,8 +195,9 @@ def _open_text(path: Path, layout: Layout, magic: bytes) -> Table:
     return Table(path, columns, stream, layout.header + layout.skip + 1, form)
 
 
-def _first_lines(path: Path, head: bytes, encoding: str, number: int) -> list[str]:
-    """The first `number` lines, the last of them the header."""
+def _first_lines(path: Path, head: bytes, encoding: str, layout: Layout) -> tuple[str, str]:
+    """The header and the first row of data (empty where there is none)."""
+    number = layout.header
     text = codecs.getincrementaldecoder(encoding)
     try:
         decoded = text().decode(head, final=False)
@@ -203,12 +206,12 @@ def _first_lines(path: Path, head: bytes, encoding: str, number: int) -> list[st
             f"{path} is not {encoding} text (byte {error.start}); if it is text, set [file] encoding = 'latin-1' (or what it is) in the mapping."
         ) from None
     lines = io.StringIO(decoded, newline=None)
-    first = [line.rstrip("\n") for line, _ in zip(lines, range(number), strict=False)]
-    if len(first) < number or not first[-1].strip():
+    first = [line.rstrip("\n") for line, _ in zip(lines, range(number + layout.skip + 1), strict=False)]
+    if len(first) < number or not first[number - 1].strip():
         raise InputError(f"{path}: row {number} holds no header ([file] header = {number}). Set the number of the row with the columns' names.")
     if len(decoded) == len(first[0]) and len(head) >= TEXT_BLOCK:
         raise InputError(f"{path}: its first line is longer than {TEXT_BLOCK >> 20} MB. Accepted: {KINDS}.")
-    return first
+    return first[number - 1], first[number + layout.skip] if len(first) > number + layout.skip else ""
 
 
 def as_batch(columns: dict[str, Any]) -> pa.RecordBatch:

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -35,9 +36,11 @@ class FolderWriter:
         self.out, self.rows = out, 0
         self._table: pa.parquet.ParquetWriter | None = None
         _check_target(out, force)
+        self._target = out.resolve()  # of a link, the folder that it points to is replaced
+        self._made = [folder for folder in self._target.parents if not folder.exists()]
         try:
-            out.absolute().parent.mkdir(parents=True, exist_ok=True)
-            self.fresh = Path(tempfile.mkdtemp(prefix=f".{out.name}.importing-", dir=out.absolute().parent))
+            self._target.parent.mkdir(parents=True, exist_ok=True)
+            self.fresh = Path(tempfile.mkdtemp(prefix=f".{self._target.name}.importing-", dir=self._target.parent))
         except OSError as error:
             raise self._unwritable(error) from None
 
@@ -75,15 +78,15 @@ class FolderWriter:
         return self.out / table.name
 
     def _replace(self) -> None:
-        if not self.out.is_dir():
-            os.replace(self.fresh, self.out)
+        if not self._target.is_dir():
+            os.replace(self.fresh, self._target)
             return
         old = self.fresh.with_name(self.fresh.name + ".old")
-        os.replace(self.out, old)
+        os.replace(self._target, old)
         try:
-            os.replace(self.fresh, self.out)
+            os.replace(self.fresh, self._target)
         except OSError:
-            os.replace(old, self.out)
+            os.replace(old, self._target)
             raise
         shutil.rmtree(old, ignore_errors=True)
 
@@ -92,8 +95,12 @@ class FolderWriter:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         if self._table is not None:
-            self._table.close()
+            with suppress(OSError):  # a full disk was told already
+                self._table.close()
         shutil.rmtree(self.fresh, ignore_errors=True)
+        with suppress(OSError):  # it is not empty: the data set is there
+            for folder in self._made:
+                folder.rmdir()
 
 
 def _check_target(out: Path, force: bool) -> None:
