@@ -14,7 +14,7 @@ import pyarrow as pa
 from ..errors import InputError
 from .tables import MOST_COLUMNS, Table, as_batch
 
-_LARGEST = 400_000_000
+_LARGEST = 1_100_000_000
 _COMPRESSED = 15
 _ROWS = 50_000
 

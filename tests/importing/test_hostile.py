@@ -6,10 +6,15 @@ import bz2
 import gzip
 import os
 import re
+import subprocess
+import sys
+import zipfile
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
 import pytest
-from trial import channels, logged, mapping, write
+from trial import SHIP, channels, logged, mapping, write
 from typer.testing import CliRunner
 
 from shipbench.cli import app
@@ -76,6 +81,112 @@ LOGS = {
     "too short": ("log.csv", "\n".join(ROWS[:5]) + "\n", "shorter than 20 s"),
     "all one time": ("log.csv", "\n".join([ROWS[0], *["5.0," + r.split(",", 1)[1] for r in ROWS[1:]]]) + "\n", "coarser|no run"),
 }
+
+
+CLOCKS = {
+    "milliseconds as seconds": ("unix", lambda k: f"{1.7e12 + 500 * k:.0f}", "year 55841; accepted: 1900 to 2199"),
+    "days as milliseconds": ("unix_us", lambda k: f"{1.7e18 + 5e5 * k:.0f}", "in the year 558"),
+    "a year far off": ("iso", lambda k: f"9999-12-31T00:{k // 60:02d}:{k % 60:02d}", "in the year 10000"),
+    "a time of day as a date": ("iso", lambda k: f"10:{k // 60:02d}:{k % 60:02d}", "%H:%M:%S"),
+    "a zone without a date": ('%H:%M:%S"\nzone = "UTC', lambda k: f"10:{k // 60:02d}:{k % 60:02d}", "without a date"),
+}
+
+
+@pytest.mark.parametrize("case", CLOCKS)
+def test_a_clock_that_cannot_be_is_one_message(trial_import, tmp_path, case):
+    form, stamp, expected = CLOCKS[case]
+    text = "\n".join([ROWS[0], *(f"{stamp(k)},{row.split(',', 1)[1]}" for k, row in enumerate(ROWS[1:]))])
+    result = trial_import(text, mapping(time=f'column = "time"\nformat = "{form}"'))
+    assert result.exit_code == 2, result.output
+    assert expected in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def matlab_of_zeros(path):
+    from scipy.io import savemat
+
+    savemat(path, {"time": T, "z": np.zeros(200_000)}, do_compression=True)
+
+
+def excel_of_zeros(path):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr("xl/sharedStrings.xml", b"<si><t>abc</t></si>" * 600_000)
+
+
+def parquet_of_one_long_text(path):
+    table = pa.table({name: pa.array(values) for name, values in logged(T).items()})
+    long = pa.array(["a" * 20_000_000] * len(T)).dictionary_encode()
+    pa.parquet.write_table(table.set_column(table.column_names.index("HDG"), "HDG", long), path)
+
+
+@pytest.mark.parametrize(
+    ("name", "write_log", "expected"),
+    [
+        ("log.mat", matlab_of_zeros, "more than 1 MB unpacked"),
+        ("log.xlsx", excel_of_zeros, "11 MB unpacked"),
+        ("log.parquet", parquet_of_one_long_text, "cannot be read"),
+    ],
+)
+def test_a_small_file_that_unpacks_to_a_large_one_is_refused_before_it_is_read(trial_import, tmp_path, monkeypatch, name, write_log, expected):
+    monkeypatch.setattr("shipbench.importing.matlab._LARGEST", 1_000_000)
+    write_log(tmp_path / name)
+    assert (tmp_path / name).stat().st_size < 1_000_000
+    result = trial_import([tmp_path / name])
+    assert result.exit_code == 2, result.output
+    assert expected in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--dt", "1e-9"], "less than 1/100 of the time between samples"),
+        (["--window", "0.01"], "split.window = 0.01 s is below dt"),
+        (["--dt", "nan"], "finite"),
+        (["--out", "new/folders/out", "--shortest", "1e6"], "no run is left"),
+    ],
+)  # fmt: skip
+def test_options_that_make_no_data_set(trial_import, tmp_path, options, expected):
+    result = trial_import(TEXT, None, *options)
+    assert result.exit_code == 2, result.output
+    assert result.stderr.startswith("error: ")
+    assert expected in result.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["log.csv", "mapping.toml", "ship.toml"]
+
+
+def test_the_same_log_twice_is_refused(trial_import, tmp_path):
+    path = write(tmp_path, "log.csv", TEXT)
+    (tmp_path / "folder").mkdir()
+    result = trial_import([path, tmp_path / "folder/../log.csv"])
+    assert result.exit_code == 2
+    assert "is given twice" in result.stderr
+
+
+def test_a_name_is_no_path_and_a_link_is_followed(trial_import, tmp_path):
+    write(tmp_path, "log.csv", TEXT)
+    write(tmp_path, "mapping.toml", mapping().replace('"trial"', '"../../trial"'))
+    write(tmp_path, "ship.toml", SHIP)
+    command = ["data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ship.toml"]
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "trial").symlink_to(tmp_path / "inner")
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    assert sorted(p.name for p in (tmp_path / "inner").iterdir()) == ["dataset.toml", "ship.toml", "trajectories.csv"]
+    assert (tmp_path / "trial").is_symlink()
+
+
+def test_a_full_disk_is_one_message_and_leaves_nothing(tmp_path):
+    pytest.importorskip("resource", reason="limits of a process are Unix's")
+    write(tmp_path, "log.csv", logged(np.arange(0.0, 4000.0, 0.5)))
+    write(tmp_path, "mapping.toml", mapping())
+    write(tmp_path, "ship.toml", SHIP)
+    code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)); from shipbench.cli import app; app(sys.argv[1:])"
+    command = [sys.executable, "-c", code, "data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ship.toml", "--out", "out"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "cannot write the data set to out" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["log.csv", "mapping.toml", "ship.toml"]
 
 
 @pytest.mark.parametrize("case", LOGS)

@@ -218,6 +218,17 @@ def test_standing_still_is_cut(trial_import):
     assert "standing still (below 0.5 m/s)" in result.stdout
 
 
+def test_times_of_day_count_on_over_midnight_and_rows_may_end_with_a_delimiter(trial_import):
+    table = logged(T[::5])
+    table["time"] = (pd.Timestamp("2024-02-29 23:59:00") + pd.to_timedelta(table["time"], "s")).dt.strftime("%H:%M:%S.%f")
+    header, rows = table.to_csv(index=False).split("\n", 1)
+    result = trial_import(f"{header}\n{rows.replace(chr(10), f',{chr(10)}')}", mapping(time='column = "time"\nformat = "%H:%M:%S.%f"'))
+    assert result.exit_code == 0, result.output
+    run = load_dataset("out").runs[0]
+    assert run.meta["from"] == 86_340.0
+    check_motion(run, run.t - 86_340.0)
+
+
 def test_several_files_of_one_layout_are_runs_of_their_own(trial_import, tmp_path):
     paths = [write(tmp_path, f"day {k}.csv", logged(T[: 400 + 100 * k])) for k in range(3)]
     result = trial_import(paths)

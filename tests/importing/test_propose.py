@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,27 @@ def test_the_draft_of_a_clear_log_imports_as_it_is(propose, tmp_path):
     done = CliRunner().invoke(app, ["data", "import", "log.csv", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"])
     assert done.exit_code == 0, done.output
     assert len(load_dataset("out")) == 1
+
+
+@pytest.mark.parametrize(
+    ("stamps", "expected"),
+    [
+        ({"Date": "05/03/2024", "Time (UTC)": "13:59:00.250"}, (["Date", "Time (UTC)"], "%d/%m/%Y %H:%M:%S.%f")),
+        ({"Date": "2024-03-05", "Time": "13:59:00"}, (["Date", "Time"], "iso")),
+        ({"Time": "03/25/2024 01:59:00 PM"}, ("Time", "%m/%d/%Y %I:%M:%S %p")),
+        ({"Time": "25.03.24 13:59"}, ("Time", "%d.%m.%y %H:%M")),
+        ({"Timestamp": "2024/03/25 13:59:00"}, ("Timestamp", "%Y/%m/%d %H:%M:%S")),
+        ({"Timestamp": "2024-03-25T13:59:00Z"}, ("Timestamp", "iso")),
+        ({"Time": "13:59:00"}, ("Time", "%H:%M:%S")),
+    ],
+)  # fmt: skip
+def test_formats_of_time_stamps_are_recognised(propose, tmp_path, stamps, expected):
+    table = logged(np.arange(0.0, 5.0)).drop(columns="time").assign(**stamps)
+    assert propose(write(tmp_path, "log.csv", table)).exit_code == 0
+    clock = tomllib.loads((tmp_path / "draft.toml").read_text())["time"]
+    assert (clock.get("columns") or clock.get("column"), clock["format"]) == expected
+    stamp = " ".join(stamps.values())
+    assert expected[1] == "iso" or datetime.strptime(stamp, expected[1]).minute == 59
 
 
 def test_instruments_become_sources_and_nautical_names_are_known(propose, tmp_path):
