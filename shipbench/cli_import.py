@@ -12,7 +12,7 @@ from .errors import InputError
 
 
 def data_import(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="CSV (also .gz), Parquet, MATLAB .mat (-v7) or Excel .xlsx files.")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="CSV (also .gz), Parquet, MATLAB .mat or Excel .xlsx files.")],
     mapping: Annotated[Path | None, typer.Option("-m", "--map", help="mapping.toml: their columns, units, signs and clock.")] = None,
     ship: Annotated[Path | None, typer.Option("--ship", help="ship.toml of the vessel.")] = None,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder of the data set (default: the mapping's name).")] = None,

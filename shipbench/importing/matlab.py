@@ -1,4 +1,4 @@
-"""MATLAB files up to version 7, through scipy: vectors, columns of matrices and fields of structs under names such as `log.gps.lat` or `data(3)`."""
+"""MATLAB files: up to version 7 through scipy: vectors, columns of matrices and fields of structs under names such as `log.gps.lat` or `data(3)`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..errors import InputError
+from .matlab73 import open_matlab73
 from .tables import MOST_COLUMNS, Table, as_batch
 
 _LARGEST = 1_100_000_000
@@ -20,21 +21,21 @@ _ROWS = 50_000
 
 
 def open_matlab(path: Path) -> Table:
-    """Read a .mat file whole (the format cannot be streamed), which is why its size is limited.
+    """Read a .mat file whole (the format cannot be streamed), which is why its size is limited; version 7.3 is another format, which is streamed.
 
     Raises:
-        InputError: version 7.3, too large, damaged, or without numeric vectors.
+        InputError: too large, damaged, or without numeric vectors.
     """
     from scipy.io import loadmat
 
     with path.open("rb") as file:
         head = file.read(128)
     if head.startswith(b"\x89HDF") or b"MATLAB 7.3" in head:
-        raise InputError(f"{path} is a MATLAB 7.3 file (HDF5), which is not read. In MATLAB: save('log.mat', ..., '-v7'), or writetable to CSV.")
+        return open_matlab73(path)
     if _unpacked_size(path) > _LARGEST:
         raise InputError(
             f"{path} holds more than {_LARGEST / 1e6:.0f} MB unpacked; .mat files are read whole, so that is the limit. "
-            "Save it as CSV (writetable) or Parquet (parquetwrite), which are streamed."
+            "Save it with '-v7.3', or as CSV (writetable) or Parquet (parquetwrite): these are streamed."
         )
     try:
         content = loadmat(path, squeeze_me=True, struct_as_record=False)

@@ -28,7 +28,7 @@ TEXT_BLOCK = 1 << 22
 """Bytes in which the header must stand, and the size of the blocks in which text is read."""
 _ROWS = 50_000
 _UNREADABLE = (ValueError, OSError, EOFError, zlib.error, lzma.LZMAError, pa.ArrowException, MemoryError)
-KINDS = "CSV or other delimited text (.csv, .txt, .dat, .tsv, also .gz, .bz2, .xz), Parquet, MATLAB .mat (version 7 or older), Excel .xlsx"
+KINDS = "CSV or other delimited text (.csv, .txt, .dat, .tsv, also .gz, .bz2, .xz), Parquet, MATLAB .mat, Excel .xlsx"
 
 
 @dataclass(frozen=True)

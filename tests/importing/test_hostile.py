@@ -74,7 +74,7 @@ LOGS = {
     "old excel": ("log.xls", b"\xd0\xcf\x11\xe0" + bytes(100), "old format"),
     "no excel": ("log.xlsx", b"PK\x03\x04" + bytes(100), "no Excel workbook"),
     "no matlab": ("log.mat", b"MATLAB 5.0 MAT-file" + bytes(300), "cannot be read|holds no vectors"),
-    "matlab 7.3": ("log.mat", b"MATLAB 7.3 MAT-file, HDF5" + bytes(300), "-v7"),
+    "matlab 7.3": ("log.mat", b"MATLAB 7.3 MAT-file, HDF5" + bytes(300), "cannot be read"),
     "truncated parquet": ("log.parquet", parquet_bytes()[:3000], "cannot be read"),
     "no parquet": ("log.parquet", b"PAR1" + bytes(100), "cannot be read"),
     "all values missing": ("log.csv", re.sub(r"(?m)^([\d.]+),.*$", r"\1,,,,,,,,,", TEXT), "no run is left"),

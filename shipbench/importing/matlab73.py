@@ -1,0 +1,118 @@
+"""MATLAB 7.3 files, which are HDF5, through h5py: streamed, so that they may be larger than memory; needs the extra `shipbench[matlab]`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .tables import MOST_COLUMNS, Table, as_batch
+
+_ROWS = 50_000
+_DEEPEST = 8
+_LARGEST_CHUNK = 200_000_000
+"""Bytes that one piece of a data set may unpack to; MATLAB's have some 100 kB."""
+_MOST_LETTERS = 100
+
+
+@dataclass(frozen=True)
+class _Vector:
+    """Where a column stands: the path of its data set, and the index of all axes but that of the samples (None where the samples are)."""
+
+    path: str
+    at: tuple[int | None, ...]
+    length: int
+    text: bool = False
+
+
+def open_matlab73(path: Path) -> Table:
+    """The vectors, columns of matrices and struct fields of the file under their MATLAB names. Cells and objects (such as tables) are passed over.
+
+    Raises:
+        InputError: h5py is not installed, or the file is damaged or holds no numeric vectors.
+    """
+    vectors: dict[str, _Vector] = {}
+    with _opened(path) as file:
+        _collect("", file, vectors, set())
+    if not vectors:
+        raise InputError(
+            f"{path} holds no vectors of two or more numbers. Accepted: vectors, matrices with a sample per row, and structs of them; "
+            "a table or timetable: save it with writetable, or its variables one by one."
+        )
+
+    def stream(wanted: Sequence[str]) -> Iterator[Any]:
+        lengths = {name: vectors[name].length for name in wanted}
+        if len(set(lengths.values())) > 1:
+            told = ", ".join(f"{name} {n}" for name, n in lengths.items())
+            raise InputError(f"{path}: vectors of one source differ in length: {told}. Give each rate a [sources.NAME] with its own time column.")
+        for begin in range(0, max(lengths.values()), _ROWS):
+            with _opened(path) as file:  # opened for each block: nothing stays open where the reader stops
+                block = {name: _read(file[vectors[name].path], vectors[name], begin) for name in wanted}
+            yield as_batch(block)
+
+    return Table(path, tuple(vectors), stream, 1, "MATLAB")
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    try:
+        import h5py
+    except ImportError:
+        raise InputError(
+            f"{path} is a MATLAB 7.3 file (HDF5), which needs h5py. Install it with `pip install 'shipbench[matlab]'`; "
+            "or in MATLAB: save('log.mat', ..., '-v7'), or writetable to CSV."
+        ) from None
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except (OSError, RuntimeError, KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"damaged MATLAB 7.3 file ({type(error).__name__}: {error})") from None  # tables.reading makes the message
+
+
+def _collect(name: str, group: Any, vectors: dict[str, _Vector], seen: set[int]) -> None:
+    """Put what can serve as a column into `vectors`. Only hard links are followed, each group once: no other files, no circles."""
+    import h5py
+
+    seen.add(h5py.h5o.get_info(group.id).addr)
+    for key in group:
+        if key.startswith("#") or not isinstance(group.get(key, getlink=True), h5py.HardLink):
+            continue
+        item, full = group[key], f"{name}.{key}" if name else key
+        if isinstance(item, h5py.Group):
+            if h5py.h5o.get_info(item.id).addr not in seen and full.count(".") < _DEEPEST:
+                _collect(full, item, vectors, seen)
+        elif isinstance(item, h5py.Dataset) and not item.is_virtual and item.external is None and "MATLAB_empty" not in item.attrs:
+            _add(full, item, vectors)
+        if len(vectors) > MOST_COLUMNS:
+            raise InputError(f"{group.file.filename} holds more than {MOST_COLUMNS} vectors; accepted: up to that. Save those that you need.")
+
+
+def _add(name: str, item: Any, vectors: dict[str, _Vector]) -> None:
+    """A vector, or each column of a matrix. MATLAB's n x m matrix is an m x n data set."""
+    if item.dtype.kind not in "fiub" or item.ndim not in (1, 2) or item.size < 2:
+        return
+    if item.chunks and np.prod(item.chunks, dtype=float) * item.dtype.itemsize > _LARGEST_CHUNK:
+        raise InputError(f"{item.file.filename}: '{name}' is packed in pieces above {_LARGEST_CHUNK / 1e6:.0f} MB; accepted: smaller ones.")
+    if item.attrs.get("MATLAB_class", b"") == b"char":
+        if item.ndim == 2 and item.shape[0] <= _MOST_LETTERS and item.shape[1] > 1:  # a row of letters for each sample, such as time stamps
+            vectors[name] = _Vector(item.name, (None,), item.shape[1], text=True)
+    elif item.ndim == 1:
+        vectors[name] = _Vector(item.name, (None,), item.shape[0])
+    elif 1 in item.shape:
+        vectors[name] = _Vector(item.name, (0, None) if item.shape[0] == 1 else (None, 0), item.size)
+    elif item.shape[0] <= MOST_COLUMNS:
+        for j in range(item.shape[0]):
+            vectors[f"{name}({j + 1})"] = _Vector(item.name, (j, None), item.shape[1])
+
+
+def _read(item: Any, vector: _Vector, begin: int) -> Any:
+    """Samples from `begin` on: floats, or texts without the blanks that fill them up."""
+    rows = slice(begin, begin + _ROWS)
+    if vector.text:
+        return ["".join(map(chr, letters)).rstrip() for letters in item[:, rows].T]
+    return item[tuple(rows if index is None else index for index in vector.at)].astype(float)
