@@ -5,6 +5,9 @@ Three files with clocks, rates, units and signs of their own; an antenna off mid
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -12,6 +15,7 @@ from scipy.interpolate import CubicSpline
 from trial import write
 
 from shipbench.data.base import load_dataset
+from shipbench.importing.mapping import load_mapping
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.signals import STATES, wrap_angle
 from shipbench.simulate.harbour import draw_plan, fly
@@ -153,6 +157,14 @@ def test_measured_speeds_come_back(trial_import, tmp_path, simulated):
     for run in data.runs:
         for name, error in errors(run, states, commands).items():
             assert np.abs(error).max() < TOLERANCES[name], (run.id, name)
+
+
+def test_the_readmes_mapping_is_accepted(tmp_path):
+    block = re.search(r"## Import your own log.*?```toml\n(.*?)```", (Path(__file__).parents[2] / "README.md").read_text(), re.DOTALL)
+    assert block is not None
+    plan = load_mapping(write(tmp_path, "mapping.toml", block[1]))
+    assert (plan.name, plan.dt, plan.split.window) == ("my_trial", 1.0, 300.0)
+    assert set(plan.sources["log"].channels) == {"lat", "lon", "psi", "n", "delta"}
 
 
 def test_derived_speeds_agree_within_the_stated_tolerance(trial_import, tmp_path, simulated):
