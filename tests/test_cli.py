@@ -34,6 +34,11 @@ def test_version(cli):
     assert cli("--version").stdout.strip() == f"shipbench {version('shipbench')}"
 
 
+def test_python_m_is_the_same_command():
+    done = subprocess.run([sys.executable, "-m", "shipbench", "--version"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.strip()) == (0, f"shipbench {version('shipbench')}")
+
+
 @pytest.mark.parametrize("command", ["run", "leaderboard", "models", "validate", "predict", "data"])
 def test_every_command_has_help(cli, command):
     result = cli(command, "-h")
