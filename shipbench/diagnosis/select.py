@@ -22,6 +22,8 @@ _REFITS = 3
 _REFIT_ITERATIONS = 12
 _WORTH_A_REFIT = 0.5
 _RIVAL, _RIVALS = 0.25, 4
+_IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
+"""What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
 _CHANGES, _CHANGE_MARGIN = 2, 14.0
 """A beginning is chosen among all effects: it must beat the best cause without one by this."""
 _OF_THE_SHAPE = ("cross_flow_drag", "wake_variation", "race_gain", "rudder_stall", "rudder_asymmetry", "propeller_walk", "propeller_walk_astern")
@@ -89,7 +91,7 @@ def without(before: Fit, index: int) -> Fit:
 
 
 def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selection:
-    """Add the best candidate while it gains more than `threshold`; drop what a later one has made needless.
+    """Add the best candidate while it gains more than `threshold` and than what the causes found leave; drop what a later one has made needless.
 
     `null` must carry the candidates. Candidates are refitted if their linear score is among the best, or the best of their family.
     """
@@ -98,9 +100,9 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     for round_ in range(most):
         tried = [with_term(now, score, origin) for score in _worth_a_refit(scores, now, threshold)]
         steps += [Step(round_, f.model.terms[-1], 2.0 * (f.evidence - now.evidence)) for f in tried]
-        best = max(tried, key=lambda f: f.evidence, default=None)
-        best = _or_change(now, best, origin)
-        if best is None or 2.0 * (best.evidence - now.evidence) < threshold:
+        best = _or_change(now, max(tried, key=lambda f: f.evidence, default=None), origin)
+        imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
+        if best is None or 2.0 * (best.evidence - now.evidence) < threshold + imprecise:
             break
         now = _backward(best, threshold)
         now = fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates, guess=now.motion)
