@@ -84,7 +84,8 @@ def _case_row(case: Case) -> dict[str, Any]:
 
 
 def _found_row(found: Diagnosis) -> dict[str, Any]:
-    estimates = {c.effect: {k: [e.value, *e.ci95] for k, e in c.parameters.items()} for c in found.causes}
+    causes = found.document()["causes"]  # without NaN
+    estimates = {c["effect"]: {k: [e["value"], *e["ci95"]] for k, e in c["parameters"].items()} for c in causes}
     return {
         "verdict": found.verdict, "named": [c.effect for c in found.causes], "confused": {c.effect: list(c.confused_with) for c in found.causes},
         "scores": {c.effect: c.score for c in found.causes}, "p_values": {c.effect: c.p_value for c in found.causes},

@@ -34,7 +34,7 @@ def quantity(value: float | None, unit: str) -> str:
 def interval(e: Estimate) -> str:
     """Such as `0.31 m/s [0.28, 0.34]`; without interval where there is none."""
     factor = display_unit(e.unit)[1]
-    known = all(v is not None and math.isfinite(v) for v in e.ci95) and e.ci95[0] != e.ci95[1]
+    known = all(v is not None and math.isfinite(v) for v in e.ci95)
     return quantity(e.value, e.unit) + (f" [{figure(factor * e.ci95[0])}, {figure(factor * e.ci95[1])}]" if known else "")
 
 

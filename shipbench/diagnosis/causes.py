@@ -53,7 +53,7 @@ def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs
     name = effect.name if term.since is None else "change_point"
     parameters = _parameters(fit, index, term)
     if term.since is not None:
-        parameters = {"from_run": Estimate(float(term.since), "1", (float(term.since), float(term.since)))} | parameters
+        parameters = {"from_run": Estimate(float(term.since), "1", (np.nan, np.nan))} | parameters
     return Cause(name, 0, score, _p(found, score), parameters, rivals, effect.separate if rivals else "", gain, evidence)
 
 
@@ -68,7 +68,7 @@ def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
 
 
 def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
-    """Sizes with 95 % intervals: the wider of the model's and of the sandwich clustered by run."""
+    """Sizes with 95 % intervals: the wider of the model's and of the sandwich clustered by run; none for shape parameters, the best of a few."""
     from scipy.stats import chi2, t
 
     effect = term.effect
@@ -92,7 +92,7 @@ def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
     found = {}
     for name, shown in reported.items():
         shape = [p for p in effect.parameters if p.name == name and p.shape]
-        spread = 0.0 if shape else half * _spread(effect, q, name, cov, len(value))
+        spread = np.nan if shape else half * _spread(effect, q, name, cov, len(value))
         found[name] = Estimate(shown, units[name], (shown - spread, shown + spread))
     return found
 

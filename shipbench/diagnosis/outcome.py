@@ -12,7 +12,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Estimate:
-    """A size with its 95 % interval, in `unit`."""
+    """A size with its 95 % interval, in `unit`; NaN where none is known (null in the document)."""
 
     value: float
     unit: str

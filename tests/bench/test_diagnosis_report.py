@@ -83,6 +83,13 @@ def test_the_summary_says_the_verdict_with_sizes_and_the_next_command():
     assert "WARNING: few runs" in text
 
 
+def test_a_size_without_interval_is_written_without_one():
+    from shipbench.bench.diagnosis_text import interval
+
+    assert interval(Estimate(1317.0, "m", (float("nan"), float("nan")))) == "1317 m"
+    assert interval(Estimate(0.31, "m/s", (0.28, 0.34))) == "0.310 m/s [0.280, 0.340]"
+
+
 def test_none_comes_with_the_sizes_that_would_have_been_seen():
     text = "\n".join(summary_lines(replace(make_diagnosis("none"), warnings=())))
     assert "Nothing found" in text

@@ -80,6 +80,7 @@ def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
     assert cause.effect == "change_point"
     assert "heading_bias" in cause.evidence
     assert abs(cause.parameters["from_run"].value - 6) <= 1
+    assert not np.isfinite(cause.parameters["from_run"].ci95).any()  # none is known: no width of zero is claimed
 
 
 def test_a_force_that_follows_no_known_cause_is_called_unknown_with_its_variable():
