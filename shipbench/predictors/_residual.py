@@ -25,7 +25,7 @@ class Residual(nn.Module):
     Args:
         physics: the fitted models, one per member.
         hidden: width of the two hidden layers.
-        scale_in: of (u, v, r, n, delta, F_b, F_s); scale_out (members, 1, 3): size of the accelerations.
+        scale_in: of `features`; scale_out (members, 1, 3): size of the accelerations.
     """
 
     p: Tensor
@@ -37,11 +37,11 @@ class Residual(nn.Module):
         self.register_buffer("p", torch.as_tensor(np.stack([m.p for m in physics]), dtype=scale_out.dtype).T[..., None].contiguous())
         self.register_buffer("scale_out", scale_out)
         self.scale_in = scale_in
-        self.net = StackedMLP([7, hidden, hidden, 3], draw, torch.tanh, zero_last=True)
+        self.net = StackedMLP([scale_in.mean.shape[-1], hidden, hidden, 3], draw, torch.tanh, zero_last=True)
 
-    def learned(self, u: Tensor, v: Tensor, r: Tensor, actuators: Sequence[Tensor]) -> Tensor:
-        """Residual accelerations (members, batch, 3); arguments (members, batch)."""
-        return self.net(self.scale_in(torch.stack([u, v, r, *actuators], dim=-1))) * self.scale_out
+    def learned(self, x: Tensor) -> Tensor:
+        """Residual accelerations (members, batch, 3) of `features` (members, batch, 7 or 9), in units of `scale_out`."""
+        return self.net(self.scale_in(x))
 
     def forward(
         self, psi: Tensor | None, u: Tensor, v: Tensor, r: Tensor, actuators: Sequence[Tensor], air: Air | None
@@ -50,8 +50,16 @@ class Residual(nn.Module):
         apparent = None if air is None or psi is None else apparent_wind(psi, u, v, *air)
         n, delta, F_b, F_s = actuators
         du, dv, dr = eq2.accelerations(u, v, r, n, delta, F_b, F_s, apparent, self.c, self.p.unbind(0))
-        more = self.learned(u, v, r, actuators).unbind(-1)
+        more = (self.learned(torch.stack([u, v, r, *actuators, *(apparent or ())], dim=-1)) * self.scale_out).unbind(-1)
         return du + more[0], dv + more[1], dr + more[2]
+
+
+def features(S: Tensor, air: Tensor | None) -> Tensor:
+    """What the network sees of states (..., 10): u, v, r, n, delta, F_b, F_s, and the speed through the air where true wind (..., 2) is given."""
+    seen = S[..., CHANNELS]
+    if air is None:
+        return seen
+    return torch.cat([seen, torch.stack(apparent_wind(S[..., PSI], S[..., U], S[..., V], *air.unbind(-1)), dim=-1)], dim=-1)
 
 
 class Grid(NamedTuple):

@@ -1,7 +1,7 @@
 """The fitted physics plus a learned residual acceleration, trained through the solver of torchdiffeq on windows that grow in length.
 
-The residual is a small network of (u, v, r, n, delta, F_b, F_s) whose output starts at exactly zero: training starts at the fitted
-physics and the weights of the best validation rollout are kept, the untouched physics among them.
+The residual is a small network of (u, v, r, n, delta, F_b, F_s), and of the velocity through the air where wind is measured, whose output starts
+at exactly zero: training starts at the fitted physics and the weights of the best validation rollout are kept, the untouched physics among them.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from ..errors import InputError
 from ..integrate import motion_rhs, rk4_step
 from ..records import Dataset
 from ..signals import ACTUATORS, MOTION, R, U
-from ._residual import Drive, Grid, Residual, solve, typical_accelerations
-from ._stacked import CHANNELS, Scaler, generators, hold_error, padded, position_score, random_windows, shares_of, trapezoid_pose, with_valid
+from ._residual import Drive, Grid, Residual, features, solve, typical_accelerations
+from ._stacked import Scaler, generators, hold_error, padded, position_score, random_windows, shares_of, trapezoid_pose, with_valid
 from .base import History, PredictorBase
 from .physics import Physics
 from .training import Chunk, Recipe, StackedTask, train
@@ -62,27 +62,27 @@ class _Windows(StackedTask):
                 picks = (random_windows(self.training_runs.counts, room, stage.batch, self.draw) for _ in range(self.MINIBATCHES))
                 yield Chunk([(runs, starts, stage.steps) for runs, starts in picks], everyone)
 
-    def _roll(self, drive: Drive, runs: Tensor, starts: Tensor, steps: int) -> tuple[Tensor, Tensor, Tensor]:
-        """Predicted u, v, r (members, batch, steps, 3) and pose, and the measured states, of windows at `starts` [knots]."""
+    def _roll(self, drive: Drive, runs: Tensor, starts: Tensor, steps: int) -> tuple[Tensor, Tensor, Tensor, Tensor | None]:
+        """Predicted u, v, r (members, batch, steps, 3) and pose, measured states and wind at the end, of windows at `starts` [knots]."""
         device, fine = self.model.p.device, self.grid.per_knot
         S = drive.S[runs[..., None], starts[..., None] + torch.arange(steps + 1)].to(device)
         at = (runs[..., None], starts[..., None] * fine + torch.arange(steps * fine))
         air = None if drive.air is None else drive.air[at].to(device)
         path = solve(self.model, S[:, :, 0], drive.path[at].to(device), air, self.grid.step)[:, :, fine - 1 :: fine]
-        return path, trapezoid_pose(S[:, :, 0], path, self.dt), S[:, :, 1:]
+        return path, trapezoid_pose(S[:, :, 0], path, self.dt), S[:, :, 1:], None if air is None else air[:, :, -1]
 
     def losses(self, minibatch: tuple[Tensor, Tensor, int]) -> Tensor:
-        velocity, pose, truth = self._roll(self.training_runs, *minibatch)
+        velocity, pose, truth, air = self._roll(self.training_runs, *minibatch)
         scale = self.scale[minibatch[2]].to(truth.device)[:, None, None]
         error = ((velocity - truth[..., U : R + 1]) / scale[..., :3]).square().sum(-1)
         error = error + ((pose[..., :2] - truth[..., :2]) / scale[..., 3:4]).square().sum(-1)
         error = error + ((pose[..., 2] - truth[..., 2]) / scale[..., 4]).square()
-        small = self.model.net(self.model.scale_in(truth[:, :, -1, CHANNELS])).square().sum(-1)
+        small = self.model.learned(features(truth[:, :, -1], air)).square().sum(-1)
         return error.mean((1, 2)) + self.penalty * small.mean(1)
 
     def scores(self) -> Tensor:
         runs, weight = padded(self.validation.counts)
-        _, pose, truth = self._roll(self.validation, runs, torch.zeros_like(runs), self.validation.S.shape[1] - 1)
+        _, pose, truth, _ = self._roll(self.validation, runs, torch.zeros_like(runs), self.validation.S.shape[1] - 1)
         return position_score(pose, truth, weight.to(pose.device))
 
 
@@ -139,7 +139,8 @@ class NeuralODE(PredictorBase):
         grid = Grid.of(physics[0])
         learn, check = (Drive.of(physics, part, grid) for part in zip(*pairs, strict=True))
         draw = generators(seeds)
-        scale_in = Scaler.fit([S[..., CHANNELS] for S in learn.S.split(learn.counts)])
+        seen = features(learn.S, None) if learn.air is None else features(learn.S[:, :-1], learn.air[:, :: grid.per_knot])
+        scale_in = Scaler.fit(seen.split(learn.counts))
         residual = Residual(physics, lead.hidden, scale_in, typical_accelerations(physics, learn), draw)
         task = _Windows(residual, learn, check, grid, lead._stages(learn.S.shape[1] - 1), draw, lead.penalty)
         # Many small elementwise operations: a second thread only costs.

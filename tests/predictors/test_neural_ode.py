@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from shipbench.errors import InputError
-from shipbench.predictors._residual import Drive, Grid, Residual, solve, typical_accelerations
-from shipbench.predictors._stacked import CHANNELS, Scaler, generators
+from shipbench.physics.wind import apparent_wind
+from shipbench.predictors._residual import Drive, Grid, Residual, features, solve, typical_accelerations
+from shipbench.predictors._stacked import Scaler, generators
 from shipbench.predictors.neural_ode import NeuralODE
 from shipbench.predictors.physics import Physics
 from shipbench.signals import MOTION, VELOCITY
@@ -73,12 +76,47 @@ def test_the_training_solver_agrees_with_the_rollout(parts, physics):
     train = parts[0]
     grid = Grid.of(physics)
     drive = Drive.of([physics], [train], grid)
-    residual = Residual([physics], 8, Scaler.fit([drive.S[..., CHANNELS]]), typical_accelerations([physics], drive), generators([0]))
+    residual = Residual([physics], 8, Scaler.fit([features(drive.S, None)]), typical_accelerations([physics], drive), generators([0]))
     with torch.no_grad():
         found = solve(residual, drive.S[None, :, 0], drive.path[None], None, grid.step)[0].numpy()
     batch = train.batch()
     truth = physics.predict(batch.s0, batch.U)[..., VELOCITY]
     assert np.abs(found - truth).max(axis=(0, 1)) == pytest.approx(np.zeros(3), abs=2e-3)
+
+
+@pytest.fixture(scope="module")
+def windy(parts):
+    """The same runs with a measured wind that does nothing: the physics' wind force is wrong by all of it."""
+    rng = np.random.default_rng(0)
+
+    def blown(run):
+        wind = np.tile([rng.uniform(6.0, 12.0), rng.uniform(0.0, 2.0 * np.pi)], (len(run), 1))
+        return replace(run, inputs=np.hstack([run.inputs, wind]), inputs_names=(*run.inputs_names, "wind_speed", "wind_from"))
+
+    return [part.with_runs([blown(run) for run in part.runs]) for part in parts]
+
+
+def test_the_residual_sees_the_measured_wind(windy):
+    physics = Physics().fit(windy[0], windy[1])
+    drive = Drive.of([physics], [windy[0]], Grid.of(physics))
+    seen = features(drive.S[:, :-1], drive.air)
+    run = windy[0].runs[3]
+    expected = apparent_wind(run.states[:-1, 2], run.states[:-1, 3], run.states[:-1, 4], *run.inputs[:-1, 4:].T)
+    np.testing.assert_allclose(seen[3, :, 7:].numpy(), np.stack(expected, axis=1), atol=1e-4)
+
+
+def test_a_wrong_wind_force_is_learned_and_the_solvers_agree_on_it(windy, tmp_path):
+    model = NeuralODE(epochs=6, hidden=16).fit(windy[0], windy[1], seed=0)
+    assert model.improved
+    unseen = windy[1].merged(windy[2])
+    assert position_error(model, unseen) < 0.6 * position_error(model.physics, unseen)
+    batch, grid = unseen.batch(), Grid.of(model.physics)
+    drive = Drive.of([model.physics], [unseen], grid)
+    with torch.no_grad():
+        found = solve(model._residual().float(), drive.S[None, :, 0], drive.path[None], drive.air[None], grid.step)[0].numpy()
+    assert np.abs(found - model.predict(batch.s0, batch.U)[..., VELOCITY]).max(axis=(0, 1)) == pytest.approx(np.zeros(3), abs=5e-3)
+    model.save(tmp_path / "m")
+    np.testing.assert_array_equal(NeuralODE.load(tmp_path / "m").predict(batch.s0, batch.U), model.predict(batch.s0, batch.U))
 
 
 def test_members_of_a_group_come_out_as_they_would_alone(parts, model):
