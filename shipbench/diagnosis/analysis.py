@@ -20,8 +20,8 @@ THRESHOLD = 10.0
 """Least gain of a named cause, 2 log Bayes factor. From nulls on the development ships, whose structure differs from the model's; the bootstrap of
 each diagnosis may raise it."""
 HULL_THRESHOLD = 30.0
-GENERIC_THRESHOLD = 30.0
-_GENERIC_OWN = {"revolutions and rudder": 55.0, "heading": 18.0, "time": 18.0, "run": 18.0}
+GENERIC_THRESHOLD = 25.0
+_GENERIC_OWN = {"revolutions and rudder": 30.0, "heading": 18.0, "time": 18.0, "run": 18.0}
 """Race and rudder together are where ordinary ships differ most from eq. (2); no ship's structure depends on heading, time or number of the run."""
 GENERIC_MARGIN = 10.0
 _NARROW = 0.1

@@ -1,6 +1,7 @@
 """Ships for the suite: known hulls at other lengths, with other derivatives, rudders, propellers, actuators and thrusters.
 
-Development ships come from container130, test ships from KCS and KVLCC2: nothing that is tuned on the first has seen the hulls of the second.
+Development ships come from container130, half of them with its hull forces rewritten as a cubic polynomial, test ships from KCS and KVLCC2: nothing
+that is tuned on the first has seen the hulls of the second.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from ..errors import WorkError
+from ..physics.hull import PolynomialHull, UnifiedHull, unified
 from ..physics.mmg import MMGShip, load_mmg_ship
 from ..physics.thruster import Tunnels
 from ..ship import Propeller, Rudder, Ship, Thrusters, Wind
@@ -84,6 +86,19 @@ def with_other_hull(ship: MMGShip, rng: np.random.Generator, which: str) -> MMGS
     return replace(ship, hull=replace(ship.hull, **values), m_y=ship.m_y * (1.0 + 0.5 * change()), J_z=ship.J_z * (1.0 + 0.5 * change()))
 
 
+def as_polynomial(hull: UnifiedHull) -> PolynomialHull:
+    """The cubic polynomial nearest to a hull's forces up to 25 deg of drift and r' = 0.8: another structure, which differs where the cubic ends."""
+    beta, rp = (a.ravel() for a in np.meshgrid(np.deg2rad(np.linspace(-25.0, 25.0, 21)), np.linspace(-0.8, 0.8, 17)))
+    v = -np.sin(beta)
+    X, Y, N = (f / 0.5 for f in unified(np.cos(beta), v, rp, hull, 1.0, 1.0, 1.0))
+    surge = np.stack([v * v, v * rp, rp * rp, v**4], axis=1)
+    odd = np.stack([v, rp, v**3, v * v * rp, v * rp * rp, rp**3], axis=1)
+    fitted = [
+        np.linalg.lstsq(basis, force, rcond=None)[0].tolist() for basis, force in ((surge, X - hull.X0_F * np.cos(beta) ** 2), (odd, Y), (odd, N))
+    ]
+    return PolynomialHull(-hull.X0_F, *fitted[0], *fitted[1], *fitted[2])
+
+
 def with_other_gear(ship: MMGShip, rng: np.random.Generator) -> MMGShip:
     """Another rudder area and propeller diameter (the ship file says so), another race and flow straightening (it does not)."""
     area, diameter = rng.uniform(0.85, 1.2), rng.uniform(0.95, 1.05)
@@ -132,6 +147,8 @@ def draw_ship(rng: np.random.Generator, which: str, thrusters: bool) -> MMGShip:
         if ship.particulars.thrusters is None and fitted:
             ship = with_thrusters(ship, rng)
         ship = with_actuators(with_other_gear(with_other_hull(ship, rng, which), rng), rng)
+        if which == "development" and isinstance(ship.hull, UnifiedHull) and rng.random() < 0.5:
+            ship = replace(ship, hull=as_polynomial(ship.hull), name=f"{ship.name}-polynomial")
         if steers(ship):
             return ship
     raise WorkError(f"none of {_TRIES} variants of ship '{parent.name}' steers; draw from another seed.")

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ..ops import Array, absolute, arctan2, clip, cos, maximum, sin, sqrt
+from ..ops import Array, absolute, arctan2, clip, cos, maximum, sin, smoothstep, sqrt
 from ..ship import Particulars
 from . import propeller, regressions, thruster, wind
 from .modifiers import Modifiers, is_neutral
@@ -120,7 +120,7 @@ def rudder(
     e = e or Modifiers()
     u2 = c.eta * race * race + (1.0 - c.eta) * V_A * V_A
     u_R = sqrt(u2 + 1e-6)
-    w_R = e.sideways(0.364 * v + 0.66 * c.x_R * r)
+    w_R = e.sideways(0.364 * v + 0.66 * c.x_R * r * e.straightening_r)
     beta = arctan2(w_R, u_R)
     a = clip(delta + e.delta + beta, -ALPHA_MAX, ALPHA_MAX)
     q = 0.5 * c.rho * c.A_R * (u2 + w_R * w_R)
@@ -145,10 +145,10 @@ class _Inertia(NamedTuple):
 
 def _inertia(c: Coefficients, e: Modifiers) -> _Inertia:
     """Masses of the left side, with what effects make of them."""
-    if all(is_neutral(field, 1.0) for field in (e.mass, e.m_y, e.J_z)) and is_neutral(e.x_G, 0.0):
+    if all(is_neutral(field, 1.0) for field in (e.mass, e.m_y, e.J_z)) and is_neutral(e.x_G, 0.0) and is_neutral(e.coupling, 0.0):
         return _Inertia(c.m, c.x_G, c.m + c.m_x, c.m11, c.m12_Y, c.m12_N, c.m22, c.X_vr, c.X_rr)
     m, x_G = c.m * e.mass, c.x_G + e.x_G
-    moved = m * x_G - c.m * c.x_G
+    moved = m * x_G - c.m * c.x_G + e.coupling
     added = c.m_y * (e.m_y - 1.0)
     m22 = c.I_zz * e.mass + m * x_G * x_G + c.J_z * e.J_z
     return _Inertia(m, x_G, m + c.m_x, m + c.m_y * e.m_y, c.m12_Y + moved, c.m12_N + moved, m22, c.X_vr + 0.72 * added + (m - c.m), c.X_rr + moved)
@@ -188,6 +188,9 @@ def accelerations(
     i = _inertia(c, e)
     speed = sqrt(u * u + v * v + c.eps * c.eps)
     X_n, V_A, race = propulsion(u, n, c, e)
+    if not is_neutral(e.backing, 0.0):
+        left = 1.0 - e.backing * smoothstep(-n / 60.0 * c.D_P, 0.0, 0.02 * (9.81 * c.L) ** 0.5)
+        V_A, race = V_A * left, race * left
     X_d, Y_d, N_d = rudder(v, r, delta, V_A, race, c, p, e)
     Y_T, N_T = thruster.tunnel_thrusters(u, F_b * e.bow, F_s * e.stern, c.tunnels, e.loss, e.lever)
     abs_r = absolute(r)

@@ -33,13 +33,15 @@ class Flow(NamedTuple):
 class Modifiers:
     """Neutral as constructed: nothing is missing.
 
-    u_c, v_c: velocity of the water in body axes [m/s]. air_u, air_v: velocity of the air beyond the measured wind, body axes [m/s].
-    delta: rudder angle to add [rad]; rudder: factor of the rudder's lift; rudder_asymmetry a: factor 1 + a to starboard and 1 - a to port;
-    stall: share of the lift lost beyond `stall_angle` [rad]. race, thrust: factors of the race's excess speed and of the thrust; straightening:
-    factor of the sideways flow at the rudder, 1 + its asymmetry where it comes from port (positive) and 1 - where from starboard; wake: added to the
-    wake fraction. bow, stern: factors of the thrusters; lever: shift of the bow thruster [m]; loss: share of side force and moment lost at speed.
-    mass, m_y, J_z: factors of the ship's mass (with its inertia), of added mass in sway and of added inertia in yaw; x_G: shift of the centre
-    of gravity [m]. hull: factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship [N m] to add.
+    u_c, v_c: velocity of the water in body axes [m/s]. air_u, air_v: velocity of the air beyond the measured wind, body axes [m/s]. delta: rudder
+    angle to add [rad]; rudder: factor of the rudder's lift; rudder_asymmetry a: factor 1 + a to starboard and 1 - a to port; stall: share of the
+    lift lost beyond `stall_angle` [rad]. race, thrust: factors of the race's excess speed and of the thrust; straightening: factor of the
+    sideways flow at the rudder, 1 + its asymmetry where it comes from port (positive) and 1 - where from starboard; straightening_r: factor of
+    its part by yaw alone; backing: share of the flow at the rudder that a reversed propeller stops; wake: added to the wake fraction. bow, stern:
+    factors of the thrusters; lever: shift of the bow thruster [m]; loss: share of side force and moment lost at speed. mass, m_y, J_z: factors of
+    the ship's mass (with its inertia), of added mass in sway and of added inertia in yaw; coupling: added mass between sway and yaw, to add [kg
+    m]; x_G: shift of the centre of gravity [m]. hull: factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship [N m] to
+    add.
     """
 
     u_c: Array = 0.0
@@ -54,6 +56,8 @@ class Modifiers:
     race: Array = 1.0
     straightening: Array = 1.0
     straightening_asymmetry: Array = 0.0
+    straightening_r: Array = 1.0
+    backing: Array = 0.0
     thrust: Array = 1.0
     wake: Array = 0.0
     bow: Array = 1.0
@@ -63,6 +67,7 @@ class Modifiers:
     mass: Array = 1.0
     m_y: Array = 1.0
     J_z: Array = 1.0
+    coupling: Array = 0.0
     x_G: Array = 0.0
     hull: HullFactors = field(default=DEEP)
     X: Array = 0.0

@@ -7,11 +7,12 @@ import pickle
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.case_ships import PARENTS, draw_ship, scaled
+from shipbench.diagnosis.case_ships import PARENTS, as_polynomial, draw_ship, scaled
 from shipbench.diagnosis.cases import KINDS, OWN_KINDS, SIZES, UNITS, count, draw_case, misread, singles
 from shipbench.diagnosis.outside import OUTSIDE, canonical
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
+from shipbench.physics.hull import polynomial, unified
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.fitted_ship import fitted_trials, is_sane
 from shipbench.simulate.manoeuvres import turning_circle
@@ -119,10 +120,25 @@ def test_nothing_in_the_data_says_what_was_hidden():
         assert all(not run.meta for run in data.runs)
 
 
+def test_a_hull_as_polynomial_is_the_same_where_it_was_fitted_and_another_beyond():
+    ship = load_mmg_ship("container130")
+    cubic, size = as_polynomial(ship.hull), (ship.L, ship.T, 1025.0)
+    u, v, r = (np.array(a) for a in ((4.0, 4.0, 4.0), (0.5, -1.0, 0.0), (0.0, 0.015, -0.02)))
+    for near, true in zip(polynomial(u, v, r, cubic, *size), unified(u, v, r, ship.hull, *size), strict=True):
+        np.testing.assert_allclose(near, true, atol=0.12 * np.abs(true).max())
+    aside = (np.array([0.5]), np.array([1.0]), np.array([0.0]))
+    assert abs(polynomial(*aside, cubic, *size)[1][0] / unified(*aside, ship.hull, *size)[1][0] - 1.0) > 0.05
+
+
+def test_half_of_the_development_ships_have_a_polynomial_hull():
+    names = [draw_ship(np.random.default_rng(seed), "development", False).name for seed in range(12)]
+    assert 2 <= sum(name.endswith("polynomial") for name in names) <= 10
+
+
 def test_development_and_test_ships_come_from_other_hulls():
     for which, parents in PARENTS.items():
         ships = [draw_ship(np.random.default_rng(seed), which, False) for seed in range(4)]
-        assert {ship.name.rsplit("-", 1)[0] for ship in ships} <= set(parents)
+        assert all(ship.name.startswith(tuple(f"{parent}-" for parent in parents)) for ship in ships)
         assert len({ship.L for ship in ships}) == 4
     assert not set(PARENTS["test"]) & set(PARENTS["development"])
 

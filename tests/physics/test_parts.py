@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from shipbench.physics import actuators, eq2, hull, mmg, propeller, rudder, shallow_water, thruster, wind
+from shipbench.physics.modifiers import Modifiers
 from shipbench.ship import complete
 
 SHIP = mmg.load_mmg_ship("container130")
@@ -281,6 +282,32 @@ def test_rudder_inflow_is_the_printed_mmg_form():
     eta, eps, kappa = D / 5.04, 0.956, 0.633
     printed = eps * (1 - w) * u * np.sqrt(eta * (1 + kappa * (np.sqrt(1 + 8 * K_T / (np.pi * J**2)) - 1)) ** 2 + (1 - eta))
     assert rudder.inflow_speed(u, n, T, w, SHIP.rudder, D, 1025.0) == pytest.approx(printed, rel=1e-6)
+
+
+def test_a_reversed_propeller_takes_the_rudders_flow_in_eq2():
+    state = (3.0, 0.0, 0.0)
+    ahead, astern = ((n, 0.3, 0.0, 0.0) for n in (60.0, -60.0))
+    still = Modifiers(backing=1.0)
+
+    def turn(actuators, mods):
+        sides = [eq2.accelerations(*state, actuators[0], s * actuators[1], 0.0, 0.0, None, C, P_SYMMETRIC, mods)[2] for s in (1.0, -1.0)]
+        return sides[0] - sides[1]
+
+    assert turn(ahead, still) == pytest.approx(turn(ahead, Modifiers()))
+    assert turn(astern, Modifiers()) > 0.0
+    assert turn(astern, still) == pytest.approx(0.0, abs=1e-3 * turn(astern, Modifiers()))
+
+
+def test_added_mass_between_sway_and_yaw_couples_both_ways():
+    """(m + m_y) dv + (m x_G + c) dr = Y, (m x_G + c) dv + (I + J) dr = N."""
+    args = (2.0, 0.3, 0.01, 60.0, 0.1, 0.0, 0.0, None, C, P)
+    coupling = 0.05 * C.m * C.L
+    _, dv, dr = eq2.accelerations(*args)
+    X_rr_only = coupling * 0.01**2
+    du2, dv2, dr2 = eq2.accelerations(*args, Modifiers(coupling=coupling))
+    assert C.m11 * dv2 + (C.m12_Y + coupling) * dr2 == pytest.approx(C.m11 * dv + C.m12_Y * dr)
+    assert (C.m12_N + coupling) * dv2 + C.m22 * dr2 == pytest.approx(C.m12_N * dv + C.m22 * dr)
+    assert (C.m + C.m_x) * (du2 - eq2.accelerations(*args)[0]) == pytest.approx(X_rr_only)
 
 
 def test_turning_is_balanced_by_hand_in_eq2():
