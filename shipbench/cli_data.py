@@ -73,21 +73,6 @@ def data_make(
         typer.echo(f"{dataset.name}: {len(dataset)} runs, fingerprint {dataset.fingerprint}, in {out or cache_folder()}")
 
 
-@data_app.command("check")
-def data_check(dataset: DatasetArgument, as_json: Json = False) -> None:
-    """Load a data set and report what was found."""
-    from .bench.listing import dataset_facts
-    from .data.base import load_dataset
-
-    facts = dataset_facts(load_dataset(dataset))
-    if as_json:
-        print_json(facts)
-        return
-    for key, value in facts.items():
-        for line in value if isinstance(value, list) else [value]:
-            typer.echo(f"{key + ':':<13s}{line}")
-
-
 @data_app.command("describe")
 def data_describe(
     dataset: DatasetArgument,

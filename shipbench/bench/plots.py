@@ -71,7 +71,7 @@ def _style(models: Sequence[str]) -> dict[str, dict[str, Any]]:
     }
 
 
-def _new_figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> Figure:
     """A figure on the Agg canvas, without pyplot's global state."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -81,7 +81,7 @@ def _new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def _save(figure: Figure, path: Path) -> Path:
+def save(figure: Figure, path: Path) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.stem}.{os.getpid()}.tmp.png")
     figure.savefig(part)
@@ -98,9 +98,9 @@ def draw_all(results: Results, dataset: str, ranking: Sequence[str], folder: Pat
         return []
     summary = next(s for s in results.summaries if s["dataset"] == dataset)
     return [
-        _save(tracks(results, dataset, models, summary), folder / "tracks.png"),
-        _save(boxes(rows, models, summary), folder / "errors.png"),
-        _save(against_horizon(results, dataset, models, summary["dt"]), folder / "error-against-horizon.png"),
+        save(tracks(results, dataset, models, summary), folder / "tracks.png"),
+        save(boxes(rows, models, summary), folder / "errors.png"),
+        save(against_horizon(results, dataset, models, summary["dt"]), folder / "error-against-horizon.png"),
     ]
 
 
@@ -124,7 +124,7 @@ def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[
     """Tracks of a good, a median and a bad run; the true ship every quarter of the horizon, the predicted ones at its end."""
     rows = results.rows[results.rows["dataset"] == dataset]
     chosen = choose_runs(rows, models)
-    figure = _new_figure(15.0, 6.2)
+    figure = new_figure(15.0, 6.2)
     axes = figure.subplots(1, 3)
     styles = _style(models)
     for model in reversed(models):  # the best on top
@@ -180,7 +180,7 @@ def _readable_limits(axis: Axes, groups: Sequence[np.ndarray]) -> None:
 def boxes(rows: Frame, models: Sequence[str], summary: dict[str, Any]) -> Figure:
     """Box plots of the per-run ED, EDH and cVDM (the paper's fig. 2): quartiles, whiskers at 5 and 95 %, mean as a diamond."""
     columns = [c for c in summary["columns"] if c["name"] in ("ed", "edh", "cvdm")]
-    figure = _new_figure(4.6 * len(columns), 4.6)
+    figure = new_figure(4.6 * len(columns), 4.6)
     styles = _style(models)
     for axis, column in zip(np.atleast_1d(figure.subplots(1, len(columns))), columns, strict=True):
         groups = [rows.loc[(rows["model"] == m) & (rows["status"] == "ok"), column["name"]].dropna().to_numpy() for m in models]
@@ -205,7 +205,7 @@ def boxes(rows: Frame, models: Sequence[str], summary: dict[str, Any]) -> Figure
 
 def against_horizon(results: Results, dataset: str, models: Sequence[str], dt: float) -> Figure:
     """Position error against time: median over runs, with the band between the quartiles."""
-    figure = _new_figure(8.6, 5.4)
+    figure = new_figure(8.6, 5.4)
     axis = figure.subplots()
     styles = _style(models)
     ends, last = [], 0.0

@@ -22,7 +22,7 @@ from .files import read_dataset, write_dataset
 from .mat import read_mat
 from .public import PublicData
 
-_HELPERS = frozenset({"base", "coverage", "describe", "export", "files", "mat", "noise", "public", "sensitivity", "units"})
+_HELPERS = frozenset({"base", "corrections", "coverage", "describe", "export", "files", "mat", "noise", "public", "sensitivity", "units"})
 DATASETS = Registry("data set", "data", "DATASET", helpers=_HELPERS, group="datasets")
 
 _log = logging.getLogger(__name__)

@@ -12,12 +12,13 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError
 
 from ..errors import InputError, unknown_name
 from ..records import Dataset, Run
 from ..ship import Ship, read_toml
-from ..signals import ACTUATORS, COMMANDS, ENVIRONMENT, STATES
+from ..signals import ACTUATORS, COMMANDS, ENVIRONMENT, STATES, wrap_angle
+from .corrections import Corrections, check_names, correct_run, split_meta, to_ned
 from .units import sign_factor, unit_factor
 
 TABLES = ("trajectories.parquet", "trajectories.csv.gz", "trajectories.csv")
@@ -29,10 +30,10 @@ _EMPTY = ["", "NA", "N/A", "NaN", "nan", "NAN", "null", "NULL", "None", "#N/A"]
 """What stands for a missing number; in the column of run names it is a name like any other."""
 
 
-class _Description(BaseModel):
+class Description(Corrections):
     """dataset.toml; an unknown key is an error, never ignored."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     name: str
     ship: str = "ship.toml"
     dt: float = Field(gt=0)
@@ -40,11 +41,11 @@ class _Description(BaseModel):
     source: str = ""
     licence: str = ""
     simulation: str | None = None
-    notes: list[str] = []
-    units: dict[str, str] = {}
-    signs: dict[str, str] = {}
-    columns: dict[str, str] = {}
-    runs: dict[str, dict[str, Any]] = {}
+    notes: list[str] = Field(default_factory=list)
+    units: dict[str, str] = Field(default_factory=dict)
+    signs: dict[str, str] = Field(default_factory=dict)
+    columns: dict[str, str] = Field(default_factory=dict)
+    runs: dict[str, dict[str, Any]] = Field(default_factory=dict)
 
 
 def read_dataset(folder: str | Path) -> Dataset:
@@ -56,35 +57,42 @@ def read_dataset(folder: str | Path) -> Dataset:
         InputError: a file or column is missing, a value is not a finite number, time is not uniform, or a key, unit or sign is unknown.
     """
     folder = Path(folder)
-    description = _describe(folder / "dataset.toml")
+    description = read_description(folder / "dataset.toml")
     ship = Ship.load(folder / description.ship)
-    table, where = _read_table(folder, description)
+    table, where = read_table(folder, description)
     notes = list(description.notes)
-    _check_columns(table, where)
-    _convert(table, description)  # before columns are filled in: what is copied from another column is in our units already
-    inputs = _complete_columns(table, notes)
+    check_columns(table, where)
+    convert_table(table, description)  # before columns are filled in: what is copied from another column is in our units already
+    inputs = complete_columns(table, notes)
     unknown = set(description.runs) - set(table["trajectory"])
     if unknown:
         raise unknown_name(f"run in [runs] of {folder / 'dataset.toml'}", sorted(unknown)[0], table["trajectory"].unique())
-    runs = tuple(_run(str(name), group, inputs, description, where) for name, group in table.groupby("trajectory", sort=False))
+    runs = tuple(run for name, rows in table.groupby("trajectory", sort=False) for run in _runs(str(name), rows, inputs, description, where))
     return Dataset(
         name=description.name, ship=ship, dt=description.dt, runs=runs, actuators=description.actuators, source=description.source,
         licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)),
     )  # fmt: skip
 
 
-def _describe(path: Path) -> _Description:
+def read_description(path: Path) -> Description:
+    """dataset.toml, validated.
+
+    Raises:
+        InputError: the file is missing, is not TOML, or has a missing, unknown or impossible entry.
+    """
     data = read_toml(path)
     try:
-        return _Description.model_validate(data)
+        description = Description.model_validate(data)
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(k) for k in first["loc"])
         value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:80]})"
-        raise InputError(f"{path}: {key}: {first['msg']}{value}. Accepted keys: {', '.join(_Description.model_fields)}.") from None
+        raise InputError(f"{path}: {key}: {first['msg']}{value}. Accepted keys: {', '.join(Description.model_fields)}.") from None
+    check_names(description, description.runs, path.name)
+    return description
 
 
-def _read_table(folder: Path, description: _Description) -> tuple[pd.DataFrame, Path]:
+def read_table(folder: Path, description: Description) -> tuple[pd.DataFrame, Path]:
     """The table under our column names, and its path."""
     found = [folder / name for name in TABLES if (folder / name).is_file()]
     if not found:
@@ -125,7 +133,7 @@ def _rename(table: pd.DataFrame, columns: dict[str, str], where: Path) -> pd.Dat
     return table
 
 
-def _check_columns(table: pd.DataFrame, where: Path) -> None:
+def check_columns(table: pd.DataFrame, where: Path) -> None:
     """Required columns are there, run names are whole blocks of rows, and every signal is numeric (then float)."""
     for column in ("trajectory", "t", *_MOTION):
         if column not in table:
@@ -155,7 +163,7 @@ def _check_columns(table: pd.DataFrame, where: Path) -> None:
         table[column] = table[column].astype(float)
 
 
-def _complete_columns(table: pd.DataFrame, notes: list[str]) -> tuple[str, ...]:
+def complete_columns(table: pd.DataFrame, notes: list[str]) -> tuple[str, ...]:
     """Add what may be missing (with a note), and return the names of the inputs."""
     for actuator, command in zip(_ACTUATORS, COMMANDS, strict=True):
         if actuator not in table and command not in table:
@@ -170,8 +178,15 @@ def _complete_columns(table: pd.DataFrame, notes: list[str]) -> tuple[str, ...]:
     return (*COMMANDS, *(c for c in ENVIRONMENT if c in table))
 
 
-def _convert(table: pd.DataFrame, description: _Description) -> None:
-    for entries, factor in ((description.units, unit_factor), (description.signs, sign_factor)):
+def convert_table(table: pd.DataFrame, description: Description) -> None:
+    """Units, signs and frame of all columns to ours, in place.
+
+    Raises:
+        InputError: an entry names no signal, or a unit or sign that is not known.
+    """
+    from_is_to = description.signs.get("wind_from") == "to"
+    signs = {signal: word for signal, word in description.signs.items() if not (signal == "wind_from" and from_is_to)}
+    for entries, factor in ((description.units, unit_factor), (signs, sign_factor)):
         for signal, word in entries.items():
             if signal not in _SIGNALS:
                 raise unknown_name("signal in [units] or [signs]", signal, _SIGNALS)
@@ -180,24 +195,36 @@ def _convert(table: pd.DataFrame, description: _Description) -> None:
             for target in targets:
                 if target in table:
                     table[target] *= factor(signal, word)
+    if from_is_to and "wind_from" in table:
+        table["wind_from"] = wrap_angle(table["wind_from"] + np.pi)
+    to_ned(table, description)
 
 
-def _run(name: str, group: pd.DataFrame, inputs: tuple[str, ...], description: _Description, where: Path) -> Run:
+def _runs(name: str, rows: pd.DataFrame, inputs: tuple[str, ...], description: Description, where: Path) -> list[Run]:
+    """The run, or the pieces that its cuts and gaps leave: these share a group, so that no fold parts them."""
+    if len(rows) < 2:
+        raise InputError(f"{where}: run '{name}' has {len(rows)} sample; at least 2 are needed.")
+    own, meta = split_meta(name, description.runs.get(name, {}), str(where))
+    parts = correct_run(rows, description, own, description.dt, f"{where}: run '{name}'")
+    if not parts:
+        raise InputError(f"{where}: run '{name}': its cuts, gaps and delays leave no two samples. Remove the run.")
+    if len(parts) == 1:
+        return [_run(name, parts[0], inputs, description, where, meta)]
+    shared = {"group": name, **meta}
+    return [_run(f"{name}#{i}", part, inputs, description, where, shared) for i, part in enumerate(parts, 1)]
+
+
+def _run(name: str, group: pd.DataFrame, inputs: tuple[str, ...], description: Description, where: Path, meta: dict[str, Any]) -> Run:
     t = group["t"].to_numpy()
-    if len(t) < 2:
-        raise InputError(f"{where}: run '{name}' has {len(t)} sample; at least 2 are needed.")
     steps = np.diff(t)
     wrong = np.flatnonzero(~(np.abs(steps - description.dt) <= 1e-3 * description.dt))
     if len(wrong):
         k = int(wrong[0])
         raise InputError(
             f"{where}: run '{name}': t goes from {t[k]:g} s to {t[k + 1]:g} s, dt in dataset.toml is {description.dt:g} s ({len(wrong)} such steps). "
-            "Time must be uniform inside a run and its rows in order: resample, or split the run at the gap."
+            'Time must be uniform inside a run and its rows in order: resample, or write gaps = "split" into dataset.toml.'
         )
-    states = group[list(STATES)].to_numpy()
-    if np.isfinite(states[:, 2]).all() and (np.abs(np.diff(states[:, 2])) > np.pi).any():  # a continuous heading keeps its bits
-        states[:, 2] = np.unwrap(states[:, 2])
-    return Run(name, t, states, group[list(inputs)].to_numpy(), inputs, dict(description.runs.get(name, {})))
+    return Run(name, t.copy(), group[list(STATES)].to_numpy(copy=True), group[list(inputs)].to_numpy(copy=True), inputs, dict(meta))
 
 
 def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz", "csv", "parquet"] = "csv.gz") -> None:

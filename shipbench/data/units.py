@@ -7,13 +7,13 @@ import math
 from ..errors import unknown_name
 from ..signals import UNITS
 
-_LENGTH = {"m": 1.0, "km": 1000.0, "ft": 0.3048, "nmi": 1852.0}
+LENGTHS = {"m": 1.0, "km": 1000.0, "ft": 0.3048, "nmi": 1852.0}
 _ANGLE = {"rad": 1.0, "deg": math.pi / 180.0}
 _SPEED = {"m/s": 1.0, "kn": 1852.0 / 3600.0, "km/h": 1.0 / 3.6, "ft/s": 0.3048}
 _RATE = {"rad/s": 1.0, "deg/s": math.pi / 180.0, "deg/min": math.pi / 10800.0}
 _SHAFT = {"rpm": 1.0, "rev/s": 60.0, "rad/s": 60.0 / (2.0 * math.pi)}
 _FORCE = {"N": 1.0, "kN": 1e3, "MN": 1e6, "tf": 9806.65}
-_BY_OURS = {"m": _LENGTH, "rad": _ANGLE, "m/s": _SPEED, "rad/s": _RATE, "rpm": _SHAFT, "N": _FORCE}
+_BY_OURS = {"m": LENGTHS, "rad": _ANGLE, "m/s": _SPEED, "rad/s": _RATE, "rpm": _SHAFT, "N": _FORCE}
 
 _FLIPS = {
     "x": "south", "y": "west", "psi": "counterclockwise", "u": "astern", "v": "port", "r": "port", "n": "astern", "delta": "port",
@@ -46,5 +46,5 @@ def sign_factor(signal: str, positive: str) -> float:
     base = signal.removesuffix("_c")
     words = [w for w in (_FLIPS.get(base), _KEEPS.get(base)) if w]
     if positive not in words:
-        raise unknown_name(f"sign of '{signal}'", positive, words)
+        raise unknown_name(f"sign of '{signal}'", positive, [*words, *(["to"] if signal == "wind_from" else [])])
     return -1.0 if positive == _FLIPS[base] else 1.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -123,10 +123,13 @@ def write_down(
     return Dataset(name=name, ship=ship.particulars, dt=sailing.dt, runs=runs, actuators="measured", source=source)
 
 
-def sea_trials(ship: MMGShip, seed: int, hidden: Sequence[Hidden] = (), plan: Trials | None = None, name: str = "trials") -> Dataset:
+def sea_trials(
+    ship: MMGShip, seed: int, hidden: Sequence[Hidden] = (), plan: Trials | None = None, name: str = "trials", wind_recorded: bool = False
+) -> Dataset:
     """Sail and record a set of runs with `hidden` causes; one sample per second at 130 m, scaled with sqrt(L) for much smaller ships.
 
-    The runs begin after a warm-up under the same causes, so that currents and winds have had their time.
+    The runs begin after a warm-up under the same causes, so that currents and winds have had their time. wind_recorded: the gusts become the input
+    channels wind_speed and wind_from.
     """
     plan = plan or Trials()
     rng = np.random.default_rng(seed)
@@ -134,4 +137,9 @@ def sea_trials(ship: MMGShip, seed: int, hidden: Sequence[Hidden] = (), plan: Tr
     scale, dt = sailing.scale, sailing.dt
     wind = gusts(rng, plan.runs, sailing.U.shape[1], dt, plan.gusts * scale, 20.0 * scale) if plan.gusts else None
     S = sail(ship, sailing.s0, sailing.U, dt, hidden, wind, max_step=sailing.max_step)
-    return write_down(ship, sailing, S, hidden, plan, rng, name, f"shipbench sea trials of {ship.name}, seed {seed}")
+    data = write_down(ship, sailing, S, hidden, plan, rng, name, f"shipbench sea trials of {ship.name}, seed {seed}")
+    if not wind_recorded or wind is None:
+        return data
+    felt = np.concatenate([wind[:, _WARM_UP:], wind[:, -1:]], axis=1)
+    names = (*COMMANDS, "wind_speed", "wind_from")
+    return data.with_runs(replace(run, inputs=np.column_stack([run.inputs, w]), inputs_names=names) for run, w in zip(data.runs, felt, strict=True))

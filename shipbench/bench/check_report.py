@@ -1,0 +1,80 @@
+"""What `data check` writes: tables, one document, one picture per finding that has evidence to look at."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..checking.finding import Finding, Picture, merged, toml_line
+from ..checking.recording import Recording
+from ..errors import InputError
+from .listing import dataset_facts
+from .results import slug
+from .tables import Table, TableColumn
+
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+
+
+def check_tables(findings: Sequence[Finding]) -> list[Table]:
+    """The findings, errors first, and what to do."""
+    if not findings:
+        return []
+    columns = [TableColumn("", "severity"), TableColumn("finding", "kind"), TableColumn("channels", "channels"), TableColumn("evidence", "text"),
+               TableColumn("dataset.toml, or what to do", "do")]  # fmt: skip
+    rows = []
+    for f in findings:
+        lines = f.line.split("\n") if f.line else []
+        short = [line if len(line) <= 60 else f"{line[:57]}..." for line in lines[:6]] + (["..."] if len(lines) > 6 else [])
+        do = "\n".join([*short, *([f.todo] if f.todo else [])])
+        rows.append({"severity": f.severity, "kind": f.kind, "channels": ", ".join(f.channels), "text": f.text, "do": do})
+    return [Table("Findings", columns, rows)]
+
+
+def check_document(recording: Recording, findings: Sequence[Finding]) -> dict[str, Any]:
+    """Facts of the data set, findings, and all lines for dataset.toml together."""
+    lines = [f.line for f in findings if f.line]
+    return dataset_facts(recording.dataset) | {"findings": [f.as_json() for f in findings], "lines": toml_line(merged({}, lines))}
+
+
+def write_findings(recording: Recording, findings: Sequence[Finding], folder: Path) -> list[Path]:
+    """findings.json, dataset_lines.toml and NN-kind.png; pictures of an earlier check are removed.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    document = check_document(recording, findings)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.glob("[0-9][0-9]-*.png"):
+            old.unlink()
+        written = [_write(folder / "findings.json", json.dumps(document, indent=1, default=str) + "\n")]
+        written.append(_write(folder / "dataset_lines.toml", document["lines"] + "\n"))
+        for number, finding in enumerate(findings, 1):
+            if finding.picture is not None:
+                written.append(_draw(finding.picture, folder / f"{number:02d}-{slug(finding.kind.replace(' ', '_'))}.png"))
+    except OSError as error:
+        raise InputError(f"cannot write to {folder}: {error.strerror}. Give a folder that can be written.") from None
+    return written
+
+
+def _write(path: Path, text: str) -> Path:
+    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    part.write_text(text, encoding="utf-8")
+    os.replace(part, path)
+    return path
+
+
+def _draw(picture: Picture, path: Path) -> Path:
+    from .plots import new_figure, save
+
+    figure = new_figure(8.0, 4.5)
+    axes = figure.add_subplot()
+    for i, curve in enumerate(picture.curves):
+        axes.plot(curve.x, curve.y, curve.style, color=_COLOURS[i % len(_COLOURS)], label=curve.label, markersize=4, linewidth=1.2)
+    axes.set(title=picture.title, xlabel=picture.xlabel, ylabel=picture.ylabel)
+    axes.grid(alpha=0.3)
+    axes.legend()
+    return save(figure, path)

@@ -1,0 +1,65 @@
+"""All checks: one file each, found by its existence. A file's `CHECK` takes a `Recording` and returns its findings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+from ..records import Dataset
+from ..registry import Registry
+from ..signals import STATES
+from .finding import SEVERITIES, Finding
+from .gross import mend
+from .reading import read_recording
+from .recording import Recording
+
+_HELPERS = frozenset({"base", "finding", "gross", "reading", "recording", "selection", "statistics"})
+CHECKS = Registry("check", "checking", "CHECK", helpers=_HELPERS, group="checks")
+
+
+@lru_cache(maxsize=1)
+def _checks() -> tuple[Callable[[Recording], list[Finding]], ...]:
+    return tuple(CHECKS.get(name) for name in CHECKS.names())  # looks for entry points, which takes as long as a check
+
+
+def check_recording(recording: Recording) -> list[Finding]:
+    """Findings of the gross checks, then those of every other on the data with the gross errors taken out; errors first."""
+    mended, found = mend(recording)
+    for check in _checks():
+        found += check(mended)
+    found = _without_consequences(found)
+    if recording.wrapped:
+        found.append(_wrapped(recording))
+    return sorted(found, key=lambda f: SEVERITIES.index(f.severity))
+
+
+def _without_consequences(found: list[Finding]) -> list[Finding]:
+    """Speeds or a yaw rate that are late against the other motion are late against rudder and shaft, too; a stuck rudder seems late. Said once."""
+    known = {c for f in found if (f.kind, f.check) in (("lag", "track"), ("lag", "yaw"), ("frozen", "samples")) for c in f.channels}
+    return [f for f in found if f.check != "response" or not known & {c.removesuffix("_c") for c in f.channels}]
+
+
+def _wrapped(recording: Recording) -> Finding:
+    names, total = recording.wrapped, len(set(recording.parent.values())) or len(recording.runs)
+    text = f"the heading is wrapped (it jumps by a whole turn) in {len(names)} of {total} runs; it is made continuous on loading."
+    return Finding("reading", "note", "wrapped heading", text, todo="Nothing.", channels=("psi",), runs=names)
+
+
+def check_dataset(dataset: Dataset) -> list[Finding]:
+    """Findings on a data set in memory.
+
+    Args:
+        dataset: as loaded or made; all its actuators and commands count as recorded.
+    """
+    return check_recording(Recording(dataset, recorded=frozenset((*STATES, *dataset.inputs))))
+
+
+def check_path(spec: str) -> tuple[Recording, list[Finding]]:
+    """A registered data set or a folder, as far as it can be read, and everything that is found in it.
+
+    Raises:
+        InputError: neither a known name nor a folder, or nothing in it can be read.
+    """
+    recording, found = read_recording(spec)
+    found += check_recording(recording)
+    return recording, sorted(found, key=lambda f: SEVERITIES.index(f.severity))

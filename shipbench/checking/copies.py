@@ -1,0 +1,189 @@
+"""Runs that hold the same samples as another (copies, pieces), and runs that go on where another ends: neither may straddle a fold.
+
+Windows of rounded samples of u, v, r are hashed, so that the cost grows with the number of samples and shifted positions do not hide a copy.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from ..records import Run
+from ..signals import PSI, R, U, V, X, Y
+from .finding import Curve, Finding, Picture, toml_line
+from .recording import Recording
+from .statistics import some, spread
+
+_WINDOW = 8
+_DIGITS = 1e-5
+"""Rounding, as a share of the channel's spread."""
+_REST = 1e-3
+"""Froude number of a ship at rest."""
+_FEWEST = 20
+"""Equal samples that make two runs copies."""
+
+
+def _hashes(run: Run, size: np.ndarray) -> np.ndarray:
+    """(windows,) 64-bit hash of each window of samples, 0 for windows in which nothing changes (ships at rest are all alike)."""
+    rounded = np.round(run.states[:, [U, V, R]] / size).astype(np.int64).astype(np.uint64)
+    with np.errstate(over="ignore"):
+        sample = (rounded * np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)).sum(axis=1, dtype=np.uint64)
+        sample ^= sample >> np.uint64(29)
+        windows = np.lib.stride_tricks.sliding_window_view(sample, _WINDOW)
+        weights = np.array([pow(0x100000001B3, i, 2**64) for i in range(_WINDOW)], dtype=np.uint64)
+        hashes = (windows * weights).sum(axis=1, dtype=np.uint64)
+    still = np.all(windows == windows[:, :1], axis=1)
+    return np.where(still, np.uint64(0), hashes)
+
+
+def overlaps(recording: Recording) -> dict[tuple[int, int], tuple[int, int]]:
+    """(i, j) of runs, i < j -> (equal samples, start of the equal part in i less that in j)."""
+    runs = [(i, run) for i, run in enumerate(recording.runs) if len(run) >= _WINDOW]
+    if len(runs) < 2:
+        return {}
+    S = np.concatenate([run.states[:, [U, V, R]] for _, run in runs])
+    size = np.maximum(S.std(axis=0) * _DIGITS, 1e-9 * np.max(np.abs(S), axis=0) + 1e-12)  # of a channel that never changes, too
+    hashes = [(i, _hashes(run, size)) for i, run in runs]
+    value = np.concatenate([h for _, h in hashes])
+    owner = np.concatenate([np.full(len(h), i) for i, h in hashes])
+    place = np.concatenate([np.arange(len(h)) for _, h in hashes])
+    order = np.argsort(value, kind="stable")
+    value, owner, place = value[order], owner[order], place[order]
+    same = np.flatnonzero((value[1:] == value[:-1]) & (value[1:] != 0) & (owner[1:] != owner[:-1]))  # neighbours: copies of copies chain up
+    pairs = np.column_stack([owner[same], owner[same + 1], place[same] - place[same + 1]])
+    found: dict[tuple[int, int], tuple[int, int]] = {}
+    for (a, b, shift), count in zip(*np.unique(pairs, axis=0, return_counts=True), strict=True):
+        i, j, offset = (int(a), int(b), int(shift)) if a < b else (int(b), int(a), -int(shift))
+        samples = int(count) + _WINDOW - 1
+        if samples >= _FEWEST // 2 and samples > found.get((i, j), (0, 0))[0]:
+            found[i, j] = (samples, offset)
+    alike = {pair: (_alike(recording.runs[pair[0]], recording.runs[pair[1]], offset, size), offset) for pair, (_, offset) in found.items()}
+    return {pair: part for pair, part in alike.items() if part[0] >= _FEWEST}
+
+
+def _alike(a: Run, b: Run, offset: int, size: np.ndarray) -> int:
+    """Number of samples that are equal to rounding where `a` begins `offset` samples before `b` (a hash breaks where rounding falls on an edge)."""
+    i, j = max(offset, 0), max(-offset, 0)
+    n = min(len(a) - i, len(b) - j)
+    return int(np.sum(np.all(np.abs(a.states[i : i + n, [U, V, R]] - b.states[j : j + n, [U, V, R]]) <= 2.0 * size, axis=1)))
+
+
+def _group(recording: Recording, run: Run) -> str:
+    return str(run.meta.get("group", run.id))
+
+
+def check(recording: Recording) -> list[Finding]:
+    """Copies and pieces, then logs that were cut; what shares a group already is not reported. All runs that hang together get one group."""
+    shared = {pair: part for pair, part in overlaps(recording).items() if _apart(recording, [recording.runs[i] for i in pair])}
+    chains = [chain for chain in _chains(recording) if _apart(recording, chain)]
+    families = _families(recording, [*([recording.runs[i] for i in pair] for pair in shared), *chains])
+    found = [_copy(recording, recording.runs[i], recording.runs[j], *part, families) for (i, j), part in shared.items()]
+    return found + [_log(recording, chain, families) for chain in chains]
+
+
+def _apart(recording: Recording, runs: list[Run]) -> bool:
+    return len({_group(recording, run) for run in runs}) > 1
+
+
+def _families(recording: Recording, sets: list[list[Run]]) -> dict[str, tuple[str, ...]]:
+    """Name of a run -> names of all runs that hang together with it by these sets and by the groups that are given, in the order of the data set."""
+    family: dict[str, set[str]] = {}
+    given: dict[str, list[Run]] = {}
+    for run in recording.runs:
+        given.setdefault(_group(recording, run), []).append(run)
+    for runs in [*given.values(), *sets]:
+        names = set(recording.names(runs)).union(*(family.get(recording.name_of(run), ()) for run in runs))
+        family |= dict.fromkeys(names, names)
+    order = recording.names(recording.runs)
+    return {name: tuple(n for n in order if n in names) for name, names in family.items()}
+
+
+def _lines(family: tuple[str, ...]) -> str:
+    return toml_line({"runs": {name: {"group": family[0]} for name in family}})
+
+
+def _copy(recording: Recording, a: Run, b: Run, samples: int, offset: int, families: dict[str, tuple[str, ...]]) -> Finding:
+    names = (recording.name_of(a), recording.name_of(b))
+    longer, shorter = (a, b) if len(a) >= len(b) else (b, a)
+    start = offset if longer is a else -offset
+    if samples >= 0.98 * len(longer):
+        kind, text = "duplicate run", f"runs '{names[0]}' and '{names[1]}' hold the same {samples} samples"
+    elif samples >= 0.98 * len(shorter):
+        where = max(start, 0) * recording.dt
+        kind = "piece of a run"
+        text = (
+            f"run '{recording.name_of(shorter)}' ({samples} samples) is a piece of '{recording.name_of(longer)}' ({len(longer)} samples), from "
+            f"{where:g} s to {where + (samples - 1) * recording.dt:g} s of it"
+        )
+    else:
+        kind, text = "overlapping runs", f"runs '{names[0]}' ({len(a)} samples) and '{names[1]}' ({len(b)}) share {samples} samples"
+    i, j = max(offset, 0), max(-offset, 0)
+    n = min(len(a) - i, len(b) - j)
+    t = np.arange(n) * recording.dt
+    picture = Picture("u of both runs in the part that they share", "time [s]", "u [m/s]", (
+        Curve(names[0], t, a.states[i : i + n, U], "-"), Curve(names[1], t, b.states[j : j + n, U], "--"),
+    ))  # fmt: skip
+    return Finding(
+        "copies", "error", kind, f"{text}: one in training and the other in test would leak.", _lines(families[names[0]]), "Or remove one of them.",
+        runs=names, evidence={"samples": samples}, picture=picture,
+    )  # fmt: skip
+
+
+def _chains(recording: Recording) -> list[list[Run]]:
+    """Chains of runs each of which goes on where the one before ends."""
+    runs = [run for run in recording.runs if len(run) >= 4]
+    after = {i: j for i in range(len(runs)) if (j := _next(recording, runs, i)) is not None}
+    starts = set(after) - set(after.values())
+    found = []
+    for start in sorted(starts):
+        chain = [start]
+        while chain[-1] in after and after[chain[-1]] not in chain:
+            chain.append(after[chain[-1]])
+        found.append([runs[i] for i in chain])
+    return found
+
+
+def _next(recording: Recording, runs: list[Run], i: int) -> int | None:
+    """The run that begins where run i ends, within a few samples: state carried on by its rates, to within noise and a sample's change."""
+    end, dt = runs[i].states[-1], recording.dt
+    rates = end[[U, V]] @ np.array([[np.cos(end[PSI]), np.sin(end[PSI])], [-np.sin(end[PSI]), np.cos(end[PSI])]])
+    noise = _noise(recording)
+    best, nearest = None, np.inf
+    if np.hypot(end[U], end[V]) < max(0.1 * recording.speed, _REST * (9.81 * recording.dataset.ship.L) ** 0.5):
+        return None  # many runs end and begin at rest at one berth
+    for j, run in enumerate(runs):
+        S = run.states[0]
+        if j == i or abs(S[X] - end[X]) > 3.0 * noise[0] + 5.0 * dt * recording.speed + 1e-9:
+            continue
+        for steps in (1, 2, 3, 0):
+            off = S[[X, Y]] - end[[X, Y]] - rates * steps * dt
+            turned = (S[PSI] - end[PSI] - end[R] * steps * dt + np.pi) % (2.0 * np.pi) - np.pi
+            error = np.array([np.hypot(*off), abs(turned), abs(S[U] - end[U]), abs(S[V] - end[V]), abs(S[R] - end[R])])
+            worst = float(np.max(error / noise))
+            if worst < 1.0 and worst < nearest:
+                best, nearest = j, worst
+    return best
+
+
+def _noise(recording: Recording) -> np.ndarray:
+    """(5,) tolerances of position, heading, u, v, r: six deviations of the change of slope within runs; of the rates a tenth of what is usual."""
+    second = np.concatenate([run.states[2:] - 2.0 * run.states[1:-1] + run.states[:-2] for run in recording.runs if len(run) >= 4])
+    own = 6.0 * np.array([np.hypot(spread(second[:, X]), spread(second[:, Y])), *(spread(second[:, c]) for c in (PSI, U, V, R))])
+    step, turn = recording.speed * recording.dt, recording.turning * recording.dt
+    return np.maximum(own, [0.6 * step, 0.6 * turn, 0.1 * recording.speed, 0.1 * recording.speed, 0.1 * recording.turning])
+
+
+def _log(recording: Recording, pieces: list[Run], families: dict[str, tuple[str, ...]]) -> Finding:
+    names = recording.names(pieces)
+    gaps = [float(b.t[0] - a.t[-1]) for a, b in pairwise(pieces)]
+    clock = f", {min(gaps):g} to {max(gaps):g} s later by their own t" if min(gaps) > 0.0 else ""
+    text = f"runs {some(names, 8)} follow one another: each begins where the one before ends{clock}. They are pieces of one log."
+    curves = tuple(Curve(recording.name_of(run), run.states[:, Y], run.states[:, X]) for run in pieces)
+    return Finding(
+        "copies", "warning", "pieces of one log", text, _lines(families[names[0]]), runs=names, evidence={"pieces": len(pieces)},
+        picture=Picture("Tracks", "y [m]", "x [m]", curves),
+    )  # fmt: skip
+
+
+CHECK = check

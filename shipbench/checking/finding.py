@@ -1,0 +1,125 @@
+"""What a check reports: what is wrong, the figures it rests on, a picture, and the lines of dataset.toml that mend it."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from ..signals import UNITS
+
+Severity = Literal["error", "warning", "note"]
+SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note")
+
+
+def labelled(*channels: str) -> str:
+    """Channels of one unit as the label of an axis: "x, y [m]"."""
+    return f"{', '.join(channels)} [{UNITS[channels[0].removesuffix('_c')]}]"
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One line or cloud of a picture: x, y of equal length; style is matplotlib's ("-", ".")."""
+
+    label: str
+    x: np.ndarray
+    y: np.ndarray
+    style: str = "-"
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Evidence to look at; axis labels carry units."""
+
+    title: str
+    xlabel: str
+    ylabel: str
+    curves: tuple[Curve, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """One fault or peculiarity of a data set.
+
+    Args:
+        check: name of the check that found it.
+        severity: "error" (fits are wrong or the loader refuses it), "warning" (fits suffer), "note" (good to know).
+        kind: the fault in a few words, the same for every data set.
+        text: what is wrong, with the figures.
+        line: TOML for dataset.toml that heals it, or "".
+        todo: what to do instead, or beside.
+        channels, runs: what is concerned; runs empty: all.
+        evidence: figures by name.
+    """
+
+    check: str
+    severity: Severity
+    kind: str
+    text: str
+    line: str = ""
+    todo: str = ""
+    channels: tuple[str, ...] = ()
+    runs: tuple[str, ...] = ()
+    evidence: dict[str, Any] = field(default_factory=dict)
+    picture: Picture | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything but the picture, with plain numbers."""
+        figures = {k: v.item() if hasattr(v, "item") else v for k, v in self.evidence.items()}
+        return {
+            "check": self.check, "severity": self.severity, "kind": self.kind, "text": self.text, "line": self.line, "todo": self.todo,
+            "channels": list(self.channels), "runs": list(self.runs), "evidence": figures,
+        }  # fmt: skip
+
+
+def toml_line(data: dict[str, Any]) -> str:
+    """As compact TOML: values first, then tables; numbers to six digits, lists on one line (tomli_w spreads intervals over four)."""
+    return "\n".join(_toml(data, ()))
+
+
+def _toml(table: dict[str, Any], path: tuple[str, ...]) -> list[str]:
+    plain = {k: v for k, v in table.items() if not isinstance(v, dict)}
+    lines = [f"[{'.'.join(map(_key, path))}]"] if path and plain else []
+    lines += [f"{_key(k)} = {json.dumps(_plain(v), ensure_ascii=False)}" for k, v in plain.items()]
+    for key, value in table.items():
+        if isinstance(value, dict):
+            lines += _toml(value, (*path, key))
+    return lines
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key, ensure_ascii=False)
+
+
+def _plain(value: Any) -> Any:
+    """Lists, text, whole numbers and floats as JSON and TOML both write them."""
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    value = value.item() if hasattr(value, "item") else value
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def merged(base: dict[str, Any], lines: Iterable[str]) -> dict[str, Any]:
+    """`base` (a parsed dataset.toml, or {}) with the lines of findings laid into it; lists of intervals grow, other values are replaced."""
+    result = dict(base)
+    for line in lines:
+        result = _laid(result, tomllib.loads(line))
+    return result
+
+
+def _laid(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
+    result = dict(old)
+    for key, value in new.items():
+        before = result.get(key)
+        if isinstance(before, dict) and isinstance(value, dict):
+            result[key] = _laid(before, value)
+        elif isinstance(before, list) and isinstance(value, list) and value and isinstance(value[0], list):
+            result[key] = before + [v for v in value if v not in before]
+        else:
+            result[key] = value
+    return result

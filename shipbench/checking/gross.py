@@ -1,0 +1,235 @@
+"""Errors that touch every figure: frames (ENU, heading from east), earth-fixed velocities, units, signs. They are taken out before finer checks.
+
+Readings of frame and velocities are compared by the share of the track, and of the heading's change, that they leave unexplained; a reading other
+than ours is believed only if it leaves a quarter or less of the squares. Units and signs are `diagnosis.units`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..diagnosis.units import BETTER, UnitFinding, check_units, corrected
+from ..records import Dataset
+from ..signals import PSI, U, V, X, Y
+from .finding import Curve, Finding, Picture, toml_line
+from .recording import Recording
+from .track import WINDOW
+
+_POOR = 0.15
+_FLIPPED = {
+    "x": ("south", "north"), "y": ("west", "east"), "psi": ("counterclockwise", "clockwise"), "u": ("astern", "ahead"), "v": ("port", "starboard"),
+    "r": ("port", "starboard"), "delta": ("port", "starboard"), "n": ("astern", "ahead"), "F_b": ("port", "starboard"), "F_s": ("port", "starboard"),
+}  # fmt: skip
+_UNITS = {
+    "degrees": "deg", "knots": "kn", "km/h": "km/h", "kN": "kN", "degrees per second": "deg/s", "degrees per minute": "deg/min", "rev/s": "rev/s",
+    "rad/s": "rad/s",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """A way to read frame and velocities: what it is called, the change of the states (a copy) that makes them ours, and its lines."""
+
+    kind: str
+    text: str
+    mend: Callable[[np.ndarray], None]
+    line: dict[str, Any]
+
+
+def _swap(S: np.ndarray) -> None:
+    S[:, [X, Y]] = S[:, [Y, X]]
+
+
+def _from_east(S: np.ndarray) -> None:
+    S[:, PSI] = 0.5 * np.pi - S[:, PSI]
+
+
+def _enu(S: np.ndarray) -> None:
+    _swap(S)
+    _from_east(S)
+
+
+def _earth(S: np.ndarray) -> None:
+    turned = (S[:, U] + 1j * S[:, V]) * np.exp(-1j * S[:, PSI])
+    S[:, U], S[:, V] = turned.real, turned.imag
+
+
+def _earth_swapped(S: np.ndarray) -> None:
+    S[:, [U, V]] = S[:, [V, U]]
+    _earth(S)
+
+
+READINGS = (
+    _Reading("ENU", "x, y, psi are of an ENU frame (x east, y north, psi counterclockwise from east)", _enu, {"frame": "ENU"}),
+    _Reading("ENU", "x is east and y north, with a compass heading", _swap, {"frame": "east-north"}),
+    _Reading(
+        "heading from east", "the heading is counted counterclockwise from east", _from_east,
+        {"signs": {"psi": "counterclockwise"}, "bias": {"psi": -math.pi / 2.0}},
+    ),
+    _Reading("earth-fixed velocities", "u, v are velocities to the north and east, not along the ship", _earth, {"velocities": "earth"}),
+    _Reading(
+        "earth-fixed velocities", "u, v are velocities to the east and north, not along the ship", _earth_swapped,
+        {"velocities": "earth-east-north"},
+    ),
+)  # fmt: skip
+
+
+def _mended(dataset: Dataset, mend: Callable[[np.ndarray], None]) -> Dataset:
+    runs = []
+    for run in dataset.runs:
+        states = run.states.copy()
+        mend(states)
+        runs.append(replace(run, states=states))
+    return dataset.with_runs(runs)
+
+
+@dataclass(frozen=True)
+class _Misfit:
+    """track: root share of the track's squares that heading and speeds leave; scale: of the speeds to the track; pairs: way said and made (W,)."""
+
+    track: float
+    scale: float
+    said: np.ndarray
+    made: np.ndarray
+
+
+def _misfit(recording: Recording, dataset: Dataset) -> _Misfit | None:
+    """How the track departs from heading and speeds, with a scale left free; None where the ship hardly moves."""
+    dt = recording.dt
+    width = max(3, round(WINDOW * recording.froude / dt))
+    pieces = [run.states[a : a + width + 1] for run in dataset.runs for a in range(0, len(run) - width, width)]
+    if len(pieces) < 12:
+        return None
+    S = np.stack(pieces)
+    made = S[:, -1, X] - S[:, 0, X] + 1j * (S[:, -1, Y] - S[:, 0, Y])
+    said = np.asarray(np.trapezoid((S[..., U] + 1j * S[..., V]) * np.exp(1j * S[..., PSI]), dx=dt, axis=1))
+    if np.mean(np.abs(made) ** 2) < (0.02 * recording.dataset.ship.L) ** 2:
+        return None
+    scale = float(np.real(np.vdot(said, made)) / max(np.real(np.vdot(said, said)), 1e-300))
+    keep = np.abs(made - scale * said)
+    keep = keep <= 6.0 * np.median(keep) + 1e-12
+    share = float(np.sqrt(np.sum(np.abs(made - scale * said)[keep] ** 2) / np.sum(np.abs(made[keep]) ** 2)))
+    return _Misfit(share if scale > 0.0 else 1.0, scale, said, made)
+
+
+def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
+    """The recording with gross errors taken out, and what they were."""
+    findings: list[Finding] = []
+    plain = _misfit(recording, recording.dataset)
+    units = check_units(recording.dataset)
+    if plain is not None and (plain.track > _POOR or len(_errors(units)) > 1):
+        best = _best_reading(recording, plain, units)
+        if best is not None:
+            reading, dataset, left = best
+            findings.append(_frame_finding(reading, plain, left))
+            recording = recording.with_dataset(dataset)
+            units = check_units(recording.dataset)
+    findings += [_unit_finding(recording, f, units) for f in units if not _follows(f, units)]
+    return recording.with_dataset(corrected(recording.dataset, units)), findings
+
+
+def _best_reading(recording: Recording, plain: _Misfit, units: list[UnitFinding]) -> tuple[_Reading, Dataset, _Misfit] | None:
+    """A reading of the frame that explains the track, unless units and signs explain it with as few errors."""
+    options = []
+    for reading in READINGS:
+        dataset = _mended(recording.dataset, reading.mend)
+        left = _misfit(recording, dataset)
+        if left is None or BETTER * left.track**2 > plain.track**2 or left.track > _POOR:
+            continue
+        further = check_units(dataset)
+        options.append((1 + len(_errors(further)), left.track, reading, dataset, left))
+    if not options:
+        return None
+    errors, _, reading, dataset, left = min(options, key=lambda o: o[:2])
+    as_units = _misfit(recording, corrected(recording.dataset, units)) if units else None
+    simpler = len(_errors(units)) < errors + (reading.kind != "ENU")  # a frame is the likelier slip of the two
+    return None if as_units is not None and simpler and as_units.track < 1.5 * left.track else (reading, dataset, left)
+
+
+def _errors(units: list[UnitFinding]) -> list[UnitFinding]:
+    """Separate mistakes: commands share that of their actuator, u and v one unit."""
+    return [f for f in units if not _follows(f, units)]
+
+
+def _follows(f: UnitFinding, units: list[UnitFinding]) -> bool:
+    """A command with its actuator's error."""
+    return f.channel.endswith("_c") and any(o.channel == f.channel.removesuffix("_c") and abs(o.factor / f.factor - 1.0) < 0.02 for o in units)
+
+
+def _picture(plain: _Misfit, left: _Misfit) -> Picture:
+    top = float(np.quantile(np.abs(plain.made), 0.99)) * 1.2
+    curves = tuple(
+        Curve(label, (m.scale * m.said).real, m.made.real, ".")
+        for label, m in (("as recorded", plain), ("as proposed", left))
+        if np.isfinite(m.scale)
+    )
+    return Picture("Way made to the north, window by window", "by heading and speeds [m]", "by position [m]", (
+        *curves, Curve("equal", np.array([-top, top]), np.array([-top, top])),
+    ))  # fmt: skip
+
+
+def _frame_finding(reading: _Reading, plain: _Misfit, left: _Misfit) -> Finding:
+    text = (
+        f"{reading.text}: the track departs from heading and speeds by {plain.track:.1%} of its length as recorded, by {left.track:.1%} read so "
+        f"({len(left.made)} windows)."
+    )
+    channels = ("u", "v") if "velocities" in reading.line else ("x", "y", "psi")
+    return Finding(
+        "gross", "error", reading.kind, text, toml_line(reading.line), channels=channels,
+        evidence={"left_plain": plain.track, "left": left.track}, picture=_picture(plain, left),
+    )  # fmt: skip
+
+
+def _unit_finding(recording: Recording, f: UnitFinding, units: list[UnitFinding]) -> Finding:
+    """In words and as lines; a sign that the file declares already is taken back."""
+    if f.kind == "exchanged with y":
+        text = f"x is east and y north. {f.evidence}"
+        line = toml_line({"frame": "east-north"})
+        return Finding(
+            "gross", "error", "ENU", text, line, channels=("x", "y"), evidence={"factor": f.factor}, picture=_channel(recording, f.channel)
+        )
+    given, lines, kinds, todo = recording.given, {}, [], ""
+    for part in f.kind.split(", "):
+        if part == "sign":
+            flipped, kept = _FLIPPED[f.channel.removesuffix("_c")]
+            lines["signs"] = {f.channel: kept if given.get("signs", {}).get(f.channel) == flipped else flipped}
+            kinds.append("sign")
+        elif part:
+            lines["units"] = {f.channel: _UNITS[part]}
+            kinds.append("unit")
+    if f.channel == "delta" and "sign" in kinds and len(_errors(units)) == 1:
+        todo = (
+            "If the rudder is right, all else is a mirror image, as of an ENU frame with v and r to port: then write frame = \"ENU\" and "
+            "[signs] v = \"port\", r = \"port\" instead. Nothing else in the data tells the two apart."
+        )  # fmt: skip
+    wrong = " and ".join(dict.fromkeys(kinds)) or "size"
+    text = f"{f.channel} is recorded with another {wrong} ({f.kind or f'{f.factor:.4g} times ours'}). {f.evidence}"
+    return Finding(
+        "gross", "error", " and ".join(dict.fromkeys(kinds)) or "unit", text, toml_line(lines), todo, (f.channel,), evidence={"factor": f.factor},
+        picture=_channel(recording, f.channel),
+    )  # fmt: skip
+
+
+def _channel(recording: Recording, channel: str) -> Picture:
+    """The channel in the longest run, and what it would have to agree with."""
+    run = max(recording.runs, key=len)
+    t, S = run.t - run.t[0], run.states
+    names = dict(zip(("x", "y", "psi", "u", "v", "r", "n", "delta", "F_b", "F_s"), S.T, strict=True)) | dict(
+        zip(run.inputs_names, run.inputs.T, strict=True)
+    )
+    curves = [Curve(f"{channel} as recorded", t, names[channel])]
+    if channel == "r":
+        curves.append(Curve("change of psi / time", t, np.gradient(S[:, PSI], recording.dt)))
+    elif channel in ("u", "v", "psi", "x", "y"):
+        z = np.gradient(S[:, X] + 1j * S[:, Y], recording.dt)
+        own = z * np.exp(-1j * S[:, PSI])
+        by = {"u": own.real, "v": own.imag, "psi": np.unwrap(np.angle(z)), "x": S[:, X], "y": S[:, Y]}
+        curves.append(Curve(f"{channel} by the track", t, by[channel]))
+    elif channel == "delta":
+        curves.append(Curve("r, to the same height", t, S[:, 5] / max(float(np.max(np.abs(S[:, 5]))), 1e-12) * float(np.max(np.abs(S[:, 7])))))
+    return Picture(f"{channel} in run {recording.name_of(run)}", "time [s]", f"{channel}, in the unit of the file", tuple(curves))

@@ -1,0 +1,235 @@
+"""Read a data set's folder as far as it goes: what the loader refuses at its first sight becomes findings here, all at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ..data.base import load_dataset
+from ..data.corrections import SIGNALS, correct_run, split_meta
+from ..data.files import Description, complete_columns, convert_table, read_description, read_table
+from ..errors import InputError
+from ..records import Dataset, Run
+from ..ship import Ship, read_toml
+from ..signals import MOTION, STATES
+from .finding import Curve, Finding, Picture, toml_line
+from .recording import Recording
+from .statistics import some
+
+_MOST = 1e12
+"""Of any channel in its own unit."""
+_SPLIT = toml_line({"gaps": "split"})
+
+
+def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
+    """A registered data set, or a folder read tolerantly, with what is wrong in its table.
+
+    Raises:
+        InputError: neither a known name nor a folder; its TOML files or its table cannot be read, or nothing usable is left of it.
+    """
+    folder = Path(spec)
+    if not (folder / "dataset.toml").is_file():
+        dataset = load_dataset(spec)
+        return Recording(dataset, recorded=frozenset((*STATES, *dataset.inputs))), []
+    description = read_description(folder / "dataset.toml")
+    ship = Ship.load(folder / description.ship)
+    table, where = read_table(folder, description)
+    missing = [c for c in ("trajectory", "t", *STATES[MOTION]) if c not in table]
+    if missing:
+        raise InputError(
+            f"{where}: missing columns: {', '.join(missing)}. Found: {', '.join(map(str, table.columns))}. "
+            "Name theirs under [columns] in dataset.toml (theirs = ours)."
+        )
+    found: list[Finding] = []
+    table = _clean(table, description, found)
+    _possible(table, str(where))
+    recorded = frozenset(c for c in SIGNALS if c in table)
+    convert_table(table, description)
+    notes = list(description.notes)
+    inputs = complete_columns(table, notes)
+    frames = {str(name): rows.reset_index(drop=True) for name, rows in table.groupby("trajectory", sort=False)}
+    frames = {name: _ordered(name, rows, found) for name, rows in frames.items()}
+    dt = _sample_time(frames, description, found)
+    _missing_values(frames, description, recorded, found)
+    _time_steps(frames, description, dt, found)
+    wrapped = tuple(name for name, rows in frames.items() if _unwrap(rows))
+    runs, parent = _runs(frames, description, inputs, dt, str(where), found)
+    if not runs:
+        empty = [c for c in ("t", *SIGNALS) if c in table and not np.isfinite(table[c]).any()]
+        without = f" Without a single number: {', '.join(empty)}." if empty else ""
+        raise InputError(f"{where}: no run has two samples with all values; there is nothing to check.{without}")
+    dataset = Dataset(
+        name=description.name, ship=ship, dt=dt, runs=tuple(runs), actuators=description.actuators, source=description.source,
+        licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)),
+    )  # fmt: skip
+    return Recording(dataset, read_toml(folder / "dataset.toml"), recorded, wrapped, parent), found
+
+
+def _error(
+    kind: str, text: str, line: str = "", todo: str = "", runs: tuple[str, ...] = (), channels: tuple[str, ...] = (), **figures: float
+) -> Finding:
+    return Finding("reading", "error", kind, text, line, todo, channels, runs, dict(figures))
+
+
+def _clean(table: pd.DataFrame, description: Description, found: list[Finding]) -> pd.DataFrame:
+    """Rows with a name, numbers or NaN in every signal."""
+    nameless = (table["trajectory"].isna() | (table["trajectory"].astype(str).str.strip() == "")).to_numpy()
+    if nameless.any():
+        row = int(np.argmax(nameless)) + 2
+        found.append(_error("nameless rows", f"{nameless.sum()} rows have no run name, the first is row {row}.", todo="Name them or remove them."))
+        table = table[~nameless]
+    table = table.assign(trajectory=table["trajectory"].astype(str))
+    for column in ("t", *(c for c in SIGNALS if c in table)):
+        if not pd.api.types.is_numeric_dtype(table[column]):
+            numbers = pd.to_numeric(table[column], errors="coerce")
+            text = numbers.isna() & table[column].notna()
+            if text.any():
+                where, value = int(np.argmax(text.to_numpy())), table[column][text].iloc[0]
+                message = f"{column} is text in {int(text.sum())} rows, the first is row {where + 2}: '{str(value)[:40]}'."
+                found.append(_error("text", message, todo="Write decimal numbers with a point.", channels=(column,), rows=int(text.sum())))
+            table[column] = numbers
+        table[column] = table[column].astype(float)
+    unknown = sorted(set(description.runs) - set(table["trajectory"]))
+    if unknown:
+        found.append(_error("unknown run", f"[runs] names {some(unknown)}, which the table does not hold.", todo="Remove it or correct the name."))
+    block = (table["trajectory"] != table["trajectory"].shift()).cumsum()
+    starts = table["trajectory"].groupby(block).first()
+    twice = tuple(dict.fromkeys(starts[starts.duplicated()]))
+    if twice:
+        message = f"rows of {len(twice)} runs stand in several places: {some(twice)}."
+        found.append(_error("scattered rows", message, todo="Sort the rows by trajectory and t, or give each run its own name.", runs=twice))
+    return table
+
+
+def _possible(table: pd.DataFrame, where: str) -> None:
+    """Refuse numbers that no sensor reads, at which arithmetic ends."""
+    for column in ("t", *(c for c in SIGNALS if c in table)):
+        values = table[column].to_numpy()
+        most = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+        if most > _MOST:
+            message = f"{where}: {column} holds values up to {most:.3g}; accepted: up to {_MOST:g}."
+            raise InputError(f"{message} Leave the cell empty where the sensor gave nothing.")
+
+
+def _ordered(name: str, rows: pd.DataFrame, found: list[Finding]) -> pd.DataFrame:
+    """Rows in order of time, one per time."""
+    t = rows["t"].to_numpy()
+    known = np.isfinite(t)
+    back = np.flatnonzero(np.diff(t[known]) <= 0.0)
+    if len(back):
+        k = int(back[0])
+        message = f"run '{name}': t does not grow in {len(back)} steps, the first from {t[known][k]:g} s to {t[known][k + 1]:g} s."
+        found.append(
+            _error("time runs back", message, todo="Sort the rows, remove those that stand twice, or name two runs.", runs=(name,), steps=len(back))
+        )
+        rows = rows.sort_values("t", kind="stable").drop_duplicates("t")
+    return rows.reset_index(drop=True)
+
+
+def _sample_time(frames: dict[str, pd.DataFrame], description: Description, found: list[Finding]) -> float:
+    steps = np.concatenate([np.diff(rows["t"].dropna().to_numpy()) for rows in frames.values()])
+    if not len(steps):
+        return description.dt
+    typical = float(np.median(steps))
+    alike = float(np.mean(np.abs(steps - typical) < 1e-3 * typical))
+    if abs(typical - description.dt) <= (1e-3 if alike > 0.5 else 0.1) * description.dt:
+        return description.dt
+    message = f"dt in dataset.toml is {description.dt:g} s; {alike:.1%} of the steps are {typical:.6g} s."
+    found.append(_error("dt", message, toml_line({"dt": typical}), dt=typical))
+    return float(f"{typical:.6g}")
+
+
+def _missing_values(frames: dict[str, pd.DataFrame], description: Description, recorded: frozenset[str], found: list[Finding]) -> None:
+    """Rows without all values: at the end of a run (a tail), or elsewhere."""
+    if description.gaps == "split":
+        return
+    columns = ["t", *(c for c in SIGNALS if c in recorded)]
+    for name, rows in frames.items():
+        lacking = ~np.isfinite(rows[columns].to_numpy())
+        bad = lacking.any(axis=1)
+        if not bad.any():
+            continue
+        whole = int(bad[::-1].cumprod().sum())
+        what = tuple(c for c, any_ in zip(columns, lacking.any(axis=0), strict=True) if any_)
+        curve = Curve("values missing in the row", np.arange(len(rows), dtype=float), lacking.sum(axis=1).astype(float))
+        picture = Picture(f"Missing values, run {name}", "row of the run", "missing values", (curve,))
+        every = " (every column)" if lacking[bad].all() else f" ({some(what)})"
+        if whole:
+            last = rows["t"].to_numpy()[: len(rows) - whole]
+            end = f" after t = {last[np.isfinite(last)][-1]:g} s" if np.isfinite(last).any() else ": the whole run"
+            message = f"run '{name}' ends in {whole} of {len(rows)} rows without values{every}{end}."
+            found.append(Finding("reading", "error", "NaN tail", message, _SPLIT, "", what, (name,), {"rows": whole}, picture))
+        inside = int(bad.sum()) - whole
+        if inside:
+            message = (
+                f"run '{name}' lacks values in {inside} of {len(rows)} rows before its end{every}, the first is its row {int(np.argmax(bad)) + 1}."
+            )
+            found.append(Finding("reading", "error", "missing values", message, _SPLIT, "", what, (name,), {"rows": inside}, picture))
+
+
+def _time_steps(frames: dict[str, pd.DataFrame], description: Description, dt: float, found: list[Finding]) -> None:
+    """Gaps, uneven steps, and runs whose time does not begin at 0."""
+    late = {}
+    for name, rows in frames.items():
+        t = rows["t"].to_numpy()
+        t, steps = t[1:], np.diff(t)  # a row without a time is reported with the missing values
+        t, steps = t[np.isfinite(steps)], steps[np.isfinite(steps)]
+        gaps = np.flatnonzero(steps > 1.5 * dt)
+        if len(gaps) and description.gaps == "refuse":
+            k = int(gaps[np.argmax(steps[gaps])])
+            message = f"run '{name}' has {len(gaps)} gaps in time, the longest from {t[k] - steps[k]:g} s to {t[k]:g} s (dt = {dt:g} s)."
+            picture = Picture(f"Steps of time, run {name}", "time [s]", "step [s]", (Curve("step", t, steps),))
+            found.append(
+                Finding("reading", "error", "gap", message, _SPLIT, "", ("t",), (name,), {"gaps": len(gaps), "longest_s": steps[k]}, picture)
+            )
+        uneven = np.abs(steps - dt) > 1e-3 * dt
+        uneven[gaps] = False
+        if uneven.any():
+            most = float(np.max(np.abs(steps - dt)[uneven]))
+            message = f"run '{name}': {int(uneven.sum())} of {len(steps)} steps of t differ from {dt:g} s, by up to {most:.2g} s."
+            found.append(_error("uneven time", message, todo="Resample the run to a uniform t.", runs=(name,), steps=int(uneven.sum())))
+            start = rows["t"].to_numpy()[0]
+            rows["t"] = start + np.round((rows["t"].to_numpy() - start) / dt) * dt  # near enough for the checks that follow
+        first = rows["t"].to_numpy()[:1]
+        if len(first) and abs(first[0]) > 0.5 * dt:
+            late[name] = float(first[0])
+    if late:
+        message = f"t does not begin at 0 in {len(late)} of {len(frames)} runs: {some([f'{k} at {v:g} s' for k, v in late.items()])}."
+        found.append(
+            Finding("reading", "note", "late start", message, todo="Nothing: time is counted inside each run.", runs=tuple(late), channels=("t",))
+        )
+
+
+def _unwrap(rows: pd.DataFrame) -> bool:
+    """Make the heading continuous, in rad or in degrees that nobody declared; True where it was wrapped."""
+    psi = rows["psi"].to_numpy(copy=True)
+    known = np.isfinite(psi)
+    steps = np.abs(np.diff(psi[known]))
+    if not (steps > np.pi).any():
+        return False
+    period = 2.0 * np.pi if np.max(steps) < 4.0 * np.pi else 360.0
+    wrapped = bool((steps > 0.5 * period).any())
+    psi[known] = np.unwrap(psi[known], period=period)
+    rows["psi"] = psi
+    return wrapped
+
+
+def _runs(
+    frames: dict[str, pd.DataFrame], description: Description, inputs: tuple[str, ...], dt: float, where: str, found: list[Finding]
+) -> tuple[list[Run], dict[str, str]]:
+    """Whole pieces of every run, and which run each is a piece of."""
+    runs, parent = [], {}
+    tolerant = description.model_copy(update={"gaps": "split"})
+    for name, rows in frames.items():
+        own, meta = split_meta(name, description.runs.get(name, {}), where)
+        pieces = correct_run(rows, tolerant, own, dt, f"{where}: run '{name}'", unwrap=False)
+        if not pieces:
+            message = f"run '{name}' has no two samples in a row with all values ({len(rows)} rows)."
+            found.append(_error("empty run", message, todo="Remove the run from the table.", runs=(name,)))
+        for i, part in enumerate(pieces, 1):
+            run = name if len(pieces) == 1 else f"{name}#{i}"
+            runs.append(Run(run, part["t"].to_numpy(), part[list(STATES)].to_numpy(), part[list(inputs)].to_numpy(), inputs, {"group": name, **meta}))
+            parent[run] = name
+    return runs, parent

@@ -1,0 +1,62 @@
+"""What the checks look at: the data set as far as it can be read, how its raw table looked, and how much time means to a ship of its size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..records import Dataset, Run
+from ..signals import STATES, R, U, V
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A data set to check.
+
+    dataset: runs without missing values, uniform in time (pieces of one run share the group `parent`). given: dataset.toml as written, {} for a
+    registered set. recorded: columns that stand in the table (states that were filled in do not). wrapped: runs whose heading was wrapped.
+    parent: id of a piece -> id of the run that it is a piece of.
+    """
+
+    dataset: Dataset
+    given: dict[str, Any] = field(default_factory=dict)
+    recorded: frozenset[str] = frozenset(STATES)
+    wrapped: tuple[str, ...] = ()
+    parent: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        return self.dataset.runs
+
+    @property
+    def dt(self) -> float:
+        return self.dataset.dt
+
+    @property
+    def froude(self) -> float:
+        """Time scale against a ship of 130 m, sqrt(L/130)."""
+        return float((self.dataset.ship.L / 130.0) ** 0.5)
+
+    @cached_property
+    def speed(self) -> float:
+        """Typical speed [m/s]: root mean square over all samples."""
+        S = np.concatenate([r.states for r in self.runs])
+        return float(np.sqrt(np.mean(S[:, U] ** 2 + S[:, V] ** 2))) + 1e-12
+
+    @cached_property
+    def turning(self) -> float:
+        """Typical yaw rate [rad/s]: root mean square over all samples."""
+        return float(np.sqrt(np.mean(np.concatenate([r.states[:, R] for r in self.runs]) ** 2))) + 1e-12
+
+    def name_of(self, run: Run) -> str:
+        """The id under which the user knows a run."""
+        return self.parent.get(run.id, run.id)
+
+    def names(self, runs: Any) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(self.name_of(run) for run in runs))
+
+    def with_dataset(self, dataset: Dataset) -> Recording:
+        return replace(self, dataset=dataset)

@@ -1,0 +1,185 @@
+"""Actuators against what they do: a rudder or shaft whose record is late against the motion, a motion late against them, late orders.
+
+Changes of yaw rate, surge, rudder and shaft over some seconds are regressed on the integrals of what causes them, with the record of the cause
+moved in time. A cause acts at once, so the move that leaves the least squares is the lag of the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..signals import DELTA, F_B, F_S, N, R, U, V
+from .actuators import check as command_like
+from .finding import Curve, Finding, Picture, toml_line
+from .recording import Recording
+from .statistics import inliers
+
+_AHEAD, _EDGE = 8.0, 2.0
+"""Seconds at 130 m: over which the effect changes, and over which each end is averaged against noise."""
+_SEARCH, _STEP = 10.0, 0.5
+"""Seconds at 130 m: greatest lag that is looked for, and the step of the search."""
+_FEWEST = 100
+"""Windows."""
+_WAITS, _WAITS_GAIN = 2.0, 20.0
+"""A rudder or shaft whose record is late waits for its order, too: by so many s at 130 m, with that gain."""
+_SHARES = (0.005, 0.02, 0.05, 0.1, 0.2, 0.5)
+_MOTION = ("x", "y", "psi", "u", "v", "r")
+_Shift = Callable[[np.ndarray], np.ndarray]
+_Columns = Callable[[np.ndarray, np.ndarray, _Shift], tuple[np.ndarray, list[np.ndarray]]]
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """A cause and its effect. columns: (states (T, 10), inputs, shift) -> effect (T,) and causes [(T,), ...], where shift moves a channel in time.
+
+    late, early: smallest lag of the cause, or lead, that is reported [s at 130 m], and the log likelihood that it must gain. agreed: what a lag must
+    gain where the actuator waits for its order, too. Noise in the motion and forces that are not recorded make the rudder seem late, never early;
+    early None: a lead is not told from the dead time of a gear.
+    order: the cause is an order, which is held until the next sample, and windows that it does not explain count; else these are left out.
+    """
+
+    cause: str
+    effect: str
+    columns: _Columns
+    late: tuple[float, float]
+    agreed: float
+    early: tuple[float, float] | None
+    order: bool
+
+
+def _yaw(S: np.ndarray, orders: np.ndarray, shift: _Shift) -> tuple[np.ndarray, list[np.ndarray]]:
+    u, v, r, n, delta = S[:, U], S[:, V], S[:, R], S[:, N], shift(S[:, DELTA])
+    speed = np.abs(u)
+    steered = [delta * u * speed, delta * n * np.abs(n), delta * n * speed]
+    return r, [*steered, r * speed, r * np.abs(r), v * speed, S[:, F_B], S[:, F_S], np.ones(len(S))]
+
+
+def _surge(S: np.ndarray, orders: np.ndarray, shift: _Shift) -> tuple[np.ndarray, list[np.ndarray]]:
+    u, v, r, delta, n = S[:, U], S[:, V], S[:, R], S[:, DELTA], shift(S[:, N])
+    return u, [n * np.abs(n), n * u, u * np.abs(u), v * r, r * r, delta**2 * u * np.abs(u), delta**2 * n * np.abs(n), np.ones(len(S))]
+
+
+def _gear(actuator: int) -> _Columns:
+    """Pace of an actuator by what is left to its order, with limits of the pace at several shares of its range."""
+
+    def columns(S: np.ndarray, orders: np.ndarray, shift: _Shift) -> tuple[np.ndarray, list[np.ndarray]]:
+        left = shift(orders[:, actuator - N]) - S[:, actuator]
+        reach = float(np.ptp(S[:, actuator])) + 1e-12
+        return S[:, actuator], [left, *(np.clip(left, -share * reach, share * reach) for share in _SHARES)]
+
+    return columns
+
+
+_PAIRS = (
+    _Pair("delta", "yaw rate", _yaw, (3.5, 20.0), 10.0, (3.0, 6.0), False),
+    _Pair("n", "surge", _surge, (5.0, 6.0), 2.0, (4.0, 10.0), False),
+    _Pair("delta_c", "rudder", _gear(DELTA), (1.5, 10.0), 10.0, None, True),
+    _Pair("n_c", "shaft", _gear(N), (1.5, 10.0), 10.0, None, True),
+)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """lags (G,) [s], mean squares that remain with each (G,), number of windows."""
+
+    lags: np.ndarray
+    squares: np.ndarray
+    windows: int
+
+    @property
+    def best(self) -> int:
+        return int(np.argmin(self.squares))
+
+    @property
+    def plain(self) -> int:
+        return len(self.lags) // 2
+
+    @property
+    def gain(self) -> float:
+        """Log likelihood gained by the lag."""
+        return 0.5 * self.windows * float(np.log((self.squares[self.plain] + 1e-300) / (self.squares[self.best] + 1e-300)))
+
+
+def _search(recording: Recording, pair: _Pair) -> _Search | None:
+    """None where there are too few windows."""
+    ahead, edge = (max(1, round(seconds * recording.froude / recording.dt)) for seconds in (_AHEAD, _EDGE))
+    half = round(_SEARCH / _STEP)
+    lags = np.arange(-half, half + 1) * _STEP * recording.froude
+    margin = int(np.ceil(lags[-1] / recording.dt))
+    lengths = np.array([len(run) for run in recording.runs])
+    ends = np.cumsum(lengths)
+    windows = np.concatenate([np.arange(b - n + margin, b - margin - ahead - edge + 1, ahead) for n, b in zip(lengths, ends, strict=True)])
+    if len(windows) < _FEWEST:
+        return None
+    S, orders = np.concatenate([run.states for run in recording.runs]), np.concatenate([run.inputs for run in recording.runs])
+    place, first, last = np.arange(len(S)), np.repeat(ends - lengths, lengths), np.repeat(ends - 1, lengths)
+
+    def rows(lag: float) -> tuple[np.ndarray, np.ndarray]:
+        """Changes of the effect (windows,) and integrals of the causes (windows, P), scaled to unit mean squares."""
+        moved = np.clip(place + lag / recording.dt, first, last)
+        low = np.minimum(moved.astype(int), len(S) - 2)
+        part = moved - low
+        effect, causes = pair.columns(S, orders, lambda values: (1.0 - part) * values[low] + part * values[low + 1])
+        cause = np.column_stack(causes) * recording.dt
+        X = _changes(np.cumsum(cause, axis=0) - (1.0 if pair.order else 0.5) * cause, windows, ahead, edge)
+        return _changes(effect[:, None], windows, ahead, edge)[:, 0], X / (np.sqrt(np.mean(X**2, axis=0)) + 1e-300)
+
+    y, X = rows(0.0)
+    keep = np.ones(len(y), dtype=bool)
+    for _ in range(0 if pair.order else 2):
+        keep = inliers(y - X @ np.linalg.lstsq(X[keep], y[keep], rcond=None)[0])
+    left = [float(np.mean((y[keep] - X[keep] @ np.linalg.lstsq(X[keep], y[keep], rcond=None)[0]) ** 2)) for y, X in map(rows, lags)]
+    return _Search(lags, np.array(left), int(keep.sum()))
+
+
+def _changes(values: np.ndarray, windows: np.ndarray, ahead: int, edge: int) -> np.ndarray:
+    """(windows, P): mean of values (T, P) over an edge less the mean over the edge `ahead` samples before; windows: their first samples."""
+    samples = windows[:, None] + np.arange(edge)
+    return np.asarray((values[samples + ahead] - values[samples]).mean(axis=1))
+
+
+def check(recording: Recording) -> list[Finding]:
+    """At most one finding for each pair; none where actuators are commands: the lag is that of the gear then."""
+    if recording.dataset.actuators != "measured" or command_like(recording):
+        return []
+    searches = {pair.cause: _search(recording, pair) for pair in _PAIRS if pair.cause in recording.recorded}
+    waits = {cause: -float(s.lags[s.best]) for cause, s in searches.items() if s is not None and s.gain >= _WAITS_GAIN}
+    found = [
+        f for pair in _PAIRS
+        if (s := searches.get(pair.cause)) is not None and (f := _judge(recording, pair, s, waits.get(f"{pair.cause}_c", 0.0))) is not None
+    ]  # fmt: skip
+    motion = [f for f in found if f.channels == _MOTION]  # rudder and shaft may both say it
+    return [f for f in found if f not in motion] + sorted(motion, key=lambda f: -f.evidence["gain"])[:1]
+
+
+def _judge(recording: Recording, pair: _Pair, found: _Search, waits: float) -> Finding | None:
+    """The finding of a pair; waits: s by which the actuator answers its order late, 0.0 where that is not known."""
+    lag, late_gain = float(found.lags[found.best]), pair.late[1]
+    at_130 = lag / recording.froude
+    if at_130 >= pair.late[0] and waits >= _WAITS * recording.froude:
+        lag, late_gain = min(lag, waits), pair.agreed
+    if at_130 >= pair.late[0] and found.gain >= late_gain:
+        line = {pair.cause: lag}
+        said = f"{pair.cause} is recorded about {lag:.2g} s late: the {pair.effect} answers before it"
+        todo = "" if not pair.order else "Commands are moved by whole samples."
+    elif pair.early is not None and at_130 <= -pair.early[0] and found.gain >= pair.early[1]:
+        line = dict.fromkeys(_MOTION, -lag)
+        said = f"the motion is recorded about {-lag:.2g} s late against {pair.cause}: no hull waits that long"
+        todo = f"If the clock of {pair.cause} is wrong instead, write [delay] {pair.cause} = {lag:.3g}."
+    else:
+        return None
+    share = float(np.sqrt(found.squares[found.best] / found.squares[found.plain]))
+    text = f"{said}. Moved so, a regression of the {pair.effect} leaves {share:.0%} of what it leaves as recorded ({found.windows} windows)."
+    curve = Curve(f"{pair.effect} by {pair.cause}", found.lags, np.sqrt(found.squares / found.squares[found.plain]), ".-")
+    title = f"What the causes of the {pair.effect} leave, with {pair.cause} moved in time"
+    picture = Picture(title, "lag of the record [s]", "left, as recorded = 1", (curve,))
+    return Finding(
+        "response", "warning", "lag", text, toml_line({"delay": {k: round(v, 3) for k, v in line.items()}}), todo, tuple(line),
+        evidence={"lag_s": lag, "gain": found.gain, "windows": found.windows}, picture=picture,
+    )  # fmt: skip
+
+
+CHECK = check

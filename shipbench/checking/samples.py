@@ -1,0 +1,181 @@
+"""Repeated, frozen and quantised samples: values that are exactly equal to the one before while the ship moves on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..records import Run
+from ..signals import DELTA, PSI, STATES, N, R, U, V, X, Y
+from .finding import Curve, Finding, Picture, labelled, toml_line
+from .recording import Recording
+from .statistics import times
+
+_REPEATED = 0.005
+"""Share of repeated samples that is reported."""
+_FEWEST, _FROZEN = 5, 3.0
+"""Samples, and s at 130 m, for which a channel must stand still to be frozen."""
+_RARE = 1e-6
+"""Chance of as many repeats in a row, from the channel's usual share of repeats, that makes them a standstill."""
+_RARELY = 0.02
+"""Share of samples that repeat the one before, below which a record is noisy."""
+_CHANNELS = {"x, y": (X, Y), "psi": (PSI,), "u": (U,), "v": (V,), "r": (R,)}
+
+
+def _equal(run: Run, channels: Sequence[int]) -> np.ndarray:
+    """(samples - 1,): the sample repeats the one before in all channels."""
+    return np.all(np.diff(run.states[:, list(channels)], axis=0) == 0.0, axis=1)
+
+
+def stretches(flags: np.ndarray) -> list[tuple[int, int]]:
+    """(start, stop) of every unbroken stretch of True, stop excluded."""
+    edges = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
+    return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
+
+
+def _moving(recording: Recording, run: Run, channels: Sequence[int]) -> np.ndarray:
+    """(samples - 1,): steps in which the channel ought to change: the ship makes way, and for psi, v and r turns (by r, or by psi)."""
+    S = run.states
+    way = np.hypot(np.diff(S[:, X]), np.diff(S[:, Y])) / recording.dt if X not in channels else np.hypot(S[1:, U], S[1:, V])
+    wide = max(3, round(2.0 * recording.froude / recording.dt)) | 1
+    way = _averaged(way, wide)
+    ahead = way > 0.2 * recording.speed
+    if PSI in channels or V in channels:  # on a straight course v is zero to the last bit where there is no noise
+        ahead &= np.abs(S[1:, R]) > 0.2 * recording.turning
+    if R in channels:
+        rate = _averaged(np.diff(S[:, PSI]) / recording.dt, wide)
+        ahead &= np.abs(rate) > 0.2 * recording.turning
+    return ahead
+
+
+def _averaged(values: np.ndarray, wide: int) -> np.ndarray:
+    """Moving mean over `wide` samples, of the same length."""
+    return np.convolve(values, np.ones(wide) / wide)[wide // 2 :][: len(values)]
+
+
+def check(recording: Recording) -> list[Finding]:
+    """Findings on single samples and standstills of motion channels, stuck actuators and coarse rudders."""
+    found = []
+    for name, channels in _CHANNELS.items():
+        found += _channel(recording, name, channels)
+    if recording.dataset.actuators == "measured":
+        found += _stuck(recording, N) + _stuck(recording, DELTA)
+    return found + _quantised(recording)
+
+
+def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[Finding]:
+    repeats = [_equal(run, channels) for run in recording.runs]
+    moving = [_moving(recording, run, channels) for run in recording.runs]
+    steps = sum(int(m.sum()) for m in moving)
+    if not steps:
+        return []
+    needed = max(_FEWEST, round(_FROZEN * recording.froude / recording.dt))
+    still = [_standstills(recording, run, channels, r, m, needed) for run, r, m in zip(recording.runs, repeats, moving, strict=True)]
+    single, shares = 0, {}
+    for run, r, m, stops in zip(recording.runs, repeats, moving, still, strict=True):
+        alone = r & m
+        for a, b in stops:
+            alone[a:b] = False
+        single += int(alone.sum())
+        if m.sum() >= 20:
+            shares[recording.name_of(run)] = float(alone.sum() / m.sum())
+    usual = single / steps
+    allowed = max(needed, int(np.ceil(np.log(_RARE) / np.log(usual))) if 0.0 < usual < 1.0 else 0)
+    frozen = {run.id: [s for s in stops if s[1] - s[0] >= allowed] for run, stops in zip(recording.runs, still, strict=True)}
+    findings = _frozen(recording, name, channels, frozen)
+    if usual > _REPEATED and name == "x, y":
+        worst = max(shares, key=lambda k: shares[k]) if shares else ""
+        text = (
+            f"{usual:.1%} of the samples of {name} repeat the one before while the ship moves"
+            + (f" ({min(shares.values()):.1%} to {shares[worst]:.1%} of a run, most in {worst})" if shares else "")
+            + f": the sensor is slower than the grid of {recording.dt:g} s or out of step with it."
+        )
+        findings.append(Finding(
+            "samples", "note", "repeated samples", text, todo="Nothing for fits over seconds; do not differentiate the position sample by sample.",
+            channels=tuple(STATES[c] for c in channels), evidence={"share": usual}, picture=_repeats_picture(recording, channels, repeats),
+        ))  # fmt: skip
+    return findings
+
+
+def _standstills(
+    recording: Recording, run: Run, channels: Sequence[int], repeated: np.ndarray, moving: np.ndarray, needed: int
+) -> list[tuple[int, int]]:
+    """Stretches of at least `needed` repeats, most of them while the ship moves, over which the channel ought to have changed visibly."""
+    found = []
+    for a, b in stretches(repeated):
+        if b - a >= needed and np.mean(moving[a:b]) > 0.7:
+            found.append((a, b))
+    return found
+
+
+def _frozen(recording: Recording, name: str, channels: Sequence[int], stops: dict[str, list[tuple[int, int]]]) -> list[Finding]:
+    """One finding on the standstills (run id -> first and last sample) of a channel in all runs."""
+    runs = [run for run in recording.runs if stops.get(run.id)]
+    if not runs:
+        return []
+    keys = tuple(STATES[c] for c in channels)
+    worst = max(runs, key=lambda run: max(b - a for a, b in stops[run.id]))
+    a, b = max(stops[worst.id], key=lambda s: s[1] - s[0])
+    total, seconds = sum(len(stops[run.id]) for run in runs), float(worst.t[b] - worst.t[a])
+    cuts: dict[str, dict[str, list[list[float]]]] = {}
+    for run in runs:
+        intervals = cuts.setdefault(recording.name_of(run), {"cut": []})["cut"]
+        intervals.extend([float(run.t[i]), float(run.t[j])] for i, j in stops[run.id])
+    text = (
+        f"{name} stand{'s' * (len(keys) == 1)} still at one value while the ship moves on, {times(total, len(cuts))}; longest for "
+        f"{seconds:.3g} s, from {worst.t[a]:g} s to {worst.t[b]:g} s of '{recording.name_of(worst)}'."
+    )
+    part = slice(max(0, a - 3 * (b - a)), min(len(worst), b + 3 * (b - a)))
+    curves = tuple(Curve(STATES[c], worst.t[part], worst.states[part, c] - worst.states[a, c], ".-") for c in channels)
+    picture = Picture(f"{name} in run {recording.name_of(worst)}, less the frozen value", "time [s]", labelled(*keys), curves)
+    line, figures = toml_line({"runs": cuts}), {"times": total, "longest_s": seconds}
+    return [Finding("samples", "warning", "frozen", text, line, "", keys, tuple(cuts), figures, picture)]
+
+
+def _repeats_picture(recording: Recording, channels: Sequence[int], repeats: list[np.ndarray]) -> Picture:
+    """Steps of the channel around the first repeats of the run that has most."""
+    i = max(range(len(repeats)), key=lambda k: repeats[k].sum())
+    run = recording.runs[i]
+    first = int(np.argmax(repeats[i]))
+    part = slice(max(0, first - 30), first + 60)
+    step = np.hypot(*np.diff(run.states[:, list(channels)], axis=0).T)
+    return Picture(f"Steps of x, y in run {recording.name_of(run)}", "time [s]", "step [m]", (Curve("step", run.t[1:][part], step[part], ".-"),))
+
+
+def _stuck(recording: Recording, channel: int) -> list[Finding]:
+    """An actuator that stays at one value while its command is far from it, or while noise would move its record."""
+    values = np.concatenate([run.states[:, channel] for run in recording.runs])
+    reach = float(np.ptp(values))
+    needed = max(_FEWEST, round(10.0 * recording.froude / recording.dt))
+    noisy = np.mean(np.concatenate([_equal(run, (channel,)) for run in recording.runs])) < _RARELY
+    stops: dict[str, list[tuple[int, int]]] = {}
+    for run in recording.runs if reach > 0.0 else ():
+        far = np.abs(run.inputs[:-1, channel - N] - run.states[1:, channel]) > 0.2 * reach
+        stops[run.id] = [(a, b) for a, b in stretches(_equal(run, (channel,)) & (far | noisy)) if b - a >= needed]
+    return _frozen(recording, STATES[channel], (channel,), stops)
+
+
+def _quantised(recording: Recording) -> list[Finding]:
+    """A rudder that is recorded in coarse steps."""
+    if "delta" not in recording.recorded:
+        return []
+    values = np.concatenate([run.states[:, DELTA] for run in recording.runs])
+    levels = np.unique(np.round(values, 7))
+    gaps = np.diff(levels)
+    if not 5 <= len(levels) <= 0.2 * len(values):
+        return []
+    step = float(np.median(gaps))
+    whole = gaps / step
+    if np.mean(np.abs(whole - np.round(whole)) < 0.1) < 0.8 or np.mean(np.round(whole) == 1.0) < 0.5:
+        return []
+    text = f"delta is recorded in steps of {np.rad2deg(step):.2f} deg: {len(levels)} values in {len(values)} samples."
+    counts = np.array([np.sum(np.abs(values - level) < 0.5 * step) for level in levels])
+    picture = Picture("Values of delta", "delta [deg]", "samples", (Curve("samples", np.rad2deg(levels), counts.astype(float), "."),))
+    return [Finding(
+        "samples", "note", "quantised", text, todo="Nothing; a rudder offset below half a step cannot be told.", channels=("delta",),
+        evidence={"step_rad": step, "levels": len(levels)}, picture=picture,
+    )]  # fmt: skip
+
+
+CHECK = check

@@ -1,0 +1,83 @@
+"""Which of several explanations the data ask for: forward selection of groups of columns by their likelihood and their clustered t."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .statistics import CHANCE, Fit, clustered_fit, clusters, inliers
+
+_MARGIN = 10.0
+"""Twice the log likelihood, less the penalty of the Bayesian criterion, that an explanation must gain."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Explanations in the order of choice, coefficients and standard errors of each, and the share of the plain squares that models leave.
+
+    left: "plain", every explanation alone, and "all chosen" -> root of squares left over root of the squares of `whole`.
+    """
+
+    names: tuple[str, ...]
+    value: dict[str, np.ndarray]
+    sd: dict[str, np.ndarray]
+    left: dict[str, float]
+    rows: int
+
+
+def select(
+    y: np.ndarray, groups: Mapping[str, np.ndarray], nuisance: np.ndarray, run: np.ndarray, parts: int, whole: float,
+    exclusive: Sequence[frozenset[str]] = (),
+) -> Chosen:  # fmt: skip
+    """Choose among `groups` (name -> columns (T, k)) beside the always present `nuisance` (T, q).
+
+    Args:
+        y: (T,) equations, `parts` blocks of the same windows one after another.
+        run: (T / parts,) index of the run of each window.
+        whole: root mean square that `left` is given in.
+        exclusive: sets of groups of which one at most is chosen.
+    """
+    keep = _trimmed(y, np.column_stack([nuisance, *(g for g in groups.values() if g.shape[1] <= 2)]), parts)
+    cluster = np.tile(clusters(run), parts)[keep]
+    y, nuisance, groups = y[keep], nuisance[keep], {name: g[keep] for name, g in groups.items()}
+
+    def fit(names: Sequence[str]) -> Fit:
+        return clustered_fit(y, np.column_stack([nuisance, *(groups[n] for n in names)]), cluster)
+
+    def share(squares: float) -> float:
+        return float(np.sqrt(squares / len(y))) / whole
+
+    now = fit(())
+    names: list[str] = []
+    left = {"plain": share(now.squares)} | {name: share(fit((name,)).squares) for name in groups}
+    while True:
+        barred = {other for s in exclusive if s & set(names) for other in s}
+        tried = {name: fit((*names, name)) for name in groups if name not in names and name not in barred}
+        gains = {name: _gain(now, f, groups[name].shape[1]) for name, f in tried.items()}
+        sure = {n: g for n, g in gains.items() if g > _MARGIN and (groups[n].shape[1] > 2 or tried[n].p[-groups[n].shape[1] :].min() < CHANCE)}
+        if not sure:
+            break
+        best = max(sure, key=lambda n: sure[n])
+        names.append(best)
+        now = tried[best]
+    value, sd, at = {}, {}, nuisance.shape[1]
+    for name in names:
+        width = groups[name].shape[1]
+        value[name], sd[name] = now.value[at : at + width], now.sd[at : at + width]
+        at += width
+    return Chosen(tuple(names), value, sd, left | {"all chosen": share(now.squares)}, len(y))
+
+
+def _gain(old: Fit, new: Fit, more: int) -> float:
+    return new.rows * float(np.log(max(old.squares, 1e-300) / max(new.squares, 1e-300))) - more * float(np.log(new.rows))
+
+
+def _trimmed(y: np.ndarray, X: np.ndarray, parts: int) -> np.ndarray:
+    """Rows that the richest model does not leave far out: jumps and spikes are found by other checks and must not decide here."""
+    keep = np.ones(len(y), dtype=bool)
+    for _ in range(4):
+        value, *_ = np.linalg.lstsq(X[keep], y[keep], rcond=None)
+        keep = inliers(y - X @ value, parts)
+    return keep

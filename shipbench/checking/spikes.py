@@ -1,0 +1,197 @@
+"""Outliers (single samples away from their neighbours) and jumps (of position or heading, that stay).
+
+A spike stands far off the mean of its neighbours while these agree among themselves; far is eight robust deviations of all such differences of the
+channel. Positions and heading are looked at after their integrals (of the speeds, of the yaw rate) are taken off. A jump is a step of that
+difference that stays, when spikes are filled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..records import Run
+from ..signals import DELTA, PSI, STATES, N, R, U, V, X, Y
+from .actuators import check as command_like
+from .finding import Curve, Finding, Picture, labelled, toml_line
+from .recording import Recording
+from .statistics import some, spread, times
+
+_FAR, _NEIGHBOURS = 8.0, 6.0
+_JUMP = 10.0
+_LEAST = {X: 0.01, Y: 0.01, PSI: 0.01}
+"""Least spike or jump: of the length of the ship, and rad."""
+_LEAST_SHARE = 0.03
+"""Of the other channels: share of the range that the data set covers."""
+
+
+def _levels(recording: Recording, run: Run, actuators: bool = False) -> dict[int, np.ndarray]:
+    """The channels to look at (samples,), slow parts of position and heading taken off."""
+    S, dt = run.states, recording.dt
+    velocity = (S[:, U] + 1j * S[:, V]) * np.exp(1j * S[:, PSI])
+    way = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * dt)])
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * (S[1:, R] + S[:-1, R]) * dt)])
+    found = {X: S[:, X] - way.real, Y: S[:, Y] - way.imag, PSI: S[:, PSI] - turned, U: S[:, U], V: S[:, V], R: S[:, R]}
+    if actuators:
+        found |= {N: S[:, N], DELTA: S[:, DELTA]}
+    return found
+
+
+def _least(recording: Recording, channel: int, values: list[np.ndarray]) -> float:
+    if channel in (X, Y):
+        return _LEAST[channel] * recording.dataset.ship.L
+    if channel == PSI:
+        return _LEAST[PSI]
+    return _LEAST_SHARE * float(np.ptp(np.concatenate([np.quantile(v, [0.02, 0.98]) for v in values])))
+
+
+def _off(values: np.ndarray) -> np.ndarray:
+    """(samples - 4,): samples 2 .. -3 less the mean of their neighbours."""
+    return values[2:-2] - 0.5 * (values[1:-3] + values[3:-1])
+
+
+def find_spikes(recording: Recording) -> dict[int, dict[str, np.ndarray]]:
+    """channel -> run id -> indices of the samples."""
+    measured = recording.dataset.actuators == "measured" and not command_like(recording)  # commands may well come for one sample only
+    levels = {run.id: _levels(recording, run, measured) for run in recording.runs if len(run) >= 7}
+    states = {run.id: run.states for run in recording.runs}
+    found: dict[int, dict[str, np.ndarray]] = {}
+    for channel in (X, Y, PSI, U, V, R, N, DELTA):
+        values = {name: each[channel] for name, each in levels.items() if channel in each}
+        if not values:
+            continue
+        limit = max(_FAR * spread(np.concatenate([_off(v) for v in values.values()])), _least(recording, channel, list(values.values())))
+        for name, v in values.items():
+            d = np.abs(np.diff(v))
+            near = np.maximum(np.maximum(d[:-3], d[3:]), np.abs(v[3:-1] - v[1:-3]))  # neighbours among themselves, without the sample
+            at = np.flatnonzero((np.abs(_off(v)) > limit) & (np.abs(_off(v)) > _NEIGHBOURS * near)) + 2
+            at = at[~_held(states[name], channel)[at]]
+            if len(at):
+                found.setdefault(channel, {})[name] = at
+    return found
+
+
+def _held(S: np.ndarray, channel: int) -> np.ndarray:
+    """(samples,): the sample or a neighbour is a repeated one, which `samples` reports."""
+    same = S[1:, channel] == S[:-1, channel]
+    near = np.zeros(len(S), dtype=bool)
+    near[1:] |= same
+    near[:-1] |= same
+    return near if channel in (X, Y, PSI) else np.zeros(len(S), dtype=bool)
+
+
+def _without(recording: Recording, found: dict[int, dict[str, np.ndarray]]) -> Recording:
+    """Spikes replaced by the mean of their neighbours."""
+    runs = []
+    for run in recording.runs:
+        states = run.states.copy()
+        for channel, by_run in found.items():
+            at = by_run.get(run.id, np.array([], dtype=int))
+            states[at, channel] = 0.5 * (states[at - 1, channel] + states[at + 1, channel])
+        runs.append(replace(run, states=states))
+    return recording.with_dataset(recording.dataset.with_runs(runs))
+
+
+def check(recording: Recording) -> list[Finding]:
+    """Spikes of every channel, then jumps of position and heading."""
+    spikes = find_spikes(recording)
+    return [_spikes(recording, channel, by_run) for channel, by_run in spikes.items()] + _jumps(_without(recording, spikes))
+
+
+def _spikes(recording: Recording, channel: int, by_run: dict[str, np.ndarray]) -> Finding:
+    name = STATES[channel]
+    runs = {run.id: run for run in recording.runs}
+    sizes = {k: float(np.max(np.abs(_off(_levels(recording, runs[k], True)[channel])[at - 2]))) for k, at in by_run.items()}
+    worst = max(sizes, key=lambda k: sizes[k])
+    run, at = runs[worst], by_run[worst]
+    total, names = sum(len(v) for v in by_run.values()), recording.names(runs[k] for k in by_run)
+    text = (
+        f"{name} stands off its neighbours {times(total, len(names))} ({some(names)}); "
+        f"the greatest outlier stands {sizes[worst]:.3g} off its neighbours, in '{recording.name_of(run)}'."
+    )
+    fills: dict[str, dict] = {}
+    for k, samples in by_run.items():
+        intervals = fills.setdefault(recording.name_of(runs[k]), {"fill": {name: []}})["fill"][name]
+        intervals.extend([float(runs[k].t[i]), float(runs[k].t[i])] for i in samples)
+    part = slice(max(0, int(at[0]) - 20), int(at[0]) + 21)
+    picture = Picture(
+        f"{name} in run {recording.name_of(run)}", "time [s]", labelled(name),
+        (Curve(name, run.t[part], run.states[part, channel], ".-"), Curve("outlier", run.t[at[:1]], run.states[at[:1], channel], "o")),
+    )  # fmt: skip
+    return Finding(
+        "spikes",
+        "warning",
+        "outliers",
+        text,
+        toml_line({"runs": fills}),
+        "",
+        (name,),
+        tuple(fills),
+        {"samples": total, "greatest": sizes[worst]},
+        picture,
+    )
+
+
+def _jumps(recording: Recording) -> list[Finding]:
+    """Steps of position less integrated speeds, and of heading less integrated yaw rate, that stay."""
+    levels = {run.id: _levels(recording, run) for run in recording.runs if len(run) >= 9}
+    states = {run.id: run.states for run in recording.runs}
+    found = []
+    for channels in ((X, Y), (PSI,)):
+        combined = {k: each[X] + 1j * each[Y] if X in channels else each[PSI] + 0j for k, each in levels.items()}
+        if not combined:
+            continue
+        steps = np.concatenate([np.diff(v) for v in combined.values()])
+        noise = float(np.hypot(spread(steps.real), spread(steps.imag)))
+        limit = max(_JUMP * noise, 2.0 * _least(recording, channels[0], []))
+        at = {
+            name: places
+            for name, v in combined.items()
+            if (
+                places := [
+                    int(k) for k in np.flatnonzero(_steps(v, states[name], channels[0]) > limit) if abs(_level_change(v, int(k))) > 0.6 * limit
+                ]
+            )
+        }
+        if at:
+            found.append(_jump(recording, channels, at, combined))
+    return found
+
+
+def _steps(v: np.ndarray, S: np.ndarray, channel: int) -> np.ndarray:
+    """(samples - 1,): sizes of the steps; 0 after a repeated sample, where a sensor that stood still catches up."""
+    held = np.concatenate([[False], S[1:-1, channel] == S[:-2, channel]])
+    return np.where(held | (S[1:, channel] == S[:-1, channel]), 0.0, np.abs(np.diff(v)))
+
+
+def _level_change(v: np.ndarray, k: int) -> complex:
+    """Median of four samples after step k less that of four before."""
+    before, after = v[max(0, k - 3) : k + 1], v[k + 1 : k + 5]
+    change = complex(np.median(after.real) - np.median(before.real), np.median(after.imag) - np.median(before.imag))
+    return change
+
+
+def _jump(recording: Recording, channels: tuple[int, ...], at: dict[str, list[int]], levels: dict[str, np.ndarray]) -> Finding:
+    """One finding on the jumps (run id -> last sample before each) of position or heading in all runs."""
+    runs = {run.id: run for run in recording.runs}
+    sizes = {(name, k): float(abs(levels[name][k + 1] - levels[name][k])) for name, places in at.items() for k in places}
+    names = recording.names(runs[r] for r in at)
+    name, k = max(sizes, key=lambda place: sizes[place])
+    run, v, keys, unit = runs[name], levels[name], tuple(STATES[c] for c in channels), "m" if X in channels else "rad"
+    text = (
+        f"{', '.join(keys)} jump{'s' * (len(keys) == 1)} {times(len(sizes), len(names))} ({some(names)}); "
+        f"the greatest by {sizes[name, k]:.3g} {unit}, from {run.t[k]:g} s to {run.t[k + 1]:g} s of '{recording.name_of(run)}'."
+    )
+    cuts: dict[str, dict[str, list[list[float]]]] = {}
+    for other, i in sizes:
+        t = float(runs[other].t[i + 1])
+        cuts.setdefault(recording.name_of(runs[other]), {"cut": []})["cut"].append([t, t])
+    part = slice(max(0, k - 20), k + 22)
+    curves = tuple(Curve(STATES[c], run.t[part], f(v)[part] - f(v)[part][0], ".-") for c, f in zip(channels, (np.real, np.imag), strict=False))
+    picture = Picture(f"{', '.join(keys)} less the integral of its rate, run {recording.name_of(run)}", "time [s]", f"[{unit}]", curves)
+    figures = {"greatest": sizes[name, k], "jumps": len(sizes)}
+    return Finding("spikes", "warning", "jump", text, toml_line({"runs": cuts}), "", keys, tuple(cuts), figures, picture)
+
+
+CHECK = check

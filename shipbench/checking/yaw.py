@@ -1,0 +1,144 @@
+"""Yaw rate against heading rate: bias (of all runs, or of single ones), scale, lag.
+
+Over windows of 30 s (at 130 m, Froude-scaled) the change of the heading is compared with the integral of the yaw rate.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..signals import PSI, R
+from .finding import Curve, Finding, Picture, Severity, toml_line
+from .recording import Recording
+from .selection import Chosen, select
+from .statistics import some, spread
+from .track import LEAST_LAG, WINDOW, shifted
+
+_LEAST_SCALE, _LEAST_BIAS = 0.02, 0.01
+"""Shares: of the rate, and of the typical yaw rate (root mean square)."""
+_BLOCKS, _SURE = 12, 5.0
+"""Blocks of a run whose scatter counts where it is greater than usual; deviations that make a bias of a single run."""
+
+
+def _windows(recording: Recording, lag: float) -> tuple[np.ndarray, np.ndarray, float] | None:
+    """(run (W,), columns (W, 3): heading's change, integral of r, change of r; span [s]), r put back by `lag` s."""
+    width = max(3, round(WINDOW * recording.froude / recording.dt))
+    pieces = [(i, S[a : a + width + 1]) for i, S in shifted(recording, {R: lag} if lag else {}) for a in range(0, len(S) - width, width)]
+    if len(pieces) < 12:
+        return None
+    S = np.stack([p for _, p in pieces])
+    integral = np.trapezoid(S[..., R], dx=recording.dt, axis=1)
+    rows = np.column_stack([S[:, -1, PSI] - S[:, 0, PSI], integral, S[:, -1, R] - S[:, 0, R]])
+    return np.array([i for i, _ in pieces]), rows, width * recording.dt
+
+
+def _explain(run: np.ndarray, rows: np.ndarray, span: float) -> Chosen:
+    groups = {"scale": rows[:, 1:2], "bias": np.full((len(run), 1), span), "lag": rows[:, 2:3]}
+    whole = float(np.sqrt(np.mean(rows[:, 0] ** 2))) + 1e-9
+    return select(rows[:, 0] - rows[:, 1], groups, np.zeros((len(run), 1)), run, 1, whole)
+
+
+def check(recording: Recording) -> list[Finding]:
+    """Findings of the yaw rate; none where the ship hardly turns."""
+    lag, made = 0.0, _windows(recording, 0.0)
+    if made is None or np.sqrt(np.mean(made[1][:, 0] ** 2)) < 0.01:
+        return []
+    first = chosen = _explain(*made)
+    lag_sd = float(first.sd["lag"][0]) if "lag" in first.names else 0.0
+    for _ in range(5):
+        move = float(chosen.value["lag"][0]) if "lag" in chosen.names else 0.0
+        if abs(move) < 0.02 * recording.dt:
+            break
+        again = _windows(recording, lag + move)
+        if again is None:
+            break
+        lag, made = lag + move, again
+        chosen = _explain(*made)
+    return _lag(recording, made, first, chosen, lag, lag_sd) + _scale(made, first, chosen) + _biases(recording, made, first, chosen)
+
+
+def _picture(made: tuple[np.ndarray, np.ndarray, float], what: str) -> Picture:
+    """Rate of the heading against the mean yaw rate, or their difference against the change of r."""
+    _, rows, span = made
+    deg = 180.0 / np.pi
+    if what == "lag":
+        curves = (Curve("windows", rows[:, 2] * deg, (rows[:, 0] - rows[:, 1]) * deg, "."),)
+        return Picture("Heading less integrated yaw rate", "change of r in the window [deg/s]", "difference [deg]", curves)
+    x, top = rows[:, 1] / span * deg, float(np.max(np.abs(rows[:, 1]))) / span * deg
+    equal = Curve("equal", np.array([-top, top]), np.array([-top, top]))
+    return Picture(
+        "Rate of the heading against yaw rate", "mean of r [deg/s]", "change of psi / time [deg/s]",
+        (Curve("windows", x, rows[:, 0] / span * deg, "."), equal),
+    )  # fmt: skip
+
+
+def _shares(first: Chosen, chosen: Chosen) -> str:
+    plain, left = first.left["plain"], chosen.left["all chosen"]
+    return f"the heading departs from the integral of r by {plain:.1%} of its change as recorded, by {left:.1%} with it"
+
+
+def _lag(recording: Recording, made: tuple, first: Chosen, chosen: Chosen, lag: float, sd: float) -> list[Finding]:
+    if abs(lag) < max(0.25 * recording.dt, LEAST_LAG * recording.froude):
+        return []
+    late, other = ("r", "the heading") if lag > 0.0 else ("psi", "the yaw rate")  # sensors are late, not early
+    text = f"{late} lags {other} by {abs(lag):.2g} s (standard error {sd:.1g} s): {_shares(first, chosen)}."
+    plain = _windows(recording, 0.0) or made
+    return [Finding(
+        "yaw", "warning", "lag", text, toml_line({"delay": {late: round(abs(lag), 3)}}), channels=(late,), evidence={"lag_s": abs(lag), "sd_s": sd},
+        picture=_picture(plain, "lag"),
+    )]  # fmt: skip
+
+
+def _scale(made: tuple, first: Chosen, chosen: Chosen) -> list[Finding]:
+    if "scale" not in chosen.names:
+        return []
+    factor, sd = 1.0 / (1.0 + float(chosen.value["scale"][0])), float(chosen.sd["scale"][0])
+    if abs(factor - 1.0) < _LEAST_SCALE:
+        return []
+    text = f"r reads {factor:.3f} of the heading's rate (standard error {sd:.3f}): {_shares(first, chosen)}."
+    line = toml_line({"scale": {"r": round(factor, 4)}})
+    severity: Severity = "error" if abs(factor - 1.0) > 0.1 else "warning"
+    return [Finding("yaw", severity, "scale", text, line, channels=("r",), evidence={"factor": factor, "sd": sd}, picture=_picture(made, "scale"))]
+
+
+def _biases(recording: Recording, made: tuple, first: Chosen, chosen: Chosen) -> list[Finding]:
+    """One bias for all runs where they agree, else those of the runs that stand out."""
+    run, rows, span = made
+    known = sum((rows[:, 1 + i] * float(chosen.value[n][0]) for i, n in enumerate(("scale", "lag")) if n in chosen.names), np.zeros(len(run)))
+    left = rows[:, 0] - rows[:, 1] - known
+    drifts = {int(i): -left[run == i] / span for i in np.unique(run) if np.sum(run == i) >= 3}
+    shared = float(np.median([d.mean() for d in drifts.values()])) if drifts else np.inf
+    if "bias" in chosen.names and abs(shared) > 0.5 * abs(float(chosen.value["bias"][0])):
+        bias, sd = -float(chosen.value["bias"][0]), float(chosen.sd["bias"][0])
+        if abs(bias) < _LEAST_BIAS * recording.turning:
+            return []
+        text = f"r reads {np.rad2deg(bias):+.4f} deg/s too much (standard error {np.rad2deg(sd):.4f}) in all runs: {_shares(first, chosen)}."
+        line = toml_line({"bias": {"r": bias}})
+        return [
+            Finding("yaw", "warning", "yaw rate bias", text, line, channels=("r",), evidence={"bias": bias, "sd": sd}, picture=_picture(made, "bias"))
+        ]
+    usual = spread(np.concatenate([d - d.mean() for d in drifts.values()])) if drifts else 0.0
+    found: dict[str, float] = {}
+    for i, mine in drifts.items():
+        blocks = np.array([part.mean() for part in np.array_split(mine, min(len(mine), _BLOCKS))])
+        mean = float(np.mean(mine))
+        sd = max(usual / np.sqrt(len(mine)), float(np.std(blocks, ddof=1)) / np.sqrt(len(blocks)) / 2.0)
+        if abs(mean) > _SURE * sd and abs(mean) > _LEAST_BIAS * recording.turning:
+            found[recording.name_of(recording.runs[i])] = mean
+    if not found:
+        return []
+    worst = max(found, key=lambda k: abs(found[k]))
+    text = (
+        f"r has a bias in {len(found)} of {len(np.unique(run))} runs ({some([f'{k} {np.rad2deg(v):+.3f}' for k, v in found.items()])} deg/s), "
+        f"greatest in {worst}: {np.rad2deg(found[worst]):+.3f} deg/s, {100 * abs(found[worst]) / recording.turning:.0f} % of the typical yaw rate."
+    )
+    line = toml_line({"runs": {name: {"bias": {"r": bias}} for name, bias in found.items()}})
+    mine = np.flatnonzero(run == next(i for i in np.unique(run) if recording.name_of(recording.runs[i]) == worst))
+    drift = Curve("psi less integral of r", np.arange(1, len(mine) + 1) * span, np.rad2deg(np.cumsum(left[mine])))
+    return [Finding(
+        "yaw", "warning", "yaw rate bias", text, line, channels=("r",), runs=tuple(found), evidence={f"bias_{k}": v for k, v in found.items()},
+        picture=Picture(f"Heading less integrated yaw rate, run {worst}", "time [s]", "difference [deg]", (drift,)),
+    )]  # fmt: skip
+
+
+CHECK = check

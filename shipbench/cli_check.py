@@ -1,0 +1,85 @@
+"""The commands of the data check: `data check`, `suite check`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .cli_common import DatasetArgument, Json, Quiet, console_for_tables, print_json
+
+if TYPE_CHECKING:
+    from .checking.finding import Finding
+
+
+def data_check(
+    dataset: DatasetArgument,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for findings.json and a picture of each finding.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Find faults of a data set from the data themselves: units, signs, frames, clocks, samples, copies.
+
+    Exit code 0: no error among the findings (warnings and notes may be there); 1: at least one error; 2: the input cannot be read.
+    """
+    from .bench.check_report import check_document, check_tables, write_findings
+    from .bench.listing import dataset_facts
+    from .checking.base import check_path
+
+    recording, findings = check_path(dataset)
+    facts = dataset_facts(recording.dataset)
+    written = write_findings(recording, findings, out) if out is not None else []
+    if as_json:
+        print_json(check_document(recording, findings))
+    else:
+        _show(facts, findings, check_tables(findings))
+        if written:
+            typer.echo(f"Written: {out} ({len(written)} files)")
+    if any(f.severity == "error" for f in findings):
+        raise typer.Exit(1)
+
+
+def _show(facts: dict[str, Any], findings: list[Finding], tables: list[Any]) -> None:
+    from .checking.finding import merged, toml_line
+
+    for key, value in facts.items():
+        for line in value if isinstance(value, list) else [value]:
+            typer.echo(f"{key + ':':<13s}{line}")
+    console = console_for_tables()
+    for table in tables:
+        table.show(console)
+    counts = {severity: sum(f.severity == severity for f in findings) for severity in ("error", "warning", "note")}
+    typer.echo(f"Findings: {counts['error']} errors, {counts['warning']} warnings, {counts['note']} notes.")
+    lines = [f.line for f in findings if f.line and f.severity != "note"]
+    if lines:
+        text = toml_line(merged({}, lines)).split("\n")
+        typer.echo("\nFor dataset.toml, after you have looked at each finding:")
+        for row in text[:40]:
+            typer.echo(f"  {row if len(row) <= 140 else row[:137] + '...'}")
+        if len(text) > 40 or any(len(row) > 140 for row in text):
+            typer.echo("  (shortened: --out FOLDER writes them all into dataset_lines.toml)")
+
+
+def suite_check(
+    ctx: typer.Context,
+    seeds: Annotated[int, typer.Option(help="Sets per source and fault.")] = 1,
+    seed: Annotated[int, typer.Option(help="First seed.")] = 540,
+    development: Annotated[bool, typer.Option("--development", help="Other seeds, on which thresholds are set; nothing is published.")] = False,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the page.")] = Path("leaderboards"),
+    quiet: Quiet = False,
+) -> None:
+    """Plant faults in clean simulated sets and count what `data check` finds: check.md."""
+    from .bench.check_suite import suite_command
+    from .bench.progress import make_progress
+
+    page, tables = suite_command(seeds=seeds, first=seed, development=development, out=out, progress=make_progress(quiet), command=str(ctx.obj))
+    if not quiet:
+        for table in tables:
+            table.show(console_for_tables())
+    typer.echo(f"Written: {page}")
+
+
+def register(data_app: typer.Typer, suite_app: typer.Typer) -> None:
+    """Add these commands to `shipbench data` and `shipbench suite`."""
+    data_app.command("check")(data_check)
+    suite_app.command("check")(suite_check)

@@ -1,0 +1,122 @@
+"""Every planted fault is found, its lines heal it, a second check and clean sets are silent. `shipbench suite check` does it on more sets."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipbench.bench.check_faults import FAULTS, Fault
+from shipbench.bench.check_sets import EQUATION, SHIPS, base_set, clean_sets
+from shipbench.bench.check_suite import Outcome, apply_lines, run_case, write_planted
+from shipbench.checking.base import check_dataset, check_path
+from shipbench.data.files import read_dataset
+from shipbench.signals import DELTA, PSI, STATES, R, U, V, X, Y
+
+SEED = 311  # neither one on which thresholds were set nor one that the suite reports
+SHIP = "kcs"
+BY_NAME = {fault.name: fault for fault in FAULTS}
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory) -> Callable[[str], tuple[Outcome, Path]]:
+    """What came of a fault, and its folder with the lines of the check in dataset.toml; each is made once."""
+    root, made = tmp_path_factory.mktemp("planted"), {}
+
+    def get(name: str) -> tuple[Outcome, Path]:
+        if name not in made:
+            made[name] = run_case(BY_NAME[name], SHIP, SEED, root / str(len(made)))
+        return made[name], root / str(list(made).index(name))
+
+    return get
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_a_planted_fault_is_found_and_healed(name: str, case):
+    outcome, _ = case(name)
+    assert outcome.found
+    assert outcome.others == ()
+    assert outcome.healed is not False, outcome.after
+
+
+@pytest.mark.parametrize("source", [*SHIPS, EQUATION])
+def test_a_clean_set_gives_no_finding(source: str):
+    assert check_dataset(base_set(source, SEED)) == []
+
+
+def test_a_clean_set_gives_no_finding_from_its_files(tmp_path):
+    _, found = check_path(str(write_planted(base_set(SHIP, SEED), None, SEED, tmp_path / "set")))
+    assert found == []
+
+
+@pytest.mark.parametrize("kind", ["MMG ships, no noise, calm", "MMG ships, wind recorded", "MMG ships under real effects"])
+def test_what_is_real_is_no_fault(kind: str):
+    make = [make for k, make in clean_sets([SEED]) if k == kind][-1]
+    assert check_dataset(replace(make(), simulation=None)) == []
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["heading in degrees", "heading in degrees, 0 to 360", "rudder in degrees", "yaw rate in deg/min", "speeds in knots", "revolutions in rev/s",
+     "rudder sign", "west positive", "x east, y north", "ENU, v and r ours", "heading from east", "velocities north, east", "velocities east, north"],
+)  # fmt: skip
+def test_healed_gross_errors_give_the_clean_samples(name: str, case):
+    clean, loaded = base_set(SHIP, SEED), read_dataset(case(name)[1])
+    for a, b in zip(clean.runs, loaded.runs, strict=True):
+        turn = 2.0 * np.pi * np.round((b.states[0, PSI] - a.states[0, PSI]) / (2.0 * np.pi))
+        np.testing.assert_allclose(b.states - turn * (np.arange(len(STATES)) == PSI), a.states, rtol=1e-5, atol=1e-6 * np.max(np.abs(a.states)))
+
+
+@pytest.mark.parametrize(
+    ("name", "channel", "within"),
+    [("speeds 8 % high", U, 0.08), ("heading bias", PSI, np.deg2rad(0.5)), ("yaw rate bias", R, np.deg2rad(0.01)), ("speeds through water", V, 0.12)],
+)
+def test_healed_biases_are_the_clean_samples_to_within_their_error(name: str, channel: int, within: float, case):
+    clean, loaded = base_set(SHIP, SEED), read_dataset(case(name)[1])
+    off = np.concatenate([b.states[:, channel] - a.states[:, channel] for a, b in zip(clean.runs, loaded.runs, strict=True)])
+    assert np.sqrt(np.mean(off**2)) < within
+
+
+@pytest.mark.parametrize(("name", "channel", "seconds"), [("yaw rate late", R, 3.0), ("position late", X, 3.0), ("rudder late", DELTA, 5.0)])
+def test_healed_lags_are_the_planted_ones(name: str, channel: int, seconds: float, case):
+    delay = tomllib.loads((case(name)[1] / "dataset.toml").read_text())["delay"]
+    assert delay[STATES[channel]] == pytest.approx(seconds * (base_set(SHIP, SEED).ship.L / 130.0) ** 0.5, rel=0.2)
+
+
+def test_runs_that_share_samples_get_one_group_so_that_no_fold_parts_them(case):
+    groups = {run.id: run.meta.get("group", run.id) for run in read_dataset(case("piece of a run")[1]).runs}
+    assert groups["copy"] == groups["run03"]
+    assert len(set(groups.values())) == len(groups) - 1
+
+
+def test_a_copy_of_parts_of_two_runs_binds_all_three(case):
+    groups = {run.id.split("#")[0]: run.meta.get("group") for run in read_dataset(case("overlapping runs")[1]).runs}
+    assert groups["copy"] == groups["run03"] == groups["run04"] is not None
+
+
+def test_two_faults_at_once_are_both_found(tmp_path):
+    def both(planting) -> None:
+        BY_NAME["speeds in knots"].plant(planting)
+        BY_NAME["yaw rate late"].plant(planting)
+
+    folder = write_planted(base_set(SHIP, SEED), Fault("both", both, []), SEED, tmp_path / "set")
+    found = check_path(str(folder))[1]
+    assert {(f.kind, c) for f in found for c in f.channels} >= {("unit", "u"), ("lag", "r")}
+    apply_lines(folder, found)
+    assert check_path(str(folder))[1] == []
+
+
+def test_ships_at_rest_at_one_berth_are_no_pieces_of_one_log():
+    data = base_set(SHIP, SEED)
+    still = []
+    for run in data.runs:
+        S = run.states.copy()
+        S[-30:, [U, V, R]] = 0.0
+        S[-30:, [X, Y, PSI]] = 0.0
+        S[:5, [X, Y, PSI, U, V, R]] = 0.0
+        still.append(replace(run, states=S))
+    assert "pieces of one log" not in {f.kind for f in check_dataset(data.with_runs(still))}
