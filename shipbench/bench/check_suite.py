@@ -22,7 +22,7 @@ from .check_sets import base_set, clean_sets, sources_of
 from .progress import Progress, Silent
 from .tables import Table
 
-CLEAN_SEEDS = 15
+CLEAN_SEEDS = 10
 """Clean sets of each kind and ship, for every seed of the planted ones."""
 _OFFSET = 7000
 """Between development seeds and reported ones."""
@@ -83,7 +83,7 @@ def run_case(fault: Fault, source: str, seed: int, folder: Path) -> Outcome:
 
 
 def suite_command(
-    *, seeds: int = 1, first: int = 540, development: bool = False, out: Path = Path("leaderboards"), progress: Progress | None = None,
+    *, seeds: int = 1, first: int = 560, development: bool = False, out: Path = Path("leaderboards"), progress: Progress | None = None,
     command: str = "shipbench suite check",
 ) -> tuple[Path, list[Table]]:  # fmt: skip
     """Run everything and write check.md; development draws other seeds and writes check-development.md.

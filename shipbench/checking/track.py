@@ -188,6 +188,12 @@ def _finding(recording: Recording, w: Windows, chosen: Chosen, name: str) -> lis
         )]  # fmt: skip
     factor = 1.0 / (1.0 + float(value[0]))
     channels = {"scale of u and v": ("u", "v"), "scale of u": ("u",), "scale of v": ("v",)}[name]
+    if name == "scale of v" and factor < -0.5:
+        positive = "starboard" if recording.given.get("signs", {}).get("v") == "port" else "port"
+        text = f"v is recorded with the other sign: {factor:.3f} of what the position says (standard error {sd[0]:.3f}): {shares}."
+        line = toml_line({"signs": {"v": positive}})
+        figures = {"factor": factor, "sd": sd[0], **evidence}
+        return [Finding("track", "error", "sign", text, line, channels=channels, evidence=figures, picture=_sway_picture(w))]
     if abs(factor - 1.0) < (LEAST_SWAY_SCALE if name == "scale of v" else LEAST_SCALE):
         return []
     gross = next((unit for unit, size in LENGTHS.items() if unit != "m" and abs(factor / size - 1.0) < 0.03), None)
@@ -237,6 +243,16 @@ def _picture(w: Windows, title: str, column: np.ndarray, label: str) -> Picture:
     left = w.moved - w.surge - w.sway
     parts = (("north", np.real), ("east", np.imag))
     return Picture(title, label, "way not explained [m]", tuple(Curve(name, f(column), f(left), ".") for name, f in parts))
+
+
+def _sway_picture(w: Windows) -> Picture:
+    """Across the ship: what the position says beside surge, against sway."""
+    turn = np.where(np.abs(w.sway) > 0.0, w.sway / np.maximum(np.abs(w.sway), 1e-300), 1.0)
+    made = np.real((w.moved - w.surge) * np.conj(turn))
+    top = float(np.max(np.abs(w.sway)))
+    equal = Curve("equal", np.array([0.0, top]), np.array([0.0, top]))
+    curves = (Curve("windows", np.abs(w.sway), made, "."), equal)
+    return Picture("Way across the ship by position against way by sway", "by sway [m]", "by position, along the way by sway [m]", curves)
 
 
 def _scale_picture(w: Windows) -> Picture:
