@@ -49,7 +49,7 @@ def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
     convert_table(table, description)
     notes = list(description.notes)
     inputs = complete_columns(table, notes)
-    frames = {str(name): rows.reset_index(drop=True) for name, rows in table.groupby("trajectory", sort=False)}
+    frames = {str(name): rows.drop(columns="trajectory").reset_index(drop=True) for name, rows in table.groupby("trajectory", sort=False)}
     frames = {name: _ordered(name, rows, found) for name, rows in frames.items()}
     dt = _sample_time(frames, description, found)
     _missing_values(frames, description, recorded, found)

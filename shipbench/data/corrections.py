@@ -204,5 +204,7 @@ def _pieces(frame: pd.DataFrame, corrections: Corrections, own: RunCorrections, 
         breaks[1:] |= ~keep[:-1] | ~(np.abs(np.diff(t) - dt) <= 1e-3 * dt)
     elif not own.cut:
         return [frame]
+    if keep.all() and not breaks.any():
+        return [frame]
     parts = [part[keep[part.index]] for _, part in frame.groupby(np.cumsum(breaks))]
     return [part for part in parts if len(part) >= _SPLIT_FEWEST]

@@ -16,7 +16,6 @@ from shipbench.bench.check_faults import FAULTS
 from shipbench.bench.check_sets import base_set
 from shipbench.bench.check_suite import write_planted
 from shipbench.cli import app
-from shipbench.data.base import load_dataset
 
 SHIP, SEED = "kcs", 311
 BY_NAME = {fault.name: fault for fault in FAULTS}
@@ -172,14 +171,6 @@ def test_a_table_that_ends_inside_a_row_is_a_finding_of_that_row(table, folder):
 def test_a_ship_that_never_moves_is_no_fault(table, folder):
     still = table.assign(**dict.fromkeys(("x", "y", "psi", "u", "v", "r", "n", "n_c", "delta", "delta_c", "F_b", "F_s", "F_b_c", "F_s_c"), 0.0))
     assert "0 errors, 0 warnings, 0 notes" in check(folder(still)).stdout
-
-
-def test_a_registered_set_is_checked_by_its_name(tmp_path, monkeypatch):
-    monkeypatch.setenv("SHIPBENCH_CACHE", str(tmp_path))
-    load_dataset("harbour90")
-    result = check("harbour90")
-    assert result.exit_code == 0
-    assert "0 errors, 0 warnings, 0 notes" in result.stdout
 
 
 def test_a_channel_that_never_changes_is_compared_without_a_warning(table, folder):
