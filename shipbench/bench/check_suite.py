@@ -83,7 +83,7 @@ def run_case(fault: Fault, source: str, seed: int, folder: Path) -> Outcome:
 
 
 def suite_command(
-    *, seeds: int = 1, first: int = 560, development: bool = False, out: Path = Path("leaderboards"), progress: Progress | None = None,
+    *, seeds: int = 1, first: int = 580, development: bool = False, out: Path = Path("leaderboards"), progress: Progress | None = None,
     command: str = "shipbench suite check",
 ) -> tuple[Path, list[Table]]:  # fmt: skip
     """Run everything and write check.md; development draws other seeds and writes check-development.md.

@@ -156,9 +156,14 @@ def check(recording: Recording) -> list[Finding]:
 
 
 def _judge(recording: Recording, pair: _Pair, found: _Search, waits: float) -> Finding | None:
-    """The finding of a pair; waits: s by which the actuator answers its order late, 0.0 where that is not known."""
+    """The finding of a pair; waits: s by which the actuator answers its order late, 0.0 where that is not known.
+
+    None where the best lag is the last one searched: forces that are not recorded do that.
+    """
     lag, late_gain = float(found.lags[found.best]), pair.late[1]
     at_130 = lag / recording.froude
+    if found.best in (0, len(found.lags) - 1):
+        return None
     if at_130 >= pair.late[0] and waits >= _WAITS * recording.froude:
         lag, late_gain = min(lag, waits), pair.agreed
     if at_130 >= pair.late[0] and found.gain >= late_gain:

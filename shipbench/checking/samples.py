@@ -18,8 +18,8 @@ _FEWEST, _FROZEN = 5, 3.0
 """Samples, and s at 130 m, for which a channel must stand still to be frozen."""
 _RARE = 1e-6
 """Chance of as many repeats in a row, from the channel's usual share of repeats, that makes them a standstill."""
-_RARELY = 0.02
-"""Share of samples that repeat the one before, below which a record is noisy."""
+_RARELY, _OFTEN = 0.02, 0.4
+"""Shares of a noisy record: of samples that repeat the one before, at most, and of steps back on the one before, at least (2/3 in white noise)."""
 _CHANNELS = {"x, y": (X, Y), "psi": (PSI,), "u": (U,), "v": (V,), "r": (R,)}
 
 
@@ -148,12 +148,19 @@ def _stuck(recording: Recording, channel: int) -> list[Finding]:
     values = np.concatenate([run.states[:, channel] for run in recording.runs])
     reach = float(np.ptp(values))
     needed = max(_FEWEST, round(10.0 * recording.froude / recording.dt))
-    noisy = np.mean(np.concatenate([_equal(run, (channel,)) for run in recording.runs])) < _RARELY
+    noisy = _noisy(recording, channel)
     stops: dict[str, list[tuple[int, int]]] = {}
     for run in recording.runs if reach > 0.0 else ():
         far = np.abs(run.inputs[:-1, channel - N] - run.states[1:, channel]) > 0.2 * reach
         stops[run.id] = [(a, b) for a, b in stretches(_equal(run, (channel,)) & (far | noisy)) if b - a >= needed]
     return _frozen(recording, STATES[channel], (channel,), stops)
+
+
+def _noisy(recording: Recording, channel: int) -> bool:
+    """Whether noise moves the record at every sample."""
+    steps = [np.diff(run.states[:, channel]) for run in recording.runs]
+    back = np.concatenate([s[1:] * s[:-1] < 0.0 for s in steps])
+    return bool(np.mean(np.concatenate(steps) == 0.0) < _RARELY and len(back) and np.mean(back) > _OFTEN)
 
 
 def _quantised(recording: Recording) -> list[Finding]:

@@ -63,9 +63,9 @@ def shifted(recording: Recording, late: dict[int, float]) -> list[tuple[int, np.
 
 
 def windows(recording: Recording, late: dict[int, float]) -> Windows | None:
-    """All windows of the data set, or None where there are fewer than 12."""
+    """All windows of the data set, each half over the next, or None where there are fewer than 12."""
     width = max(3, round(WINDOW * recording.froude / recording.dt))
-    pieces = [(i, S[a : a + width + 1]) for i, S in shifted(recording, late) for a in range(0, len(S) - width, width)]
+    pieces = [(i, S[a : a + width + 1]) for i, S in shifted(recording, late) for a in range(0, len(S) - width, width // 2)]
     if len(pieces) < 12:
         return None
     S, dt = np.stack([p for _, p in pieces]), recording.dt

@@ -21,9 +21,10 @@ _BLOCKS, _SURE = 12, 5.0
 
 
 def _windows(recording: Recording, lag: float) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """(run (W,), columns (W, 3): heading's change, integral of r, change of r; span [s]), r put back by `lag` s."""
+    """(run (W,), columns (W, 3): heading's change, integral of r, change of r; span [s]), r put back by `lag` s. Windows overlap by half: whatever is
+    chosen is judged by runs, which are independent."""
     width = max(3, round(WINDOW * recording.froude / recording.dt))
-    pieces = [(i, S[a : a + width + 1]) for i, S in shifted(recording, {R: lag} if lag else {}) for a in range(0, len(S) - width, width)]
+    pieces = [(i, S[a : a + width + 1]) for i, S in shifted(recording, {R: lag} if lag else {}) for a in range(0, len(S) - width, width // 2)]
     if len(pieces) < 12:
         return None
     S = np.stack([p for _, p in pieces])
@@ -103,7 +104,7 @@ def _scale(made: tuple, first: Chosen, chosen: Chosen) -> list[Finding]:
 
 def _biases(recording: Recording, made: tuple, first: Chosen, chosen: Chosen) -> list[Finding]:
     """One bias for all runs where they agree, else those of the runs that stand out."""
-    run, rows, span = made
+    run, rows, span = made[0][::2], made[1][::2], made[2]  # drifts add up over windows that do not overlap
     known = sum((rows[:, 1 + i] * float(chosen.value[n][0]) for i, n in enumerate(("scale", "lag")) if n in chosen.names), np.zeros(len(run)))
     left = rows[:, 0] - rows[:, 1] - known
     drifts = {int(i): -left[run == i] / span for i in np.unique(run) if np.sum(run == i) >= 3}
