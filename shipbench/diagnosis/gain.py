@@ -11,9 +11,10 @@ import numpy as np
 from ..physics.actuators import Gear
 from ..records import Dataset
 from ..ship import complete
-from .model import FREE, NUM_BASE, STRUCTURE, Linearisation, Point, Scales, Term
+from .model import FREE, NUM_BASE, Linearisation, Point, Scales, Term
 from .outcome import Gain
 from .plant import NUM_HULL, Plant, cut
+from .structure import STRUCTURE
 
 HORIZON = 120.0
 _STEPS = 8

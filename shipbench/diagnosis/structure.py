@@ -1,0 +1,78 @@
+"""What differs between one ordinary ship and another, beside hull derivatives and the fitted parameters: part of every fit, never a cause."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..effects.base import Effect, Parameter
+from ..effects.cross_flow_drag import EFFECT as CROSS_FLOW
+from ..effects.propeller_walk_astern import EFFECT as ASTERN
+from ..effects.race_gain import EFFECT as RACE
+from ..effects.thruster_gain import EFFECT as THRUSTERS
+from ..effects.thruster_speed_loss import EFFECT as LOSS
+from ..effects.wake_variation import EFFECT as WAKE
+from ..ops import Array, absolute, arctan2, clip, exp, maximum, sqrt, tanh
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+
+
+class Structure(Effect):
+    """What differs between one ordinary ship and another beyond hull and rudder lift: race at the rudder, wake in turns, thrusters at speed.
+
+    Without it every ship's own race or thruster tunnel would be reported as missing physics. Centres and spreads: kappa 0.3 to 0.8 (physics
+    reference, R16), C_2 - 1 of the wake 0 to 0.6, by side (Yasukawa & Yoshimura 2015), loss of the thrusters' moment up to 50 % (T41),
+    cross-flow drag of a hull whose regressions lack it (H52), side force of a propeller going astern (P37),
+    gamma_R 0.4 to 0.64, by side, l'_R -0.7 to -1 (Yasukawa & Yoshimura 2015, table 3), X'_vv and X'_rr that eq. (2) lacks (same table: -0.040,
+    0.011); added mass between sway and yaw, which regressions hardly know and the MMG form leaves out (of m L); flow at the rudder that a reversed
+    propeller stops, from none to all (Kitagawa et al., physics reference 2.6).
+    """
+
+    family = "hull"
+    summary = "ordinary differences between ships"
+    source = "see above"
+    parameters = (
+        Parameter("race", "1", 0.2, -0.9, 1.0),
+        Parameter("wake_variation", "1", 0.3, -1.0, 2.0),
+        Parameter("thruster_loss", "1", 0.25, -0.5, 1.2),
+        Parameter("thruster_gain", "1", 0.1, -0.5, 0.5),
+        Parameter("cross_flow", "1", 0.6, -1.0, 2.0),
+        Parameter("walk_astern", "1", 0.4, -2.0, 2.0),
+        Parameter("straightening", "1", 0.3, -0.9, 1.0),
+        Parameter("straightening_asymmetry", "1", 0.25, -0.9, 0.9),
+        Parameter("X_vv", "1", 0.05, -0.5, 0.5),
+        Parameter("X_rr", "1", 0.03, -0.5, 0.5),
+        Parameter("wake_asymmetry", "1", 0.25, -1.0, 1.0),
+        Parameter("Y_vr", "1", 0.15, -2.0, 2.0),
+        Parameter("Y_rr", "1", 0.03, -0.5, 0.5),
+        Parameter("N_rr", "1", 0.015, -0.3, 0.3),
+        Parameter("N_vvr", "1", 0.15, -2.0, 2.0),
+        Parameter("N_vrr", "1", 0.06, -1.0, 1.0),
+        Parameter("coupling", "1", 0.05, -0.5, 0.5),
+        Parameter("straightening_r", "1", 0.25, -0.9, 1.0),
+        Parameter("backing", "1", 0.4, -1.4, 0.4),
+    )
+    backing = 0.5
+    parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
+
+    def plain(self) -> np.ndarray:
+        """Values, in units of their spreads, at which it adds nothing to eq. (2)."""
+        centres = [c for _, c in self.parts] + [0.0] * (len(self.parameters) - len(self.parts) - 1) + [self.backing]
+        return np.array([-c / p.typical for c, p in zip(centres, self.parameters, strict=True)])
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        for (effect, centre), value in zip(self.parts, q[:6], strict=True):
+            effect.force(e, s, (centre + value,), ship)
+        e.straightening, e.straightening_asymmetry, e.straightening_r = 1.0 + q[6], q[7], 1.0 + q[17]
+        e.backing, e.coupling = self.backing + q[18], q[16] * ship.mass * ship.L
+        unit = 0.5 * ship.rho * ship.L * ship.T
+        u, v, r = s.u - e.u_c, s.v - e.v_c, s.r * ship.L
+        drift = clip(v / sqrt(u * u + v * v + 1e-3 * ship.L), -0.5, 0.5)
+        X, Y = q[8] * v * v + q[9] * r * r, absolute(r) * (q[11] * v + q[12] * r)
+        e.push(unit * X, unit * Y, unit * ship.L * r * (q[13] * absolute(r) + drift * (q[14] * v + q[15] * r)))
+        beta_P = arctan2(-(v + ship.x_P * s.r), maximum(u, 0.0) + 0.1)
+        e.wake = e.wake - q[10] * (1.0 - ship.w_P0) * (1.0 - exp(-2.0 * absolute(beta_P))) * tanh(beta_P / 0.05)
+
+
+STRUCTURE = Structure()
