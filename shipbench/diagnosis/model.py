@@ -29,12 +29,13 @@ _PER_RUN = 20.0
 
 @dataclass(frozen=True)
 class Term:
-    """An effect in the model: shape parameters fixed, amplitudes free; one set of amplitudes, or one per run; `since`: absent before that run."""
+    """An effect in the model: shape parameters fixed, one of `choices`; amplitudes free, one set or one per run; `since`: absent before that run."""
 
     effect: Effect
     setting: tuple[float, ...] = ()
     per_run: bool = False
     since: int | None = None
+    choices: int = 1
 
     @property
     def size(self) -> int:
@@ -46,10 +47,10 @@ class Term:
         return self.effect.name
 
     def cost(self, runs: int) -> float:
-        """Twice the log odds against it before any data: for the choice of a beginning, for variances of values per run."""
+        """Twice the log odds against it before any data: for the choice of a beginning or of shape parameters, for variances of values per run."""
         if self.since is not None:
             return 2.0 * float(np.log(runs))
-        return _PER_RUN + float(np.log(runs)) if self.per_run else 0.0
+        return 2.0 * float(np.log(self.choices)) + (_PER_RUN + float(np.log(runs)) if self.per_run else 0.0)
 
 
 @dataclass

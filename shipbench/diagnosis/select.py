@@ -24,10 +24,14 @@ _WORTH_A_REFIT = 0.5
 _RIVAL, _RIVALS = 0.25, 4
 _IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
 """What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
-_CHANGES, _CHANGE_MARGIN = 2, 14.0
-"""A beginning is chosen among all effects: it must beat the best cause without one by this."""
-_OF_THE_SHAPE = ("cross_flow_drag", "wake_variation", "race_gain", "rudder_stall", "rudder_asymmetry", "propeller_walk", "propeller_walk_astern")
-"""Hull, rudder and propeller keep their shape during trials: these do not begin with a run."""
+_CHANGES, _CHANGE_MARGIN, _OWN_MARGIN = 2, 14.0, 4.0
+"""A beginning is chosen among all effects: it must beat the best cause without one by this; the second where that is the same effect."""
+_INSEPARABLE = ({"wind", "wind_per_run", "wave_drift"},)
+"""Beside one of these the others are not named: wind and short waves come together and push alike, whatever their formulas (reference, E05)."""
+_LASTING = (
+    "cross_flow_drag", "wake_variation", "race_gain", "rudder_stall", "rudder_asymmetry", "propeller_walk", "propeller_walk_astern", "bank_suction",
+)  # fmt: skip
+"""Hull, rudder and propeller keep their shape during trials, a bank its place: these do not begin with a run."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,8 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None) -> list[Ter
         effect = EFFECTS.get(name)
         if effect.family == "thruster" and not np.any(plant.seg.states[..., 8:]):
             continue
-        found += [Term(effect, setting, effect.per_run) for setting in effect.settings(plant.seg.states[..., :2], plant.ship)]
+        settings = effect.settings(plant.seg.states[..., :2], plant.ship)
+        found += [Term(effect, setting, effect.per_run, choices=len(settings)) for setting in settings]
     return found
 
 
@@ -119,11 +124,12 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
     if any(t.since is not None for t in now.model.terms):
         return best
     present = {t.label for t in now.model.terms}
-    late = [s for s in changes(now) if s.score > _CHANGE_MARGIN and s.term.label not in (*present, *_OF_THE_SHAPE)][:_CHANGES]
-    gain = 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
+    late = [s for s in changes(now) if s.score > _CHANGE_MARGIN and s.term.label not in (*present, *_LASTING)][:_CHANGES]
+    plain, gain = best, 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
     for score in late:
         found = with_term(now, score, origin)
-        if 2.0 * (found.evidence - now.evidence) > gain + _CHANGE_MARGIN:
+        own = plain is not None and plain.model.terms[-1].label == score.term.label
+        if 2.0 * (found.evidence - now.evidence) > gain + (_OWN_MARGIN if own else _CHANGE_MARGIN):
             best, gain = found, 2.0 * (found.evidence - now.evidence)
     return best
 
@@ -131,6 +137,7 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
 def _worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[Score]:
     """The best, the best of each family, and whatever could stand in for the best: one line each per effect."""
     present = {t.label for t in now.model.terms}
+    present |= {label for group in _INSEPARABLE if group & present for label in group}
     best: dict[str, Score] = {}
     for s in scores:
         if s.term.label not in present:

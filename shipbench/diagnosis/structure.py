@@ -13,7 +13,7 @@ from ..effects.race_gain import EFFECT as RACE
 from ..effects.thruster_gain import EFFECT as THRUSTERS
 from ..effects.thruster_speed_loss import EFFECT as LOSS
 from ..effects.wake_variation import EFFECT as WAKE
-from ..ops import Array, absolute, arctan2, clip, exp, maximum, sqrt, tanh
+from ..ops import Array, absolute, arctan2, clip, exp, maximum, smoothstep, sqrt, tanh
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 
@@ -22,11 +22,11 @@ class Structure(Effect):
     """What differs between one ordinary ship and another beyond hull and rudder lift: race at the rudder, wake in turns, thrusters at speed.
 
     Without it every ship's own race or thruster tunnel would be reported as missing physics. Centres and spreads: kappa 0.3 to 0.8 (physics
-    reference, R16), C_2 - 1 of the wake 0 to 0.6, by side (Yasukawa & Yoshimura 2015), loss of the thrusters' moment up to 50 % (T41),
-    cross-flow drag of a hull whose regressions lack it (H52), side force of a propeller going astern (P37),
-    gamma_R 0.4 to 0.64, by side, l'_R -0.7 to -1 (Yasukawa & Yoshimura 2015, table 3), X'_vv and X'_rr that eq. (2) lacks (same table: -0.040,
-    0.011); added mass between sway and yaw, which regressions hardly know and the MMG form leaves out (of m L); flow at the rudder that a reversed
-    propeller stops, from none to all (Kitagawa et al., physics reference 2.6).
+    reference, R16), C_2 - 1 of the wake 0 to 0.6, by side (Yasukawa & Yoshimura 2015), loss of the thrusters' moment up to 50 % (T41), cross-flow
+    drag of a hull whose regressions lack it (H52), side force of a propeller going astern (P37), gamma_R 0.4 to 0.64, by side, l'_R -0.7 to -1
+    (Yasukawa & Yoshimura 2015, table 3), X'_vv and X'_rr that eq. (2) lacks (same table: -0.040, 0.011); added mass between sway and yaw, which
+    regressions hardly know and the MMG form leaves out (of m L); flow at the rudder that a reversed propeller stops, from none to all (Kitagawa
+    et al., physics reference 2.6); thrust astern, of which eq. (2) knows one level (0.65 of ahead at rest; four-quadrant curves 0.5 to 0.8).
     """
 
     family = "hull"
@@ -51,6 +51,7 @@ class Structure(Effect):
         Parameter("N_vrr", "1", 0.06, -1.0, 1.0),
         Parameter("coupling", "1", 0.05, -0.5, 0.5),
         Parameter("straightening_r", "1", 0.25, -0.9, 1.0),
+        Parameter("thrust_astern", "1", 0.15, -0.8, 1.0),
         Parameter("backing", "1", 0.4, -1.4, 0.4),
     )
     backing = 0.5
@@ -65,7 +66,8 @@ class Structure(Effect):
         for (effect, centre), value in zip(self.parts, q[:6], strict=True):
             effect.force(e, s, (centre + value,), ship)
         e.straightening, e.straightening_asymmetry, e.straightening_r = 1.0 + q[6], q[7], 1.0 + q[17]
-        e.backing, e.coupling = self.backing + q[18], q[16] * ship.mass * ship.L
+        e.coupling, e.backing = q[16] * ship.mass * ship.L, self.backing + q[19]
+        e.thrust = e.thrust * (1.0 + q[18] * smoothstep(-s.n, 0.0, 1.0))
         unit = 0.5 * ship.rho * ship.L * ship.T
         u, v, r = s.u - e.u_c, s.v - e.v_c, s.r * ship.L
         drift = clip(v / sqrt(u * u + v * v + 1e-3 * ship.L), -0.5, 0.5)

@@ -11,8 +11,10 @@ from shipbench.diagnosis.fit import Model, Origin, fit, settle, start
 from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, ornstein_uhlenbeck, solve
 from shipbench.diagnosis.model import Linearisation, Scales, Term, predict
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS, flow_first
 from shipbench.physics.mmg import load_mmg_ship
+from shipbench.physics.modifiers import Flow, Modifiers
 from shipbench.simulate.trials import Trials, sea_trials
 
 
@@ -122,3 +124,29 @@ def test_environment_comes_before_the_forces_that_follow_the_flow():
     """A current beside a cross-flow drag, named in either order, is the same model."""
     items = [Term(EFFECTS.get(name), ()) for name in ("cross_flow_drag", "current")]
     assert [i.effect.name for i in flow_first(items)] == ["current", "cross_flow_drag"] == [i.effect.name for i in flow_first(items[::-1])]
+
+
+def test_what_was_chosen_among_many_costs_more():
+    """Twice log of the number of shapes, or of runs where it may begin; a random effect for its variance."""
+    bank, wind = EFFECTS.get("bank_suction"), EFFECTS.get("wind_per_run")
+    assert Term(bank, (0.0, 100.0), choices=4).cost(24) == pytest.approx(2.0 * np.log(4.0))
+    assert Term(EFFECTS.get("list"), ()).cost(24) == 0.0
+    assert Term(EFFECTS.get("list"), (), since=7).cost(24) == pytest.approx(2.0 * np.log(24.0))
+    assert Term(wind, (), per_run=True).cost(24) > np.log(24.0)
+
+
+def test_thrust_astern_and_coupling_are_ordinary_differences(plant):
+    """Each has a place in the fit's own parameters, at which eq. (2) alone is one value."""
+    names = [p.name for p in STRUCTURE.parameters]
+    plain = dict(zip(names, STRUCTURE.plain(), strict=True))
+    assert plain["thrust_astern"] == plain["coupling"] == plain["straightening_r"] == 0.0
+    mods = Modifiers()
+    STRUCTURE.force(
+        mods,
+        Flow(*([0.0] * 4), 2.0, 0.3, 0.01, -60.0, 0.0, 0.0, 0.0),
+        tuple(p.typical * v for p, v in zip(STRUCTURE.parameters, STRUCTURE.plain(), strict=True)),
+        plant.ship,
+    )
+    assert mods.backing == pytest.approx(0.0)
+    assert mods.thrust == pytest.approx(1.0)
+    assert mods.coupling == pytest.approx(0.0)
