@@ -125,7 +125,8 @@ def _line_search(plant: Plant, scales: Scales, point: Point, target: Point, nois
     """The first of the full, half ... sixteenth step that lowers the cost by more than one thousandth; None if none does."""
 
     def cost(at: Point) -> float:
-        value = float(np.sum(((plant.seg.states[..., :6] - predict(plant, scales, at)) / noise)[plant.seg.mask] ** 2) + np.sum(at.base**2))
+        with np.errstate(over="ignore", invalid="ignore"):  # a step that sends the ship away costs infinitely much
+            value = float(np.sum(((plant.seg.states[..., :6] - predict(plant, scales, at)) / noise)[plant.seg.mask] ** 2) + np.sum(at.base**2))
         return value if np.isfinite(value) else np.inf
 
     now = cost(point)
