@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bz2
 import gzip
+import io
 import os
 import re
 import subprocess
@@ -37,14 +38,10 @@ def swapped() -> str:
     return "\n".join([*ROWS[:10], ROWS[12], ROWS[11], ROWS[10], *ROWS[13:]]) + "\n"
 
 
-def parquet_bytes(tmp=[]) -> bytes:  # noqa: B006 - a cache
-    import io
-
-    if not tmp:
-        buffer = io.BytesIO()
-        logged(T).to_parquet(buffer)
-        tmp.append(buffer.getvalue())
-    return tmp[0]
+def parquet_bytes() -> bytes:
+    buffer = io.BytesIO()
+    logged(T).to_parquet(buffer)
+    return buffer.getvalue()
 
 
 LOGS = {
