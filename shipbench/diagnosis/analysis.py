@@ -58,7 +58,7 @@ class Analysis:
 def causes_of(plant: Plant, threshold: float, only: Sequence[str] | None = None) -> tuple[Extension, dict[str, Gear]]:
     """What one training part alone leads to, by the same selection, with the threshold of the whole; and the best ordinary gears."""
     selection = select(null_fit(plant, Scales(plant), candidates_for(plant, only)), threshold)
-    findings, plain = find_in_gears(plant)
+    findings, plain = find_in_gears(selection.final.plant)
     gears = {g.actuator: g.gear for g in _named_gears(findings, threshold, only)}
     return Extension(selection.final.model.terms, selection.final.values, False, gears or None), plain
 
@@ -84,7 +84,7 @@ def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, c
     draws = null_maxima(null, seed)
     threshold = max(THRESHOLD, float(np.quantile(draws, 0.95))) if only is None else 0.0
     selection = select(null, np.inf if cautious else threshold)
-    findings, plain = find_in_gears(plant)
+    findings, plain = find_in_gears(null.plant)
     gears = [] if cautious else _named_gears(findings, threshold, only)
     hull = 0.0 if only is not None and "hull_derivatives" not in only else hull_evidence(selection.final)
     generic = tuple(dependences(selection.final))

@@ -76,6 +76,9 @@ def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
     value = fit.values[index] * unit
     num = fit.plant.seg.runs
     if term.per_run:
+        if effect.vector is not None:
+            size, towards = np.array([tuple(effect.public(row).values()) for row in value]).T
+            value = np.stack([size * np.cos(towards), size * np.sin(towards)], axis=1)
         rms = np.sqrt(np.mean(value**2, axis=0))
         low, high = np.sqrt(num / chi2.ppf(0.975, num)), np.sqrt(num / chi2.ppf(0.025, num))
         names = [p.name for p in effect.parameters if not p.shape]

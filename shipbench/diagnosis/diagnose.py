@@ -18,7 +18,7 @@ from .causes import describe_candidates, describe_causes, remaining, unknown_par
 from .gain import FoldGain, fold_gain, summarise
 from .model import NUM_BASE
 from .outcome import Diagnosis, Gain
-from .plant import Plant
+from .plant import FEW_STEPS, Plant
 from .trace import trace_of
 from .units import check_units, corrected
 from .wrong import what_is_wrong
@@ -122,7 +122,7 @@ def _one_fold(fold: int, dataset: Dataset, seed: int, only: Sequence[str] | None
     """Selection and fits on the training part of one fold."""
     test = _folds(len(dataset), seed)[fold]
     train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
-    plant = Plant.of(dataset.with_runs(train))
+    plant = Plant.of(dataset.with_runs(train), FEW_STEPS)
     extension, plain = causes_of(plant, threshold, only)
     return fold_gain(dataset, test, extension, plain, hull)
 

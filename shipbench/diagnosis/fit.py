@@ -99,13 +99,17 @@ def products_of(plant: Plant, scales: Scales, point: Point, columns: Columns, ex
     """Products of [eta, w, base, own, candidates, extra, e]; e is the residual with everything linear added back, so that all of it competes anew."""
     B, noise = len(point.eta), np.tile(scales.noise, plant.steps + 1)
     e = (plant.seg.states[..., :6] - columns.predicted).reshape(B, -1)
-    e = e + np.einsum("btz,bz->bt", columns.eta, point.eta)
-    e = e + np.einsum("btz,bz->bt", columns.w, np.moveaxis(point.w, -1, 1).reshape(B, -1)) + columns.base @ point.base
+    e = e + _times(columns.eta, point.eta) + _times(columns.w, np.moveaxis(point.w, -1, 1).reshape(B, -1)) + columns.base @ point.base
     for term, value, own in zip(point.terms, point.values, columns.own, strict=True):
-        e = e + np.einsum("bta,ba->bt", own, value[plant.seg.run] if term.per_run else np.broadcast_to(value, (B, term.size)))
+        e = e + _times(own, value[plant.seg.run] if term.per_run else np.broadcast_to(value, (B, term.size)))
     Z = np.concatenate([columns.eta, columns.w, columns.base, *columns.own, *columns.candidates, *extra, e[..., None]], axis=-1)
     Z = np.nan_to_num(Z / noise[None, :, None], nan=0.0, posinf=0.0, neginf=0.0)
     return Products.of(Z, plant.seg.mask, plant.knots, plant.knot_time, plant.seg.run, plant.seg.runs)
+
+
+def _times(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """(B, T) from columns (B, T, C) and coefficients (B, C)."""
+    return (columns @ values[:, :, None])[..., 0]
 
 
 def point_from(model: Model, point: Point, solution: Solution, prior: Prior, estimate: np.ndarray) -> Point:
@@ -150,7 +154,7 @@ def objective(lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int
     with np.errstate(over="ignore"):
         cost = float(np.sum(error**2 * np.exp(-hyper.log_noise))) + float(np.sum(base_precision(model) * point.base**2))
     w = np.moveaxis(point.w, -1, 1)
-    cost += float(np.sum(np.einsum("bji,ik,bjk->j", w, gram.K_inv, w) * np.exp(-hyper.log_force)))
+    cost += float(np.sum(np.sum(w @ gram.K_inv * w, axis=(0, 2)) * np.exp(-hyper.log_force)))
     for i, (term, value) in enumerate(zip(point.terms, point.values, strict=True)):
         cost += float(np.sum(value**2)) * (np.exp(-log_tau2.get(i, 0.0)) if term.per_run else 1.0)
     return cost if np.isfinite(cost) else np.inf

@@ -43,16 +43,8 @@ class Rollout:
 def rollout_plant(dataset: Dataset, gears: dict[str, Gear]) -> Plant:
     """Segments of `HORIZON` (Froude-scaled), driven by the commands through `gears` from the actuators' first measured places."""
     ship = complete(dataset.ship)
-    plant = Plant(ship, cut(dataset, max(20, round(HORIZON * (ship.L / 130.0) ** 0.5 / dataset.dt))))
-    if not plant.seg.commanded:
-        plant = _commanded(plant, gears)
-    return plant
-
-
-def _commanded(plant: Plant, gears: dict[str, Gear]) -> Plant:
-    driven = Plant(plant.ship, replace(plant.seg, commanded=True))
-    driven.drive(gears)
-    return driven
+    segments = cut(dataset, max(20, round(HORIZON * (ship.L / 130.0) ** 0.5 / dataset.dt)))
+    return Plant(ship, replace(segments, commanded=True)).driven(gears)
 
 
 def plain_base() -> np.ndarray:

@@ -88,10 +88,11 @@ def _kinds(actuator: str, scale: float, span: float, ordinary: Gear) -> list[_Ki
 
 
 def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear]]:
-    """Findings of every actuator that moves, best first, and the best ordinary gears; nothing where only commands are recorded."""
+    """Findings of every actuator that moves, best first, and the best ordinary gears; nothing where only commands are recorded (those that the motion
+    was fitted with)."""
+    if plant.seg.commanded:
+        return [], plant.ordinary
     seg, gears = plant.long, ordinary_gears(plant.c.L)
-    if seg.commanded:
-        return [], gears
     found: list[GearFinding] = []
     for name, channels in _ACTUATORS.items():
         rows = range(len(seg.run))

@@ -78,6 +78,11 @@ def ornstein_uhlenbeck(knots: int, spacing: float, tau: float) -> tuple[np.ndarr
     return np.linalg.inv(K), float(np.linalg.slogdet(K)[1])
 
 
+def _log_determinant(A: np.ndarray) -> np.ndarray:
+    """Of positive definite matrices (..., n, n): half the work of a decomposition that must pivot."""
+    return 2.0 * np.log(np.diagonal(np.linalg.cholesky(A), axis1=-2, axis2=-1)).sum(axis=-1)
+
+
 @dataclass(frozen=True)
 class Gram:
     """Whitened products per segment, (B, Z + G + 1, Z + G + 1); log_noise (B,): sums of log variances of the samples."""
@@ -110,12 +115,9 @@ class Gram:
         inverse = np.linalg.inv(A)
         solved = inverse @ self.G[:, :Z, Z:]
         S = self.G[:, Z:, Z:] - np.swapaxes(self.G[:, :Z, Z:], 1, 2) @ solved
-        logdet = np.linalg.slogdet(A)[1] + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
-        per_run = np.zeros((self.runs, *S.shape[1:]))
-        np.add.at(per_run, self.run, S)
-        sums = np.zeros(self.runs)
-        np.add.at(sums, self.run, logdet)
-        return Reduced(per_run, sums, inverse, solved)
+        logdet = _log_determinant(A) + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
+        first = np.flatnonzero(np.diff(self.run, prepend=-1))  # segments stand in the order of their runs
+        return Reduced(np.add.reduceat(S, first), np.add.reduceat(logdet, first), inverse, solved)
 
 
 @dataclass(frozen=True)
@@ -164,13 +166,13 @@ def solve(reduced: Reduced, prior: Prior) -> Solution:
         right = reduced.S[:, prior.random][:, :, keep]
         back = covs @ right
         S = S - np.swapaxes(right, 1, 2) @ back
-        logdet = logdet + np.linalg.slogdet(A)[1] + np.sum(prior.log_tau2)
+        logdet = logdet + _log_determinant(A) + np.sum(prior.log_tau2)
     total = S.sum(axis=0)
     A = total[:-1, :-1] + np.diag(prior.precision)
     cov = np.linalg.inv(A)
     mean = cov @ total[:-1, -1]
     quad = total[-1, -1] - total[:-1, -1] @ mean
-    log_evidence = -0.5 * (quad + np.sum(logdet) + np.linalg.slogdet(A)[1] - np.sum(np.log(prior.precision)))
+    log_evidence = -0.5 * (quad + np.sum(logdet) + _log_determinant(A) - np.sum(np.log(prior.precision)))
     fitted = np.append(-mean, 1.0)
     per_run = -0.5 * (np.einsum("nij,i,j->n", S, fitted, fitted) + logdet)
     if back is None:
@@ -186,7 +188,7 @@ def background(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -
     coefficients = np.zeros((B, G))
     coefficients[:, prior.shared] = solution.mean
     coefficients[:, prior.random] = solution.means[gram.run]
-    estimate = reduced.solved[:, :, -1] - np.einsum("bzg,bg->bz", reduced.solved[:, :, :-1], coefficients)
+    estimate = reduced.solved[:, :, -1] - (reduced.solved[:, :, :-1] @ coefficients[:, :, None])[..., 0]
     J = reduced.solved[:, :, prior.shared]
     cov = reduced.inverse + J @ solution.cov @ np.swapaxes(J, 1, 2)
     if len(prior.random):
@@ -201,7 +203,7 @@ def update_force(gram: Gram, estimate: np.ndarray, cov: np.ndarray) -> np.ndarra
     for j in range(3):
         at = slice(6 + j * gram.knots, 6 + (j + 1) * gram.knots)
         w = estimate[:, at]
-        quad = np.einsum("bi,ij,bj->", w, gram.K_inv, w) + np.einsum("ij,bji->", gram.K_inv, cov[:, at, at])
+        quad = np.sum(w @ gram.K_inv * w) + np.sum(gram.K_inv * cov[:, at, at].sum(axis=0))
         log_force[j] = np.log(quad / (len(w) * gram.knots))
     return log_force
 
@@ -225,7 +227,8 @@ def update_noise(
     """
     theta = coefficients_of(gram, prior, solution, estimate, products.P.shape[-1])
     Z = gram.latent
-    squares = np.einsum("cbij,bi,bj->c", products.P, theta, theta) + np.einsum("cbij,bji->c", products.P[:, :, :Z, :Z], reduced.inverse)
+    fitted = np.einsum("cbi,bi->c", (products.P @ theta[:, :, None])[..., 0], theta)
+    squares = fitted + np.array([np.vdot(P[:, :Z, :Z], reduced.inverse) for P in products.P])
     return np.maximum(np.log(squares / np.sum(products.samples)), floor)
 
 

@@ -77,6 +77,7 @@ class Scales:
         self.p = parameter_scale(plant.c)
         self.eta = np.array([0.5 * froude**2, 0.5 * froude**2, 5e-3, 0.05 * froude, 0.05 * froude, 1e-3 / froude])
         self.w = np.array([5e-3, 5e-3, 1e-4 / froude**2])  # accelerations do not scale; yaw acceleration goes with 1/L
+        self.structure = STRUCTURE.spreads(measured_wind=plant.seg.wind is not None)
         self.noise = np.array([0.3 * froude**2, 0.3 * froude**2, 4e-3, 0.04 * froude, 0.04 * froude, 7e-4 / froude])
 
     def amplitudes(self, term: Term, L: float) -> np.ndarray:
@@ -92,7 +93,7 @@ def parameters(scales: Scales, base: np.ndarray) -> tuple[list[np.ndarray | floa
         p[index] = (_CENTRE[i] + _SPREAD[i] * base[..., i]) * scales.p[index]
     at = len(FREE) + NUM_HULL
     hull = tuple(HULL_SPREAD * base[..., len(FREE) + i] for i in range(NUM_HULL))
-    structure = tuple(item.typical * base[..., at + i] for i, item in enumerate(STRUCTURE.parameters))
+    structure = tuple(spread * base[..., at + i] for i, spread in enumerate(scales.structure))
     return p, [Active(HULL, hull), Active(STRUCTURE, structure)]
 
 
@@ -128,9 +129,10 @@ class Columns:
     candidates: tuple[np.ndarray, ...]
 
 
-_STEP, _OWN_STEP, CANDIDATE_STEP, VECTOR_STEP = 1e-4, 0.02, 0.5, 1.0
+_STEP, _OWN_STEP, _OWN_VECTOR_STEP, CANDIDATE_STEP, VECTOR_STEP = 1e-4, 0.02, 0.5, 0.5, 1.0
 """Steps in units of the scales. A candidate's is finite: some (wind, deadband) act with the square of their size or not at all below one; that of a
-vector goes both ways, because its sign differs from heading to heading."""
+vector goes both ways, because its sign differs from heading to heading. So does that of a vector in the model, or a wind near zero, where its
+force has no slope, would be held there."""
 
 
 class Linearisation:
@@ -236,8 +238,12 @@ class Linearisation:
 
     def _of_term(self, index: int, term: Term) -> np.ndarray:
         """Columns of a term that is in the model."""
-        steps = _OWN_STEP * self.scales.amplitudes(term, self.plant.c.L)
-        columns, sources = self._moved(index, term, steps, _OWN_STEP)
+        step = _OWN_VECTOR_STEP if term.effect.vector else _OWN_STEP
+        steps = step * self.scales.amplitudes(term, self.plant.c.L)
+        columns, sources = self._moved(index, term, steps, step)
+        if term.effect.vector and sources is not None:
+            back, sources_back = self._moved(index, term, -steps, -step)
+            columns, sources = 0.5 * (columns + back), 0.5 * (sources + sources_back)
         self.own_sources.append(sources)
         return columns
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -25,8 +26,9 @@ NUM_HULL = len(HULL.parameters)
 NO_GEAR = Gear(1e-3, 1e12)
 SEGMENT = 60.0
 _LONG = 5
-MOST_STEPS = 12_000
-"""Of all segments together, per stage: more runs than this teach little and cost minutes."""
+MOST_STEPS, FEW_STEPS = 48_000, 12_000
+"""Of all segments together, per stage: more cost many minutes. A mean wind of every run shows in all of a long record (3.5 h of a 3 m model: 48,000);
+the fewer serve where a fit is repeated."""
 
 
 def ordinary_gears(L: float) -> dict[str, Gear]:
@@ -125,16 +127,22 @@ class Plant:
         self.ordinary = gears
         self.path = np.stack([self._stages(i, gears[k]) for i, k in enumerate(("n", "delta", "F", "F"))], axis=-1)
 
+    def driven(self, gears: dict[str, Gear]) -> Plant:
+        """The same runs with some other ordinary gears."""
+        plant = copy(self)
+        plant.drive(self.ordinary | gears)
+        return plant
+
     @classmethod
-    def of(cls, dataset: Dataset) -> Plant:
+    def of(cls, dataset: Dataset, most_steps: int = MOST_STEPS) -> Plant:
         """The plant of a data set, cut into segments of about 60 s at 130 m (Froude-scaled): over longer ones the motion is far from linear in its
-        parameters, and little is learnt from the place where the next one begins. Long data are thinned to `MOST_STEPS` integration steps. `long` are
+        parameters, and little is learnt from the place where the next one begins. Long data are thinned to `most_steps` integration steps. `long` are
         longer pieces for what has no such limit: the gears."""
         ship = complete(dataset.ship)
         samples = max(20, round(SEGMENT * (ship.L / 130.0) ** 0.5 / dataset.dt))
         segments, long = cut(dataset, samples), cut(dataset, _LONG * samples)
         steps = (segments.states.shape[1] - 1) * _substeps(segments.dt, ship.L)
-        most = max(len(dataset), MOST_STEPS // steps)
+        most = max(len(dataset), most_steps // steps)
         return cls(ship, segments.thinned(most), long.thinned(max(len(dataset), most // _LONG)))
 
     def path_of(self, active: Sequence[Active]) -> np.ndarray:

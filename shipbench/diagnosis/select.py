@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -17,10 +18,14 @@ NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error")
 """Found by their own tests: prior width of the hull, gated columns, kinematics."""
 AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft_rate_limit", "shaft_lag", "thruster_lag", "rudder_lag")
 """Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
+WITH_WIND, WITHOUT_WIND = ("wind_coefficients",), ("wind", "wind_per_run")
+"""Only where the wind is measured, and only where it is not."""
 MOST_EFFECTS = 6
+_GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
 _REFITS = 3
 _REFIT_ITERATIONS = 12
-_WORTH_A_REFIT = 0.5
+_WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
+"""Least linear score of what is refitted: of the threshold, and of the best."""
 _RIVAL, _RIVALS = 0.25, 4
 _IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
 """What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
@@ -60,20 +65,43 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None) -> list[Ter
     for name in names if names is not None else EFFECTS.names():
         if name in NOT_SCREENED or (not plant.seg.commanded and name in AS_RECORDED):
             continue
-        if plant.seg.wind is not None and name in ("wind", "wind_per_run"):
+        if name in (WITH_WIND if plant.seg.wind is None else WITHOUT_WIND):
             continue
         effect = EFFECTS.get(name)
         if effect.family == "thruster" and not np.any(plant.seg.states[..., 8:]):
             continue
-        settings = effect.settings(plant.seg.states[..., :2], plant.ship)
-        found += [Term(effect, setting, effect.per_run, choices=len(settings)) for setting in settings]
+        ways = list(product(effect.fitted(plant.c.L), effect.settings(plant.seg.states[..., :2], plant.ship)))
+        found += [Term(way, setting, effect.per_run, choices=len(ways)) for way, setting in ways]
     return found
 
 
 def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
-    """The plain model, fitted from the regressions."""
+    """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion."""
     origin = Origin.of(plant, scales)
+    if plant.seg.commanded:
+        found = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion)
+        for i, name, field in ((0, "n", "T"), (1, "delta", "rate"), (1, "delta", "T")):
+            if np.ptp(plant.seg.commands[..., i]) > 0.0:
+                found = _with_gear(found, name, field)
+        return fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion)
     return fit(plant, scales, Model(), origin.point, origin.hyper, candidates=candidates, guess=origin.motion)
+
+
+def _with_gear(found: Fit, name: str, field: str) -> Fit:
+    """`found` behind a gear whose time constant or rate is that of an ordinary one times the factor that suits the motion (servos of models are
+    quicker than Froude's law makes an ordinary gear)."""
+    gear = found.plant.ordinary[name]
+    for factors in _GEAR_FACTORS:
+        before = found
+        for factor in factors:
+            plant = found.plant.driven({name: replace(gear, **{field: getattr(gear, field) * factor})})
+            tried = fit(plant, found.scales, found.model, found.point, found.hyper, iterations=_REFIT_ITERATIONS, guess=found.motion)
+            if 2.0 * (tried.evidence - found.evidence) < _WORTH_A_GEAR:
+                break
+            found = tried
+        if found is not before:
+            break
+    return found
 
 
 def with_term(before: Fit, score: Score, origin: Origin) -> Fit:
@@ -123,9 +151,9 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
     """The best candidate, or one that begins at a later run, where that explains the runs better by the threshold."""
     if any(t.since is not None for t in now.model.terms):
         return best
-    present = {t.label for t in now.model.terms}
-    late = [s for s in changes(now) if s.score > _CHANGE_MARGIN and s.term.label not in (*present, *_LASTING)][:_CHANGES]
     plain, gain = best, 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
+    out, least = (*(t.label for t in now.model.terms), *_LASTING), max(_CHANGE_MARGIN, _FAR_BEHIND * gain)
+    late = [s for s in changes(now) if s.score > least and s.term.label not in out][:_CHANGES]
     for score in late:
         found = with_term(now, score, origin)
         own = plain is not None and plain.model.terms[-1].label == score.term.label
@@ -145,10 +173,11 @@ def _worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[
     ranked = sorted(best.values(), key=lambda s: -s.score)
     if not ranked or ranked[0].score < _WORTH_A_REFIT * threshold:
         return []
-    chosen = [s for s in ranked[:_REFITS] if s.score > _WORTH_A_REFIT * threshold]
+    least = max(_WORTH_A_REFIT * threshold, _FAR_BEHIND * ranked[0].score)
+    chosen = [s for s in ranked[:_REFITS] if s.score > least]
     families = {s.term.effect.family for s in chosen}
     for s in ranked[_REFITS:]:
-        if s.score > threshold and s.term.effect.family not in families:
+        if s.score > max(threshold, least) and s.term.effect.family not in families:
             chosen.append(s)
             families.add(s.term.effect.family)
     best_of_all = ranked[0].term.effect

@@ -13,6 +13,7 @@ from ..effects.race_gain import EFFECT as RACE
 from ..effects.thruster_gain import EFFECT as THRUSTERS
 from ..effects.thruster_speed_loss import EFFECT as LOSS
 from ..effects.wake_variation import EFFECT as WAKE
+from ..effects.wind_coefficients import EFFECT as WIND
 from ..ops import Array, absolute, arctan2, clip, exp, maximum, smoothstep, sqrt, tanh
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
@@ -26,7 +27,8 @@ class Structure(Effect):
     drag of a hull whose regressions lack it (H52), side force of a propeller going astern (P37), gamma_R 0.4 to 0.64, by side, l'_R -0.7 to -1
     (Yasukawa & Yoshimura 2015, table 3), X'_vv and X'_rr that eq. (2) lacks (same table: -0.040, 0.011); added mass between sway and yaw, which
     regressions hardly know and the MMG form leaves out (of m L); flow at the rudder that a reversed propeller stops, from none to all (Kitagawa
-    et al., physics reference 2.6); thrust astern, of which eq. (2) knows one level (0.65 of ahead at rest; four-quadrant curves 0.5 to 0.8).
+    et al., physics reference 2.6); thrust astern, of which eq. (2) knows one level (0.65 of ahead at rest; four-quadrant curves 0.5 to 0.8); wind on
+    superstructures of all kinds (Blendermann 1994, physics reference E03).
     """
 
     family = "hull"
@@ -53,13 +55,23 @@ class Structure(Effect):
         Parameter("straightening_r", "1", 0.25, -0.9, 1.0),
         Parameter("thrust_astern", "1", 0.15, -0.8, 1.0),
         Parameter("backing", "1", 0.4, -1.4, 0.4),
+        Parameter("wind_X", "1", 0.3, -0.9, 3.0),
+        Parameter("wind_Y", "1", 0.15, -0.9, 2.0),
+        Parameter("wind_N", "1", 0.4, -2.0, 3.0),
+        Parameter("wind_lever", "1", 0.04, -0.3, 0.3),
     )
     backing = 0.5
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
 
+    def spreads(self, measured_wind: bool) -> np.ndarray:
+        """Standard deviations of the values. What a wind that is not measured does to this ship cannot be told from the wind itself."""
+        return np.array([p.typical * (measured_wind or not p.name.startswith("wind_")) for p in self.parameters])
+
     def plain(self) -> np.ndarray:
         """Values, in units of their spreads, at which it adds nothing to eq. (2)."""
-        centres = [c for _, c in self.parts] + [0.0] * (len(self.parameters) - len(self.parts) - 1) + [self.backing]
+        centres = np.zeros(len(self.parameters))
+        centres[: len(self.parts)] = [c for _, c in self.parts]
+        centres[[p.name for p in self.parameters].index("backing")] = self.backing
         return np.array([-c / p.typical for c, p in zip(centres, self.parameters, strict=True)])
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
@@ -67,6 +79,7 @@ class Structure(Effect):
             effect.force(e, s, (centre + value,), ship)
         e.straightening, e.straightening_asymmetry, e.straightening_r = 1.0 + q[6], q[7], 1.0 + q[17]
         e.coupling, e.backing = q[16] * ship.mass * ship.L, self.backing + q[19]
+        WIND.force(e, s, (*q[20:23], q[23] * ship.L), ship)
         e.thrust = e.thrust * (1.0 + q[18] * smoothstep(-s.n, 0.0, 1.0))
         unit = 0.5 * ship.rho * ship.L * ship.T
         u, v, r = s.u - e.u_c, s.v - e.v_c, s.r * ship.L

@@ -89,6 +89,11 @@ class Effect:
         """Values of the shape parameters to try, given the places (.., 2) that the ship visited."""
         return [()]
 
+    def fitted(self, L: float) -> tuple[Effect, ...]:
+        """The same effect with values in which it acts about linearly on a ship of length L [m] (`public` gives what they mean), once for each way in
+        which it may act."""
+        return (self,)
+
     def sized(self, L: float) -> tuple[Parameter, ...]:
         """The parameters for a ship of length L [m]."""
         return tuple(p.for_length(L) for p in self.parameters)
@@ -152,15 +157,20 @@ def per_run(value: Array) -> Array:
 def delayed(S: np.ndarray, channels: Sequence[int], delay: Array, dt: float) -> np.ndarray:
     """States (runs, samples, 10) whose `channels` are read `delay` seconds late (a number or one per run); before the run they go on as they began.
 
-    Linear between samples, so that a small delay acts in proportion to its size.
+    Between samples a cubic with central slopes (Catmull & Rom): a fit would not settle where the slope against the delay jumps, as it does at whole
+    samples of straight lines.
     """
     runs, samples = S.shape[:2]
     shift = np.broadcast_to(np.asarray(delay, dtype=float) / dt, (runs,))
     at = np.arange(samples)[None, :] - shift[:, None]
     low = np.clip(np.floor(at).astype(int), 0, samples - 2)
     part = (at - low)[..., None]
-    rows = np.arange(runs)[:, None]
+    p = np.clip(part, 0.0, 1.0)
+    weights = (0.5 * p * (p * (2.0 - p) - 1.0), 0.5 * (p * p * (3.0 * p - 5.0) + 2.0), 0.5 * p * (p * (4.0 - 3.0 * p) + 1.0), 0.5 * p * p * (p - 1.0))
     columns = S[:, :, list(channels)]
+    first, last = columns[:, 1:2] - columns[:, :1], columns[:, -1:] - columns[:, -2:-1]
+    padded = np.concatenate([columns[:, :1] - first, columns, columns[:, -1:] + last], axis=1)
+    rows = np.arange(runs)[:, None]
     out = S.copy()
-    out[:, :, list(channels)] = columns[rows, low] * (1.0 - part) + columns[rows, low + 1] * part
+    out[:, :, list(channels)] = sum(w * padded[rows, low + i] for i, w in enumerate(weights)) + np.where(part < 0.0, first, last) * (part - p)
     return out

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from typing import Self
 
-from ..ops import Array
+from ..ops import Array, sqrt
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter, body_axes
@@ -17,10 +19,36 @@ class Wind(Effect):
     parameters = (Parameter("north", "m/s", 7.0, -30.0, 30.0, scaling="speed"), Parameter("east", "m/s", 7.0, -30.0, 30.0, scaling="speed"))
     vector = ("speed", "from")
     separate = "the same manoeuvre at two speeds and on reciprocal courses: wind forces do not grow with the ship's speed"
+    stretch: tuple[float, float] | None = None
+    moment: float = 1.0
+
+    def fitted(self, L: float) -> tuple[Self, ...]:
+        """Components a = W (W + W_0)/(W_t + W_0) of a wind W, W_t the typical one, W_0 a ship's ordinary speed: its forces grow with them, while the
+        square of a weak wind has no slope that a fit could follow. Once for each of three moments: that of an unknown superstructure may be a
+        fraction of the formula's or twice as large (the spread between types of ship: physics reference, E03)."""
+        found = []
+        for moment in (0.3, 1.0, 2.0):
+            effect = copy(self)
+            effect.stretch, effect.moment = (self.sized(L)[0].typical, 0.1 * (9.81 * L) ** 0.5), moment
+            found.append(effect)
+        return tuple(found)
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        air_u, air_v = body_axes(q[0], q[1], s.psi)
-        e.air_u, e.air_v = e.air_u - air_u, e.air_v - air_v
+        air_u, air_v = body_axes(*self._wind(q), s.psi)
+        e.air_u, e.air_v, e.wind_N = e.air_u - air_u, e.air_v - air_v, e.wind_N * self.moment
+
+    def public(self, q: Sequence[float]) -> dict[str, float]:
+        return super().public([float(v) for v in self._wind(q)])
+
+    def _wind(self, q: Sequence[Array]) -> tuple[Array, Array]:
+        """North and east component of the wind [m/s]."""
+        north, east = q
+        if self.stretch is None:
+            return north, east
+        typical, speed = self.stretch
+        size = sqrt(north * north + east * east + (1e-6 * typical) ** 2)
+        share = (sqrt(0.25 * speed * speed + size * (typical + speed)) - 0.5 * speed) / size
+        return north * share, east * share
 
 
 EFFECT = Wind()

@@ -202,7 +202,7 @@ def accelerations(
     drift = clip(v / speed, -c.max_drift, c.max_drift)
     N = N + f.N_nonlinear * (c.N_rr * r * abs_r + (c.N_vvr * v + c.N_vrr * r) * drift * r)
     if air is not None:
-        X_W, Y_W, N_W = wind.harmonic(*air, c.A_F, c.A_L, c.L)
+        X_W, Y_W, N_W = e.wind_on(*wind.harmonic(*air, c.A_F, c.A_L, c.L))
         X, Y, N = X + X_W, Y + Y_W, N + N_W
     det = i.m11 * i.m22 - i.m12_Y * i.m12_N
     du, dv, dr = X / i.surge, (i.m22 * Y - i.m12_Y * N) / det, (i.m11 * N - i.m12_N * Y) / det

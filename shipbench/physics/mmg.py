@@ -119,7 +119,7 @@ def accelerations(
         m_y, J_z, factors = m_y * deep.m_y, J_z * deep.J_z, factors * deep.hull
     X, Y, N = water_forces(ship, u_w, v_w, r, n / 60.0, delta, F_b, F_s, factors, e)
     u_rw, v_rw = wind.apparent_wind(psi, u, v, env.wind_speed, env.wind_from)
-    X_W, Y_W, N_W = wind.blendermann(u_rw - e.air_u, v_rw - e.air_v, ship.A_F, ship.A_L, ship.L)
+    X_W, Y_W, N_W = e.wind_on(*wind.blendermann(u_rw - e.air_u, v_rw - e.air_v, ship.A_F, ship.A_L, ship.L))
     X, Y, N = X + X_W + e.X, Y + Y_W + e.Y, N + N_W + e.N
     m, x_G = ship.m * e.mass, ship.x_G + e.x_G
     du = (X + (m + m_y) * v_w * r + m * x_G * r * r) / (m + m_x)

@@ -1,0 +1,30 @@
+"""The measured wind does not push this ship as the formula says: forces times 1 + X and 1 + Y, moment times 1 + N, side force `lever` further ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..ops import Array
+from ..physics.modifiers import Flow, Modifiers
+from ..ship import Particulars
+from .base import Effect, Parameter
+
+
+class WindCoefficients(Effect):
+    family = "environment"
+    summary = "wind forces off the formula"
+    source = "spread between types of ship: Blendermann (1994), Isherwood (1972) (physics reference, section 5, E03); s_L, centre of the lateral area"
+    parameters = (
+        Parameter("X", "1", 0.5, -1.5, 3.0),
+        Parameter("Y", "1", 0.3, -1.0, 2.0),
+        Parameter("N", "1", 0.8, -3.0, 4.0),
+        Parameter("lever", "m", 13.0, -40.0, 40.0, scaling="length"),
+    )
+    separate = "drifting in wind from all sides, with an anemometer"
+
+    def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.wind_X, e.wind_Y, e.wind_N = e.wind_X * (1.0 + q[0]), e.wind_Y * (1.0 + q[1]), e.wind_N * (1.0 + q[2])
+        e.wind_lever = e.wind_lever + q[3]
+
+
+EFFECT = WindCoefficients()
