@@ -18,6 +18,7 @@ def diagnose(
     gain: Annotated[bool, typer.Option(help="Measure the gain on held-out runs (most of the time).")] = True,
     seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
     workers: Annotated[int, typer.Option(help="Processes for the folds.")] = 2,
+    thorough: Annotated[bool, typer.Option("--thorough", help="Use up to four times as much of a long record (some times the time).")] = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -29,7 +30,7 @@ def diagnose(
     from .diagnosis.diagnose import diagnose as run
 
     data = load_dataset(dataset)
-    found = run(data, gain=gain, seed=seed, workers=workers)
+    found = run(data, gain=gain, seed=seed, workers=workers, thorough=thorough)
     written = write_diagnosis(found, out or Path("diagnoses") / slug(Path(data.name).name))
     if as_json:
         print_json(found.document())

@@ -18,7 +18,7 @@ from .causes import describe_candidates, describe_causes, remaining, unknown_par
 from .gain import FoldGain, fold_gain, summarise
 from .model import NUM_BASE
 from .outcome import Diagnosis, Gain
-from .plant import FEW_STEPS, Plant
+from .plant import MOST_STEPS, THOROUGH_STEPS, Plant
 from .trace import trace_of
 from .units import check_units, corrected
 from .wrong import what_is_wrong
@@ -31,7 +31,9 @@ NOT_A_MODEL = ("unit_or_sign_error", "change_point")
 """They describe the data, not the ship: correct the data, or fit the runs before and after the change apart."""
 
 
-def diagnose(dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequence[str] | None = None, workers: int = 1) -> Diagnosis:
+def diagnose(
+    dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequence[str] | None = None, workers: int = 1, thorough: bool = False
+) -> Diagnosis:
     """Show what the plain physics model gets wrong on measured runs, name the causes, and measure what naming them is worth.
 
     Args:
@@ -40,6 +42,7 @@ def diagnose(dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequen
         seed: of the bootstrap and of the folds.
         only: effects to consider (an oracle that knows what is hidden); default all.
         workers: processes for the folds.
+        thorough: use up to four times as much of a long record (the folds do not); 90 runs of 120 s are used whole either way.
 
     Raises:
         InputError: the ship never moves, or there are too few samples for any fit.
@@ -48,7 +51,7 @@ def diagnose(dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequen
     warnings = _check(dataset)
     units = check_units(dataset) if only is None else []
     dataset = corrected(dataset, units)
-    plant = Plant.of(dataset)
+    plant = Plant.of(dataset, THOROUGH_STEPS if thorough else MOST_STEPS)
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     found = analyse(plant, only=only, seed=seed, cautious=cautious)
     doubts = _doubts(found) if only is None else []
@@ -122,7 +125,7 @@ def _one_fold(fold: int, dataset: Dataset, seed: int, only: Sequence[str] | None
     """Selection and fits on the training part of one fold."""
     test = _folds(len(dataset), seed)[fold]
     train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
-    plant = Plant.of(dataset.with_runs(train), FEW_STEPS)
+    plant = Plant.of(dataset.with_runs(train))
     extension, plain = causes_of(plant, threshold, only)
     return fold_gain(dataset, test, extension, plain, hull)
 

@@ -26,9 +26,9 @@ NUM_HULL = len(HULL.parameters)
 NO_GEAR = Gear(1e-3, 1e12)
 SEGMENT = 60.0
 _LONG = 5
-MOST_STEPS, FEW_STEPS = 48_000, 12_000
-"""Of all segments together, per stage: more cost many minutes. A mean wind of every run shows in all of a long record (3.5 h of a 3 m model: 48,000);
-the fewer serve where a fit is repeated."""
+MOST_STEPS, THOROUGH_STEPS = 12_000, 48_000
+"""Of all segments together, per stage: more cost many minutes. What differs from run to run, such as the wind, may show only in all of a long record
+(3.5 h of a 3 m model: 48,000)."""
 
 
 def ordinary_gears(L: float) -> dict[str, Gear]:

@@ -10,9 +10,11 @@ import torch
 from torch import Tensor, nn
 
 from ..physics import eq2
+from ..physics.modifiers import Flow
 from ..physics.wind import apparent_wind
 from ..records import Dataset
 from ..signals import PSI, R, U, V
+from ._physics_effects import Active, accelerations
 from ._stacked import CHANNELS, Scaler, StackedMLP
 from .physics import Physics
 
@@ -23,17 +25,22 @@ class Residual(nn.Module):
     """Accelerations of all members: physics plus network.
 
     Args:
-        physics: the fitted models, one per member.
+        physics: the fitted models, one per member, all with the same effects.
         hidden: width of the two hidden layers.
         scale_in: of `features`; scale_out (members, 1, 3): size of the accelerations.
     """
 
     p: Tensor
+    q: Tensor
     scale_out: Tensor
 
     def __init__(self, physics: Sequence[Physics], hidden: int, scale_in: Scaler, scale_out: Tensor, draw: Sequence[torch.Generator]) -> None:
         super().__init__()
-        self.c = physics[0].c
+        self.c, self.ship = physics[0].c, physics[0].particulars
+        forces = [_forces(m) for m in physics]
+        self.effects = [(a.effect, len(a.q)) for a in forces[0]]
+        q = np.array([[v for a in own for v in a.q] for own in forces])
+        self.register_buffer("q", torch.as_tensor(q, dtype=scale_out.dtype).T[..., None].contiguous())
         self.register_buffer("p", torch.as_tensor(np.stack([m.p for m in physics]), dtype=scale_out.dtype).T[..., None].contiguous())
         self.register_buffer("scale_out", scale_out)
         self.scale_in = scale_in
@@ -48,10 +55,21 @@ class Residual(nn.Module):
     ) -> tuple[Tensor, Tensor, Tensor]:
         """(du, dv, dr), each (members, batch); `air` is true wind speed and direction."""
         apparent = None if air is None or psi is None else apparent_wind(psi, u, v, *air)
-        n, delta, F_b, F_s = actuators
-        du, dv, dr = eq2.accelerations(u, v, r, n, delta, F_b, F_s, apparent, self.c, self.p.unbind(0))
+        if self.effects and psi is not None:
+            q = iter(self.q.unbind(0))
+            active = [Active(effect, tuple(next(q) for _ in range(num))) for effect, num in self.effects]
+            nowhere = torch.zeros_like(u)
+            flow = Flow(nowhere, nowhere, nowhere, psi, u, v, r, *actuators)
+            du, dv, dr = accelerations(active, flow, air, self.c, self.p.unbind(0), self.ship)
+        else:
+            du, dv, dr = eq2.accelerations(u, v, r, *actuators, apparent, self.c, self.p.unbind(0))
         more = (self.learned(torch.stack([u, v, r, *actuators, *(apparent or ())], dim=-1)) * self.scale_out).unbind(-1)
         return du + more[0], dv + more[1], dr + more[2]
+
+
+def _forces(physics: Physics) -> list[Active]:
+    """The effects of a fitted model that act as forces."""
+    return [] if physics.extension is None else list(physics.extension.active("force"))
 
 
 def features(S: Tensor, air: Tensor | None) -> Tensor:
@@ -127,20 +145,20 @@ def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step
     def rate(t: Tensor, y: Tensor) -> Tensor:
         j, half = divmod(round(2.0 * float(t)), 2)  # time in steps: the rule asks at j and j + 1/2
         u, v, r = y[0], y[1], y[2]
-        psi, now = (None, None) if wind is None else (y[3], (wind[j, 0], wind[j, 1]))
-        rates = model(psi, u, v, r, stages[j, half].unbind(0), now)
-        return step * torch.stack(rates if wind is None else (*rates, r))
+        rates = model(y[3] if turns else None, u, v, r, stages[j, half].unbind(0), None if wind is None else (wind[j, 0], wind[j, 1]))
+        return step * torch.stack((*rates, r) if turns else rates)
 
-    first = start[..., [U, V, R] if wind is None else [U, V, R, PSI]].movedim(-1, 0)
+    turns = wind is not None or bool(model.effects)  # the heading matters
+    first = start[..., [U, V, R, PSI] if turns else [U, V, R]].movedim(-1, 0)
     times = torch.arange(path.shape[2] + 1, dtype=start.dtype)
     return odeint(rate, first, times, method="midpoint")[1:, :3].permute(2, 3, 0, 1)  # pyright: ignore[reportIndexIssue, reportCallIssue, reportArgumentType]
 
 
 def typical_accelerations(physics: Sequence[Physics], drive: Drive) -> Tensor:
-    """Root mean square (members, 1, 3) of the physics' accelerations in still air along the measured states."""
+    """Root mean square (members, 1, 3) of the physics' accelerations without measured wind along the measured states."""
     sizes = []
     for model, S in zip(physics, drive.S.double().split(drive.counts), strict=True):
-        u, v, r, n, delta, F_b, F_s = S[..., CHANNELS].movedim(-1, 0).numpy()
-        found = eq2.accelerations(u, v, r, n, delta, F_b, F_s, None, model.c, list(model.p))
+        flow = Flow(0.0, 0.0, 0.0, S[..., PSI].numpy(), *S[..., CHANNELS].movedim(-1, 0).numpy())
+        found = accelerations(_forces(model), flow, None, model.c, list(model.p), model.particulars)
         sizes.append([float(np.sqrt(np.mean(np.square(a)))) for a in found])
     return torch.tensor(sizes, dtype=torch.float32)[:, None]

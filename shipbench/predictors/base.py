@@ -153,7 +153,7 @@ def _class_from_file(path: Path, class_name: str) -> Any:
 
 def _no_effects(spec: Spec) -> InputError:
     added = "+".join(e.name for e in spec.effects)
-    return InputError(f"model spec '{spec.text}': effects extend 'physics' only, '{spec.name}' takes none. Write physics+{added}.")
+    return InputError(f"model spec '{spec.text}': effects extend 'physics' and 'neural_ode', '{spec.name}' takes none. Write physics+{added}.")
 
 
 def make_predictor(spec: Spec) -> Any:

@@ -14,15 +14,21 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ..effects.base import EFFECTS
 from ..errors import InputError
 from ..integrate import motion_rhs, rk4_step
 from ..records import Dataset
 from ..signals import ACTUATORS, MOTION, R, U
+from ..specs import EffectSpec
 from ._residual import Drive, Grid, Residual, features, solve, typical_accelerations
 from ._stacked import Scaler, generators, hold_error, padded, position_score, random_windows, shares_of, trapezoid_pose, with_valid
 from .base import History, PredictorBase
 from .physics import Physics
 from .training import Chunk, Recipe, StackedTask, train
+
+
+_NOWHERE = ("bank_suction", "change_point")
+"""Effects that depend on where the ship is, or when."""
 
 
 class Stage(NamedTuple):
@@ -112,9 +118,27 @@ class NeuralODE(PredictorBase):
             if getattr(self, key) < 1:
                 raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
         self.physics = Physics()
+        self.effects: tuple[EffectSpec, ...] = ()
         self._weights: dict[str, np.ndarray] = {}
         self.improved = False
         """Whether validation preferred the trained residual; without it the predictions are the physics' own."""
+
+    def extend(self, effects: Sequence[EffectSpec]) -> Self:
+        """Add effects to the physics beneath (`neural_ode+race_gain`), as in `Physics.extend`.
+
+        Raises:
+            InputError: an effect is unknown, acts on the sensors, or depends on place or time, which the training windows do not know.
+        """
+        self.physics = Physics().extend(effects)
+        for effect in effects:
+            enters = "sensor" if effect.name in _NOWHERE else EFFECTS.get(effect.name).enters
+            if enters == "sensor":
+                raise InputError(
+                    f"effect '{effect.name}' cannot extend neural_ode: it acts on the sensors, or at a place or time. "
+                    f"Accepted: effects that act as forces or in the gears. Write physics+{effect.name}, or mend the data."
+                )
+        self.effects = tuple(effects)
+        return self
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Fit the physics on `train` and `valid`, train the residual on `train`; `valid` decides what is kept."""
@@ -134,7 +158,8 @@ class NeuralODE(PredictorBase):
         pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
         for model, (training, validation), seed in zip(models, pairs, seeds, strict=True):
             model.inputs = training.inputs
-            model.physics = Physics().fit(training, validation, seed=seed)
+            model.physics = Physics().extend(model.effects) if model.effects else Physics()
+            model.physics.fit(training, validation, seed=seed)
         physics = [m.physics for m in models]
         grid = Grid.of(physics[0])
         learn, check = (Drive.of(physics, part, grid) for part in zip(*pairs, strict=True))
@@ -148,7 +173,7 @@ class NeuralODE(PredictorBase):
         train(task, recipe)
         state = {k: v.detach().cpu().numpy() for k, v in residual.state_dict().items()}
         for m, model in enumerate(models):
-            model._weights = {k: v[:, m : m + 1].copy() if k == "p" else v[m : m + 1].copy() for k, v in state.items()}
+            model._weights = {k: v[:, m : m + 1].copy() if k in ("p", "q") else v[m : m + 1].copy() for k, v in state.items()}
             model.improved = bool(np.any(model._weights["net.layers.2.weight"]))
 
     def _residual(self) -> Residual:
@@ -156,7 +181,7 @@ class NeuralODE(PredictorBase):
         w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
         scale_in = Scaler(w["scale_in.mean"], w["scale_in.std"])
         model = Residual([self.physics], self.hidden, scale_in, w["scale_out"], generators([0])).double()
-        model.load_state_dict({**w, "p": model.p})
+        model.load_state_dict({**w, "p": model.p, "q": model.q})
         return model
 
     @torch.no_grad()
@@ -191,6 +216,7 @@ class NeuralODE(PredictorBase):
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
         self.physics.inputs = self.inputs
         self.physics._restore({k[8:]: v for k, v in arrays.items() if k.startswith("physics.")}, meta["physics"])
+        self.effects = tuple(EffectSpec(e["name"], e["params"]) for e in meta["physics"].get("effects", []))
         self._weights = {k: v for k, v in arrays.items() if not k.startswith("physics.")}
         self.improved = bool(meta["improved"])
 

@@ -9,7 +9,7 @@ import pytest
 
 from shipbench.effects.base import EFFECTS, Effect
 from shipbench.errors import InputError
-from shipbench.physics import eq2, mmg
+from shipbench.physics import eq2, mmg, wind
 from shipbench.physics.actuators import gear_path
 from shipbench.physics.modifiers import Flow, Modifiers
 from shipbench.ship import complete
@@ -321,3 +321,60 @@ def test_values_not_given_are_zero_and_shapes_typical():
 
 def test_the_states_stand_in_the_order_that_the_mirror_assumes():
     assert [s for s, f in zip(STATES, FLIPPED_STATES, strict=True) if f < 0] == ["y", "psi", "v", "r", "delta", "F_b", "F_s"]
+
+
+# --- delays, and wind as a fit sees it
+
+
+def test_the_slope_of_a_delayed_record_does_not_jump_at_whole_samples():
+    S, effect = record(), get("position_delay")
+    left, at, right = (effect.measure(S, (1.0 + d,), 1.0)[:, 5:-5, :2] for d in (-1e-4, 0.0, 1e-4))
+    np.testing.assert_allclose((at - left) / 1e-4, (right - at) / 1e-4, atol=1e-2)
+    np.testing.assert_allclose(at, S[:, 4:-6, :2], atol=1e-12)
+
+
+def test_a_delay_goes_on_as_the_run_began_and_ended():
+    S = np.zeros((1, 8, 10))
+    S[0, :, 0] = 3.0 * np.arange(8)
+    for delay in (1.7, -2.4):
+        np.testing.assert_allclose(get("position_delay").measure(S, (delay,), 1.0)[0, :, 0], 3.0 * (np.arange(8) - delay), atol=1e-12)
+
+
+def test_velocities_late_in_the_earths_axes_turn_with_the_ship():
+    """A ship that drifts in a straight line while it turns: its earth-fixed velocity is constant, so that no delay of it shows."""
+    S, effect = np.zeros((1, 30, 10)), get("velocity_delay")
+    S[0, :, 2] = 0.05 * np.arange(30)
+    S[0, :, 3], S[0, :, 4] = 4.0 * np.cos(S[0, :, 2]), -4.0 * np.sin(S[0, :, 2])
+    np.testing.assert_allclose(effect.measure(S, (2.3, 1.0), 1.0), S, atol=1e-12)
+    assert np.max(np.abs(effect.measure(S, (2.3, 0.0), 1.0) - S)) > 0.3
+
+
+@pytest.mark.parametrize("name", ["wind", "wind_per_run"])
+def test_stretched_wind_says_the_wind_that_it_pushes_with(name: str):
+    plain = get(name)
+    for fitted in plain.fitted(130.0):
+        for q in ((7.0, 0.0), (-2.0, 3.0), (0.1, 0.0)):
+            said = fitted.public(q)
+            stretched, wind = Modifiers(), Modifiers()
+            fitted.force(stretched, flow(), q, PARTICULARS)
+            plain.force(wind, flow(), plain.internal(said), PARTICULARS)
+            np.testing.assert_allclose((stretched.air_u, stretched.air_v), (wind.air_u, wind.air_v), rtol=1e-9, atol=1e-9)
+        assert fitted.public((7.0, 0.0))["speed"] == pytest.approx(7.0, rel=1e-6)  # the typical wind is itself
+        assert (fitted.name, fitted.enters, fitted.per_run) == (plain.name, plain.enters, plain.per_run)
+
+
+def test_wind_coefficients_scale_the_wind_alone():
+    effect = get("wind_coefficients")
+    still, moved = Modifiers(), Modifiers()
+    effect.force(moved, flow(), (0.5, -0.2, -1.0, 10.0), PARTICULARS)
+    s, air = flow(), (flow().u + 8.0, flow().v - 5.0)
+    one = eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, air, C, list(P), still)
+    other = eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, air, C, list(P), moved)
+    calm = eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, None, C, list(P), moved)
+    np.testing.assert_allclose(calm, eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, None, C, list(P), still))
+    X, Y, N = wind.harmonic(*air, C.A_F, C.A_L, C.L)
+    np.testing.assert_allclose((other[0] - one[0]) * (C.m + C.m_x), 0.5 * X, rtol=1e-9)
+    dY = C.m11 * (other[1] - one[1]) + C.m12_Y * (other[2] - one[2])
+    dN = C.m12_N * (other[1] - one[1]) + C.m22 * (other[2] - one[2])
+    np.testing.assert_allclose(dY, -0.2 * Y, rtol=1e-6, atol=1e-3)
+    np.testing.assert_allclose(dN, -N + 10.0 * Y, rtol=1e-6, atol=1e-1)

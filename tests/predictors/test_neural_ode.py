@@ -13,6 +13,7 @@ from shipbench.predictors._stacked import Scaler, generators
 from shipbench.predictors.neural_ode import NeuralODE
 from shipbench.predictors.physics import Physics
 from shipbench.signals import MOTION, VELOCITY
+from shipbench.specs import EffectSpec
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +118,34 @@ def test_a_wrong_wind_force_is_learned_and_the_solvers_agree_on_it(windy, tmp_pa
     assert np.abs(found - model.predict(batch.s0, batch.U)[..., VELOCITY]).max(axis=(0, 1)) == pytest.approx(np.zeros(3), abs=5e-3)
     model.save(tmp_path / "m")
     np.testing.assert_array_equal(NeuralODE.load(tmp_path / "m").predict(batch.s0, batch.U), model.predict(batch.s0, batch.U))
+
+
+def test_effects_of_the_physics_act_in_training_and_in_rollouts(parts, tmp_path):
+    train, valid, test = parts
+    effects = [EffectSpec("current", {}), EffectSpec("race_gain", {}), EffectSpec("rudder_lag", {})]
+    group = [NeuralODE(epochs=2, hidden=8).extend(effects) for _ in range(2)]
+    NeuralODE.fit_group(group, [train, train.subset(range(9))], [valid, None], [0, 1])
+    batch = test.batch()
+    for m, model in enumerate(group):
+        physics = Physics().extend(effects).fit(train if m == 0 else train.subset(range(9)), valid if m == 0 else None, seed=m)
+        drive, grid = Drive.of([model.physics], [test], Grid.of(model.physics)), Grid.of(model.physics)
+        model.improved = True  # also where validation kept the physics: the network is in the way, and adds nothing
+        with torch.no_grad():
+            found = solve(model._residual().float(), drive.S[None, :, 0], drive.path[None], None, grid.step)[0].numpy()
+        assert np.abs(found - model.predict(batch.s0, batch.U)[..., VELOCITY]).max(axis=(0, 1)) == pytest.approx(np.zeros(3), abs=5e-3)
+        model._weights = {k: np.zeros_like(v) if "layers.2" in k else v for k, v in model._weights.items()}
+        if m == 0:  # the other physics lost its validation runs to the split
+            np.testing.assert_allclose(model.predict(batch.s0, batch.U), physics.predict(batch.s0, batch.U), rtol=1e-5, atol=1e-4)
+        model.save(tmp_path / f"m{m}")
+        again = NeuralODE.load(tmp_path / f"m{m}")
+        assert again.effects == tuple(effects)
+        np.testing.assert_array_equal(again.predict(batch.s0, batch.U), model.predict(batch.s0, batch.U))
+
+
+@pytest.mark.parametrize("name", ["heading_bias", "bank_suction", "no_such"])
+def test_effects_that_it_cannot_train_with_are_refused(name):
+    with pytest.raises(InputError, match=name):
+        NeuralODE().extend([EffectSpec(name, {})])
 
 
 def test_members_of_a_group_come_out_as_they_would_alone(parts, model):

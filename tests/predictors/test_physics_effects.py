@@ -197,7 +197,7 @@ def test_the_start_behind_a_sensor_is_the_one_that_it_shows(name):
 
 
 @pytest.mark.parametrize(("spec", "message"), [
-    ("hold+current", "effects extend 'physics' only"),
+    ("hold+current", "effects extend 'physics' and 'neural_ode'"),
     ("physics+currant", "unknown effect 'currant'.*Did you mean 'current'"),
     ("physics+current+current", "named 2 times"),
     ("physics+current[sped=0.3]", "unknown parameter of effect 'current' 'sped'.*speed"),
