@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipbench.bench.leaderboard import PAPER, build_board, write_boards
+from shipbench.bench.board_tables import PAPER
+from shipbench.bench.leaderboard import build_board, write_boards
 from shipbench.bench.results import PROTOCOL, Results
 from shipbench.bench.tables import Table, TableColumn, number, significant
 from shipbench.errors import InputError

@@ -53,7 +53,7 @@ def test_shipped_configs_are_found_by_name_and_valid(name):
         ('models = ["hold"]\nhorizn_s = 60', r"unknown key 'horizn_s'. Did you mean 'horizon_s'\?"),
         ('models = ["hold"]\nhorizon_s = -1', r"horizon_s: .*greater than 0.*\(value: -1\)"),
         ('models = ["hold"]\nfolds = 1', r"folds: .*\(value: 1\)"),
-        ('models = ["hold"]\nsplit = "random"', r"split: .*'folds' or 'published'"),
+        ('models = ["hold"]\nsplit = "random"', r"split: .*'folds', 'published', 'kind' or 'speed'"),
         ('models = ["hold"]\nmetrics = ["ed", "edx"]', r"unknown metric 'edx'. Did you mean 'ed"),
         ('models = ["hold"]\nmetrics = ["edh"]', r"'ed' must be among the metrics"),
         ('dataset = "a"\ndatasets = ["b"]\nmodels = ["hold"]', r"both 'dataset' and 'datasets'"),
