@@ -9,7 +9,7 @@ import numpy as np
 from ..metrics.trial_indices import COLUMNS as TRIAL_COLUMNS
 from ..metrics.trial_indices import NAMES as TRIAL_NAMES
 from .board_scores import CEILING, Scores
-from .board_tables import SIGMA, group_lines
+from .board_tables import FEW_RUNS, SIGMA, group_lines
 from .regimes import slices
 from .results import Frame
 from .statistics import RESAMPLES
@@ -82,7 +82,7 @@ def pair_table(scores: Scores) -> Table:
         f"Mean ED of the first less that of the second on the same windows, seeds averaged; bootstrap-t over {runs} runs ({RESAMPLES} resamples, "
         "windows of one run drawn together), p after Holm over all pairs.",
     ]
-    if runs < 10:
+    if runs < FEW_RUNS:
         notes.append(f"Only {runs} runs: with so few, intervals and p are rough.")
     left_out = [m for m in scores.ranked if m not in matched.complete]
     if left_out:
@@ -108,11 +108,13 @@ def slice_table(scores: Scores) -> Table | None:
     lines = group_lines(scores, "ed", {name: s.members[place] for name, s in names.items()})
     by_slice: list[dict[str, Any]] = []
     for name, s in names.items():
-        line: dict[str, Any] = {"slice": s.label, "windows": int(s.members.sum())}
+        runs = scores.rows["cluster"][s.members[place]].nunique()
+        line: dict[str, Any] = {"slice": s.label, "windows": f"{s.members.sum()}" if runs == s.members.sum() else f"{s.members.sum()} ({runs})"}
         for i, model in enumerate(lines):
             line |= {f"m{i}{end}": model.get(f"{name}{end}", float("nan")) for end in ("", "_low", "_high")}
         by_slice.append(line)
-    columns = [TableColumn("windows in which the true ship", "slice"), TableColumn("number", "windows", str)]
+    few = any("(" in line["windows"] for line in by_slice)
+    columns = [TableColumn("windows in which the true ship", "slice"), TableColumn("number (runs)" if few else "number", "windows", str)]
     columns += [TableColumn(model, f"m{i}", significant(3), interval=True) for i, model in enumerate(scores.models)]
     notes = [
         "ED [m], mean over the windows. Speed, drift angle (weighted with speed) and |rudder| are means over the window, cut into thirds of them; "

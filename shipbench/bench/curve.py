@@ -64,17 +64,22 @@ def _board(found: dict[int, Scores], last: Board) -> Board:
     for model in last.ranking:
         line: dict[str, Any] = {"model": model}
         for n, scores in found.items():
-            figures = scores.figures("ed")[model]
-            line |= {f"n{n}{end}": figures[f"ed_mean{end}"] for end in ("", "_low", "_high")}
-            scored, expected = scores.shares[model]
-            line[f"n{n}"] = line[f"n{n}"] if scored == expected else float("nan")
+            figures = _figures(scores, model)
+            line |= {f"n{n}{end}": figures[end] for end in figures}
         lines.append(line)
     columns = [TableColumn("model", "model"), *[TableColumn(f"{n} runs", f"n{n}", number(2), interval=True) for n in found]]
     incomplete = {m: [n for n, s in found.items() if s.shares[m][0] < s.shares[m][1]] for m in last.ranking}
     notes = ["ED [m], mean over runs and folds; small: 95 % interval, bootstrap over the scored runs, which are the same in every column."]
     notes.append("Training runs include those set aside for early stopping; the runs of a smaller number are among those of a larger one.")
     notes += [f"`{m}` has runs without a score with {', '.join(map(str, n))} training runs: no figure there." for m, n in incomplete.items() if n]
-    return Board(last.dataset, last.ranking, [Table("Error against number of training runs", columns, lines, notes)], last.head)
+    return Board(last.dataset, last.ranking, [Table("Error against number of training runs", columns, lines, notes)], last.head, "Learning curve")
+
+
+def _figures(scores: Scores, model: str) -> dict[str, float]:
+    """ED [m] and the ends of its interval; not-a-number where a run has no score, which would flatter the model."""
+    scored, expected = scores.shares[model]
+    figures = scores.figures("ed")[model] if scored == expected else {}
+    return {end: figures.get(f"ed_mean{end}", float("nan")) for end in ("", "_low", "_high")}
 
 
 def draw(found: dict[int, Scores], dataset: str) -> Figure:
@@ -86,8 +91,8 @@ def draw(found: dict[int, Scores], dataset: str) -> Figure:
     axis, styles = figure.subplots(), style(models)
     numbers = list(found)
     for model in models:
-        figures = [scores.figures("ed")[model] for scores in found.values()]
-        middle, low, high = ([f[f"ed_mean{end}"] for f in figures] for end in ("", "_low", "_high"))
+        figures = [_figures(scores, model) for scores in found.values()]
+        middle, low, high = ([f[end] for f in figures] for end in ("", "_low", "_high"))
         if not any(m > 0 for m in middle):
             continue
         axis.plot(numbers, middle, marker="o", ms=5, lw=2, label=short_name(model), **styles[model])

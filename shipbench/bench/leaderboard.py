@@ -32,11 +32,12 @@ class Board:
     tables: list[Table]
     head: list[str]
     """Lines on where the figures come from."""
+    heading: str = "Leaderboard"
 
     @property
     def title(self) -> str:
         """Of the page."""
-        return f"Leaderboard: {self.dataset}"
+        return f"{self.heading}: {self.dataset}"
 
     def markdown(self, command: str, plots: Sequence[str] = ()) -> str:
         """The whole page; `command` is what rendered it, `plots` are image paths relative to it."""

@@ -109,7 +109,7 @@ def verify(results: Results) -> tuple[list[str], list[str]]:
     differences: list[str] = []
     notes: dict[str, None] = {}
     known: dict[tuple[str, str, int], np.ndarray] = {}
-    rows = results.rows.set_index([*_CELL, "run"])
+    rows = results.rows.set_index([*_CELL, "run"]).sort_index()
     for summary, source in zip(results.summaries, results.sources, strict=True):
         cell = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"])
         own = rows.loc[(cell.dataset, cell.model, cell.fold, cell.seed)]
