@@ -79,13 +79,13 @@ class Bootstrap:
         mean = differences.sum() / weights.sum()
         if mean == 0.0:
             return 1.0
-        scale = num / (num - 1.0)
-        error = np.sqrt(scale * np.sum((differences - mean * weights) ** 2)) / weights.sum()
-        sums = self.counts @ np.stack([differences, weights, differences**2, differences * weights, weights**2], axis=1)
+        scale, rest = num / (num - 1.0), differences - mean * weights
+        error = np.sqrt(scale * np.sum(rest**2)) / weights.sum()
+        sums = self.counts @ np.stack([rest, weights, rest**2, rest * weights, weights**2], axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
-            means = sums[:, 0] / sums[:, 1]
-            errors = np.sqrt(scale * np.maximum(sums[:, 2] - 2 * means * sums[:, 3] + means**2 * sums[:, 4], 0.0)) / sums[:, 1]
-            drawn = np.abs(means - mean) / errors
+            moved = sums[:, 0] / sums[:, 1]  # the resample's mean less the mean
+            errors = np.sqrt(scale * np.maximum(sums[:, 2] - 2 * moved * sums[:, 3] + moved**2 * sums[:, 4], 0.0)) / sums[:, 1]
+            drawn = np.abs(moved) / errors
             seen = abs(mean) / error
         return float((1 + np.sum(drawn >= seen)) / (len(self.counts) + 1))
 

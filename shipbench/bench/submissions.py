@@ -82,7 +82,7 @@ def _check_task(summary: dict[str, Any], cell: Cell, refuse: Any) -> None:
 def _check_cells(rows: Frame, summaries: list[dict[str, Any]], refuse: Any) -> None:
     cells = {(s["dataset"], s["model"], s["fold"], s["seed"]): s for s in summaries}
     groups = {key: part for key, part in rows.groupby(_CELL, sort=False)}
-    for key in groups.keys() - cells.keys():
+    for key in sorted(groups.keys() - cells.keys()):
         raise refuse(f"rows of {Cell(*key).label} have no entry in summary.json")
     for key, summary in cells.items():
         label = Cell(*key).label
@@ -108,7 +108,7 @@ def verify(results: Results) -> tuple[list[str], list[str]]:
     """
     differences: list[str] = []
     notes: dict[str, None] = {}
-    known: dict[tuple[str, str, int], np.ndarray] = {}
+    wrong: dict[tuple[Path, str, int], list[str]] = {}
     rows = results.rows.set_index([*_CELL, "run"]).sort_index()
     for summary, source in zip(results.summaries, results.sources, strict=True):
         cell = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"])
@@ -124,10 +124,12 @@ def verify(results: Results) -> tuple[list[str], list[str]]:
         if S.shape != batch.truth.shape:
             differences.append(f"{cell.label}: predictions of shape {S.shape} for a truth of shape {batch.truth.shape}.")
             continue
-        differences += _compare(summary, cell, own.loc[list(batch.ids)], batch, S)
-        if (str(source), cell.dataset, cell.fold) not in known:
-            known[str(source), cell.dataset, cell.fold] = batch.truth
-            differences += _compare_truth(summary, cell, batch, notes)
+        at = (source, cell.dataset, cell.fold)
+        if at not in wrong:
+            wrong[at] = _compare_truth(summary, cell, batch, notes)
+            differences += wrong[at]
+        if not wrong[at]:  # scores against another truth say nothing
+            differences += _compare(summary, cell, own.loc[list(batch.ids)], batch, S)
     return differences, list(notes)
 
 
