@@ -31,7 +31,7 @@ def test_there_are_results():
 
 
 def test_every_folder_of_results_is_a_submission():
-    assert STUDIES == sorted(p for p in (FOLDER / "results").iterdir())
+    assert sorted(p for p in (FOLDER / "results").iterdir()) == STUDIES
 
 
 @pytest.mark.parametrize("study", STUDIES, ids=lambda p: p.name)

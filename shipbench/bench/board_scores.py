@@ -20,18 +20,23 @@ FLOOR = "hold"
 
 def cluster_of(rows: Frame) -> Frame:
     """The unit of resampling of each row: the group of runs where rows tell it, else the run that the window was cut from."""
-    return rows["group"].fillna(rows["parent"]) if "group" in rows else rows["parent"]
+    if "group" not in rows:
+        return rows["parent"]
+    known = rows.groupby(["fold", "run"])["group"].transform("first")  # of the same window in rows that tell it
+    return known.fillna(rows["parent"])
 
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Rows of one data set; `columns` are the numeric columns by name; `windows` tells what the true ship does (or None); `baseline` of the skill."""
+    """Rows of one data set; `columns` are the numeric columns by name; `windows` tells what the true ship does (or None); `asked_baseline`:
+    the model that skill is counted from, where one was named; `beside_paper`: the source paper's figures are of such a task."""
 
     dataset: str
     rows: Frame
     columns: dict[str, dict[str, str]]
     windows: Frame | None = None
     asked_baseline: str | None = None
+    beside_paper: bool = False
 
     @cached_property
     def boot(self) -> Bootstrap:

@@ -41,7 +41,7 @@ def table_iii(scores: Scores) -> Table:
     notes = [
         f"{', '.join(columns[m]['label'] + ' in ' + columns[m]['unit'] for m in metrics)}: per run the mean over the predicted knots; "
         f"{MU} mean, m median, {SIGMA} standard deviation (n - 1), IQR interquartile range over the runs of a fold; "
-        "then the mean over folds (and seeds). Small: 95 % interval, bootstrap over runs."
+        "then the mean over folds (and seeds). Intervals: 95 %, bootstrap over runs."
     ]
     runs = scores.matched.clusters
     if runs < FEW_RUNS:
@@ -53,7 +53,7 @@ def table_iii(scores: Scores) -> Table:
         notes.append(f"In {undefined} rows the true ship does not move: cVDM has no scale there and leaves them out.")
     if CEILING in scores.models:
         notes.append("`oracle` is the simulator itself: the ceiling, not ranked.")
-    if scores.dataset == PAPER_DATASET:
+    if scores.beside_paper:
         lines += [
             {"model": name, "_reference": True} | {f"{m}_{s}": v for m in metrics for s, v in zip(STATISTICS, values[m], strict=True)}
             for name, values in PAPER.items()

@@ -69,7 +69,7 @@ def _board(found: dict[int, Scores], last: Board) -> Board:
         lines.append(line)
     columns = [TableColumn("model", "model"), *[TableColumn(f"{n} runs", f"n{n}", number(2), interval=True) for n in found]]
     incomplete = {m: [n for n, s in found.items() if s.shares[m][0] < s.shares[m][1]] for m in last.ranking}
-    notes = ["ED [m], mean over runs and folds; small: 95 % interval, bootstrap over the scored runs, which are the same in every column."]
+    notes = ["ED [m], mean over runs and folds; intervals: 95 %, bootstrap over the scored runs, which are the same in every column."]
     notes.append("Training runs include those set aside for early stopping; the runs of a smaller number are among those of a larger one.")
     notes += [f"`{m}` has runs without a score with {', '.join(map(str, n))} training runs: no figure there." for m, n in incomplete.items() if n]
     return Board(last.dataset, last.ranking, [Table("Error against number of training runs", columns, lines, notes)], last.head, "Learning curve")

@@ -70,12 +70,14 @@ def scores_of(results: Results, dataset: str, baseline: str | None = None) -> Sc
     windows = results.windows
     if windows is not None:
         windows = windows[(windows["dataset"] == dataset) & windows["fingerprint"].isin(rows["fingerprint"]) & windows["task"].isin(rows["task"])]
-    return Scores(dataset, rows.assign(cluster=cluster_of(rows)), columns, windows, baseline)
+    tasks = [s["task"] for s in results.summaries if s["dataset"] == dataset]
+    beside_paper = dataset == board_tables.PAPER_DATASET and all(t["split"] == "folds" and not t.get("train_runs") for t in tasks)
+    return Scores(dataset, rows.assign(cluster=cluster_of(rows)), columns, windows, baseline, beside_paper)
 
 
 def _board(scores: Scores, summaries: list[dict[str, Any]]) -> Board:
     tables: list[Table | None] = [board_tables.table_iii(scores)]
-    if scores.dataset == board_tables.PAPER_DATASET and {"physics", "mlp"} <= set(scores.models):
+    if scores.beside_paper and {"physics", "mlp"} <= set(scores.models):
         tables.append(board_tables.claim(scores))
     tables.append(board_statistics.comparison_table(scores))
     if len(scores.matched.complete) > 1 and len(scores.ranked) > 1:

@@ -123,7 +123,7 @@ def _table(sets: Sequence[Scores], models: list[str], errors: np.ndarray, baseli
         lines.append(line)
     columns = [TableColumn("model", "model"), TableColumn("mean rank", "rank", number(2), interval=True)]
     columns.append(TableColumn("win rate [%]", "wins", number(1), interval=True))
-    notes = ["Every data set counts the same. Small: 95 % interval, bootstrap over the runs of each data set; for these data sets, not for others."]
+    notes = ["Every data set counts the same. Intervals: 95 %, bootstrap over the runs of each data set; for these data sets, not for others."]
     if baseline:
         columns.append(TableColumn(f"skill against `{baseline}` [%]", "skill", number(1), interval=True))
         notes.append(f"Skill: 100 (1 - geometric mean of ED / ED of `{baseline}`).")

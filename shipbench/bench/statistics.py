@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -90,18 +91,24 @@ class Bootstrap:
         return float((1 + np.sum(drawn >= seen)) / (len(self.counts) + 1))
 
 
+@cache
+def _tail(clusters: int) -> float:
+    """Share of the resamples that is cut off at each end."""
+    from scipy import stats
+
+    return float(stats.norm.sf(np.sqrt(clusters / (clusters - 1.0)) * stats.t.ppf(0.5 + LEVEL / 2, clusters - 1)))
+
+
 def interval(replicates: np.ndarray, clusters: int) -> tuple[float, float]:
     """The 95 % interval of `replicates` (resamples,) that were drawn from `clusters` runs; not-a-number for fewer than two runs.
 
     Percentiles, widened for few runs: the level is that of sqrt(n / (n - 1)) t(n - 1) instead of the normal quantile.
     Source: Hesterberg (2015), What teachers should know about the bootstrap, section 5.2 (expanded percentile interval).
     """
-    from scipy import stats
-
     known = replicates[np.isfinite(replicates)]
     if clusters < 2 or not len(known):
         return float("nan"), float("nan")
-    tail = stats.norm.sf(np.sqrt(clusters / (clusters - 1.0)) * stats.t.ppf(0.5 + LEVEL / 2, clusters - 1))
+    tail = _tail(clusters)
     low, high = np.quantile(known, [tail, 1.0 - tail])
     return float(low), float(high)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 import zlib
 from pathlib import Path
@@ -35,6 +36,7 @@ def check_submission(folder: Path, rows: Frame, summaries: list[dict[str, Any]])
     def refuse(what: str, help_: str = "Give the folder as `shipbench run` wrote it.") -> InputError:
         return InputError(f"{folder}: {what}. {help_}")
 
+    keys: dict[str, str] = {}  # of tasks that were looked at already: cells share them
     for summary in summaries:
         missing = [key for key in _SUMMARY if key not in summary]
         if missing:
@@ -45,7 +47,7 @@ def check_submission(folder: Path, rows: Frame, summaries: list[dict[str, Any]])
                 f"{cell.label} is of protocol {summary['protocol']}, this version ranks protocol {PROTOCOL}",
                 "Run the models again with this version.",
             )
-        _check_task(summary, cell, refuse)
+        _check_task(summary, cell, keys, refuse)
     if rows.empty and not summaries:
         return
     wanted = [*IDENTITY, *(c["name"] for s in summaries for c in s["columns"]), *_TIMES]
@@ -70,9 +72,10 @@ def check_submission(folder: Path, rows: Frame, summaries: list[dict[str, Any]])
         raise refuse(f"{where}: status '{first['status']}' with ED = {first['ed']}; a score of at least 0 goes with 'ok', none with all others")
 
 
-def _check_task(summary: dict[str, Any], cell: Cell, refuse: Any) -> None:
+def _check_task(summary: dict[str, Any], cell: Cell, keys: dict[str, str], refuse: Any) -> None:
+    text = json.dumps([summary["task"], summary["fingerprint"]], sort_keys=True)
     try:
-        key = make_task(summary["task"]).key(summary["fingerprint"])
+        key = keys[text] if text in keys else keys.setdefault(text, make_task(summary["task"]).key(summary["fingerprint"]))
     except InputError as error:
         raise refuse(f"{cell.label}: this version does not know the task ({error})", "Update shipbench, or run the models again.") from None
     if key != summary["task_key"]:

@@ -211,6 +211,25 @@ def test_seeds_are_averaged_inside_a_run_and_their_spread_has_a_column():
     assert again["p"] == pytest.approx(pair["p"])
 
 
+def test_pieces_of_one_log_are_drawn_together():
+    found = results({"a": many(1), "b": many(2)})
+    number = found.rows["run"].map({run: i for i, run in enumerate(found.rows["run"].unique())})
+    grouped = with_columns(found, {"group": (number // 5).map("log{}".format)})
+    assert "over 30 runs" in by_title(build_board(found, "toy"), "Paired").notes[0]
+    assert "over 6 runs" in by_title(build_board(grouped, "toy"), "Paired").notes[0]
+    older = with_columns(grouped, {"group": grouped.rows["group"].where(grouped.rows["model"] == "a")})  # rows of b from before the column
+    assert "over 6 runs" in by_title(build_board(older, "toy"), "Paired").notes[0]
+
+
+def test_the_papers_figures_stand_beside_its_own_task_only():
+    found = results({"physics": [[6, 12]], "mlp": [[20, 30]]}, "harbour90")
+    for summary in found.summaries:
+        summary["task"] = summary["task"] | {"split": "speed"}
+    board = build_board(found, "harbour90")
+    assert "paper: physics" not in first_table(board)
+    assert "trained on the slower runs, scored on the fastest" in board.head[0]
+
+
 def windows_of(found, **values):
     frame = found.rows.drop_duplicates(["fold", "run"])[["dataset", "fingerprint", "task", "fold", "run"]].reset_index(drop=True)
     blank = dict.fromkeys(REGIMES, 0.0) | dict.fromkeys(TRIAL_NAMES, np.nan)
@@ -219,7 +238,7 @@ def windows_of(found, **values):
 
 def test_slices_are_means_over_the_windows_of_each_regime():
     found = results({"m": [[1, 2, 3], [4, 5, 6]]})
-    object.__setattr__(found, "windows", windows_of(found, speed=[1.0, 2, 3, 4, 5, 6], astern=[0, 0, 0, 0, 0.1, 0.5]))
+    found.__dict__["windows"] = windows_of(found, speed=[1.0, 2, 3, 4, 5, 6], astern=[0, 0, 0, 0, 0.1, 0.5])  # a cached property
     table = by_title(build_board(found, "toy"), "Regime")
     rows = {row["slice"]: (row["windows"], row["m0"]) for row in table.rows}
     assert rows == {
@@ -234,7 +253,7 @@ def test_without_windows_there_are_no_slices():
 
 def test_indices_of_manoeuvres_stand_beside_the_true_ones():
     found = results({"m": [[1, 2], [3, 4]]})
-    object.__setattr__(found, "windows", windows_of(found, advance=[3.0, 5.0, np.nan, np.nan], overshoot_1=[np.nan, np.nan, 0.1, np.nan]))
+    found.__dict__["windows"] = windows_of(found, advance=[3.0, 5.0, np.nan, np.nan], overshoot_1=[np.nan, np.nan, 0.1, np.nan])  # a cached property
     errors = {"advance_error": [-0.5, np.nan, np.nan, np.nan], "overshoot_1_error": [np.nan, np.nan, np.deg2rad(2.0), np.nan]}
     table = by_title(build_board(with_columns(found, errors), "toy"), "Indices")
     rows = {row["index"]: row for row in table.rows}
@@ -245,7 +264,7 @@ def test_indices_of_manoeuvres_stand_beside_the_true_ones():
 
 def with_columns(found, columns):
     made = Results(found.rows.assign(**columns), found.summaries, found.sources)
-    object.__setattr__(made, "windows", found.windows)
+    made.__dict__["windows"] = found.windows  # a cached property
     return made
 
 

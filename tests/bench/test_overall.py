@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from test_leaderboard import many, results
 
 from shipbench.bench.leaderboard import scores_of, write_boards
 from shipbench.bench.overall import NAME, data_sets_needed, over_data_sets
 from shipbench.bench.results import Results
-from test_leaderboard import many, results
 
 
 def merged(sets):

@@ -64,6 +64,12 @@ def edit_rows(folder: Path, change) -> None:
     change(pd.read_parquet(folder / "rows.parquet")).to_parquet(folder / "rows.parquet", index=False)
 
 
+def test_rows_tell_which_runs_belong_together(two):
+    rows = read_results([two / "anna"]).rows
+    assert (rows["group"] == rows["parent"]).all()  # windows of one run; this data set names no groups
+    assert rows["group"].nunique() == 8
+
+
 def test_folders_of_several_people_become_one_table(cli, two):
     result = cli("leaderboard", two / "anna", two / "ben", "--no-plots", "--json")
     assert result.exit_code == 0, result.output
