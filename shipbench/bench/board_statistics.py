@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..metrics.base import Column
 from ..metrics.trial_indices import COLUMNS as TRIAL_COLUMNS
 from ..metrics.trial_indices import NAMES as TRIAL_NAMES
 from .board_scores import CEILING, Scores
@@ -114,7 +115,7 @@ def slice_table(scores: Scores) -> Table | None:
             line |= {f"m{i}{end}": model.get(f"{name}{end}", float("nan")) for end in ("", "_low", "_high")}
         by_slice.append(line)
     few = any("(" in line["windows"] for line in by_slice)
-    columns = [TableColumn("windows in which the true ship", "slice"), TableColumn("number (runs)" if few else "number", "windows", str)]
+    columns = [TableColumn("windows in which the true ship", "slice"), TableColumn("number (runs)" if few else "number", "windows")]
     columns += [TableColumn(model, f"m{i}", significant(3), interval=True) for i, model in enumerate(scores.models)]
     notes = [
         "ED [m], mean over the windows. Speed, drift angle (weighted with speed) and |rudder| are means over the window, cut into thirds of them; "
@@ -129,30 +130,30 @@ def trial_table(scores: Scores) -> Table | None:
     columns = {name: column for name, column in zip(TRIAL_NAMES, TRIAL_COLUMNS, strict=True) if column.name in scores.rows}
     if windows is None or not columns:
         return None
-    lines = [line for name, column in columns.items() if (line := _trial_line(scores, windows, name, column.name, column.label, column.unit))]
+    lines = [line for name, column in columns.items() for line in _trial_lines(scores, windows, name, column)]
     if not lines:
         return None
-    shown = [TableColumn("index", "index"), TableColumn("windows", "windows", str), TableColumn("true mean", "true", significant(3))]
-    shown += [TableColumn(model, f"m{i}") for i, model in enumerate(scores.models)]
+    shown = [TableColumn("index", "index"), TableColumn("model", "model"), TableColumn("windows", "windows", str)]
+    shown += [TableColumn("reached", "reached", str), TableColumn("true mean", "true", significant(3))]
+    shown += [TableColumn("mean absolute error", "error", significant(3)), TableColumn("mean error", "bias", significant(3))]
     notes = [
-        "Mean |predicted - true| over windows that are a turn or a zig-zag (the rudder leaves a straight course for one angle and stays, or goes to "
+        "Predicted less true, over windows that are a turn or a zig-zag (the rudder leaves a straight course for one angle and stays, or goes to "
         "and fro), under the recorded orders: a model's overshoot is counted from its own heading when the true rudder was reversed.",
-        "In brackets: windows in which the model gets there (turns 90 or 180 degrees, comes back from the overshoot), where not in all.",
+        "Reached: windows in which the model gets there too (turns 90 or 180 degrees, comes back from the overshoot); the errors are of those.",
     ]
     return Table("Indices of standard manoeuvres (IMO, ITTC)", shown, lines, notes)
 
 
-def _trial_line(scores: Scores, windows: Frame, name: str, column: str, label: str, unit: str) -> dict[str, Any] | None:
+def _trial_lines(scores: Scores, windows: Frame, name: str, column: Column) -> list[dict[str, Any]]:
+    """One line for each model, none where no window has the index."""
     there = windows[windows[name].notna()]
-    if there.empty:
-        return None
-    shown, factor = display_unit(unit)
+    shown, factor = display_unit(column.unit)
     keys = set(zip(there["fold"], there["run"], strict=True))
-    line: dict[str, Any] = {"index": f"{label} [{shown}]", "windows": len(there), "true": factor * float(there[name].mean())}
-    for i, model in enumerate(scores.models):
+    lines = []
+    for model in scores.models if len(there) else []:
         part = scores.rows[scores.rows["model"] == model]
         mine = part[[key in keys for key in zip(part["fold"], part["run"], strict=True)]]
-        errors = mine[column].abs().dropna()
-        reached = "" if len(errors) == len(mine) else f" ({len(errors)}/{len(mine)})"
-        line[f"m{i}"] = f"{significant(3)(factor * float(errors.mean()) if len(errors) else None)}{reached}"
-    return line
+        errors = factor * mine[column.name].dropna()
+        line: dict[str, Any] = {"index": f"{column.label} [{shown}]", "model": model, "windows": len(mine), "reached": len(errors)}
+        lines.append(line | {"true": factor * float(there[name].mean()), "error": float(errors.abs().mean()), "bias": float(errors.mean())})
+    return lines

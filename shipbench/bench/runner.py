@@ -19,7 +19,7 @@ from ..predictors.base import fit_models, make_predictor
 from ..records import Batch, Dataset
 from ..specs import Spec, parse_spec
 from .cost import count_parameters
-from .folds import Fold, group_of, make_folds, select_runs
+from .folds import Fold, make_folds, select_runs
 from .progress import Progress, Silent
 from .provenance import code_version, machine
 from .results import PROTOCOL, Cell, Frame, Results, assemble, read_summary, write_cell, write_json, write_truth
@@ -256,7 +256,7 @@ def _rows(study: _Study, cell: Cell, statuses: list[str], reasons: list[str], va
     per_run = {
         "run": [r.id for r in runs],
         "parent": [str(r.meta.get("parent", r.id)) for r in runs],
-        "group": [group_of(r) for r in runs],
+        "group": [str(r.meta.get("group", r.meta.get("parent", r.id))) for r in runs],  # windows of one run belong together
         "kind": [str(r.meta.get("manoeuvre", "")) for r in runs],
         "status": statuses,
         "reason": reasons,

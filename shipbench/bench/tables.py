@@ -92,7 +92,7 @@ class Table:
     def markdown(self) -> str:
         """Heading, table and notes."""
         lines = [f"## {self.title}", ""]
-        lines.append("| " + " | ".join(c.header for c in self.columns) + " |")
+        lines.append("| " + " | ".join(c.header.replace("|", "\\|") for c in self.columns) + " |")
         lines.append("|" + "|".join("---:" if c.format else ":---" for c in self.columns) + "|")
         for row in self.rows:
             cells = [" ".join(c.text(row).split()).replace("|", "\\|") for c in self.columns]

@@ -258,8 +258,8 @@ def test_indices_of_manoeuvres_stand_beside_the_true_ones():
     table = by_title(build_board(with_columns(found, errors), "toy"), "Indices")
     rows = {row["index"]: row for row in table.rows}
     assert list(rows) == ["advance [L]", "first overshoot [deg]"]
-    assert (rows["advance [L]"]["true"], rows["advance [L]"]["windows"], rows["advance [L]"]["m0"]) == (4.0, 2, "0.500 (1/2)")
-    assert rows["first overshoot [deg]"]["m0"] == "2.00"
+    assert rows["advance [L]"] == {"index": "advance [L]", "model": "m", "windows": 2, "reached": 1, "true": 4.0, "error": 0.5, "bias": -0.5}
+    assert rows["first overshoot [deg]"]["error"] == pytest.approx(2.0)
 
 
 def with_columns(found, columns):
@@ -313,7 +313,8 @@ def test_a_page_is_written_per_data_set_with_what_made_it(tmp_path):
 
 
 def test_a_table_escapes_what_would_break_markdown_and_gives_null_for_nan():
-    table = Table("T", [TableColumn("m", "m"), TableColumn("v", "v", number(1))], [{"m": "a|b", "v": float("nan")}])
+    table = Table("T", [TableColumn("m|n", "m"), TableColumn("v", "v", number(1))], [{"m": "a|b", "v": float("nan")}])
+    assert "| m\\|n | v |" in table.markdown()
     assert "| a\\|b | - |" in table.markdown()
     assert table.as_json()["rows"] == [{"m": "a|b", "v": None}]
 
