@@ -87,41 +87,63 @@ class Scores:
             raise InputError(f"--baseline: data set '{self.dataset}' has no rows of it: {text}")
         return self.asked_baseline
 
+    @cached_property
+    def _cells(self) -> dict[str, tuple[Frame, np.ndarray, np.ndarray]]:
+        """Of each model its scored rows, their runs as places in `boot`, and the number of their cell (fold and seed)."""
+        found = {}
+        for model in self.shares:
+            part = self.scored[self.scored["model"] == model]
+            codes = self.boot.codes(part["cluster"].tolist())
+            found[model] = part, codes, part.groupby(["fold", "seed"]).ngroup().to_numpy()
+        return found
+
+    def _values(self, column: str, model: str) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+        """Values of a model that are numbers (n,), their runs (n,), and the places of each cell among them."""
+        part, codes, cells = self._cells[model]
+        values = part[column].to_numpy(float)
+        known = np.isfinite(values)
+        values, codes, cells = values[known], codes[known], cells[known]
+        return values, codes, [np.flatnonzero(cells == cell) for cell in np.unique(cells)]
+
     def means(self, column: str) -> dict[str, dict[str, float]]:
         """By model the statistics over the runs of a fold, then their mean over folds and seeds (sigma: n - 1; IQR: linear quantiles)."""
-        if self.scored.empty:
-            return {m: {} for m in self.shares}
-        grouped = self.scored.groupby(["model", "fold", "seed"])[column]
-        quartiles = grouped.quantile([0.25, 0.75]).unstack()
-        statistics = grouped.agg(["mean", "median", "std"])
-        statistics["iqr"] = quartiles[0.75] - quartiles[0.25]
-        found = statistics.groupby("model").mean()
-        return {m: dict(found.loc[m]) if m in found.index else {} for m in self.shares}
+        return {model: self._means(*self._values(column, model)) for model in self.shares}
+
+    @staticmethod
+    def _means(values: np.ndarray, codes: np.ndarray, places: list[np.ndarray]) -> dict[str, float]:
+        if not places:
+            return {}
+        groups = [values[at] for at in places]
+        quartiles = np.array([np.quantile(g, [0.25, 0.5, 0.75]) for g in groups])
+        spreads = [np.std(g, ddof=1) for g in groups if len(g) > 1]  # one run alone has none
+        return {
+            "mean": float(np.mean([g.mean() for g in groups])), "median": float(np.mean(quartiles[:, 1])),
+            "std": float(np.mean(spreads)) if spreads else float("nan"), "iqr": float(np.mean(quartiles[:, 2] - quartiles[:, 0])),
+        }  # fmt: skip
 
     def figures(self, column: str, statistics: tuple[str, ...] = ("mean",), factor: float = 1.0) -> dict[str, dict[str, float]]:
         """By model `column_statistic`, `.._low` and `.._high` with the 95 % interval over runs, for tables."""
-        means = self.means(column)
         found: dict[str, dict[str, float]] = {}
         for model in self.shares:
-            part = self.scored[(self.scored["model"] == model) & self.scored[column].notna()]
-            drawn = self._replicates(part, column, statistics) if len(part) else np.full((1, len(statistics)), np.nan)
-            runs = part["cluster"].nunique()
+            values, codes, places = self._values(column, model)
+            means = self._means(values, codes, places)
+            drawn = self._replicates(values, codes, places, statistics) if places else np.full((1, len(statistics)), np.nan)
+            runs = len(np.unique(codes))
             line: dict[str, float] = {}
             for i, name in enumerate(statistics):
                 low, high = interval(drawn[:, i], runs)
                 key = f"{column}_{name}"
-                line |= {key: factor * means[model].get(name, float("nan")), f"{key}_low": factor * low, f"{key}_high": factor * high}
+                line |= {key: factor * means.get(name, float("nan")), f"{key}_low": factor * low, f"{key}_high": factor * high}
             found[model] = line
         return found
 
-    def _replicates(self, part: Frame, column: str, statistics: tuple[str, ...]) -> np.ndarray:
-        """(resamples, statistics) of one model's rows, with the weights of the means over folds and seeds."""
-        cells = part.groupby(["fold", "seed"])[column]
-        values, codes = part[column].to_numpy(float), self.boot.codes(part["cluster"].tolist())
-        weights = 1.0 / cells.transform("size").to_numpy(float)
+    def _replicates(self, values: np.ndarray, codes: np.ndarray, places: list[np.ndarray], statistics: tuple[str, ...]) -> np.ndarray:
+        """(resamples, statistics) of one model's values, with the weights of the means over folds and seeds."""
+        weights = np.empty(len(values))
+        for at in places:
+            weights[at] = 1.0 / len(at)
         drawn = [self.boot.means(codes, values[:, None], weights[:, None])[:, 0]]
         if len(statistics) > 1:
-            places = cells.indices.values()
             spreads = np.stack([self.boot.spread(codes[at], values[at]) for at in places])
             known = np.isfinite(spreads)
             with np.errstate(invalid="ignore"):

@@ -96,7 +96,7 @@ class Table:
         lines.append("|" + "|".join("---:" if c.format else ":---" for c in self.columns) + "|")
         for row in self.rows:
             cells = [" ".join(c.text(row).split()).replace("|", "\\|") for c in self.columns]
-            intervals = [c.interval_text(row) for c in self.columns]
+            intervals = [c.interval_text(row).replace(" to ", " to\u00a0") for c in self.columns]  # wraps once at most
             cells = [f"{cell}<br><sub>{between}</sub>" if between else cell for cell, between in zip(cells, intervals, strict=True)]
             if row.get("_reference"):
                 cells = [f"*{cell}*" if cell else "" for cell in cells]

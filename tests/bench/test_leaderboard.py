@@ -141,7 +141,7 @@ def test_every_figure_of_table_iii_has_an_interval_around_it():
             low, high = row[f"{metric}_{statistic}_low"], row[f"{metric}_{statistic}_high"]
             assert low < row[f"{metric}_{statistic}"] < high
     text = build_board(results({"m": many(0)}), "toy").tables[0].markdown()
-    assert f"{row['ed_mean']:.2f}<br><sub>{row['ed_mean_low']:.2f} to {row['ed_mean_high']:.2f}</sub>" in text
+    assert f"{row['ed_mean']:.2f}<br><sub>{row['ed_mean_low']:.2f} to\u00a0{row['ed_mean_high']:.2f}</sub>" in text
 
 
 def test_the_interval_of_the_mean_is_that_of_the_mean_over_folds():
