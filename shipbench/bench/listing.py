@@ -11,7 +11,7 @@ from typing import Any
 from ..records import Dataset
 from ..registry import Registry
 from ..ship import complete
-from .leaderboard import PAPER_DATASET
+from .board_tables import PAPER_DATASET
 from .tables import Table, TableColumn, number, significant
 
 

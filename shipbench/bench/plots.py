@@ -58,7 +58,7 @@ def short_name(model: str) -> str:
     return name if len(name) <= 28 else f"{name[:25]}..."
 
 
-def _style(models: Sequence[str]) -> dict[str, dict[str, Any]]:
+def style(models: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Colour and dashes of each model: the same for a known name in every plot."""
     bases: dict[str, str] = {}  # of variants such as mlp and mlp[hidden=64] the first has the name's colour
     for model in sorted(models, key=len):
@@ -126,7 +126,7 @@ def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[
     chosen = choose_runs(rows, models)
     figure = new_figure(15.0, 6.2)
     axes = figure.subplots(1, 3)
-    styles = _style(models)
+    styles = style(models)
     for model in reversed(models):  # the best on top
         for cell in _predictions(results, dataset, model):
             for axis, run in zip(axes, chosen.values(), strict=True):
@@ -181,7 +181,7 @@ def boxes(rows: Frame, models: Sequence[str], summary: dict[str, Any]) -> Figure
     """Box plots of the per-run ED, EDH and cVDM (the paper's fig. 2): quartiles, whiskers at 5 and 95 %, mean as a diamond."""
     columns = [c for c in summary["columns"] if c["name"] in ("ed", "edh", "cvdm")]
     figure = new_figure(4.6 * len(columns), 4.6)
-    styles = _style(models)
+    styles = style(models)
     for axis, column in zip(np.atleast_1d(figure.subplots(1, len(columns))), columns, strict=True):
         groups = [rows.loc[(rows["model"] == m) & (rows["status"] == "ok"), column["name"]].dropna().to_numpy() for m in models]
         shown = [(m, g) for m, g in zip(models, groups, strict=True) if len(g)]
@@ -207,7 +207,7 @@ def against_horizon(results: Results, dataset: str, models: Sequence[str], dt: f
     """Position error against time: median over runs, with the band between the quartiles."""
     figure = new_figure(8.6, 5.4)
     axis = figure.subplots()
-    styles = _style(models)
+    styles = style(models)
     ends, last = [], 0.0
     for model in models:
         errors = np.concatenate([ed(true=c.truth[c.ok], pred=c.S[c.ok]) for c in _predictions(results, dataset, model)])

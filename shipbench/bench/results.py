@@ -3,6 +3,7 @@
 - `study.json`: tasks, command, code, machine, times.
 - `rows.parquet`: one row per (dataset, model, fold, seed, run) of the study.
 - `summary.json`: one entry per cell that alone identifies its experiment.
+- `windows.parquet`: one row per scored window: what the true ship does there (see `regimes`). These three files are a submission.
 - `truth/<dataset>/fold0.npz`: ids, s0, U and truth of the scored windows (the same for all models).
 - `cells/<dataset>/<model>/fold0-seed0/`: rows.parquet, summary.json, predictions.npz (S), equations.txt, model/.
 """
@@ -16,6 +17,7 @@ import re
 import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..records import Batch
+from .regimes import window_features
 from .scoring import measure
 
 PROTOCOL = 1
@@ -152,7 +155,35 @@ def assemble(out: Path, cells: Iterable[Cell]) -> tuple[Frame, list[dict[str, An
     summaries = [summary for _, summary in done]
     write_rows(out / "rows.parquet", rows)
     write_json(out / "summary.json", summaries)
+    if summaries:
+        write_rows(out / "windows.parquet", window_table(out, summaries))
     return rows, summaries
+
+
+def window_table(out: Path, summaries: Sequence[dict[str, Any]]) -> Frame:
+    """What the true ship does in every scored window of a study, from its saved truth: dataset, fingerprint, fold, run and `window_features`."""
+    import pandas as pd
+
+    frames = []
+    for dataset, fold in dict.fromkeys((s["dataset"], s["fold"]) for s in summaries):
+        summary = next(s for s in summaries if s["dataset"] == dataset)
+        batch = read_truth(out, dataset, fold)
+        identity = {"dataset": dataset, "fingerprint": summary["fingerprint"], "task": summary["task_key"], "fold": fold, "run": list(batch.ids)}
+        frames.append(pd.DataFrame(identity | window_features(batch, summary["ship_L"])))
+    return pd.concat(frames, ignore_index=True)
+
+
+def _read_windows(folder: Path, summaries: list[dict[str, Any]]) -> Frame | None:
+    """`windows.parquet` of a study, made from the saved truth where it is missing; None without both."""
+    import pandas as pd
+
+    try:
+        path = folder / "windows.parquet"
+        return pd.read_parquet(path) if path.is_file() else window_table(folder, summaries)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{folder}: windows.parquet cannot be read ({error}). Give the folder that `shipbench run` wrote, whole.") from None
 
 
 @dataclass(frozen=True)
@@ -163,14 +194,26 @@ class Results:
     summaries: list[dict[str, Any]]
     sources: list[Path]
 
+    @cached_property
+    def windows(self) -> Frame | None:
+        """What the true ship does in every scored window, from all folders that tell; None where none does."""
+        import pandas as pd
+
+        folders = {source: [s for s, at in zip(self.summaries, self.sources, strict=True) if at == source] for source in dict.fromkeys(self.sources)}
+        found = [frame for folder, own in folders.items() if (frame := _read_windows(folder, own)) is not None]
+        keys = ["dataset", "fingerprint", "task", "fold", "run"]
+        return pd.concat(found, ignore_index=True).drop_duplicates(keys, ignore_index=True) if found else None
+
 
 def read_results(folders: Sequence[str | Path]) -> Results:
     """Read the result folders of `shipbench run`.
 
     Raises:
-        InputError: a folder holds no results, or the same cell stands in two of them.
+        InputError: a folder holds no results, they contradict themselves (see `submissions`), or the same cell stands in two of them.
     """
     import pandas as pd
+
+    from .submissions import check_submission
 
     frames, summaries, sources = [], [], []
     for folder in map(Path, folders):
@@ -179,6 +222,7 @@ def read_results(folders: Sequence[str | Path]) -> Results:
             found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise InputError(f"{folder} holds no results: {error}. Give a folder that `shipbench run --out` wrote.") from None
+        check_submission(folder, frames[-1], found)
         summaries += found
         sources += [folder] * len(found)
     if not summaries:
@@ -193,6 +237,21 @@ def read_results(folders: Sequence[str | Path]) -> Results:
             )
         seen[cell] = source
     return Results(pd.concat(frames, ignore_index=True), summaries, sources)
+
+
+def write_submission(results: Results, folder: Path) -> None:
+    """Write `rows.parquet`, `summary.json` and, where the windows are known, `windows.parquet`: all that a leaderboard is rendered from.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    try:
+        if results.windows is not None:
+            write_rows(folder / "windows.parquet", results.windows)
+        write_rows(folder / "rows.parquet", results.rows)
+        write_json(folder / "summary.json", results.summaries)
+    except OSError as error:
+        raise InputError(f"cannot write to {folder}: {error.strerror}. Give a folder that can be written with --submission.") from None
 
 
 def rescore(out: Path, summary: dict[str, Any]) -> dict[str, np.ndarray]:

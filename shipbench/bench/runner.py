@@ -18,6 +18,7 @@ from ..errors import InputError, ShipbenchError
 from ..predictors.base import fit_models, make_predictor
 from ..records import Batch, Dataset
 from ..specs import Spec, parse_spec
+from .cost import count_parameters
 from .folds import Fold, make_folds, select_runs
 from .progress import Progress, Silent
 from .provenance import code_version, machine
@@ -106,6 +107,11 @@ def run_tasks(tasks: Sequence[Task], out: str | Path, *, resume: bool = False, p
         write_json(out / "study.json", about | {"tasks": [task.model_dump(mode="json") for task in tasks], "seconds": round(seconds, 1)})
     failed = [f"{s['dataset']} {s['model']} fold {s['fold']} seed {s['seed']}: {s['reason']}" for s in summaries if s["status"] == "failed"]
     return Outcome(out, rows, summaries, failed)
+
+
+def check_task(task: Task) -> None:
+    """Raise what `run_tasks` would raise before it fits anything."""
+    _prepare(task)
 
 
 def _prepare(task: Task) -> _Study:
@@ -250,6 +256,7 @@ def _rows(study: _Study, cell: Cell, statuses: list[str], reasons: list[str], va
     per_run = {
         "run": [r.id for r in runs],
         "parent": [str(r.meta.get("parent", r.id)) for r in runs],
+        "group": [str(r.meta.get("group", r.meta.get("parent", r.id))) for r in runs],  # windows of one run belong together
         "kind": [str(r.meta.get("manoeuvre", "")) for r in runs],
         "status": statuses,
         "reason": reasons,
@@ -267,6 +274,7 @@ def _summary(study: _Study, spec: Spec, cell: Cell, fitted: _Fitted, times: dict
         "protocol": PROTOCOL, "dataset": data.name, "fingerprint": data.fingerprint, "task_key": study.task.key(data.fingerprint),
         "task": study.task.model_dump(mode="json"), "model": cell.model, "name": spec.name,
         "params": asdict(fitted.model) if is_dataclass(fitted.model) and not isinstance(fitted.model, type) else spec.params,
+        "parameters": None if fitted.status else count_parameters(fitted.model),
         "fold": cell.fold, "seed": cell.seed, "ship": data.ship.name, "ship_L": data.ship.L, "ship_B": data.ship.B, "dt": data.dt,
         "inputs": list(data.inputs), "columns": study.columns, "notes": list(study.notes), "source": data.source, "licence": data.licence,
         "runs": {side: [r.id for r in part.runs] if part else [] for side, part in

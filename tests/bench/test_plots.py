@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipbench.bench.plots import _outline, _style, against_horizon, boxes, choose_runs, draw_all, short_name, tracks
+from shipbench.bench.plots import _outline, against_horizon, boxes, choose_runs, draw_all, short_name, style, tracks
 from shipbench.bench.results import read_results
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
@@ -86,6 +86,6 @@ def test_names_in_legends_stay_short(spec, name):
 
 
 def test_models_have_colours_of_their_own_and_known_ones_keep_theirs():
-    styles = _style(["physics", "mlp", "mine", "physics+current"])
-    assert styles["physics"] == _style(["physics"])["physics"]
+    styles = style(["physics", "mlp", "mine", "physics+current"])
+    assert styles["physics"] == style(["physics"])["physics"]
     assert len({s["color"] for s in styles.values()}) == 4
