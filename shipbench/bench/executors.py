@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import pickle
 import platform
@@ -19,6 +20,8 @@ from .work import Answer, FoldData, Job, one_line, work
 NAMES = ("local", "processes", "dask")
 CONNECT_S = 5.0
 """A scheduler that does not answer within this time [s] is not there."""
+
+_GO_ON = "What is finished is kept; run the same command again with --resume."
 
 
 @dataclass(frozen=True)
@@ -132,7 +135,7 @@ def _on_dask(job: Job, limits: Limits, threads: Mapping[str, str], *folds: FoldD
     """In a child process of the worker: killable, and alone (a worker may have many threads)."""
     for package, digest in job.code.items():
         if (here := package_digest(package)) != digest:
-            found = f"other code of {package} (source {here}, this machine: {digest})" if here else f"no {package}"
+            found = f"other code of {package} (source {here}; of the study: {digest})" if here else f"no {package}"
             raise InputError(f"the Dask worker on {platform.node()} has {found}; install the same version on all workers.")
     return work_isolated(job, folds, limits, threads)
 
@@ -170,17 +173,25 @@ def _connected(how: Execution) -> Iterator[Workers]:
 
 def _client(scheduler: str) -> Any:
     try:
-        from distributed import Client
+        from distributed import Client, Security
+        from distributed.comm import connect
     except ImportError:
         raise InputError('--executor dask needs the package `distributed`; install it with pip install "shipbench[dask]".') from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is said once, by us
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is said once, by us
+
+    async def reach() -> None:
+        comm = await connect(scheduler, timeout=CONNECT_S, **Security().get_connection_args("client"))
+        await comm.close()
+
     try:
-        return Client(scheduler, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError) as error:
+        asyncio.run(reach())
+    except Exception as error:  # an address that cannot be read, nobody there, or somebody who is no scheduler and answers anything
         raise InputError(
-            f"no Dask scheduler answers at {scheduler} within {CONNECT_S:g} s ({one_line(error)}); "
-            "start one (`dask scheduler`) or correct the address, such as tcp://host:8786."
+            f"no Dask scheduler answers at {scheduler} ({one_line(error)}); start one (`dask scheduler`) or correct the address, such as "
+            "tcp://host:8786."
         ) from None
+    return Client(scheduler, timeout=CONNECT_S, set_as_default=False)
 
 
 def answers_of(future: Future[list[Answer]], cells: int) -> list[Answer]:
@@ -195,8 +206,8 @@ def answers_of(future: Future[list[Answer]], cells: int) -> list[Answer]:
     except InputError:
         raise
     except CancelledError:
-        raise WorkError("the connection to the Dask scheduler is lost") from None
+        raise WorkError(f"the connection to the Dask scheduler is lost. {_GO_ON}") from None
     except Exception as error:
         if type(error).__name__ == "KilledWorker":  # known without importing distributed
             return [Answer("failed", f"fit or prediction: {one_line(error)}") for _ in range(cells)]
-        raise WorkError(f"the workers cannot do their work: {one_line(error)}") from error
+        raise WorkError(f"the workers cannot do their work: {one_line(error)}. {_GO_ON}") from error

@@ -15,7 +15,7 @@ from ..predictors.base import make_predictor
 from ..records import Batch, Dataset
 from ..specs import Spec
 from .folds import Fold
-from .provenance import code_version, plugin_digests
+from .provenance import plugin_digests, source_digest
 from .results import PROTOCOL, Cell
 from .task import Task
 from .work import FoldData, Job
@@ -41,29 +41,39 @@ class Study:
             for f, b in zip(self.folds, self.batches, strict=True)
         ]
 
+    @cached_property
+    def metrics_code(self) -> dict[str, str]:
+        """Digests of the plug-ins that scores come from."""
+        return plugin_digests(self.task.metrics)
+
     def parts(self) -> list[Part]:
         """All cells: the folds of a model and seed as one part where its class fits them together, else each cell as its own."""
         parts = []
         for spec in self.specs:
             model, files = new_model(spec), _model_files(spec)
+            code = {"shipbench": source_digest(), **plugin_digests([spec.name, *(effect.name for effect in spec.effects)])}
             seeds = spec.seeds or list(self.task.seeds)
             if not getattr(model, "seeded", True):  # it draws no random numbers: one seed is enough
                 seeds = seeds[:1]
             together = hasattr(type(model), "fit_group")
             for seed in seeds:
                 cells = [Cell(self.data.name, spec.text, fold.index, seed) for fold in self.folds]
-                parts += [Part(self, spec, group, files) for group in ([cells] if together else [[cell] for cell in cells])]
+                parts += [Part(self, spec, group, files, code) for group in ([cells] if together else [[cell] for cell in cells])]
         return parts
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Cells that are one job: run, sent and resumed together (see `work`). `files` are those of the user's model."""
+    """Cells that are one job: run, sent and resumed together (see `work`).
+
+    `files`: content by relative name of the user's model; `code`: digests of the packages that it takes.
+    """
 
     study: Study
     spec: Spec
     cells: list[Cell]
     files: dict[str, bytes]
+    code: dict[str, str]
 
     @property
     def label(self) -> str:
@@ -75,7 +85,6 @@ class Part:
     def keys(self) -> list[str]:
         """For each cell the digest of everything that decides its content; `--resume` keeps a cell only where it agrees."""
         task, data = self.study.task, self.study.data
-        used = [self.spec.name, *(effect.name for effect in self.spec.effects), *task.metrics]
         files = {name: hashlib.sha256(content).hexdigest() for name, content in self.files.items()}
         keys = []
         for cell in self.cells:
@@ -83,7 +92,7 @@ class Part:
             runs = [[(run.id, run.meta) for run in side.runs] if side else [] for side in (fold.train, fold.valid, fold.test)]
             parts = [
                 PROTOCOL, task.key(data.fingerprint), task.metrics, runs, cell.model, cell.fold, cell.seed, files,
-                code_version()["source"], plugin_digests(used),
+                self.code, self.study.metrics_code,
             ]  # fmt: skip
             keys.append(hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()[:16])
         return keys
@@ -95,9 +104,7 @@ class Part:
 
     def job(self, send_files: bool) -> Job:
         """What a worker is given beside `fold_data`."""
-        plugins = plugin_digests([self.spec.name, *(effect.name for effect in self.spec.effects)])
-        code = {"shipbench": code_version()["source"], **plugins}
-        return Job(self.spec, self.cells[0].seed, code, self.files if send_files else None)
+        return Job(self.spec, self.cells[0].seed, self.code, self.files if send_files else None)
 
     def refuse_changed_files(self) -> None:
         """To be asked after a fit whose worker read the user's model file in place.

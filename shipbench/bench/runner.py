@@ -88,10 +88,11 @@ def run_tasks(
                     progress.done(cell.label, _outcome_text(summary))
         finally:
             progress.finish()
-            rows, summaries = assemble(out, [cell for part in parts for cell in part.cells if cell in finished])
-            seconds = round((datetime.now(UTC) - began).total_seconds(), 1)
-            study_facts = {"machine": machine(), "execution": asdict(execution), "seconds": seconds}
-            write_json(out / "study.json", about | study_facts | {"tasks": [task.model_dump(mode="json") for task in tasks]})
+            if finished:  # also of a study that stops early; one that finished nothing leaves an older table as it is
+                rows, summaries = assemble(out, [cell for part in parts for cell in part.cells if cell in finished])
+                seconds = round((datetime.now(UTC) - began).total_seconds(), 1)
+                facts = {"machine": machine(), "execution": asdict(execution), "seconds": seconds}
+                write_json(out / "study.json", about | facts | {"tasks": [task.model_dump(mode="json") for task in tasks]})
     failed = [f"{s['dataset']} {s['model']} fold {s['fold']} seed {s['seed']}: {s['reason']}" for s in summaries if s["status"] == "failed"]
     return Outcome(out, rows, summaries, failed)
 

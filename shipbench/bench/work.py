@@ -145,7 +145,8 @@ def _fit(spec: Spec, seed: int, folds: Sequence[FoldData]) -> list[_Fit]:
     if group is not None and len(folds) > 1:
         try:
             group(models, [fold.train for fold in folds], [fold.valid for fold in folds], [seed] * len(folds))
-            return [_Fit(model, (time.perf_counter() - began) / len(folds), len(folds)) for model in models]
+            seconds = (time.perf_counter() - began) / len(folds)
+            return [_Fit(model, seconds, len(folds)) for model in models]
         except _RAISED:  # one fold is enough to fail them all: each gets its chance alone
             models = [make_predictor(spec) for _ in folds]
     fits = []
