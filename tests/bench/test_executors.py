@@ -132,7 +132,7 @@ def test_models_get_one_memory_layout_wherever_the_data_come_from(toy, tmp_path,
     )
     told = set()
     for order in (np.ascontiguousarray, np.asfortranarray):  # as made by a simulator, as read from files
-        data = toy(runs=6, steps=40)
+        data = toy(runs=6, steps=20)
         data = data.with_runs(dataclasses.replace(r, states=order(r.states), inputs=order(r.inputs)) for r in data.runs)
         monkeypatch.setattr("shipbench.bench.runner.load_dataset", lambda _, data=data: data)
         task = make_task({"dataset": "toy", "models": [f"{tmp_path}/layout.py:Tells"], "horizon_s": 20, "folds": 2, "max_runs": 4})
