@@ -209,5 +209,5 @@ def answers_of(future: Future[list[Answer]], cells: int) -> list[Answer]:
         raise WorkError(f"the connection to the Dask scheduler is lost. {_GO_ON}") from None
     except Exception as error:
         if type(error).__name__ == "KilledWorker":  # known without importing distributed
-            return [Answer("failed", f"fit or prediction: {one_line(error)}") for _ in range(cells)]
+            return [Answer("failed", "fit or prediction: all Dask workers that took it died, one after another") for _ in range(cells)]
         raise WorkError(f"the workers cannot do their work: {one_line(error)}. {_GO_ON}") from error

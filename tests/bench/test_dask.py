@@ -160,3 +160,29 @@ def test_a_missing_package_is_told_with_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r'needs the package `distributed`; install it with pip install "shipbench\[dask\]"'):
         open_workers(Execution("dask", scheduler="tcp://127.0.0.1:1")).__enter__()
+
+
+def test_a_job_that_kills_its_workers_fails_alone_and_lost_workers_stop_the_study():
+    from concurrent.futures import Future
+
+    from distributed import KilledWorker
+
+    from shipbench.bench.executors import answers_of
+    from shipbench.errors import InputError, WorkError
+
+    def ended(error: BaseException) -> Future:
+        future: Future = Future()
+        future.set_exception(error)
+        return future
+
+    answers = answers_of(ended(KilledWorker("job", None, 3)), cells=2)
+    assert [a.status for a in answers] == ["failed", "failed"]
+    assert "all Dask workers that took it died" in answers[0].reason
+    with pytest.raises(InputError, match="other code"):
+        answers_of(ended(InputError("other code")), cells=2)
+    lost: Future = Future()
+    lost.cancel()
+    with pytest.raises(WorkError, match=r"connection to the Dask scheduler is lost.*--resume"):
+        answers_of(lost, cells=2)
+    with pytest.raises(WorkError, match=r"cannot do their work: ModuleNotFoundError: no shipbench.*--resume"):
+        answers_of(ended(ModuleNotFoundError("no shipbench")), cells=2)

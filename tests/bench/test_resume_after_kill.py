@@ -13,6 +13,9 @@ import pandas as pd
 import psutil
 import pytest
 
+from shipbench.bench.runner import run_tasks
+from shipbench.bench.task import make_task
+
 MODELS = '''
 import time
 import numpy as np
@@ -116,7 +119,7 @@ def test_a_study_killed_at_any_step_on_the_file_system_resumes_to_the_same_table
     assert int(done.stdout) > 60  # as many steps were there to be killed at
 
 
-def test_the_command_killed_again_and_again_resumes_to_the_same_table_and_leaves_no_process(folder):
+def test_the_command_killed_again_and_again_resumes_to_the_same_table(folder, monkeypatch):
     (folder / "models.py").write_text(f"PAUSE = 0.2\n{MODELS}")
     options = ["-m", "models.py:Drawn", "-m", "models.py:Together", "-d", "toyset", "--horizon", "20", "--folds", "2", "--seeds", "0,1,2"]
 
@@ -124,23 +127,42 @@ def test_the_command_killed_again_and_again_resumes_to_the_same_table_and_leaves
         command = [sys.executable, "-m", "shipbench", "run", *options, "-o", out, *more]
         return subprocess.Popen(command, cwd=folder, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
-    whole = start("whole")
-    assert whole.wait() == 0, whole.stdout.read()
-    whole.stdout.close()
+    monkeypatch.chdir(folder)
+    models = ["models.py:Drawn", "models.py:Together"]
+    run_tasks([make_task({"dataset": "toyset", "models": models, "horizon_s": 20, "folds": 2, "seeds": [0, 1, 2]})], "whole")
     for cells, more in ((1, ["--executor", "processes", "--workers", "2"]), (5, ["--resume"]), (9, ["--resume", "--executor", "processes"])):
         study, end = start("killed", *more), time.monotonic() + 60
-        while len(list(folder.glob("killed/cells/*/*/fold*/summary.json"))) < cells and study.poll() is None:
+        while len(list(folder.glob("killed/cells/*/*/fold*/summary.json"))) < cells:
             assert time.monotonic() < end
             time.sleep(0.005)
-        children = psutil.Process(study.pid).children(recursive=True)
         study.send_signal(signal.SIGKILL)
         assert study.wait() == -signal.SIGKILL
         study.stdout.close()
-        assert children or "processes" not in more
-        assert psutil.wait_procs(children, timeout=10)[1] == [], "a child outlived its study"
     last = start("killed", "--resume")
     said, _ = last.communicate()
     assert last.returncode == 0, said
     assert said.count("(kept)") >= 6
     tables = [pd.read_parquet(folder / out / "rows.parquet").drop(columns=["fit_s", "predict_s"]) for out in ("whole", "killed")]
     pd.testing.assert_frame_equal(*tables, check_exact=True)
+
+
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_no_process_outlives_a_study_that_is_stopped(folder, sent):
+    (folder / "models.py").write_text(f"PAUSE = 600\n{MODELS}")
+    command = "from shipbench.bench import executors, runner, task; runner.run_tasks([task.make_task(TASK)], 'out', execution=HOW)"
+    settings = {"dataset": "toyset", "models": ["models.py:Drawn"], "horizon_s": 20, "folds": 2}
+    command = command.replace("TASK", repr(settings)).replace("HOW", "executors.Execution('processes', workers=2)")
+    study = subprocess.Popen([sys.executable, "-c", command], cwd=folder, env=environment(), stderr=subprocess.DEVNULL)
+    end, children = time.monotonic() + 60, []
+    while len(children) < 2:
+        assert time.monotonic() < end
+        assert study.poll() is None
+        children = psutil.Process(study.pid).children(recursive=True)
+        time.sleep(0.02)
+    time.sleep(0.5)  # they are at work
+    study.send_signal(sent)
+    outlived = psutil.wait_procs([*children, psutil.Process(study.pid)], timeout=10)[1]
+    for process in outlived:
+        process.kill()
+    study.wait()
+    assert outlived == []
