@@ -31,9 +31,9 @@ class _Group(TyperGroup):
         except ShipbenchError as error:
             code, text = 1, str(error)
         except OSError as error:
-            if error.filename is None:
+            if error.errno is None:
                 raise
-            code, text = 1, f"{error.filename}: {error.strerror}."
+            code, text = 1, f"{error.filename or 'a file'}: {error.strerror}."
         typer.echo(f"error: {text}", err=True)
         raise typer.Exit(code)
 
@@ -78,11 +78,18 @@ def run(
     stride: Annotated[float | None, typer.Option(help="Seconds between scored windows (default: the horizon).")] = None,
     max_runs: Annotated[int | None, typer.Option(help="Use only that many runs, evenly spread.")] = None,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for the results (default runs/<name>).")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Keep what the same code, data and task finished before.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Keep what the same code, data and task scored before.")] = False,
+    executor: Annotated[str, typer.Option(help="Where the cells run: local, processes or dask; the numbers are the same.")] = "local",
+    workers: Annotated[int | None, typer.Option(help="Number of processes at a time (default: one for each CPU).")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Address of the Dask scheduler, such as tcp://host:8786.")] = None,
+    time_limit: Annotated[float | None, typer.Option(help="Most seconds for one cell (fit and prediction); beyond, it fails.")] = None,
+    memory_limit: Annotated[float | None, typer.Option(help="Most GB of memory for one cell; beyond, it fails.")] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Fit, roll out and score models; print the leaderboard."""
+    from .bench.executors import Execution
+    from .bench.isolate import Limits
     from .bench.leaderboard import write_boards
     from .bench.progress import make_progress
     from .bench.results import slug
@@ -93,9 +100,10 @@ def run(
         "models": model or None, "datasets": dataset or None, "folds": folds, "split": split, "seeds": parse_seeds(seeds),
         "horizon_s": horizon, "history_s": history, "stride_s": stride, "max_runs": max_runs,
     }  # fmt: skip
+    execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit))
     tasks = load_tasks(config, overrides)
     folder = out or Path("runs") / (Path(config).stem if config else slug(Path(tasks[0].dataset).name))
-    outcome = run_tasks(tasks, folder, resume=resume, progress=make_progress(quiet), command=str(ctx.obj))
+    outcome = run_tasks(tasks, folder, resume=resume, execution=execution, progress=make_progress(quiet), command=str(ctx.obj))
     written = write_boards(outcome.results, folder, str(ctx.obj))
     if as_json:
         boards = {board.dataset: board.as_json() for board, _ in written}

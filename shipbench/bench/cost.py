@@ -14,11 +14,15 @@ def count_parameters(model: Any) -> int | None:
     inputs and outputs, and a hybrid's copy of its physics. Torch modules held as attributes are counted for any other model.
     """
     try:
-        said = getattr(model, "num_parameters", None)
-        if said is not None:
-            return int(said() if callable(said) else said)
+        return _count(model)
     except Exception:  # a user's own model; its scores are good all the same
         return None
+
+
+def _count(model: Any) -> int | None:
+    said = getattr(model, "num_parameters", None)
+    if said is not None:
+        return int(said() if callable(said) else said)
     arrays = getattr(model, "_arrays", None)
     if callable(arrays):
         found = arrays()

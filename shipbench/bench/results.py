@@ -15,7 +15,8 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -63,29 +64,35 @@ class Cell:
         return Path("cells", slug(self.dataset), slug(self.model), f"fold{self.fold}-seed{self.seed}")
 
 
-def write_json(path: Path, data: Any) -> None:
-    """Write JSON in one step: a reader sees the old file or the new one, never half of it."""
+@contextmanager
+def _in_one_step(path: Path) -> Iterator[Path]:
+    """A hidden sibling to write, which then takes the place of `path`: a reader sees the old or the new, never half. It goes if writing fails."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    part.write_text(json.dumps(data, indent=1, default=str) + "\n", encoding="utf-8")
-    os.replace(part, path)
+    try:
+        yield part
+        os.replace(part, path)
+    except BaseException:
+        shutil.rmtree(part) if part.is_dir() else part.unlink(missing_ok=True)
+        raise
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write JSON in one step."""
+    with _in_one_step(path) as part:
+        part.write_text(json.dumps(data, indent=1, default=str) + "\n", encoding="utf-8")
 
 
 def write_rows(path: Path, rows: Frame) -> None:
     """Write parquet in one step."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    rows.to_parquet(part, index=False)
-    os.replace(part, path)
+    with _in_one_step(path) as part:
+        rows.to_parquet(part, index=False)
 
 
 def write_truth(out: Path, dataset: str, fold: int, batch: Batch) -> None:
     """Save what every model of this fold is scored against."""
-    path = out / "truth" / slug(dataset) / f"fold{fold}.npz"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.stem}.{os.getpid()}.tmp.npz")
-    np.savez_compressed(part, ids=np.array(batch.ids), s0=batch.s0, U=batch.U, truth=batch.truth)
-    os.replace(part, path)
+    with _in_one_step(out / "truth" / slug(dataset) / f"fold{fold}.npz") as part, part.open("wb") as file:
+        np.savez_compressed(file, ids=np.array(batch.ids), s0=batch.s0, U=batch.U, truth=batch.truth)
 
 
 def read_truth(out: Path, dataset: str, fold: int) -> Batch:
@@ -104,39 +111,28 @@ def read_predictions(out: Path, cell: Cell) -> np.ndarray | None:
         return file["S"]
 
 
-def write_cell(out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, model: Any = None) -> None:
-    """Write a finished cell: into a hidden folder first, then renamed into place (an older one is replaced).
-
-    The fitted `model` is saved where it can be; a foreign model's own failure to save or describe itself is noted in the summary.
-    """
+def write_cell(out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, files: Mapping[str, bytes]) -> None:
+    """Write a finished cell in one step (an older one is replaced); `files` are further ones, by relative name (saved model, equations)."""
     final = out / cell.folder
-    part = final.with_name(f".{final.name}.{os.getpid()}.tmp")
-    shutil.rmtree(part, ignore_errors=True)
-    part.mkdir(parents=True)
-    summary = dict(summary)
-    if S is not None:
-        np.savez_compressed(part / "predictions.npz", S=S)
-    if model is not None:
-        summary.update(_keep_model(part, model))
-    rows.to_parquet(part / "rows.parquet", index=False)
-    write_json(part / "summary.json", summary)
-    shutil.rmtree(final, ignore_errors=True)
-    os.replace(part, final)
+    old = final.with_name(f".{final.name}.{os.getpid()}.old.tmp")
+    with _in_one_step(final) as part:
+        part.mkdir(parents=True)
+        if S is not None:
+            np.savez_compressed(part / "predictions.npz", S=S)
+        for name, content in files.items():
+            (part / name).parent.mkdir(parents=True, exist_ok=True)
+            (part / name).write_bytes(content)
+        rows.to_parquet(part / "rows.parquet", index=False)
+        write_json(part / "summary.json", summary | {"files": _digests(part)})
+        if final.exists():  # moved away whole: who is killed in between leaves no cell, never half of one
+            os.replace(final, old)
+    shutil.rmtree(old, ignore_errors=True)
 
 
-def _keep_model(folder: Path, model: Any) -> dict[str, str]:
-    notes: dict[str, str] = {}
-    for method, action in (("save", lambda: model.save(folder / "model")), ("describe", lambda: model.describe())):
-        if not callable(getattr(model, method, None)):
-            continue
-        try:
-            text = action()
-        except Exception as error:  # a user's own model; its predictions are good all the same
-            notes[f"{method}_failed"] = f"{type(error).__name__}: {error}"
-            continue
-        if method == "describe" and text:
-            (folder / "equations.txt").write_text(str(text).rstrip() + "\n", encoding="utf-8")
-    return notes
+def _digests(folder: Path) -> dict[str, str]:
+    """SHA-256 (first 16 digits) of what a cell's rows and scores are read from."""
+    found = (folder / name for name in ("rows.parquet", "predictions.npz"))
+    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest()[:16] for p in found if p.is_file()}
 
 
 def read_summary(out: Path, cell: Cell) -> dict[str, Any] | None:
@@ -145,8 +141,18 @@ def read_summary(out: Path, cell: Cell) -> dict[str, Any] | None:
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
+def scored_before(out: Path, cell: Cell, key: str) -> str:
+    """The status of a cell that need not be run again ("ok", "diverged"), or "": it is not there, damaged, of another key, failed or skipped."""
+    try:
+        summary = read_summary(out, cell) or {}
+        whole = summary.get("key") == key and summary["files"] == _digests(out / cell.folder)
+        return summary["status"] if whole and summary["status"] in ("ok", "diverged") else ""
+    except (OSError, ValueError, KeyError, AttributeError):  # a damaged summary may hold anything
+        return ""
+
+
 def assemble(out: Path, cells: Iterable[Cell]) -> tuple[Frame, list[dict[str, Any]]]:
-    """Gather the finished cells of a study into `rows.parquet` and `summary.json`, and return both."""
+    """Gather the given cells (all finished) of a study into `rows.parquet` and `summary.json`, and return both."""
     import pandas as pd
 
     done = [(cell, summary) for cell in cells if (summary := read_summary(out, cell)) is not None]

@@ -11,14 +11,13 @@ import json
 import os
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from ..errors import InputError, WorkError, unknown_name
+from ..errors import InputError, unknown_name
 from ..records import Dataset
 from ..registry import Registry
 from ..signals import COMMANDS, STATES
@@ -27,7 +26,7 @@ from ..specs import Spec, parse_spec
 PREDICTORS = Registry("predictor", "predictors", "PREDICTOR", helpers=frozenset({"base", "training"}))
 
 History = tuple[np.ndarray, np.ndarray]
-__all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "fit_models", "make_predictor", "parse_spec"]
+__all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "make_predictor", "parse_spec"]
 
 
 @runtime_checkable
@@ -180,26 +179,3 @@ def make_predictor(spec: Spec) -> Any:
         return model.extend(spec.effects) if spec.effects else model
     except (TypeError, ValueError) as error:
         raise InputError(f"model spec '{spec.text}': {error}. See `shipbench models` for the parameters.") from None
-
-
-def fit_models(models: Sequence[Any], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]) -> list[Exception | None]:
-    """Fit several models of one spec (folds x seeds), together where the class can; one model's failure stays its own.
-
-    Returns:
-        For each model None, or the exception that its fit raised.
-    """
-    group = getattr(type(models[0]), "fit_group", None)
-    if group is not None and len(models) > 1:
-        try:
-            group(models, trains, valids, seeds)
-            return [None] * len(models)
-        except (ArithmeticError, RuntimeError, ValueError, WorkError) as error:
-            return [error] * len(models)
-    errors: list[Exception | None] = []
-    for model, train, valid, seed in zip(models, trains, valids, seeds, strict=True):
-        try:
-            model.fit(train, valid, seed=seed)
-            errors.append(None)
-        except Exception as error:  # a user's model may raise anything; its row says what
-            errors.append(error)
-    return errors
