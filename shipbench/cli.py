@@ -178,6 +178,8 @@ def models(as_json: Json = False) -> None:
         typer.echo(f"{part['name']:<12s} {part['summary']}" + ("" if part["from"] == "shipbench" else f"  [{part['from']}]"))
         if part["parameters"]:
             typer.echo(" " * 13 + ", ".join(f"{k}={v}" if v else k for k, v in part["parameters"].items()))
+        if part["unusable"]:
+            typer.echo(" " * 13 + f"NOT USABLE HERE: {part['unusable']}")
     typer.echo("\nA spec sets parameters in brackets, such as 'mlp[hidden=64,seed=3]'; your own class: path/to/model.py:ClassName.")
 
 

@@ -75,7 +75,7 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
         files = "trajectories.csv (or .csv.gz, .parquet), dataset.toml and ship.toml"
         raise InputError(f"folder {folder} holds no dataset.toml; a data set has {files}.")
     parsed = parse_spec(spec)
-    if parsed.name not in DATASETS.names():
+    if parsed.name not in DATASETS:
         more = " (nor is it a folder)" if os.sep in spec else ""
         raise unknown_name(f"data set{more}", parsed.name, DATASETS.names())
     if parsed.effects or parsed.path is not None:
