@@ -7,8 +7,10 @@ parts claim is given to neither: shipbench cannot know which one is meant.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import logging
+import sys
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -119,6 +121,19 @@ class Registry:
         if problem:
             raise InputError(problem)
         return part
+
+    def digest(self, name: str) -> str:
+        """What tells one version of a plug-in from another: its package's list of files with their hashes, and its own module's source.
+
+        "" for a part of shipbench's own, whose version is that of shipbench.
+        """
+        if name in self._files() or name not in self.plugins():
+            return ""
+        self.get(name)
+        point = self.plugins()[name][0]
+        source = getattr(sys.modules[point.module], "__file__", None)
+        listed = (point.dist.read_text("RECORD") if point.dist is not None else "") or ""
+        return hashlib.sha256(listed.encode() + (Path(source).read_bytes() if source else b"")).hexdigest()[:12]
 
     def _clash(self, name: str, points: list[EntryPoint]) -> str:
         """What is wrong with a name that two parts claim, or ""."""

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..data.base import load_dataset
+from ..effects.base import EFFECTS
 from ..errors import InputError, ShipbenchError
-from ..predictors.base import fit_models, make_predictor
+from ..predictors.base import PREDICTORS, fit_models, make_predictor
 from ..records import Batch, Dataset
 from ..specs import Spec, parse_spec
 from .folds import Fold, make_folds, select_runs
@@ -136,9 +137,9 @@ def _new_model(spec: Spec) -> Any:
 
 
 def _file_digest(spec: Spec) -> str:
-    """Digest of the user's file or saved folder behind a spec."""
+    """Digest of the user's file, saved folder or plug-ins behind a spec; "" where all of it is shipbench's own."""
     if spec.path is None:
-        return ""
+        return "".join([PREDICTORS.digest(spec.name.partition(":")[0]), *(EFFECTS.digest(effect.name) for effect in spec.effects)])
     files = sorted(p for p in spec.path.rglob("*") if p.is_file()) if spec.path.is_dir() else [spec.path]
     return hashlib.sha256(b"".join(p.read_bytes() for p in files)).hexdigest()[:12]
 

@@ -111,9 +111,11 @@ def _make(part: DatasetPart, params: dict[str, Any]) -> Dataset:
 
 
 def _cache_key(part: DatasetPart, params: dict[str, Any]) -> str:
-    """Folder name; the digest keeps apart what any readable form of the parameters might confuse."""
+    """Folder name; digests keep apart what any readable form of the parameters might confuse, and the versions of a plug-in."""
     text = json.dumps(params, sort_keys=True, default=str)
-    return "-".join((part.name, f"v{part.version}", *([hashlib.sha256(text.encode()).hexdigest()[:12]] if params else [])))
+    plugin = DATASETS.digest(part.name)
+    digest = [hashlib.sha256(text.encode()).hexdigest()[:12]] if params else []
+    return "-".join((part.name, f"v{part.version}", *([plugin] if plugin else []), *digest))
 
 
 def _from_cache(folder: Path) -> Dataset | None:
