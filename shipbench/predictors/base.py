@@ -54,7 +54,7 @@ class PredictorBase(ABC):
 
     def skip(self, dataset: Dataset) -> str | None:
         """Why this model cannot take `dataset`, or None; a study then has rows with the status `skipped` and this reason."""
-        return not_installed(self.name, self.needs)
+        return not_installed(self.name, self.needs) if self.needs else None
 
     @abstractmethod
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:

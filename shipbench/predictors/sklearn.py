@@ -145,6 +145,8 @@ class SklearnOneStep(PredictorFamily):
         return {"dt": self._dt, "seed": self._seed, "scikit-learn": sklearn.__version__}
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+        if missing := not_installed(self.name, self.needs):
+            raise InputError(f"the saved model 'sklearn:{self.regressor}' cannot be loaded: {missing}.")
         import sklearn
 
         self._x, self._z = arrays["x"], arrays["z"]
