@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from importlib.metadata import EntryPoint
 
 import pytest
+from toy_ship import toy
 from typer.testing import CliRunner
 
 from shipbench import registry
 from shipbench.bench.listing import describe_parts
+from shipbench.bench.runner import run_tasks
+from shipbench.bench.task import make_task
 from shipbench.cli import app
-from shipbench.data.base import DATASETS, load_dataset
+from shipbench.data.base import DATASETS, _cache_key, load_dataset
+from shipbench.data.files import write_dataset
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.metrics.base import METRICS
 from shipbench.predictors.base import PREDICTORS, make_predictor, parse_spec
+
+__all__ = ["toy"]  # a fixture
 
 GOOD = """
 import numpy as np
@@ -118,6 +125,38 @@ def test_a_plug_in_that_calls_itself_otherwise_is_refused(installed):
     installed("datasets", tank="shipbench.data.harbour90:DATASET")  # its cache would be that of harbour90
     with pytest.raises(InputError, match="calls itself 'harbour90'"):
         load_dataset("tank")
+
+
+def test_a_changed_plug_in_is_another_model_for_resume(installed, toy, tmp_path):
+    installed("predictors", mine="stranger:Mine")
+    write_dataset(toy(runs=4), tmp_path / "toy")
+    task = make_task({"dataset": str(tmp_path / "toy"), "models": ["mine", "hold"], "folds": 2, "horizon_s": 20.0})
+
+    def kept() -> set[str]:
+        """The models whose cells another run would keep."""
+        run_tasks([task], tmp_path / "out")
+        return {name for name in keys if _keys(tmp_path / "out", name) == keys[name]}
+
+    run_tasks([task], tmp_path / "out")
+    keys = {name: _keys(tmp_path / "out", name) for name in ("mine", "hold")}
+    assert kept() == {"mine", "hold"}
+    (tmp_path / "stranger.py").write_text(GOOD + "# changed")
+    assert kept() == {"hold"}
+
+
+def _keys(out, model: str) -> list[str]:
+    """What `--resume` compares."""
+    return [json.loads(p.read_text())["key"] for p in sorted(out.glob(f"cells/*/{model}/*/summary.json"))]
+
+
+def test_a_changed_plug_in_is_another_data_set_for_the_cache(installed, tmp_path):
+    source = "from dataclasses import replace\nfrom shipbench.data.harbour90 import DATASET\nD = replace(DATASET, name='tank')"
+    (tmp_path / "tank.py").write_text(source)
+    installed("datasets", tank="tank:D")
+    before = _cache_key(DATASETS.get("tank"), {})
+    (tmp_path / "tank.py").write_text(source + "# changed")
+    assert _cache_key(DATASETS.get("tank"), {}) != before
+    assert _cache_key(DATASETS.get("harbour90"), {}) == "harbour90-v1"  # ours keep the names that they had
 
 
 def test_a_model_whose_optional_package_is_missing_is_listed_as_not_installed(monkeypatch):

@@ -100,10 +100,16 @@ def _fields(node: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> dict[str, s
             found |= _fields(classes[base.id], classes)
     for item in node.body:
         if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name) and not item.target.id.startswith("_"):
-            default = ast.unparse(item.value) if item.value else ""
+            default = _default(item.value)
             if "ClassVar" not in ast.unparse(item.annotation) and "init=False" not in default:
                 found[item.target.id] = default
     return found
+
+
+def _default(value: ast.expr | None) -> str:
+    """A field's default as written; `{}` for `field(default_factory=dict)`, "" where there is none."""
+    text = ast.unparse(value) if value else ""
+    return {"field(default_factory=dict)": "{}", "field(default_factory=list)": "[]"}.get(text, text)
 
 
 def dataset_facts(dataset: Dataset) -> dict[str, Any]:

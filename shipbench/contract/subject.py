@@ -67,12 +67,17 @@ class Subject:
         """What the model is asked about."""
         return self.parts[2].batch()
 
-    def fit(self, state: int, *, valid: bool = True) -> Fitted:
-        """A fresh model fitted with the seed `SEED`; `state` is what the global random generators are set to meanwhile."""
+    @property
+    def few(self) -> Dataset:
+        """Some of the runs to fit on, where it is only to be seen whether a fit works."""
+        return self.parts[0].subset(range(min(4, len(self.parts[0]))))
+
+    def fit(self, state: int, *, train: Dataset | None = None) -> Fitted:
+        """A fresh model fitted with the seed `SEED`, on `train` alone if it is given; `state` is what the global generators are set to meanwhile."""
         model = make_predictor(self.spec)
         if self.saved:
             return Fitted(model, self.parts[0], None, model)
-        train, held = copied(self.parts[0]), copied(self.parts[1]) if valid else None
+        train, held = (copied(train), None) if train is not None else (copied(self.parts[0]), copied(self.parts[1]))
         began = time.perf_counter()
         with global_generators(state):
             returned = model.fit(train, held, seed=SEED)
