@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import sys
 from importlib.metadata import EntryPoint
 
 import pytest
@@ -39,6 +40,8 @@ def installed(monkeypatch, tmp_path):
     """`installed("group", name="module:object")`: as if a package had registered these; `stranger` is a module with the model `Mine`."""
     points: list[EntryPoint] = []
     (tmp_path / "stranger.py").write_text(GOOD)
+    for module in ("stranger", "tank", "raises", "leaves"):  # of an earlier test's folder
+        monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(registry, "entry_points", lambda group: [p for p in points if p.group == group])
     monkeypatch.setattr(registry, "_problems", {})
@@ -160,7 +163,7 @@ def test_a_changed_plug_in_is_another_data_set_for_the_cache(installed, tmp_path
 
 
 def test_a_model_whose_optional_package_is_missing_is_listed_as_not_installed(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "pysindy", None)
+    monkeypatch.setitem(sys.modules, "pysindy", None)
     unusable = {part["name"]: part["unusable"] for part in describe_parts(PREDICTORS)}
     assert unusable["pysindy"] == "pysindy is not installed: pip install 'shipbench[pysindy]'"
     assert unusable["hold"] == ""

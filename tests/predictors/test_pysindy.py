@@ -82,6 +82,7 @@ def test_a_run_that_diverges_is_nan_from_there_on_and_the_others_are_not(model, 
     s0[2, 3] = -40.0  # astern, its quadratic drag drives it on
     S = model.predict(s0, batch.U)
     assert np.isnan(S[2, -1, :6]).all()
+    assert (np.nanmax(np.abs(S[2, :, 3:6]), axis=0) <= 10.0 * model._found["largest"]).all(), "beyond ten times the data nothing is predicted"
     assert np.isfinite(np.delete(S, 2, axis=0)).all()
 
 
