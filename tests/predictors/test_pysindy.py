@@ -79,7 +79,7 @@ def test_its_equations_are_printed(model):
 def test_a_run_that_diverges_is_nan_from_there_on_and_the_others_are_not(model, known):
     batch = known.batch()
     s0 = batch.s0.copy()
-    s0[2, 3] = -40.0  # astern, its quadratic drag drives it on
+    s0[2, 3] = -12.0  # astern, its quadratic drag drives it on
     S = model.predict(s0, batch.U)
     assert np.isnan(S[2, -1, :6]).all()
     assert (np.nanmax(np.abs(S[2, :, 3:6]), axis=0) <= 10.0 * model._found["largest"]).all(), "beyond ten times the data nothing is predicted"
