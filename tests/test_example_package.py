@@ -70,8 +70,8 @@ def test_its_parts_are_listed_with_where_they_come_from(stranger):
 
 
 def test_a_parameter_of_its_data_set_is_honoured_and_a_wrong_one_refused(stranger):
-    assert "runs" in stranger("data", "describe", "barge_trial[drag=0.02]").stdout
-    done = stranger("data", "describe", "barge_trial[drig=0.02]")
+    assert stranger("data", "make", "barge_trial[drag=0.02]", "--out", "made").returncode == 0
+    done = stranger("data", "make", "barge_trial[drig=0.02]", "--out", "made")
     assert done.returncode == 2
     assert "Did you mean 'drag'" in done.stderr
 
