@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from . import cli_check, cli_data, cli_diagnosis, cli_import, cli_leaderboard
+from . import cli_check, cli_contract, cli_data, cli_diagnosis, cli_import, cli_leaderboard
 from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, parse_seeds, print_json, show_boards
 from .errors import InputError, ShipbenchError
 
@@ -45,6 +45,7 @@ app = typer.Typer(
 cli_data.register(app)
 cli_import.register(cli_data.data_app)
 cli_diagnosis.register(app)
+cli_contract.register(app)
 cli_check.register(cli_data.data_app, cli_diagnosis.suite_app)
 cli_leaderboard.register(app)
 
@@ -134,6 +135,8 @@ def models(as_json: Json = False) -> None:
         typer.echo(f"{part['name']:<12s} {part['summary']}" + ("" if part["from"] == "shipbench" else f"  [{part['from']}]"))
         if part["parameters"]:
             typer.echo(" " * 13 + ", ".join(f"{k}={v}" if v else k for k, v in part["parameters"].items()))
+        if part["unusable"]:
+            typer.echo(" " * 13 + f"NOT USABLE HERE: {part['unusable']}")
     typer.echo("\nA spec sets parameters in brackets, such as 'mlp[hidden=64,seed=3]'; your own class: path/to/model.py:ClassName.")
 
 

@@ -10,11 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 from ..errors import InputError, WorkError
+from ..registry import package_digest
 from .isolate import Limits, stop_all, thread_settings, work_isolated
-from .provenance import machine, package_digest
+from .provenance import machine
 from .work import Answer, FoldData, Job, one_line, work
 
 NAMES = ("local", "processes", "dask")
@@ -131,10 +133,14 @@ def _itself(fold: FoldData) -> FoldData:
     return fold
 
 
+_digest_here = cache(package_digest)
+"""Of a worker that answers many jobs; one with new code is started anew."""
+
+
 def _on_dask(job: Job, limits: Limits, threads: Mapping[str, str], *folds: FoldData) -> list[Answer]:
     """In a child process of the worker: killable, and alone (a worker may have many threads)."""
     for package, digest in job.code.items():
-        if (here := package_digest(package)) != digest:
+        if (here := _digest_here(package)) != digest:
             found = f"other code of {package} (source {here}; of the study: {digest})" if here else f"no {package}"
             raise InputError(f"the Dask worker on {platform.node()} has {found}; install the same version on all workers.")
     return work_isolated(job, folds, limits, threads)

@@ -10,12 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from ..effects.base import EFFECTS
 from ..errors import InputError, ShipbenchError, WorkError
-from ..predictors.base import make_predictor
+from ..metrics.base import METRICS
+from ..predictors.base import PREDICTORS, make_predictor
 from ..records import Batch, Dataset
+from ..registry import package_digest
 from ..specs import Spec
 from .folds import Fold
-from .provenance import plugin_digests, source_digest
+from .provenance import source_digest
 from .results import PROTOCOL, Cell
 from .task import Task
 from .work import FoldData, Job
@@ -42,23 +45,27 @@ class Study:
         ]
 
     @cached_property
-    def metrics_code(self) -> dict[str, str]:
-        """Digests of the plug-ins that scores come from."""
-        return plugin_digests(self.task.metrics)
+    def metric_plugins(self) -> list[str]:
+        """Versions of the plug-ins that scores come from ("" for a metric of shipbench's own)."""
+        return [METRICS.digest(name) for name in self.task.metrics]
 
     def parts(self) -> list[Part]:
         """All cells: the folds of a model and seed as one part where its class fits them together, else each cell as its own."""
         parts = []
         for spec in self.specs:
             model, files = new_model(spec), _model_files(spec)
-            code = {"shipbench": source_digest(), **plugin_digests([spec.name, *(effect.name for effect in spec.effects)])}
+            taken = [(EFFECTS, effect.name) for effect in spec.effects]
+            taken += [(PREDICTORS, spec.name.partition(":")[0])] if spec.path is None else []
+            plugins = [registry.digest(name) for registry, name in taken]
+            packages = sorted({package for registry, name in taken if (package := registry.package(name))})
+            code = {"shipbench": source_digest(), **{package: package_digest(package) for package in packages}}
             seeds = spec.seeds or list(self.task.seeds)
             if not getattr(model, "seeded", True):  # it draws no random numbers: one seed is enough
                 seeds = seeds[:1]
             together = hasattr(type(model), "fit_group")
             for seed in seeds:
                 cells = [Cell(self.data.name, spec.text, fold.index, seed) for fold in self.folds]
-                parts += [Part(self, spec, group, files, code) for group in ([cells] if together else [[cell] for cell in cells])]
+                parts += [Part(self, spec, group, files, plugins, code) for group in ([cells] if together else [[cell] for cell in cells])]
         return parts
 
 
@@ -66,13 +73,15 @@ class Study:
 class Part:
     """Cells that are one job: run, sent and resumed together (see `work`).
 
-    `files`: content by relative name of the user's model; `code`: digests of the packages that it takes.
+    `files`: content by relative name of the user's model; `plugins`: versions of the model's and its effects' plug-ins ("" for shipbench's own);
+    `code`: digests of the packages that it takes, by which a worker knows its own (`package_digest`).
     """
 
     study: Study
     spec: Spec
     cells: list[Cell]
     files: dict[str, bytes]
+    plugins: list[str]
     code: dict[str, str]
 
     @property
@@ -92,7 +101,7 @@ class Part:
             runs = [[(run.id, run.meta) for run in side.runs] if side else [] for side in (fold.train, fold.valid, fold.test)]
             parts = [
                 PROTOCOL, task.key(data.fingerprint), task.metrics, runs, cell.model, cell.fold, cell.seed, files,
-                self.code, self.study.metrics_code,
+                self.plugins, self.code, self.study.metric_plugins,
             ]  # fmt: skip
             keys.append(hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()[:16])
         return keys

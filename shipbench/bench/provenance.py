@@ -2,45 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
 import subprocess
-from collections.abc import Iterable
 from functools import cache
-from importlib.metadata import PackageNotFoundError, entry_points, version
-from importlib.util import find_spec
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+from ..registry import package_digest
 
 _LIBRARIES = ("numpy", "scipy", "pandas", "casadi", "torch", "lightning", "torchdiffeq")
 
 
+@cache
 def source_digest() -> str:
     """That of shipbench itself: tells edited code from the released one."""
     return package_digest("shipbench")
-
-
-@cache
-def package_digest(name: str) -> str:
-    """SHA-256 (first 12 digits) over the Python files of an importable package or module; "" where it is not installed."""
-    found = find_spec(name)
-    if found is None or found.origin is None:
-        return ""
-    origin = Path(found.origin)
-    package = origin.parent
-    files = sorted(package.rglob("*.py")) if found.submodule_search_locations else [origin]
-    digest = hashlib.sha256()
-    for path in files:
-        digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:12]
-
-
-def plugin_digests(names: Iterable[str]) -> dict[str, str]:
-    """Package -> digest of the plug-ins that add one of these parts through an entry point."""
-    wanted = set(names)
-    groups = ("predictors", "effects", "metrics")
-    points = [point for group in groups for point in entry_points(group=f"shipbench.{group}") if point.name in wanted]
-    return {package: package_digest(package) for package in sorted({point.module.partition(".")[0] for point in points})}
 
 
 @cache

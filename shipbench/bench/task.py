@@ -54,7 +54,7 @@ class Task(BaseModel):
     @classmethod
     def _known_metrics(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         for name in value:
-            if name not in METRICS.names():
+            if name not in METRICS:
                 raise unknown_name("metric", name, METRICS.names())
         if "ed" not in value:
             raise ValueError("'ed' must be among the metrics: models are ranked by it")
