@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from . import cli_check, cli_data, cli_diagnosis, cli_import
+from . import cli_check, cli_data, cli_diagnosis, cli_import, cli_report
 from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, print_json
 from .errors import InputError, ShipbenchError
 
@@ -50,6 +50,7 @@ cli_data.register(app)
 cli_import.register(cli_data.data_app)
 cli_diagnosis.register(app)
 cli_check.register(cli_data.data_app, cli_diagnosis.suite_app)
+cli_report.register(app)
 
 
 def _show_version(wanted: bool) -> None:
