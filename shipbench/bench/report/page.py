@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
 import json
 import os
@@ -56,7 +57,8 @@ def write_report(results: Results, out: Path, command: str, *, given: Sequence[P
         part.write_text(text, encoding="utf-8", errors="replace")  # names from badly decoded files may hold lone surrogates
         os.replace(part, out)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            part.unlink()
         raise InputError(f"cannot write the page to {out}: {error.strerror}. Give a file that can be written with --out.") from None
     return Written(out, out.stat().st_size, {s["name"]: s["left_out"] for s in sections if s["left_out"]})
 

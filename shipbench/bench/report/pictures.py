@@ -55,8 +55,9 @@ def slices(regime: Regime, models: Sequence[str]) -> str:
         dots = "".join(f'<circle class="dot c{i % COLOURS}" cx="{float(axes.px(x)):.1f}" cy="{float(axes.py(e)):.1f}" r="3"/>'
                        for x, e in zip(at, v, strict=True) if np.isfinite(e))  # fmt: skip
         parts.append(f'<g data-m="{i}"><path {stroke(i)} d="{axes.line(at, v)}"/>{dots}</g>')
-    names = [label.removeprefix(f"{regime.name} ") for label in regime.labels]  # the caption names the regime
-    return axes.grid("", "mean ED [m]", names) + "".join(parts)
+    unit = next((u for u in ("m/s", "deg") if all(label.endswith(f" {u}") for label in regime.labels)), "")
+    names = [label.removesuffix(f" {unit}") for label in regime.labels]
+    return axes.grid(regime.name + (f" [{unit}]" if unit else ""), "mean ED [m]", names) + "".join(parts)
 
 
 def track(found: Track, models: Sequence[str], L: float, B: float) -> str:

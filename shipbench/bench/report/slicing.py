@@ -30,7 +30,8 @@ def regime_errors(rows: Frame, windows: Frame | None, models: Sequence[str]) -> 
     means: dict[str, list[tuple[str, int, Any]]] = {}
     for part in slices(windows):
         inside = scored[scored["run"].isin(windows.loc[part.members, "run"])]
-        means.setdefault(part.regime, []).append((part.label, int(part.members.sum()), inside.groupby("model")["ed"].mean()))
+        label, count = part.label.removeprefix(f"{part.regime} "), int(part.members.sum())
+        means.setdefault(part.regime, []).append((label, count, inside.groupby("model")["ed"].mean()))
     return [
         Regime(
             name, tuple(label for label, _, _ in found), tuple(count for _, count, _ in found),
