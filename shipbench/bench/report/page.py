@@ -17,7 +17,6 @@ import numpy as np
 
 from ...errors import InputError
 from ..leaderboard import Board, build_board
-from ..plots import short_name
 from ..provenance import code_version
 from ..results import Frame, Results
 from ..tables import Table, TableColumn
@@ -69,7 +68,7 @@ def render(sections: Sequence[dict[str, Any]], results: Results, command: str) -
 
     environment = Environment(loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters["ticks"] = _ticks
-    environment.filters["short"] = short_name
+    environment.filters["short"] = lambda model: Path(model).name if "/" in model else model
     script = (_HERE / "report.js").read_text(encoding="utf-8")
     # the digest lets the browser run this script and no other, whatever a name of a run may hold
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
@@ -183,4 +182,4 @@ def _script_json(data: Any) -> Any:
     from markupsafe import Markup
 
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True)
-    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
+    return Markup(text.replace("<", "\\u003c"))

@@ -17,10 +17,12 @@ from ...signals import PSI, X, Y, wrap_angle
 from ..regimes import window_features
 from ..results import Cell, Frame, Results, read_predictions, read_truth
 
-POINTS = 200_000
-"""Points of all tracks of one page together; a point takes some ten characters."""
+POINTS = 250_000
+"""Points of all tracks of one page together; a point takes some ten characters, so that a page stays below 4 MB."""
 _MOST, _LEAST = 121, 25
 """Points of one track: no more than are seen, no fewer than a track can be followed by."""
+_WINDOW = 200
+"""What axes and ships of one window take, in points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +54,12 @@ def gather(results: Results, dataset: str, models: Sequence[str], points: int = 
     left_out = left_out if rows["seed"].nunique() > 1 else []
     order = rows[rows["status"] == "ok"].groupby("run")["ed"].median().sort_values().index.tolist()
     order += [run for run in dict.fromkeys(rows["run"]) if run not in set(order)]
-    kept = max(1, points // (_LEAST * (len(models) + 1)))
+    tracks = len(models) + 1  # and the true one
+    kept = max(1, points // (_LEAST * tracks + _WINDOW))
     chosen = set(order if len(order) <= kept else [order[i] for i in np.linspace(0, len(order) - 1, kept).round().astype(int)])
     if len(chosen) < len(order):
         left_out.append(f"Tracks: {len(chosen)} of {len(order)} windows, evenly spread from the least error to the greatest.")
-    reading = _Reading(chosen, int(np.clip(points // (len(chosen) * (len(models) + 1)), _LEAST, _MOST)))
+    reading = _Reading(chosen, int(np.clip((points // max(1, len(chosen)) - _WINDOW) // tracks, _LEAST, _MOST)))
     pairs = list(zip(results.summaries, results.sources, strict=True))
     for summary, source in pairs:
         if summary["dataset"] == dataset and summary["model"] in seeds and summary["seed"] == seeds[summary["model"]]:
