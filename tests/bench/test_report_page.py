@@ -13,12 +13,13 @@ import pytest
 from typer.testing import CliRunner
 
 from shipbench.bench.report.beside import _numbers
-from shipbench.bench.report.page import write_report
+from shipbench.bench.report.page import _table, write_report
 from shipbench.bench.report.pictures import track
 from shipbench.bench.report.series import Track, gather
 from shipbench.bench.report.svg import Axes, limits, path, ticks
 from shipbench.bench.results import read_results
 from shipbench.bench.runner import run_tasks
+from shipbench.bench.tables import Table, TableColumn, number
 from shipbench.bench.task import make_task
 from shipbench.cli import app
 from shipbench.errors import InputError
@@ -258,3 +259,9 @@ def test_the_command_writes_the_page_and_says_what_it_left_out(study, tmp_path):
     refused = command(study, "--out", tmp_path / "file" / "p.html")
     assert (refused.exit_code, "Traceback" in refused.output) == (2, False)
     assert "cannot write the page" in refused.output
+
+
+def test_intervals_of_a_table_stand_under_their_figures():
+    column = TableColumn("ED", "ed", number(2))
+    cells = _table(Table("T", [column], [{"ed": 1.0, "ed_low": 0.5, "ed_high": 2.0}, {"ed": 1.0}, {"ed": float("nan")}]))["rows"]
+    assert [(row["cells"][0]["between"], row["cells"][0]["by"]) for row in cells] == [("0.50 to 2.00", "1.0"), ("", "1.0"), ("", "")]
