@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from . import cli_check, cli_contract, cli_data, cli_diagnosis, cli_import, cli_leaderboard
+from . import cli_check, cli_contract, cli_data, cli_diagnosis, cli_import, cli_leaderboard, cli_report
 from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, parse_seeds, print_json, show_boards
 from .errors import InputError, ShipbenchError
 
@@ -48,6 +48,7 @@ cli_diagnosis.register(app)
 cli_contract.register(app)
 cli_check.register(cli_data.data_app, cli_diagnosis.suite_app)
 cli_leaderboard.register(app)
+cli_report.register(app)
 
 
 def _show_version(wanted: bool) -> None:

@@ -113,7 +113,7 @@ def choose_runs(rows: Frame, models: Sequence[str]) -> dict[str, str]:
     return {name: str(order[round(q * (len(order) - 1))]) for name, q in places.items()}
 
 
-def _outline(x: float, y: float, psi: float, L: float, B: float) -> np.ndarray:
+def outline(x: float, y: float, psi: float, L: float, B: float) -> np.ndarray:
     """Corners (east, north) [m] of a ship's deck with its bow at heading `psi` [rad]."""
     ahead = L * np.array([0.5, 0.3, -0.44, -0.5, -0.5, -0.44, 0.3])
     starboard = B * np.array([0.0, 0.5, 0.5, 0.3, -0.3, -0.5, -0.5])
@@ -161,7 +161,7 @@ def _track(
     axis.plot(path[:, Y], path[:, X], color=color, linestyle=linestyle, lw=2.6 if fill else 1.8, label=label, zorder=2 if fill else 3)
     quarters = np.linspace(0, len(path) - 1, 5).round().astype(int)
     for k in quarters if fill else quarters[-1:] if label != "oracle" else []:
-        corners = _outline(path[k, X], path[k, Y], path[k, PSI], summary["ship_L"], summary["ship_B"])
+        corners = outline(path[k, X], path[k, Y], path[k, PSI], summary["ship_L"], summary["ship_B"])
         axis.fill(*corners.T, facecolor="0.85" if fill else "none", edgecolor=color, lw=0.9, alpha=0.9, zorder=1 if fill else 3)
 
 
