@@ -16,6 +16,7 @@ from shipbench.bench.report.beside import _numbers
 from shipbench.bench.report.page import _table, write_report
 from shipbench.bench.report.pictures import track
 from shipbench.bench.report.series import Track, gather
+from shipbench.bench.report.slicing import regime_errors
 from shipbench.bench.report.svg import Axes, limits, path, ticks
 from shipbench.bench.results import read_results
 from shipbench.bench.runner import run_tasks
@@ -169,13 +170,18 @@ def test_the_growth_ends_at_the_median_error_of_the_rows(study):
 
 
 def test_regimes_are_means_over_the_windows_of_the_slice(study, tmp_path):
-    text = page_of(study, tmp_path).path.read_text()
-    rows = read_results([study]).rows
-    held = rows[rows["model"] == "hold"].set_index("run")["ed"]
+    results = read_results([study])
+    held = results.rows[results.rows["model"] == "hold"].set_index("run")["ed"]
     astern = f"r4 {HOSTILE}"
-    table = text[text.index("ED [m] by astern") :]
-    cells = re.findall(r'<td class="number" data-by="([\d.]+)">', table[table.index(">hold<") :])[:2]
-    assert [float(c) for c in cells] == pytest.approx([held.drop(astern).mean(), held[astern]])
+    expected = [held.drop(astern).mean(), held[astern]]
+    (drawn,) = [r for r in regime_errors(results.rows, results.windows, ["hold"]) if r.name == "astern"]
+    assert (drawn.labels, drawn.counts) == (("never astern", "astern"), (8, 1))
+    assert drawn.values["hold"] == pytest.approx(expected)
+    text = page_of(study, tmp_path).path.read_text()
+    table = text[text.index("<summary>Regime slices") :]
+    for label, value in zip(drawn.labels, expected, strict=True):
+        row = table[table.index(f">{label}<") :].split("</tr>")[0]
+        assert any(float(v) == pytest.approx(value) for v in re.findall(r'class="number" data-by="([\d.]+)">', row))
 
 
 def diagnosis(folder: Path, fingerprint: str, dataset: str = "toy") -> Path:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ..leaderboard import Board, build_board
+from ..leaderboard import Board, build_board, scores_of
 from ..provenance import code_version
 from ..results import Frame, Results
 from ..tables import Table, TableColumn
@@ -92,7 +92,7 @@ def _section(number: int, results: Results, board: Board, given: Sequence[Path],
     scored = set(rows.loc[rows["status"] == "ok", "model"])
     models = [m for m in board.ranking if m in scored]
     series = gather(results, board.dataset, models, points)
-    found = regime_errors(rows, series.windows, models)
+    found = regime_errors(rows, scores_of(results, board.dataset).windows, models)
     return {
         "id": f"d{number}", "name": board.dataset, "head": board.head, "models": [_model(i, m) for i, m in enumerate(models)],
         "tables": [_table(t) for t in board.tables], "tracks": _tracks(series, rows, models, summary),

@@ -14,8 +14,7 @@ import numpy as np
 from ...metrics.ed import ed
 from ...records import Batch
 from ...signals import PSI, X, Y, wrap_angle
-from ..regimes import window_features
-from ..results import Cell, Frame, Results, read_predictions, read_truth
+from ..results import Cell, Results, read_predictions, read_truth
 
 POINTS = 250_000
 """Points of all tracks of one page together; a point takes some ten characters, so that a page stays below 4 MB."""
@@ -37,12 +36,11 @@ class Track:
 @dataclass(frozen=True, eq=False)
 class Series:
     """Of one data set: `t` (knots,) [s]; tracks by window; errors of each model by window, position [m] and heading [deg], (windows, knots);
-    `windows`: what the true ship does in each (`run` and `window_features`; None without truth); `left_out`: lines on what is not drawn."""
+    `left_out`: lines on what is not drawn."""
 
     t: np.ndarray
     tracks: list[Track]
     errors: dict[str, tuple[np.ndarray, np.ndarray]]
-    windows: Frame | None
     left_out: list[str]
 
 
@@ -80,7 +78,6 @@ class _Reading:
         self.chosen, self.most, self.thinned = chosen, most, 0
         self.tracks: dict[str, Track] = {}
         self.errors: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
-        self.windows: dict[tuple[Path, int], Frame] = {}
         self.missing: list[str] = []
         self.t = np.zeros(0)
         self._truth: dict[tuple[Path, int], Batch] = {}
@@ -88,7 +85,7 @@ class _Reading:
     def take(self, summary: dict[str, Any], source: Path) -> None:
         cell = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"])
         try:
-            batch = self._batch(cell, source, float(summary["ship_L"]))
+            batch = self._batch(cell, source)
             S = read_predictions(source, cell)
         except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             reason = " ".join(str(error).split())
@@ -107,13 +104,9 @@ class _Reading:
         self._errors(summary, batch.truth[ok], S[ok])
         self._tracks(cell.model, batch, S)
 
-    def _batch(self, cell: Cell, source: Path, L: float) -> Batch:
-        import pandas as pd
-
+    def _batch(self, cell: Cell, source: Path) -> Batch:
         if (source, cell.fold) not in self._truth:
-            batch = read_truth(source, cell.dataset, cell.fold)
-            self._truth = {(source, cell.fold): batch}  # one at a time
-            self.windows[source, cell.fold] = pd.DataFrame({"run": list(batch.ids)} | window_features(batch, L))
+            self._truth = {(source, cell.fold): read_truth(source, cell.dataset, cell.fold)}  # one at a time
         return self._truth[source, cell.fold]
 
     def _errors(self, summary: dict[str, Any], truth: np.ndarray, S: np.ndarray) -> None:
@@ -134,12 +127,9 @@ class _Reading:
                 self.tracks[run].predicted[model] = np.concatenate([batch.s0[i : i + 1], S[i]])[knots][:, pose]
 
     def series(self, order: Sequence[str], left_out: list[str]) -> Series:
-        import pandas as pd
-
-        windows = pd.concat(self.windows.values(), ignore_index=True).drop_duplicates("run") if self.windows else None
         errors = {m: (np.concatenate([e for e, _ in parts]), np.concatenate([h for _, h in parts])) for m, parts in self.errors.items()}
         tracks = [self.tracks[run] for run in sorted(order) if run in self.tracks]
-        return Series(self.t, tracks, {m: e for m, e in errors.items() if len(e[0])}, windows, left_out)
+        return Series(self.t, tracks, {m: e for m, e in errors.items() if len(e[0])}, left_out)
 
 
 def _thin(count: int, most: int) -> np.ndarray:
