@@ -10,8 +10,9 @@ _NO_PARAMETERS = ("ci95", "scale_")
 def count_parameters(model: Any) -> int | None:
     """Numbers that `fit` set in `model`; None where that cannot be told.
 
-    A foreign model may say it itself: `num_parameters`, a number or a method. Of ours the saved arrays are counted, without intervals, scales of
-    inputs and outputs, and a hybrid's copy of its physics. Torch modules held as attributes are counted for any other model.
+    A model may say it itself: `num_parameters`, a number or a method (None: it cannot tell). Of others of ours the saved arrays are counted,
+    without intervals, scales of inputs and outputs, and a hybrid's copy of its physics. Torch modules held as attributes are counted for any
+    other model.
     """
     try:
         return _count(model)
@@ -20,9 +21,9 @@ def count_parameters(model: Any) -> int | None:
 
 
 def _count(model: Any) -> int | None:
-    said = getattr(model, "num_parameters", None)
-    if said is not None:
-        return int(said() if callable(said) else said)
+    if hasattr(model, "num_parameters"):
+        said = model.num_parameters() if callable(model.num_parameters) else model.num_parameters
+        return None if said is None else int(said)
     arrays = getattr(model, "_arrays", None)
     if callable(arrays):
         found = arrays()

@@ -251,7 +251,7 @@ def _force_map(trace: Trace, j: int, caption: str, factor: float) -> Panel:
         image = ax.imshow(force, aspect="auto", cmap=_two_colours(), vmin=-reach, vmax=reach, extent=extent, interpolation="nearest")
         bar = ax.figure.colorbar(image, ax=ax, pad=0.04, fraction=0.06)
         bar.outline.set_visible(False)
-        bar.solids.set_rasterized(True)  # its 256 stripes would show their seams
+        bar.solids.set_rasterized(True)  # type: ignore[union-attr]  # its 256 stripes would show their seams
         bar.ax.locator_params(nbins=5)
         ax.set_xlabel("time [s]")
         ax.set_ylabel("run" if len(force) == len(trace.names) else "piece of a run")

@@ -36,7 +36,8 @@ class Predictor(Protocol):
 
     `predict(s0, U, history)`: s0 (batch, 10), U (batch, K, inputs) -> S (batch, K, 10), S[:, k] at t_k+1. A class may also offer the
     class method `fit_group(models, trains, valids, seeds)`, which fits many at once (folds and seeds) in place; `skip(dataset)`, which says why it
-    cannot take a data set, or None; `seeded = False` where nothing is drawn; `earth_fixed = True` where it knows a place on earth.
+    cannot take a data set, or None; `num_parameters`, how many numbers a fit sets; `seeded = False` where nothing is drawn;
+    `earth_fixed = True` where it knows a place on earth.
     """
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Any: ...

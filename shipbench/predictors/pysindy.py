@@ -140,6 +140,10 @@ class PySINDy(PredictorBase):
         rates = ", ".join(f"d{n}/dt {s:.4g}" for n, s in zip(STATES[VELOCITY], f["scale_rate"], strict=True))
         return "\n".join([*lines, "divided by: " + ", ".join(f"{n} {s:.4g}" for n, s in zip(names, sizes, strict=True)) + "; " + rates])
 
+    def num_parameters(self) -> int:
+        """Coefficients that are not zero, and the lags and rates of the actuators."""
+        return int(np.count_nonzero(self._found["coefficients"]) + np.size(self._found["actuators"]))
+
     def _arrays(self) -> dict[str, np.ndarray]:
         return self._found
 

@@ -132,6 +132,13 @@ class SklearnOneStep(PredictorFamily):
             raise InputError("sklearn: predict was called before fit; fit or load the model first.")
         return one_step_rollout(self._step, s0, U, InputFeatures(self.inputs), self._dt, increment=self.target == "increment")
 
+    def num_parameters(self) -> int | None:
+        """Coefficients and intercepts of a linear regressor; None for any other, which keeps its numbers in ways of its own."""
+        found = getattr(self._fitted, "estimators_", [self._fitted])  # one for each channel, or one for all
+        if not all(hasattr(linear, "coef_") for linear in found):
+            return None
+        return sum(np.size(linear.coef_) + np.size(linear.intercept_) for linear in found)
+
     def _probe(self) -> np.ndarray:
         """What the fitted regressor says of a few training samples."""
         return self._step(torch.from_numpy(self._x[:: max(1, len(self._x) // 20)])).numpy()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 import torch
 
@@ -45,6 +47,22 @@ def test_ours_count_weights_and_physics_once(harbour):
     assert count("mlp[epochs=1,hidden=5]") == 11 * 5 + 5 + 2 * (5 * 5 + 5) + 5 * 7 + 7
     net = 7 * 4 + 4 + 4 * 4 + 4 + 4 * 3 + 3
     assert count("neural_ode[epochs=1,hidden=4]") == 11 + 6 + net
+
+
+def test_adapters_count_coefficients_and_not_what_they_keep_for_loading(harbour):
+    pytest.importorskip("sklearn")
+    train = harbour.subset(range(6))
+
+    def count(spec):
+        return count_parameters(make_predictor(parse_spec(spec)).fit(train, seed=0))
+
+    features = 7 + 4
+    assert count("sklearn:Ridge") == count("sklearn:BayesianRidge") == 7 * (features + 1)
+    assert count("sklearn:DecisionTreeRegressor[max_depth=2]") is None
+    pytest.importorskip("pysindy")
+    sparse = make_predictor(parse_spec("pysindy")).fit(train, seed=0)
+    equations = sparse.describe().split("divided by")[0]
+    assert count_parameters(sparse) == 6 + len(re.findall(r" [+-][\d.]+", equations))  # the actuators, and what the equations show
 
 
 def test_the_table_has_the_mean_over_cells_of_those_that_tell():
