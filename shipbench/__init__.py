@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from .bench.results import read_results
     from .bench.runner import run_tasks
     from .bench.task import Task, load_tasks
+    from .contract.check import check_model
     from .data.base import DATASETS, load_dataset
     from .errors import InputError, ShipbenchError, WorkError
     from .metrics.base import METRICS
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "build_board": "bench.leaderboard", "write_boards": "bench.leaderboard", "read_results": "bench.results",
-    "run_tasks": "bench.runner", "Task": "bench.task", "load_tasks": "bench.task",
+    "run_tasks": "bench.runner", "Task": "bench.task", "load_tasks": "bench.task", "check_model": "contract.check",
     "DATASETS": "data.base", "load_dataset": "data.base",
     "InputError": "errors", "ShipbenchError": "errors", "WorkError": "errors", "METRICS": "metrics.base",
     "PREDICTORS": "predictors.base", "Predictor": "predictors.base", "PredictorBase": "predictors.base",
@@ -32,7 +33,7 @@ _HOME = {
 
 __all__ = [
     "DATASETS", "METRICS", "PREDICTORS", "Batch", "Dataset", "InputError", "Predictor", "PredictorBase", "Run", "Ship", "ShipbenchError",
-    "Task", "WorkError", "__version__", "build_board", "load_dataset", "load_tasks", "make_predictor", "parse_spec", "read_results",
+    "Task", "WorkError", "__version__", "build_board", "check_model", "load_dataset", "load_tasks", "make_predictor", "parse_spec", "read_results",
     "run_tasks", "write_boards",
 ]  # fmt: skip
 

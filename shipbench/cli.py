@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from . import cli_check, cli_data, cli_diagnosis, cli_import
-from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, print_json
+from . import cli_check, cli_contract, cli_data, cli_diagnosis, cli_import, cli_leaderboard, cli_report
+from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, parse_seeds, print_json, show_boards
 from .errors import InputError, ShipbenchError
-
-if TYPE_CHECKING:
-    from .bench.leaderboard import Board
-    from .bench.results import Results
 
 
 class _Group(TyperGroup):
@@ -35,9 +31,9 @@ class _Group(TyperGroup):
         except ShipbenchError as error:
             code, text = 1, str(error)
         except OSError as error:
-            if error.filename is None:
+            if error.errno is None:
                 raise
-            code, text = 1, f"{error.filename}: {error.strerror}."
+            code, text = 1, f"{error.filename or 'a file'}: {error.strerror}."
         typer.echo(f"error: {text}", err=True)
         raise typer.Exit(code)
 
@@ -49,7 +45,10 @@ app = typer.Typer(
 cli_data.register(app)
 cli_import.register(cli_data.data_app)
 cli_diagnosis.register(app)
+cli_contract.register(app)
 cli_check.register(cli_data.data_app, cli_diagnosis.suite_app)
+cli_leaderboard.register(app)
+cli_report.register(app)
 
 
 def _show_version(wanted: bool) -> None:
@@ -67,15 +66,6 @@ def _main(
     pass
 
 
-def _seeds(text: str | None) -> tuple[int, ...] | None:
-    if text is None:
-        return None
-    try:
-        return tuple(int(s) for s in text.replace(",", " ").split())
-    except ValueError:
-        raise InputError(f"--seeds {text}: not a list of whole numbers; write --seeds 0,1,2.") from None
-
-
 @app.command()
 def run(
     ctx: typer.Context,
@@ -83,36 +73,45 @@ def run(
     dataset: Annotated[list[str] | None, typer.Option("-d", "--dataset", help="Registered name or folder; may be repeated.")] = None,
     config: Annotated[str | None, typer.Option("-c", "--config", help="Task file (TOML), or the name of a shipped one: paper, smoke.")] = None,
     folds: Annotated[int | None, typer.Option(help="Number of folds (default 5).")] = None,
-    split: Annotated[str | None, typer.Option(help="folds or published.")] = None,
+    split: Annotated[str | None, typer.Option(help="folds, published, kind (leave one kind of manoeuvre out) or speed (score the fastest).")] = None,
     seeds: Annotated[str | None, typer.Option(help="Seeds, such as 0,1,2 (default 0).")] = None,
     horizon: Annotated[float | None, typer.Option(help="Seconds to predict (default 120).")] = None,
     history: Annotated[float | None, typer.Option(help="Seconds before the start that models may use (default 0).")] = None,
     stride: Annotated[float | None, typer.Option(help="Seconds between scored windows (default: the horizon).")] = None,
     max_runs: Annotated[int | None, typer.Option(help="Use only that many runs, evenly spread.")] = None,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for the results (default runs/<name>).")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Keep what the same code, data and task finished before.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Keep what the same code, data and task scored before.")] = False,
+    executor: Annotated[str, typer.Option(help="Where the cells run: local, processes or dask; the numbers are the same.")] = "local",
+    workers: Annotated[int | None, typer.Option(help="Number of processes at a time (default: one for each CPU).")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Address of the Dask scheduler, such as tcp://host:8786.")] = None,
+    time_limit: Annotated[float | None, typer.Option(help="Most seconds for one cell (fit and prediction); beyond, it fails.")] = None,
+    memory_limit: Annotated[float | None, typer.Option(help="Most GB of memory for one cell; beyond, it fails.")] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Fit, roll out and score models; print the leaderboard."""
+    from .bench.executors import Execution
+    from .bench.isolate import Limits
+    from .bench.leaderboard import write_boards
     from .bench.progress import make_progress
     from .bench.results import slug
     from .bench.runner import run_tasks
     from .bench.task import load_tasks
 
     overrides = {
-        "models": model or None, "datasets": dataset or None, "folds": folds, "split": split, "seeds": _seeds(seeds),
+        "models": model or None, "datasets": dataset or None, "folds": folds, "split": split, "seeds": parse_seeds(seeds),
         "horizon_s": horizon, "history_s": history, "stride_s": stride, "max_runs": max_runs,
     }  # fmt: skip
+    execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit))
     tasks = load_tasks(config, overrides)
     folder = out or Path("runs") / (Path(config).stem if config else slug(Path(tasks[0].dataset).name))
-    outcome = run_tasks(tasks, folder, resume=resume, progress=make_progress(quiet), command=str(ctx.obj))
-    written = _write_boards(outcome.results, folder, str(ctx.obj))
+    outcome = run_tasks(tasks, folder, resume=resume, execution=execution, progress=make_progress(quiet), command=str(ctx.obj))
+    written = write_boards(outcome.results, folder, str(ctx.obj))
     if as_json:
         boards = {board.dataset: board.as_json() for board, _ in written}
         print_json({"out": str(folder), "leaderboards": boards, "failed": outcome.failed})
     elif not quiet:
-        _show_boards(written)
+        show_boards([board for board, _ in written])
         typer.echo(f"Results in {folder}; leaderboard: {', '.join(str(path) for _, path in written)}")
         if equations := sorted(folder.glob("cells/*/*/*/equations.txt")):
             typer.echo(f"Fitted equations of {len(equations)} models beside their predictions, e.g. {equations[0]}")
@@ -121,47 +120,6 @@ def run(
         for line in outcome.failed:
             typer.echo(f"  {line}", err=True)
         raise typer.Exit(1)
-
-
-def _write_boards(results: Results, folder: Path, command: str, plots: bool = True) -> list[tuple[Board, Path]]:
-    from .bench.leaderboard import write_boards
-
-    return write_boards(results, folder, command, plots=plots)
-
-
-def _show_boards(written: list[tuple[Board, Path]]) -> None:
-    console = console_for_tables()
-    for board, _ in written:
-        console.print(f"\nLeaderboard: {board.dataset}", style="bold", markup=False)
-        for table in board.tables:
-            table.show(console)
-
-
-@app.command()
-def leaderboard(
-    ctx: typer.Context,
-    results: Annotated[list[Path] | None, typer.Argument(metavar="[RESULTS]...", help="Result folders (default: the newest below runs/).")] = None,
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the pages.")] = Path("leaderboards"),
-    plots: Annotated[bool, typer.Option(help="Draw the plots.")] = True,
-    quiet: Quiet = False,
-    as_json: Json = False,
-) -> None:
-    """Render leaderboards and plots from results."""
-    from .bench.results import read_results
-
-    written = _write_boards(read_results(results or [_newest_results()]), out, str(ctx.obj), plots)
-    if as_json:
-        print_json({board.dataset: board.as_json() for board, _ in written})
-    elif not quiet:
-        _show_boards(written)
-        typer.echo(f"Written: {', '.join(str(path) for _, path in written)}")
-
-
-def _newest_results() -> Path:
-    found = sorted(Path("runs").glob("*/study.json"), key=lambda p: p.stat().st_mtime)
-    if not found:
-        raise InputError("no results below runs/; give result folders, or run `shipbench run` first.")
-    return found[-1].parent
 
 
 @app.command()
@@ -178,6 +136,8 @@ def models(as_json: Json = False) -> None:
         typer.echo(f"{part['name']:<12s} {part['summary']}" + ("" if part["from"] == "shipbench" else f"  [{part['from']}]"))
         if part["parameters"]:
             typer.echo(" " * 13 + ", ".join(f"{k}={v}" if v else k for k, v in part["parameters"].items()))
+        if part["unusable"]:
+            typer.echo(" " * 13 + f"NOT USABLE HERE: {part['unusable']}")
     typer.echo("\nA spec sets parameters in brackets, such as 'mlp[hidden=64,seed=3]'; your own class: path/to/model.py:ClassName.")
 
 

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .errors import InputError
+
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from .bench.leaderboard import Board
 
 SETTINGS: dict[str, Any] = {"context_settings": {"help_option_names": ["-h", "--help"]}, "no_args_is_help": True}
 """Of every group of commands."""
@@ -28,3 +33,29 @@ def console_for_tables() -> Console:
 
     console = Console(highlight=False, soft_wrap=False)
     return console if console.is_terminal else Console(highlight=False, width=160)
+
+
+def parse_numbers(option: str, text: str) -> tuple[int, ...]:
+    """The whole numbers of an option such as `--seeds 0,1,2`.
+
+    Raises:
+        InputError: it is no such list.
+    """
+    try:
+        return tuple(int(s) for s in text.replace(",", " ").split())
+    except ValueError:
+        raise InputError(f"{option} {text}: not a list of whole numbers; write {option} 0,1,2.") from None
+
+
+def parse_seeds(text: str | None) -> tuple[int, ...] | None:
+    """`--seeds`, or None where it is not given."""
+    return None if text is None else parse_numbers("--seeds", text)
+
+
+def show_boards(boards: Sequence[Board]) -> None:
+    """Print leaderboards on a terminal."""
+    console = console_for_tables()
+    for board in boards:
+        console.print(f"\n{board.title}", style="bold", markup=False)
+        for table in board.tables:
+            table.show(console)

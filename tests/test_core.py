@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint
-
 import numpy as np
 import pytest
 
-from shipbench.data.base import DATASETS
 from shipbench.errors import InputError
 from shipbench.integrate import rk4_step
-from shipbench.predictors.base import PREDICTORS, make_predictor
 from shipbench.records import Dataset, Run
 from shipbench.registry import Registry
 from shipbench.ship import Ship, complete
@@ -104,35 +100,6 @@ def test_listing_a_registry_imports_nothing_and_a_misspelling_is_met_with_a_sugg
     assert "base" not in registry.names()
     with pytest.raises(InputError, match="Did you mean 'lstm'"):
         registry.get("lstn")
-
-
-def _installed(monkeypatch, *points: EntryPoint) -> None:
-    """As if packages had registered these entry points."""
-    monkeypatch.setattr("shipbench.registry.entry_points", lambda group: [p for p in points if p.group == group])
-
-
-def test_a_model_of_an_installed_package_is_found_by_its_entry_point(monkeypatch):
-    _installed(monkeypatch, EntryPoint("mine", "shipbench.predictors.hold:Hold", "shipbench.predictors"))
-    assert "mine" in PREDICTORS.names()
-    assert make_predictor(parse_spec("mine")).name == "hold"
-
-
-def test_data_sets_of_packages_use_the_group_of_the_contract(monkeypatch):
-    _installed(monkeypatch, EntryPoint("tank", "shipbench.data.harbour90:DATASET", "shipbench.datasets"))
-    assert "tank" in DATASETS.names()
-
-
-def test_a_package_that_takes_a_name_of_ours_is_refused(monkeypatch):
-    _installed(monkeypatch, EntryPoint("lstm", "their.package:Model", "shipbench.predictors"))
-    with pytest.raises(InputError, match=r"'lstm' is defined twice.*their\.package"):
-        PREDICTORS.names()
-
-
-def test_a_broken_plug_in_stays_listed_and_raises_its_own_error_when_asked_for(monkeypatch):
-    _installed(monkeypatch, EntryPoint("broken", "no_such_package:Model", "shipbench.predictors"))
-    assert "broken" in PREDICTORS.names()
-    with pytest.raises(ModuleNotFoundError, match="no_such_package"):
-        make_predictor(parse_spec("broken"))
 
 
 def test_what_a_ship_file_leaves_out_is_estimated_and_said_so():

@@ -4,17 +4,41 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from shipbench.bench.leaderboard import build_board
-from shipbench.bench.results import STATUSES, read_results
+from shipbench.bench.folds import make_folds, select_runs
+from shipbench.bench.leaderboard import build_board, scores_of
+from shipbench.bench.overall import over_data_sets
+from shipbench.bench.regimes import window_features
+from shipbench.bench.results import PROTOCOL, STATUSES, read_results
+from shipbench.bench.task import load_tasks
+from shipbench.data.base import load_dataset
 
 FOLDER = Path(__file__).parent.parent / "leaderboards"
 STUDIES = sorted(p.parent for p in FOLDER.glob("results/*/rows.parquet"))
 
 
+FINGERPRINTS = {"harbour90": "e102babe79cc29d8", "harbour90_noisy": "10a8bd89a404cf35", "esso_osaka": "97bfd8cf5c3a1622"}
+KNOWN = {task.dataset: task for path in (FOLDER.parent / "configs").glob("*.toml") for task in load_tasks(path) if path.stem != "smoke"}
+"""The tasks of the shipped configs, by data set: what a committed submission may be of."""
+ALLOWED = {"rows.parquet", "summary.json", "windows.parquet"}
+MOST_BYTES = 2_000_000
+
+
 def test_there_are_results():
     assert {p.name for p in STUDIES} >= {"paper", "esso_osaka"}
+
+
+def test_every_folder_of_results_is_a_submission():
+    assert sorted(p for p in (FOLDER / "results").iterdir()) == STUDIES
+
+
+@pytest.mark.parametrize("study", STUDIES, ids=lambda p: p.name)
+def test_a_submission_holds_rows_summary_and_windows_and_nothing_else(study):
+    names = {p.name for p in study.iterdir()}
+    assert {"rows.parquet", "summary.json"} <= names <= ALLOWED
+    assert sum(p.stat().st_size for p in study.iterdir()) < MOST_BYTES
 
 
 @pytest.fixture(scope="module", params=STUDIES, ids=lambda p: p.name)
@@ -23,7 +47,7 @@ def results(request):
 
 
 def test_rows_are_complete_and_not_repeated(results):
-    rows = results.rows
+    rows = results.rows  # schema, protocol, statuses and duplicates are checked by read_results
     assert not rows.duplicated(["dataset", "model", "fold", "seed", "run"]).any()
     assert set(rows["status"]) <= set(STATUSES)
     assert rows.loc[rows["status"] == "ok", "ed"].notna().all()
@@ -31,11 +55,46 @@ def test_rows_are_complete_and_not_repeated(results):
         assert part.groupby(["model", "seed"])["run"].nunique().nunique() == 1, "every model has a row for every run"
 
 
+def test_the_task_is_that_of_a_shipped_config_on_one_known_data_set(results):
+    for summary in results.summaries:
+        task = KNOWN[summary["dataset"]]
+        assert summary["task_key"] == task.key(FINGERPRINTS[summary["dataset"]])
+        assert summary["fingerprint"] == FINGERPRINTS[summary["dataset"]]
+        assert summary["protocol"] == PROTOCOL
+
+
+def test_no_submission_repeats_or_contradicts_another():
+    together = read_results(STUDIES)
+    assert len(together.rows) == sum(len(read_results([study]).rows) for study in STUDIES)
+
+
 def test_every_figure_of_the_page_comes_from_the_rows(results):
     for dataset in results.rows["dataset"].unique():
         page = (FOLDER / f"{dataset}.md").read_text()
-        for table in build_board(results, dataset).tables:
+        tables = build_board(results, dataset).tables
+        for table in tables:
             assert table.markdown().strip() in page
+        assert page.count("\n## ") == len(tables), "nothing stands on the page that is not rendered"
+
+
+def test_the_page_over_data_sets_is_that_of_the_paper():
+    paper = read_results([FOLDER / "results/paper"])
+    overall = over_data_sets([scores_of(paper, name) for name in ("harbour90", "harbour90_noisy")])
+    assert overall.board.tables[0].markdown().strip() in (FOLDER / "over-data-sets.md").read_text()
+
+
+@pytest.mark.parametrize("dataset", ["harbour90", "harbour90_noisy"])
+def test_the_windows_are_those_of_the_data_set(dataset):
+    """What stands in `windows.parquet` is computed again from the data set itself."""
+    task = KNOWN[dataset]
+    data, _ = select_runs(load_dataset(dataset), task)
+    assert data.fingerprint == FINGERPRINTS[dataset]
+    windows = read_results([FOLDER / "results/paper"]).windows
+    for fold in make_folds(data, task):
+        batch = fold.test.batch()
+        there = windows[(windows["dataset"] == dataset) & (windows["fold"] == fold.index)].set_index("run").loc[list(batch.ids)]
+        for name, values in window_features(batch, data.ship.L).items():
+            np.testing.assert_allclose(there[name], values, rtol=1e-9, err_msg=name)
 
 
 def test_pages_name_the_command_that_made_them(results):
@@ -47,7 +106,7 @@ def readme_table(results_folder: Path, dataset: str) -> list[str]:
     """Lines of the README's short table of a data set."""
     board = build_board(read_results([results_folder]), dataset)
     rows = {row["model"]: row for row in board.tables[0].rows if not row.get("_reference")}
-    rest = {row["model"]: row for row in board.tables[1 + (dataset == "harbour90")].rows}
+    rest = {row["model"]: row for row in next(t for t in board.tables if t.title == "Error against horizon").rows}
     lines = []
     for model in board.ranking:
         row, more = rows[model], rest[model]

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from shipbench.bench.task import load_tasks
+from shipbench.contract.base import BROKEN
+from shipbench.contract.check import check_model
 from shipbench.predictors.base import make_predictor, parse_spec
 
 ROOT = Path(__file__).parent.parent
@@ -30,6 +32,7 @@ def test_the_model_of_ones_own_runs_from_its_file(tmp_path, harbour):
     model = make_predictor(parse_spec(f"{path}:Drift")).fit(harbour)
     batch = harbour.batch()
     assert np.isfinite(model.predict(batch.s0, batch.U)).all()
+    assert check_model(f"{path}:Drift").of(BROKEN) == []
 
 
 @pytest.mark.parametrize("config", sorted(set(re.findall(r"--config (\S+\.toml)", README))))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,28 +46,32 @@ def toy() -> Callable[..., Dataset]:
     return make
 
 
+def write_toy_folder(folder: Path, runs: int = 6, steps: int = 40, *, drop: str = "", spoil: tuple[int, str, str] | None = None) -> Path:
+    """A data set folder named after `folder`: `drop` leaves a column out, `spoil` puts a value (row, column, text) into the table."""
+    folder.mkdir()
+    header = [c for c in ("trajectory", "t", *STATES, *COMMANDS) if c != drop]
+    rows = []
+    for i in range(runs):
+        S, C = sail(steps, i)
+        for k in range(steps + 1):
+            row = dict(zip((*STATES, *COMMANDS), [*S[k], *C[k]], strict=True)) | {"trajectory": f"r{i:02d}", "t": float(k)}
+            rows.append([row[c] for c in header])
+    if spoil is not None:
+        rows[spoil[0]][header.index(spoil[1])] = spoil[2]
+    with (folder / "trajectories.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([header, *rows])
+    (folder / "ship.toml").write_text(TOY_SHIP.to_toml())
+    (folder / "dataset.toml").write_text(
+        f'name = "{folder.name}"\nship = "ship.toml"\ndt = 1.0\nactuators = "measured"\nsource = "formula"\nlicence = "MIT"\n'
+    )
+    return folder
+
+
 @pytest.fixture
 def toy_folder(tmp_path: Path) -> Callable[..., Path]:
-    """Writes a data set folder: `drop` leaves a column out, `spoil` puts a value (row, column, text) into the table."""
+    """`write_toy_folder` below the test's own folder; `name` is the data set's."""
 
-    def write(runs: int = 6, steps: int = 40, *, drop: str = "", spoil: tuple[int, str, str] | None = None, name: str = "toyset") -> Path:
-        folder = tmp_path / name
-        folder.mkdir()
-        header = [c for c in ("trajectory", "t", *STATES, *COMMANDS) if c != drop]
-        rows = []
-        for i in range(runs):
-            S, C = sail(steps, i)
-            for k in range(steps + 1):
-                row = dict(zip((*STATES, *COMMANDS), [*S[k], *C[k]], strict=True)) | {"trajectory": f"r{i:02d}", "t": float(k)}
-                rows.append([row[c] for c in header])
-        if spoil is not None:
-            rows[spoil[0]][header.index(spoil[1])] = spoil[2]
-        with (folder / "trajectories.csv").open("w", newline="") as file:
-            csv.writer(file).writerows([header, *rows])
-        (folder / "ship.toml").write_text(TOY_SHIP.to_toml())
-        (folder / "dataset.toml").write_text(
-            f'name = "{name}"\nship = "ship.toml"\ndt = 1.0\nactuators = "measured"\nsource = "formula"\nlicence = "MIT"\n'
-        )
-        return folder
+    def write(runs: int = 6, steps: int = 40, *, name: str = "toyset", **options: Any) -> Path:
+        return write_toy_folder(tmp_path / name, runs, steps, **options)
 
     return write

@@ -39,9 +39,14 @@ def sections(d: Diagnosis) -> list[tuple[str, str]]:
     ]  # fmt: skip
 
 
+def picture(panel: plots.Panel) -> str:
+    """A figure with its caption; a reader of the screen is told what it shows."""
+    svg = panel.svg.replace("<svg", f'<svg role="img" aria-label="{escape(panel.caption or panel.shows)}"', 1)
+    return f"<figure>{svg}" + (f"<figcaption>{escape(panel.caption)}</figcaption>" if panel.caption else "") + "</figure>"
+
+
 def _grid(panels: Iterable[plots.Panel]) -> str:
-    figures = [f"<figure>{p.svg}" + (f"<figcaption>{escape(p.caption)}</figcaption>" if p.caption else "") + "</figure>" for p in panels]
-    return f'<div class="grid">{"".join(figures)}</div>'
+    return f'<div class="grid">{"".join(map(picture, panels))}</div>'
 
 
 def _words(d: Diagnosis) -> str:
@@ -74,7 +79,7 @@ def _worst_runs(tables: ErrorTables) -> str:
 
 
 def _whiteness(trace: Trace, tables: ErrorTables) -> str:
-    white = [[name, f"{value:.2f}", "white" if value <= 1.0 else "not white"] for name, value in tables.white.items()]
+    white = [[name, f"{value:.2f}", "white" if value <= 1.0 else "not\N{NO-BREAK SPACE}white"] for name, value in tables.white.items()]
     against = sorted(tables.inputs.items(), key=lambda item: -item[1])
     beyond = [[name, label, f"{value:.2f}"] for (name, label), value in against if value > 1.0]
     text = table(["residual", "Ljung-Box over its 95 % limit", ""], white, numbers=(1,)) + _grid(plots.autocorrelations(trace))

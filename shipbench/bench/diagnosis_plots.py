@@ -21,6 +21,7 @@ from ..diagnosis.wrong import FORCE_UNITS, INPUTS, LAGS, RESIDUALS, ErrorTables,
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
 
 _INK, _BEFORE, _AFTER = "#010203", "#d55e01", "#0072b3"
 _CSS = {_INK: "currentColor", _BEFORE: "var(--before)", _AFTER: "var(--after)"}
@@ -34,23 +35,22 @@ _MOST_DOTS = 900
 
 
 class Panel(NamedTuple):
-    """One picture (an SVG element) and its caption (plain text, to be escaped)."""
+    """One picture (an SVG element), its caption, and where it has none what it shows, for those who do not see it (plain text, to be escaped)."""
 
     svg: str
     caption: str = ""
+    shows: str = ""
 
 
-def panel(
-    draw: Callable[[Axes], object], caption: str = "", width: float = 3.4, height: float = 2.5, left: float = 0.58, right: float = 0.1
-) -> Panel:
-    """Draw on fresh axes, `left` and `right` inches from the edges; no global state, no display."""
+def panel(draw: Callable[[Axes], object], caption: str = "", shows: str = "", width: float = 3.4, height: float = 2.5) -> Panel:
+    """Draw on fresh axes, which leave the room that labels and numbers take; no global state, no display."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     buffer = io.StringIO()
     with rc_context({**_RC, "svg.hashsalt": "shipbench"}):
-        figure = Figure(figsize=(width, height))
-        axes = figure.add_axes((left / width, 0.46 / height, 1.0 - (left + right) / width, 1.0 - 0.54 / height))
+        figure = Figure(figsize=(width, height), layout="constrained")
+        axes = figure.add_subplot()
         axes.patch.set_visible(False)
         draw(axes)
         figure.savefig(buffer, format="svg", transparent=True, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
@@ -61,7 +61,7 @@ def panel(
         text = text.replace(placeholder, css)
     own = hashlib.sha256(text.encode()).hexdigest()[:8]  # many pictures share a page: their ids must not
     text = re.sub(r'( id="|url\(#|href="#)', rf"\g<1>{own}", text)
-    return Panel(re.sub(r' width="[\d.]+pt" height="[\d.]+pt"| height="[\d.]+pt"', "", text, count=1), caption)
+    return Panel(re.sub(r' width="[\d.]+pt" height="[\d.]+pt"| height="[\d.]+pt"', "", text, count=1), caption, shows)
 
 
 def distances(trace: Trace, predicted: np.ndarray) -> np.ndarray:
@@ -103,7 +103,7 @@ def tracks(trace: Trace, changed: bool) -> list[Panel]:
 
         times = f" from {trace.start[b]:.0f} s" if trace.start[b] > 0 else ""
         change = f" -> {after[b]:.3g} m" if changed else " m"
-        found.append(panel(draw, f"{trace.names[int(trace.run[b])]}{times}: mean distance {before[b]:.3g}{change}", left=0.62))
+        found.append(panel(draw, f"{trace.names[int(trace.run[b])]}{times}: mean distance {before[b]:.3g}{change}"))
     return found
 
 
@@ -139,7 +139,7 @@ def growth(trace: Trace, changed: bool) -> list[Panel]:
             ax.set_ylim(bottom=0.0)
             ax.margins(x=0.0)
 
-        found.append(panel(draw))
+        found.append(panel(draw, shows=f"{label} against the time of prediction"))
     return found
 
 
@@ -163,7 +163,7 @@ def error_slices(trace: Trace, tables: ErrorTables, changed: bool) -> list[Panel
             ax.set_xlabel(_axis_text(name))
             ax.set_ylabel("error")
 
-        found.append(panel(draw, height=2.3))
+        found.append(panel(draw, shows=f"error against {_axis_text(name)}", height=2.3))
     return found
 
 
@@ -237,7 +237,7 @@ def forces(trace: Trace, tables: ErrorTables, changed: bool) -> list[Panel]:
             ax.set_xlim(0.0, max(10.0, 115.0 * max(f.share for f in rows)))
             ax.set_xlabel("share of the variance explained [%]")
 
-        found.append(panel(draw, f"What the missing {axis} force follows (pale: could be chance)", left=1.05))
+        found.append(panel(draw, f"What the missing {axis} force follows (pale: could be chance)"))
     return found
 
 
@@ -248,14 +248,23 @@ def _force_map(trace: Trace, j: int, caption: str, factor: float) -> Panel:
         reach = max(float(np.quantile(known, 0.98)), 1e-9) if len(known) else 1.0
         step = trace.knots[1] - trace.knots[0] if len(trace.knots) > 1 else 1.0
         extent = (trace.knots[0] - 0.5 * step, trace.knots[-1] + 0.5 * step, len(force) - 0.5, -0.5)
-        image = ax.imshow(force, aspect="auto", cmap="RdBu_r", vmin=-reach, vmax=reach, extent=extent, interpolation="nearest")
+        image = ax.imshow(force, aspect="auto", cmap=_two_colours(), vmin=-reach, vmax=reach, extent=extent, interpolation="nearest")
         bar = ax.figure.colorbar(image, ax=ax, pad=0.04, fraction=0.06)
         bar.outline.set_visible(False)
+        bar.solids.set_rasterized(True)  # type: ignore[union-attr]  # its 256 stripes would show their seams
         bar.ax.locator_params(nbins=5)
         ax.set_xlabel("time [s]")
         ax.set_ylabel("run" if len(force) == len(trace.names) else "piece of a run")
 
-    return panel(draw, caption, right=0.42)
+    return panel(draw, caption)
+
+
+def _two_colours() -> Colormap:
+    """Blue below zero, red above, nothing at zero: the page shows through there, light or dark."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    blue, red = (0.16, 0.47, 0.73), (0.82, 0.20, 0.16)
+    return LinearSegmentedColormap.from_list("two", [(0.0, (*blue, 1.0)), (0.5, (*blue, 0.0)), (0.5, (*red, 0.0)), (1.0, (*red, 1.0))])
 
 
 def _force_against(trace: Trace, j: int, name: str, x: np.ndarray, changed: bool, label: str, factor: float) -> Panel:
@@ -302,7 +311,7 @@ def gain_per_run(rows: Sequence[tuple[str, float, float]]) -> Panel:
         ax.set_xlim(-0.7, len(order) - 0.3)
         ax.set_ylim(bottom=0.0)
 
-    return panel(draw, width=6.8, height=2.6)
+    return panel(draw, shows="mean distance of every run before and after, from models that have not seen it", width=6.8, height=2.6)
 
 
 def changed(d: Diagnosis) -> bool:

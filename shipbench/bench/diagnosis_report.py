@@ -24,7 +24,7 @@ body { font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif;
 h1 { font-size: 1.55rem; line-height: 1.25; margin: .3rem 0 .8rem; overflow-wrap: anywhere; }
 h2 { font-size: 1.2rem; margin: 2.4rem 0 .5rem; padding-top: .6rem; border-top: 1px solid var(--line); }
 h3 { font-size: 1rem; margin: 1.2rem 0 .3rem; } p { max-width: 46rem; margin: .5rem 0; overflow-wrap: anywhere; }
-nav { font-size: .87rem; line-height: 1.9; margin: 1rem 0; } nav a { color: var(--accent); margin-right: .9rem; white-space: nowrap; }
+nav { font-size: .87rem; line-height: 1.9; margin: 1rem 0; } nav a { color: var(--accent); margin-right: .9rem; display: inline-block; }
 .verdict { background: var(--soft); border-left: .35rem solid var(--accent); padding: .8rem 1rem; font-size: 1.08rem; max-width: none; }
 .verdict.unknown, .warning { border-left: .35rem solid var(--warn); } .warning { background: var(--soft); padding: .5rem 1rem; max-width: none; }
 .small, figcaption { font-size: .85rem; opacity: .85; } .grid { display: grid; gap: .9rem; grid-template-columns: repeat(auto-fill,
@@ -81,7 +81,7 @@ def page(d: Diagnosis) -> str:
         ("What these data cannot tell apart", _confused(d)), ("What remains", _remains(d)), ("Next", _next(d)), ("How this was computed", _method(d)),
     ]  # fmt: skip
     sections = [(title, body) for title, body in sections if body]
-    links = "".join(f'<a href="#s{i}">{escape(title)}</a>' for i, (title, _) in enumerate(sections))
+    links = " ".join(f'<a href="#s{i}">{escape(title)}</a>' for i, (title, _) in enumerate(sections))
     body = [
         f"<h1>Diagnosis of {escape(d.dataset)}</h1>", f'<p class="verdict {escape(d.verdict)}">{escape(headline(d))}</p>',
         *(f'<p class="warning"><b>Warning:</b> {escape(w)}</p>' for w in d.warnings), f"<nav>{links}</nav>",
@@ -116,7 +116,8 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[
         stress = ' class="named"' if named and row[-1] == named else ""
         body += f"<tr{stress}>" + "".join(f"<td{kind(i)}>{escape(str(v))}</td>" for i, v in enumerate(row)) + "</tr>"
     top = f"<thead><tr>{cells}</tr></thead>" if any(head) else ""
-    return f'<div class="scroll"><table>{top}<tbody>{body}</tbody></table></div>'
+    says = f"Table of {escape(', '.join(filter(None, head)))}" if any(head) else "Table"
+    return f'<div class="scroll" tabindex="0" role="region" aria-label="{says}"><table>{top}<tbody>{body}</tbody></table></div>'
 
 
 def _causes(d: Diagnosis) -> str:
@@ -145,6 +146,7 @@ def _cause(c: Cause) -> str:
 def _gains(d: Diagnosis) -> str:
     if not d.gain_per_run:
         return ""
+    from .diagnosis_pictures import picture
     from .diagnosis_plots import gain_per_run
 
     rows = [
@@ -152,7 +154,7 @@ def _gains(d: Diagnosis) -> str:
     ]
     listed = table(["run", "before [m]", "after [m]", "less error"], rows, numbers=(1, 2, 3))
     return (
-        key(True) + f'<div class="wide"><figure>{gain_per_run(d.gain_per_run).svg}</figure></div>'
+        key(True) + f'<div class="wide" tabindex="0" role="region" aria-label="Gain per run">{picture(gain_per_run(d.gain_per_run))}</div>'
         + paragraph("Mean distance of every run, from models that were neither chosen nor fitted with it.", small=True)
         + f"<details><summary>Every run in figures</summary>{listed}</details>"
     )  # fmt: skip
@@ -202,7 +204,8 @@ def _next(d: Diagnosis) -> str:
     command = next_command(d)
     if not command:
         return ""
-    return f"<p>Extended model: <code>{escape(d.extended_model)}</code>. To compare it with the plain one:</p><pre>{escape(command)}</pre>"
+    words = f"<p>Extended model: <code>{escape(d.extended_model)}</code>. To compare it with the plain one:</p>"
+    return f'{words}<pre tabindex="0">{escape(command)}</pre>'
 
 
 _METHOD = """
@@ -218,6 +221,6 @@ looked for in the actuator alone. Gains are measured on runs that neither select
 def _method(d: Diagnosis) -> str:
     command = f"shipbench diagnose {shlex.quote(d.dataset)}"
     return (
-        f"<p>{_METHOD.strip()}</p><pre>{escape(command)}</pre>"
+        f"<p>{_METHOD.strip()}</p><pre tabindex='0'>{escape(command)}</pre>"
         f"<p class='small'>Data fingerprint <code>{escape(d.fingerprint)}</code>; {d.seconds:.0f} s.</p>"
     )

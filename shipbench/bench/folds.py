@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..records import Dataset, Run
+from ..signals import U, V
 from .task import Task
 
 
@@ -43,7 +44,8 @@ def select_runs(dataset: Dataset, task: Task) -> tuple[Dataset, tuple[str, ...]]
         sides = {side: {group_of(r) for r in usable if r.meta.get("split") == side} for side in ("train", "test")}
         for group in sorted(sides["train"] & sides["test"]):
             notes.append(f"the published split has pieces of '{group}' both in training and in test")
-    return dataset.with_runs(usable), tuple(notes)
+    selected = dataset.with_runs(usable)
+    return selected, (*notes, *split_notes(selected, task))
 
 
 def group_of(run: Run) -> str:
@@ -104,19 +106,112 @@ def _by_folds(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]
     return [([r for r in dataset.runs if r.id not in ids], [r for r in dataset.runs if r.id in ids]) for ids in parts]
 
 
+def kinds_of(dataset: Dataset) -> list[str]:
+    """The kinds of manoeuvre of a data set, in the order of the folds of split = "kind"."""
+    return sorted({str(r.meta.get("manoeuvre", "")) for r in dataset.runs})
+
+
+def _parted(dataset: Dataset, test: list[Run]) -> tuple[list[Run], list[Run]]:
+    """(rest, test): runs of a group that is scored train nothing."""
+    scored = {group_of(r) for r in test}
+    return [r for r in dataset.runs if group_of(r) not in scored], test
+
+
+def _by_kind(dataset: Dataset) -> list[tuple[list[Run], list[Run]]]:
+    kinds = kinds_of(dataset)
+    pairs = [_parted(dataset, [r for r in dataset.runs if str(r.meta.get("manoeuvre", "")) == kind]) for kind in kinds]
+    empty = [kind for kind, (rest, _) in zip(kinds, pairs, strict=True) if not rest]
+    if len(kinds) < 2 or empty:
+        why = f"without '{empty[0]}' no run is left to train on" if empty and len(kinds) > 1 else f"every run has manoeuvre = '{kinds[0]}'"
+        raise InputError(
+            f"split = 'kind', but in data set '{dataset.name}' {why}; name the kinds (two or more) with manoeuvre = \"..\" under [runs.<id>] "
+            "in dataset.toml, or use split = 'folds'."
+        )
+    return pairs
+
+
+def mean_speed(run: Run) -> float:
+    """Mean resultant speed of a run [m/s]."""
+    return float(np.hypot(run.states[:, U], run.states[:, V]).mean())
+
+
+def _by_speed(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]:
+    """Whole groups by their mean speed: the fastest are scored, until they are one `folds`-th of the runs."""
+    groups: dict[str, list[Run]] = {}
+    for run in dataset.runs:
+        groups.setdefault(group_of(run), []).append(run)
+    if len(groups) < 2:
+        raise InputError(
+            f"split = 'speed', but data set '{dataset.name}' has one group of runs only; two or more are needed. Use split = 'published'."
+        )
+    fastest = sorted(groups.values(), key=lambda group: -float(np.mean([mean_speed(r) for r in group])))
+    test: list[Run] = []
+    for group in fastest[:-1]:
+        test += group
+        if len(test) * task.folds >= len(dataset):
+            break
+    return [_parted(dataset, test)]
+
+
+def _fewer(rest: list[Run], task: Task, index: int) -> tuple[list[Run], int | None]:
+    """The training runs of a task with `train_runs`, whole groups in a random order that is the same for every number, and its `valid_runs`."""
+    if task.train_runs is None:
+        return rest, task.valid_runs
+    if task.train_runs > len(rest):
+        raise InputError(f"train_runs = {task.train_runs}, but fold {index} has {len(rest)} training runs; give at most {len(rest)}.")
+    kept: list[Run] = []
+    for group in _groups(rest, np.random.default_rng([task.fold_seed, index, 2])):
+        if len(kept) + len(group) <= task.train_runs:
+            kept += group
+    if len({group_of(r) for r in kept}) < 2:
+        raise InputError(
+            f"train_runs = {task.train_runs}: in fold {index} that is fewer than two groups of runs, one to fit and one for early stopping; "
+            "give more runs."
+        )
+    valid = task.valid_runs
+    return kept, valid if not valid else max(1, round(valid * len(kept) / len(rest)))
+
+
+def split_notes(dataset: Dataset, task: Task) -> tuple[str, ...]:
+    """What a reader must know of an extrapolation split: which fold scores which kind, or where the speeds part."""
+    if task.split == "kind":
+        pairs = _by_kind(dataset)
+        return tuple(
+            f"fold {i} scores '{kind}' ({len(test)} runs) after training on the other kinds ({len(rest)} runs)"
+            for i, (kind, (rest, test)) in enumerate(zip(kinds_of(dataset), pairs, strict=True))
+        )
+    if task.split == "speed":
+        [(rest, test)] = _by_speed(dataset, task)
+        slow, fast = sorted(map(mean_speed, rest)), sorted(map(mean_speed, test))
+        return (
+            f"trained on {len(rest)} runs with mean speeds of {slow[0]:.3g} to {slow[-1]:.3g} m/s, "
+            f"scored on the {len(test)} fastest with {fast[0]:.3g} to {fast[-1]:.3g} m/s",
+        )
+    return ()
+
+
+def _pairs(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]:
+    """(rest, test) of each fold."""
+    if task.split == "published":
+        return _published(dataset)
+    if task.split == "kind":
+        return _by_kind(dataset)
+    return _by_speed(dataset, task) if task.split == "speed" else _by_folds(dataset, task)
+
+
 def make_folds(dataset: Dataset, task: Task) -> list[Fold]:
-    """The folds of a task, the same for every model. The published split is a single fold.
+    """The folds of a task, the same for every model. The published split and the split by speed are a single fold.
 
     `dataset` holds whole runs (see `select_runs`). Training and validation windows do not overlap; scored windows are `stride_s` apart.
 
     Raises:
-        InputError: more folds than groups, too many validation runs, or no published split.
+        InputError: more folds than groups, too many training or validation runs, or no published split, or no kinds to tell apart.
     """
     steps, history, stride = task.steps(dataset.dt), task.history(dataset.dt), task.stride(dataset.dt)
-    pairs = _published(dataset) if task.split == "published" else _by_folds(dataset, task)
     folds = []
-    for index, (rest, test) in enumerate(pairs):
-        train, valid = _carve_valid(rest, task.valid_runs, np.random.default_rng([task.fold_seed, index, 1]))
+    for index, (rest, test) in enumerate(_pairs(dataset, task)):
+        rest, valid_runs = _fewer(rest, task, index)
+        train, valid = _carve_valid(rest, valid_runs, np.random.default_rng([task.fold_seed, index, 1]))
         folds.append(
             Fold(
                 index,

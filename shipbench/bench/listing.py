@@ -4,27 +4,39 @@ from __future__ import annotations
 
 import ast
 import importlib.util
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
+from ..errors import InputError
+from ..predictors.base import not_installed
 from ..records import Dataset
 from ..registry import Registry
 from ..ship import complete
-from .leaderboard import PAPER_DATASET
+from .board_tables import PAPER_DATASET
 from .tables import Table, TableColumn, number, significant
 
 
 def describe_parts(registry: Registry) -> list[dict[str, Any]]:
-    """For each registered part its name, one line on it, its parameters with their defaults as written, and where it comes from."""
-    plugins = {e.name: e.value for e in entry_points(group=f"shipbench.{registry.folder}")}
+    """For each registered part its name, one line on it, its parameters with their defaults as written, where it comes from, and why it
+    cannot be used here ("" where it can): an optional package is missing, or a plug-in (only these are imported) fails to import."""
     folder = Path(__file__).resolve().parent.parent / registry.folder
+    built_in, plugins = set(registry.built_in()), registry.plugins()
     parts = []
     for name in registry.names():
-        path = _source(plugins[name]) if name in plugins else folder / f"{name}.py"
-        summary, parameters = read_part(path, registry.attribute, plugins.get(name)) if path else ("", {})
-        parts.append({"name": name, "summary": summary, "parameters": parameters, "from": plugins.get(name, "shipbench")})
+        entry = None if name in built_in else plugins[name][0].value
+        path = folder / f"{name}.py" if entry is None else _source(entry)
+        summary, parameters, needs = read_part(path, registry.attribute, entry) if path else ("", {}, ())
+        unusable = (not_installed(name, needs) or "") if entry is None else _problem(registry, name)
+        parts.append({"name": name, "summary": summary, "parameters": parameters, "from": entry or "shipbench", "unusable": unusable})
     return parts
+
+
+def _problem(registry: Registry, name: str) -> str:
+    try:
+        registry.get(name)
+    except InputError as error:
+        return str(error)
+    return ""
 
 
 def describe_effects() -> list[dict[str, Any]]:
@@ -46,24 +58,30 @@ def _source(entry: str) -> Path | None:
     """The file of an entry point's module, or None where it cannot be found."""
     try:
         found = importlib.util.find_spec(entry.partition(":")[0])
-    except (ImportError, ValueError):
+    except Exception:  # finding a module imports the package around it, and a stranger's package may raise anything
         return None
     return Path(found.origin) if found and found.origin and found.origin.endswith(".py") else None
 
 
-def read_part(path: Path, attribute: str, entry: str | None = None) -> tuple[str, dict[str, str]]:
-    """First line of the module's docstring, and the fields (name -> default as written) of the class bound to `attribute`.
+def read_part(path: Path, attribute: str, entry: str | None = None) -> tuple[str, dict[str, str], tuple[str, ...]]:
+    """First line of the module's docstring; the fields (name -> default as written) of the class bound to `attribute`; the packages it needs.
 
     `entry` ("module:Class") names the class of a plug-in instead.
     """
     try:
         tree = ast.parse(path.read_text(encoding="utf-8"))
     except (OSError, SyntaxError, UnicodeDecodeError):
-        return "(its source cannot be read)", {}
+        return "(its source cannot be read)", {}, ()
     classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
     summary = (ast.get_docstring(tree) or "").strip().split("\n")[0]
     bound = entry.partition(":")[2] if entry else next((_bound_name(n) for n in tree.body if _binds(n, attribute)), "")
-    return summary, _fields(classes[bound], classes) if bound in classes else {}
+    return (summary, _fields(classes[bound], classes), _needs(classes[bound])) if bound in classes else (summary, {}, ())
+
+
+def _needs(node: ast.ClassDef) -> tuple[str, ...]:
+    """The literal value of the class variable `needs` of a predictor."""
+    values = [n.value for n in node.body if isinstance(n, ast.AnnAssign) and n.value and ast.unparse(n.target) == "needs"]
+    return ast.literal_eval(values[0]) if values else ()
 
 
 def _binds(node: ast.stmt, attribute: str) -> bool:
@@ -82,10 +100,16 @@ def _fields(node: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> dict[str, s
             found |= _fields(classes[base.id], classes)
     for item in node.body:
         if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name) and not item.target.id.startswith("_"):
-            default = ast.unparse(item.value) if item.value else ""
+            default = _default(item.value)
             if "ClassVar" not in ast.unparse(item.annotation) and "init=False" not in default:
                 found[item.target.id] = default
     return found
+
+
+def _default(value: ast.expr | None) -> str:
+    """A field's default as written; `{}` for `field(default_factory=dict)`, "" where there is none."""
+    text = ast.unparse(value) if value else ""
+    return {"field(default_factory=dict)": "{}", "field(default_factory=list)": "[]"}.get(text, text)
 
 
 def dataset_facts(dataset: Dataset) -> dict[str, Any]:

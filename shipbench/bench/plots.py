@@ -58,7 +58,7 @@ def short_name(model: str) -> str:
     return name if len(name) <= 28 else f"{name[:25]}..."
 
 
-def _style(models: Sequence[str]) -> dict[str, dict[str, Any]]:
+def style(models: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Colour and dashes of each model: the same for a known name in every plot."""
     bases: dict[str, str] = {}  # of variants such as mlp and mlp[hidden=64] the first has the name's colour
     for model in sorted(models, key=len):
@@ -113,7 +113,7 @@ def choose_runs(rows: Frame, models: Sequence[str]) -> dict[str, str]:
     return {name: str(order[round(q * (len(order) - 1))]) for name, q in places.items()}
 
 
-def _outline(x: float, y: float, psi: float, L: float, B: float) -> np.ndarray:
+def outline(x: float, y: float, psi: float, L: float, B: float) -> np.ndarray:
     """Corners (east, north) [m] of a ship's deck with its bow at heading `psi` [rad]."""
     ahead = L * np.array([0.5, 0.3, -0.44, -0.5, -0.5, -0.44, 0.3])
     starboard = B * np.array([0.0, 0.5, 0.5, 0.3, -0.3, -0.5, -0.5])
@@ -126,7 +126,7 @@ def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[
     chosen = choose_runs(rows, models)
     figure = new_figure(15.0, 6.2)
     axes = figure.subplots(1, 3)
-    styles = _style(models)
+    styles = style(models)
     for model in reversed(models):  # the best on top
         for cell in _predictions(results, dataset, model):
             for axis, run in zip(axes, chosen.values(), strict=True):
@@ -161,7 +161,7 @@ def _track(
     axis.plot(path[:, Y], path[:, X], color=color, linestyle=linestyle, lw=2.6 if fill else 1.8, label=label, zorder=2 if fill else 3)
     quarters = np.linspace(0, len(path) - 1, 5).round().astype(int)
     for k in quarters if fill else quarters[-1:] if label != "oracle" else []:
-        corners = _outline(path[k, X], path[k, Y], path[k, PSI], summary["ship_L"], summary["ship_B"])
+        corners = outline(path[k, X], path[k, Y], path[k, PSI], summary["ship_L"], summary["ship_B"])
         axis.fill(*corners.T, facecolor="0.85" if fill else "none", edgecolor=color, lw=0.9, alpha=0.9, zorder=1 if fill else 3)
 
 
@@ -181,7 +181,7 @@ def boxes(rows: Frame, models: Sequence[str], summary: dict[str, Any]) -> Figure
     """Box plots of the per-run ED, EDH and cVDM (the paper's fig. 2): quartiles, whiskers at 5 and 95 %, mean as a diamond."""
     columns = [c for c in summary["columns"] if c["name"] in ("ed", "edh", "cvdm")]
     figure = new_figure(4.6 * len(columns), 4.6)
-    styles = _style(models)
+    styles = style(models)
     for axis, column in zip(np.atleast_1d(figure.subplots(1, len(columns))), columns, strict=True):
         groups = [rows.loc[(rows["model"] == m) & (rows["status"] == "ok"), column["name"]].dropna().to_numpy() for m in models]
         shown = [(m, g) for m, g in zip(models, groups, strict=True) if len(g)]
@@ -207,7 +207,7 @@ def against_horizon(results: Results, dataset: str, models: Sequence[str], dt: f
     """Position error against time: median over runs, with the band between the quartiles."""
     figure = new_figure(8.6, 5.4)
     axis = figure.subplots()
-    styles = _style(models)
+    styles = style(models)
     ends, last = [], 0.0
     for model in models:
         errors = np.concatenate([ed(true=c.truth[c.ok], pred=c.S[c.ok]) for c in _predictions(results, dataset, model)])

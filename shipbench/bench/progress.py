@@ -47,7 +47,7 @@ class Lines:
         self.total, self.count, self.began = 0, 0, time.monotonic()
 
     def start(self, total: int) -> None:
-        self.total, self.began = total, time.monotonic()
+        self.total, self.count, self.began = total, 0, time.monotonic()
 
     def working(self, label: str) -> None:
         print(f"        {label} ...", file=self.stream, flush=True)

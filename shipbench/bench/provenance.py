@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
 import subprocess
@@ -10,17 +9,15 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from ..registry import package_digest
+
 _LIBRARIES = ("numpy", "scipy", "pandas", "casadi", "torch", "lightning", "torchdiffeq")
 
 
 @cache
 def source_digest() -> str:
-    """SHA-256 (first 12 digits) over the package's Python files: tells edited code from the released one."""
-    package = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256()
-    for path in sorted(package.rglob("*.py")):
-        digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:12]
+    """That of shipbench itself: tells edited code from the released one."""
+    return package_digest("shipbench")
 
 
 @cache
@@ -44,6 +41,7 @@ def machine() -> dict[str, str | int]:
         "cpus": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
         "platform": platform.platform(),
         "python": platform.python_version(),
+        "threads": os.environ.get("OMP_NUM_THREADS", "default"),
     }
     return info | {name: _version(name) for name in _LIBRARIES}
 

@@ -3,6 +3,7 @@
 - `study.json`: tasks, command, code, machine, times.
 - `rows.parquet`: one row per (dataset, model, fold, seed, run) of the study.
 - `summary.json`: one entry per cell that alone identifies its experiment.
+- `windows.parquet`: one row per scored window: what the true ship does there (see `regimes`). These three files are a submission.
 - `truth/<dataset>/fold0.npz`: ids, s0, U and truth of the scored windows (the same for all models).
 - `cells/<dataset>/<model>/fold0-seed0/`: rows.parquet, summary.json, predictions.npz (S), equations.txt, model/.
 """
@@ -14,8 +15,10 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..records import Batch
+from .regimes import window_features
 from .scoring import measure
 
 PROTOCOL = 1
@@ -60,29 +64,35 @@ class Cell:
         return Path("cells", slug(self.dataset), slug(self.model), f"fold{self.fold}-seed{self.seed}")
 
 
-def write_json(path: Path, data: Any) -> None:
-    """Write JSON in one step: a reader sees the old file or the new one, never half of it."""
+@contextmanager
+def _in_one_step(path: Path) -> Iterator[Path]:
+    """A hidden sibling to write, which then takes the place of `path`: a reader sees the old or the new, never half. It goes if writing fails."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    part.write_text(json.dumps(data, indent=1, default=str) + "\n", encoding="utf-8")
-    os.replace(part, path)
+    try:
+        yield part
+        os.replace(part, path)
+    except BaseException:
+        shutil.rmtree(part) if part.is_dir() else part.unlink(missing_ok=True)
+        raise
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write JSON in one step."""
+    with _in_one_step(path) as part:
+        part.write_text(json.dumps(data, indent=1, default=str) + "\n", encoding="utf-8")
 
 
 def write_rows(path: Path, rows: Frame) -> None:
     """Write parquet in one step."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    rows.to_parquet(part, index=False)
-    os.replace(part, path)
+    with _in_one_step(path) as part:
+        rows.to_parquet(part, index=False)
 
 
 def write_truth(out: Path, dataset: str, fold: int, batch: Batch) -> None:
     """Save what every model of this fold is scored against."""
-    path = out / "truth" / slug(dataset) / f"fold{fold}.npz"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.stem}.{os.getpid()}.tmp.npz")
-    np.savez_compressed(part, ids=np.array(batch.ids), s0=batch.s0, U=batch.U, truth=batch.truth)
-    os.replace(part, path)
+    with _in_one_step(out / "truth" / slug(dataset) / f"fold{fold}.npz") as part, part.open("wb") as file:
+        np.savez_compressed(file, ids=np.array(batch.ids), s0=batch.s0, U=batch.U, truth=batch.truth)
 
 
 def read_truth(out: Path, dataset: str, fold: int) -> Batch:
@@ -101,39 +111,28 @@ def read_predictions(out: Path, cell: Cell) -> np.ndarray | None:
         return file["S"]
 
 
-def write_cell(out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, model: Any = None) -> None:
-    """Write a finished cell: into a hidden folder first, then renamed into place (an older one is replaced).
-
-    The fitted `model` is saved where it can be; a foreign model's own failure to save or describe itself is noted in the summary.
-    """
+def write_cell(out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, files: Mapping[str, bytes]) -> None:
+    """Write a finished cell in one step (an older one is replaced); `files` are further ones, by relative name (saved model, equations)."""
     final = out / cell.folder
-    part = final.with_name(f".{final.name}.{os.getpid()}.tmp")
-    shutil.rmtree(part, ignore_errors=True)
-    part.mkdir(parents=True)
-    summary = dict(summary)
-    if S is not None:
-        np.savez_compressed(part / "predictions.npz", S=S)
-    if model is not None:
-        summary.update(_keep_model(part, model))
-    rows.to_parquet(part / "rows.parquet", index=False)
-    write_json(part / "summary.json", summary)
-    shutil.rmtree(final, ignore_errors=True)
-    os.replace(part, final)
+    old = final.with_name(f".{final.name}.{os.getpid()}.old.tmp")
+    with _in_one_step(final) as part:
+        part.mkdir(parents=True)
+        if S is not None:
+            np.savez_compressed(part / "predictions.npz", S=S)
+        for name, content in files.items():
+            (part / name).parent.mkdir(parents=True, exist_ok=True)
+            (part / name).write_bytes(content)
+        rows.to_parquet(part / "rows.parquet", index=False)
+        write_json(part / "summary.json", summary | {"files": _digests(part)})
+        if final.exists():  # moved away whole: who is killed in between leaves no cell, never half of one
+            os.replace(final, old)
+    shutil.rmtree(old, ignore_errors=True)
 
 
-def _keep_model(folder: Path, model: Any) -> dict[str, str]:
-    notes: dict[str, str] = {}
-    for method, action in (("save", lambda: model.save(folder / "model")), ("describe", lambda: model.describe())):
-        if not callable(getattr(model, method, None)):
-            continue
-        try:
-            text = action()
-        except Exception as error:  # a user's own model; its predictions are good all the same
-            notes[f"{method}_failed"] = f"{type(error).__name__}: {error}"
-            continue
-        if method == "describe" and text:
-            (folder / "equations.txt").write_text(str(text).rstrip() + "\n", encoding="utf-8")
-    return notes
+def _digests(folder: Path) -> dict[str, str]:
+    """SHA-256 (first 16 digits) of what a cell's rows and scores are read from."""
+    found = (folder / name for name in ("rows.parquet", "predictions.npz"))
+    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest()[:16] for p in found if p.is_file()}
 
 
 def read_summary(out: Path, cell: Cell) -> dict[str, Any] | None:
@@ -142,8 +141,18 @@ def read_summary(out: Path, cell: Cell) -> dict[str, Any] | None:
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
+def scored_before(out: Path, cell: Cell, key: str) -> str:
+    """The status of a cell that need not be run again ("ok", "diverged"), or "": it is not there, damaged, of another key, failed or skipped."""
+    try:
+        summary = read_summary(out, cell) or {}
+        whole = summary.get("key") == key and summary["files"] == _digests(out / cell.folder)
+        return summary["status"] if whole and summary["status"] in ("ok", "diverged") else ""
+    except (OSError, ValueError, KeyError, AttributeError):  # a damaged summary may hold anything
+        return ""
+
+
 def assemble(out: Path, cells: Iterable[Cell]) -> tuple[Frame, list[dict[str, Any]]]:
-    """Gather the finished cells of a study into `rows.parquet` and `summary.json`, and return both."""
+    """Gather the given cells (all finished) of a study into `rows.parquet` and `summary.json`, and return both."""
     import pandas as pd
 
     done = [(cell, summary) for cell in cells if (summary := read_summary(out, cell)) is not None]
@@ -152,7 +161,35 @@ def assemble(out: Path, cells: Iterable[Cell]) -> tuple[Frame, list[dict[str, An
     summaries = [summary for _, summary in done]
     write_rows(out / "rows.parquet", rows)
     write_json(out / "summary.json", summaries)
+    if summaries:
+        write_rows(out / "windows.parquet", window_table(out, summaries))
     return rows, summaries
+
+
+def window_table(out: Path, summaries: Sequence[dict[str, Any]]) -> Frame:
+    """What the true ship does in every scored window of a study, from its saved truth: dataset, fingerprint, fold, run and `window_features`."""
+    import pandas as pd
+
+    frames = []
+    for dataset, fold in dict.fromkeys((s["dataset"], s["fold"]) for s in summaries):
+        summary = next(s for s in summaries if s["dataset"] == dataset)
+        batch = read_truth(out, dataset, fold)
+        identity = {"dataset": dataset, "fingerprint": summary["fingerprint"], "task": summary["task_key"], "fold": fold, "run": list(batch.ids)}
+        frames.append(pd.DataFrame(identity | window_features(batch, summary["ship_L"])))
+    return pd.concat(frames, ignore_index=True)
+
+
+def _read_windows(folder: Path, summaries: list[dict[str, Any]]) -> Frame | None:
+    """`windows.parquet` of a study, made from the saved truth where it is missing; None without both."""
+    import pandas as pd
+
+    try:
+        path = folder / "windows.parquet"
+        return pd.read_parquet(path) if path.is_file() else window_table(folder, summaries)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{folder}: windows.parquet cannot be read ({error}). Give the folder that `shipbench run` wrote, whole.") from None
 
 
 @dataclass(frozen=True)
@@ -163,14 +200,26 @@ class Results:
     summaries: list[dict[str, Any]]
     sources: list[Path]
 
+    @cached_property
+    def windows(self) -> Frame | None:
+        """What the true ship does in every scored window, from all folders that tell; None where none does."""
+        import pandas as pd
+
+        folders = {source: [s for s, at in zip(self.summaries, self.sources, strict=True) if at == source] for source in dict.fromkeys(self.sources)}
+        found = [frame for folder, own in folders.items() if (frame := _read_windows(folder, own)) is not None]
+        keys = ["dataset", "fingerprint", "task", "fold", "run"]
+        return pd.concat(found, ignore_index=True).drop_duplicates(keys, ignore_index=True) if found else None
+
 
 def read_results(folders: Sequence[str | Path]) -> Results:
     """Read the result folders of `shipbench run`.
 
     Raises:
-        InputError: a folder holds no results, or the same cell stands in two of them.
+        InputError: a folder holds no results, they contradict themselves (see `submissions`), or the same cell stands in two of them.
     """
     import pandas as pd
+
+    from .submissions import check_submission
 
     frames, summaries, sources = [], [], []
     for folder in map(Path, folders):
@@ -179,6 +228,7 @@ def read_results(folders: Sequence[str | Path]) -> Results:
             found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise InputError(f"{folder} holds no results: {error}. Give a folder that `shipbench run --out` wrote.") from None
+        check_submission(folder, frames[-1], found)
         summaries += found
         sources += [folder] * len(found)
     if not summaries:
@@ -193,6 +243,21 @@ def read_results(folders: Sequence[str | Path]) -> Results:
             )
         seen[cell] = source
     return Results(pd.concat(frames, ignore_index=True), summaries, sources)
+
+
+def write_submission(results: Results, folder: Path) -> None:
+    """Write `rows.parquet`, `summary.json` and, where the windows are known, `windows.parquet`: all that a leaderboard is rendered from.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    try:
+        if results.windows is not None:
+            write_rows(folder / "windows.parquet", results.windows)
+        write_rows(folder / "rows.parquet", results.rows)
+        write_json(folder / "summary.json", results.summaries)
+    except OSError as error:
+        raise InputError(f"cannot write to {folder}: {error.strerror}. Give a folder that can be written with --submission.") from None
 
 
 def rescore(out: Path, summary: dict[str, Any]) -> dict[str, np.ndarray]:

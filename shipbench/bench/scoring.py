@@ -57,9 +57,9 @@ def measure(metrics: Sequence[str], batch: Batch, S: np.ndarray, *, L: float, dt
         values[name] = np.full(len(S), np.nan)
         values[name][ok] = scored
 
-    true, pred, s0 = batch.truth[ok], S[ok], batch.s0[ok]
+    true, pred, s0, U = batch.truth[ok], S[ok], batch.s0[ok], batch.U[ok]
     for name in metrics:
-        for column, scored in METRICS.get(name).per_run(true=true, pred=pred, s0=s0, L=L, dt=dt).items():
+        for column, scored in METRICS.get(name).per_run(true=true, pred=pred, s0=s0, L=L, dt=dt, U=U).items():
             put(column, scored)
     distance = ed(true=true, pred=pred)
     for column, knot in horizons(steps * dt, dt).items():

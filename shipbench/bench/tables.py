@@ -48,16 +48,36 @@ def significant(digits: int) -> Callable[[Any], str]:
 
 @dataclass(frozen=True)
 class TableColumn:
-    """Header, key in the rows, and how a value becomes text (None: text, left aligned)."""
+    """Header, key in the rows, and how a value becomes text (None: text, left aligned).
+
+    `interval`: the rows may hold the ends of an interval under `key_low` and `key_high`.
+    """
 
     header: str
     key: str
     format: Callable[[Any], str] | None = None
+    interval: bool = False
 
     def text(self, row: dict[str, Any]) -> str:
         """The cell of `row`."""
         value = row.get(self.key)
         return self.format(value) if self.format else "" if value is None else str(value)
+
+    def interval_text(self, row: dict[str, Any]) -> str:
+        """The interval of the cell, "" where there is none or it has no width but rounding."""
+        low, high = (row.get(f"{self.key}_{end}") for end in ("low", "high"))
+        if not self.interval or self.format is None or low is None or high is None or not high - low > 1e-9:
+            return ""
+        return f"{self.format(low)} to {self.format(high)}"
+
+
+MOST_INTERVALS = 8
+"""More columns with intervals than that do not fit on a terminal: figures alone are shown there, intervals on the page."""
+
+
+def _html_cell(column: TableColumn, row: dict[str, Any]) -> str:
+    between = column.interval_text(row)
+    return escape(column.text(row)) + (f"<br><small>{escape(between)}</small>" if between else "")
 
 
 @dataclass(frozen=True)
@@ -72,10 +92,12 @@ class Table:
     def markdown(self) -> str:
         """Heading, table and notes."""
         lines = [f"## {self.title}", ""]
-        lines.append("| " + " | ".join(c.header for c in self.columns) + " |")
+        lines.append("| " + " | ".join(c.header.replace("|", "\\|") for c in self.columns) + " |")
         lines.append("|" + "|".join("---:" if c.format else ":---" for c in self.columns) + "|")
         for row in self.rows:
             cells = [" ".join(c.text(row).split()).replace("|", "\\|") for c in self.columns]
+            intervals = [c.interval_text(row).replace(" to ", " to\u00a0") for c in self.columns]  # wraps once at most
+            cells = [f"{cell}<br><sub>{between}</sub>" if between else cell for cell, between in zip(cells, intervals, strict=True)]
             if row.get("_reference"):
                 cells = [f"*{cell}*" if cell else "" for cell in cells]
             lines.append("| " + " | ".join(cells) + " |")
@@ -86,7 +108,7 @@ class Table:
         """Heading, table and notes; every text is escaped."""
         numeric = [' class="number"' if c.format else "" for c in self.columns]
         head = "".join(f"<th{kind}>{escape(c.header)}</th>" for c, kind in zip(self.columns, numeric, strict=True))
-        rows = ["".join(f"<td{kind}>{escape(c.text(row))}</td>" for c, kind in zip(self.columns, numeric, strict=True)) for row in self.rows]
+        rows = ["".join(f"<td{kind}>{_html_cell(c, row)}</td>" for c, kind in zip(self.columns, numeric, strict=True)) for row in self.rows]
         body = "".join(f"<tr>{cells}</tr>" for cells in rows)
         notes = "".join(f'<p class="note">{escape(note)}</p>' for note in self.notes)
         return f'<h2>{escape(self.title)}</h2><div class="table"><table><tr>{head}</tr>{body}</table></div>{notes}'
@@ -97,12 +119,17 @@ class Table:
         from rich.table import Table as RichTable
         from rich.text import Text
 
+        def cell(column: TableColumn, row: dict[str, Any]) -> Text:
+            text, between = Text(column.text(row)), column.interval_text(row) if narrow else ""
+            return text.append(f"\n{between}", style="dim") if between else text
+
+        narrow = sum(c.interval for c in self.columns) <= MOST_INTERVALS
         table = RichTable(title=Text(self.title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
         for column in self.columns:
             numeric = column.format is not None
             table.add_column(Text(column.header), justify="right" if numeric else "left", no_wrap=numeric, overflow="fold")
         for row in self.rows:
-            table.add_row(*[Text(c.text(row)) for c in self.columns], style="italic dim" if row.get("_reference") else None)
+            table.add_row(*[cell(c, row) for c in self.columns], style="italic dim" if row.get("_reference") else None)
         console.print(table)
         for note in self.notes:
             console.print(Text(note, style="dim"))
@@ -114,5 +141,6 @@ class Table:
             value = value.item() if hasattr(value, "item") else value
             return None if isinstance(value, float) and not math.isfinite(value) else value
 
-        rows = [{c.key: plain(row.get(c.key)) for c in self.columns} for row in self.rows]
+        keys = [key for c in self.columns for key in (c.key, *((f"{c.key}_low", f"{c.key}_high") if c.interval else ()))]
+        rows = [{key: plain(row.get(key)) for key in keys} for row in self.rows]
         return {"title": self.title, "columns": {c.key: c.header for c in self.columns}, "rows": rows, "notes": list(self.notes)}

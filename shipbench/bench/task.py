@@ -13,16 +13,18 @@ from ..errors import InputError, unknown_name
 from ..metrics.base import METRICS
 from ..ship import read_toml
 
-DEFAULT_METRICS = ("ed", "edh", "cvdm", "final_displacement", "heading_error", "position_rmse", "signal_rmse")
+DEFAULT_METRICS = ("ed", "edh", "cvdm", "final_displacement", "heading_error", "position_rmse", "signal_rmse", "trial_indices")
 _NOT_IDENTITY = {"models", "metrics", "seeds", "title"}
 
 
 class Task(BaseModel):
     """One data set, the split, the horizon, and the models and metrics to run. Times in s.
 
-    `history_s`: recorded time before s0 that every predictor may use. `split`: "folds" (by run, seeded by `fold_seed`) or "published"
-    (the data set's own `split` of each run). `stride_s`: distance of the scored windows in runs longer than the horizon (default: they
-    do not overlap). `valid_runs`: training runs set aside for early stopping (default: one ninth, 8 of 72). `max_runs`: use only
+    `history_s`: recorded time before s0 that every predictor may use. `split`: "folds" (by run, seeded by `fold_seed`), "published"
+    (the data set's own `split` of each run), "kind" (each fold scores one kind of manoeuvre and trains on all others) or "speed" (trains on the
+    slower runs and scores the fastest 1/`folds` of them). `stride_s`: distance of the scored windows in runs longer than the horizon (default: they
+    do not overlap). `valid_runs`: training runs set aside for early stopping (default: one ninth, 8 of 72). `train_runs`: use only that many
+    runs for fitting and early stopping together, the same scored runs (`valid_runs` shrinks in proportion, to one at least). `max_runs`: use only
     that many runs, evenly spread over the data set.
     """
 
@@ -33,11 +35,12 @@ class Task(BaseModel):
     horizon_s: float = Field(120.0, gt=0)
     history_s: float = Field(0.0, ge=0)
     folds: int = Field(5, ge=2)
-    split: Literal["folds", "published"] = "folds"
+    split: Literal["folds", "published", "kind", "speed"] = "folds"
     stride_s: float | None = Field(None, gt=0)
     seeds: tuple[int, ...] = Field((0,), min_length=1)
     metrics: tuple[str, ...] = DEFAULT_METRICS
     valid_runs: int | None = Field(None, ge=0)
+    train_runs: int | None = Field(None, ge=2)
     max_runs: int | None = Field(None, ge=2)
     fold_seed: int = 0
     title: str = ""
@@ -51,7 +54,7 @@ class Task(BaseModel):
     @classmethod
     def _known_metrics(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         for name in value:
-            if name not in METRICS.names():
+            if name not in METRICS:
                 raise unknown_name("metric", name, METRICS.names())
         if "ed" not in value:
             raise ValueError("'ed' must be among the metrics: models are ranked by it")
@@ -72,6 +75,8 @@ class Task(BaseModel):
     def key(self, fingerprint: str) -> str:
         """Digest of all that decides what is scored on which data; rows are ranked together only where it agrees."""
         data = self.model_dump(mode="json", exclude=_NOT_IDENTITY)
+        if self.train_runs is None:
+            del data["train_runs"]  # tasks from before this key keep theirs
         data["dataset"] = fingerprint  # the data's own digest: the same data under another path is the same task
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:12]
 

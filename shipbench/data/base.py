@@ -75,7 +75,7 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
         files = "trajectories.csv (or .csv.gz, .parquet), dataset.toml and ship.toml"
         raise InputError(f"folder {folder} holds no dataset.toml; a data set has {files}.")
     parsed = parse_spec(spec)
-    if parsed.name not in DATASETS.names():
+    if parsed.name not in DATASETS:
         more = " (nor is it a folder)" if os.sep in spec else ""
         raise unknown_name(f"data set{more}", parsed.name, DATASETS.names())
     if parsed.effects or parsed.path is not None:
@@ -111,9 +111,11 @@ def _make(part: DatasetPart, params: dict[str, Any]) -> Dataset:
 
 
 def _cache_key(part: DatasetPart, params: dict[str, Any]) -> str:
-    """Folder name; the digest keeps apart what any readable form of the parameters might confuse."""
+    """Folder name; digests keep apart what any readable form of the parameters might confuse, and the versions of a plug-in."""
     text = json.dumps(params, sort_keys=True, default=str)
-    return "-".join((part.name, f"v{part.version}", *([hashlib.sha256(text.encode()).hexdigest()[:12]] if params else [])))
+    plugin = DATASETS.digest(part.name)
+    digest = [hashlib.sha256(text.encode()).hexdigest()[:12]] if params else []
+    return "-".join((part.name, f"v{part.version}", *([plugin] if plugin else []), *digest))
 
 
 def _from_cache(folder: Path) -> Dataset | None:

@@ -106,7 +106,7 @@ class Case:
 
 def singles() -> list[str]:
     """Effects that are hidden one at a time."""
-    return [name for name in EFFECTS.names() if name not in OWN_KINDS]
+    return [name for name in EFFECTS.built_in() if name not in OWN_KINDS]
 
 
 def count(kind: str, per_effect: int) -> int:

@@ -1,4 +1,4 @@
-"""The measured wind does not push this ship as the formula says: forces times 1 + X and 1 + Y, moment times 1 + N, side force `lever` further ahead."""
+"""The measured wind does not push this ship as the formula says: forces times 1 + X, 1 + Y, moment times 1 + N, side force `lever` further ahead."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ arguments, and only those of these that it needs:
 
 - `true`, `pred`: (batch, K, 10), states at the K predicted knots, order and units of `signals.STATES`;
 - `s0`: (batch, 10), the state that the predictor was given. It is known, so it is never scored;
+- `U`: (batch, K, inputs), the recorded orders and what else was measured, `U[:, k]` held on the step that ends at knot k;
 - `L`: the ship's length [m]; `dt`: sample time [s].
 """
 
@@ -48,23 +49,28 @@ class Metric:
     per_knot: bool = True
     smaller_is_better: bool = True
 
-    def values(self, *, true: np.ndarray, pred: np.ndarray, s0: np.ndarray, L: float, dt: float) -> np.ndarray:
+    def values(self, *, true: np.ndarray, pred: np.ndarray, s0: np.ndarray, L: float, dt: float, U: np.ndarray | None = None) -> np.ndarray:
         """What the function returns, (batch, K[, columns]) or (batch[, columns]).
 
         Raises:
-            InputError: the shapes of truth and prediction differ.
+            InputError: the shapes of truth and prediction differ, or the metric needs `U` and none is given.
         """
         if true.shape != pred.shape or true.ndim != 3 or true.shape[2] != len(STATES) or s0.shape != (len(true), len(STATES)):
             raise InputError(
                 f"{self.columns[0].label}: true {true.shape}, pred {pred.shape}, s0 {s0.shape}; accepted: true and pred "
                 f"(batch, K, {len(STATES)}), s0 (batch, {len(STATES)})."
             )
-        known = {"true": true, "pred": pred, "s0": s0, "L": L, "dt": dt}
-        return self.function(**{name: known[name] for name in inspect.signature(self.function).parameters})
+        known = {"true": true, "pred": pred, "s0": s0, "L": L, "dt": dt, "U": U}
+        needed = inspect.signature(self.function).parameters
+        if "U" in needed and U is None:
+            raise InputError(f"{self.columns[0].label}: the metric needs the inputs; give U (batch, K, inputs).")
+        return self.function(**{name: known[name] for name in needed})
 
-    def per_run(self, *, true: np.ndarray, pred: np.ndarray, s0: np.ndarray, L: float, dt: float) -> dict[str, np.ndarray]:
+    def per_run(
+        self, *, true: np.ndarray, pred: np.ndarray, s0: np.ndarray, L: float, dt: float, U: np.ndarray | None = None
+    ) -> dict[str, np.ndarray]:
         """For each column the values (batch,): the mean over knots where the metric is one per knot."""
-        values = self.values(true=true, pred=pred, s0=s0, L=L, dt=dt)
+        values = self.values(true=true, pred=pred, s0=s0, L=L, dt=dt, U=U)
         if self.per_knot:
             values = values.mean(axis=1)
         if len(self.columns) == 1:

@@ -55,14 +55,15 @@ class Residual(nn.Module):
     ) -> tuple[Tensor, Tensor, Tensor]:
         """(du, dv, dr), each (members, batch); `air` is true wind speed and direction."""
         apparent = None if air is None or psi is None else apparent_wind(psi, u, v, *air)
+        n, delta, F_b, F_s = actuators
         if self.effects and psi is not None:
             q = iter(self.q.unbind(0))
             active = [Active(effect, tuple(next(q) for _ in range(num))) for effect, num in self.effects]
             nowhere = torch.zeros_like(u)
-            flow = Flow(nowhere, nowhere, nowhere, psi, u, v, r, *actuators)
+            flow = Flow(nowhere, nowhere, nowhere, psi, u, v, r, n, delta, F_b, F_s)
             du, dv, dr = accelerations(active, flow, air, self.c, self.p.unbind(0), self.ship)
         else:
-            du, dv, dr = eq2.accelerations(u, v, r, *actuators, apparent, self.c, self.p.unbind(0))
+            du, dv, dr = eq2.accelerations(u, v, r, n, delta, F_b, F_s, apparent, self.c, self.p.unbind(0))
         more = (self.learned(torch.stack([u, v, r, *actuators, *(apparent or ())], dim=-1)) * self.scale_out).unbind(-1)
         return du + more[0], dv + more[1], dr + more[2]
 

@@ -18,16 +18,16 @@ from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from ..errors import InputError, WorkError, unknown_name
+from ..errors import InputError, unknown_name
 from ..records import Dataset
 from ..registry import Registry
 from ..signals import COMMANDS, STATES
 from ..specs import Spec, parse_spec
 
-PREDICTORS = Registry("predictor", "predictors", "PREDICTOR", helpers=frozenset({"base", "training"}))
+PREDICTORS = Registry("predictor", "predictors", "PREDICTOR", helpers=frozenset({"base", "training"}), lazy=True)
 
 History = tuple[np.ndarray, np.ndarray]
-__all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "fit_models", "make_predictor", "parse_spec"]
+__all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "make_predictor", "parse_spec"]
 
 
 @runtime_checkable
@@ -35,7 +35,9 @@ class Predictor(Protocol):
     """The seam of the benchmark; foreign classes conform without inheriting.
 
     `predict(s0, U, history)`: s0 (batch, 10), U (batch, K, inputs) -> S (batch, K, 10), S[:, k] at t_k+1. A class may also offer the
-    class method `fit_group(models, trains, valids, seeds)`, which fits many at once (folds and seeds) in place.
+    class method `fit_group(models, trains, valids, seeds)`, which fits many at once (folds and seeds) in place; `skip(dataset)`, which says why it
+    cannot take a data set, or None; `num_parameters`, how many numbers a fit sets; `seeded = False` where nothing is drawn;
+    `earth_fixed = True` where it knows a place on earth.
     """
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Any: ...
@@ -47,8 +49,14 @@ class PredictorBase(ABC):
     """Input checks, single runs, saving and loading, for the predictors of this package."""
 
     name: ClassVar[str]
+    needs: ClassVar[tuple[str, ...]] = ()
+    """Optional packages, as they are imported, that a model of this class cannot do without; shipbench has an extra of the predictor's name."""
     inputs: tuple[str, ...] = COMMANDS
     """Names of the columns of U, known after `fit`."""
+
+    def skip(self, dataset: Dataset) -> str | None:
+        """Why this model cannot take `dataset`, or None; a study then has rows with the status `skipped` and this reason."""
+        return not_installed(self.name, self.needs) if self.needs else None
 
     @abstractmethod
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
@@ -136,6 +144,25 @@ class PredictorBase(ABC):
         return model
 
 
+class PredictorFamily(PredictorBase):
+    """A predictor that stands for many: `sklearn:Ridge[alpha=0.1]` is the member "Ridge" of the family "sklearn"."""
+
+    @classmethod
+    @abstractmethod
+    def member(cls, member: str, params: dict[str, Any]) -> Self:
+        """The unfitted model of a spec; `member` is what stands behind the colon ("" where there is none), `params` are unchecked.
+
+        Raises:
+            InputError: an unknown member or parameter, or a value that is not accepted.
+        """
+
+
+def not_installed(name: str, needs: Sequence[str]) -> str | None:
+    """What the optional packages `needs` of the predictor `name` lack here, and how to install them; None where all are there."""
+    missing = [package for package in needs if importlib.util.find_spec(package) is None]
+    return f"{' and '.join(missing)} is not installed: pip install 'shipbench[{name}]'" if missing else None
+
+
 def _class_from_file(path: Path, class_name: str) -> Any:
     if not path.is_file():
         raise InputError(f"model file {path} does not exist; give path/to/model.py:ClassName.")
@@ -167,10 +194,15 @@ def make_predictor(spec: Spec) -> Any:
             raise _no_effects(spec)
         kind = json.loads((spec.path / "model.json").read_text()).get("predictor", "?")
         return PREDICTORS.get(kind).load(spec.path)
-    cls = _class_from_file(spec.path, str(spec.class_name)) if spec.path is not None else PREDICTORS.get(spec.name)
+    family, _, member = (spec.name, "", "") if spec.path is not None else spec.name.partition(":")
+    cls = _class_from_file(spec.path, str(spec.class_name)) if spec.path is not None else PREDICTORS.get(family)
     if spec.effects and not hasattr(cls, "extend"):
         raise _no_effects(spec)
     params = {k: v for k, v in spec.params.items() if k != "seed"}
+    if isinstance(cls, type) and issubclass(cls, PredictorFamily):
+        return cls.member(member, params)
+    if member:
+        raise InputError(f"model spec '{spec.text}': '{family}' takes no ':{member}'. Write {family}, or {family}[parameter=value].")
     if is_dataclass(cls):
         for key in params:
             if key not in {f.name for f in fields(cls)}:
@@ -180,26 +212,3 @@ def make_predictor(spec: Spec) -> Any:
         return model.extend(spec.effects) if spec.effects else model
     except (TypeError, ValueError) as error:
         raise InputError(f"model spec '{spec.text}': {error}. See `shipbench models` for the parameters.") from None
-
-
-def fit_models(models: Sequence[Any], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]) -> list[Exception | None]:
-    """Fit several models of one spec (folds x seeds), together where the class can; one model's failure stays its own.
-
-    Returns:
-        For each model None, or the exception that its fit raised.
-    """
-    group = getattr(type(models[0]), "fit_group", None)
-    if group is not None and len(models) > 1:
-        try:
-            group(models, trains, valids, seeds)
-            return [None] * len(models)
-        except (ArithmeticError, RuntimeError, ValueError, WorkError) as error:
-            return [error] * len(models)
-    errors: list[Exception | None] = []
-    for model, train, valid, seed in zip(models, trains, valids, seeds, strict=True):
-        try:
-            model.fit(train, valid, seed=seed)
-            errors.append(None)
-        except Exception as error:  # a user's model may raise anything; its row says what
-            errors.append(error)
-    return errors

@@ -16,21 +16,10 @@ from torch import Tensor
 
 from ..errors import InputError
 from ..records import Dataset
-from ..signals import PSI
-from ._stacked import CHANNELS, InputFeatures, Scaler, StackedMLP, StackedRuns, dead_reckoning, generators, padded, with_valid
+from ._one_step import NUM_CHANNELS, check_target, one_step_rollout, transitions
+from ._stacked import InputFeatures, Scaler, StackedMLP, StackedRuns, generators, padded, with_valid
 from .base import History, PredictorBase
 from .training import Chunk, Recipe, StackedTask, epochs_of_samples, train
-
-_Y = 7
-
-
-def transitions(runs: StackedRuns, features: InputFeatures) -> list[tuple[Tensor, Tensor, Tensor]]:
-    """Per member: y_k (samples, 7), input features at k (samples, features), y_k+1 (samples, 7)."""
-    parts = []
-    for S, held in zip(runs.S.split(runs.counts), runs.U.split(runs.counts), strict=True):
-        inputs = features(held, S[:, :-1, PSI])
-        parts.append((S[:, :-1, CHANNELS].flatten(0, 1), inputs.flatten(0, 1), S[:, 1:, CHANNELS].flatten(0, 1)))
-    return parts
 
 
 class _OneStep(StackedTask):
@@ -43,7 +32,7 @@ class _OneStep(StackedTask):
         self.draw = generators(seeds)
         self.scale_x = Scaler.fit([torch.cat([y, inputs], dim=-1) for y, inputs, _ in training])
         self.scale_z = Scaler.fit([self._target(y, after) for y, _, after in training])
-        sizes = [_Y + training[0][1].shape[-1], *[model.hidden] * model.layers, _Y]
+        sizes = [NUM_CHANNELS + training[0][1].shape[-1], *[model.hidden] * model.layers, NUM_CHANNELS]
         self.net = StackedMLP(sizes, self.draw)
         self.counts = [len(y) for y, _, _ in training]
         self.data = self._standardised(training)
@@ -103,8 +92,7 @@ class MLP(PredictorBase):
     device: str = "cpu"
 
     def __post_init__(self) -> None:
-        if self.target not in ("state", "increment"):
-            raise ValueError(f"target = '{self.target}'; accepted: 'state' or 'increment'")
+        check_target(self.target)
         for key in ("hidden", "layers", "epochs", "batch", "patience"):
             if getattr(self, key) < 1:
                 raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
@@ -134,27 +122,19 @@ class MLP(PredictorBase):
             model._weights = {k: v[m : m + 1].copy() for k, v in state.items()}
             model._epochs_run = int(watch.validations[m])
 
-    @torch.no_grad()
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
         if not self._weights:
             raise InputError("mlp: predict was called before fit; fit or load the model first.")
-        # Float64: what is predicted for a run then does not depend, to far below 1 mm, on the runs beside it.
         w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
-        start, held = torch.as_tensor(s0), torch.as_tensor(U)
         layers = [(w[f"net.layers.{i}.weight"][0], w[f"net.layers.{i}.bias"][0]) for i in range(self.layers + 1)]
-        features = InputFeatures(self.inputs)
-        y, psi, path = start[:, CHANNELS], start[:, PSI], []
-        for k in range(U.shape[1]):
-            h = torch.cat([y, features(held[:, k], psi)], dim=-1)
-            h = (h - w["scale_x.mean"][0]) / w["scale_x.std"][0]
+
+        def step(x: Tensor) -> Tensor:
+            h = (x - w["scale_x.mean"][0]) / w["scale_x.std"][0]
             for weight, bias in layers[:-1]:
                 h = torch.relu(torch.addmm(bias, h, weight))
-            z = torch.addmm(layers[-1][1], h, layers[-1][0]) * w["scale_z.std"][0] + w["scale_z.mean"][0]
-            y = y + z if self.target == "increment" else z
-            psi = psi + self._dt * y[:, 2]
-            path.append(y)
-        channels = torch.stack(path, dim=1)
-        return torch.cat([dead_reckoning(start, channels, self._dt), channels], dim=-1).numpy()
+            return torch.addmm(layers[-1][1], h, layers[-1][0]) * w["scale_z.std"][0] + w["scale_z.mean"][0]
+
+        return one_step_rollout(step, s0, U, InputFeatures(self.inputs), self._dt, increment=self.target == "increment")
 
     def _arrays(self) -> dict[str, np.ndarray]:
         return self._weights

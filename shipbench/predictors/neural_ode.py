@@ -26,7 +26,6 @@ from .base import History, PredictorBase
 from .physics import Physics
 from .training import Chunk, Recipe, StackedTask, train
 
-
 _NOWHERE = ("bank_suction", "change_point")
 """Effects that depend on where the ship is, or when."""
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import WorkError
-from ..signals import PSI, N, R, U, V, X, Y
+from ..metrics.trial_indices import turning_indices
+from ..signals import PSI, N, R, U, V
 from .simulator import Simulator
 
 
@@ -45,21 +46,17 @@ def turning_circle(sim: Simulator, speed: float, rpm: float, delta_deg: float, d
     turned = np.abs(S[:, PSI])
     if not turned[-1] > np.pi:
         raise WorkError(f"turning circle: {np.rad2deg(turned[-1]):.0f} deg of heading change after {duration:g} s; 180 are needed: sail longer.")
-    L, t = sim.ship.L, np.arange(steps + 1) * dt
-
-    def at(angle: float, values: np.ndarray) -> float:
-        return float(np.interp(angle, np.maximum.accumulate(turned), values))
-
-    end = S[-1]
+    L, t, end = sim.ship.L, np.arange(steps + 1) * dt, S[-1]
+    advance, transfer, tactical_diameter = turning_indices(S, L)
     speed_end = float(np.hypot(end[U], end[V]))
     return Turning(
-        advance=at(np.pi / 2, S[:, X]) / L,
-        transfer=abs(at(np.pi / 2, S[:, Y])) / L,
-        tactical_diameter=abs(at(np.pi, S[:, Y])) / L,
+        advance=advance,
+        transfer=transfer,
+        tactical_diameter=tactical_diameter,
         steady_speed_ratio=speed_end / speed,
         steady_r_dash=abs(float(end[R])) * L / speed_end,
         steady_drift_deg=abs(float(np.rad2deg(np.arctan2(-end[V], end[U])))),
-        time_90=at(np.pi / 2, t),
+        time_90=float(np.interp(np.pi / 2, np.maximum.accumulate(turned), t)),
     )
 
 

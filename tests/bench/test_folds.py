@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipbench.bench.folds import make_folds, select_runs
+from shipbench.bench.folds import make_folds, mean_speed, select_runs
 from shipbench.bench.task import make_task
 from shipbench.errors import InputError
 
@@ -129,3 +129,68 @@ def test_what_cannot_be_split_is_refused(toy, changes, meta, message):
 
     with pytest.raises(InputError, match=message):
         split()
+
+
+def test_leaving_a_kind_of_manoeuvre_out_trains_on_all_others(toy):
+    kinds = ("zigzag", "turn", "stop")
+    data = toy(12, meta=lambda i: {"manoeuvre": kinds[i % 3]})
+    kind = {r.id: r.meta["manoeuvre"] for r in data.runs}
+    folds = make_folds(data, task(split="kind"))
+    assert [{kind[r] for r in sides(f)[2]} for f in folds] == [{"stop"}, {"turn"}, {"zigzag"}]
+    for fold in folds:
+        train, valid, test = sides(fold)
+        assert len(train | valid) == 8
+        assert len(test) == 4
+        assert not {kind[r] for r in train | valid} & {kind[r] for r in test}
+    notes = select_runs(data, task(split="kind"))[1]
+    assert notes[0] == "fold 0 scores 'stop' (4 runs) after training on the other kinds (8 runs)"
+
+
+def test_a_piece_of_a_scored_log_trains_nothing(toy):
+    """Group log0 holds a run of each kind: where one is scored, the other must not be trained on."""
+    data = toy(8, meta=lambda i: {"manoeuvre": "turn" if i % 2 else "stop", "group": f"log{i // 2 if i < 2 else i}"})
+    for fold in make_folds(data, task(split="kind", valid_runs=0)):
+        train, _, test = sides(fold)
+        assert len({"r00", "r01"} & train) == 0
+        assert len({"r00", "r01"} & test) == 1
+
+
+def test_the_split_by_speed_scores_the_fastest_runs_only(toy):
+    data = toy(20)
+    speed = {r.id: mean_speed(r) for r in data.runs}
+    [fold] = make_folds(data, task(split="speed", folds=4))
+    train, valid, test = sides(fold)
+    assert len(test) == 5
+    assert min(speed[r] for r in test) > max(speed[r] for r in train | valid)
+    [note] = select_runs(data, task(split="speed", folds=4))[1]
+    assert note.startswith("trained on 15 runs with mean speeds of ")
+    assert f"to {max(speed.values()):.3g} m/s" in note
+
+
+def test_fewer_training_runs_are_among_the_more_and_are_scored_on_the_same(toy):
+    data = toy(30)
+    found = {n: make_folds(data, task(folds=3, train_runs=n, valid_runs=4)) for n in (4, 8, 20)}
+    for few, more, all_ in zip(*found.values(), strict=True):
+        assert sides(few)[2] == sides(more)[2] == sides(all_)[2]
+        known = [sides(f)[0] | sides(f)[1] for f in (few, more, all_)]
+        assert [len(k) for k in known] == [4, 8, 20]
+        assert known[0] < known[1] < known[2]
+        assert [len(sides(f)[1]) for f in (few, more, all_)] == [1, 2, 4]
+    whole = make_folds(data, task(folds=3, valid_runs=4))
+    assert [sides(f)[0] | sides(f)[1] for f in whole] == [sides(f)[0] | sides(f)[1] for f in found[20]]
+
+
+@pytest.mark.parametrize(
+    ("changes", "meta", "message"),
+    [
+        ({"split": "kind"}, lambda i: {"manoeuvre": "turn"}, r"every run has manoeuvre = 'turn'; name the kinds"),
+        ({"split": "kind"}, lambda i: {}, r"every run has manoeuvre = ''"),
+        ({"split": "kind"}, lambda i: {"manoeuvre": "ab"[i % 2], "group": 1}, r"without 'a' no run is left to train on"),
+        ({"split": "speed"}, lambda i: {"group": 1}, r"has one group of runs only"),
+        ({"train_runs": 9}, lambda i: {}, r"train_runs = 9, but fold 0 has 8 training runs; give at most 8"),
+        ({"train_runs": 3, "folds": 2}, lambda i: {"group": i // 2}, r"in fold 0 that is fewer than two groups of runs"),
+    ],
+)
+def test_a_split_that_cannot_be_made_says_why(toy, changes, meta, message):
+    with pytest.raises(InputError, match=message):
+        make_folds(toy(10, meta=meta), task(**changes))

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipbench.bench.plots import _outline, _style, against_horizon, boxes, choose_runs, draw_all, short_name, tracks
+from shipbench.bench.plots import against_horizon, boxes, choose_runs, draw_all, outline, short_name, style, tracks
 from shipbench.bench.results import read_results
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
@@ -74,7 +74,7 @@ def test_chosen_runs_are_good_median_and_bad_by_the_models_and_not_by_the_floor(
 
 
 def test_the_outline_points_its_bow_along_the_heading():
-    corners = _outline(x=100.0, y=10.0, psi=np.pi / 2, L=40.0, B=6.0)  # heading east
+    corners = outline(x=100.0, y=10.0, psi=np.pi / 2, L=40.0, B=6.0)  # heading east
     np.testing.assert_allclose(corners[0], [30.0, 100.0], atol=1e-12)
     assert np.ptp(corners[:, 0]) == pytest.approx(40.0)
     assert np.ptp(corners[:, 1]) == pytest.approx(6.0)
@@ -86,6 +86,6 @@ def test_names_in_legends_stay_short(spec, name):
 
 
 def test_models_have_colours_of_their_own_and_known_ones_keep_theirs():
-    styles = _style(["physics", "mlp", "mine", "physics+current"])
-    assert styles["physics"] == _style(["physics"])["physics"]
+    styles = style(["physics", "mlp", "mine", "physics+current"])
+    assert styles["physics"] == style(["physics"])["physics"]
     assert len({s["color"] for s in styles.values()}) == 4

@@ -33,8 +33,14 @@ def made(monkeypatch, tmp_path):
         def names(self) -> list[str]:
             return ["made"]
 
+        def __contains__(self, name: str) -> bool:
+            return name in self.names()
+
         def get(self, name: str) -> DatasetPart:
             return DatasetPart(name, "a toy", "MIT", counted, cached=True)
+
+        def digest(self, name: str) -> str:
+            return ""
 
     monkeypatch.setattr(base, "DATASETS", Shelf())
     monkeypatch.setenv("SHIPBENCH_CACHE", str(tmp_path / "cache"))

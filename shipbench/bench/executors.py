@@ -1,0 +1,219 @@
+"""Where the jobs of a study run: in this process, in processes of this machine, or on a Dask cluster; all behind `concurrent.futures`."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import pickle
+import platform
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+from ..errors import InputError, WorkError
+from ..registry import package_digest
+from .isolate import Limits, stop_all, thread_settings, work_isolated
+from .provenance import machine
+from .work import Answer, FoldData, Job, one_line, work
+
+NAMES = ("local", "processes", "dask")
+CONNECT_S = 5.0
+"""A scheduler that does not answer within this time [s] is not there."""
+
+_GO_ON = "What is finished is kept; run the same command again with --resume."
+
+
+@dataclass(frozen=True)
+class Execution:
+    """Where the jobs run and what each may use.
+
+    Args:
+        executor: "local" (one after another in this process; in a child process if there are limits), "processes" (`workers` child processes at
+            a time) or "dask" (the workers of the Dask cluster at `scheduler`).
+        workers: number of processes; None: one for each CPU.
+        scheduler: address, such as "tcp://host:8786".
+        limits: of each cell.
+
+    Raises:
+        InputError: an unknown executor, or an option that it lacks or does not take.
+    """
+
+    executor: str = "local"
+    workers: int | None = None
+    scheduler: str | None = None
+    limits: Limits = field(default_factory=Limits)
+
+    def __post_init__(self) -> None:
+        if self.executor not in NAMES:
+            raise InputError(f"--executor {self.executor}: unknown. Accepted: {', '.join(NAMES)}.")
+        if self.workers is not None and self.executor != "processes":
+            hint = "its workers are those of the cluster" if self.executor == "dask" else "give --executor processes"
+            raise InputError(f"--workers {self.workers} does not belong to --executor {self.executor}: {hint}.")
+        if self.workers is not None and self.workers < 1:
+            raise InputError(f"--workers {self.workers}; accepted: 1 or more.")
+        if self.executor == "dask" and not self.scheduler:
+            raise InputError("--executor dask needs --scheduler, the address of a running Dask scheduler, such as --scheduler tcp://host:8786.")
+        if self.executor != "dask" and self.scheduler:
+            raise InputError(f"--scheduler {self.scheduler} belongs to --executor dask, not to --executor {self.executor}.")
+        for option, value in (("--time-limit", self.limits.seconds), ("--memory-limit", self.limits.memory_gb)):
+            if value is not None and not value > 0:
+                raise InputError(f"{option} {value:g}; accepted: more than 0.")
+
+
+class Workers:
+    """Takes jobs. `room`: how many at once at most (None: all, the cluster queues them); `about`: who they are, for the progress.
+
+    `sends_files`: the workers may not see this machine's files, so that a job must bring those of the model.
+    """
+
+    def __init__(self, executor: Executor, room: int | None, about: str = "") -> None:
+        self.executor, self.room, self.about, self.sends_files = executor, room, about, False
+
+    def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
+        """Start the job (or put it in the queue)."""
+        raise NotImplementedError
+
+
+class _Here(Executor):
+    """Runs what is submitted at once, in this thread, so that Ctrl-C reaches it."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+class _Local(Workers):
+    def __init__(self) -> None:
+        super().__init__(_Here(), room=1)
+
+    def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
+        # Copies, as a child process gets them: what a model writes into them stays its own.
+        return self.executor.submit(work, job, pickle.loads(pickle.dumps(list(folds))))
+
+
+class _Processes(Workers):
+    """One child process for each job; the threads only wait for them."""
+
+    def __init__(self, workers: int, limits: Limits) -> None:
+        super().__init__(ThreadPoolExecutor(workers), room=workers)
+        self.limits = limits
+
+    def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
+        return self.executor.submit(work_isolated, job, folds, self.limits, thread_settings())
+
+
+class _Dask(Workers):
+    """Jobs go to the cluster by value: neither files nor caches are shared. A fold's data go once to each worker that needs them."""
+
+    def __init__(self, client: Any, limits: Limits) -> None:
+        about = f"{client.scheduler.address}, {len(client.scheduler_info(n_workers=-1)['workers'])} workers now"
+        super().__init__(client.get_executor(pure=False), room=None, about=about)
+        self.client, self.limits, self.sends_files = client, limits, True
+        self.shared: dict[int, tuple[FoldData, Any]] = {}
+
+    def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
+        data = [self._shared(fold) for fold in folds]
+        return self.executor.submit(_on_dask, job, self.limits, thread_settings(), *data)
+
+    def _shared(self, fold: FoldData) -> Any:
+        """As a task of the cluster, not as data scattered to it: the scheduler gives it to another worker where one is lost."""
+        if id(fold) not in self.shared:
+            self.shared[id(fold)] = fold, self.client.submit(_itself, fold, pure=False)
+        return self.shared[id(fold)][1]
+
+
+def _itself(fold: FoldData) -> FoldData:
+    return fold
+
+
+_digest_here = cache(package_digest)
+"""Of a worker that answers many jobs; one with new code is started anew."""
+
+
+def _on_dask(job: Job, limits: Limits, threads: Mapping[str, str], *folds: FoldData) -> list[Answer]:
+    """In a child process of the worker: killable, and alone (a worker may have many threads)."""
+    for package, digest in job.code.items():
+        if (here := _digest_here(package)) != digest:
+            found = f"other code of {package} (source {here}; of the study: {digest})" if here else f"no {package}"
+            raise InputError(f"the Dask worker on {platform.node()} has {found}; install the same version on all workers.")
+    return work_isolated(job, folds, limits, threads)
+
+
+@contextmanager
+def open_workers(how: Execution) -> Iterator[Workers]:
+    """The workers of `how`; where the study ends early, what still runs is stopped.
+
+    Raises:
+        InputError: Dask is not installed, or no scheduler answers.
+    """
+    with _connected(how) as workers:
+        try:
+            yield workers
+        except BaseException:
+            workers.executor.shutdown(wait=False)
+            stop_all()
+            raise
+        workers.executor.shutdown()
+
+
+@contextmanager
+def _connected(how: Execution) -> Iterator[Workers]:
+    if how.executor == "dask":
+        client = _client(str(how.scheduler))
+        try:
+            yield _Dask(client, how.limits)
+        finally:
+            client.close(timeout=CONNECT_S)
+    elif how.executor == "processes" or how.limits:
+        yield _Processes(1 if how.executor == "local" else how.workers or int(machine()["cpus"]), how.limits)
+    else:
+        yield _Local()
+
+
+def _client(scheduler: str) -> Any:
+    try:
+        from distributed import Client, Security
+        from distributed.comm import connect
+    except ImportError:
+        raise InputError('--executor dask needs the package `distributed`; install it with pip install "shipbench[dask]".') from None
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is said once, by us
+
+    async def reach() -> None:
+        comm = await connect(scheduler, timeout=CONNECT_S, **Security().get_connection_args("client"))
+        await comm.close()
+
+    try:
+        asyncio.run(reach())
+    except Exception as error:  # an address that cannot be read, nobody there, or somebody who is no scheduler and answers anything
+        raise InputError(
+            f"no Dask scheduler answers at {scheduler} ({one_line(error)}); start one (`dask scheduler`) or correct the address, such as "
+            "tcp://host:8786."
+        ) from None
+    return Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+
+
+def answers_of(future: Future[list[Answer]], cells: int) -> list[Answer]:
+    """What the workers answered; a job that was lost with every worker that took it is the model's failure.
+
+    Raises:
+        InputError: the workers' code is another.
+        WorkError: the workers are lost.
+    """
+    try:
+        return future.result()
+    except InputError:
+        raise
+    except CancelledError:
+        raise WorkError(f"the connection to the Dask scheduler is lost. {_GO_ON}") from None
+    except Exception as error:
+        if type(error).__name__ == "KilledWorker":  # known without importing distributed
+            return [Answer("failed", "fit or prediction: all Dask workers that took it died, one after another") for _ in range(cells)]
+        raise WorkError(f"the workers cannot do their work: {one_line(error)}. {_GO_ON}") from error

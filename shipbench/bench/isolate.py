@@ -1,0 +1,154 @@
+"""A job in a process of its own, which can be killed: where a model hangs, eats memory or crashes, only the cells of its job fail.
+
+The process is a plain `python -c`, not one of `multiprocessing`: workers of Dask are daemons, which may not have such children, and a user's
+script needs no `if __name__ == "__main__"`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+from .work import Answer, FoldData, Job, work
+
+THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+"""Sums in another number of threads round differently: the study's settings go with its jobs."""
+
+_LOOK_EVERY = 0.1
+"""Seconds between two looks at the memory: what is filled meanwhile (about 0.2 GB) is what a model may exceed its limit by."""
+
+_running: set[subprocess.Popen[bytes]] = set()
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Most time [s] and memory [GB, 1e9 bytes] of one cell, or None; cells that are fitted together share the sum of their times."""
+
+    seconds: float | None = None
+    memory_gb: float | None = None
+
+    def __bool__(self) -> bool:
+        return self.seconds is not None or self.memory_gb is not None
+
+
+def thread_settings() -> dict[str, str]:
+    """Those of `THREADS` that are set here."""
+    return {name: os.environ[name] for name in THREADS if name in os.environ}
+
+
+def work_isolated(job: Job, folds: Sequence[FoldData], limits: Limits, threads: Mapping[str, str]) -> list[Answer]:
+    """`work` in a process of its own; where it does not answer, each of its cells fails with the reason."""
+    alive, held = os.pipe()
+    with tempfile.TemporaryDirectory(prefix="shipbench-") as scratch:
+        environment = {name: value for name, value in os.environ.items() if name not in THREADS}
+        environment |= {**threads, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "TMPDIR": scratch}
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-c", f"from {__name__} import main; main({alive})"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=[alive], start_new_session=True, env=environment,
+        )  # fmt: skip
+        _running.add(process)
+        try:
+            answer, reason = _attend(process, pickle.dumps((job, list(folds))), limits, len(folds))
+            return [Answer("failed", f"fit or prediction: {reason}") for _ in folds] if reason else pickle.loads(answer)
+        finally:
+            _kill(process)
+            _running.discard(process)
+            os.close(alive)
+            os.close(held)
+
+
+def stop_all() -> None:
+    """Kill every process of `work_isolated` that still runs (the study ends early)."""
+    for process in list(_running):
+        _kill(process)
+
+
+def _attend(process: subprocess.Popen[bytes], question: bytes, limits: Limits, cells: int) -> tuple[bytes, str]:
+    """What the process answers, or why it does not: it is left alone until it ends or exceeds a limit."""
+    ended, exceeded = threading.Event(), list[str]()
+    watch = threading.Thread(target=_watch, args=(process, limits, cells, ended, exceeded))
+    watch.start()
+    try:
+        answer, _ = process.communicate(question)
+    finally:
+        ended.set()
+        watch.join()
+    return answer, "" if process.returncode == 0 and answer else (exceeded or [_ending(process.returncode)])[0]
+
+
+def _watch(process: subprocess.Popen[bytes], limits: Limits, cells: int, ended: threading.Event, exceeded: list[str]) -> None:
+    """Kill the process when it exceeds a limit, and say which."""
+    end = math.inf if limits.seconds is None else time.monotonic() + limits.seconds * cells
+    look_every = math.inf if limits.memory_gb is None else _LOOK_EVERY
+    while not ended.wait(min(end - time.monotonic(), look_every, threading.TIMEOUT_MAX)):
+        if time.monotonic() >= end:
+            shared = f" for each of {cells} cells that are fitted together" if cells > 1 else ""
+            exceeded.append(f"stopped at the time limit of {limits.seconds:g} s{shared}")
+        elif limits.memory_gb is not None and (used := _memory_gb(process.pid)) > limits.memory_gb:
+            exceeded.append(f"stopped at {used:.2f} GB of memory; the limit is {limits.memory_gb:g} GB")
+        if exceeded:
+            _end_group(process)
+            return
+
+
+def _memory_gb(pid: int) -> float:
+    """Resident memory of a process and all that it started."""
+    import psutil
+
+    total = 0
+    try:
+        first = psutil.Process(pid)
+        for process in (first, *first.children(recursive=True)):
+            total += process.memory_info().rss
+    except psutil.NoSuchProcess:
+        pass  # one of them has just ended
+    return total / 1e9
+
+
+def _ending(code: int) -> str:
+    if code == -signal.SIGKILL:
+        return "its process was killed from outside (by the system where memory runs out)"
+    how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+    return f"its process ended {how} before it answered"
+
+
+def _end_group(process: subprocess.Popen[bytes]) -> None:
+    """Kill the process and all that it started."""
+    with suppress(ProcessLookupError):  # they have all ended
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """The same, and clean up after them."""
+    _end_group(process)
+    process.wait()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            pipe.close()
+
+
+def _end_with_parent(alive: int) -> None:
+    """The parent never writes to this pipe: reading ends when the parent does, also by `kill -9`."""
+    os.read(alive, 1)
+    os._exit(1)
+
+
+def main(alive: int) -> None:
+    """The process: a job from stdin, its answers to stdout; what the model prints goes to stderr."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    threading.Thread(target=_end_with_parent, args=(alive,), daemon=True).start()
+    job, folds = pickle.load(sys.stdin.buffer)  # a pipe from our own parent, never a file
+    pickle.dump(work(job, folds), answers)
+    answers.close()
+    os._exit(0)  # without waiting for threads that a model has left behind

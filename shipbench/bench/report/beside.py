@@ -1,0 +1,146 @@
+"""What lies beside the scores: fitted equations of the models, diagnoses of the same data."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from ...errors import InputError
+from ..results import Cell, Results, slug
+
+_PARAMETER = re.compile(r"^\s+(\w+)\s+=\s+([-+]?\d[\d.]*(?:e[-+]?\d+)?)\s+(\S.*)$", re.IGNORECASE)
+_LONGEST = 20_000
+"""Characters of one model's own description that the page takes."""
+
+
+@dataclass(frozen=True)
+class Fits:
+    """Fitted models of one spec: their descriptions by fold and seed, and the numbers in them (name, median, least, greatest, what it is)."""
+
+    model: str
+    texts: list[tuple[str, str]]
+    numbers: list[tuple[str, float, float, float, str]]
+
+
+def fitted(results: Results, dataset: str, models: Sequence[str]) -> list[Fits]:
+    """What the models of `dataset` say of themselves (`equations.txt` beside their predictions); models that say nothing are left out."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for summary, source in zip(results.summaries, results.sources, strict=True):
+        if summary["dataset"] != dataset:
+            continue
+        path = source / Cell(dataset, summary["model"], summary["fold"], summary["seed"]).folder / "equations.txt"
+        try:
+            text = path.read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            continue  # most models have no equations
+        cut = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}\n... cut here; the whole text is in {path.name} of the result folder"
+        found.setdefault(summary["model"], []).append((f"fold {summary['fold']}, seed {summary['seed']}", cut))
+    return [Fits(model, found[model], _numbers([text for _, text in found[model]])) for model in models if model in found]
+
+
+def _numbers(texts: Sequence[str]) -> list[tuple[str, float, float, float, str]]:
+    """Lines `name = number what`, compared over the texts; a name that stands in several lines is told apart by its place."""
+    values: dict[tuple[str, int], list[float]] = {}
+    what: dict[tuple[str, int], str] = {}
+    for text in texts:
+        seen: dict[str, int] = {}
+        for line in text.splitlines():
+            if (match := _PARAMETER.match(line)) is not None:
+                name = match[1]
+                seen[name] = seen.get(name, 0) + 1
+                values.setdefault((name, seen[name]), []).append(float(match[2]))
+                what.setdefault((name, seen[name]), " ".join(match[3].split()))
+    return [(name, sorted(v)[len(v) // 2], min(v), max(v), what[name, place]) for (name, place), v in values.items()]
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """A diagnosis: its verdict in words, the causes (effect, sizes, gain), the model it proposes, the link to its page ("" if there is none)."""
+
+    dataset: str
+    verdict: str
+    causes: list[tuple[str, str, str]]
+    extended_model: str
+    link: str
+    warning: str
+
+
+def diagnoses(results: Results, dataset: str, given: Sequence[Path], page: Path) -> list[Diagnosed]:
+    """Diagnoses of `dataset`: in the folders `given`, and in the usual places beside the result folders; links are relative to `page`.
+
+    Raises:
+        InputError: a given folder holds no diagnosis.
+    """
+    fingerprint = next(s["fingerprint"] for s in results.summaries if s["dataset"] == dataset)
+    found = {}
+    for folder in dict.fromkeys(results.sources):
+        up = folder.resolve().parent
+        for near in (folder, folder / "diagnosis", *(root / "diagnoses" / slug(Path(dataset).name) for root in (up, up.parent))):
+            if (near / "diagnosis.json").is_file():
+                try:
+                    found[near.resolve()] = _told(near, _read(near), fingerprint, page)
+                except InputError as error:  # it was not asked for: said on the page, and no reason to write none
+                    found[near.resolve()] = Diagnosed(dataset, "A diagnosis lies beside the results.", [], "", "", str(error))
+    for folder in given:
+        found[folder.resolve()] = _told(folder, _read(folder), fingerprint, page)
+    return [d for d in found.values() if d.dataset == dataset]
+
+
+def check_given(given: Sequence[Path], datasets: Sequence[str]) -> None:
+    """Refuse a diagnosis of a data set that the page does not show.
+
+    Raises:
+        InputError: see above, or the folder holds no diagnosis.
+    """
+    for folder in given:
+        if (name := _read(folder)["dataset"]) not in datasets:
+            raise InputError(f"--diagnosis {folder} is of data set '{name}'; these results are of {', '.join(datasets)}. Leave it out.")
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    try:
+        document = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+        missing = [key for key in ("dataset", "verdict", "causes", "extended_model", "fingerprint") if key not in document]
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"{folder} holds no diagnosis that can be read: {error}. Give a folder that `shipbench diagnose --out` wrote.") from None
+    if missing:
+        raise InputError(f"{folder / 'diagnosis.json'} lacks {', '.join(missing)}. Give a folder that `shipbench diagnose --out` wrote.")
+    return document
+
+
+_VERDICTS = {"found": "Causes are named.", "none": "No cause is named: nothing is missing that these runs could show.",
+             "unknown": "The model lacks something that is not in the library."}  # fmt: skip
+
+
+def _told(place: Path, document: dict[str, Any], fingerprint: str, page: Path) -> Diagnosed:
+    pages = [name for name in ("report.html", "diagnosis.html") if (place / name).is_file()]
+    link = quote(Path(os.path.relpath(place / pages[0], page.resolve().parent)).as_posix()) if pages else ""
+    same = document["fingerprint"] == fingerprint
+    warning = "" if same else f"It is of other data than these scores (fingerprint {document['fingerprint']}, here {fingerprint})."
+    causes = [(str(c.get("effect", "")), _sizes(c.get("parameters") or {}), _gain(c.get("gain"))) for c in document["causes"]]
+    verdict = _VERDICTS.get(document["verdict"], str(document["verdict"]))
+    return Diagnosed(document["dataset"], verdict, causes, str(document["extended_model"] or ""), f"./{link}" if link else "", warning)
+
+
+def _sizes(parameters: dict[str, Any]) -> str:
+    return "; ".join(f"{name} {_figure(p.get('value'))} {p.get('unit', '')} {_interval(p.get('ci95'))}".strip() for name, p in parameters.items())
+
+
+def _interval(ends: Any) -> str:
+    return f"[{_figure(ends[0])}, {_figure(ends[1])}]" if isinstance(ends, list) and len(ends) == 2 else ""
+
+
+def _gain(gain: dict[str, Any] | None) -> str:
+    if not gain or not isinstance(gain.get("relative"), int | float):
+        return "not measured"
+    return f"{gain.get('metric', 'error')} {-100 * gain['relative']:+.0f} % on held-out runs"
+
+
+def _figure(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, int | float) else "-"

@@ -1,0 +1,209 @@
+"""What a worker does: fit the cells of one job and predict. It scores nothing and writes no result; no truth reaches it.
+
+A job holds the cells that are fitted together: all folds of one model, data set and seed where the model's class offers `fit_group`, else one
+cell. Stacked training rounds differently with other members beside it, so a job is the unit that is sent, killed and resumed: its numbers then do
+not depend on where and in which order jobs run.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ShipbenchError
+from ..predictors.base import History, make_predictor
+from ..records import Dataset
+from ..specs import Spec
+from .cost import count_parameters
+from .provenance import machine
+
+_RAISED = (Exception, SystemExit)
+"""What a user's own model may raise, and only its own rows say so."""
+
+
+@dataclass(frozen=True, eq=False)
+class FoldData:
+    """What a model may see of a fold: windows for fitting and for early stopping, and start, inputs and history of the scored windows."""
+
+    train: Dataset
+    valid: Dataset | None
+    s0: np.ndarray
+    U: np.ndarray
+    history: History | None
+
+
+@dataclass(frozen=True)
+class Job:
+    """A model and a seed, to be fitted on one or several folds.
+
+    `code`: digests of the packages that it takes (`package_digest`). `files`: content by relative name of the user's model file or saved
+    folder, where the worker may not have it; None: it is read in place.
+    """
+
+    spec: Spec
+    seed: int
+    code: dict[str, str]
+    files: dict[str, bytes] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What came of a cell.
+
+    Args:
+        status: "" (predicted, to be scored), "failed" or "skipped", with the `reason`.
+        S: prediction (batch, K, 10), or None.
+        fit_s: time of the fit [s], shared equally by the `shared_by` cells that were fitted together.
+        predict_s: time of one rollout [s].
+        params: the model's settings, or None if it does not state them.
+        parameters: how many numbers the fit set (see `cost`), or None if that cannot be told.
+        files: saved model and fitted equations, content by relative name.
+        notes: why the model could not be saved or described.
+        machine: where it was computed.
+    """
+
+    status: str = ""
+    reason: str = ""
+    S: np.ndarray | None = None
+    fit_s: float = 0.0
+    shared_by: int = 1
+    predict_s: float = 0.0
+    params: dict[str, Any] | None = None
+    parameters: int | None = None
+    files: dict[str, bytes] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
+    machine: dict[str, Any] = field(default_factory=machine)
+
+
+def work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
+    """Fit and predict; whatever the model raises becomes the answer of its cells (one for each of `folds`)."""
+    try:
+        with _at_hand(job) as spec:
+            return _work(spec, job.seed, folds)
+    except _RAISED as error:
+        return [Answer("failed", one_line(error)) for _ in folds]
+
+
+def one_line(error: BaseException) -> str:
+    """An exception as a reason for a row."""
+    text = str(error) if isinstance(error, ShipbenchError) else f"{type(error).__name__}: {error}".removesuffix(": ")
+    return " ".join(text.split())[:400]
+
+
+@contextmanager
+def _at_hand(job: Job) -> Iterator[Spec]:
+    """The job's spec, with the files behind it in a temporary folder where they were sent along."""
+    if job.files is None or job.spec.path is None:
+        yield job.spec
+        return
+    with tempfile.TemporaryDirectory(prefix="shipbench-") as folder:
+        for name, content in job.files.items():
+            Path(folder, name).parent.mkdir(parents=True, exist_ok=True)
+            Path(folder, name).write_bytes(content)
+        yield replace(job.spec, path=Path(folder, job.spec.path.name))
+
+
+def _work(spec: Spec, seed: int, folds: Sequence[FoldData]) -> list[Answer]:
+    model = make_predictor(spec)
+    refusal = getattr(model, "skip", None)
+    reason = refusal(folds[0].train) if callable(refusal) else None
+    if reason:
+        return [Answer("skipped", str(reason)) for _ in folds]
+    _seed_global_draws(seed)
+    return [_predicted(fit, fold) for fit, fold in zip(_fit(spec, seed, folds), folds, strict=True)]
+
+
+def _seed_global_draws(seed: int) -> None:
+    """A model that draws from a global generator then draws the same wherever and after whatever it runs."""
+    random.seed(seed)
+    np.random.seed(seed % 2**32)  # noqa: NPY002 - for models of others; ours draw from generators of their own
+    if "torch" in sys.modules:
+        sys.modules["torch"].manual_seed(seed)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    model: Any
+    seconds: float
+    shared_by: int = 1
+    error: str = ""
+
+
+def _fit(spec: Spec, seed: int, folds: Sequence[FoldData]) -> list[_Fit]:
+    """The fitted models of the folds: together where the class can, else one by one; one model's failure stays its own."""
+    models = [make_predictor(spec) for _ in folds]
+    if spec.path is not None and spec.class_name is None:
+        return [_Fit(model, 0.0) for model in models]  # a saved model comes fitted
+    group, began = getattr(type(models[0]), "fit_group", None), time.perf_counter()
+    if group is not None and len(folds) > 1:
+        try:
+            group(models, [fold.train for fold in folds], [fold.valid for fold in folds], [seed] * len(folds))
+            seconds = (time.perf_counter() - began) / len(folds)
+            return [_Fit(model, seconds, len(folds)) for model in models]
+        except _RAISED:  # one fold is enough to fail them all: each gets its chance alone
+            models = [make_predictor(spec) for _ in folds]
+    fits = []
+    for model, fold in zip(models, folds, strict=True):
+        began, reason = time.perf_counter(), ""
+        try:
+            model.fit(fold.train, fold.valid, seed=seed)
+        except _RAISED as error:
+            reason = f"fit: {one_line(error)}"
+        fits.append(_Fit(model, time.perf_counter() - began, error=reason))
+    return fits
+
+
+def _predicted(fit: _Fit, fold: FoldData) -> Answer:
+    if fit.error:
+        return Answer("failed", fit.error, fit_s=fit.seconds, shared_by=fit.shared_by)
+    began = time.perf_counter()
+    try:
+        S = _predict(fit.model, fold)
+        predict_s = (time.perf_counter() - began) / len(S)
+        params = json.loads(json.dumps(asdict(fit.model), default=str)) if is_dataclass(fit.model) and not isinstance(fit.model, type) else None
+    except _RAISED as error:
+        return Answer("failed", f"predict: {one_line(error)}", fit_s=fit.seconds, shared_by=fit.shared_by)
+    files, notes = _kept(fit.model)
+    return Answer("", "", S, fit.seconds, fit.shared_by, predict_s, params, count_parameters(fit.model), files, notes)
+
+
+def _predict(model: Any, fold: FoldData) -> np.ndarray:
+    """The model's prediction of copies of what it may see: writing into them, or looking behind them, never reaches the truth."""
+    history = None if fold.history is None else (fold.history[0].copy(), fold.history[1].copy())
+    S = np.array(model.predict(fold.s0.copy(), fold.U.copy(), history), dtype=float)
+    expected = (*fold.U.shape[:2], fold.s0.shape[1])
+    if S.shape != expected:
+        raise ValueError(f"the prediction has shape {S.shape}; accepted: {expected} (batch, K, 10), without s0")
+    return S
+
+
+def _kept(model: Any) -> tuple[dict[str, bytes], dict[str, str]]:
+    """The saved model and its equations as files, and a note where a foreign model fails to save or to describe itself."""
+    files: dict[str, bytes] = {}
+    notes: dict[str, str] = {}
+    if callable(getattr(model, "save", None)):
+        try:
+            with tempfile.TemporaryDirectory(prefix="shipbench-") as folder:
+                model.save(Path(folder, "model"))
+                files = {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(Path(folder).rglob("*")) if p.is_file()}
+        except _RAISED as error:  # its predictions are good all the same
+            notes["save_failed"] = one_line(error)
+    if callable(getattr(model, "describe", None)):
+        try:
+            text = model.describe()
+        except _RAISED as error:
+            notes["describe_failed"] = one_line(error)
+        else:
+            if text:
+                files["equations.txt"] = (str(text).rstrip() + "\n").encode()
+    return files, notes

@@ -1,0 +1,101 @@
+"""Puts every rule of the contract to a model, in seconds."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import InputError
+from ..predictors.base import make_predictor
+from ..records import Dataset
+from ..registry import reason
+from ..signals import COMMANDS
+from ..specs import parse_spec
+from .base import BROKEN, NOT_APPLICABLE, PASSED, Rule, Verdict
+from .rules import RULES
+from .small import few_windows, small_harbour
+from .subject import Broken, NotApplicable, Subject
+
+
+@dataclass(frozen=True)
+class Report:
+    """What came of a check."""
+
+    model: str
+    data: str
+    seconds: float
+    verdicts: tuple[Verdict, ...]
+
+    def of(self, status: str) -> list[Verdict]:
+        """The verdicts with that status."""
+        return [v for v in self.verdicts if v.status == status]
+
+    def document(self) -> dict[str, Any]:
+        """As one JSON document."""
+        return {
+            "model": self.model, "data": self.data, "seconds": round(self.seconds, 2),
+            "passed": len(self.of(PASSED)), "broken": len(self.of(BROKEN)), "not_applicable": len(self.of(NOT_APPLICABLE)),
+            "rules": [{"rule": v.rule, "says": v.says, "status": v.status, "evidence": v.evidence} for v in self.verdicts],
+        }  # fmt: skip
+
+
+def check_model(text: str, data: Dataset | None = None) -> Report:
+    """Check the model of a spec (name, name[key=value], path.py:Class, saved folder) against the contract.
+
+    Args:
+        text: the model spec.
+        data: where to check it (a few windows are used); small simulated port manoeuvres by default.
+
+    Raises:
+        InputError: the spec cannot be made into a model, the model refuses the data (`skip`), or its inputs are not those of the data.
+    """
+    began = time.perf_counter()
+    spec = parse_spec(text)
+    try:
+        model = make_predictor(spec)
+    except InputError:
+        raise
+    except Exception as error:  # a stranger's file is imported here
+        raise InputError(f"model '{text}' cannot be made: {reason(error)}. Mend its file.") from error
+    for method in ("fit", "predict"):
+        if not callable(getattr(model, method, None)):
+            raise InputError(
+                f"model '{text}' has no method {method}; a predictor has fit(train, valid=None, *, seed) and predict(s0, U, history=None)."
+            )
+    inputs = tuple(getattr(model, "inputs", COMMANDS)) if spec.path is not None and spec.class_name is None else COMMANDS
+    used = small_harbour(inputs=inputs) if data is None else few_windows(data)
+    if inputs != used.inputs and spec.class_name is None and spec.path is not None:
+        raise InputError(
+            f"the saved model uses the inputs {', '.join(inputs)}; data set '{used.name}' has {', '.join(used.inputs)}. Give its own data."
+        )
+    refusal = getattr(model, "skip", None)
+    if callable(refusal) and (why := refusal(used)):
+        raise InputError(f"model '{text}' cannot be checked here: {why}.")
+    return check_subject(Subject(spec, used), began)
+
+
+def check_subject(subject: Subject, began: float | None = None) -> Report:
+    """Put every rule to a model on the subject's data."""
+    began = time.perf_counter() if began is None else began
+    verdicts: dict[str, Verdict] = {}
+    for rule in RULES:
+        verdicts[rule.name] = _try(rule, subject, [verdicts[name] for name in rule.after])
+    data = subject.data
+    about = f"{data.name}, {len(data)} runs of {len(data.runs[0]) - 1} steps of {data.dt:g} s"
+    return Report(subject.spec.text, about, time.perf_counter() - began, tuple(verdicts.values()))
+
+
+def _try(rule: Rule, subject: Subject, before: list[Verdict]) -> Verdict:
+    """The verdict on one rule."""
+    missing = [v.rule for v in before if v.status == BROKEN]
+    if missing:
+        return Verdict(rule.name, rule.says, NOT_APPLICABLE, f"not tried: the rule '{missing[0]}' is broken")
+    try:
+        return Verdict(rule.name, rule.says, PASSED, rule.tries(subject))
+    except NotApplicable as why:
+        return Verdict(rule.name, rule.says, NOT_APPLICABLE, str(why))
+    except Broken as evidence:
+        return Verdict(rule.name, rule.says, BROKEN, str(evidence))
+    except Exception as error:  # a stranger's model may raise anything, anywhere
+        return Verdict(rule.name, rule.says, BROKEN, f"raised {reason(error)}")

@@ -1,0 +1,170 @@
+"""The model under check: made, fitted and asked on small data; and how two predictions are compared."""
+
+from __future__ import annotations
+
+import random
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..effects.base import EFFECTS
+from ..predictors.base import make_predictor
+from ..records import Batch, Dataset
+from ..registry import reason
+from ..signals import PSI, STATES
+from ..specs import Spec
+from .small import copied
+
+SEED = 3
+HISTORY = 10
+
+
+class Broken(Exception):  # noqa: N818 - a verdict, not an error of ours
+    """A rule is broken; the text is the evidence."""
+
+
+class NotApplicable(Exception):  # noqa: N818
+    """A rule cannot be put to this model or these data; the text is why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A model after `fit`, with what it was given (copies that it may have written into), what `fit` returned and how long it took."""
+
+    model: Any
+    train: Dataset
+    valid: Dataset | None
+    returned: Any
+    seconds: float = 0.0
+
+
+@dataclass(eq=False)
+class Subject:
+    """One model spec and the data that it is checked on; what several rules need is made once."""
+
+    spec: Spec
+    data: Dataset
+    saved: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.saved = self.spec.path is not None and self.spec.class_name is None
+
+    @cached_property
+    def parts(self) -> tuple[Dataset, Dataset, Dataset]:
+        """Runs to fit on, to stop by, and to predict."""
+        n = len(self.data)
+        test = 3 if n >= 12 else 2
+        return self.data.subset(range(n - test - 2)), self.data.subset(range(n - test - 2, n - test)), self.data.subset(range(n - test, n))
+
+    @cached_property
+    def batch(self) -> Batch:
+        """What the model is asked about."""
+        return self.parts[2].batch()
+
+    @property
+    def few(self) -> Dataset:
+        """Some of the runs to fit on, where it is only to be seen whether a fit works."""
+        return self.parts[0].subset(range(min(4, len(self.parts[0]))))
+
+    def fit(self, state: int, *, train: Dataset | None = None) -> Fitted:
+        """A fresh model fitted with the seed `SEED`, on `train` alone if it is given; `state` is what the global generators are set to meanwhile."""
+        model = make_predictor(self.spec)
+        if self.saved:
+            return Fitted(model, self.parts[0], None, model)
+        train, held = (copied(train), None) if train is not None else (copied(self.parts[0]), copied(self.parts[1]))
+        began = time.perf_counter()
+        with global_generators(state):
+            returned = model.fit(train, held, seed=SEED)
+        return Fitted(model, train, held, returned, time.perf_counter() - began)
+
+    @cached_property
+    def fitted(self) -> Fitted:
+        """The model that most rules are put to."""
+        return self.fit(state=1)
+
+    @property
+    def model(self) -> Any:
+        return self.fitted.model
+
+    @cached_property
+    def S(self) -> np.ndarray:
+        """Its prediction of `batch`, in float64."""
+        return self.ask(self.batch.s0, self.batch.U)
+
+    def ask(self, s0: np.ndarray, U: np.ndarray, history: Any = None, model: Any = None) -> np.ndarray:
+        """What the model says of copies of the arguments, in float64, shape unchecked."""
+        copies = None if history is None else (history[0].copy(), history[1].copy())
+        return np.array((model or self.model).predict(s0.copy(), U.copy(), copies), dtype=float)
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """Size (10,) by which differences are judged: how far each state moves within the runs (1 for one that never moves)."""
+        states = np.stack([r.states for r in self.data.runs])
+        moved = np.concatenate([states[..., : PSI + 1] - states[:, :1, : PSI + 1], states[..., PSI + 1 :]], axis=-1)
+        size = np.sqrt(np.mean(moved**2, axis=(0, 1)))
+        size[:2] = np.max(size[:2])  # north and east alike, whatever the runs' courses
+        return np.where(size > 0.0, size, 1.0)
+
+    def same(self, a: np.ndarray, b: np.ndarray, limit: float, what: str) -> str:
+        """Evidence that `a` and `b` (..., 10) agree.
+
+        Raises:
+            Broken: they differ by more than `limit` times the size of a state, or in shape.
+        """
+        if a.shape != b.shape:
+            raise Broken(f"{what}: shapes {a.shape} and {b.shape}")
+        with np.errstate(all="ignore"):
+            apart = np.abs(a - b) / self.scale
+        apart = np.where((a == b) | (np.isnan(a) & np.isnan(b)), 0.0, np.where(np.isnan(apart), np.inf, apart))
+        worst = float(apart.max(initial=0.0))
+        if worst > limit:
+            where = np.unravel_index(int(np.argmax(apart)), apart.shape)
+            size = f"{STATES[where[-1]]} is {a[where]:.6g} against {b[where]:.6g}"
+            raise Broken(f"{what}: {size} (limit {limit:g} of its size {self.scale[where[-1]]:.3g})")
+        return f"{what}: " + ("equal bit for bit" if not limit else f"{worst:.1e} (limit {limit:g})" if worst else "no difference")
+
+    @property
+    def earth_fixed(self) -> str:
+        """Why a moved earth frame changes what this model must say, or ""."""
+        effects = [e.name for e in self.spec.effects if EFFECTS.get(e.name).family in ("environment", "time")]
+        if effects:
+            return f"the model has earth-fixed effects ({', '.join(effects)})"
+        return "the model says that it knows a place on earth (earth_fixed)" if getattr(self.model, "earth_fixed", False) else ""
+
+
+def attempt(action: Callable[[], np.ndarray]) -> np.ndarray | Exception:
+    """What the action returns, or what it raises; numpy's warnings on overflow are the model's own business."""
+    try:
+        with np.errstate(all="ignore"):
+            return action()
+    except Exception as error:  # a stranger's model may raise anything
+        return error
+
+
+def raised(error: Exception) -> str:
+    """For the evidence."""
+    return f"raised {reason(error)}"
+
+
+@contextmanager
+def global_generators(state: int) -> Iterator[None]:
+    """Set the global generators of random, numpy and torch; put them back afterwards. A model that draws from them does not follow its seed."""
+    torch = sys.modules.get("torch")
+    kept = random.getstate(), np.random.get_state(), torch.get_rng_state() if torch else None  # noqa: NPY002 - it is the global one that is meant
+    random.seed(state)
+    np.random.seed(state)  # noqa: NPY002
+    if torch:
+        torch.manual_seed(state)
+    try:
+        yield
+    finally:
+        random.setstate(kept[0])
+        np.random.set_state(kept[1])  # noqa: NPY002
+        if torch and kept[2] is not None:
+            torch.set_rng_state(kept[2])

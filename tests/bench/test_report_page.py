@@ -1,0 +1,273 @@
+"""The page of `shipbench report`: what it holds, what it leaves out, what it refuses, and that no name can break out of its text."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from shipbench.bench.report.beside import _numbers
+from shipbench.bench.report.page import _table, write_report
+from shipbench.bench.report.pictures import track
+from shipbench.bench.report.series import Track, gather
+from shipbench.bench.report.slicing import regime_errors
+from shipbench.bench.report.svg import Axes, limits, path, ticks
+from shipbench.bench.results import read_results
+from shipbench.bench.runner import run_tasks
+from shipbench.bench.tables import Table, TableColumn, number
+from shipbench.bench.task import make_task
+from shipbench.cli import app
+from shipbench.errors import InputError
+
+HOSTILE = "<img src=x onerror=alert(1)>&\"'</script><script>alert(2)</script>"
+MODELS = """
+import numpy as np
+class Still:
+    def fit(self, train, valid=None, *, seed=0): return self
+    def predict(self, s0, U, history=None): return np.repeat(s0[:, None], U.shape[1], axis=1)
+    def describe(self): return "still\\n  k = 2.5 1/s [1, 3] some <b>gain</b>"
+class Fails(Still):
+    def predict(self, s0, U, history=None): raise ValueError("</script><script>alert(3)</script> no")
+class Blows(Still):
+    def predict(self, s0, U, history=None):
+        S = np.repeat(s0[:, None], U.shape[1], axis=1)
+        S[0, 5:] = np.inf
+        return S
+"""
+
+
+@pytest.fixture(scope="session")
+def study(tmp_path_factory):
+    """Results of four models, one of which fails and one diverges, on runs with hostile names."""
+    from toy_ship import TOY_SHIP, sail
+
+    from shipbench.records import Dataset, Run
+
+    runs = []
+    for i in range(9):
+        S, C = sail(30, i)
+        S[:, 6], C[:, 0], C[:, 2] = (-40.0, -40.0, 5e3) if i == 4 else (90.0, 90.0, 0.0)
+        runs.append(Run(f"r{i} {HOSTILE}", np.arange(31.0), S, C, meta={"manoeuvre": "turn" if i % 2 else HOSTILE}))
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "m.py").write_text(MODELS)
+    models = ["hold", f"{folder}/m.py:Still", f"{folder}/m.py:Fails", f"{folder}/m.py:Blows"]
+    patch = pytest.MonkeyPatch()
+    patch.setattr("shipbench.bench.runner.load_dataset", lambda name: Dataset("toy", TOY_SHIP, 1.0, tuple(runs), source=HOSTILE))
+    run_tasks([make_task({"dataset": "toy", "models": models, "horizon_s": 30, "folds": 3})], folder / "out", command=f"shipbench run {HOSTILE}")
+    patch.undo()
+    return folder / "out"
+
+
+class Elements(HTMLParser):
+    """Start tags with their attributes, and the data of scripts."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict]] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+
+def page_of(study, tmp_path, **options):
+    return write_report(read_results([study]), tmp_path / "page.html", f"shipbench report {HOSTILE}", **options)
+
+
+def drawings(text):
+    return json.loads(re.search(r'<script type="application/json">(.*?)</script>', text, re.DOTALL)[1])
+
+
+def test_the_page_holds_all_parts_and_fetches_nothing(study, tmp_path):
+    text = page_of(study, tmp_path).path.read_text()
+    for part in ("board", "tracks", "growth", "regimes", "fits", "diagnoses", "status", "about"):
+        assert f'id="d0-{part}"' in text
+        assert f'href="#d0-{part}"' in text
+    assert "default-src 'none'" in text
+    for tag, attributes in Elements(text).tags:
+        assert "src" not in attributes, tag
+        assert attributes.get("href", "#").startswith("#")  # no diagnosis here, so no link out of the page
+
+
+def test_no_name_breaks_out_of_its_text(study, tmp_path):
+    text = page_of(study, tmp_path).path.read_text()
+    tags = Elements(text).tags
+    assert "r4 &lt;img" in text
+    assert [a.get("type") for tag, a in tags if tag == "script"] == ["application/json", None]
+    assert "img" not in dict(tags)
+    assert not [name for _, attributes in tags for name in attributes if name.startswith("on")]
+    assert {run["run"] for run in drawings(text)} == {f"r{i} {HOSTILE}" for i in range(9)}
+    assert not any("<img" in run["svg"] or "alert" in run["svg"] for run in drawings(text))
+
+
+def test_failed_and_diverged_models_stand_with_their_reasons(study, tmp_path):
+    text = page_of(study, tmp_path).path.read_text()
+    status = text[text.index('id="d0-status"') :]
+    assert "predict: ValueError: &lt;/script&gt;" in status
+    assert "x is inf at t = 6 s" in status
+    assert "6 of them failed, diverged or were skipped" in text  # three folds each of Fails and Blows
+    assert "m.py:Fails" not in text[text.index("Models in the pictures") : text.index('id="d0-tracks"')]
+
+
+def test_any_run_can_be_drawn_with_the_error_of_each_model(study, tmp_path):
+    runs = drawings(page_of(study, tmp_path).path.read_text())
+    results = read_results([study])
+    assert len(runs) == 9
+    for run in runs:
+        rows = results.rows[results.rows["run"] == run["run"]].set_index("model")["ed"]
+        assert run["errors"][0].endswith(" m")
+        shown = sorted(float(e.split()[0]) for e in run["errors"] if re.fullmatch(r"[\d.e+-]+ m", e))
+        assert shown == sorted(float(f"{v:.3g}") for v in rows.dropna())
+        assert run["svg"].count("data-m=") == 3
+
+
+def test_tracks_are_thinned_and_left_out_within_the_budget_and_the_page_says_so(study):
+    results, models = read_results([study]), ["hold"]
+    whole = gather(results, "toy", models)
+    assert (len(whole.tracks), len(whole.tracks[0].truth), whole.left_out) == (9, 31, [])
+    thinned = gather(results, "toy", models, points=9 * (2 * 26 + 200))
+    assert (len(thinned.tracks), len(thinned.tracks[0].truth)) == (9, 26)
+    np.testing.assert_array_equal(thinned.tracks[0].truth[[0, -1]], whole.tracks[0].truth[[0, -1]])
+    assert any("26 of its points" in line for line in thinned.left_out)
+    few = gather(results, "toy", models, points=4 * (2 * 25 + 200))
+    assert len(few.tracks) == 4
+    assert any("Tracks: 4 of 9 windows" in line for line in few.left_out)
+
+
+def test_a_folder_without_predictions_still_gives_its_tables(study, tmp_path):
+    bare = tmp_path / "bare"
+    bare.mkdir()
+    for name in ("rows.parquet", "summary.json"):
+        shutil.copy(study / name, bare)
+    written = write_report(read_results([bare]), tmp_path / "page.html", "c")
+    text = written.path.read_text()
+    assert 'id="d0-board"' in text
+    assert 'id="d0-tracks"' not in text
+    assert any("`hold`, fold 0, are not drawn; they cannot be read" in line for line in written.left_out["toy"])
+    assert "<code>hold</code>, fold 0, are not drawn" in text
+
+
+def test_damaged_predictions_are_named_and_the_others_drawn(study, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(study, copy)
+    (copy / "cells" / "toy" / "hold" / "fold1-seed0" / "predictions.npz").write_bytes(b"PK\x03\x04 no archive")
+    written = write_report(read_results([copy]), tmp_path / "page.html", "c")
+    assert [line[:40] for line in written.left_out["toy"]] == ["The predictions of `hold`, fold 1, are n"]
+    assert len(drawings(written.path.read_text())) == 9
+
+
+def test_the_growth_ends_at_the_median_error_of_the_rows(study):
+    series = gather(read_results([study]), "toy", ["hold"])
+    rows = read_results([study]).rows
+    assert series.t[-1] == 30.0
+    assert np.median(series.errors["hold"][0][:, -1]) == pytest.approx(rows.loc[rows["model"] == "hold", "final_displacement"].median())
+
+
+def test_regimes_are_means_over_the_windows_of_the_slice(study, tmp_path):
+    results = read_results([study])
+    held = results.rows[results.rows["model"] == "hold"].set_index("run")["ed"]
+    astern = f"r4 {HOSTILE}"
+    expected = [held.drop(astern).mean(), held[astern]]
+    (drawn,) = [r for r in regime_errors(results.rows, results.windows, ["hold"]) if r.name == "astern"]
+    assert (drawn.labels, drawn.counts) == (("never astern", "astern"), (8, 1))
+    assert drawn.values["hold"] == pytest.approx(expected)
+    text = page_of(study, tmp_path).path.read_text()
+    table = text[text.index("<summary>Regime slices") :]
+    for label, value in zip(drawn.labels, expected, strict=True):
+        row = table[table.index(f">{label}<") :].split("</tr>")[0]
+        assert any(float(v) == pytest.approx(value) for v in re.findall(r'class="number" data-by="([\d.]+)">', row))
+
+
+def diagnosis(folder: Path, fingerprint: str, dataset: str = "toy") -> Path:
+    cause = {"effect": f"current{HOSTILE}", "parameters": {"speed": {"value": 0.3, "unit": "m/s", "ci95": [0.2, None]}},
+             "gain": {"metric": "ED", "relative": 0.25}}  # fmt: skip
+    document = {"dataset": dataset, "verdict": "found", "causes": [cause], "extended_model": "physics+current", "fingerprint": fingerprint}
+    folder.mkdir(parents=True)
+    (folder / "diagnosis.json").write_text(json.dumps(document))
+    (folder / "report.html").write_text("<p>diagnosis</p>")
+    return folder
+
+
+def test_diagnoses_are_linked_whether_given_or_found_beside(study, tmp_path):
+    fingerprint = read_results([study]).summaries[0]["fingerprint"]
+    given = diagnosis(tmp_path / "my diagnosis?#", fingerprint)
+    text = page_of(study, tmp_path, given=[given]).path.read_text()
+    assert 'href="./my%20diagnosis%3F%23/report.html"' in text
+    assert "speed 0.3 m/s [0.2, -]; ED -25 % on held-out runs" in text
+    assert "other data" not in text
+    copy = tmp_path / "runs" / "copy"
+    shutil.copytree(study, copy)
+    diagnosis(tmp_path / "diagnoses" / "toy", "f00")
+    text = write_report(read_results([copy]), copy / "report.html", "c").path.read_text()
+    assert 'href="./../../diagnoses/toy/report.html"' in text
+    assert f"other data than these scores (fingerprint f00, here {fingerprint})" in text
+
+
+def test_a_diagnosis_that_cannot_be_read_is_refused_where_given_and_told_where_found(study, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(study, copy)
+    (copy / "diagnosis.json").write_text("[1")
+    results = read_results([copy])
+    with pytest.raises(InputError, match=r"holds no diagnosis that can be read"):
+        write_report(results, tmp_path / "page.html", "c", given=[copy])
+    assert not (tmp_path / "page.html").exists()
+    assert "holds no diagnosis that can be read" in write_report(results, tmp_path / "page.html", "c").path.read_text()
+    with pytest.raises(InputError, match=r"is of data set 'other'; these results are of toy"):
+        write_report(results, tmp_path / "page.html", "c", given=[diagnosis(tmp_path / "d", "f", "other")])
+
+
+def test_fitted_numbers_are_compared_over_the_fits(study, tmp_path):
+    text = page_of(study, tmp_path).path.read_text()
+    assert "1/s [1, 3] some &lt;b&gt;gain&lt;/b&gt;" in text
+    found = _numbers(["a\n  p1 = 2 N s/m [1, 3] x\n  p1 = 7 1 y", "  p1 = 4e1 N s/m z\n  p1 = 7 1 y", "  p1 = -1 N s/m z"])
+    assert found == [("p1", 2.0, -1.0, 40.0, "N s/m [1, 3] x"), ("p1", 7.0, 7.0, 7.0, "1 y")]
+
+
+def test_a_track_that_leaves_the_picture_is_cut():
+    truth = np.column_stack([np.linspace(0, 100, 11), np.zeros(11), np.zeros(11)])
+    away = truth.copy()
+    away[5:, 1] = 1e7
+    away[8, 0] = np.nan
+    svg = track(Track("r", truth, {"m": away}), ["m"], 50.0, 8.0)
+    assert svg.count("<text") > 4
+    rise = [float(v) for v in re.findall(r"-[\d.]+", re.search(r'class="true" d="([^"]*)"', svg)[1])]
+    assert sum(rise) < -100.0  # of 284 units: the true track, 100 m to the north, still fills the picture
+
+
+def test_axes_put_points_where_they_belong():
+    axes = Axes((0.0, 10.0), (1.0, 100.0), log=True)
+    assert float(axes.py(10.0)) == pytest.approx(0.5 * float(axes.py(1.0) + axes.py(100.0)))
+    assert float(axes.py(0.0)) == float(axes.py(1.0))
+    assert path(np.array([[0, 0], [1.26, 2], [np.nan, 0], [5, 5.04]])) == "M0 0l1.3 2M5 5"
+    assert ticks(0.0, 10.0) == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]
+    assert limits([0.0], [2.0], [1.0, 1.5]) == ((0.0, 2.1), False)
+    assert limits([0.1, 1.0], [2.0, 60.0], [0.5, 40.0])[1]
+
+
+def test_the_command_writes_the_page_and_says_what_it_left_out(study, tmp_path):
+    def command(*args):
+        return CliRunner().invoke(app, ["report", *map(str, args)])
+
+    done = command(study, "--out", tmp_path / "deep" / "p.html", "--json")
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["bytes"] == (tmp_path / "deep" / "p.html").stat().st_size
+    assert [p.name for p in (tmp_path / "deep").iterdir()] == ["p.html"]
+    refused = command(tmp_path / "nothing")
+    assert refused.exit_code == 2
+    assert "holds no results" in refused.output
+    (tmp_path / "file").write_text("")
+    refused = command(study, "--out", tmp_path / "file" / "p.html")
+    assert (refused.exit_code, "Traceback" in refused.output) == (2, False)
+    assert "cannot write the page" in refused.output
+
+
+def test_intervals_of_a_table_stand_under_their_figures():
+    column = TableColumn("ED", "ed", number(2))
+    cells = _table(Table("T", [column], [{"ed": 1.0, "ed_low": 0.5, "ed_high": 2.0}, {"ed": 1.0}, {"ed": float("nan")}]))["rows"]
+    assert [(row["cells"][0]["between"], row["cells"][0]["by"]) for row in cells] == [("0.50 to 2.00", "1.0"), ("", "1.0"), ("", "")]
