@@ -16,7 +16,7 @@ from .model import FREE, HULL_SPREAD, Term
 from .outcome import Candidate, Cause, Estimate, Gain
 from .plant import HULL, NUM_HULL
 from .screen import Score
-from .select import AS_RECORDED
+from .select import AS_RECORDED, WITH_WIND, WITHOUT_WIND
 from .units import UnitFinding
 
 _TIE = 10.0
@@ -218,7 +218,8 @@ def _detectable(found: Analysis, s: Score) -> dict[str, float]:
     values, needed = {}, found.threshold + s.term.cost(found.selection.null.plant.seg.runs)
     for i, name in enumerate(names):
         V = float(s.information[i, i])
-        values[name] = float(unit[i] * np.sqrt((needed + np.log1p(max(V, 0.0))) / V)) if V > 1e-6 else float("nan")
+        size = float(unit[i] * np.sqrt((needed + np.log1p(max(V, 0.0))) / V)) if V > 1e-6 else float("nan")
+        values[name] = s.term.effect.public((size, 0.0))[s.term.effect.vector[0]] if s.term.effect.vector else size
     return values
 
 
@@ -229,8 +230,10 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str]) -> Candidate
     elif name == "hull_derivatives":
         below = found.hull <= HULL_THRESHOLD
         reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}" if below else "not shown to pay on held-out runs"
-    elif name in ("wind", "wind_per_run"):
+    elif name in WITHOUT_WIND and plant.seg.wind is not None:
         reason = "the wind is measured and in the model already"
+    elif name in WITH_WIND and plant.seg.wind is None:
+        reason = "the wind is not measured"
     elif name in ("change_point", "unit_or_sign_error"):
         reason = "no sign of it"
     elif effect.family == "thruster":

@@ -23,8 +23,7 @@ class WindCoefficients(Effect):
     separate = "drifting in wind from all sides, with an anemometer"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        e.wind_X, e.wind_Y, e.wind_N = e.wind_X * (1.0 + q[0]), e.wind_Y * (1.0 + q[1]), e.wind_N * (1.0 + q[2])
-        e.wind_lever = e.wind_lever + q[3]
+        e.wind_X, e.wind_Y, e.wind_N, e.wind_lever = e.wind_X + q[0], e.wind_Y + q[1], e.wind_N + q[2], e.wind_lever + q[3]
 
 
 EFFECT = WindCoefficients()

@@ -12,8 +12,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shipbench.diagnosis.analysis import THRESHOLD
 from shipbench.diagnosis.cases import draw_case, singles
 from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.screen import screen
+from shipbench.diagnosis.select import candidates_for, null_fit
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship
@@ -117,3 +122,23 @@ def test_a_ship_that_never_moves_is_refused():
 def test_twenty_samples_are_refused_or_name_nothing():
     with pytest.raises(InputError, match="at least 20"):
         diagnose(_trials(runs=1, samples=12))
+
+
+def test_where_the_wind_is_measured_it_is_not_missing_but_its_coefficients_may_be():
+    """A container ship in a strong measured wind that turns it the other way, twice as hard as the formula says; and as it says."""
+    ship, plan = load_mmg_ship("container130"), Trials(runs=24, samples=120, gusts=9.0)
+    for hidden in ((), (Hidden(EFFECTS.get("wind_coefficients"), (0.0, 0.0, -3.0, 0.0)),)):
+        data = sea_trials(ship, 4, hidden, plan, wind_recorded=True)
+        plant = Plant.of(data)
+        assert not {"wind", "wind_per_run"} & {t.label for t in candidates_for(plant)}
+        scores = {s.term.label: s for s in reversed(screen(null_fit(plant, Scales(plant), candidates_for(plant))))}
+        if hidden:
+            assert max(scores, key=lambda name: scores[name].score) == "wind_coefficients"
+            assert scores["wind_coefficients"].score > THRESHOLD
+            assert scores["wind_coefficients"].estimate[2] < 0
+        else:
+            assert scores["wind_coefficients"].score < THRESHOLD
+
+
+def test_without_a_measured_wind_its_coefficients_are_no_candidate():
+    assert "wind_coefficients" not in {t.label for t in candidates_for(Plant.of(_trials()))}
