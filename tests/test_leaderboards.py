@@ -20,7 +20,8 @@ STUDIES = sorted(p.parent for p in FOLDER.glob("results/*/rows.parquet"))
 
 
 FINGERPRINTS = {
-    "harbour90": "e102babe79cc29d8", "harbour90_noisy": "10a8bd89a404cf35", "esso_osaka": "97bfd8cf5c3a1622", "esso_osaka_no_wind": "f82dbf16459d1fd4",
+    "harbour90": "e102babe79cc29d8", "harbour90_noisy": "10a8bd89a404cf35", "esso_osaka": "97bfd8cf5c3a1622",
+    "esso_osaka_no_wind": "f82dbf16459d1fd4",
 }  # fmt: skip
 KNOWN = {task.dataset: task for path in (FOLDER.parent / "configs").glob("*.toml") for task in load_tasks(path) if path.stem != "smoke"}
 """The tasks of the shipped configs, by data set: what a committed submission may be of."""
