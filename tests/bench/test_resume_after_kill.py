@@ -149,7 +149,8 @@ def test_the_command_killed_again_and_again_resumes_to_the_same_table(folder, mo
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_no_process_outlives_a_study_that_is_stopped(folder, sent):
     (folder / "models.py").write_text(f"PAUSE = 600\n{MODELS}")
-    command = "from shipbench.bench import executors, runner, task; runner.run_tasks([task.make_task(TASK)], 'out', execution=HOW)"
+    command = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # tests in the background inherit that it is ignored
+    command += "from shipbench.bench import executors, runner, task; runner.run_tasks([task.make_task(TASK)], 'out', execution=HOW)"
     settings = {"dataset": "toyset", "models": ["models.py:Drawn"], "horizon_s": 20, "folds": 2}
     command = command.replace("TASK", repr(settings)).replace("HOW", "executors.Execution('processes', workers=2)")
     study = subprocess.Popen([sys.executable, "-c", command], cwd=folder, env=environment(), stderr=subprocess.DEVNULL)
