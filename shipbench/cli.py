@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from . import cli_check, cli_contract, cli_data, cli_diagnosis, cli_import, cli_leaderboard, cli_report
-from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, parse_seeds, print_json, show_boards
+from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, exit_if_failed, parse_seeds, print_json, show_boards
 from .errors import InputError, ShipbenchError
 
 
@@ -115,11 +115,7 @@ def run(
         typer.echo(f"Results in {folder}; leaderboard: {', '.join(str(path) for _, path in written)}")
         if equations := sorted(folder.glob("cells/*/*/*/equations.txt")):
             typer.echo(f"Fitted equations of {len(equations)} models beside their predictions, e.g. {equations[0]}")
-    if outcome.failed:
-        typer.echo(f"{len(outcome.failed)} of {len(outcome.summaries)} fits failed:", err=True)
-        for line in outcome.failed:
-            typer.echo(f"  {line}", err=True)
-        raise typer.Exit(1)
+    exit_if_failed(outcome.failed, f"{len(outcome.failed)} of {len(outcome.summaries)} fits")
 
 
 @app.command()

@@ -52,6 +52,15 @@ def parse_seeds(text: str | None) -> tuple[int, ...] | None:
     return None if text is None else parse_numbers("--seeds", text)
 
 
+def exit_if_failed(failed: Sequence[str], what: str) -> None:
+    """Name the fits that failed and end with exit code 1, if there are any; `what` heads the list."""
+    if failed:
+        typer.echo(f"{what} failed:", err=True)
+        for line in failed:
+            typer.echo(f"  {line}", err=True)
+        raise typer.Exit(1)
+
+
 def show_boards(boards: Sequence[Board]) -> None:
     """Print leaderboards on a terminal."""
     console = console_for_tables()

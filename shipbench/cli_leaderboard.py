@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .cli_common import Json, Quiet, parse_numbers, parse_seeds, print_json, show_boards
+from .cli_common import Json, Quiet, exit_if_failed, parse_numbers, parse_seeds, print_json, show_boards
 from .errors import InputError
 
 if TYPE_CHECKING:
@@ -111,8 +111,4 @@ def learning_curve(
     elif not quiet:
         show_boards([curve.board])
         typer.echo(f"Results in {folder}; page: {curve.page}")
-    if curve.failed:
-        typer.echo(f"{len(curve.failed)} fits failed:", err=True)
-        for line in curve.failed:
-            typer.echo(f"  {line}", err=True)
-        raise typer.Exit(1)
+    exit_if_failed(curve.failed, f"{len(curve.failed)} fits")

@@ -16,7 +16,7 @@ from .model import FREE, HULL_SPREAD, Term
 from .outcome import Candidate, Cause, Estimate, Gain
 from .plant import HULL, NUM_HULL
 from .screen import Score
-from .select import AS_RECORDED, WITH_WIND, WITHOUT_WIND
+from .select import AS_RECORDED, WITHOUT_WIND
 from .units import UnitFinding
 
 _TIE = 10.0
@@ -232,8 +232,8 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str]) -> Candidate
         reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}" if below else "not shown to pay on held-out runs"
     elif name in WITHOUT_WIND and plant.seg.wind is not None:
         reason = "the wind is measured and in the model already"
-    elif name in WITH_WIND and plant.seg.wind is None:
-        reason = "the wind is not measured"
+    elif effect.channels and plant.seg.wind is None:
+        reason = f"{' and '.join(effect.channels)} are not measured"
     elif name in ("change_point", "unit_or_sign_error"):
         reason = "no sign of it"
     elif effect.family == "thruster":

@@ -18,8 +18,8 @@ NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error")
 """Found by their own tests: prior width of the hull, gated columns, kinematics."""
 AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft_rate_limit", "shaft_lag", "thruster_lag", "rudder_lag")
 """Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
-WITH_WIND, WITHOUT_WIND = ("wind_coefficients",), ("wind", "wind_per_run")
-"""Only where the wind is measured, and only where it is not."""
+WITHOUT_WIND = ("wind", "wind_per_run")
+"""Only where the wind is not measured."""
 MOST_EFFECTS = 6
 _GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
 _REFITS = 3
@@ -65,9 +65,9 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None) -> list[Ter
     for name in names if names is not None else EFFECTS.names():
         if name in NOT_SCREENED or (not plant.seg.commanded and name in AS_RECORDED):
             continue
-        if name in (WITH_WIND if plant.seg.wind is None else WITHOUT_WIND):
-            continue
         effect = EFFECTS.get(name)
+        if effect.channels if plant.seg.wind is None else name in WITHOUT_WIND:
+            continue
         if effect.family == "thruster" and not np.any(plant.seg.states[..., 8:]):
             continue
         ways = list(product(effect.fitted(plant.c.L), effect.settings(plant.seg.states[..., :2], plant.ship)))

@@ -54,7 +54,7 @@ class Effect:
 
     Class attributes: `family` (environment, rudder, propulsion, thruster, hull, sensor, time), `summary`, `source`, `parameters`, `per_run`
     (every run has its own values), `vector` (names of size and direction that two earth-fixed components are reported as), `separate` (the
-    manoeuvre that tells it from its look-alikes).
+    manoeuvre that tells it from its look-alikes), `channels` (measured inputs without which it means nothing).
     """
 
     name: str = ""
@@ -65,6 +65,7 @@ class Effect:
     per_run: ClassVar[bool] = False
     vector: ClassVar[tuple[str, str] | None] = None
     separate: ClassVar[str] = ""
+    channels: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         cls.name = cls.__module__.rsplit(".", 1)[-1]

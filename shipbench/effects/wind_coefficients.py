@@ -21,6 +21,7 @@ class WindCoefficients(Effect):
         Parameter("lever", "m", 13.0, -40.0, 40.0, scaling="length"),
     )
     separate = "drifting in wind from all sides, with an anemometer"
+    channels = ("wind_speed", "wind_from")
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.wind_X, e.wind_Y, e.wind_N, e.wind_lever = e.wind_X + q[0], e.wind_Y + q[1], e.wind_N + q[2], e.wind_lever + q[3]

@@ -139,6 +139,10 @@ class NeuralODE(PredictorBase):
         self.effects = tuple(effects)
         return self
 
+    def skip(self, dataset: Dataset) -> str | None:
+        """Why this model cannot take `dataset`: the physics beneath cannot."""
+        return self.physics.skip(dataset)
+
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Fit the physics on `train` and `valid`, train the residual on `train`; `valid` decides what is kept."""
         type(self).fit_group([self], [train], [valid], [seed])

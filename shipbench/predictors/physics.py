@@ -75,6 +75,13 @@ class Physics(PredictorBase):
         self.extension = extension_of(effects)
         return self
 
+    def skip(self, dataset: Dataset) -> str | None:
+        """Why this model cannot take `dataset`: an effect needs a channel that was not measured."""
+        for term in self.extension.terms if self.extension is not None else ():
+            if missing := [c for c in term.effect.channels if c not in dataset.inputs]:
+                return f"effect '{term.name}' needs {' and '.join(missing)}, which data set '{dataset.name}' lacks"
+        return None
+
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Fit actuator dynamics, then p0..p10, over full rollouts of all runs of `train` and `valid` (nothing is tuned on `valid`).
 

@@ -229,3 +229,10 @@ def test_it_runs_beside_the_plain_physics_on_the_command_line(tmp_path):
     text = (tmp_path / "out" / "cells" / "trials" / "physics+current" / "fold0-seed0" / "equations.txt").read_text()
     assert "speed = " in text
     assert "m/s [" in text
+
+
+@pytest.mark.parametrize("model", ["physics", "neural_ode"])
+def test_an_effect_of_the_wind_is_skipped_where_no_wind_is_measured(model, harbour):
+    refused = make_predictor(parse_spec(f"{model}+wind_coefficients")).skip(harbour)
+    assert "wind_speed and wind_from" in refused
+    assert make_predictor(parse_spec(f"{model}+current")).skip(harbour) is None
