@@ -78,9 +78,13 @@ def ornstein_uhlenbeck(knots: int, spacing: float, tau: float) -> tuple[np.ndarr
     return np.linalg.inv(K), float(np.linalg.slogdet(K)[1])
 
 
-def _log_determinant(A: np.ndarray) -> np.ndarray:
-    """Of positive definite matrices (..., n, n): half the work of a decomposition that must pivot."""
-    return 2.0 * np.log(np.diagonal(np.linalg.cholesky(A), axis1=-2, axis2=-1)).sum(axis=-1)
+def log_determinant(A: np.ndarray) -> np.ndarray:
+    """Of positive definite matrices (..., n, n): half the work of a decomposition that must pivot, which is left for matrices that are only nearly so
+    (sensitivities of a trajectory that blows up)."""
+    try:
+        return 2.0 * np.log(np.diagonal(np.linalg.cholesky(A), axis1=-2, axis2=-1)).sum(axis=-1)
+    except np.linalg.LinAlgError:
+        return np.linalg.slogdet(A)[1]
 
 
 @dataclass(frozen=True)
@@ -115,7 +119,7 @@ class Gram:
         inverse = np.linalg.inv(A)
         solved = inverse @ self.G[:, :Z, Z:]
         S = self.G[:, Z:, Z:] - np.swapaxes(self.G[:, :Z, Z:], 1, 2) @ solved
-        logdet = _log_determinant(A) + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
+        logdet = log_determinant(A) + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
         first = np.flatnonzero(np.diff(self.run, prepend=-1))  # segments stand in the order of their runs
         return Reduced(np.add.reduceat(S, first), np.add.reduceat(logdet, first), inverse, solved)
 
@@ -166,13 +170,13 @@ def solve(reduced: Reduced, prior: Prior) -> Solution:
         right = reduced.S[:, prior.random][:, :, keep]
         back = covs @ right
         S = S - np.swapaxes(right, 1, 2) @ back
-        logdet = logdet + _log_determinant(A) + np.sum(prior.log_tau2)
+        logdet = logdet + log_determinant(A) + np.sum(prior.log_tau2)
     total = S.sum(axis=0)
     A = total[:-1, :-1] + np.diag(prior.precision)
     cov = np.linalg.inv(A)
     mean = cov @ total[:-1, -1]
     quad = total[-1, -1] - total[:-1, -1] @ mean
-    log_evidence = -0.5 * (quad + np.sum(logdet) + _log_determinant(A) - np.sum(np.log(prior.precision)))
+    log_evidence = -0.5 * (quad + np.sum(logdet) + log_determinant(A) - np.sum(np.log(prior.precision)))
     fitted = np.append(-mean, 1.0)
     per_run = -0.5 * (np.einsum("nij,i,j->n", S, fitted, fitted) + logdet)
     if back is None:

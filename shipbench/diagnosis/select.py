@@ -66,7 +66,9 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None) -> list[Ter
         if name in NOT_SCREENED or (not plant.seg.commanded and name in AS_RECORDED):
             continue
         effect = EFFECTS.get(name)
-        if effect.channels if plant.seg.wind is None else name in WITHOUT_WIND:
+        if plant.seg.wind is None and effect.channels:
+            continue
+        if plant.seg.wind is not None and name in WITHOUT_WIND:
             continue
         if effect.family == "thruster" and not np.any(plant.seg.states[..., 8:]):
             continue

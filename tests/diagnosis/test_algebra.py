@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.fit import Model, Origin, fit, settle, start
-from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, ornstein_uhlenbeck, solve
+from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, log_determinant, ornstein_uhlenbeck, solve
 from shipbench.diagnosis.model import Linearisation, Scales, Term, predict
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.structure import STRUCTURE
@@ -150,3 +150,16 @@ def test_thrust_astern_and_coupling_are_ordinary_differences(plant):
     assert mods.backing == pytest.approx(0.0)
     assert mods.thrust == pytest.approx(1.0)
     assert mods.coupling == pytest.approx(0.0)
+
+
+def test_log_determinants_of_sound_and_of_blown_up_matrices():
+    rng = np.random.default_rng(0)
+    J = rng.standard_normal((5, 12, 8))
+    sound = np.swapaxes(J, 1, 2) @ J + np.eye(8)
+    np.testing.assert_allclose(log_determinant(sound), np.linalg.slogdet(sound)[1], rtol=1e-12)
+    J[2, :, 0] *= 1e18
+    J[2, :, 1] = J[2, :, 0]  # rounding alone decides whether this is positive definite
+    blown = np.swapaxes(J, 1, 2) @ J - 1e25 * np.eye(8) * (np.arange(5) == 2)[:, None, None]
+    with pytest.raises(np.linalg.LinAlgError):
+        np.linalg.cholesky(blown)
+    assert np.isfinite(log_determinant(blown)).all()
