@@ -19,13 +19,17 @@ from .subject import HISTORY, Broken, NotApplicable, Subject, attempt, raised
 ROUNDING = 1e-4
 """Of a state's size: what a model in single precision may lose when the same is computed in another order."""
 _LEAK = 1e-6
-_SAVED = "a saved model comes fitted"
+
+
+def _unfitted(c: Subject) -> None:
+    """A rule of `fit` cannot be put to a saved model."""
+    if c.saved:
+        raise NotApplicable("a saved model comes fitted")
 
 
 def fit(c: Subject) -> str:
     """`fit(train, valid, seed=...)` learns from the training runs; `valid` only decides when to stop."""
-    if c.saved:
-        raise NotApplicable(_SAVED)
+    _unfitted(c)
     return f"{len(c.parts[0])} runs, {len(c.parts[1])} validation runs: {c.fitted.seconds:.2f} s"
 
 
@@ -58,8 +62,7 @@ def _flat(model: Any) -> dict[str, Any]:
 
 def fit_returns(c: Subject) -> str:
     """`fit` returns the model, so that `make_predictor(...).fit(train)` can be used at once."""
-    if c.saved:
-        raise NotApplicable(_SAVED)
+    _unfitted(c)
     if c.fitted.returned is not c.model:
         raise Broken(f"fit returned {type(c.fitted.returned).__name__}; end it with `return self`")
     return "the model itself"
@@ -67,15 +70,13 @@ def fit_returns(c: Subject) -> str:
 
 def valid_optional(c: Subject) -> str:
     """`fit(train, seed=...)` works without validation runs."""
-    if c.saved:
-        raise NotApplicable(_SAVED)
+    _unfitted(c)
     return f"{len(c.few)} runs: {c.fit(state=1, train=c.few).seconds:.2f} s"
 
 
 def fit_inputs(c: Subject) -> str:
     """`fit` leaves the data as they are: other models are fitted on them too."""
-    if c.saved:
-        raise NotApplicable(_SAVED)
+    _unfitted(c)
     for name, before, after in (("train", c.parts[0], c.fitted.train), ("valid", c.parts[1], c.fitted.valid)):
         if changed := what_changed(before, after):  # type: ignore[arg-type]
             raise Broken(f"fit changed {changed} of `{name}`; work on a copy")
@@ -222,8 +223,7 @@ def rotation(c: Subject) -> str:
 
 def seed(c: Subject) -> str:
     """The same data and seed give the same model, whatever the global random generators are at."""
-    if c.saved:
-        raise NotApplicable(_SAVED)
+    _unfitted(c)
     again = c.fit(state=2).model
     return c.same(c.ask(c.batch.s0, c.batch.U, model=again), c.S, ROUNDING, "fitted again with the same seed")
 
