@@ -1,7 +1,7 @@
 """Errors that touch every figure: frames (ENU, heading from east), earth-fixed velocities, units, signs. They are taken out before finer checks.
 
 Readings of frame and velocities are compared by the share of the track, and of the heading's change, that they leave unexplained; a reading other
-than ours is believed only if it leaves a quarter or less of the squares. Units and signs are `diagnosis.units`.
+than ours is believed only if it leaves a quarter or less of the squares. Units and signs are `units`.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnosis.units import BETTER, UnitFinding, check_units, corrected
 from ..records import Dataset
 from ..signals import PSI, U, V, X, Y
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
 from .track import WINDOW
+from .units import BETTER, UnitFinding, check_units, corrected
 
 _POOR = 0.15
 _FLIPPED = {

@@ -97,12 +97,23 @@ def _explain(w: Windows) -> Chosen:
     )  # fmt: skip
 
 
-def check(recording: Recording) -> list[Finding]:
-    """Findings of the track; none where the ship hardly moves."""
+@dataclass(frozen=True)
+class Explained:
+    """The windows as recorded (`plain`) and with the lags put back (`mended`), what was chosen on each, and seconds of lag by channel."""
+
+    plain: Windows
+    mended: Windows
+    first: Chosen
+    chosen: Chosen
+    late: dict[int, float]
+
+
+def explain(recording: Recording) -> Explained | None:
+    """What the track needs beside heading and speeds; None where the ship hardly moves or too little is recorded."""
     late: dict[int, float] = {}
     w = plain = windows(recording, late)
     if w is None or plain is None or np.sqrt(np.mean(np.abs(w.moved) ** 2)) < 0.02 * recording.dataset.ship.L:
-        return []
+        return None
     first = chosen = _explain(w)
     for _ in range(8):  # a lag is linear for small ones only; one at a time, so that the error of a great one is not put down to another
         moves = [name for name in chosen.names if name in _LAGS and abs(chosen.value[name][0]) > 0.02 * recording.dt]
@@ -114,14 +125,33 @@ def check(recording: Recording) -> list[Finding]:
         if again is None:
             break
         w, chosen = again, _explain(again)
-    chosen = replace(chosen, left=first.left | {"all chosen": chosen.left["all chosen"]})
-    found = _lag_findings(recording, plain, chosen, first, late)
-    return found + [f for name in chosen.names if name not in _LAGS for f in _finding(recording, w, chosen, name)]
+    return Explained(plain, w, first, replace(chosen, left=first.left | {"all chosen": chosen.left["all chosen"]}), late)
+
+
+def late_velocities(recording: Recording) -> tuple[float, float] | None:
+    """Seconds by which the velocities, as a vector in the earth's axes, are late against the position, with their standard error; None if not."""
+    found = explain(recording)
+    if found is None or "lag of position" not in found.first.sd:
+        return None
+    lag = -found.late.get(X, 0.0)
+    return (lag, float(found.first.sd["lag of position"][0])) if lag >= _least_lag(recording) else None
+
+
+def _least_lag(recording: Recording) -> float:
+    return max(0.25 * recording.dt, LEAST_LAG * recording.froude)
+
+
+def check(recording: Recording) -> list[Finding]:
+    """Findings of the track; none where the ship hardly moves."""
+    x = explain(recording)
+    if x is None:
+        return []
+    found = _lag_findings(recording, x.plain, x.chosen, x.first, x.late)
+    return found + [f for name in x.chosen.names if name not in _LAGS for f in _finding(recording, x.mended, x.chosen, name)]
 
 
 def _lag_findings(recording: Recording, w: Windows, chosen: Chosen, first: Chosen, late: dict[int, float]) -> list[Finding]:
     """Sensors are late, not early: a position ahead of heading and speeds together is a velocity vector that is late in earth axes."""
-    least = max(0.25 * recording.dt, LEAST_LAG * recording.froude)
     vector = "the position, as a vector in earth axes (a filter there, before the turn into the ship's axes),"
     words = {
         ("lag of u, v", True): (("u", "v"), "the position", ("u", "v")), ("lag of u, v", False): (("x", "y"), "u, v", ("x", "y")),
@@ -133,7 +163,7 @@ def _lag_findings(recording: Recording, w: Windows, chosen: Chosen, first: Chose
     found = []
     for name, channels in _LAGS.items():
         lag = late.get(channels[0], 0.0)
-        if abs(lag) < least or name not in first.sd:
+        if abs(lag) < _least_lag(recording) or name not in first.sd:
             continue
         names, others, keys = words[name, lag > 0.0]
         lag, sd = abs(lag), float(first.sd[name][0])

@@ -126,7 +126,7 @@ def correct_run(frame: pd.DataFrame, corrections: Corrections, own: RunCorrectio
         if signal in frame:
             frame[signal] /= scale
     _to_body_over_ground(frame, corrections, own, where)
-    parts = [_undelayed(part, corrections.delay, dt) for part in _pieces(frame, corrections, own, dt)]  # nothing is interpolated over a gap or a cut
+    parts = [undelayed(part, corrections.delay, dt) for part in _pieces(frame, corrections, own, dt)]  # nothing is interpolated over a gap or a cut
     return [_at_midship(part, corrections.antenna) for part in parts if len(part) >= _SPLIT_FEWEST]
 
 
@@ -171,7 +171,7 @@ def _to_body_over_ground(frame: pd.DataFrame, corrections: Corrections, own: Run
     frame["u"], frame["v"] = own_way[0] + cos * north + sin * east, own_way[1] - sin * north + cos * east
 
 
-def _undelayed(frame: pd.DataFrame, delay: dict[str, float], dt: float) -> pd.DataFrame:
+def undelayed(frame: pd.DataFrame, delay: dict[str, float], dt: float) -> pd.DataFrame:
     """Signals that were late put back in time; samples whose values lie outside the record are dropped. Commands move by whole samples."""
     late = {s: d for s, d in delay.items() if (s in frame or s == VECTOR) and d != 0.0}
     t = frame["t"].to_numpy()

@@ -55,9 +55,9 @@ class Analysis:
         return Extension(self.final.model.terms, self.final.values, name_hull and self.hull > HULL_THRESHOLD, gears)
 
 
-def causes_of(plant: Plant, threshold: float, only: Sequence[str] | None = None) -> tuple[Extension, dict[str, Gear]]:
+def causes_of(plant: Plant, threshold: float, only: Sequence[str] | None = None, settled: Sequence[str] = ()) -> tuple[Extension, dict[str, Gear]]:
     """What one training part alone leads to, by the same selection, with the threshold of the whole; and the best ordinary gears."""
-    selection = select(null_fit(plant, Scales(plant), candidates_for(plant, only)), threshold)
+    selection = select(null_fit(plant, Scales(plant), candidates_for(plant, only, settled)), threshold)
     findings, plain = find_in_gears(selection.final.plant)
     gears = {g.actuator: g.gear for g in _named_gears(findings, threshold, only)}
     return Extension(selection.final.model.terms, selection.final.values, False, gears or None), plain
@@ -72,15 +72,16 @@ def _named_gears(findings: Sequence[GearFinding], threshold: float, only: Sequen
     return list(named.values())
 
 
-def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, cautious: bool = False) -> Analysis:
+def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, cautious: bool = False, settled: Sequence[str] = ()) -> Analysis:
     """Fit the plain model, look for causes in the motion and in the gears, and for dependences that no cause explains.
 
     Args:
         only: restrict the candidates to these effects (for an oracle that knows the truth).
         cautious: name nothing (too little data), but rank everything.
+        settled: effects of which the data are free already.
     """
     scales = Scales(plant)
-    null = null_fit(plant, scales, candidates_for(plant, only))
+    null = null_fit(plant, scales, candidates_for(plant, only, settled))
     draws = null_maxima(null, seed)
     threshold = max(THRESHOLD, float(np.quantile(draws, 0.95))) if only is None else 0.0
     selection = select(null, np.inf if cautious else threshold)
@@ -112,7 +113,7 @@ def hull_evidence(fit: Fit) -> float:
     lin = Linearisation(fit.plant, fit.scales, fit.point, fit.motion)
     wide = settle(lin, fit.model, fit.hyper, fit.log_tau2)
     narrow = settle(lin, replace(fit.model, hull=_NARROW), fit.hyper, fit.log_tau2)
-    return 2.0 * (wide.evidence - narrow.evidence)
+    return 2.0 * (wide.solution.log_evidence - narrow.solution.log_evidence)
 
 
 def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..checking.units import UnitFinding
 from ..effects.base import EFFECTS, Effect
 from .analysis import HULL_THRESHOLD, Analysis
+from .clocks import NAMES, LateVelocities
 from .fit import Fit
 from .gears import GearFinding
 from .model import FREE, HULL_SPREAD, Term
@@ -17,15 +19,19 @@ from .outcome import Candidate, Cause, Estimate, Gain
 from .plant import HULL, NUM_HULL
 from .screen import Score
 from .select import AS_RECORDED, WITHOUT_WIND
-from .units import UnitFinding
 
 _TIE = 10.0
 """Candidates within this of the winner's score (2 log Bayes factor) are called confused with it."""
 
 
-def describe_causes(found: Analysis, units: Sequence[UnitFinding], gain: Gain | None, hull: bool, runs: Sequence[str]) -> list[Cause]:
-    """Named causes: faults of units first, then by score; the hull last, because it is off the regressions on most ships. `runs` are their names."""
+def describe_causes(
+    found: Analysis, units: Sequence[UnitFinding], late: LateVelocities | None, gain: Gain | None, hull: bool, runs: Sequence[str]
+) -> list[Cause]:
+    """Named causes: what was taken out before the fit first (units, late velocities), then by score; the hull last, because it is off the
+    regressions on most ships. `runs` are their names."""
     causes = [_unit_cause(i + 1, u) for i, u in enumerate(units)]
+    if late is not None:
+        causes.append(_late_cause(len(causes) + 1, found, late))
     if found.unknown is not None:
         return causes
     named: list[Cause] = []
@@ -157,6 +163,20 @@ def _unit_cause(rank: int, u: UnitFinding) -> Cause:
     return Cause("unit_or_sign_error", rank, np.inf, 0.0, parameters, (), "", None, f"{u.channel}: {u.kind}. {u.evidence}")
 
 
+def _late_cause(rank: int, found: Analysis, late: LateVelocities) -> Cause:
+    half = 1.96 * late.sd
+    parameters = {
+        "delay": Estimate(late.delay, "s", (late.delay - half, late.delay + half)), "earth_axes": Estimate(1.0, "1", (np.nan, np.nan)),
+    }  # fmt: skip
+    how = "behind a filter of first order" if late.filtered else "as they were"
+    evidence = (
+        f"u and v follow the track {late.delay:.2g} s late, {how}, as a vector in the earth's axes: seen by kinematics and taken out before the fit. "
+        f"The plain model agrees: {0.5 * late.score:.0f} of log evidence over the runs as recorded, {0.5 * late.over_position:.0f} over a position "
+        "that is early"
+    )
+    return Cause("velocity_delay", rank, late.score, _p(found, late.score), parameters, (), "", None, evidence)
+
+
 def describe_candidates(found: Analysis, named: Sequence[str]) -> list[Candidate]:
     """Every effect of the library once, best first, with why it was not named and the smallest size that would have been."""
     lines: dict[str, Candidate] = {}
@@ -230,6 +250,8 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str]) -> Candidate
     elif name == "hull_derivatives":
         below = found.hull <= HULL_THRESHOLD
         reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}" if below else "not shown to pay on held-out runs"
+    elif name in NAMES and "velocity_delay" in named:
+        reason = "the clocks of position and velocities were put right before the fit"
     elif name in WITHOUT_WIND and plant.seg.wind is not None:
         reason = "the wind is measured and in the model already"
     elif effect.channels and plant.seg.wind is None:

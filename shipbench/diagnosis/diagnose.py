@@ -11,16 +11,17 @@ from multiprocessing import get_context
 
 import numpy as np
 
+from ..checking.units import check_units, corrected
 from ..errors import InputError
 from ..records import Dataset
 from .analysis import HULL_THRESHOLD, Analysis, analyse, causes_of
 from .causes import describe_candidates, describe_causes, remaining, unknown_part
+from .clocks import NAMES, check_clocks
 from .gain import FoldGain, fold_gain, summarise
 from .model import NUM_BASE
 from .outcome import Diagnosis, Gain
 from .plant import MOST_STEPS, THOROUGH_STEPS, Plant
 from .trace import trace_of
-from .units import check_units, corrected
 from .wrong import what_is_wrong
 
 FOLDS = 5
@@ -51,13 +52,17 @@ def diagnose(
     warnings = _check(dataset)
     units = check_units(dataset) if only is None else []
     dataset = corrected(dataset, units)
+    late = check_clocks(dataset) if only is None else None
+    if late is not None:
+        dataset = late.mended
+    settled = NAMES if late is not None else ()
     plant = Plant.of(dataset, THOROUGH_STEPS if thorough else MOST_STEPS)
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
-    found = analyse(plant, only=only, seed=seed, cautious=cautious)
+    found = analyse(plant, only=only, seed=seed, cautious=cautious, settled=settled)
     doubts = _doubts(found) if only is None else []
     warnings += doubts
-    worth = _cross_validated(dataset, found, only, seed, workers) if gain and not cautious and not doubts else Worth()
-    causes = [] if doubts else describe_causes(found, units, worth.gain, worth.hull, [r.id for r in dataset.runs])
+    worth = _cross_validated(dataset, found, only, seed, workers, settled) if gain and not cautious and not doubts else Worth()
+    causes = [] if doubts else describe_causes(found, units, late, worth.gain, worth.hull, [r.id for r in dataset.runs])
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)
     verdict = "unknown" if doubts or (found.unknown is not None and not units) else "found" if causes else "none"
@@ -121,12 +126,12 @@ def _doubts(found: Analysis) -> list[str]:
     ]
 
 
-def _one_fold(fold: int, dataset: Dataset, seed: int, only: Sequence[str] | None, threshold: float, hull: bool) -> FoldGain:
+def _one_fold(fold: int, dataset: Dataset, seed: int, only: Sequence[str] | None, threshold: float, hull: bool, settled: Sequence[str]) -> FoldGain:
     """Selection and fits on the training part of one fold."""
     test = _folds(len(dataset), seed)[fold]
     train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
     plant = Plant.of(dataset.with_runs(train))
-    extension, plain = causes_of(plant, threshold, only)
+    extension, plain = causes_of(plant, threshold, only, settled)
     return fold_gain(dataset, test, extension, plain, hull)
 
 
@@ -134,12 +139,12 @@ def _folds(num: int, seed: int) -> list[np.ndarray]:
     return [np.sort(part) for part in np.array_split(np.random.default_rng(seed).permutation(num), min(FOLDS, num))]
 
 
-def _cross_validated(dataset: Dataset, found: Analysis, only: Sequence[str] | None, seed: int, workers: int) -> Worth:
+def _cross_validated(dataset: Dataset, found: Analysis, only: Sequence[str] | None, seed: int, workers: int, settled: Sequence[str]) -> Worth:
     """Held-out gain of the causes, and of the hull's derivatives beside them."""
     hull = found.hull > HULL_THRESHOLD
     if not (found.final.model.terms or found.gears or hull) or found.unknown is not None:
         return Worth()
-    work = partial(_one_fold, dataset=dataset, seed=seed, only=only, threshold=found.threshold, hull=hull)
+    work = partial(_one_fold, dataset=dataset, seed=seed, only=only, threshold=found.threshold, hull=hull, settled=settled)
     folds = range(len(_folds(len(dataset), seed)))
     if workers > 1:
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:

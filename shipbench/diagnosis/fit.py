@@ -7,12 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .gram import Gram, Hyper, Prior, Products, Reduced, Solution, accelerated, background, solve, update_force, update_noise
+from .colour import Colour
+from .gram import ETA_PRECISION, Gram, Hyper, Prior, Products, Reduced, Solution, accelerated, background, solve, update_force, update_noise
 from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, Term
 from .plant import NUM_HULL, Plant
 
 _EM_CYCLES = 3
-_MAY_RISE, _AT_REST, _AT_REST_EVIDENCE = 1.1, 0.03, 0.1
+_MAY_RISE, _FREE_STEPS, _LEAST_SHARE = 1.1, 5, 0.05
+"""Factor by which a step may raise the cost, on the first steps; later ones must lower it."""
+_LEAP = 0.3
+"""Most that the logarithm of a variance moves between those later steps: two linearisations may else call the other's variance wrong for ever."""
+_AT_REST, _AT_REST_EVIDENCE = 0.5, 0.1
+"""Excess of the cost over what the linear model promises, and change of the evidence, at which a fit rests."""
 _LOG_FLOOR = np.log(0.1**2)
 """A channel is never taken for better than a tenth of an ordinary sensor, else the latent force follows its noise."""
 
@@ -67,11 +73,15 @@ class Fit:
     solution: Solution
     estimate: np.ndarray
     cov: np.ndarray
+    excess: float
 
     @property
     def evidence(self) -> float:
-        """Log evidence, without constants, less the costs of the terms."""
-        return self.solution.log_evidence - 0.5 * sum(t.cost(self.plant.seg.runs) for t in self.model.terms)
+        """Log evidence, without constants, less the costs of the terms.
+
+        Laplace's: with the cost that the point has, not the lower one that the linear model promises. Where the fit rests they are the same.
+        """
+        return self.solution.log_evidence - 0.5 * (self.excess + sum(t.cost(self.plant.seg.runs) for t in self.model.terms))
 
     @property
     def values(self) -> tuple[np.ndarray, ...]:
@@ -104,7 +114,9 @@ def products_of(plant: Plant, scales: Scales, point: Point, columns: Columns, ex
         e = e + _times(own, value[plant.seg.run] if term.per_run else np.broadcast_to(value, (B, term.size)))
     Z = np.concatenate([columns.eta, columns.w, columns.base, *columns.own, *columns.candidates, *extra, e[..., None]], axis=-1)
     Z = np.nan_to_num(Z / noise[None, :, None], nan=0.0, posinf=0.0, neginf=0.0)
-    return Products.of(Z, plant.seg.mask, plant.knots, plant.knot_time, plant.seg.run, plant.seg.runs)
+    Z = scales.colour.whitened(Z.reshape(B, plant.steps + 1, 6, -1)).reshape(Z.shape)
+    logdet = scales.colour.log_determinant(plant.seg.mask.sum(axis=1))
+    return Products.of(Z, plant.seg.mask, plant.knots, plant.knot_time, plant.seg.run, plant.seg.runs, logdet)
 
 
 def _times(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -138,9 +150,12 @@ def between(a: Point, b: Point, share: float) -> Point:
 
 
 def within_bounds(plant: Plant, scales: Scales, point: Point) -> Point:
-    """Amplitudes held inside the bounds of their effects."""
+    """Amplitudes held inside the bounds of their effects; those of single runs are held by what the runs have in common."""
     values = []
     for term, value in zip(point.terms, point.values, strict=True):
+        if term.per_run:
+            values.append(value)
+            continue
         unit = scales.amplitudes(term, plant.c.L)
         sized = [p for p in term.effect.sized(plant.c.L) if not p.shape]
         values.append(np.clip(value, [p.low / s for p, s in zip(sized, unit, strict=True)], [p.high / s for p, s in zip(sized, unit, strict=True)]))
@@ -151,8 +166,10 @@ def objective(lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int
     """Twice the negative log posterior of a point, without constants."""
     plant, point = lin.plant, lin.point
     error = np.where(plant.seg.mask[..., None], (plant.seg.states[..., :6] - lin.predicted) / lin.scales.noise, 0.0)
+    error = np.where(plant.seg.mask[..., None], lin.scales.colour.whitened(error), 0.0)
     with np.errstate(over="ignore"):
         cost = float(np.sum(error**2 * np.exp(-hyper.log_noise))) + float(np.sum(base_precision(model) * point.base**2))
+    cost += ETA_PRECISION * float(np.sum(point.eta**2))
     w = np.moveaxis(point.w, -1, 1)
     cost += float(np.sum(np.sum(w @ gram.K_inv * w, axis=(0, 2)) * np.exp(-hyper.log_force)))
     for i, (term, value) in enumerate(zip(point.terms, point.values, strict=True)):
@@ -173,38 +190,46 @@ def fit(
 ) -> Fit:  # fmt: skip
     """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), until it rests.
 
-    The evidence of a linearisation is that of the model only where the trajectory is the model's own: on the way it can be far too high. A step is
-    halved only where the cost explodes: the cost of a step that is right for the parameters rises at first, until the latent force has followed, and
-    the path would else end where parameters compensate each other. `candidates` get columns at the last point.
+    A step is at first halved only where the cost explodes: the cost of a step that is right for the parameters rises until the latent force has
+    followed, and the path would else end where parameters compensate each other. The best point of the path is kept, by its evidence.
+    `candidates` get columns there.
     """
     log_tau2 = dict(log_tau2 or {})
     if len(point.terms) < len(model.terms):
         new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
         point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
-    lin, before, last = Linearisation(plant, scales, point, guess), -np.inf, np.inf
-    for left in reversed(range(iterations)):
-        found = settle(lin, model, hyper, log_tau2)
+    lin, best, before = Linearisation(plant, scales, point, guess), None, -np.inf
+    for number in range(iterations):
+        free = number < _FREE_STEPS
+        found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP)
         hyper, log_tau2 = found.hyper, found.log_tau2
-        target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
-        far = _distance(lin.point, target)
-        if left == 0 or (far < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
+        if best is None or found.evidence > best[0].evidence:
+            best = found, lin
+        if found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE:
             break
-        at, share = objective(lin, model, hyper, log_tau2, found.gram), 1.0
-        if last < far < 1.0:  # it goes to and fro about the optimum
-            share, target = 0.5, between(lin.point, target, 0.5)
-        before, last = found.evidence, far
-        trial = Linearisation(plant, scales, target, lin.towards(target))
-        while objective(trial, model, hyper, log_tau2, found.gram) > _MAY_RISE * at and share > 0.1:
-            share *= 0.5
-            part = between(lin.point, target, share)
-            trial = Linearisation(plant, scales, part, lin.towards(part))
-        lin = trial
-    return settle(lin, model, hyper, log_tau2, candidates) if candidates else found
+        before = found.evidence
+        after = _step(lin, found, number + 1 < _FREE_STEPS) if number < iterations - 1 else None
+        if after is None:
+            break
+        lin = after
+    assert best is not None
+    found, lin = best
+    return settle(lin, model, found.hyper, found.log_tau2, candidates, leap=0.0) if candidates else found
 
 
-def _distance(a: Point, b: Point) -> float:
-    """Greatest change of a coefficient, in units of its scale."""
-    return max(float(np.max(np.abs(p - q))) for p, q in zip((a.base, *a.values), (b.base, *b.values), strict=True))
+def _step(lin: Linearisation, found: Fit, free: bool) -> Linearisation | None:
+    """Towards the point that the linear model thinks best; None where no part of the way is any better (the first steps are `free`)."""
+    plant, scales, model, may_rise = lin.plant, lin.scales, found.model, _MAY_RISE if free else 1.0
+    target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
+    at, share = objective(lin, model, found.hyper, found.log_tau2, found.gram), 1.0
+    while True:
+        part = between(lin.point, target, share)
+        trial = Linearisation(plant, scales, part, lin.towards(part), coarse=free)
+        if objective(trial, model, found.hyper, found.log_tau2, found.gram) < may_rise * at:
+            return trial
+        share *= 0.5
+        if share < _LEAST_SHARE:
+            return trial if free else None
 
 
 @dataclass(frozen=True)
@@ -226,23 +251,37 @@ class Origin:
 
 
 def settle(
-    lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (), cycles: int = _EM_CYCLES
-) -> Fit:
-    """Variances and posterior on one linearisation."""
+    lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (), cycles: int = _EM_CYCLES,
+    leap: float = np.inf,
+) -> Fit:  # fmt: skip
+    """Variances, whose logarithms move by `leap` at most, and posterior on one linearisation."""
     plant, scales, point, columns = lin.plant, lin.scales, lin.point, lin.columns(candidates)
     products = products_of(plant, scales, point, columns)
-    hyper, log_tau2 = _variances(products.without(sum(t.size for t in candidates)), model, hyper, log_tau2, cycles)
+    if leap > 0.0:
+        hyper, log_tau2 = _variances(products.without(sum(t.size for t in candidates)), model, hyper, log_tau2, cycles, leap)
     gram = products.weigh(hyper)
     reduced = gram.reduce(hyper.log_force)
     prior = model.prior(log_tau2)
     solution = solve(reduced, prior)
     estimate, cov = background(gram, reduced, prior, solution)
+    excess = max(objective(lin, model, hyper, log_tau2, gram) - solution.squares, 0.0)
     return Fit(
-        plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), lin.motion, products, gram, reduced, solution, estimate, cov
-    )
+        plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), lin.motion, products, gram, reduced, solution, estimate, cov,
+        excess,
+    )  # fmt: skip
 
 
-def _variances(products: Products, model: Model, hyper: Hyper, log_tau2: dict[int, float], cycles: int) -> tuple[Hyper, dict[int, float]]:
+def evidence_with(found: Fit, colour: Colour) -> float:
+    """Log evidence of the same linearisation with noise of another correlation, whose variances are fitted anew."""
+    scales, more = found.scales.coloured(colour), sum(t.size for t in found.candidates)
+    products = products_of(found.plant, scales, found.point, found.columns).without(more)
+    hyper, log_tau2 = _variances(products, found.model, found.hyper, found.log_tau2, 1)
+    return solve(products.weigh(hyper).reduce(hyper.log_force), found.model.prior(log_tau2)).log_evidence
+
+
+def _variances(
+    products: Products, model: Model, hyper: Hyper, log_tau2: dict[int, float], cycles: int, leap: float = np.inf
+) -> tuple[Hyper, dict[int, float]]:
     """Variances of force, noise and random effects on one linearisation."""
     random = [i for i, term in enumerate(model.terms) if term.per_run]
 
@@ -255,8 +294,8 @@ def _variances(products: Products, model: Model, hyper: Hyper, log_tau2: dict[in
         force, noise = update_force(gram, estimate, cov), update_noise(products, gram, reduced, prior, solution, estimate, _LOG_FLOOR)
         return solution.log_evidence, np.concatenate([force, noise, _random_variances(model, solution)])
 
-    theta = np.concatenate([hyper.log_force, hyper.log_noise, [log_tau2.get(i, 0.0) for i in random]])
-    theta = accelerated(step, theta, cycles)
+    first = np.concatenate([hyper.log_force, hyper.log_noise, [log_tau2.get(i, 0.0) for i in random]])
+    theta = np.clip(accelerated(step, first, cycles), first - leap, first + leap)
     return Hyper(theta[:3], theta[3:9], hyper.tau), dict(zip(random, (float(v) for v in theta[9:]), strict=True))
 
 

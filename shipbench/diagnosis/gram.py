@@ -29,7 +29,7 @@ class Hyper:
 class Products:
     """Products of columns [eta, w, shared, e] per channel and segment, (6, B, Z + G + 1, Z + G + 1), before the noise is known.
 
-    run (B,): the segment's run; samples (B,): of real samples.
+    run (B,): the segment's run; samples (B,): of real samples; colour (B,): log determinant of the noise's correlations.
     """
 
     P: np.ndarray
@@ -38,14 +38,17 @@ class Products:
     run: np.ndarray
     runs: int
     samples: np.ndarray
+    colour: np.ndarray
 
     @classmethod
-    def of(cls, Z: np.ndarray, mask: np.ndarray, knots: int, spacing: float, run: np.ndarray, runs: int) -> Products:
+    def of(
+        cls, Z: np.ndarray, mask: np.ndarray, knots: int, spacing: float, run: np.ndarray, runs: int, colour: np.ndarray | None = None
+    ) -> Products:
         """From columns Z (B, T, Z + G + 1), T = 6 (K + 1), channel last; `mask` (B, K + 1) of real samples."""
         B, T, C = Z.shape
         Z = np.ascontiguousarray(np.moveaxis(Z.reshape(B, T // 6, 6, C) * mask[:, :, None, None], 2, 0))  # BLAS wants each channel in one piece
         P = np.swapaxes(Z, 2, 3) @ Z
-        return cls(P, knots, spacing, run, runs, mask.sum(axis=1))
+        return cls(P, knots, spacing, run, runs, mask.sum(axis=1), np.zeros(B) if colour is None else colour)
 
     @property
     def latent(self) -> int:
@@ -58,7 +61,7 @@ class Products:
     def take(self, rows: np.ndarray, runs: np.ndarray) -> Products:
         """Some segments; `runs` are the numbers of the runs that are kept, which are numbered anew."""
         new = np.searchsorted(runs, self.run[rows])
-        return replace(self, P=self.P[:, rows], run=new, runs=len(runs), samples=self.samples[rows])
+        return replace(self, P=self.P[:, rows], run=new, runs=len(runs), samples=self.samples[rows], colour=self.colour[rows])
 
     def without(self, num: int) -> Products:
         """Without the last `num` shared columns."""
@@ -69,7 +72,8 @@ class Products:
         """The Gram under given noise."""
         G = np.einsum("cbij,c->bij", self.P, np.exp(-hyper.log_noise))
         K_inv, K_logdet = ornstein_uhlenbeck(self.knots, self.spacing, hyper.tau)
-        return Gram(G, self.knots, K_inv, K_logdet, self.samples * float(np.sum(hyper.log_noise)), self.run, self.runs)
+        log_noise = self.samples * float(np.sum(hyper.log_noise)) + self.colour
+        return Gram(G, self.knots, K_inv, K_logdet, log_noise, self.run, self.runs)
 
 
 def ornstein_uhlenbeck(knots: int, spacing: float, tau: float) -> tuple[np.ndarray, float]:
@@ -147,10 +151,12 @@ class Prior:
 
 @dataclass(frozen=True)
 class Solution:
-    """Posterior of the coefficients. log_evidence without constants; mean, cov of `prior.shared`; means (N, R), covs (N, R, R) of `prior.random`;
-    per_run (N,): share of each run in the log evidence given the mean."""
+    """Posterior of the coefficients. log_evidence without constants; squares: twice the negative log posterior at its mode, as the linear model
+    expects it; mean, cov of `prior.shared`; means (N, R), covs (N, R, R) of `prior.random`; per_run (N,): share of each run in the log evidence given
+    the mean."""
 
     log_evidence: float
+    squares: float
     mean: np.ndarray
     cov: np.ndarray
     means: np.ndarray
@@ -180,10 +186,10 @@ def solve(reduced: Reduced, prior: Prior) -> Solution:
     fitted = np.append(-mean, 1.0)
     per_run = -0.5 * (np.einsum("nij,i,j->n", S, fitted, fitted) + logdet)
     if back is None:
-        return Solution(float(log_evidence), mean, cov, np.zeros((len(S), 0)), np.zeros((len(S), 0, 0)), per_run)
+        return Solution(float(log_evidence), float(quad), mean, cov, np.zeros((len(S), 0)), np.zeros((len(S), 0, 0)), per_run)
     means = back @ fitted
     spread = back[:, :, :-1] @ cov @ np.swapaxes(back[:, :, :-1], 1, 2)
-    return Solution(float(log_evidence), mean, cov, means, covs + spread, per_run)
+    return Solution(float(log_evidence), float(quad), mean, cov, means, covs + spread, per_run)
 
 
 def background(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -> tuple[np.ndarray, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ..effects.base import Effect, flow_first
 from ..ops import Array
 from ..predictors._physics_fit import parameter_scale
+from .colour import Colour
 from .plant import HULL, NUM_HULL, Active, Plant
 from .structure import STRUCTURE
 
@@ -79,6 +81,13 @@ class Scales:
         self.w = np.array([5e-3, 5e-3, 1e-4 / froude**2])  # accelerations do not scale; yaw acceleration goes with 1/L
         self.structure = STRUCTURE.spreads(measured_wind=plant.seg.wind is not None)
         self.noise = np.array([0.3 * froude**2, 0.3 * froude**2, 4e-3, 0.04 * froude, 0.04 * froude, 7e-4 / froude])
+        self.colour = Colour.white(plant.steps + 1)
+
+    def coloured(self, colour: Colour) -> Scales:
+        """The same with another correlation of the noise."""
+        new = copy(self)
+        new.colour = colour
+        return new
 
     def amplitudes(self, term: Term, L: float) -> np.ndarray:
         """Typical sizes of a term's amplitudes."""
@@ -139,11 +148,12 @@ class Linearisation:
     """A trajectory and its sensitivities: forward differences of all single steps at once, chained by the steps' Jacobians.
 
     The trajectory may be a guess whose steps do not quite meet (lifted Newton, multiple shooting): the gaps are chained into `predicted`, and close
-    as the iterations converge. Without a guess the model is rolled out.
+    as the iterations converge. Without a guess the model is rolled out. `coarse`: vectors in the model are moved by half their typical size; finely a
+    fit comes to rest where it is best, but does not leave the place where a vector is zero.
     """
 
-    def __init__(self, plant: Plant, scales: Scales, point: Point, guess: np.ndarray | None = None) -> None:
-        self.plant, self.scales, self.point = plant, scales, point
+    def __init__(self, plant: Plant, scales: Scales, point: Point, guess: np.ndarray | None = None, coarse: bool = True) -> None:
+        self.plant, self.scales, self.point, self.coarse = plant, scales, point, coarse
         self.now = actives(plant, scales, point)
         self.p, self.ship = parameters(scales, point.base)
         self.forces = [a for a in self.now if a.effect.enters == "force"]
@@ -238,7 +248,7 @@ class Linearisation:
 
     def _of_term(self, index: int, term: Term) -> np.ndarray:
         """Columns of a term that is in the model."""
-        step = _OWN_VECTOR_STEP if term.effect.vector else _OWN_STEP
+        step = _OWN_VECTOR_STEP if term.effect.vector and self.coarse else _OWN_STEP
         steps = step * self.scales.amplitudes(term, self.plant.c.L)
         columns, sources = self._moved(index, term, steps, step)
         if term.effect.vector and sources is not None:

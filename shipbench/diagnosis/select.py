@@ -9,7 +9,8 @@ from itertools import product
 import numpy as np
 
 from ..effects.base import EFFECTS
-from .fit import Fit, Model, Origin, fit
+from .colour import SHARES, TIMES, Colour
+from .fit import Fit, Model, Origin, evidence_with, fit
 from .model import Scales, Term
 from .plant import Plant
 from .screen import Score, changes, overlap, screen
@@ -22,8 +23,10 @@ WITHOUT_WIND = ("wind", "wind_per_run")
 """Only where the wind is not measured."""
 MOST_EFFECTS = 6
 _GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
+_FIRST_COLOURS, _WORTH_A_COLOUR = ((1.0, 2.0), (4.0, 6.0)), 50.0
+"""Share and time of noise that is tried first, and the log evidence that it must gain: a cause in the sensors leaves lasting residuals, too."""
 _REFITS = 3
-_REFIT_ITERATIONS = 12
+_REFIT_ITERATIONS = 16
 _WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
 """Least linear score of what is refitted: of the threshold, and of the best."""
 _RIVAL, _RIVALS = 0.25, 4
@@ -59,11 +62,11 @@ class Selection:
     steps: list[Step]
 
 
-def candidates_for(plant: Plant, names: Sequence[str] | None = None) -> list[Term]:
-    """Every effect that could act on these data, once per shape setting."""
+def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Sequence[str] = ()) -> list[Term]:
+    """Every effect that could act on these data, less those that are `settled`, once per shape setting."""
     found = []
     for name in names if names is not None else EFFECTS.names():
-        if name in NOT_SCREENED or (not plant.seg.commanded and name in AS_RECORDED):
+        if name in NOT_SCREENED or name in settled or (not plant.seg.commanded and name in AS_RECORDED):
             continue
         effect = EFFECTS.get(name)
         if plant.seg.wind is None and effect.channels:
@@ -78,15 +81,30 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None) -> list[Ter
 
 
 def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
-    """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion."""
+    """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion; where sensors err
+    for longer than a sample, with such noise."""
     origin = Origin.of(plant, scales)
+    found = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion)
     if plant.seg.commanded:
-        found = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion)
         for i, name, field in ((0, "n", "T"), (1, "delta", "rate"), (1, "delta", "T")):
             if np.ptp(plant.seg.commands[..., i]) > 0.0:
                 found = _with_gear(found, name, field)
-        return fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion)
-    return fit(plant, scales, Model(), origin.point, origin.hyper, candidates=candidates, guess=origin.motion)
+    scales = found.scales.coloured(colour_of(found))
+    return fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion)
+
+
+def colour_of(found: Fit) -> Colour:
+    """Correlation of the noise of each channel that suits the residuals by far better than none."""
+    colour = Colour.white(found.plant.steps + 1)
+    best = evidence_with(found, colour)
+    for channel in range(6):
+        first = [colour.with_channel(channel, share, time) for share, time in _FIRST_COLOURS]
+        if max(evidence_with(found, way) for way in first) < best + _WORTH_A_COLOUR:
+            continue
+        ways = [colour.with_channel(channel, share, time) for share, time in product(SHARES, TIMES)]
+        worth = [evidence_with(found, way) for way in ways]
+        best, colour = max(worth), ways[int(np.argmax(worth))]
+    return colour
 
 
 def _with_gear(found: Fit, name: str, field: str) -> Fit:

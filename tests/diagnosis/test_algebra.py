@@ -163,3 +163,15 @@ def test_log_determinants_of_sound_and_of_blown_up_matrices():
     with pytest.raises(np.linalg.LinAlgError):
         np.linalg.cholesky(blown)
     assert np.isfinite(log_determinant(blown)).all()
+
+
+def test_a_fit_that_has_not_come_to_rest_is_charged_with_the_cost_it_has(plant):
+    """One step from far away promises much; the evidence counts what was reached, and the best point of the path is kept."""
+    scales = Scales(plant)
+    origin = Origin.of(plant, scales)
+    far = replace(origin.point, base=origin.point.base + 2.0 * np.cos(np.arange(len(origin.point.base))))
+    short, long = (fit(plant, scales, Model(), far, origin.hyper, iterations=k, guess=origin.motion) for k in (1, 20))
+    assert short.excess > 10.0
+    assert short.evidence < short.solution.log_evidence - 5.0
+    assert long.excess < 1.0
+    assert long.evidence > short.evidence

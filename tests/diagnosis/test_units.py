@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.units import check_units, corrected
+from shipbench.checking.units import check_units, corrected
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset

@@ -1,0 +1,96 @@
+"""Velocities that are late as a vector in the earth's axes: filtered there by a receiver, then turned by the heading of the moment.
+
+Kinematics alone show it, over windows of many samples. It is taken out before any model is fitted: pieces of a minute cannot hold it, as what came
+before them is not theirs, and beside it every other fault of a sensor is hidden.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from ..checking.recording import Recording
+from ..checking.track import late_velocities
+from ..data.corrections import undelayed
+from ..records import Dataset, Run
+from ..signals import PSI, STATES, U, V
+from .fit import Model, Origin, fit
+from .model import Scales
+from .plant import Plant
+
+NAMES = ("velocity_delay", "position_delay")
+"""What need not be asked of the model once the clocks are put right."""
+
+
+@dataclass(frozen=True)
+class LateVelocities:
+    """delay, sd [s]; filtered: by a filter of first order, else as they were; score: 2 log evidence of the plain model that mending the velocities
+    adds; over_position: the same over moving the position instead; mended: the runs with it taken out."""
+
+    delay: float
+    sd: float
+    filtered: bool
+    score: float
+    over_position: float
+    mended: Dataset
+
+
+def check_clocks(dataset: Dataset) -> LateVelocities | None:
+    """Late velocities, if the track shows them and the plain model agrees that it is they that are late, not the position that is early."""
+    found = late_velocities(Recording(dataset))
+    if found is None:
+        return None
+    delay, sd = found
+    sharp, noise_gain = unfiltered(dataset, delay)
+    ways = {
+        "filtered": put_back(sharp, {}, delay), "late": put_back(dataset, {"velocity": delay}, delay),
+        "position": put_back(dataset, {"x": -delay, "y": -delay}, delay), "as recorded": put_back(dataset, {}, delay),
+    }  # fmt: skip
+    worth = {name: _evidence(runs, noise_gain if name == "filtered" else 1.0) for name, runs in ways.items()}
+    best = max(worth, key=lambda name: worth[name])
+    if best not in ("filtered", "late"):
+        return None
+    score, over_position = (2.0 * (worth[best] - worth[other]) for other in ("as recorded", "position"))
+    return LateVelocities(delay, sd, best == "filtered", score, over_position, ways[best])
+
+
+def put_back(dataset: Dataset, delay: dict[str, float], ends: float) -> Dataset:
+    """The runs with late signals put back in time, less `ends` seconds at both ends; runs that leave less than 3 samples are left out."""
+    runs = []
+    for run in dataset.runs:
+        names = (*STATES, *run.inputs_names)
+        frame = pd.DataFrame({"t": run.t} | dict(zip(names, np.column_stack([run.states, run.inputs]).T, strict=True)))
+        frame = undelayed(frame, delay, dataset.dt)
+        inside = (frame["t"] >= run.t[0] + ends - 1e-6) & (frame["t"] <= run.t[-1] - ends + 1e-6)
+        values = frame[inside].to_numpy()
+        if len(values) >= 3:
+            runs.append(replace(run, t=values[:, 0], states=values[:, 1 : 1 + len(STATES)], inputs=values[:, 1 + len(STATES) :]))
+    return dataset.with_runs(runs)
+
+
+def unfiltered(dataset: Dataset, delay: float) -> tuple[Dataset, float]:
+    """The velocities before a filter y_k = a y_{k-1} + (1 - a) x_k of that mean delay, a dt / (1 - a), and the gain 1 / (1 - a) by which each sample
+    is stretched."""
+    keep = delay / (delay + dataset.dt)
+
+    def sharpened(run: Run) -> Run:
+        states = run.states.copy()
+        turn = np.exp(1j * states[:, PSI])
+        earth = (states[:, U] + 1j * states[:, V]) * turn
+        earth[1:] = (earth[1:] - keep * earth[:-1]) / (1.0 - keep)
+        own = earth * np.conj(turn)
+        states[:, U], states[:, V] = own.real, own.imag
+        return replace(run, states=states)
+
+    return dataset.with_runs([sharpened(run) for run in dataset.runs]), 1.0 / (1.0 - keep)
+
+
+def _evidence(dataset: Dataset, noise_gain: float) -> float:
+    """Log evidence of the plain model for the recorded samples, where those of u and v were stretched by `noise_gain`."""
+    plant = Plant.of(dataset)
+    scales = Scales(plant)
+    origin = Origin.of(plant, scales)
+    found = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion)
+    return found.evidence + 2.0 * float(plant.seg.mask.sum()) * float(np.log(noise_gain))

@@ -1,0 +1,52 @@
+"""Sensor noise whose samples go together: a compass or a receiver that filters errs for seconds, and samples taken as independent would say too much.
+
+Noise of a channel: white, and `share` times as much variance that forgets itself like exp(-|t - s| / time). Both sides of the linear model are
+multiplied by the inverse of its Cholesky factor; what is left is white again, also in a piece that ends early, as the factor is triangular.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+SHARES, TIMES = (1.0, 4.0, 16.0, 64.0), (2.0, 6.0, 20.0)
+"""Tried; times in samples."""
+
+
+@dataclass(frozen=True)
+class Colour:
+    """share (6,), variance of the part that lasts over that of the white part; time (6,) in samples; factor (6, K + 1, K + 1) that whitens; logdet
+    (6, K + 2) of the covariance of the first k samples."""
+
+    share: np.ndarray
+    time: np.ndarray
+    factor: np.ndarray
+    logdet: np.ndarray
+
+    @classmethod
+    def white(cls, samples: int) -> Colour:
+        """Independent samples, in pieces of `samples`."""
+        return cls(np.zeros(6), np.ones(6), np.tile(np.eye(samples), (6, 1, 1)), np.zeros((6, samples + 1)))
+
+    def with_channel(self, channel: int, share: float, time: float) -> Colour:
+        """The same with another noise in one channel."""
+        samples = self.factor.shape[1]
+        lag = np.abs(np.subtract.outer(np.arange(samples), np.arange(samples)))
+        root = np.linalg.cholesky(np.eye(samples) + share * np.exp(-lag / time))
+        new = replace(self, share=self.share.copy(), time=self.time.copy(), factor=self.factor.copy(), logdet=self.logdet.copy())
+        new.share[channel], new.time[channel] = share, time
+        new.factor[channel] = np.linalg.inv(root)
+        new.logdet[channel, 1:] = 2.0 * np.cumsum(np.log(np.diag(root)))
+        return new
+
+    def whitened(self, values: np.ndarray) -> np.ndarray:
+        """(B, K + 1, 6, ...) as if their noise were white."""
+        out = values.copy()
+        for c in np.flatnonzero(self.share):
+            out[:, :, c] = np.einsum("kl,bl...->bk...", self.factor[c], values[:, :, c], optimize=True)
+        return out
+
+    def log_determinant(self, lengths: np.ndarray) -> np.ndarray:
+        """(B,) of the covariance of all channels, for pieces of `lengths` samples."""
+        return np.asarray(self.logdet[:, lengths].sum(axis=0))

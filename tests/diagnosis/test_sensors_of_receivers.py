@@ -1,0 +1,137 @@
+"""What receivers and compasses of real ships do to a record: errors that last, and velocities that were filtered in the earth's axes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from shipbench.diagnosis.clocks import check_clocks
+from shipbench.diagnosis.colour import Colour
+from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.fit import Model, Origin, fit
+from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.select import colour_of
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.records import Dataset
+from shipbench.signals import PSI, U, V
+from shipbench.simulate.trials import Trials, sea_trials
+
+LATE = 3.0
+
+
+@pytest.fixture(scope="module")
+def trials() -> Dataset:
+    return sea_trials(load_mmg_ship("kcs"), 3, (), Trials(runs=12, samples=120))
+
+
+def _changed(data: Dataset, change) -> Dataset:
+    states = [run.states.copy() for run in data.runs]
+    for S in states:
+        change(S)
+    return data.with_runs([replace(run, states=S) for run, S in zip(data.runs, states, strict=True)])
+
+
+def _filter_in_earth_axes(data: Dataset, T: float) -> Dataset:
+    """Surge and sway behind a first-order filter of the earth-fixed velocity, turned back by the heading of the moment."""
+    keep = float(np.exp(-data.dt / T))
+
+    def change(S: np.ndarray) -> None:
+        turn = np.exp(1j * S[:, PSI])
+        earth = (S[:, U] + 1j * S[:, V]) * turn
+        smooth, _ = lfilter([1.0 - keep], [1.0, -keep], earth, zi=[keep * earth[0]])
+        S[:, U], S[:, V] = (smooth * np.conj(turn)).real, (smooth * np.conj(turn)).imag
+
+    return _changed(data, change)
+
+
+@pytest.fixture(scope="module")
+def filtered(trials) -> Dataset:
+    return _filter_in_earth_axes(trials, LATE)
+
+
+def test_whitened_noise_is_white_and_its_determinant_right():
+    colour = Colour.white(7).with_channel(2, 16.0, 6.0)
+    lag = np.abs(np.subtract.outer(np.arange(7), np.arange(7)))
+    covariance = np.eye(7) + 16.0 * np.exp(-lag / 6.0)
+    assert colour.factor[2] @ covariance @ colour.factor[2].T == pytest.approx(np.eye(7), abs=1e-9)
+    for length in (3, 7):
+        assert colour.log_determinant(np.array([length]))[0] == pytest.approx(np.linalg.slogdet(covariance[:length, :length])[1])
+    values = np.random.default_rng(0).standard_normal((2, 7, 6))
+    white = colour.whitened(values)
+    assert white[:, :, [0, 1, 3, 4, 5]] == pytest.approx(values[:, :, [0, 1, 3, 4, 5]])
+    assert colour.whitened(np.where(np.arange(7)[:, None] < 4, values, 9.0))[:, :4] == pytest.approx(white[:, :4])  # what follows does not matter
+
+
+def _colour(data: Dataset) -> Colour:
+    plant = Plant.of(data)
+    scales = Scales(plant)
+    origin = Origin.of(plant, scales)
+    return colour_of(fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion))
+
+
+def test_a_compass_whose_errors_last_is_told_from_independent_ones(trials):
+    rng = np.random.default_rng(1)
+
+    def change(S: np.ndarray) -> None:
+        error = lfilter([1.0], [1.0, -np.exp(-1.0 / 8.0)], rng.standard_normal(len(S) + 50))[50:]
+        S[:, PSI] += np.deg2rad(0.7) * error * np.sqrt(1.0 - np.exp(-2.0 / 8.0))
+
+    assert not np.any(_colour(trials).share)
+    share = _colour(_changed(trials, change)).share
+    assert share[PSI] > 0.0
+    assert not np.any(np.delete(share, PSI))
+
+
+def test_velocities_filtered_in_the_earths_axes_are_seen_and_put_back(trials, filtered):
+    late = check_clocks(filtered)
+    assert late is not None
+    assert late.delay == pytest.approx(LATE, rel=0.2)
+    assert min(late.score, late.over_position) > 50.0
+    assert late.filtered
+    assert [len(r) for r in late.mended.runs] == [len(r) - 2 * int(np.ceil(late.delay / filtered.dt)) for r in filtered.runs]
+    assert check_clocks(late.mended) is None
+    edge = int(np.ceil(late.delay / filtered.dt))
+    for mended, recorded, true in zip(late.mended.runs, filtered.runs, trials.runs, strict=True):
+        fast = true.states[edge:-edge, U]
+        assert np.abs(mended.states[:, U] - fast).mean() < np.abs(recorded.states[edge:-edge, U] - fast).mean()
+
+
+def test_velocities_that_are_late_without_a_filter_are_told_from_filtered_ones(trials):
+    by = int(LATE / trials.dt)
+
+    def change(S: np.ndarray) -> None:
+        turn = np.exp(1j * S[:, PSI])
+        earth = (S[:, U] + 1j * S[:, V]) * turn
+        earth[by:] = earth[:-by].copy()
+        S[:, U], S[:, V] = (earth * np.conj(turn)).real, (earth * np.conj(turn)).imag
+
+    late = check_clocks(_changed(trials, change))
+    assert late is not None
+    assert not late.filtered
+    assert late.delay == pytest.approx(LATE, rel=0.2)
+
+
+def test_clocks_that_agree_or_a_late_position_are_left_to_the_model(trials):
+    assert check_clocks(trials) is None
+    by = int(LATE / trials.dt)
+
+    def late(S: np.ndarray) -> None:
+        S[by:, :2] = S[:-by, :2].copy()
+
+    behind = _changed(trials, late)
+    assert check_clocks(behind.with_runs([replace(r, t=r.t[by:], states=r.states[by:], inputs=r.inputs[by:]) for r in behind.runs])) is None
+
+
+def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):
+    verdict = diagnose(filtered, gain=False)
+    assert verdict.causes[0].effect == "velocity_delay"
+    delay = verdict.causes[0].parameters["delay"]
+    assert delay.ci95[0] < delay.value < delay.ci95[1]
+    assert verdict.causes[0].parameters["earth_axes"].value == 1.0
+    assert len(verdict.causes) == 1
+    position = next(c for c in verdict.candidates if c.effect == "position_delay")
+    assert "put right before the fit" in position.rejected_because
