@@ -151,7 +151,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     candidates, first = null.candidates, screen(null)
     now, scores, steps, origin = null, first, [], Origin.of(null.plant, null.scales)
     for round_ in range(most):
-        tried = [with_term(now, score, origin) for score in _worth_a_refit(scores, now, threshold)]
+        tried = [with_term(now, score, origin) for score in worth_a_refit(scores, now, threshold)]
         steps += [Step(round_, f.model.terms[-1], 2.0 * (f.evidence - now.evidence)) for f in tried]
         best = _or_change(now, max(tried, key=lambda f: f.evidence, default=None), origin)
         imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
@@ -182,7 +182,7 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
     return best
 
 
-def _worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[Score]:
+def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[Score]:
     """The best, the best of each family, and whatever could stand in for the best: one line each per effect."""
     present = {t.label for t in now.model.terms}
     present |= {label for group in _INSEPARABLE if group & present for label in group}
