@@ -94,8 +94,8 @@ class _Local(Workers):
         super().__init__(_Here(), room=1)
 
     def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
-        # Copies, as a child process gets them: what a model writes into them stays its own.
-        return self.executor.submit(work, job, pickle.loads(pickle.dumps(list(folds))))
+        # Copies, as a child process gets them, each fold's apart: what a model writes into them stays its own.
+        return self.executor.submit(work, job, [pickle.loads(pickle.dumps(fold)) for fold in folds])
 
 
 class _Processes(Workers):

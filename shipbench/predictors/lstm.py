@@ -218,9 +218,9 @@ class LSTM(PredictorBase):
         features, draw = InputFeatures(names), generators(seeds)
         parts = list(zip(training.S.split(training.counts), training.U.split(training.counts), strict=True))
         scalers = (
-            Scaler.fit([S[..., CHANNELS] for S, _ in parts]),
-            Scaler.fit([features(held, S[:, :-1, PSI]) for S, held in parts]),
-            Scaler.fit([S[:, 1:, CHANNELS] - S[:, :-1, CHANNELS] for S, _ in parts], centred=False),
+            Scaler.fit(S[..., CHANNELS] for S, _ in parts),
+            Scaler.fit(features(held, S[:, :-1, PSI]) for S, held in parts),
+            Scaler.fit((S[:, 1:, CHANNELS] - S[:, :-1, CHANNELS] for S, _ in parts), centred=False),
         )
         commanded = trains[0].actuators == "commanded"
         net = _Network(features, lead.hidden, scalers, draw, commanded)

@@ -21,6 +21,9 @@ from ._stacked import InputFeatures, Scaler, StackedMLP, StackedRuns, generators
 from .base import History, PredictorBase
 from .training import Chunk, Recipe, StackedTask, epochs_of_samples, train
 
+_GATHERED = 256
+"""Minibatches."""
+
 
 class _OneStep(StackedTask):
     """Standardised one-step regression of all members."""
@@ -30,8 +33,8 @@ class _OneStep(StackedTask):
         self.members, self.epochs, self.batch = len(seeds), model.epochs, model.batch
         self.increment = model.target == "increment"
         self.draw = generators(seeds)
-        self.scale_x = Scaler.fit([torch.cat([y, inputs], dim=-1) for y, inputs, _ in training])
-        self.scale_z = Scaler.fit([self._target(y, after) for y, _, after in training])
+        self.scale_x = Scaler.fit(torch.cat([y, inputs], dim=-1) for y, inputs, _ in training)
+        self.scale_z = Scaler.fit(self._target(y, after) for y, _, after in training)
         sizes = [NUM_CHANNELS + training[0][1].shape[-1], *[model.hidden] * model.layers, NUM_CHANNELS]
         self.net = StackedMLP(sizes, self.draw)
         self.counts = [len(y) for y, _, _ in training]
@@ -53,10 +56,14 @@ class _OneStep(StackedTask):
         x, z = (part.to(device) for part in self.data)
         first = torch.tensor([0, *np.cumsum(self.counts)[:-1].tolist()])
         for index, ended in epochs_of_samples(self.counts, self.batch, self.epochs, self.draw):
-            rows = (index + first[:, None]).flatten().to(device)
-            shape = (*index.shape, -1)
-            # One gather per chunk: a step then costs no indexing at all.
-            yield Chunk(list(zip(x[rows].view(shape).unbind(0), z[rows].view(shape).unbind(0), strict=True)), ended)
+            yield Chunk(self._gathered(x, z, (index + first[:, None]).to(device)), ended)
+
+    @staticmethod
+    def _gathered(x: Tensor, z: Tensor, rows: Tensor) -> Iterator[tuple[Tensor, Tensor]]:
+        """The minibatches of `rows` (steps, members, batch), gathered many at a time: a step then costs no indexing, an epoch no second copy."""
+        for some in rows.split(_GATHERED):
+            flat, shape = some.flatten(), (*some.shape, -1)
+            yield from zip(x[flat].view(shape).unbind(0), z[flat].view(shape).unbind(0), strict=True)
 
     def losses(self, minibatch: tuple[Tensor, Tensor]) -> Tensor:
         x, z = minibatch
@@ -112,10 +119,10 @@ class MLP(PredictorBase):
         pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
         names = trains[0].inputs
         features = InputFeatures(names)
-        training = transitions(StackedRuns.of([t for t, _ in pairs]), features)
-        validation = transitions(StackedRuns.of([v for _, v in pairs]), features)
-        task = _OneStep(lead, training, validation, seeds)
-        watch = train(task, Recipe(lr=lead.lr, patience=lead.patience, min_delta=lead.min_delta, device=lead.device))
+        # Not bound to names: the samples as they are would otherwise be kept beside the standardised ones.
+        task = _OneStep(lead, *(transitions(StackedRuns.of(side), features) for side in zip(*pairs, strict=True)), seeds)
+        # Matrices this small gain nothing from a second thread, and on a busy machine two that wait for one another cost tenfold.
+        watch = train(task, Recipe(lr=lead.lr, patience=lead.patience, min_delta=lead.min_delta, device=lead.device, threads=1))
         state = {k: v.detach().cpu().numpy() for k, v in task.state_dict().items()}
         for m, model in enumerate(models):
             model.inputs, model._dt = names, trains[m].dt

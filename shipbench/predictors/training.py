@@ -14,7 +14,7 @@ import logging
 import math
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -28,9 +28,9 @@ from ..errors import WorkError
 
 @dataclass(frozen=True)
 class Chunk:
-    """Minibatches up to the next validation; `ended` (members,) says whose epoch ends there."""
+    """Minibatches up to the next validation, gone through once; `ended` (members,) says whose epoch ends there."""
 
-    minibatches: Sequence[Any]
+    minibatches: Iterable[Any]
     ended: Tensor
 
 
