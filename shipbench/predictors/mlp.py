@@ -21,8 +21,8 @@ from ._stacked import InputFeatures, Scaler, StackedMLP, StackedRuns, generators
 from .base import History, PredictorBase
 from .training import Chunk, Recipe, StackedTask, epochs_of_samples, train
 
-_GATHERED = 256
-"""Minibatches."""
+_GATHERED, _SCORED = 256, 16384
+"""Minibatches that are gathered, and samples of a member that are scored, at a time."""
 
 
 class _OneStep(StackedTask):
@@ -47,9 +47,12 @@ class _OneStep(StackedTask):
 
     def _standardised(self, parts: list[Any]) -> tuple[Tensor, Tensor]:
         """x and z of all members, one member after another."""
-        x = [(torch.cat([y, i], dim=-1) - self.scale_x.mean[m]) / self.scale_x.std[m] for m, (y, i, _) in enumerate(parts)]
-        z = [(self._target(y, after) - self.scale_z.mean[m]) / self.scale_z.std[m] for m, (y, _, after) in enumerate(parts)]
-        return torch.cat(x), torch.cat(z)
+        counts = [len(y) for y, _, _ in parts]
+        x, z = (torch.empty(sum(counts), scale.mean.shape[-1]) for scale in (self.scale_x, self.scale_z))
+        for m, ((y, inputs, after), x_m, z_m) in enumerate(zip(parts, x.split(counts), z.split(counts), strict=True)):
+            x_m.copy_((torch.cat([y, inputs], dim=-1) - self.scale_x.mean[m]) / self.scale_x.std[m])
+            z_m.copy_((self._target(y, after) - self.scale_z.mean[m]) / self.scale_z.std[m])
+        return x, z
 
     def chunks(self) -> Iterator[Chunk]:
         device = self.device
@@ -73,7 +76,8 @@ class _OneStep(StackedTask):
         device = self.device
         x, z = (part.to(device) for part in self.valid)
         rows, weight = (part.to(device) for part in self.valid_rows)
-        return ((self.net(x[rows]) - z[rows]).square().mean(2) * weight).sum(1)
+        errors = [(self.net(x[some]) - z[some]).square().mean(2) for some in rows.split(_SCORED, dim=1)]
+        return (torch.cat(errors, dim=1) * weight).sum(1)
 
 
 @dataclass
