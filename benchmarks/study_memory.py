@@ -2,9 +2,9 @@
 
     python benchmarks/study_memory.py [--dt 1.0] [--models 1 3 6] [--quick] [--json FILE]
 
-Makes the data set (the simulator's harbour runs, 1 s apart; a smaller --dt interpolates them), writes it as Parquet, and runs `shipbench run` on it in
-a process of its own for each number of models: five folds, windows of 120 s, every network for one epoch, since epochs take time and no memory. The
-figure is the greatest sum of the resident memory of that process and all that it started, looked at every 20 ms.
+Makes the data set (the simulator's harbour runs, 1 s apart; a smaller --dt interpolates them), writes it as Parquet, and runs `shipbench run` on
+it in a process of its own for each number of models: five folds, windows of 120 s, every network for one epoch, since epochs take time and no memory.
+The figure is the greatest sum of the resident memory of that process and all that it started, looked at every 20 ms.
 """
 
 from __future__ import annotations

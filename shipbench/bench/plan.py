@@ -112,9 +112,9 @@ class Part:
         """Of each cell."""
         return [self.study.fold_data[cell.fold] for cell in self.cells]
 
-    def job(self, send_files: bool) -> Job:
+    def job(self, send_files: bool, device: str | None) -> Job:
         """What a worker is given beside `fold_data`."""
-        return Job(self.spec, self.cells[0].seed, self.code, self.files if send_files else None)
+        return Job(self.spec, self.cells[0].seed, self.code, self.files if send_files else None, device)
 
     def refuse_changed_files(self) -> None:
         """To be asked after a fit whose worker read the user's model file in place.

@@ -151,7 +151,7 @@ def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step
 
     turns = wind is not None or bool(model.effects)  # the heading matters
     first = start[..., [U, V, R, PSI] if turns else [U, V, R]].movedim(-1, 0)
-    times = torch.arange(path.shape[2] + 1, dtype=start.dtype)
+    times = torch.arange(path.shape[2] + 1, dtype=start.dtype, device=start.device)
     return odeint(rate, first, times, method="midpoint")[1:, :3].permute(2, 3, 0, 1)  # pyright: ignore[reportIndexIssue, reportCallIssue, reportArgumentType]
 
 

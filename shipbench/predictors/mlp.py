@@ -19,6 +19,7 @@ from ..records import Dataset
 from ._one_step import NUM_CHANNELS, check_target, one_step_rollout, transitions
 from ._stacked import InputFeatures, Scaler, StackedMLP, StackedRuns, generators, padded, with_valid
 from .base import History, PredictorBase
+from .device import check_device
 from .training import Chunk, Recipe, StackedTask, epochs_of_samples, train
 
 _GATHERED, _SCORED = 256, 16384
@@ -88,7 +89,7 @@ class MLP(PredictorBase):
         hidden, layers: width and number of the hidden layers.
         epochs, batch, lr, patience, min_delta: training, as in the paper.
         target: "state" predicts y at k + 1 as the paper does; "increment" predicts y_k+1 - y_k, an honest stronger variant.
-        device: where to train ("cpu", "cuda").
+        device: where to train and to predict: "cpu", "cuda" or "cuda:1".
     """
 
     name: ClassVar[str] = "mlp"
@@ -103,6 +104,7 @@ class MLP(PredictorBase):
     device: str = "cpu"
 
     def __post_init__(self) -> None:
+        check_device(self.device)
         check_target(self.target)
         for key in ("hidden", "layers", "epochs", "batch", "patience"):
             if getattr(self, key) < 1:
@@ -124,7 +126,8 @@ class MLP(PredictorBase):
         names = trains[0].inputs
         features = InputFeatures(names)
         # Not bound to names: the samples as they are would otherwise be kept beside the standardised ones.
-        task = _OneStep(lead, *(transitions(StackedRuns.of(side), features) for side in zip(*pairs, strict=True)), seeds)
+        trained, stopped = zip(*pairs, strict=True)
+        task = _OneStep(lead, transitions(StackedRuns.of(trained), features), transitions(StackedRuns.of(stopped), features), seeds)
         # Matrices this small gain nothing from a second thread, and on a busy machine two that wait for one another cost tenfold.
         watch = train(task, Recipe(lr=lead.lr, patience=lead.patience, min_delta=lead.min_delta, device=lead.device, threads=1))
         state = {k: v.detach().cpu().numpy() for k, v in task.state_dict().items()}
@@ -136,7 +139,7 @@ class MLP(PredictorBase):
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
         if not self._weights:
             raise InputError("mlp: predict was called before fit; fit or load the model first.")
-        w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
+        w = {k: torch.as_tensor(v, dtype=torch.float64, device=self.device) for k, v in self._weights.items()}
         layers = [(w[f"net.layers.{i}.weight"][0], w[f"net.layers.{i}.bias"][0]) for i in range(self.layers + 1)]
 
         def step(x: Tensor) -> Tensor:
@@ -145,7 +148,8 @@ class MLP(PredictorBase):
                 h = torch.relu(torch.addmm(bias, h, weight))
             return torch.addmm(layers[-1][1], h, layers[-1][0]) * w["scale_z.std"][0] + w["scale_z.mean"][0]
 
-        return one_step_rollout(step, s0, U, InputFeatures(self.inputs), self._dt, increment=self.target == "increment")
+        increment = self.target == "increment"
+        return one_step_rollout(step, s0, U, InputFeatures(self.inputs), self._dt, increment=increment, device=self.device)
 
     def _arrays(self) -> dict[str, np.ndarray]:
         return self._weights

@@ -66,7 +66,7 @@ class Recipe:
         patience, min_delta: a member stops when its score has not fallen by `min_delta` for `patience` validations.
         clip: greatest gradient norm of a member, if set.
         weight_decay: decoupled (AdamW), 0 for plain Adam.
-        device: "cpu", "cuda", "cuda:1", "mps".
+        device: "cpu", "cuda" or "cuda:1".
         threads: of torch while it trains; None leaves them.
     """
 
