@@ -13,8 +13,9 @@ ROOT = Path(__file__).parent.parent / "shipbench"
 FILES = sorted(ROOT.rglob("*.py"))
 
 LAYERS = {
-    "errors": 0, "ops": 0, "signals": 0, "registry": 1, "specs": 1, "integrate": 1, "ship": 1, "records": 2, "physics": 2, "metrics": 2.5,
-    "effects": 2.7, "simulate": 3, "predictors": 3.5, "data": 4, "importing": 4.3, "diagnosis": 4.5, "checking": 4.7, "contract": 4.8, "bench": 5,
+    "cache": 0, "errors": 0, "ops": 0, "signals": 0, "registry": 1, "specs": 1, "compiled": 1, "integrate": 1, "ship": 1,
+    "records": 2, "physics": 2, "metrics": 2.5, "effects": 2.7, "simulate": 3, "predictors": 3.5, "data": 4, "importing": 4.3,
+    "diagnosis": 4.5, "checking": 4.7, "contract": 4.8, "bench": 5,
     "adapters": 5.5, "cli_common": 5.8, "cli_check": 5.9, "cli_contract": 5.9, "cli_diagnosis": 5.9, "cli_data": 5.9,
     "cli_import": 5.9, "cli_leaderboard": 5.9, "cli_report": 5.9, "cli": 6, "__init__": 7, "__main__": 7,
 }  # fmt: skip

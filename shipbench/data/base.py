@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..cache import cache_folder
 from ..errors import InputError, ShipbenchError, unknown_name
 from ..records import Dataset
 from ..registry import Registry
@@ -42,11 +43,6 @@ class DatasetPart:
     cached: bool
     version: str = "1"
     public: PublicData | None = None
-
-
-def cache_folder() -> Path:
-    """Where made data sets are kept: the environment variable SHIPBENCH_CACHE, else ~/.cache/shipbench."""
-    return Path(os.environ.get("SHIPBENCH_CACHE") or Path.home() / ".cache" / "shipbench")
 
 
 def public_folder(name: str) -> Path:
