@@ -19,8 +19,6 @@ from ..errors import InputError, ShipbenchError, unknown_name
 from ..records import Dataset
 from ..registry import Registry
 from ..specs import parse_spec
-from .files import read_dataset, write_dataset
-from .mat import read_mat
 from .public import PublicData
 
 _HELPERS = frozenset({"base", "corrections", "coverage", "describe", "export", "files", "mat", "noise", "public", "sensitivity", "units"})
@@ -61,6 +59,9 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
     Raises:
         InputError: neither a known name nor a data set's folder, an unknown parameter, or faulty files.
     """
+    from .files import read_dataset  # pandas is loaded for reading and writing, not for the list
+    from .mat import read_mat
+
     folder = Path(spec)
     exported = folder.suffix == ".mat" and folder.is_file()
     if exported or (folder / "dataset.toml").is_file():
@@ -116,6 +117,8 @@ def _cache_key(part: DatasetPart, params: dict[str, Any]) -> str:
 
 def _from_cache(folder: Path) -> Dataset | None:
     """The cached data set, or None where there is none or it is damaged (said in the log, then made anew)."""
+    from .files import read_dataset
+
     if not folder.is_dir():
         return None
     try:
@@ -132,6 +135,8 @@ def _from_cache(folder: Path) -> Dataset | None:
 
 def _to_cache(dataset: Dataset, folder: Path) -> None:
     """Write beside the cache, then move: a reader sees a whole data set or none. A cache that cannot be written costs time, not results."""
+    from .files import write_dataset
+
     fresh: Path | None = None
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
