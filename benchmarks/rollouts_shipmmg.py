@@ -2,8 +2,9 @@
 
     python benchmarks/rollouts_shipmmg.py [--runs N] [--quick] [--json FILE]
 
-Needs `pip install -c constraints.txt shipmmg` (the extra `benchmarks`). Both sides sail the same ship from the same start under the same rudder and
-revolutions: turns, shipmmg's own example and its cheapest manoeuvre (a rudder that moves costs it up to twice as many evaluations).
+Needs `pip install --no-deps shipmmg==0.0.9`: it asks for numpy below 2 and Pillow below 10, but runs with newer ones. Both sides sail the same ship
+from the same start under the same rudder and revolutions: turns, shipmmg's own example and its cheapest manoeuvre (a rudder that moves costs it up to
+twice as many evaluations).
 
 - shipmmg: as its documentation has it, `simulate_mmg_3dof` with the default RK45 and `sol.sol(time)` for the states at 1 s; one run a call, it has no
   batches. Its result holds u, v, r; x, y, psi would cost it more.
@@ -44,7 +45,7 @@ def import_shipmmg() -> Any:
     try:
         from shipmmg import mmg_3dof
     except ImportError as error:
-        raise SystemExit(f"{error}: pip install -c constraints.txt 'shipbench[benchmarks]'") from None
+        raise SystemExit(f"{error}: pip install --no-deps shipmmg==0.0.9") from None
     return mmg_3dof
 
 

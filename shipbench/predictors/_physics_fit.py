@@ -175,7 +175,8 @@ def fit_parameters(rolling: Rolling, batch: Batch, iterations: int, tolerance: f
     def linearise(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         S, J = rolling.linearised(batch.s0, batch.U, q * scale)
         with np.errstate(all="ignore"):
-            return (S[:, :, MOTION] - truth) * weight, J * weight[:, None] * scale
+            J *= weight[:, None] * scale  # in place: of many runs, nothing else is as large
+            return (S[:, :, MOTION] - truth) * weight, J
 
     solver = subproblem(_P, scale)
     q, e, J, cost, taken = descend(linearise, residuals, solver, np.clip(_START, low, high), low, high, np.zeros(_P), iterations, tolerance)

@@ -63,7 +63,7 @@ class Rolling:
         x0 = np.concatenate([s0, np.zeros((len(s0), _P * _MOTION))], axis=1)
         found = self._rollout(True)(x0, self._inputs(U), self._values(p), self.substeps)
         size = len(STATES)
-        return found[..., :size], found[..., size:].reshape(*found.shape[:2], _P, _MOTION).swapaxes(2, 3)
+        return found[..., :size], found[..., size:].reshape(*found.shape[:2], _MOTION, _P)
 
     def _inputs(self, U: np.ndarray) -> np.ndarray:
         return U if self.columns == tuple(range(U.shape[2])) else U[:, :, list(self.columns)]
@@ -101,7 +101,7 @@ def _with(like: Any, numbers: Iterator[Array]) -> Any:
 
 
 def _step(like: eq2.Coefficients, commanded: bool, wind: bool, sensitivities: bool) -> casadi.Function:
-    """One integration step (x, w, p) -> x': x the ten states, then, with `sensitivities`, d(motion)/d(p0..p10) column by column."""
+    """One integration step (x, w, p) -> x': x the ten states, then, with `sensitivities`, d(motion)/d(p0..p10) row by row."""
     import casadi as ca
 
     x, w = ca.SX.sym("x", len(STATES)), ca.SX.sym("w", len(COMMANDS) + 2 * wind)
@@ -123,6 +123,6 @@ def _step(like: eq2.Coefficients, commanded: bool, wind: bool, sensitivities: bo
     given = ca.vertcat(p, values, h, numbers)
     if not sensitivities:
         return ca.Function("step", [x, w, given], [following], {"cse": True})
-    S = ca.SX.sym("S", _MOTION, _P)
+    S = ca.SX.sym("S", _P, _MOTION).T
     S_after = ca.jacobian(after, x[:_MOTION]) @ S + ca.jacobian(after, p)
-    return ca.Function("step", [ca.vertcat(x, ca.vec(S)), w, given], [ca.vertcat(following, ca.vec(S_after))], {"cse": True})
+    return ca.Function("step", [ca.vertcat(x, ca.vec(S.T)), w, given], [ca.vertcat(following, ca.vec(S_after.T))], {"cse": True})
