@@ -123,7 +123,7 @@ def run(
 def models(as_json: Json = False) -> None:
     """List the models with their parameters."""
     from .bench.listing import describe_parts
-    from .predictors.base import PREDICTORS
+    from .predictors.registered import PREDICTORS
 
     parts = describe_parts(PREDICTORS)
     if as_json:

@@ -1,6 +1,7 @@
 """Constrained nonlinear least squares over full rollouts (eq. 9): Gauss-Newton steps whose constrained subproblems IPOPT solves.
 
-CasADi differentiates one integration step; the sensitivities are carried along all runs at once. IPOPT then meets a problem of 11 unknowns (and
+CasADi differentiates one integration step; the sensitivities are carried along all runs at once (without effects as machine code,
+`_physics_rollout`). IPOPT then meets a problem of 11 unknowns (and
 the values of effects) with the bounds and the nonlinear constraints exact, so a step costs milliseconds, and the rollouts are evaluated once per
 step instead of once per barrier iteration.
 """
@@ -23,6 +24,7 @@ from ..physics.modifiers import Flow
 from ..records import Batch
 from ..signals import COMMANDS, MOTION
 from ._physics_effects import Active, accelerations
+from ._physics_rollout import Rolling
 from .hold import Hold
 
 _P = eq2.NUM_PARAMETERS
@@ -127,9 +129,7 @@ class Data:
         return self.batch.truth[:, :, MOTION]
 
     def weight(self) -> np.ndarray:
-        """Per signal, the inverse root mean square of how far holding s0's velocities errs: the size of what there is to predict."""
-        runs, samples = self.batch.truth.shape[:2]
-        return 1.0 / (_hold_error(self.batch, self.dt) * np.sqrt(runs * samples * 6.0))
+        return inverse_size(self.batch, self.dt)
 
     def columns(self, path: np.ndarray, with_time: bool = False) -> np.ndarray:
         """Inputs of the rollout function, (rows, runs * steps)."""
@@ -156,34 +156,27 @@ class Data:
 Linearise = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def fit_parameters(
-    c: eq2.Coefficients, batch: Batch, path: np.ndarray, wind: np.ndarray | None, dt: float, substeps: int, iterations: int, tolerance: float
-) -> Fit:
+def fit_parameters(rolling: Rolling, batch: Batch, iterations: int, tolerance: float) -> Fit:
     """Minimise the mean over runs of the weighted squared trajectory error of x, y, psi, u, v, r.
 
     Args:
-        c: left side.
+        rolling: ship, actuators and step.
         batch: runs of equal length.
-        path, wind, dt, substeps: as in `Data`.
         iterations, tolerance: stop after so many steps, or when the cost falls by less than this share.
     """
-    data = Data(c, batch, path, wind, dt, substeps)
-    runs, steps = path.shape[:2]
-    w, x0, truth, weight = data.columns(path), batch.s0[:, MOTION].T, data.truth, data.weight()
-    args = (c, steps, runs, dt / substeps, wind is not None)
-    full, plain = rollout_function(*args, True), rollout_function(*args, False)
-    scale = parameter_scale(c)
+    truth, weight = batch.truth[:, :, MOTION], inverse_size(batch, rolling.dt)
+    scale = parameter_scale(rolling.c)
     low, high = (b / scale for b in bounds(scale))
 
     def residuals(q: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):  # a diverging trial comes back non-finite and is refused
-            return (data.samples(plain(x0, w, q * scale)) - truth) * weight
+            return (rolling.states(batch.s0, batch.U, q * scale)[:, :, MOTION] - truth) * weight
 
     def linearise(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        X, S = full(x0, np.zeros((6, _P * runs)), w, q * scale)
+        S, J = rolling.linearised(batch.s0, batch.U, q * scale)
         with np.errstate(all="ignore"):
-            e = (data.samples(X) - truth) * weight
-        return e, data.sensitivities(S, _P) * weight[:, None] * scale
+            J *= weight[:, None] * scale  # in place: of many runs, nothing else is as large
+            return (S[:, :, MOTION] - truth) * weight, J
 
     solver = subproblem(_P, scale)
     q, e, J, cost, taken = descend(linearise, residuals, solver, np.clip(_START, low, high), low, high, np.zeros(_P), iterations, tolerance)
@@ -218,6 +211,12 @@ def descend(
         else:
             damping *= 10.0
     return q, e, J, cost, taken
+
+
+def inverse_size(batch: Batch, dt: float) -> np.ndarray:
+    """Per signal, the inverse root mean square of how far holding s0's velocities errs: the size of what there is to predict."""
+    runs, samples = batch.truth.shape[:2]
+    return 1.0 / (_hold_error(batch, dt) * np.sqrt(runs * samples * 6.0))
 
 
 def _hold_error(batch: Batch, dt: float) -> np.ndarray:

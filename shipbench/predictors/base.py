@@ -11,7 +11,6 @@ import json
 import os
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
@@ -20,15 +19,13 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..records import Dataset
-from ..registry import Registry
 from ..signals import COMMANDS, STATES
 from ..specs import Spec, parse_spec
 from .device import check_device
-
-PREDICTORS = Registry("predictor", "predictors", "PREDICTOR", helpers=frozenset({"base", "device", "training"}), lazy=True)
+from .registered import PREDICTORS, not_installed
 
 History = tuple[np.ndarray, np.ndarray]
-__all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "make_predictor", "parse_spec"]
+__all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "make_predictor", "not_installed", "parse_spec"]
 
 
 @runtime_checkable
@@ -157,12 +154,6 @@ class PredictorFamily(PredictorBase):
         Raises:
             InputError: an unknown member or parameter, or a value that is not accepted.
         """
-
-
-def not_installed(name: str, needs: Sequence[str]) -> str | None:
-    """What the optional packages `needs` of the predictor `name` lack here, and how to install them; None where all are there."""
-    missing = [package for package in needs if importlib.util.find_spec(package) is None]
-    return f"{' and '.join(missing)} is not installed: pip install 'shipbench[{name}]'" if missing else None
 
 
 def _class_from_file(path: Path, class_name: str) -> Any:
