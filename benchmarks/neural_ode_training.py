@@ -46,7 +46,7 @@ class Rates(nn.Module):
         self.knots = torch.cat([path.flatten(1, 2), last], dim=1).unbind(1)  # at the beginnings and middles of the steps, half a step apart
 
     def forward(self, t: Tensor, y: Tensor) -> Tensor:
-        place = min(2.0 * float(t) / self.step, len(self.knots) - 1.0)
+        place = min(2.0 * float(t.detach()) / self.step, len(self.knots) - 1.0)
         k = min(int(place), len(self.knots) - 2)
         now = self.knots[k] + (place - k) * (self.knots[k + 1] - self.knots[k])
         rates = self.model(None, *(c[None] for c in y.unbind(-1)), now[None].unbind(-1), None)
