@@ -95,12 +95,13 @@ class Rollout:
 
     Args:
         step: x' = step(x (nx,), w (nw,), p) in SX; p is shared by all runs.
+        machine_code: whether compiling it, up to some seconds, is worth while.
     """
 
-    def __init__(self, step: casadi.Function) -> None:
+    def __init__(self, step: casadi.Function, machine_code: bool = True) -> None:
         self.nx, self.nw, self.num = (step.numel_in(i) for i in range(3))
         self._step = step
-        self._compiled = _machine_code(c_source(step))
+        self._compiled = _machine_code(c_source(step)) if machine_code else None
         self._interpreted = cache(lambda steps: step.mapaccum("roll", steps))
 
     @property

@@ -16,6 +16,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ..compiled import Rollout
 from ..effects.base import Effect
 from ..integrate import kinematics, rk4_step
 from ..ops import Array
@@ -32,6 +33,9 @@ _START = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, -0.8, 1.0, 0.0, 1.0])
 Forces = tuple[tuple[Effect, tuple[float | None, ...]], ...]
 """Force effects and their values; None where the value is a symbol."""
 
+_WORTH_COMPILING = 5000
+"""Integration steps of all runs; a fit interprets each of them some 15 times at about 40 microseconds."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -43,17 +47,22 @@ class Fit:
     steps: int
 
 
-@lru_cache(maxsize=8)
 def rollout_function(
-    c: eq2.Coefficients, steps: int, runs: int, h: float, wind: bool, sensitivities: bool, forces: Forces = (), ship: Any = None
-) -> ca.Function:
-    """Rollout of `runs` runs: (x0, S0, w, p) -> (X, S), or (x0, w, p) -> X without sensitivities.
+    c: eq2.Coefficients, h: float, wind: bool, sensitivities: bool, forces: Forces = (), ship: Any = None, run_steps: int = 0
+) -> Rollout:
+    """Rollout with force effects: x the motion (6,), then, with `sensitivities`, its derivatives (6, num) by row; w as in `Data.inputs`.
 
-    p holds p0..p10 and then the values of `forces` that are None; the last row of w is the time at the beginning of the step, if there are forces.
-    `ship` (Particulars) is what effects know of the ship.
+    p holds p0..p10 and then the values of `forces` that are None; the last column of w is the time at the beginning of the step, if there are forces.
+    `ship` (Particulars) is what effects know of the ship. The code is of this ship and these effects alone: it is compiled where `run_steps`, the
+    integration steps of all runs, are so many that a fit gains more than the 3 s that this takes.
     """
+    return _rollout_function(c, h, wind, sensitivities, forces, ship, run_steps >= _WORTH_COMPILING)
+
+
+@lru_cache(maxsize=8)
+def _rollout_function(c: eq2.Coefficients, h: float, wind: bool, sensitivities: bool, forces: Forces, ship: Any, machine_code: bool) -> Rollout:
     num = _P + sum(v is None for _, q in forces for v in q)
-    x, S, p = ca.SX.sym("x", 6), ca.SX.sym("S", 6, num), ca.SX.sym("p", num)
+    x, S, p = ca.SX.sym("x", 6), ca.SX.sym("S", num, 6).T, ca.SX.sym("p", num)
     w = ca.SX.sym("w", (14 if wind else 12) + bool(forces))
     free = iter([p[i] for i in range(_P, num)])
     active = [Active(effect, tuple(next(free) if v is None else v for v in q)) for effect, q in forces]
@@ -67,10 +76,10 @@ def rollout_function(
 
     x_next = ca.vertcat(*rk4_step(rhs, tuple(x[i] for i in range(6)), h))
     if not sensitivities:
-        return ca.Function("step", [x, w, p], [x_next], {"cse": True}).mapaccum("roll", steps).map(runs)
+        return Rollout(ca.Function("step", [x, w, p], [x_next], {"cse": True}), machine_code)
     S_next = ca.jacobian(x_next, x) @ S + ca.jacobian(x_next, p)
-    step = ca.Function("step", [x, S, w, p], [x_next, S_next], {"cse": True})
-    return step.mapaccum("roll", steps, 2).map(runs)
+    state, following = ca.vertcat(x, ca.vec(S.T)), ca.vertcat(x_next, ca.vec(S_next.T))
+    return Rollout(ca.Function("step", [state, w, p], [following], {"cse": True}), machine_code)
 
 
 def parameter_scale(c: eq2.Coefficients) -> np.ndarray:
@@ -131,8 +140,8 @@ class Data:
     def weight(self) -> np.ndarray:
         return inverse_size(self.batch, self.dt)
 
-    def columns(self, path: np.ndarray, with_time: bool = False) -> np.ndarray:
-        """Inputs of the rollout function, (rows, runs * steps)."""
+    def inputs(self, path: np.ndarray, with_time: bool = False) -> np.ndarray:
+        """Inputs of the rollout function (runs, steps, columns)."""
         runs, steps = path.shape[:2]
         w = path.reshape(runs, steps, 12)
         if self.wind is not None:
@@ -140,17 +149,17 @@ class Data:
         if with_time:
             t = np.arange(steps) * self.dt / self.substeps
             w = np.concatenate([w, np.broadcast_to(t[:, None], (runs, steps, 1))], axis=2)
-        return w.reshape(runs * steps, -1).T
+        return w
 
-    def samples(self, X: ca.DM) -> np.ndarray:
-        """(runs, K, 6) at the samples, from the rollout function's (6, runs * steps)."""
-        runs, steps = self.path.shape[:2]
-        return np.asarray(X).T.reshape(runs, steps, 6)[:, self.substeps - 1 :: self.substeps]
+    def motion(self, rollout: Rollout, start: np.ndarray, w: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Motion (runs, K, 6) at the samples from start (runs, 10)."""
+        return rollout(start[:, MOTION], w, p)[:, self.substeps - 1 :: self.substeps]
 
-    def sensitivities(self, S: ca.DM, num: int) -> np.ndarray:
-        """(runs, K, 6, num) at the samples."""
-        runs, steps = self.path.shape[:2]
-        return np.asarray(S).reshape(6, runs, steps, num)[:, :, self.substeps - 1 :: self.substeps].transpose(1, 2, 0, 3)
+    def linearised(self, rollout: Rollout, start: np.ndarray, w: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Motion and its derivatives (runs, K, 6, num) with respect to p, at the samples."""
+        x0 = np.concatenate([start[:, MOTION], np.zeros((len(start), 6 * len(p)))], axis=1)
+        found = rollout(x0, w, p)[:, self.substeps - 1 :: self.substeps]
+        return found[..., :6], found[..., 6:].reshape(*found.shape[:2], 6, len(p))
 
 
 Linearise = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]

@@ -83,19 +83,18 @@ def test_the_gradient_used_by_the_fit_is_the_finite_difference(harbour):
     model = Physics(iterations=0).fit(harbour)
     batch = harbour.subset([0, 1]).batch()
     path = model.actuator_path(batch.s0, batch.U)
-    w = path.reshape(2 * path.shape[1], 12).T
-    args = (model.c, path.shape[1], 2, 1.0, False)
-    full, plain = fit.rollout_function(*args, True), fit.rollout_function(*args, False)
+    data = fit.Data(model.c, batch, path, None, 1.0, 1)
+    w = data.inputs(path)
+    full, plain = (fit.rollout_function(model.c, 1.0, False, sensitivities) for sensitivities in (True, False))
     p = np.array([0.05, 1500.0, 6000.0, 40.0, 0.02, 1.9, 0.05, -1.2, 0.03, 0.02, 1.1])
-    x0 = batch.s0[:, :6].T
-    S = np.asarray(full(x0, np.zeros((6, 22)), w, p)[1]).reshape(6, -1, 11)
+    S = data.linearised(full, batch.s0, w, p)[1]
     for i in range(11):
         h = 1e-5 * fit.parameter_scale(model.c)[i]
         up, down = p.copy(), p.copy()
         up[i] += h
         down[i] -= h
-        slope = (np.asarray(plain(x0, w, up)) - np.asarray(plain(x0, w, down))) / (2 * h)
-        np.testing.assert_allclose(S[:, :, i], slope, atol=1e-4 * np.abs(slope).max())
+        slope = (data.motion(plain, batch.s0, w, up) - data.motion(plain, batch.s0, w, down)) / (2 * h)
+        np.testing.assert_allclose(S[..., i], slope, atol=1e-4 * np.abs(slope).max())
 
 
 def test_rollout_of_the_fit_and_of_predict_are_the_same_model(harbour, fitted):
@@ -103,8 +102,8 @@ def test_rollout_of_the_fit_and_of_predict_are_the_same_model(harbour, fitted):
 
     batch = harbour.subset([0, 1, 2]).batch()
     path = fitted.actuator_path(batch.s0, batch.U)
-    plain = fit.rollout_function(fitted.c, path.shape[1], 3, 1.0, False, False)
-    X = np.asarray(plain(batch.s0[:, :6].T, path.reshape(-1, 12).T, fitted.p)).T.reshape(3, -1, 6)
+    plain = fit.rollout_function(fitted.c, 1.0, False, False)
+    X = plain(batch.s0[:, :6], path.reshape(3, -1, 12), fitted.p)
     np.testing.assert_allclose(X, fitted.predict(batch.s0, batch.U)[..., :6], rtol=1e-9, atol=1e-9)
 
 
