@@ -98,7 +98,7 @@ def diagnoses(data: Dataset, sizes: Sequence[int]) -> list[Curve]:
     return [curve]
 
 
-def draw(curves: list[Curve]) -> None:
+def draw(curves: list[Curve], picture: Path) -> None:
     """One panel a question, time over size, both logarithmic."""
     import matplotlib
 
@@ -115,8 +115,8 @@ def draw(curves: list[Curve]) -> None:
         axis.set_ylabel("seconds")
         axis.grid(True, which="both", alpha=0.2)
         axis.legend(fontsize="small")
-    figure.savefig(PICTURE, dpi=110)
-    print(f"Written: benchmarks/{PICTURE.name}")
+    figure.savefig(picture, dpi=110)
+    print(f"Written: benchmarks/{picture.name}")
 
 
 def main() -> None:
@@ -139,7 +139,7 @@ def main() -> None:
                 print(f"  {size:14d} {seconds:12.6f} {1e6 * seconds / size:18.2f}", flush=True)
             measure.record(given, vars(curve))
     if not quick:
-        draw(curves)
+        draw(curves, PICTURE)
 
 
 if __name__ == "__main__":

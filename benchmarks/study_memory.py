@@ -26,7 +26,7 @@ from shipbench.records import Dataset, Run
 from shipbench.simulate.harbour import draw_plan, fly
 
 MODELS = (
-    "mlp[epochs=1]", "lstm[epochs=1]", "hold", "mlp[epochs=1,target=increment]", "lstm[epochs=1,hidden=24]", "mlp[epochs=1,hidden=50]",
+    "mlp[epochs=1]", "lstm[epochs=1]", "physics", "hold", "neural_ode[epochs=1]", "mlp[epochs=1,target=increment]",
 )  # fmt: skip
 LIMIT_GB = 4.0
 GROWTH = 1.1

@@ -12,7 +12,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-SCRIPTS = {"rollouts_shipmmg": ("shipmmg",), "fit_scipy": (), "startup": (), "scaling": ()}
+SCRIPTS = {
+    "rollouts_shipmmg": ("shipmmg",), "fit_scipy": (), "startup": (), "scaling": (), "mlp_training": (), "neural_ode_training": (),
+    "stacked_training": (), "training_scaling": (), "study_memory": (),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
