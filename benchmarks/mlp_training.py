@@ -31,8 +31,8 @@ from shipbench.predictors.base import make_predictor, parse_spec
 from shipbench.records import Dataset
 
 EPOCHS = 200
-TARGET, ACCEPTED = 6.0, 0.2
-"""Ratio to be reached, and accepted relative difference of the losses in the mean over folds; the folds themselves differ by more."""
+TARGET, ACCEPTED = 6.0, 0.15
+"""Ratio to be reached, and by how much our losses may exceed the peer's in the mean over folds: seeds make that much, folds more."""
 Samples = tuple[Tensor, Tensor, Tensor, Tensor]
 
 
@@ -158,8 +158,8 @@ def main() -> None:
         a, b = losses([ours[i] for i in done], [data[i] for i in done]), losses([peers[i] for i in done], [data[i] for i in done])
         for side, pair in (("ours", a), ("peer", b)):
             print(f"  {side} loss, mean of folds {done}: training {pair[0]:.6f}, validation {pair[1]:.6f}")
-        measure.agree("relative training loss", abs(a[0] / b[0] - 1.0), 1.0 if given.quick else ACCEPTED)
-        measure.agree("relative validation loss", abs(a[1] / b[1] - 1.0), 1.0 if given.quick else ACCEPTED)
+        for what, ratio in (("training", a[0] / b[0]), ("validation", a[1] / b[1])):
+            measure.agree(f"{what} loss, ours above the peer's by a share of", ratio - 1.0, 1.0 if given.quick else ACCEPTED)
 
 
 if __name__ == "__main__":
