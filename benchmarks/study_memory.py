@@ -4,7 +4,7 @@
 
 Makes the data set (the simulator's harbour runs, 1 s apart; a smaller --dt interpolates them), writes it as Parquet, and runs `shipbench run` on
 it in a process of its own for each number of models: five folds, windows of 120 s, every network for one epoch, since epochs take time and no memory.
-The figure is the greatest sum of the resident memory of that process and all that it started, looked at every 20 ms.
+The figure is the greatest sum of the resident memory of that process and all that it started, looked at every 50 ms.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def peak_of(command: list[str]) -> tuple[float, float, int]:
             except psutil.NoSuchProcess:  # it has just ended
                 continue
         peak = max(peak, total)
-        time.sleep(0.02)
+        time.sleep(0.05)
     return peak / 1e9, time.perf_counter() - began, process.returncode
 
 
