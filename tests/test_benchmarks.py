@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-SCRIPTS = {"rollouts_shipmmg": ("shipmmg",), "fit_scipy": (), "startup": (), "scaling": ()}
+SCRIPTS = {"rollouts_shipmmg": ("shipmmg",), "fit_scipy": (), "startup": (), "scaling": (), "paper_study": ()}
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
