@@ -2,12 +2,14 @@
 
     python benchmarks/scaling.py [--runs N] [--quick] [--json FILE]
 
-Prints a table and writes `benchmarks/scaling.png` (`--quick` writes nothing). Every time is the smallest of N repeats: a busy machine only adds.
+Prints a table and writes `benchmarks/scaling.png` (`--quick` writes nothing). Times are processor seconds of this process, the smallest of N repeats,
+so that other work on the machine hardly shows; set OMP_NUM_THREADS=1, or they add up over threads.
 What bends the curves is explained in `benchmarks/README.md`.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -43,7 +45,14 @@ class Curve:
         if repeats > 1:
             call()
         self.sizes.append(size)
-        self.seconds.append(min(measure.seconds(call) for _ in range(repeats)))
+        self.seconds.append(min(processor_seconds(call) for _ in range(repeats)))
+
+
+def processor_seconds(call: Callable[[], Any]) -> float:
+    """Of one call, in all threads of this process."""
+    begin = time.process_time()
+    call()
+    return time.process_time() - begin
 
 
 def repeated(data: Dataset, number: int) -> Dataset:
@@ -112,7 +121,7 @@ def draw(curves: list[Curve], picture: Path) -> None:
             axis.loglog(curve.sizes, curve.seconds, "o-", label=curve.label)
             axis.set_xlabel(curve.axis)
         axis.set_title(panel)
-        axis.set_ylabel("seconds")
+        axis.set_ylabel("processor seconds")
         axis.grid(True, which="both", alpha=0.2)
         axis.legend(fontsize="small")
     figure.savefig(picture, dpi=110)
