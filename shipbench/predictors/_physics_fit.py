@@ -213,6 +213,7 @@ def descend(
         if np.isfinite(new) and new < cost:
             done = cost - new < tolerance * cost
             q, damping = trial, max(damping * 0.1, 1e-8)
+            del e, J  # of many runs, two of them side by side are most of the memory
             e, J = linearise(q)
             cost = float(np.sum(e * e) + np.sum(ridge * q * q))
             if done:
@@ -247,9 +248,8 @@ def intervals(q: np.ndarray, e: np.ndarray, J: np.ndarray, low: np.ndarray, high
     runs = len(e)
     if runs < 2 or not free.any():
         return interval
-    G = J[..., free]
-    bread = np.linalg.pinv(np.einsum("bksp,bksq->pq", G, G))
-    scores = np.einsum("bksp,bks->bp", G, e)
+    bread = np.linalg.pinv(np.einsum("bksp,bksq->pq", J, J)[np.ix_(free, free)])
+    scores = np.einsum("bksp,bks->bp", J, e)[:, free]
     spread = np.sqrt(np.diag(bread @ (scores.T @ scores * runs / (runs - 1)) @ bread))
     half = float(stdtrit(runs - 1, 0.975)) * spread
     interval[free] = np.stack([q[free] - half, q[free] + half], axis=1)
