@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from . import cli_check, cli_contract, cli_data, cli_diagnosis, cli_import, cli_leaderboard, cli_report
-from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, exit_if_failed, parse_seeds, print_json, show_boards
+from .cli_common import SETTINGS, DatasetArgument, Device, Json, Quiet, console_for_tables, exit_if_failed, parse_seeds, print_json, show_boards
 from .errors import InputError, ShipbenchError
 
 
@@ -86,6 +86,7 @@ def run(
     scheduler: Annotated[str | None, typer.Option(help="Address of the Dask scheduler, such as tcp://host:8786.")] = None,
     time_limit: Annotated[float | None, typer.Option(help="Most seconds for one cell (fit and prediction); beyond, it fails.")] = None,
     memory_limit: Annotated[float | None, typer.Option(help="Most GB of memory for one cell; beyond, it fails.")] = None,
+    device: Device = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -102,7 +103,7 @@ def run(
         "models": model or None, "datasets": dataset or None, "folds": folds, "split": split, "seeds": parse_seeds(seeds),
         "horizon_s": horizon, "history_s": history, "stride_s": stride, "max_runs": max_runs,
     }  # fmt: skip
-    execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit))
+    execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit), device)
     tasks = load_tasks(config, overrides)
     folder = out or Path("runs") / (Path(config).stem if config else slug(Path(tasks[0].dataset).name))
     outcome = run_tasks(tasks, folder, resume=resume, execution=execution, progress=make_progress(quiet), command=str(ctx.obj))
@@ -122,7 +123,7 @@ def run(
 def models(as_json: Json = False) -> None:
     """List the models with their parameters."""
     from .bench.listing import describe_parts
-    from .predictors.base import PREDICTORS
+    from .predictors.registered import PREDICTORS
 
     parts = describe_parts(PREDICTORS)
     if as_json:
@@ -164,12 +165,13 @@ def predict(
     dataset: DatasetArgument,
     out: Annotated[Path, typer.Option("-o", "--out", help="CSV file to write.")] = Path("predictions.csv"),
     horizon: Annotated[float | None, typer.Option(help="Seconds to predict (default: each run's length).")] = None,
+    device: Device = None,
 ) -> None:
     """Roll a saved model out over a data set into CSV."""
     from .bench.rollout import predict_runs, write_csv
     from .data.base import load_dataset
 
-    predicted = predict_runs(model, load_dataset(dataset), horizon)
+    predicted = predict_runs(model, load_dataset(dataset), horizon, device)
     write_csv(predicted, out)
     typer.echo(f"Written: {out} ({len(predicted)} runs)")
 

@@ -23,7 +23,7 @@ def data_check(
     Exit code 0: no error among the findings (warnings and notes may be there); 1: at least one error; 2: the input cannot be read.
     """
     from .bench.check_report import check_document, check_tables, write_findings
-    from .bench.listing import dataset_facts
+    from .bench.dataset_facts import dataset_facts
     from .checking.base import check_path
 
     recording, findings = check_path(dataset)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_common import Json, console_for_tables, print_json
+from .cli_common import Device, Json, console_for_tables, print_json
 
 
 def check(
@@ -16,6 +16,7 @@ def check(
     dataset: Annotated[
         str | None, typer.Option("-d", "--dataset", help="Check on a few windows of these data (default: small simulated runs).")
     ] = None,
+    device: Device = None,
     as_json: Json = False,
 ) -> None:
     """Check whether a model keeps the contract, rule by rule, in seconds.
@@ -29,7 +30,7 @@ def check(
     from .contract.check import check_model
     from .data.base import load_dataset
 
-    report = check_model(model, None if dataset is None else load_dataset(dataset))
+    report = check_model(model, None if dataset is None else load_dataset(dataset), device)
     if as_json:
         print_json(report.document())
     else:

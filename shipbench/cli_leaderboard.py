@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .cli_common import Json, Quiet, exit_if_failed, parse_numbers, parse_seeds, print_json, show_boards
+from .cli_common import Device, Json, Quiet, exit_if_failed, parse_numbers, parse_seeds, print_json, show_boards
 from .errors import InputError
 
 if TYPE_CHECKING:
@@ -90,11 +90,13 @@ def learning_curve(
     horizon: Annotated[float | None, typer.Option(help="Seconds to predict (default 120).")] = None,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for the results (default runs/curve-<data set>).")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Keep what the same code, data and task finished before.")] = False,
+    device: Device = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Error against the number of training runs: the same scored runs, ever more runs to learn from; table and plot."""
     from .bench.curve import run_curve
+    from .bench.executors import Execution
     from .bench.progress import make_progress
     from .bench.results import slug
     from .bench.task import load_tasks
@@ -105,7 +107,7 @@ def learning_curve(
     task = load_tasks(config, overrides)[0]
     folder = out or Path("runs") / f"curve-{slug(Path(task.dataset).name)}"
     numbers = parse_numbers("--sizes", sizes)
-    curve = run_curve(task, numbers, folder, resume=resume, progress=make_progress(quiet), command=str(ctx.obj))
+    curve = run_curve(task, numbers, folder, resume=resume, execution=Execution(device=device), progress=make_progress(quiet), command=str(ctx.obj))
     if as_json:
         print_json({"out": str(folder), "page": str(curve.page), "curve": curve.board.as_json(), "failed": curve.failed})
     elif not quiet:

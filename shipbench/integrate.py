@@ -12,7 +12,7 @@ from .ops import Array, cos, sin
 State = tuple[Array, ...]
 
 
-def rk4_step(rhs: Callable[[State, int], State], state: State, dt: float) -> State:
+def rk4_step(rhs: Callable[[State, int], State], state: State, dt: Array) -> State:
     """One classical Runge-Kutta step of order 4.
 
     `rhs(state, stage)` returns the derivatives; `stage` is 0 at the beginning, 1 at the middle and 2 at the end of the step, for

@@ -11,7 +11,7 @@ from typing import Any
 from ..checking.finding import Finding, Picture, merged, toml_line
 from ..checking.recording import Recording
 from ..errors import InputError
-from .listing import dataset_facts
+from .dataset_facts import dataset_facts
 from .results import slug
 from .tables import Table, TableColumn
 

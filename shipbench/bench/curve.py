@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from .board_scores import Scores
+from .executors import Execution
 from .leaderboard import Board, build_board, scores_of
 from .progress import Progress
 from .runner import check_task, run_tasks
@@ -29,7 +30,16 @@ class Curve:
     failed: list[str]
 
 
-def run_curve(task: Task, sizes: Sequence[int], out: Path, *, resume: bool = False, progress: Progress | None = None, command: str = "") -> Curve:
+def run_curve(
+    task: Task,
+    sizes: Sequence[int],
+    out: Path,
+    *,
+    resume: bool = False,
+    execution: Execution | None = None,
+    progress: Progress | None = None,
+    command: str = "",
+) -> Curve:
     """Run `task` with each number of training runs into `out/train<number>`, and write `out/learning-curve.md` with its plot.
 
     The training runs of a smaller number are among those of a larger one; the scored runs are the same.
@@ -47,7 +57,7 @@ def run_curve(task: Task, sizes: Sequence[int], out: Path, *, resume: bool = Fal
     failed: list[str] = []
     boards: dict[int, Board] = {}
     for n, one in tasks.items():
-        outcome = run_tasks([one], out / f"train{n:03d}", resume=resume, progress=progress, command=command)
+        outcome = run_tasks([one], out / f"train{n:03d}", resume=resume, execution=execution, progress=progress, command=command)
         failed += [f"{n} training runs: {line}" for line in outcome.failed]
         dataset = outcome.summaries[0]["dataset"]
         found[n], boards[n] = scores_of(outcome.results, dataset), build_board(outcome.results, dataset)

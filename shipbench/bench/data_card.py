@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..records import Dataset
 from ..signals import UNITS
 from .data_card_plots import Picture, pictures
-from .listing import dataset_facts, describe_tables
+from .dataset_facts import dataset_facts, describe_tables
 from .tables import Table, TableColumn, display_unit, number, significant
 
 _NOISE = (

@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any
 
 from ..errors import InputError, WorkError
+from ..predictors.device import check_device
 from ..registry import package_digest
 from .isolate import Limits, stop_all, thread_settings, work_isolated
 from .provenance import machine
@@ -36,15 +37,17 @@ class Execution:
         workers: number of processes; None: one for each CPU.
         scheduler: address, such as "tcp://host:8786".
         limits: of each cell.
+        device: where networks train and predict ("cpu", "cuda", "cuda:1"); None: where their specs say, else on the CPU.
 
     Raises:
-        InputError: an unknown executor, or an option that it lacks or does not take.
+        InputError: an unknown executor, an option that it lacks or does not take, or a device that is not here (with Dask, each worker looks itself).
     """
 
     executor: str = "local"
     workers: int | None = None
     scheduler: str | None = None
     limits: Limits = field(default_factory=Limits)
+    device: str | None = None
 
     def __post_init__(self) -> None:
         if self.executor not in NAMES:
@@ -58,6 +61,8 @@ class Execution:
             raise InputError("--executor dask needs --scheduler, the address of a running Dask scheduler, such as --scheduler tcp://host:8786.")
         if self.executor != "dask" and self.scheduler:
             raise InputError(f"--scheduler {self.scheduler} belongs to --executor dask, not to --executor {self.executor}.")
+        if self.device is not None:
+            check_device(self.device, here=self.executor != "dask")
         for option, value in (("--time-limit", self.limits.seconds), ("--memory-limit", self.limits.memory_gb)):
             if value is not None and not value > 0:
                 raise InputError(f"{option} {value:g}; accepted: more than 0.")
@@ -94,8 +99,8 @@ class _Local(Workers):
         super().__init__(_Here(), room=1)
 
     def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
-        # Copies, as a child process gets them: what a model writes into them stays its own.
-        return self.executor.submit(work, job, pickle.loads(pickle.dumps(list(folds))))
+        # Copies, as a child process gets them, each fold's apart: what a model writes into them stays its own.
+        return self.executor.submit(work, job, [pickle.loads(pickle.dumps(fold)) for fold in folds])
 
 
 class _Processes(Workers):

@@ -58,7 +58,9 @@ def work_isolated(job: Job, folds: Sequence[FoldData], limits: Limits, threads: 
         )  # fmt: skip
         _running.add(process)
         try:
-            answer, reason = _attend(process, pickle.dumps((job, list(folds))), limits, len(folds))
+            # Folds apart, since they share windows: what a model writes into one must not reach another.
+            question = b"".join(pickle.dumps(part) for part in ((job, len(folds)), *folds))
+            answer, reason = _attend(process, question, limits, len(folds))
             return [Answer("failed", f"fit or prediction: {reason}") for _ in folds] if reason else pickle.loads(answer)
         finally:
             _kill(process)
@@ -148,7 +150,8 @@ def main(alive: int) -> None:
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     threading.Thread(target=_end_with_parent, args=(alive,), daemon=True).start()
-    job, folds = pickle.load(sys.stdin.buffer)  # a pipe from our own parent, never a file
+    job, count = pickle.load(sys.stdin.buffer)  # a pipe from our own parent, never a file
+    folds = [pickle.load(sys.stdin.buffer) for _ in range(count)]
     pickle.dump(work(job, folds), answers)
     answers.close()
     os._exit(0)  # without waiting for threads that a model has left behind

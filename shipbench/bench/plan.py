@@ -14,7 +14,7 @@ from ..effects.base import EFFECTS
 from ..errors import InputError, ShipbenchError, WorkError
 from ..metrics.base import METRICS
 from ..predictors.base import PREDICTORS, make_predictor
-from ..records import Batch, Dataset
+from ..records import Batch, Dataset, Run
 from ..registry import package_digest
 from ..specs import Spec
 from .folds import Fold
@@ -38,9 +38,10 @@ class Study:
 
     @cached_property
     def fold_data(self) -> list[FoldData]:
-        """What models may see of each fold."""
+        """What models may see of each fold; a window that several folds train on is kept once."""
+        kept: dict[str, Run] = {}
         return [
-            FoldData(_column_by_column(f.train), _column_by_column(f.valid) if f.valid else None, b.s0, b.U, b.history)
+            FoldData(_column_by_column(f.train, kept), _column_by_column(f.valid, kept) if f.valid else None, b.s0, b.U, b.history)
             for f, b in zip(self.folds, self.batches, strict=True)
         ]
 
@@ -111,9 +112,9 @@ class Part:
         """Of each cell."""
         return [self.study.fold_data[cell.fold] for cell in self.cells]
 
-    def job(self, send_files: bool) -> Job:
+    def job(self, send_files: bool, device: str | None) -> Job:
         """What a worker is given beside `fold_data`."""
-        return Job(self.spec, self.cells[0].seed, self.code, self.files if send_files else None)
+        return Job(self.spec, self.cells[0].seed, self.code, self.files if send_files else None, device)
 
     def refuse_changed_files(self) -> None:
         """To be asked after a fit whose worker read the user's model file in place.
@@ -128,9 +129,15 @@ class Part:
             )
 
 
-def _column_by_column(data: Dataset) -> Dataset:
-    """Samples in the memory layout of data read from files, which copies keep: sums over another layout round differently."""
-    return data.with_runs(replace(run, states=np.asfortranarray(run.states), inputs=np.asfortranarray(run.inputs)) for run in data.runs)
+def _column_by_column(data: Dataset, kept: dict[str, Run]) -> Dataset:
+    """Samples in the memory layout of data read from files, which copies keep: sums over another layout round differently.
+
+    `kept` holds, by name, the windows that were converted before; their names are unique in a study.
+    """
+    for run in data.runs:
+        if run.id not in kept:
+            kept[run.id] = replace(run, states=np.asfortranarray(run.states), inputs=np.asfortranarray(run.inputs))
+    return data.with_runs(kept[run.id] for run in data.runs)
 
 
 def new_model(spec: Spec) -> Any:

@@ -18,16 +18,18 @@ Rollout = tuple[str, np.ndarray, np.ndarray]
 """Run id, t (K + 1,) [s] and states (K + 1, 10), the first being the recorded start."""
 
 
-def predict_runs(model: str, dataset: Dataset, horizon_s: float | None = None) -> list[Rollout]:
-    """Roll the saved model in the folder `model` out from the first sample of every run, to its end or over `horizon_s` seconds.
+def predict_runs(model: str, dataset: Dataset, horizon_s: float | None = None, device: str | None = None) -> list[Rollout]:
+    """Roll the saved model in the folder `model` out from the first sample of every run, to its end or over `horizon_s` seconds, on
+    `device` (see `check_device`).
 
     Raises:
-        InputError: the folder is no saved model, its inputs are not those of the data set, or a run is shorter than the horizon.
+        InputError: the folder is no saved model, its inputs are not those of the data set, a run is shorter than the horizon, or the device is
+            not here.
     """
     spec = parse_spec(model)
     if spec.path is None or spec.class_name is not None:
         raise InputError(f"'{model}' is not a saved model; give a folder that holds model.json (cells/<dataset>/<model>/fold0-seed0/model).")
-    predictor = make_predictor(spec)
+    predictor = make_predictor(spec, device)
     if tuple(predictor.inputs) != dataset.inputs:
         raise InputError(
             f"the model uses the inputs {', '.join(predictor.inputs)}; data set '{dataset.name}' has {', '.join(dataset.inputs)}. "

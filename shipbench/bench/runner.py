@@ -57,7 +57,7 @@ def run_tasks(
         tasks: one per data set.
         out: folder of the study; cells of an earlier study there are replaced when they are run again.
         resume: keep the scored cells that the same code, data and task made; failed and skipped ones are tried again.
-        execution: where the cells run and what each may use; it changes no number.
+        execution: where the cells run and what each may use; it changes no number (a GPU rounds otherwise than a CPU).
         progress: told of every cell.
         command: the command line, kept in the results.
 
@@ -79,7 +79,7 @@ def run_tasks(
         finished: set[Cell] = set()
         try:
             todo = [part for part in parts if not (resume and _kept(part, out, progress, finished))]
-            for part, answers in _answers(todo, workers, progress):
+            for part, answers in _answers(todo, workers, progress, execution.device):
                 for cell, key, answer in zip(part.cells, part.keys, answers, strict=True):
                     record = _score(part.study, part.spec, cell, answer)
                     summary = record.summary | about | {"key": key}
@@ -130,7 +130,7 @@ def _kept(part: Part, out: Path, progress: Progress, finished: set[Cell]) -> boo
     return True
 
 
-def _answers(parts: Sequence[Part], workers: Workers, progress: Progress) -> Iterator[tuple[Part, list[Answer]]]:
+def _answers(parts: Sequence[Part], workers: Workers, progress: Progress, device: str | None) -> Iterator[tuple[Part, list[Answer]]]:
     """Each part with the answers for its cells, as they come."""
     if workers.room is None and parts:
         progress.working(f"{len(parts)} jobs sent to {workers.about}")
@@ -140,7 +140,7 @@ def _answers(parts: Sequence[Part], workers: Workers, progress: Progress) -> Ite
             part = waiting.popleft()
             if workers.room is not None:
                 progress.working(part.label)
-            running[workers.submit(part.job(workers.sends_files), part.fold_data)] = part
+            running[workers.submit(part.job(workers.sends_files, device), part.fold_data)] = part
         for future in wait(running, return_when=FIRST_COMPLETED).done:
             part = running.pop(future)
             answers = answers_of(future, len(part.cells))

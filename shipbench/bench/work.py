@@ -47,13 +47,14 @@ class Job:
     """A model and a seed, to be fitted on one or several folds.
 
     `code`: digests of the packages that it takes (`package_digest`). `files`: content by relative name of the user's model file or saved
-    folder, where the worker may not have it; None: it is read in place.
+    folder, where the worker may not have it; None: it is read in place. `device`: where it computes, unless its spec says.
     """
 
     spec: Spec
     seed: int
     code: dict[str, str]
     files: dict[str, bytes] | None = None
+    device: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +90,7 @@ def work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
     """Fit and predict; whatever the model raises becomes the answer of its cells (one for each of `folds`)."""
     try:
         with _at_hand(job) as spec:
-            return _work(spec, job.seed, folds)
+            return _work(replace(job, spec=spec), folds)
     except _RAISED as error:
         return [Answer("failed", one_line(error)) for _ in folds]
 
@@ -113,14 +114,14 @@ def _at_hand(job: Job) -> Iterator[Spec]:
         yield replace(job.spec, path=Path(folder, job.spec.path.name))
 
 
-def _work(spec: Spec, seed: int, folds: Sequence[FoldData]) -> list[Answer]:
-    model = make_predictor(spec)
+def _work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
+    model = make_predictor(job.spec, job.device)
     refusal = getattr(model, "skip", None)
     reason = refusal(folds[0].train) if callable(refusal) else None
     if reason:
         return [Answer("skipped", str(reason)) for _ in folds]
-    _seed_global_draws(seed)
-    return [_predicted(fit, fold) for fit, fold in zip(_fit(spec, seed, folds), folds, strict=True)]
+    _seed_global_draws(job.seed)
+    return [_predicted(fit, fold) for fit, fold in zip(_fit(job, folds), folds, strict=True)]
 
 
 def _seed_global_draws(seed: int) -> None:
@@ -139,9 +140,10 @@ class _Fit:
     error: str = ""
 
 
-def _fit(spec: Spec, seed: int, folds: Sequence[FoldData]) -> list[_Fit]:
+def _fit(job: Job, folds: Sequence[FoldData]) -> list[_Fit]:
     """The fitted models of the folds: together where the class can, else one by one; one model's failure stays its own."""
-    models = [make_predictor(spec) for _ in folds]
+    spec, seed = job.spec, job.seed
+    models = [make_predictor(spec, job.device) for _ in folds]
     if spec.path is not None and spec.class_name is None:
         return [_Fit(model, 0.0) for model in models]  # a saved model comes fitted
     group, began = getattr(type(models[0]), "fit_group", None), time.perf_counter()
@@ -151,7 +153,7 @@ def _fit(spec: Spec, seed: int, folds: Sequence[FoldData]) -> list[_Fit]:
             seconds = (time.perf_counter() - began) / len(folds)
             return [_Fit(model, seconds, len(folds)) for model in models]
         except _RAISED:  # one fold is enough to fail them all: each gets its chance alone
-            models = [make_predictor(spec) for _ in folds]
+            models = [make_predictor(spec, job.device) for _ in folds]
     fits = []
     for model, fold in zip(models, folds, strict=True):
         began, reason = time.perf_counter(), ""

@@ -40,20 +40,22 @@ class Report:
         }  # fmt: skip
 
 
-def check_model(text: str, data: Dataset | None = None) -> Report:
+def check_model(text: str, data: Dataset | None = None, device: str | None = None) -> Report:
     """Check the model of a spec (name, name[key=value], path.py:Class, saved folder) against the contract.
 
     Args:
         text: the model spec.
         data: where to check it (a few windows are used); small simulated port manoeuvres by default.
+        device: where the model computes, if it has a device and the spec names none (see `check_device`).
 
     Raises:
-        InputError: the spec cannot be made into a model, the model refuses the data (`skip`), or its inputs are not those of the data.
+        InputError: the spec cannot be made into a model, the model refuses the data (`skip`), its inputs are not those of the data, or no such
+            device is here.
     """
     began = time.perf_counter()
     spec = parse_spec(text)
     try:
-        model = make_predictor(spec)
+        model = make_predictor(spec, device)
     except InputError:
         raise
     except Exception as error:  # a stranger's file is imported here
@@ -72,7 +74,7 @@ def check_model(text: str, data: Dataset | None = None) -> Report:
     refusal = getattr(model, "skip", None)
     if callable(refusal) and (why := refusal(used)):
         raise InputError(f"model '{text}' cannot be checked here: {why}.")
-    return check_subject(Subject(spec, used), began)
+    return check_subject(Subject(spec, used, device), began)
 
 
 def check_subject(subject: Subject, began: float | None = None) -> Report:

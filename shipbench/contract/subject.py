@@ -50,6 +50,7 @@ class Subject:
 
     spec: Spec
     data: Dataset
+    device: str | None = None
     saved: bool = field(init=False)
 
     def __post_init__(self) -> None:
@@ -74,7 +75,7 @@ class Subject:
 
     def fit(self, state: int, *, train: Dataset | None = None) -> Fitted:
         """A fresh model fitted with the seed `SEED`, on `train` alone if it is given; `state` is what the global generators are set to meanwhile."""
-        model = make_predictor(self.spec)
+        model = make_predictor(self.spec, self.device)
         if self.saved:
             return Fitted(model, self.parts[0], None, model)
         train, held = (copied(train), None) if train is not None else (copied(self.parts[0]), copied(self.parts[1]))

@@ -14,12 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..cache import cache_folder
 from ..errors import InputError, ShipbenchError, unknown_name
 from ..records import Dataset
 from ..registry import Registry
 from ..specs import parse_spec
-from .files import read_dataset, write_dataset
-from .mat import read_mat
 from .public import PublicData
 
 _HELPERS = frozenset({"base", "corrections", "coverage", "describe", "export", "files", "mat", "noise", "public", "sensitivity", "units"})
@@ -44,11 +43,6 @@ class DatasetPart:
     public: PublicData | None = None
 
 
-def cache_folder() -> Path:
-    """Where made data sets are kept: the environment variable SHIPBENCH_CACHE, else ~/.cache/shipbench."""
-    return Path(os.environ.get("SHIPBENCH_CACHE") or Path.home() / ".cache" / "shipbench")
-
-
 def public_folder(name: str) -> Path:
     """Where the files of a public data set are kept once they are downloaded."""
     return cache_folder() / "public" / name
@@ -65,6 +59,9 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
     Raises:
         InputError: neither a known name nor a data set's folder, an unknown parameter, or faulty files.
     """
+    from .files import read_dataset  # pandas is loaded for reading and writing, not for the list
+    from .mat import read_mat
+
     folder = Path(spec)
     exported = folder.suffix == ".mat" and folder.is_file()
     if exported or (folder / "dataset.toml").is_file():
@@ -120,6 +117,8 @@ def _cache_key(part: DatasetPart, params: dict[str, Any]) -> str:
 
 def _from_cache(folder: Path) -> Dataset | None:
     """The cached data set, or None where there is none or it is damaged (said in the log, then made anew)."""
+    from .files import read_dataset
+
     if not folder.is_dir():
         return None
     try:
@@ -136,6 +135,8 @@ def _from_cache(folder: Path) -> Dataset | None:
 
 def _to_cache(dataset: Dataset, folder: Path) -> None:
     """Write beside the cache, then move: a reader sees a whole data set or none. A cache that cannot be written costs time, not results."""
+    from .files import write_dataset
+
     fresh: Path | None = None
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)

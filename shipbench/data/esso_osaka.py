@@ -9,9 +9,9 @@ import math
 import os
 import zlib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from ..errors import InputError
 from ..records import Dataset, Run
@@ -19,6 +19,9 @@ from ..ship import Propeller, Rudder, Ship, Wind
 from ..signals import COMMANDS, DELTA, PSI, N, R, U, V, X, Y
 from .base import DatasetPart, public_folder
 from .public import PublicData, find
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _COLUMNS = {
     X: "x_position_mid [m]", Y: "y_position_mid [m]", PSI: "psi_hat [rad]", U: "u_velo [m/s]", V: "vm_velo [m/s]", R: "r_angvelo [rad/s]",
@@ -83,6 +86,8 @@ def find_copy(path: str | None = None) -> Path:
 
 def _index(folder: Path) -> pd.DataFrame:
     """Files, manoeuvres and published split of a copy: its runs.csv, or what the published names say."""
+    import pandas as pd  # not above: `data list` imports this module
+
     if not (folder / "runs.csv").is_file():
         names = list(PUBLIC.checksums)
         stems = [Path(name).stem for name in names]
@@ -147,6 +152,8 @@ def make(path: str | None = None, dt: float = 0.5, wind: bool = True) -> Dataset
 
 
 def _read_run(file: Path, stem: str, every: int, wind: bool, kind: str, test: bool) -> Run:
+    import pandas as pd
+
     try:
         table = pd.read_csv(file)
         raw = table[["t [s]", *_COLUMNS.values(), _RPS, _RUDDER, _WIND_SPEED, _WIND_FROM]].to_numpy(float)

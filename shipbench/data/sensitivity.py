@@ -12,7 +12,7 @@ import numpy as np
 from ..effects.base import EFFECTS
 from ..errors import ShipbenchError
 from ..records import Dataset
-from ..signals import F_B, MOTION
+from ..signals import F_B
 from .coverage import unit_time
 
 _WINDOW, _MOST_WINDOWS, _FIT_STEPS = 6.0, 24, 3
@@ -78,14 +78,14 @@ def _columns(windows: Dataset) -> tuple[np.ndarray, list[str], dict[str, str]]:
     effects = [EFFECTS.get(name) for name in _EFFECTS]
     sized = [effect.sized(windows.ship.L) for effect in effects]
     forces = tuple((e, tuple(p.typical if p.shape else None for p in parameters)) for e, parameters in zip(effects, sized, strict=True))
-    runs, rows = data.path.shape[:2]
-    function = rollout_function(model.c, rows, runs, windows.dt / model.substeps, data.wind is not None, True, forces, model.particulars)
+    runs = len(data.path)
+    function = rollout_function(model.c, windows.dt / model.substeps, data.wind is not None, True, forces, model.particulars)
     free = [(e, p) for e, parameters in zip(effects, sized, strict=True) for p in parameters if not p.shape]
     p = np.concatenate([model.p, np.zeros(len(free))])
-    _, S = function(batch.s0[:, MOTION].T, np.zeros((6, len(p) * runs)), data.columns(data.path, with_time=True), p)
+    _, S = data.linearised(function, batch.s0, data.inputs(data.path, with_time=True), p)
     root = np.sqrt(runs * data.truth.shape[1] * 6.0)
     size = np.maximum(1.0 / (data.weight() * root), _LEAST * _froude_units(model.c.L))
-    J = data.sensitivities(S, len(p)) / (size * root)[:, None]
+    J = S / (size * root)[:, None]
     scale = np.concatenate([parameter_scale(model.c), [abs(parameter.typical) for _, parameter in free]])
     kept = [*_PARAMETERS, *range(len(model.p), len(p))]
     Z = (J * scale)[..., kept].reshape(-1, len(kept))

@@ -9,7 +9,7 @@ import numpy as np
 from ..ops import Array, absolute, clip, exp, maximum, minimum, sign
 
 
-def lag_with_rate_limit(value: Array, command: Array, dt: float, T: Array, rate: Array) -> Array:
+def lag_with_rate_limit(value: Array, command: Array, dt: Array, T: Array, rate: Array) -> Array:
     """The actuator after `dt` seconds of a held command.
 
     d(value)/dt = clip((command - value)/T, -rate, rate): it moves at `rate` while the error exceeds rate T, then decays with time constant T [s].

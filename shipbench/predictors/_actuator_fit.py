@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cache
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.optimize import least_squares
 
 from ..physics.actuators import lag_with_rate_limit
 from ..records import Batch
 from ..signals import DELTA, F_B, F_S, N
+
+if TYPE_CHECKING:
+    from ..compiled import Rollout
 
 DEFAULT_ACTUATORS = np.array([6.0, 10.0, 1.0, np.deg2rad(2.5), 2.0, 3e4])
 """T_n [s], rate_n [rpm/s], T_delta [s], rate_delta [rad/s], T_F [s], rate_F [N/s]: kept for an actuator that the data never move."""
@@ -35,13 +41,20 @@ def fit_actuators(batch: Batch, dt: float) -> np.ndarray:
     return found
 
 
+@cache
+def _rollout() -> Rollout:
+    """Actuators (runs, K, 1) that follow held commands; p = (T, rate, dt)."""
+    import casadi as ca
+
+    from ..compiled import Rollout
+
+    x, w, p = ca.SX.sym("x"), ca.SX.sym("w"), ca.SX.sym("p", 3)
+    return Rollout(ca.Function("step", [x, w, p], [lag_with_rate_limit(x, w, p[2], p[0], p[1])], {"cse": True}))
+
+
 def _fit_one(s0: np.ndarray, command: np.ndarray, truth: np.ndarray, scale: float, dt: float) -> np.ndarray:
     def residual(log_params: np.ndarray) -> np.ndarray:
-        T, rate = np.exp(log_params)
-        now, predicted = s0, np.empty_like(truth)
-        for k in range(truth.shape[1]):
-            now = lag_with_rate_limit(now, command[:, k], dt, T, rate)
-            predicted[:, k] = now
+        predicted = _rollout()(s0[:, None], command[:, :, None], np.array([*np.exp(log_params), dt]))[:, :, 0]
         return ((predicted - truth) / scale).ravel()
 
     low, high = np.log([0.02 * dt, 1e-3 * scale / dt]), np.log([100.0 * dt, _NO_LIMIT * scale / dt])

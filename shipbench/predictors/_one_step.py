@@ -35,18 +35,25 @@ def transitions(runs: StackedRuns, features: InputFeatures) -> list[tuple[Tensor
 
 @torch.no_grad()
 def one_step_rollout(
-    step: Callable[[Tensor], Tensor], s0: np.ndarray, U: np.ndarray, features: InputFeatures, dt: float, *, increment: bool
+    step: Callable[[Tensor], Tensor],
+    s0: np.ndarray,
+    U: np.ndarray,
+    features: InputFeatures,
+    dt: float,
+    *,
+    increment: bool,
+    device: str = "cpu",
 ) -> np.ndarray:
     """Roll a one-step model out in float64, so that what is predicted for a run does not depend, to far below 1 mm, on the runs beside it.
 
     Args:
-        step: (batch, 7 + features) to the next y (batch, 7), or to its change if `increment`; both in physical units.
+        step: (batch, 7 + features) to the next y (batch, 7), or to its change if `increment`; both in physical units, on `device`.
         s0: (batch, 10); U: (batch, K, inputs).
 
     Returns:
         S (batch, K, 10).
     """
-    start, held = torch.as_tensor(s0), torch.as_tensor(U)
+    start, held = torch.as_tensor(s0, device=device), torch.as_tensor(U, device=device)
     y, psi, path = start[:, CHANNELS], start[:, PSI], []
     for k in range(U.shape[1]):
         z = step(torch.cat([y, features(held[:, k], psi)], dim=-1))
@@ -54,4 +61,4 @@ def one_step_rollout(
         psi = psi + dt * y[:, 2]
         path.append(y)
     channels = torch.stack(path, dim=1)
-    return torch.cat([dead_reckoning(start, channels, dt), channels], dim=-1).numpy()
+    return torch.cat([dead_reckoning(start, channels, dt), channels], dim=-1).cpu().numpy()

@@ -74,8 +74,8 @@ class _Extended:
         )
         self.timed = bool(forces)
         runs, steps = data.path.shape[:2]
-        args = (data.c, steps, runs, data.dt / data.substeps, data.wind is not None)
-        self.full, self.plain = (rollout_function(*args, s, forces, ship) for s in (True, False))
+        args = (data.c, data.dt / data.substeps, data.wind is not None)
+        self.full, self.plain = (rollout_function(*args, s, forces, ship, runs * steps) for s in (True, False))
         self.num = _P + len(self.forces)
 
     def extension_at(self, q: np.ndarray) -> Extension:
@@ -84,7 +84,7 @@ class _Extended:
     def _inputs(self, at: Extension) -> tuple[np.ndarray, np.ndarray]:
         """True start (batch, 10) and the rollout's inputs."""
         path = self.repath(at) if self.regear else self.data.path
-        return true_start(self.data.batch.s0, at.active("sensor"), self.data.dt), self.data.columns(path, self.timed)
+        return true_start(self.data.batch.s0, at.active("sensor"), self.data.dt), self.data.inputs(path, self.timed)
 
     def _measured(self, start: np.ndarray, X: np.ndarray, at: Extension) -> np.ndarray:
         """What the sensors say of the motion X (batch, K, 6)."""
@@ -98,15 +98,15 @@ class _Extended:
     def residuals(self, q: np.ndarray) -> np.ndarray:
         at = self.extension_at(q)
         start, w = self._inputs(at)
-        X = self.data.samples(self.plain(start[:, MOTION].T, w, (q * self.scale)[: self.num]))
+        X = self.data.motion(self.plain, start, w, (q * self.scale)[: self.num])
         with np.errstate(all="ignore"):
             return (self._measured(start, X, at) - self.data.truth) * self.weight
 
     def linearise(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         at = self.extension_at(q)
         start, w = self._inputs(at)
-        X, S = self.full(start[:, MOTION].T, np.zeros((6, self.num * len(start))), w, (q * self.scale)[: self.num])
-        motion, slope = self.data.samples(X), self.data.sensitivities(S, self.num) * self.scale[: self.num]
+        motion, slope = self.data.linearised(self.full, start, w, (q * self.scale)[: self.num])
+        slope = slope * self.scale[: self.num]
         J = np.empty((*motion.shape, len(q)))
         with np.errstate(all="ignore"):
             e = (self._measured(start, motion, at) - self.data.truth) * self.weight

@@ -1,6 +1,7 @@
 """Constrained nonlinear least squares over full rollouts (eq. 9): Gauss-Newton steps whose constrained subproblems IPOPT solves.
 
-CasADi differentiates one integration step; the sensitivities are carried along all runs at once. IPOPT then meets a problem of 11 unknowns (and
+CasADi differentiates one integration step; the sensitivities are carried along all runs at once (without effects as machine code,
+`_physics_rollout`). IPOPT then meets a problem of 11 unknowns (and
 the values of effects) with the bounds and the nonlinear constraints exact, so a step costs milliseconds, and the rollouts are evaluated once per
 step instead of once per barrier iteration.
 """
@@ -15,6 +16,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ..compiled import Rollout
 from ..effects.base import Effect
 from ..integrate import kinematics, rk4_step
 from ..ops import Array
@@ -23,12 +25,16 @@ from ..physics.modifiers import Flow
 from ..records import Batch
 from ..signals import COMMANDS, MOTION
 from ._physics_effects import Active, accelerations
+from ._physics_rollout import Rolling
 from .hold import Hold
 
 _P = eq2.NUM_PARAMETERS
 _START = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, -0.8, 1.0, 0.0, 1.0])
 Forces = tuple[tuple[Effect, tuple[float | None, ...]], ...]
 """Force effects and their values; None where the value is a symbol."""
+
+_WORTH_COMPILING = 5000
+"""Integration steps of all runs; a fit interprets each of them some 15 times at about 40 microseconds."""
 
 
 @dataclass(frozen=True)
@@ -41,17 +47,22 @@ class Fit:
     steps: int
 
 
-@lru_cache(maxsize=8)
 def rollout_function(
-    c: eq2.Coefficients, steps: int, runs: int, h: float, wind: bool, sensitivities: bool, forces: Forces = (), ship: Any = None
-) -> ca.Function:
-    """Rollout of `runs` runs: (x0, S0, w, p) -> (X, S), or (x0, w, p) -> X without sensitivities.
+    c: eq2.Coefficients, h: float, wind: bool, sensitivities: bool, forces: Forces = (), ship: Any = None, run_steps: int = 0
+) -> Rollout:
+    """Rollout with force effects: x the motion (6,), then, with `sensitivities`, its derivatives (6, num) by row; w as in `Data.inputs`.
 
-    p holds p0..p10 and then the values of `forces` that are None; the last row of w is the time at the beginning of the step, if there are forces.
-    `ship` (Particulars) is what effects know of the ship.
+    p holds p0..p10 and then the values of `forces` that are None; the last column of w is the time at the beginning of the step, if there are forces.
+    `ship` (Particulars) is what effects know of the ship. The code is of this ship and these effects alone: it is compiled where `run_steps`, the
+    integration steps of all runs, are so many that a fit gains more than the 3 s that this takes.
     """
+    return _rollout_function(c, h, wind, sensitivities, forces, ship, run_steps >= _WORTH_COMPILING)
+
+
+@lru_cache(maxsize=8)
+def _rollout_function(c: eq2.Coefficients, h: float, wind: bool, sensitivities: bool, forces: Forces, ship: Any, machine_code: bool) -> Rollout:
     num = _P + sum(v is None for _, q in forces for v in q)
-    x, S, p = ca.SX.sym("x", 6), ca.SX.sym("S", 6, num), ca.SX.sym("p", num)
+    x, S, p = ca.SX.sym("x", 6), ca.SX.sym("S", num, 6).T, ca.SX.sym("p", num)
     w = ca.SX.sym("w", (14 if wind else 12) + bool(forces))
     free = iter([p[i] for i in range(_P, num)])
     active = [Active(effect, tuple(next(free) if v is None else v for v in q)) for effect, q in forces]
@@ -65,10 +76,10 @@ def rollout_function(
 
     x_next = ca.vertcat(*rk4_step(rhs, tuple(x[i] for i in range(6)), h))
     if not sensitivities:
-        return ca.Function("step", [x, w, p], [x_next], {"cse": True}).mapaccum("roll", steps).map(runs)
+        return Rollout(ca.Function("step", [x, w, p], [x_next], {"cse": True}), machine_code)
     S_next = ca.jacobian(x_next, x) @ S + ca.jacobian(x_next, p)
-    step = ca.Function("step", [x, S, w, p], [x_next, S_next], {"cse": True})
-    return step.mapaccum("roll", steps, 2).map(runs)
+    state, following = ca.vertcat(x, ca.vec(S.T)), ca.vertcat(x_next, ca.vec(S_next.T))
+    return Rollout(ca.Function("step", [state, w, p], [following], {"cse": True}), machine_code)
 
 
 def parameter_scale(c: eq2.Coefficients) -> np.ndarray:
@@ -127,12 +138,10 @@ class Data:
         return self.batch.truth[:, :, MOTION]
 
     def weight(self) -> np.ndarray:
-        """Per signal, the inverse root mean square of how far holding s0's velocities errs: the size of what there is to predict."""
-        runs, samples = self.batch.truth.shape[:2]
-        return 1.0 / (_hold_error(self.batch, self.dt) * np.sqrt(runs * samples * 6.0))
+        return inverse_size(self.batch, self.dt)
 
-    def columns(self, path: np.ndarray, with_time: bool = False) -> np.ndarray:
-        """Inputs of the rollout function, (rows, runs * steps)."""
+    def inputs(self, path: np.ndarray, with_time: bool = False) -> np.ndarray:
+        """Inputs of the rollout function (runs, steps, columns)."""
         runs, steps = path.shape[:2]
         w = path.reshape(runs, steps, 12)
         if self.wind is not None:
@@ -140,50 +149,43 @@ class Data:
         if with_time:
             t = np.arange(steps) * self.dt / self.substeps
             w = np.concatenate([w, np.broadcast_to(t[:, None], (runs, steps, 1))], axis=2)
-        return w.reshape(runs * steps, -1).T
+        return w
 
-    def samples(self, X: ca.DM) -> np.ndarray:
-        """(runs, K, 6) at the samples, from the rollout function's (6, runs * steps)."""
-        runs, steps = self.path.shape[:2]
-        return np.asarray(X).T.reshape(runs, steps, 6)[:, self.substeps - 1 :: self.substeps]
+    def motion(self, rollout: Rollout, start: np.ndarray, w: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Motion (runs, K, 6) at the samples from start (runs, 10)."""
+        return rollout(start[:, MOTION], w, p)[:, self.substeps - 1 :: self.substeps]
 
-    def sensitivities(self, S: ca.DM, num: int) -> np.ndarray:
-        """(runs, K, 6, num) at the samples."""
-        runs, steps = self.path.shape[:2]
-        return np.asarray(S).reshape(6, runs, steps, num)[:, :, self.substeps - 1 :: self.substeps].transpose(1, 2, 0, 3)
+    def linearised(self, rollout: Rollout, start: np.ndarray, w: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Motion and its derivatives (runs, K, 6, num) with respect to p, at the samples."""
+        x0 = np.concatenate([start[:, MOTION], np.zeros((len(start), 6 * len(p)))], axis=1)
+        found = rollout(x0, w, p)[:, self.substeps - 1 :: self.substeps]
+        return found[..., :6], found[..., 6:].reshape(*found.shape[:2], 6, len(p))
 
 
 Linearise = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def fit_parameters(
-    c: eq2.Coefficients, batch: Batch, path: np.ndarray, wind: np.ndarray | None, dt: float, substeps: int, iterations: int, tolerance: float
-) -> Fit:
+def fit_parameters(rolling: Rolling, batch: Batch, iterations: int, tolerance: float) -> Fit:
     """Minimise the mean over runs of the weighted squared trajectory error of x, y, psi, u, v, r.
 
     Args:
-        c: left side.
+        rolling: ship, actuators and step.
         batch: runs of equal length.
-        path, wind, dt, substeps: as in `Data`.
         iterations, tolerance: stop after so many steps, or when the cost falls by less than this share.
     """
-    data = Data(c, batch, path, wind, dt, substeps)
-    runs, steps = path.shape[:2]
-    w, x0, truth, weight = data.columns(path), batch.s0[:, MOTION].T, data.truth, data.weight()
-    args = (c, steps, runs, dt / substeps, wind is not None)
-    full, plain = rollout_function(*args, True), rollout_function(*args, False)
-    scale = parameter_scale(c)
+    truth, weight = batch.truth[:, :, MOTION], inverse_size(batch, rolling.dt)
+    scale = parameter_scale(rolling.c)
     low, high = (b / scale for b in bounds(scale))
 
     def residuals(q: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):  # a diverging trial comes back non-finite and is refused
-            return (data.samples(plain(x0, w, q * scale)) - truth) * weight
+            return (rolling.states(batch.s0, batch.U, q * scale)[:, :, MOTION] - truth) * weight
 
     def linearise(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        X, S = full(x0, np.zeros((6, _P * runs)), w, q * scale)
+        S, J = rolling.linearised(batch.s0, batch.U, q * scale)
         with np.errstate(all="ignore"):
-            e = (data.samples(X) - truth) * weight
-        return e, data.sensitivities(S, _P) * weight[:, None] * scale
+            J *= weight[:, None] * scale  # in place: of many runs, nothing else is as large
+            return (S[:, :, MOTION] - truth) * weight, J
 
     solver = subproblem(_P, scale)
     q, e, J, cost, taken = descend(linearise, residuals, solver, np.clip(_START, low, high), low, high, np.zeros(_P), iterations, tolerance)
@@ -211,6 +213,7 @@ def descend(
         if np.isfinite(new) and new < cost:
             done = cost - new < tolerance * cost
             q, damping = trial, max(damping * 0.1, 1e-8)
+            del e, J  # of many runs, two of them side by side are most of the memory
             e, J = linearise(q)
             cost = float(np.sum(e * e) + np.sum(ridge * q * q))
             if done:
@@ -218,6 +221,12 @@ def descend(
         else:
             damping *= 10.0
     return q, e, J, cost, taken
+
+
+def inverse_size(batch: Batch, dt: float) -> np.ndarray:
+    """Per signal, the inverse root mean square of how far holding s0's velocities errs: the size of what there is to predict."""
+    runs, samples = batch.truth.shape[:2]
+    return 1.0 / (_hold_error(batch, dt) * np.sqrt(runs * samples * 6.0))
 
 
 def _hold_error(batch: Batch, dt: float) -> np.ndarray:
@@ -232,17 +241,16 @@ def _hold_error(batch: Batch, dt: float) -> np.ndarray:
 
 def intervals(q: np.ndarray, e: np.ndarray, J: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """95 % intervals (num, 2) of the scaled parameters: sandwich covariance clustered over runs, Student's t; NaN at a bound."""
-    from scipy.stats import t
+    from scipy.special import stdtrit  # Student's t; scipy.stats would take a second to import
 
     free = (q > low + 1e-6) & (q < high - 1e-6)
     interval = np.full((len(q), 2), np.nan)
     runs = len(e)
     if runs < 2 or not free.any():
         return interval
-    G = J[..., free]
-    bread = np.linalg.pinv(np.einsum("bksp,bksq->pq", G, G))
-    scores = np.einsum("bksp,bks->bp", G, e)
+    bread = np.linalg.pinv(np.einsum("bksp,bksq->pq", J, J)[np.ix_(free, free)])
+    scores = np.einsum("bksp,bks->bp", J, e)[:, free]
     spread = np.sqrt(np.diag(bread @ (scores.T @ scores * runs / (runs - 1)) @ bread))
-    half = float(t.ppf(0.975, runs - 1)) * spread
+    half = float(stdtrit(runs - 1, 0.975)) * spread
     interval[free] = np.stack([q[free] - half, q[free] + half], axis=1)
     return interval

@@ -124,9 +124,9 @@ class Drive(NamedTuple):
             begin, middle = full[:, 0 : knots * d * grid.per_knot : d, 0], full[:, d // 2 :: d, d % 2][:, : knots * grid.per_knot]
             air = model._wind(batch.U)
             wind = np.zeros((len(S), 0, 2)) if air is None else np.repeat(air[:, : knots * d : d], grid.per_knot, axis=1)
-            parts.append((S, np.stack([begin, middle], axis=2), wind))
+            parts.append([torch.as_tensor(known, dtype=torch.float32) for known in (S, np.stack([begin, middle], axis=2), wind)])
             counts.append(len(S))
-        states, path, held = (torch.as_tensor(np.concatenate(p), dtype=torch.float32) for p in zip(*parts, strict=True))
+        states, path, held = (torch.cat(known) for known in zip(*parts, strict=True))
         return cls(states, path, held if held.shape[1] else None, tuple(counts))
 
 
@@ -151,7 +151,7 @@ def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step
 
     turns = wind is not None or bool(model.effects)  # the heading matters
     first = start[..., [U, V, R, PSI] if turns else [U, V, R]].movedim(-1, 0)
-    times = torch.arange(path.shape[2] + 1, dtype=start.dtype)
+    times = torch.arange(path.shape[2] + 1, dtype=start.dtype, device=start.device)
     return odeint(rate, first, times, method="midpoint")[1:, :3].permute(2, 3, 0, 1)  # pyright: ignore[reportIndexIssue, reportCallIssue, reportArgumentType]
 
 

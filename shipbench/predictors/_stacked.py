@@ -6,7 +6,7 @@ Every layer is one batched matrix product, since small networks on a CPU are all
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -57,10 +57,12 @@ class StackedRuns:
     @classmethod
     def of(cls, datasets: Sequence[Dataset], dtype: torch.dtype = torch.float32) -> StackedRuns:
         """Stack data sets whose runs are equally long."""
-        batches = [d.batch() for d in datasets]
-        S = np.concatenate([np.concatenate([b.s0[:, None], b.truth], axis=1) for b in batches])
-        held = np.concatenate([b.U for b in batches])
-        return cls(torch.as_tensor(S, dtype=dtype), torch.as_tensor(held, dtype=dtype), tuple(len(b.ids) for b in batches))
+        states, held = [], []
+        for data in datasets:  # one at a time: folds of a large data set in float64 would stand side by side
+            batch = data.batch()
+            states.append(torch.as_tensor(np.concatenate([batch.s0[:, None], batch.truth], axis=1), dtype=dtype))
+            held.append(torch.as_tensor(batch.U, dtype=dtype))
+        return cls(torch.cat(states), torch.cat(held), tuple(len(s) for s in states))
 
     @property
     def steps(self) -> int:
@@ -91,14 +93,17 @@ class Scaler(nn.Module):
         self.register_buffer("std", std)
 
     @classmethod
-    def fit(cls, samples: Sequence[Tensor], centred: bool = True) -> Scaler:
+    def fit(cls, samples: Iterable[Tensor], centred: bool = True) -> Scaler:
         """From each member's training samples (..., features); `centred=False` keeps zero at zero (for increments)."""
-        flat = [s.reshape(-1, s.shape[-1]).double() for s in samples]
-        mean = torch.stack([f.mean(0, keepdim=True) for f in flat])
-        spread = torch.stack([f.std(0, keepdim=True, correction=0) if centred else f.square().mean(0, keepdim=True).sqrt() for f in flat])
+        found = []
+        for part in samples:
+            flat = part.reshape(-1, part.shape[-1]).double()
+            spread = flat.std(0, keepdim=True, correction=0) if centred else flat.square().mean(0, keepdim=True).sqrt()
+            found.append((flat.mean(0, keepdim=True), spread))
+            dtype = part.dtype
+        mean, spread = (torch.stack(parts) for parts in zip(*found, strict=True))
         # A channel that does not move up to round-off has nothing to be scaled by.
         still = spread <= 1e-9 * (mean.abs() + 1e-12)
-        dtype = samples[0].dtype
         return cls((mean if centred else torch.zeros_like(mean)).to(dtype), torch.where(still, 1.0, spread).to(dtype))
 
     def forward(self, x: Tensor) -> Tensor:

@@ -11,7 +11,6 @@ import json
 import os
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
@@ -20,14 +19,13 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..records import Dataset
-from ..registry import Registry
 from ..signals import COMMANDS, STATES
 from ..specs import Spec, parse_spec
-
-PREDICTORS = Registry("predictor", "predictors", "PREDICTOR", helpers=frozenset({"base", "training"}), lazy=True)
+from .device import check_device
+from .registered import PREDICTORS, not_installed
 
 History = tuple[np.ndarray, np.ndarray]
-__all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "make_predictor", "parse_spec"]
+__all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "make_predictor", "not_installed", "parse_spec"]
 
 
 @runtime_checkable
@@ -37,7 +35,7 @@ class Predictor(Protocol):
     `predict(s0, U, history)`: s0 (batch, 10), U (batch, K, inputs) -> S (batch, K, 10), S[:, k] at t_k+1. A class may also offer the
     class method `fit_group(models, trains, valids, seeds)`, which fits many at once (folds and seeds) in place; `skip(dataset)`, which says why it
     cannot take a data set, or None; `num_parameters`, how many numbers a fit sets; `seeded = False` where nothing is drawn;
-    `earth_fixed = True` where it knows a place on earth.
+    `earth_fixed = True` where it knows a place on earth; `device`, which `--device` sets ("cpu", "cuda", "cuda:1") before it fits or predicts.
     """
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Any: ...
@@ -136,7 +134,8 @@ class PredictorBase(ABC):
             meta = json.loads((folder / "model.json").read_text())
             with np.load(folder / "arrays.npz", allow_pickle=False) as file:
                 arrays = {k: file[k] for k in file.files}
-            model = cls(**meta["params"])
+            # Where it was trained says nothing of where it is read: a model from a machine with a GPU predicts on one without.
+            model = cls(**{key: value for key, value in meta["params"].items() if key != "device"})
             model.inputs = tuple(meta["inputs"])
             model._restore(arrays, meta["meta"])
         except (OSError, KeyError, ValueError, TypeError) as error:
@@ -155,12 +154,6 @@ class PredictorFamily(PredictorBase):
         Raises:
             InputError: an unknown member or parameter, or a value that is not accepted.
         """
-
-
-def not_installed(name: str, needs: Sequence[str]) -> str | None:
-    """What the optional packages `needs` of the predictor `name` lack here, and how to install them; None where all are there."""
-    missing = [package for package in needs if importlib.util.find_spec(package) is None]
-    return f"{' and '.join(missing)} is not installed: pip install 'shipbench[{name}]'" if missing else None
 
 
 def _class_from_file(path: Path, class_name: str) -> Any:
@@ -183,12 +176,19 @@ def _no_effects(spec: Spec) -> InputError:
     return InputError(f"model spec '{spec.text}': effects extend 'physics' and 'neural_ode', '{spec.name}' takes none. Write physics+{added}.")
 
 
-def make_predictor(spec: Spec) -> Any:
-    """The unfitted predictor of a spec (or the fitted one, for a saved folder).
+def make_predictor(spec: Spec, device: str | None = None) -> Any:
+    """The unfitted predictor of a spec (or the fitted one, for a saved folder), to compute on `device` if it has one and the spec names none.
 
     Raises:
-        InputError: unknown name or parameter, or a value that the class refuses.
+        InputError: unknown name or parameter, a value that the class refuses, or a device that is not here.
     """
+    model = _made(spec)
+    if device is not None and check_device(device) and hasattr(model, "device") and "device" not in spec.params:
+        model.device = device
+    return model
+
+
+def _made(spec: Spec) -> Any:
     if spec.path is not None and spec.class_name is None:
         if spec.effects:
             raise _no_effects(spec)

@@ -34,6 +34,7 @@ from ._stacked import (
     with_valid,
 )
 from .base import History, PredictorBase
+from .device import check_device
 from .training import Chunk, Recipe, StackedTask, train
 
 _Y = 7
@@ -175,7 +176,7 @@ class LSTM(PredictorBase):
         lr: Adam's first step size; a cosine takes it down to a hundredth.
         epochs: number of validations, each after 10 minibatches.
         pose_weight: weight of the pose error (in units of the error of kept velocities) against the error of standardised y.
-        device: where to train.
+        device: where to train and to predict: "cpu", "cuda" or "cuda:1".
     """
 
     name: ClassVar[str] = "lstm"
@@ -186,6 +187,7 @@ class LSTM(PredictorBase):
     device: str = "cpu"
 
     def __post_init__(self) -> None:
+        check_device(self.device)
         for key in ("hidden", "epochs"):
             if getattr(self, key) < 1:
                 raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
@@ -218,9 +220,9 @@ class LSTM(PredictorBase):
         features, draw = InputFeatures(names), generators(seeds)
         parts = list(zip(training.S.split(training.counts), training.U.split(training.counts), strict=True))
         scalers = (
-            Scaler.fit([S[..., CHANNELS] for S, _ in parts]),
-            Scaler.fit([features(held, S[:, :-1, PSI]) for S, held in parts]),
-            Scaler.fit([S[:, 1:, CHANNELS] - S[:, :-1, CHANNELS] for S, _ in parts], centred=False),
+            Scaler.fit(S[..., CHANNELS] for S, _ in parts),
+            Scaler.fit(features(held, S[:, :-1, PSI]) for S, held in parts),
+            Scaler.fit((S[:, 1:, CHANNELS] - S[:, :-1, CHANNELS] for S, _ in parts), centred=False),
         )
         commanded = trains[0].actuators == "commanded"
         net = _Network(features, lead.hidden, scalers, draw, commanded)
@@ -240,20 +242,21 @@ class LSTM(PredictorBase):
         y, u, dy = (Scaler(w[f"scale_{k}.mean"], w[f"scale_{k}.std"]) for k in ("y", "u", "dy"))
         net = _Network(InputFeatures(self.inputs), self.hidden, (y, u, dy), generators([0]), self._commanded).double()
         net.load_state_dict(w)
-        return net
+        return net.to(self.device)
 
     @torch.no_grad()
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
         net, d, K = self._network(), self._stride, U.shape[1]
-        start, held = torch.as_tensor(s0)[None], torch.as_tensor(U[:, ::d])[None]
-        past = (torch.empty(1, len(s0), 0, s0.shape[1], dtype=torch.float64), held[:, :, :0])
+        start, held = (torch.as_tensor(known, device=self.device)[None] for known in (s0, U[:, ::d]))
+        past = (start[:, :, None][:, :, :0], held[:, :, :0])
         if history is not None and len(history[0][0]) >= d:
             first = len(history[0][0]) % d  # the samples d, 2 d, .. steps before s0
-            past = (torch.as_tensor(history[0][:, first::d])[None].double(), torch.as_tensor(history[1][:, first::d])[None].double())
+            states, inputs = (torch.as_tensor(known[:, first::d], dtype=torch.float64, device=self.device)[None] for known in history)
+            past = (states, inputs)
         y = net.rollout(past, start, held, d * self._dt)[0]
         if d > 1:
             y = _between(start[0, :, CHANNELS], y, d)[:, :K]
-        return torch.cat([trapezoid_pose(start[0], y, self._dt), y], dim=-1).numpy()
+        return torch.cat([trapezoid_pose(start[0], y, self._dt), y], dim=-1).cpu().numpy()
 
     def _arrays(self) -> dict[str, np.ndarray]:
         return self._weights
@@ -269,7 +272,7 @@ class LSTM(PredictorBase):
 def _between(y0: Tensor, y: Tensor, stride: int) -> Tensor:
     """Linear interpolation to `stride` samples per model step: y (batch, steps, 7) at the ends of steps -> (batch, steps * stride, 7)."""
     before = torch.cat([y0[:, None], y[:, :-1]], dim=1)
-    share = torch.arange(1, stride + 1, dtype=y.dtype)[:, None] / stride
+    share = torch.arange(1, stride + 1, dtype=y.dtype, device=y.device)[:, None] / stride
     return (before[:, :, None] + share * (y - before)[:, :, None]).flatten(1, 2)
 
 

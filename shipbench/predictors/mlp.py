@@ -19,7 +19,11 @@ from ..records import Dataset
 from ._one_step import NUM_CHANNELS, check_target, one_step_rollout, transitions
 from ._stacked import InputFeatures, Scaler, StackedMLP, StackedRuns, generators, padded, with_valid
 from .base import History, PredictorBase
+from .device import check_device
 from .training import Chunk, Recipe, StackedTask, epochs_of_samples, train
+
+_GATHERED, _SCORED = 256, 16384
+"""Minibatches that are gathered, and samples of a member that are scored, at a time."""
 
 
 class _OneStep(StackedTask):
@@ -30,8 +34,8 @@ class _OneStep(StackedTask):
         self.members, self.epochs, self.batch = len(seeds), model.epochs, model.batch
         self.increment = model.target == "increment"
         self.draw = generators(seeds)
-        self.scale_x = Scaler.fit([torch.cat([y, inputs], dim=-1) for y, inputs, _ in training])
-        self.scale_z = Scaler.fit([self._target(y, after) for y, _, after in training])
+        self.scale_x = Scaler.fit(torch.cat([y, inputs], dim=-1) for y, inputs, _ in training)
+        self.scale_z = Scaler.fit(self._target(y, after) for y, _, after in training)
         sizes = [NUM_CHANNELS + training[0][1].shape[-1], *[model.hidden] * model.layers, NUM_CHANNELS]
         self.net = StackedMLP(sizes, self.draw)
         self.counts = [len(y) for y, _, _ in training]
@@ -44,19 +48,26 @@ class _OneStep(StackedTask):
 
     def _standardised(self, parts: list[Any]) -> tuple[Tensor, Tensor]:
         """x and z of all members, one member after another."""
-        x = [(torch.cat([y, i], dim=-1) - self.scale_x.mean[m]) / self.scale_x.std[m] for m, (y, i, _) in enumerate(parts)]
-        z = [(self._target(y, after) - self.scale_z.mean[m]) / self.scale_z.std[m] for m, (y, _, after) in enumerate(parts)]
-        return torch.cat(x), torch.cat(z)
+        counts = [len(y) for y, _, _ in parts]
+        x, z = (torch.empty(sum(counts), scale.mean.shape[-1]) for scale in (self.scale_x, self.scale_z))
+        for m, ((y, inputs, after), x_m, z_m) in enumerate(zip(parts, x.split(counts), z.split(counts), strict=True)):
+            x_m.copy_((torch.cat([y, inputs], dim=-1) - self.scale_x.mean[m]) / self.scale_x.std[m])
+            z_m.copy_((self._target(y, after) - self.scale_z.mean[m]) / self.scale_z.std[m])
+        return x, z
 
     def chunks(self) -> Iterator[Chunk]:
         device = self.device
         x, z = (part.to(device) for part in self.data)
         first = torch.tensor([0, *np.cumsum(self.counts)[:-1].tolist()])
         for index, ended in epochs_of_samples(self.counts, self.batch, self.epochs, self.draw):
-            rows = (index + first[:, None]).flatten().to(device)
-            shape = (*index.shape, -1)
-            # One gather per chunk: a step then costs no indexing at all.
-            yield Chunk(list(zip(x[rows].view(shape).unbind(0), z[rows].view(shape).unbind(0), strict=True)), ended)
+            yield Chunk(self._gathered(x, z, (index + first[:, None]).to(device)), ended)
+
+    @staticmethod
+    def _gathered(x: Tensor, z: Tensor, rows: Tensor) -> Iterator[tuple[Tensor, Tensor]]:
+        """The minibatches of `rows` (steps, members, batch), gathered many at a time: a step then costs no indexing, an epoch no second copy."""
+        for some in rows.split(_GATHERED):
+            flat, shape = some.flatten(), (*some.shape, -1)
+            yield from zip(x[flat].view(shape).unbind(0), z[flat].view(shape).unbind(0), strict=True)
 
     def losses(self, minibatch: tuple[Tensor, Tensor]) -> Tensor:
         x, z = minibatch
@@ -66,7 +77,8 @@ class _OneStep(StackedTask):
         device = self.device
         x, z = (part.to(device) for part in self.valid)
         rows, weight = (part.to(device) for part in self.valid_rows)
-        return ((self.net(x[rows]) - z[rows]).square().mean(2) * weight).sum(1)
+        errors = [(self.net(x[some]) - z[some]).square().mean(2) for some in rows.split(_SCORED, dim=1)]
+        return (torch.cat(errors, dim=1) * weight).sum(1)
 
 
 @dataclass
@@ -77,7 +89,7 @@ class MLP(PredictorBase):
         hidden, layers: width and number of the hidden layers.
         epochs, batch, lr, patience, min_delta: training, as in the paper.
         target: "state" predicts y at k + 1 as the paper does; "increment" predicts y_k+1 - y_k, an honest stronger variant.
-        device: where to train ("cpu", "cuda").
+        device: where to train and to predict: "cpu", "cuda" or "cuda:1".
     """
 
     name: ClassVar[str] = "mlp"
@@ -92,6 +104,7 @@ class MLP(PredictorBase):
     device: str = "cpu"
 
     def __post_init__(self) -> None:
+        check_device(self.device)
         check_target(self.target)
         for key in ("hidden", "layers", "epochs", "batch", "patience"):
             if getattr(self, key) < 1:
@@ -112,10 +125,11 @@ class MLP(PredictorBase):
         pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
         names = trains[0].inputs
         features = InputFeatures(names)
-        training = transitions(StackedRuns.of([t for t, _ in pairs]), features)
-        validation = transitions(StackedRuns.of([v for _, v in pairs]), features)
-        task = _OneStep(lead, training, validation, seeds)
-        watch = train(task, Recipe(lr=lead.lr, patience=lead.patience, min_delta=lead.min_delta, device=lead.device))
+        # Not bound to names: the samples as they are would otherwise be kept beside the standardised ones.
+        trained, stopped = zip(*pairs, strict=True)
+        task = _OneStep(lead, transitions(StackedRuns.of(trained), features), transitions(StackedRuns.of(stopped), features), seeds)
+        # Matrices this small gain nothing from a second thread, and on a busy machine two that wait for one another cost tenfold.
+        watch = train(task, Recipe(lr=lead.lr, patience=lead.patience, min_delta=lead.min_delta, device=lead.device, threads=1))
         state = {k: v.detach().cpu().numpy() for k, v in task.state_dict().items()}
         for m, model in enumerate(models):
             model.inputs, model._dt = names, trains[m].dt
@@ -125,7 +139,7 @@ class MLP(PredictorBase):
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
         if not self._weights:
             raise InputError("mlp: predict was called before fit; fit or load the model first.")
-        w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
+        w = {k: torch.as_tensor(v, dtype=torch.float64, device=self.device) for k, v in self._weights.items()}
         layers = [(w[f"net.layers.{i}.weight"][0], w[f"net.layers.{i}.bias"][0]) for i in range(self.layers + 1)]
 
         def step(x: Tensor) -> Tensor:
@@ -134,7 +148,8 @@ class MLP(PredictorBase):
                 h = torch.relu(torch.addmm(bias, h, weight))
             return torch.addmm(layers[-1][1], h, layers[-1][0]) * w["scale_z.std"][0] + w["scale_z.mean"][0]
 
-        return one_step_rollout(step, s0, U, InputFeatures(self.inputs), self._dt, increment=self.target == "increment")
+        increment = self.target == "increment"
+        return one_step_rollout(step, s0, U, InputFeatures(self.inputs), self._dt, increment=increment, device=self.device)
 
     def _arrays(self) -> dict[str, np.ndarray]:
         return self._weights

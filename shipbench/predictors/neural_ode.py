@@ -23,6 +23,7 @@ from ..specs import EffectSpec
 from ._residual import Drive, Grid, Residual, features, solve, typical_accelerations
 from ._stacked import Scaler, generators, hold_error, padded, position_score, random_windows, shares_of, trapezoid_pose, with_valid
 from .base import History, PredictorBase
+from .device import check_device
 from .physics import Physics
 from .training import Chunk, Recipe, StackedTask, train
 
@@ -101,7 +102,7 @@ class NeuralODE(PredictorBase):
         epochs: number of validations, each after 20 minibatches.
         penalty: weight of the squared residual, in units of the accelerations that occur.
         weight_decay: of AdamW.
-        device: where to train.
+        device: where to train and to predict: "cpu", "cuda" or "cuda:1".
     """
 
     name: ClassVar[str] = "neural_ode"
@@ -113,6 +114,7 @@ class NeuralODE(PredictorBase):
     device: str = "cpu"
 
     def __post_init__(self) -> None:
+        check_device(self.device)
         for key in ("hidden", "epochs"):
             if getattr(self, key) < 1:
                 raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
@@ -185,7 +187,7 @@ class NeuralODE(PredictorBase):
         scale_in = Scaler(w["scale_in.mean"], w["scale_in.std"])
         model = Residual([self.physics], self.hidden, scale_in, w["scale_out"], generators([0])).double()
         model.load_state_dict({**w, "p": model.p, "q": model.q})
-        return model
+        return model.to(self.device)
 
     @torch.no_grad()
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
@@ -195,9 +197,9 @@ class NeuralODE(PredictorBase):
         if not self.improved:
             return base._rollout(s0, U, history)
         model, air = self._residual(), base._wind(U)
-        path = torch.as_tensor(base.actuator_path(s0, U)).permute(1, 2, 3, 0)[:, :, :, None]
-        wind = None if air is None else torch.as_tensor(air).permute(1, 2, 0)[:, :, None]
-        motion = tuple(torch.as_tensor(s0[:, MOTION]).T[:, None])
+        path = torch.as_tensor(base.actuator_path(s0, U), device=self.device).permute(1, 2, 3, 0)[:, :, :, None]
+        wind = None if air is None else torch.as_tensor(air, device=self.device).permute(1, 2, 0)[:, :, None]
+        motion = tuple(torch.as_tensor(s0[:, MOTION], device=self.device).T[:, None])
         S = np.empty((len(s0), U.shape[1], s0.shape[1]))
         for j in range(path.shape[0]):
             k = j // base.substeps
@@ -206,8 +208,8 @@ class NeuralODE(PredictorBase):
                 return model(psi, u, v, r, path[j, stage].unbind(0), None if wind is None else (wind[k, 0], wind[k, 1]))
 
             motion = rk4_step(motion_rhs(acc), motion, base.dt / base.substeps)
-            S[:, k, MOTION] = torch.cat(motion).T.numpy()
-        S[:, :, ACTUATORS] = path[base.substeps - 1 :: base.substeps, 2, :, 0].permute(2, 0, 1).numpy()
+            S[:, k, MOTION] = torch.cat(motion).T.cpu().numpy()
+        S[:, :, ACTUATORS] = path[base.substeps - 1 :: base.substeps, 2, :, 0].permute(2, 0, 1).cpu().numpy()
         return S
 
     def _arrays(self) -> dict[str, np.ndarray]:

@@ -42,7 +42,7 @@ class Oracle(PredictorBase):
         self._simulator = Simulator(load_mmg_ship(ship))
 
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
-        return self._simulator.rollout(s0, U[..., : len(COMMANDS)], self.dt)
+        return self._simulator.fast_rollout(s0, U[..., : len(COMMANDS)], self.dt)
 
     def _meta(self) -> dict[str, Any]:
         return {"ship": self.ship, "dt": self.dt}

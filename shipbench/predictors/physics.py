@@ -11,7 +11,6 @@ import numpy as np
 
 from ..errors import WorkError
 from ..physics import eq2
-from ..physics.actuators import lag_with_rate_limit
 from ..records import Batch, Dataset
 from ..ship import Ship, complete
 from ..signals import ACTUATORS, COMMANDS, MOTION
@@ -19,6 +18,7 @@ from ..specs import EffectSpec
 from ._actuator_fit import DEFAULT_ACTUATORS, fit_actuators
 from ._physics_effects import Extension, extension_of, geared, measured, no_gear, roll, true_start
 from ._physics_gears import fit_gears, gears_of
+from ._physics_rollout import Rolling, actuators_after
 from .base import History, PredictorBase
 
 if TYPE_CHECKING:
@@ -96,9 +96,7 @@ class Physics(PredictorBase):
         asked, self.extension = self.extension, None
         if not self.commanded:
             self.actuator_params = fit_actuators(batch, self.dt)
-        result = fit_parameters(
-            self.c, batch, self.actuator_path(batch.s0, batch.U), self._wind(batch.U), self.dt, self.substeps, self.iterations, self.tolerance
-        )
+        result = fit_parameters(self._rolling(), batch, self.iterations, self.tolerance)
         self.extension = asked
         if asked is not None and np.isfinite(result.cost):
             result = self._fit_effects(batch, result, asked)
@@ -147,9 +145,8 @@ class Physics(PredictorBase):
         """Actuator states (..., 4) after `dt` seconds of held commands (..., 4); they are the commands themselves where none were measured."""
         if self.commanded:
             return commands.copy()
-        T_n, rate_n, T_d, rate_d, T_F, rate_F = self.actuator_params
-        pairs = ((T_n, rate_n), (T_d, rate_d), (T_F, rate_F), (T_F, rate_F))
-        return np.stack([lag_with_rate_limit(actuators[..., i], commands[..., i], dt, T, rate) for i, (T, rate) in enumerate(pairs)], axis=-1)
+        now, wanted = (list(np.moveaxis(a, -1, 0)) for a in (actuators, commands))
+        return np.stack(actuators_after(now, wanted, dt, list(self.actuator_params)), axis=-1)
 
     def actuator_path(self, s0: np.ndarray, U: np.ndarray) -> np.ndarray:
         """n, delta, F_b, F_s at the beginning, middle and end of every substep, (batch, K * substeps, 3, 4)."""
@@ -168,14 +165,23 @@ class Physics(PredictorBase):
         base = dict.fromkeys(("n", "delta", "F"), no_gear(h)) if self.commanded else gears_of(self.actuator_params)
         return geared(path, s0, U, base, gears, self.dt, self.substeps)
 
+    def _wind_columns(self) -> list[int]:
+        """Columns of U with the measured wind's speed and direction; none where it was not measured."""
+        names = ("wind_speed", "wind_from")
+        return [self.inputs.index(name) for name in names] if set(names) <= set(self.inputs) else []
+
     def _wind(self, U: np.ndarray) -> np.ndarray | None:
         """Measured wind speed and direction (batch, K, 2), or None."""
-        if not {"wind_speed", "wind_from"} <= set(self.inputs):
-            return None
-        return U[..., [self.inputs.index("wind_speed"), self.inputs.index("wind_from")]]
+        return U[..., columns] if (columns := self._wind_columns()) else None
+
+    def _rolling(self) -> Rolling:
+        columns = (*range(len(COMMANDS)), *self._wind_columns())
+        return Rolling(self.c, None if self.commanded else self.actuator_params, columns, self.dt, self.substeps)
 
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
-        forces, sensors = ([], []) if self.extension is None else (self.extension.active("force"), self.extension.active("sensor"))
+        if self.extension is None:
+            return self._rolling().states(s0, U, self.p)
+        forces, sensors = self.extension.active("force"), self.extension.active("sensor")
         start, path = true_start(s0, sensors, self.dt), self.actuator_path(s0, U)
         S = np.empty((len(s0), U.shape[1] + 1, s0.shape[1]))
         S[:, 0] = start

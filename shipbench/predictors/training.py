@@ -14,7 +14,7 @@ import logging
 import math
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -28,9 +28,9 @@ from ..errors import WorkError
 
 @dataclass(frozen=True)
 class Chunk:
-    """Minibatches up to the next validation; `ended` (members,) says whose epoch ends there."""
+    """Minibatches up to the next validation, gone through once; `ended` (members,) says whose epoch ends there."""
 
-    minibatches: Sequence[Any]
+    minibatches: Iterable[Any]
     ended: Tensor
 
 
@@ -66,7 +66,7 @@ class Recipe:
         patience, min_delta: a member stops when its score has not fallen by `min_delta` for `patience` validations.
         clip: greatest gradient norm of a member, if set.
         weight_decay: decoupled (AdamW), 0 for plain Adam.
-        device: "cpu", "cuda", "cuda:1", "mps".
+        device: "cpu", "cuda" or "cuda:1".
         threads: of torch while it trains; None leaves them.
     """
 

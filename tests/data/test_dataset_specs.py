@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from toy_ship import TOY_SHIP, sail
 
-from shipbench.data import base
+from shipbench.data import base, files
 from shipbench.data.base import DatasetPart, load_dataset
 from shipbench.data.describe import compare_with_paper
 from shipbench.errors import InputError, WorkError
@@ -83,7 +83,7 @@ def test_a_cache_that_fails_in_the_middle_costs_no_result_and_leaves_nothing(mad
     def full(*args, **options):
         raise InputError("no space left")
 
-    monkeypatch.setattr(base, "write_dataset", full)
+    monkeypatch.setattr(files, "write_dataset", full)
     with caplog.at_level(logging.WARNING):
         assert load_dataset("made").fingerprint == make().fingerprint
     assert "cannot be kept" in caplog.text
@@ -119,7 +119,7 @@ def test_a_fault_of_the_maker_is_not_blamed_on_the_user(made, monkeypatch):
 
 
 def test_a_folder_takes_no_parameters(tmp_path):
-    base.write_dataset(make(), tmp_path)
+    files.write_dataset(make(), tmp_path)
     with pytest.raises(InputError, match="seed"):
         load_dataset(str(tmp_path), seed=3)
     assert load_dataset(str(tmp_path)).fingerprint == make().fingerprint

@@ -13,6 +13,7 @@ from shipbench.predictors._actuator_fit import DEFAULT_ACTUATORS, fit_actuators
 from shipbench.predictors.physics import Physics
 from shipbench.records import Batch, Dataset, Run
 from shipbench.ship import complete
+from shipbench.signals import COMMANDS
 
 
 @pytest.fixture(scope="module")
@@ -82,19 +83,18 @@ def test_the_gradient_used_by_the_fit_is_the_finite_difference(harbour):
     model = Physics(iterations=0).fit(harbour)
     batch = harbour.subset([0, 1]).batch()
     path = model.actuator_path(batch.s0, batch.U)
-    w = path.reshape(2 * path.shape[1], 12).T
-    args = (model.c, path.shape[1], 2, 1.0, False)
-    full, plain = fit.rollout_function(*args, True), fit.rollout_function(*args, False)
+    data = fit.Data(model.c, batch, path, None, 1.0, 1)
+    w = data.inputs(path)
+    full, plain = (fit.rollout_function(model.c, 1.0, False, sensitivities) for sensitivities in (True, False))
     p = np.array([0.05, 1500.0, 6000.0, 40.0, 0.02, 1.9, 0.05, -1.2, 0.03, 0.02, 1.1])
-    x0 = batch.s0[:, :6].T
-    S = np.asarray(full(x0, np.zeros((6, 22)), w, p)[1]).reshape(6, -1, 11)
+    S = data.linearised(full, batch.s0, w, p)[1]
     for i in range(11):
         h = 1e-5 * fit.parameter_scale(model.c)[i]
         up, down = p.copy(), p.copy()
         up[i] += h
         down[i] -= h
-        slope = (np.asarray(plain(x0, w, up)) - np.asarray(plain(x0, w, down))) / (2 * h)
-        np.testing.assert_allclose(S[:, :, i], slope, atol=1e-4 * np.abs(slope).max())
+        slope = (data.motion(plain, batch.s0, w, up) - data.motion(plain, batch.s0, w, down)) / (2 * h)
+        np.testing.assert_allclose(S[..., i], slope, atol=1e-4 * np.abs(slope).max())
 
 
 def test_rollout_of_the_fit_and_of_predict_are_the_same_model(harbour, fitted):
@@ -102,8 +102,8 @@ def test_rollout_of_the_fit_and_of_predict_are_the_same_model(harbour, fitted):
 
     batch = harbour.subset([0, 1, 2]).batch()
     path = fitted.actuator_path(batch.s0, batch.U)
-    plain = fit.rollout_function(fitted.c, path.shape[1], 3, 1.0, False, False)
-    X = np.asarray(plain(batch.s0[:, :6].T, path.reshape(-1, 12).T, fitted.p)).T.reshape(3, -1, 6)
+    plain = fit.rollout_function(fitted.c, 1.0, False, False)
+    X = plain(batch.s0[:, :6], path.reshape(3, -1, 12), fitted.p)
     np.testing.assert_allclose(X, fitted.predict(batch.s0, batch.U)[..., :6], rtol=1e-9, atol=1e-9)
 
 
@@ -181,3 +181,31 @@ def test_left_side_is_clarke_and_inoue_by_hand():
     assert c.m11 == pytest.approx(9402.0 * 1025 + m_y)
     assert c.Y_vv / (0.5 * 1025 * L * T) == pytest.approx(-0.688, abs=0.001)
     assert c.N_vvr / (0.5 * 1025 * L**3 * T) == pytest.approx(-0.230, abs=0.001)
+
+
+@pytest.mark.parametrize(("commanded", "wind", "substeps"), [(False, False, 1), (False, True, 3), (True, True, 1)])
+def test_rolling_is_the_same_model_as_the_formula_step_by_step(harbour, fitted, commanded, wind, substeps):
+    from shipbench.predictors._physics_effects import roll
+    from shipbench.predictors._physics_fit import parameter_scale
+    from shipbench.predictors._physics_rollout import Rolling
+
+    model = Physics()
+    model._set_ship(harbour.ship, (*COMMANDS, "depth", "wind_from", "wind_speed") if wind else COMMANDS, 1.0, commanded)
+    model.actuator_params, model.p, model.substeps = fitted.actuator_params, fitted.p, substeps
+    batch = harbour.subset([0, 1, 2]).batch()
+    U = batch.U
+    if wind:
+        rng = np.random.default_rng(0)
+        U = np.concatenate([U, 20.0 + 0.0 * U[..., :1], rng.uniform(0, 6, (*U.shape[:2], 1)), rng.uniform(0, 15, (*U.shape[:2], 1))], axis=2)
+    path, measured = model.actuator_path(batch.s0, U), model._wind(U)
+    expected = roll([], batch.s0, path, measured, 1.0 / substeps, substeps, model.c, list(model.p), model.particulars)
+    S = model.predict(batch.s0, U)
+    np.testing.assert_allclose(S[..., :6], expected, rtol=1e-9, atol=1e-9)
+    rolling = Rolling(model.c, None if commanded else model.actuator_params, (0, 1, 2, 3, 6, 5) if wind else (0, 1, 2, 3), 1.0, substeps)
+    again, slopes = rolling.linearised(batch.s0, U, model.p)
+    np.testing.assert_allclose(again, S, rtol=1e-9, atol=1e-9)
+    step = 1e-4 * parameter_scale(model.c)
+    for i in range(len(model.p)):
+        up, down = (rolling.states(batch.s0, U, model.p + sign * step * (np.arange(len(model.p)) == i)) for sign in (1, -1))
+        slope = (up - down)[..., :6] / (2.0 * step[i])
+        np.testing.assert_allclose(slopes[..., i], slope, atol=1e-4 * np.abs(slope).max() + 1e-9)

@@ -123,3 +123,25 @@ def test_a_turn_that_does_not_come_round_says_so():
 def test_an_unknown_ship_is_named_with_the_nearest():
     with pytest.raises(InputError, match="container130"):
         load_mmg_ship("container13")
+
+
+@pytest.mark.parametrize("name", ["container130", "kvlcc2_l7", "kcs"])
+def test_the_fast_rollout_has_the_numbers_of_the_ordinary_one(name):
+    ship, rng = load_mmg_ship(name), np.random.default_rng(0)
+    froude = (ship.L / 130.0) ** 0.5
+    s0 = straight_state(4.0 * froude, 100.0 / froude, 9)
+    s0[:, 2] = rng.uniform(-3.0, 3.0, 9)
+    U = np.zeros((9, 40, 4))
+    U[:, :, 0] = 100.0 / froude * np.where(np.arange(40) < 25, 1.0, -0.6)
+    U[:, :, 1] = rng.uniform(-0.6, 0.6, (9, 1)) * np.sign(np.sin(np.arange(40) / 5.0))
+    U[:, 20:, 2] = 3e4
+    env = Environment(rng.uniform(0.0, 0.5, 9), 1.0, rng.uniform(0.0, 8.0, 9), 2.0)
+    sim = Simulator(ship, 0.5)
+    for around in (env, Environment()):
+        np.testing.assert_allclose(sim.fast_rollout(s0, U, 1.0, around), sim.rollout(s0, U, 1.0, around), rtol=1e-9, atol=1e-9)
+
+
+def test_the_fast_rollout_refuses_shallow_water():
+    sim = Simulator(load_mmg_ship("container130"))
+    with pytest.raises(InputError, match="deep water"):
+        sim.fast_rollout(straight_state(4.0, 100.0), np.zeros((1, 5, 4)), 1.0, Environment(depth=9.0))

@@ -1,0 +1,215 @@
+"""Rollouts of a step that is written once, as machine code.
+
+A step x' = f(x, w, p) comes as a CasADi function, traced from the one formula. Where a C compiler is at hand its instructions are written as C in
+which every number is a vector over runs (CasADi's own C code treats one run at a time and calls scalar sine and cosine), compiled once, and kept in
+the cache folder under the digest of source, compiler and processor. Elsewhere CasADi interprets the same instructions: slower, the same numbers to
+rounding.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import logging
+import math
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .cache import cache_folder
+
+if TYPE_CHECKING:
+    import casadi
+
+_log = logging.getLogger(__name__)
+_SECONDS = 120
+_FLAGS = (
+    "-std=gnu11", "-O1", "-ftree-vectorize", "-march=native", "-mprefer-vector-width=512", "-fopenmp-simd",
+    "-fno-math-errno", "-fno-trapping-math",  # neither is ever read; without them no square root would be a vector's
+    "-fno-builtin-sin", "-fno-builtin-cos",  # gcc would join them to sincos, which has no vector form
+    "-w", "-shared", "-fPIC",
+)  # fmt: skip
+
+_HEAD = """
+#include <math.h>
+#if defined(__AVX512F__)
+#define W 8
+#elif defined(__AVX__)
+#define W 4
+#else
+#define W 2
+#endif
+typedef double v __attribute__((vector_size(8 * W)));
+typedef long long m __attribute__((vector_size(8 * W)));
+#define K(c) ((v){0} + (c))
+#define SEL(c, a, b) ((v)(((m)(c) & (m)(a)) | (~(m)(c) & (m)(b))))
+#if defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#if __GLIBC_PREREQ(2, 35)
+#define SIMD __attribute__((simd("notinbranch")))
+SIMD double sin(double); SIMD double cos(double); SIMD double exp(double); SIMD double log(double); SIMD double tanh(double);
+SIMD double atan2(double, double); SIMD double pow(double, double);
+#endif
+#endif
+#define LANES _Pragma("omp simd") for (int l = 0; l < W; l++)
+#define ONE(f) static inline v v##f(v a) { v y; LANES y[l] = f(a[l]); return y; }
+#define TWO(f) static inline v v##f(v a, v b) { v y; LANES y[l] = f(a[l], b[l]); return y; }
+ONE(sin) ONE(cos) ONE(exp) ONE(log) ONE(tanh) ONE(sqrt) TWO(atan2) TWO(pow)
+"""
+_LOOP = """
+void rollout(long runs, long samples, long substeps, const double *x0, const double *w, const double *p, double *X) {
+  for (long b = 0; b < runs; b += W) {
+    v x[NX], y[NX], in[NW];
+    const long n = runs - b < W ? runs - b : W;
+    for (long l = 0; l < W; l++) for (long i = 0; i < NX; i++) x[i][l] = x0[(b + (l < n ? l : n - 1)) * NX + i];
+    for (long k = 0; k < samples; k++) {
+      for (long l = 0; l < W; l++) for (long i = 0; i < NW; i++) in[i][l] = w[((b + (l < n ? l : n - 1)) * samples + k) * NW + i];
+      for (long s = 0; s < substeps; s++) { step(x, in, p, y); for (long i = 0; i < NX; i++) x[i] = y[i]; }
+      for (long l = 0; l < n; l++) for (long i = 0; i < NX; i++) X[((b + l) * samples + k) * NX + i] = x[i][l];
+    }
+  }
+}
+"""
+_C = {
+    "ASSIGN": "{0}", "ADD": "{0} + {1}", "SUB": "{0} - {1}", "MUL": "{0} * {1}", "DIV": "{0} / {1}", "NEG": "-{0}", "INV": "1.0 / {0}",
+    "SQ": "{0} * {0}", "TWICE": "{0} + {0}", "FABS": "SEL({0} < 0, -{0}, {0})", "SQRT": "vsqrt({0})", "SIN": "vsin({0})", "COS": "vcos({0})",
+    "EXP": "vexp({0})", "LOG": "vlog({0})", "TANH": "vtanh({0})", "ATAN2": "vatan2({0}, {1})", "POW": "vpow({0}, {1})", "CONSTPOW": "vpow({0}, {1})",
+    "FMIN": "SEL(({0} < {1}) | ({0} != {0}), {0}, {1})", "FMAX": "SEL(({0} > {1}) | ({0} != {0}), {0}, {1})",  # not a number stays so
+    "LT": "SEL({0} < {1}, K(1), K(0))", "LE": "SEL({0} <= {1}, K(1), K(0))", "EQ": "SEL({0} == {1}, K(1), K(0))",
+    "NE": "SEL({0} != {1}, K(1), K(0))", "NOT": "SEL({0} == 0, K(1), K(0))", "AND": "SEL(({0} != 0) & ({1} != 0), K(1), K(0))",
+    "OR": "SEL(({0} != 0) | ({1} != 0), K(1), K(0))", "IF_ELSE_ZERO": "SEL({0} != 0, {1}, K(0))",
+    "SIGN": "SEL({0} > 0, K(1), SEL({0} < 0, K(-1), K(0)))",
+}  # fmt: skip
+
+
+class Rollout:
+    """Repeats a step over many runs.
+
+    Args:
+        step: x' = step(x (nx,), w (nw,), p) in SX; p is shared by all runs.
+        machine_code: whether compiling it, up to some seconds, is worth while.
+    """
+
+    def __init__(self, step: casadi.Function, machine_code: bool = True) -> None:
+        self.nx, self.nw, self.num = (step.numel_in(i) for i in range(3))
+        self._step = step
+        self._compiled = _machine_code(c_source(step)) if machine_code else None
+        self._interpreted = cache(lambda steps: step.mapaccum("roll", steps))
+
+    @property
+    def compiled(self) -> bool:
+        """Whether it runs as machine code; else CasADi interprets it."""
+        return self._compiled is not None
+
+    def __call__(self, x0: np.ndarray, w: np.ndarray, p: np.ndarray, substeps: int = 1) -> np.ndarray:
+        """States (runs, K, nx) at t_1..t_K from x0 (runs, nx), `substeps` steps a sample under inputs w (runs, K, nw) held over it; p (num,)."""
+        x0, w, p = (np.ascontiguousarray(a, dtype=float) for a in (x0, w, p))
+        runs, samples = w.shape[:2]
+        if x0.shape != (runs, self.nx) or w.shape[2] != self.nw or p.shape != (self.num,):
+            raise ValueError(f"shapes {x0.shape}, {w.shape}, {p.shape}; accepted: (runs, {self.nx}), (runs, samples, {self.nw}), ({self.num},)")
+        if self._compiled is None:
+            return self._interpret(x0, np.repeat(w, substeps, axis=1), p)[:, substeps - 1 :: substeps]
+        X = np.empty((runs, samples, self.nx))
+        self._compiled(runs, samples, substeps, x0.ctypes.data, w.ctypes.data, p.ctypes.data, X.ctypes.data)
+        return X
+
+    def _interpret(self, x0: np.ndarray, w: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """States (runs, steps, nx) after every step."""
+        X, values = np.empty((*w.shape[:2], self.nx)), np.tile(p, w.shape[1])
+        made: Any = self._interpreted(w.shape[1])
+        buffer, trigger = made.buffer()  # reads and writes arrays in place; a call with arrays would copy number by number
+        buffer.set_arg(2, values.data)
+        for start, inputs, out in zip(x0, w, X, strict=True):
+            buffer.set_arg(0, start.data)
+            buffer.set_arg(1, inputs.data)
+            buffer.set_res(0, out.data)
+            trigger()
+        return X
+
+
+def c_source(step: casadi.Function) -> str | None:
+    """C code of a rollout of `step`, every number of which is a vector over runs; None where it holds an operation that is not known here."""
+    import casadi
+
+    names = {number: name[3:] for name, number in vars(casadi).items() if name.startswith("OP_")}
+    lines = []
+    for k in range(step.n_instructions()):
+        name, given, out = names[step.instruction_id(k)], step.instruction_input(k), step.instruction_output(k)
+        if name == "CONST" and math.isfinite(value := step.instruction_constant(k)):
+            lines.append(f"a{out[0]} = K({value!r});")
+        elif name == "INPUT":
+            lines.append(f"a{out[0]} = {('x[{}]', 'w[{}]', 'K(p[{}])')[given[0]].format(given[1])};")
+        elif name == "OUTPUT":
+            lines.append(f"y[{out[1]}] = a{given[0]};")
+        elif name in _C:
+            lines.append(f"a{out[0]} = {_C[name].format(*(f'a{i}' for i in given))};")
+        else:
+            return None
+    body = "\n".join(lines)
+    work = ", ".join(f"a{i}" for i in range(step.sz_w()))
+    sizes = f"#define NX {step.numel_in(0)}\n#define NW {step.numel_in(1)}\n"
+    return f"{_HEAD}{sizes}static void step(const v *x, const v *w, const double *p, v *y) {{\nv {work};\n{body}\n}}\n{_LOOP}"
+
+
+@cache
+def _compiler() -> tuple[tuple[str, ...], str]:
+    """The C compiler's command (empty: there is none) and what tells its version and this processor apart.
+
+    SHIPBENCH_COMPILER names another than `cc`; "none" switches compiling off.
+    """
+    command = tuple(shlex.split(os.environ.get("SHIPBENCH_COMPILER") or "cc"))
+    if command == ("none",) or shutil.which(command[0]) is None:
+        return (), ""
+    try:
+        found = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=_SECONDS, check=True).stdout
+        cpu = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").is_file() else platform.processor()
+    except (OSError, subprocess.SubprocessError):
+        return (), ""
+    flags = next((line for line in cpu.splitlines() if line.startswith(("flags", "Features"))), cpu)
+    return command, "\n".join([found, platform.machine(), platform.libc_ver()[1], flags])
+
+
+def _machine_code(source: str | None) -> Callable[..., Any] | None:
+    """The C function `rollout` of `source`, compiled or taken from the cache folder; None where that cannot be done."""
+    command, machine = _compiler()
+    if source is None or not command:
+        return None
+    name = hashlib.sha256("\n".join([source, *command, *_FLAGS, machine]).encode()).hexdigest()[:24] + ".so"
+    kept = cache_folder() / "compiled" / name
+    try:
+        if not kept.is_file():
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            _compile(command, source, kept)
+        return _function(kept)
+    except (OSError, subprocess.SubprocessError) as error:
+        _log.debug("%s: %s", kept, error)
+    try:  # the cache folder cannot be written, or holds no code that runs
+        with tempfile.TemporaryDirectory(prefix="shipbench-") as folder:
+            _compile(command, source, Path(folder) / name)
+            return _function(Path(folder) / name)
+    except (OSError, subprocess.SubprocessError) as error:
+        _log.debug("the C compiler %s failed, CasADi interprets instead: %s", command[0], error)
+        return None
+
+
+def _compile(command: tuple[str, ...], source: str, path: Path) -> None:
+    """Write the shared library `path` in one step: processes that compile the same at the same time do not meet."""
+    with tempfile.TemporaryDirectory(prefix=".", dir=path.parent) as folder:
+        written, made = Path(folder) / "rollout.c", Path(folder) / "rollout.so"
+        written.write_text(source)
+        subprocess.run([*command, *_FLAGS, "-o", str(made), str(written), "-lm"], capture_output=True, timeout=_SECONDS, check=True)
+        os.replace(made, path)
+
+
+def _function(path: Path) -> Callable[..., Any]:
+    function = ctypes.CDLL(str(path)).rollout
+    function.argtypes, function.restype = [ctypes.c_long] * 3 + [ctypes.c_void_p] * 4, None
+    return function
