@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 SCRIPTS = {
-    "rollouts_shipmmg": ("shipmmg",), "fit_scipy": (), "startup": (), "scaling": (), "paper_study": (), "mlp_training": (),
+    "rollouts_shipmmg": ("shipmmg",), "fit_scipy": (), "diagnosis_refits": (), "startup": (), "scaling": (), "paper_study": (), "mlp_training": (),
     "neural_ode_training": (), "stacked_training": (), "training_scaling": (), "study_memory": (),
 }  # fmt: skip
 
