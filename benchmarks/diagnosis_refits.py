@@ -52,10 +52,12 @@ def compare(title: str, hidden: tuple[Hidden, ...], given: measure.Options) -> N
 
 
 def main() -> None:
-    """A ship with a current, and one with nothing hidden."""
+    """A ship with a hidden cause, and one with nothing hidden."""
     given = measure.options(__doc__, runs=3)
     measure.header(given)
-    compare("first cause of a diagnosis, a current hidden", (Hidden(EFFECTS.get("current"), (0.25, -0.2)),), given)
+    # a few short runs hardly show a current before it is fitted; a compass error they do
+    cause = Hidden(EFFECTS.get("heading_bias"), (0.05,)) if given.quick else Hidden(EFFECTS.get("current"), (0.25, -0.2))
+    compare(f"first cause of a diagnosis, {cause.effect.name} hidden", (cause,), given)
     compare("first cause of a diagnosis, nothing hidden", (), given)
 
 
