@@ -46,8 +46,10 @@ def diagnose(
         thorough: use up to four times as much of a long record (the folds do not); 90 runs of 120 s are used whole either way.
 
     Raises:
-        InputError: the ship never moves, or there are too few samples for any fit.
+        InputError: the ship never moves, there are too few samples for any fit, or `workers` is less than one.
     """
+    if workers < 1:
+        raise InputError(f"workers: {workers}; accepted: whole numbers from 1.")
     began = time.perf_counter()
     warnings = _check(dataset)
     units = check_units(dataset) if only is None else []

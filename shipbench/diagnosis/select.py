@@ -155,7 +155,8 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         steps += [Step(round_, f.model.terms[-1], 2.0 * (f.evidence - now.evidence)) for f in tried]
         best = _or_change(now, max(tried, key=lambda f: f.evidence, default=None), origin)
         imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
-        if best is None or 2.0 * (best.evidence - now.evidence) < threshold + imprecise:
+        # what a fit that does not rest could still gain by itself is no gain of the next cause
+        if best is None or 2.0 * (best.evidence - now.evidence) < threshold + imprecise + now.excess:
             break
         now = _backward(best, threshold)
         now = fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates, guess=now.motion)

@@ -48,6 +48,11 @@ def test_fresh_draws_of_clear_effects_at_their_typical_size_are_named_first(name
     assert len(wrong) <= 1, f"seed {SEED}: {wrong}"
 
 
+def test_no_workers_are_refused_before_any_work():
+    with pytest.raises(InputError, match=r"workers: 0; accepted: whole numbers from 1\."):
+        diagnose(_trials(runs=2, samples=20), workers=0)
+
+
 def test_nothing_is_named_on_most_fresh_ships_without_a_hidden_effect():
     named = {}
     for kind in ("none-same", "none-other"):
