@@ -10,8 +10,8 @@ import numpy as np
 
 from ..effects.base import EFFECTS
 from .colour import SHARES, TIMES, Colour
-from .fit import Fit, Model, Origin, evidence_with, fit
-from .model import Scales, Term
+from .fit import Fit, Model, Origin, evidence_with, fit, settle
+from .model import Linearisation, Scales, Term
 from .plant import Plant
 from .screen import Score, changes, overlap, screen
 
@@ -151,7 +151,8 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     candidates, first = null.candidates, screen(null)
     now, scores, steps, origin = null, first, [], Origin.of(null.plant, null.scales)
     for round_ in range(most):
-        tried = [with_term(now, score, origin) for score in worth_a_refit(scores, now, threshold)]
+        chosen = worth_a_refit(scores, now, threshold)
+        tried = [with_term(now, score, origin) for score in [*chosen, *absorbed(chosen, now, threshold, origin)]]
         steps += [Step(round_, f.model.terms[-1], 2.0 * (f.evidence - now.evidence)) for f in tried]
         best = _or_change(now, max(tried, key=lambda f: f.evidence, default=None), origin)
         imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
@@ -185,9 +186,7 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
 
 def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[Score]:
     """The best, the best of each family, and whatever could stand in for the best: one line each per effect."""
-    present = {t.label for t in now.model.terms}
-    present |= {label for group in _INSEPARABLE if group & present for label in group}
-    best: dict[str, Score] = {}
+    present, best = _beside(now), dict[str, Score]()
     for s in scores:
         if s.term.label not in present:
             best.setdefault(s.term.label, s)
@@ -207,6 +206,28 @@ def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[S
         rivals |= {s.term.label: 1.0 for s in ranked if s.term.effect.vector or s.term.effect.per_run}
     near = sorted((s for s in ranked if rivals.get(s.term.label, 0.0) > _RIVAL and s not in chosen), key=lambda s: -rivals[s.term.label])
     return chosen + near[:_RIVALS]
+
+
+def _beside(now: Fit) -> set[str]:
+    """Effects that are in the model, and those that cannot be named beside them."""
+    present = {t.label for t in now.model.terms}
+    return present | {label for group in _INSEPARABLE if group & present for label in group}
+
+
+def absorbed(chosen: Sequence[Score], now: Fit, threshold: float, origin: Origin) -> list[Score]:
+    """Vectors and values of single runs that are worth a refit as seen from `origin`, where the model has not been fitted yet: in few or short runs
+    in calm weather latent force and parameters take a current over so well that nothing is left of it where they rest."""
+    terms = [t for t in now.candidates if t.effect.vector or t.per_run]
+    if not terms:
+        return []
+    at_rest = replace(origin.point, terms=now.model.terms, values=tuple(np.zeros_like(v) for v in now.values))
+    lin = Linearisation(now.plant, now.scales, at_rest, origin.motion)
+    best: dict[str, Score] = {}
+    for s in screen(settle(lin, now.model, origin.hyper, now.log_tau2, terms)):
+        best.setdefault(s.term.label, s)
+    least = max(threshold, _FAR_BEHIND * max(s.score for s in best.values()))
+    seen = _beside(now) | {s.term.label for s in chosen}
+    return [s for label, s in best.items() if label not in seen and s.score > least][:_RIVALS]
 
 
 def _backward(found: Fit, threshold: float, spare_last: bool = True) -> Fit:

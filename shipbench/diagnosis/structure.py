@@ -28,7 +28,8 @@ class Structure(Effect):
     (Yasukawa & Yoshimura 2015, table 3), X'_vv and X'_rr that eq. (2) lacks (same table: -0.040, 0.011); added mass between sway and yaw, which
     regressions hardly know and the MMG form leaves out (of m L); flow at the rudder that a reversed propeller stops, from none to all (Kitagawa
     et al., physics reference 2.6); thrust astern, of which eq. (2) knows one level (0.65 of ahead at rest; four-quadrant curves 0.5 to 0.8); wind on
-    superstructures of all kinds (Blendermann 1994, physics reference E03).
+    superstructures of all kinds (Blendermann 1994, physics reference E03); added mass in surge, for which charts (Zhou et al. 1983) and ships of the
+    literature have 0.4 to 0.75 of Soeding's value (physics reference 3.2: 0.036 and 0.071 of the mass).
     """
 
     family = "hull"
@@ -59,8 +60,9 @@ class Structure(Effect):
         Parameter("wind_Y", "1", 0.15, -0.9, 2.0),
         Parameter("wind_N", "1", 0.4, -2.0, 3.0),
         Parameter("wind_lever", "1", 0.04, -0.3, 0.3),
+        Parameter("m_x", "1", 0.25, -0.5, 2.0),
     )
-    backing = 0.5
+    backing, m_x = 0.5, -0.4
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
 
     def spreads(self, measured_wind: bool) -> np.ndarray:
@@ -71,7 +73,8 @@ class Structure(Effect):
         """Values, in units of their spreads, at which it adds nothing to eq. (2)."""
         centres = np.zeros(len(self.parameters))
         centres[: len(self.parts)] = [c for _, c in self.parts]
-        centres[[p.name for p in self.parameters].index("backing")] = self.backing
+        names = [p.name for p in self.parameters]
+        centres[names.index("backing")], centres[names.index("m_x")] = self.backing, self.m_x
         return np.array([-c / p.typical for c, p in zip(centres, self.parameters, strict=True)])
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
@@ -79,6 +82,7 @@ class Structure(Effect):
             effect.force(e, s, (centre + value,), ship)
         e.straightening, e.straightening_asymmetry, e.straightening_r = 1.0 + q[6], q[7], 1.0 + q[17]
         e.coupling, e.backing = q[16] * ship.mass * ship.L, self.backing + q[19]
+        e.m_x = 1.0 + self.m_x + q[24]
         WIND.force(e, s, (*q[20:23], q[23] * ship.L), ship)
         e.thrust = e.thrust * (1.0 + q[18] * smoothstep(-s.n, 0.0, 1.0))
         unit = 0.5 * ship.rho * ship.L * ship.T

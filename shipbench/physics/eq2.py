@@ -145,13 +145,14 @@ class _Inertia(NamedTuple):
 
 def _inertia(c: Coefficients, e: Modifiers) -> _Inertia:
     """Masses of the left side, with what effects make of them."""
-    if all(is_neutral(field, 1.0) for field in (e.mass, e.m_y, e.J_z)) and is_neutral(e.x_G, 0.0) and is_neutral(e.coupling, 0.0):
+    if all(is_neutral(field, 1.0) for field in (e.mass, e.m_x, e.m_y, e.J_z)) and is_neutral(e.x_G, 0.0) and is_neutral(e.coupling, 0.0):
         return _Inertia(c.m, c.x_G, c.m + c.m_x, c.m11, c.m12_Y, c.m12_N, c.m22, c.X_vr, c.X_rr)
     m, x_G = c.m * e.mass, c.x_G + e.x_G
     moved = m * x_G - c.m * c.x_G + e.coupling
     added = c.m_y * (e.m_y - 1.0)
     m22 = c.I_zz * e.mass + m * x_G * x_G + c.J_z * e.J_z
-    return _Inertia(m, x_G, m + c.m_x, m + c.m_y * e.m_y, c.m12_Y + moved, c.m12_N + moved, m22, c.X_vr + 0.72 * added + (m - c.m), c.X_rr + moved)
+    X_vr = c.X_vr + 0.72 * added + (m - c.m)
+    return _Inertia(m, x_G, m + c.m_x * e.m_x, m + c.m_y * e.m_y, c.m12_Y + moved, c.m12_N + moved, m22, X_vr, c.X_rr + moved)
 
 
 def accelerations(

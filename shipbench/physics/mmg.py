@@ -113,7 +113,7 @@ def accelerations(
     u_c = env.current_speed * cos(env.current_to - psi) + e.u_c
     v_c = env.current_speed * sin(env.current_to - psi) + e.v_c
     u_w, v_w = u - u_c, v - v_c
-    m_x, m_y, J_z, factors = ship.m_x, ship.m_y * e.m_y, ship.J_z * e.J_z, e.hull
+    m_x, m_y, J_z, factors = ship.m_x * e.m_x, ship.m_y * e.m_y, ship.J_z * e.J_z, e.hull
     if env.depth is not None:
         deep = shallow_water.depth_factors(env.depth, ship.L, ship.B, ship.T, ship.Cb)
         m_y, J_z, factors = m_y * deep.m_y, J_z * deep.J_z, factors * deep.hull

@@ -39,9 +39,9 @@ class Modifiers:
     race, thrust: factors of the race's excess speed and of the thrust; straightening: factor of the sideways flow at the rudder, 1 + its asymmetry
     where it comes from port (positive) and 1 - where from starboard; straightening_r: factor of its part by yaw alone; backing: share of the flow at
     the rudder that a reversed propeller stops; wake: added to the wake fraction. bow, stern: factors of the thrusters; lever: shift of the bow
-    thruster [m]; loss: share of side force and moment lost at speed. mass, m_y, J_z: factors of the ship's mass (with its inertia), of added mass in
-    sway and of added inertia in yaw; coupling: added mass between sway and yaw, to add [kg m]; x_G: shift of the centre of gravity [m]. hull: factors
-    of the hull's derivatives. X, Y, N: forces [N] and moment about midship [N m] to add.
+    thruster [m]; loss: share of side force and moment lost at speed. mass, m_x, m_y, J_z: factors of the ship's mass (with its inertia), of added
+    mass in surge and sway and of added inertia in yaw; coupling: added mass between sway and yaw, to add [kg m]; x_G: shift of the centre of gravity
+    [m]. hull: factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship [N m] to add.
     """
 
     u_c: Array = 0.0
@@ -69,6 +69,7 @@ class Modifiers:
     lever: Array = 0.0
     loss: Array = 0.0
     mass: Array = 1.0
+    m_x: Array = 1.0
     m_y: Array = 1.0
     J_z: Array = 1.0
     coupling: Array = 0.0

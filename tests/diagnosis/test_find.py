@@ -18,7 +18,7 @@ from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import screen
-from shipbench.diagnosis.select import candidates_for, null_fit
+from shipbench.diagnosis.select import candidates_for, null_fit, select
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship
@@ -60,6 +60,15 @@ def test_nothing_is_named_on_most_fresh_ships_without_a_hidden_effect():
             verdict = diagnose(draw_case(kind, index, SEED, "test").dataset(), gain=False)
             named[f"{kind} {index}"] = [c.effect for c in verdict.causes]
     assert sum(bool(n) for n in named.values()) <= 1, f"seed {SEED}: {named}"
+
+
+def test_a_current_that_the_plain_model_has_absorbed_is_refitted():
+    plant = Plant.of(_trials(Hidden(EFFECTS.get("current"), (0.25, -0.2))))
+    null = null_fit(plant, Scales(plant), candidates_for(plant, ("current", "heading_bias", "speed_scale")))
+    assert max(s.score for s in screen(null)) < 0.5 * THRESHOLD  # nothing of it is left where the plain model rests
+    found = select(null, THRESHOLD)
+    assert [t.label for t in found.final.model.terms] == ["current"]
+    assert found.final.evidence - found.null.evidence > 50.0
 
 
 def test_a_hidden_current_is_sized_and_pays_on_runs_that_were_not_fitted():
