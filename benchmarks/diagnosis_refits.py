@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import measure
 
-from shipbench.diagnosis.fit import Fit, Model, Origin, fit
+from shipbench.diagnosis.fit import Origin, fit
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import screen
 from shipbench.diagnosis.select import candidates_for, null_fit, with_term, worth_a_refit
+from shipbench.diagnosis.settle import Fit, Model
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.hidden import Hidden

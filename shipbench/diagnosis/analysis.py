@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..physics.actuators import Gear
-from .fit import Fit, settle
 from .gain import Extension
 from .gears import GearFinding, find_in_gears
 from .generic import Dependence, dependences
 from .model import Linearisation, Scales
 from .plant import Plant
 from .select import Selection, candidates_for, null_fit, select
+from .settle import Fit, settle
 
 THRESHOLD = 10.0
 """Least gain of a named cause, 2 log Bayes factor. From nulls on the development ships, whose structure differs from the model's; the bootstrap of
@@ -24,6 +24,8 @@ GENERIC_THRESHOLD = 25.0
 _GENERIC_OWN = {"revolutions and rudder": 30.0, "heading": 18.0, "time": 18.0, "run": 18.0}
 """Race and rudder together are where ordinary ships differ most from eq. (2); no ship's structure depends on heading, time or number of the run."""
 GENERIC_MARGIN = 10.0
+_HULL_ALONE = ("speed", "sway velocity", "yaw rate")
+"""A force that follows nothing but the hull's own motion is the hull's: where its derivatives are off, it is no unknown cause."""
 _NARROW = 0.1
 
 
@@ -91,18 +93,23 @@ def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, c
     generic = tuple(dependences(selection.final))
     unknown = None
     if only is None and not cautious:
-        unknown = _unknown(selection, gears, generic, null)
+        unknown = _unknown(selection, gears, generic, null, hull > HULL_THRESHOLD)
     return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown)
 
 
-def _unknown(selection: Selection, gears: Sequence[GearFinding], after: Sequence[Dependence], null: Fit) -> Dependence | None:
-    """The dependence that beats every named cause, if one does."""
+def _unknown(selection: Selection, gears: Sequence[GearFinding], after: Sequence[Dependence], null: Fit, hull: bool) -> Dependence | None:
+    """The dependence that beats every named cause, if one does; hull: its derivatives are known to be off."""
+
+    def above(found: Sequence[Dependence]) -> list[Dependence]:
+        strange = [d for d in found if not (hull and d.variable in _HULL_ALONE)]
+        return [d for d in strange if d.score > _GENERIC_OWN.get(d.variable, GENERIC_THRESHOLD)]
+
     terms = selection.final.model.terms
     best = max([*(s.score for s in selection.steps if s.round == 0), *(g.score for g in gears)], default=-np.inf)
-    left = [d for d in after if d.score > _GENERIC_OWN.get(d.variable, GENERIC_THRESHOLD)]
+    left = above(after)
     if not terms and not gears:
         return left[0] if left else None
-    first = [d for d in dependences(null) if d.score > _GENERIC_OWN.get(d.variable, GENERIC_THRESHOLD)]
+    first = above(dependences(null))
     if left and first and first[0].score > best + GENERIC_MARGIN:
         return first[0]
     return None

@@ -8,11 +8,11 @@ import numpy as np
 
 from ..effects.base import Effect
 from ..records import Dataset
-from .fit import Fit, settle
 from .gears import find_in_gears
 from .model import Linearisation, Scales, Term
 from .plant import Plant
 from .select import null_fit
+from .settle import Fit, settle
 
 LEVEL = 0.05
 

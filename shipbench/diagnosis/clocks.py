@@ -16,9 +16,10 @@ from ..checking.track import late_velocities
 from ..data.corrections import undelayed
 from ..records import Dataset, Run
 from ..signals import PSI, STATES, U, V
-from .fit import Model, Origin, fit
+from .fit import Origin, fit
 from .model import Scales
 from .plant import Plant
+from .settle import Model
 
 NAMES = ("velocity_delay", "position_delay")
 """What need not be asked of the model once the clocks are put right."""

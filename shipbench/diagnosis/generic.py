@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .fit import Fit
 from .gram import Gram, solve
 from .plant import Plant
 from .screen import evidence
+from .settle import Fit
 
 AXES = ("surge", "sway", "yaw")
 _PRIOR_SD = 0.5

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .fit import Fit
 from .gram import Gram, Prior, Reduced, accelerated, background, solve, update_force
 from .model import Term
+from .settle import Fit
 
 _TAUS = np.log(np.array([0.03, 0.1, 0.3, 1.0, 3.0]) ** 2)
 _CYCLES, _LEAST_START = 6, float(np.log(0.1**2))

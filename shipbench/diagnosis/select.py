@@ -10,10 +10,11 @@ import numpy as np
 
 from ..effects.base import EFFECTS
 from .colour import SHARES, TIMES, Colour
-from .fit import Fit, Model, Origin, evidence_with, fit, settle
+from .fit import Origin, fit
 from .model import Linearisation, Scales, Term
 from .plant import Plant
 from .screen import Score, changes, overlap, screen
+from .settle import Fit, Model, evidence_with, settle
 
 NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error")
 """Found by their own tests: prior width of the hull, gated columns, kinematics."""

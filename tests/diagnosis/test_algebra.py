@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.fit import Model, Origin, fit, settle, start
+from shipbench.diagnosis.fit import Origin, fit, start
 from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, log_determinant, ornstein_uhlenbeck, solve
 from shipbench.diagnosis.model import Linearisation, Scales, Term, predict
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.settle import Model, settle
 from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS, flow_first
 from shipbench.physics.mmg import load_mmg_ship

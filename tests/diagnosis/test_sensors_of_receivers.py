@@ -11,10 +11,11 @@ from scipy.signal import lfilter
 from shipbench.diagnosis.clocks import check_clocks
 from shipbench.diagnosis.colour import Colour
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.fit import Model, Origin, fit
+from shipbench.diagnosis.fit import Origin, fit
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.select import colour_of
+from shipbench.diagnosis.settle import Model
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
 from shipbench.signals import PSI, U, V

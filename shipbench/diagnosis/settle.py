@@ -1,0 +1,245 @@
+"""One linearisation of the joint fit: the variances of force, noise and random effects, the posterior, and what points cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .colour import Colour
+from .gram import ETA_PRECISION, Gram, Hyper, Prior, Products, Reduced, Solution, accelerated, background, solve, update_force, update_noise
+from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, Term
+from .plant import NUM_HULL, Plant
+
+_EM_CYCLES = 3
+_LOG_FLOOR = np.log(0.1**2)
+"""A channel is never taken for better than a tenth of an ordinary sensor, else the latent force follows its noise."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """Structure: terms, and how far the hull may lie from the regressions and the other parameters from their centres (factors of the prior
+    standard deviations)."""
+
+    terms: tuple[Term, ...] = ()
+    hull: float = 1.0
+    base: float = 1.0
+
+    def prior(self, log_tau2: dict[int, float]) -> Prior:
+        """Columns in the order base, own terms; candidates stay outside."""
+        at, shared, precision, random, tau = NUM_BASE, list(range(NUM_BASE)), base_precision(self), [], []
+        weights = list(precision)
+        for i, term in enumerate(self.terms):
+            columns = list(range(at, at + term.size))
+            at += term.size
+            if term.per_run:
+                random += columns
+                tau += [log_tau2.get(i, 0.0)] * term.size
+            else:
+                shared += columns
+                weights += [1.0] * term.size
+        return Prior(np.array(shared), np.array(weights), np.array(random, dtype=int), np.array(tau))
+
+
+def base_precision(model: Model) -> np.ndarray:
+    """Prior precisions of the base parameters in units of their spreads."""
+    return np.repeat([model.base**-2, model.hull**-2, model.base**-2], [len(FREE), NUM_HULL, NUM_BASE - len(FREE) - NUM_HULL])
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate, cov: of [eta, w] per segment."""
+
+    plant: Plant
+    scales: Scales
+    model: Model
+    point: Point
+    hyper: Hyper
+    log_tau2: dict[int, float]
+    prior: Prior
+    columns: Columns
+    candidates: tuple[Term, ...]
+    motion: np.ndarray
+    products: Products
+    gram: Gram
+    reduced: Reduced
+    solution: Solution
+    estimate: np.ndarray
+    cov: np.ndarray
+    excess: float
+
+    @property
+    def evidence(self) -> float:
+        """Log evidence, without constants, less the costs of the terms.
+
+        Laplace's: with the cost that the point has, not the lower one that the linear model promises. Where the fit rests they are the same.
+        """
+        return self.solution.log_evidence - 0.5 * (self.excess + sum(t.cost(self.plant.seg.runs) for t in self.model.terms))
+
+    @property
+    def evidence_followed(self) -> float:
+        """Log evidence once initial states and latent force have followed the parameters of the point, as the linear model expects it."""
+        return self.evidence + 0.5 * (self.excess - at_point(self, self.point) + self.solution.squares)
+
+    @property
+    def values(self) -> tuple[np.ndarray, ...]:
+        """Estimates of the terms' amplitudes, in units of their typical sizes: (size,), or (runs, size) of a random effect."""
+        return point_from(self.model, self.point, self.solution, self.prior, self.estimate).values
+
+    def solution_without(self, index: int) -> Solution:
+        """The posterior on the same linearisation with the model's index-th term left out."""
+        columns, prior = self.columns_of(index), self.prior
+        keep, random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
+        return solve(self.reduced, Prior(prior.shared[keep], prior.precision[keep], prior.random[random], prior.log_tau2[random]))
+
+    def worth(self, index: int) -> float:
+        """Twice the log evidence that the index-th term adds on this linearisation, its cost taken off."""
+        gain = 2.0 * (self.solution.log_evidence - self.solution_without(index).log_evidence)
+        return gain - self.model.terms[index].cost(self.plant.seg.runs)
+
+    def columns_of(self, index: int) -> np.ndarray:
+        """Shared columns of the model's index-th term."""
+        at = NUM_BASE + sum(t.size for t in self.model.terms[:index])
+        return np.arange(at, at + self.model.terms[index].size)
+
+
+def products_of(plant: Plant, scales: Scales, point: Point, columns: Columns, extra: Sequence[np.ndarray] = ()) -> Products:
+    """Products of [eta, w, base, own, candidates, extra, e]; e is the residual with everything linear added back, so that all of it competes anew."""
+    B, noise = len(point.eta), np.tile(scales.noise, plant.steps + 1)
+    e = (plant.seg.states[..., :6] - columns.predicted).reshape(B, -1)
+    e = e + _times(columns.eta, point.eta) + _times(columns.w, np.moveaxis(point.w, -1, 1).reshape(B, -1)) + columns.base @ point.base
+    for term, value, own in zip(point.terms, point.values, columns.own, strict=True):
+        e = e + _times(own, value[plant.seg.run] if term.per_run else np.broadcast_to(value, (B, term.size)))
+    Z = np.concatenate([columns.eta, columns.w, columns.base, *columns.own, *columns.candidates, *extra, e[..., None]], axis=-1)
+    Z = np.nan_to_num(Z / noise[None, :, None], nan=0.0, posinf=0.0, neginf=0.0)
+    Z = scales.colour.whitened(Z.reshape(B, plant.steps + 1, 6, -1)).reshape(Z.shape)
+    logdet = scales.colour.log_determinant(plant.seg.mask.sum(axis=1))
+    return Products.of(Z, plant.seg.mask, plant.knots, plant.knot_time, plant.seg.run, plant.seg.runs, logdet)
+
+
+def _times(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """(B, T) from columns (B, T, C) and coefficients (B, C)."""
+    return (columns @ values[:, :, None])[..., 0]
+
+
+def point_from(model: Model, point: Point, solution: Solution, prior: Prior, estimate: np.ndarray) -> Point:
+    """The point that a solution describes."""
+    knots = point.w.shape[1]
+    values, at, at_random = [], NUM_BASE, 0
+    for term in model.terms:
+        if term.per_run:
+            values.append(solution.means[:, at_random : at_random + term.size])
+            at_random += term.size
+        else:
+            values.append(solution.mean[at : at + term.size])
+            at += term.size
+    w = np.moveaxis(estimate[:, 6:].reshape(len(estimate), 3, knots), 1, 2)
+    return Point(solution.mean[:NUM_BASE], estimate[:, :6], w, model.terms, tuple(values))
+
+
+def objective(lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], gram: Gram) -> float:
+    """Twice the negative log posterior of a point, without constants."""
+    return float(np.sum(by_segment(lin, hyper, gram))) + prior_squares(model, lin.point, log_tau2)
+
+
+def by_segment(lin: Linearisation, hyper: Hyper, gram: Gram) -> np.ndarray:
+    """Twice the negative log posterior of every segment (B,) given the parameters: errors, initial state, latent force; infinite if it diverges."""
+    plant, point = lin.plant, lin.point
+    error = np.where(plant.seg.mask[..., None], (plant.seg.states[..., :6] - lin.predicted) / lin.scales.noise, 0.0)
+    error = np.where(plant.seg.mask[..., None], lin.scales.colour.whitened(error), 0.0)
+    w = np.moveaxis(point.w, -1, 1)
+    with np.errstate(over="ignore"):
+        cost = np.sum(error**2 * np.exp(-hyper.log_noise), axis=(1, 2)) + ETA_PRECISION * np.sum(point.eta**2, axis=1)
+    cost += np.sum(w @ gram.K_inv * w, axis=2) @ np.exp(-hyper.log_force)
+    return np.where(np.isfinite(cost), cost, np.inf)
+
+
+def suiting(found: Fit, point: Point) -> tuple[np.ndarray, np.ndarray]:
+    """Initial states (B, 6) and latent force (B, knots, 3) that suit the parameters and values of a point best, on the linearisation of `found`."""
+    theta = _coefficients(found, point)[found.plant.seg.run]
+    estimate = -(found.reduced.solved @ theta[:, :, None])[..., 0]
+    return estimate[:, :6], np.moveaxis(estimate[:, 6:].reshape(len(estimate), 3, -1), 1, 2)
+
+
+def at_point(found: Fit, point: Point) -> float:
+    """Twice the negative log posterior at the parameters and values of a point, with the initial states and the latent force that suit them best on
+    the linearisation of `found`."""
+    theta = _coefficients(found, point)
+    return float(np.einsum("ni,nij,nj", theta, found.reduced.S, theta)) + prior_squares(found.model, point, found.log_tau2)
+
+
+def _coefficients(found: Fit, point: Point) -> np.ndarray:
+    """(N, G + 1): parameters and values of a point by run, -1 for the residual."""
+    runs = found.plant.seg.runs
+    own = [v if t.per_run else np.broadcast_to(v, (runs, t.size)) for t, v in zip(point.terms, point.values, strict=True)]
+    return np.concatenate([np.broadcast_to(point.base, (runs, NUM_BASE)), *own, -np.ones((runs, 1))], axis=1)
+
+
+def prior_squares(model: Model, point: Point, log_tau2: dict[int, float]) -> float:
+    """Twice the negative log prior of the parameters and values, without constants."""
+    squares = float(np.sum(base_precision(model) * point.base**2))
+    for i, (term, value) in enumerate(zip(point.terms, point.values, strict=True)):
+        squares += float(np.sum(value**2)) * (np.exp(-log_tau2.get(i, 0.0)) if term.per_run else 1.0)
+    return squares
+
+
+def settle(
+    lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (), cycles: int = _EM_CYCLES,
+    leap: float = np.inf,
+) -> Fit:  # fmt: skip
+    """Variances, whose logarithms move by `leap` at most, and posterior on one linearisation."""
+    plant, scales, point, columns = lin.plant, lin.scales, lin.point, lin.columns(candidates)
+    products = products_of(plant, scales, point, columns)
+    if leap > 0.0:
+        hyper, log_tau2 = _variances(products.without(sum(t.size for t in candidates)), model, hyper, log_tau2, cycles, leap)
+    gram = products.weigh(hyper)
+    reduced = gram.reduce(hyper.log_force)
+    prior = model.prior(log_tau2)
+    solution = solve(reduced, prior)
+    estimate, cov = background(gram, reduced, prior, solution)
+    excess = max(objective(lin, model, hyper, log_tau2, gram) - solution.squares, 0.0)
+    return Fit(
+        plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), lin.motion, products, gram, reduced, solution, estimate, cov,
+        excess,
+    )  # fmt: skip
+
+
+def evidence_with(found: Fit, colour: Colour) -> float:
+    """Log evidence of the same linearisation with noise of another correlation, whose variances are fitted anew."""
+    scales, more = found.scales.coloured(colour), sum(t.size for t in found.candidates)
+    products = products_of(found.plant, scales, found.point, found.columns).without(more)
+    hyper, log_tau2 = _variances(products, found.model, found.hyper, found.log_tau2, 1)
+    return solve(products.weigh(hyper).reduce(hyper.log_force), found.model.prior(log_tau2)).log_evidence
+
+
+def _variances(
+    products: Products, model: Model, hyper: Hyper, log_tau2: dict[int, float], cycles: int, leap: float = np.inf
+) -> tuple[Hyper, dict[int, float]]:
+    """Variances of force, noise and random effects on one linearisation."""
+    random = [i for i, term in enumerate(model.terms) if term.per_run]
+
+    def step(theta: np.ndarray) -> tuple[float, np.ndarray]:
+        now, tau2 = Hyper(theta[:3], theta[3:9], hyper.tau), dict(zip(random, theta[9:], strict=True))
+        gram, prior = products.weigh(now), model.prior(tau2)
+        reduced = gram.reduce(now.log_force)
+        solution = solve(reduced, prior)
+        estimate, cov = background(gram, reduced, prior, solution)
+        force, noise = update_force(gram, estimate, cov), update_noise(products, gram, reduced, prior, solution, estimate, _LOG_FLOOR)
+        return solution.log_evidence, np.concatenate([force, noise, _random_variances(model, solution)])
+
+    first = np.concatenate([hyper.log_force, hyper.log_noise, [log_tau2.get(i, 0.0) for i in random]])
+    theta = np.clip(accelerated(step, first, cycles), first - leap, first + leap)
+    return Hyper(theta[:3], theta[3:9], hyper.tau), dict(zip(random, (float(v) for v in theta[9:]), strict=True))
+
+
+def _random_variances(model: Model, solution: Solution) -> list[float]:
+    """One EM step for the log variance of each random effect."""
+    at, found = 0, []
+    for term in model.terms:
+        if term.per_run:
+            sel = slice(at, at + term.size)
+            at += term.size
+            second = np.mean(solution.means[:, sel] ** 2) + np.mean(np.diagonal(solution.covs[:, sel, sel], axis1=1, axis2=2))
+            found.append(float(np.log(second)))
+    return found
