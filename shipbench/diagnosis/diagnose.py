@@ -21,6 +21,7 @@ from .gain import FoldGain, fold_gain, summarise
 from .model import NUM_BASE
 from .outcome import Diagnosis, Gain
 from .plant import MOST_STEPS, THOROUGH_STEPS, Plant
+from .strange import left_out
 from .trace import trace_of
 from .wrong import what_is_wrong
 
@@ -62,7 +63,7 @@ def diagnose(
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     found = analyse(plant, only=only, seed=seed, cautious=cautious, settled=settled)
     doubts = _doubts(found) if only is None else []
-    warnings += doubts
+    warnings += doubts + left_out(found.selection.null.plant, [r.id for r in dataset.runs])
     worth = _cross_validated(dataset, found, only, seed, workers, settled) if gain and not cautious and not doubts else Worth()
     causes = [] if doubts else describe_causes(found, units, late, worth.gain, worth.hull, [r.id for r in dataset.runs])
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]

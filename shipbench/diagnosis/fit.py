@@ -14,6 +14,8 @@ from .settle import Fit, Model, at_point, by_segment, objective, point_from, set
 
 _MAY_RISE, _FREE_STEPS, _LEAST_SHARE = 1.1, 5, 0.05
 """Factor by which a step may raise the cost, on the first steps; later ones must lower it."""
+_MAY_FOLLOW = 100.0
+"""Factor of the cost beyond which the latent force is not asked whether it could follow: the trajectory blows up."""
 _LEAP = 0.3
 """Most that the logarithm of a variance moves between those later steps: two linearisations may else call the other's variance wrong for ever."""
 _AT_REST, _AT_REST_EVIDENCE = 0.5, 0.1
@@ -71,9 +73,10 @@ def _step(lin: Linearisation, found: Fit, free: bool) -> Linearisation | None:
     while True:
         part = between(lin.point, target, share)
         trial = Linearisation(plant, scales, part, lin.towards(part), coarse=free)
-        if objective(trial, model, found.hyper, found.log_tau2, found.gram) < may_rise * at:
+        cost = objective(trial, model, found.hyper, found.log_tau2, found.gram)
+        if cost < may_rise * at:
             return trial
-        if at_point(settle(trial, model, found.hyper, found.log_tau2, leap=0.0), part) < followed:
+        if cost < _MAY_FOLLOW * at and at_point(settle(trial, model, found.hyper, found.log_tau2, leap=0.0), part) < followed:
             return trial
         share *= 0.5
         if share < _LEAST_SHARE:

@@ -25,6 +25,8 @@ from ..signals import MOTION
 NUM_HULL = len(HULL.parameters)
 NO_GEAR = Gear(1e-3, 1e12)
 SEGMENT = 60.0
+_EARLIER = 40.0
+"""Seconds of commands (Froude-scaled, 130 m) before a piece: where its actuators stand when it begins."""
 _LONG = 5
 MOST_STEPS, THOROUGH_STEPS = 12_000, 48_000
 """Of all segments together, per stage: more cost many minutes. What differs from run to run, such as the wind, may show only in all of a long record
@@ -44,13 +46,15 @@ class Segments:
     """Pieces of runs of at most `steps` transitions, padded to equal length.
 
     Shapes: states (B, K + 1, 10), commands (B, K + 1, 4), wind (B, K + 1, 2) or None, mask (B, K + 1) of real samples, run (B,) index of the run,
-    start (B,) time since the run began [s].
+    start (B,) time since the run began [s]; earlier (B, P, 4): the commands before the piece (the first, before the run), without any where actuators
+    are recorded.
     """
 
     dt: float
     commanded: bool
     states: np.ndarray
     commands: np.ndarray
+    earlier: np.ndarray
     wind: np.ndarray | None
     mask: np.ndarray
     run: np.ndarray
@@ -66,8 +70,15 @@ class Segments:
         rows = np.unique(np.concatenate([first, spread]))
         wind = None if self.wind is None else self.wind[rows]
         return replace(
-            self, states=self.states[rows], commands=self.commands[rows], wind=wind, mask=self.mask[rows], run=self.run[rows], start=self.start[rows]
-        )
+            self, states=self.states[rows], commands=self.commands[rows], earlier=self.earlier[rows], wind=wind, mask=self.mask[rows],
+            run=self.run[rows], start=self.start[rows],
+        )  # fmt: skip
+
+    def without(self, pieces: np.ndarray) -> Segments:
+        """The same with nothing to be seen in some pieces."""
+        mask = self.mask.copy()
+        mask[pieces] = False
+        return replace(self, mask=mask)
 
 
 def cut(dataset: Dataset, steps: int) -> Segments:
@@ -82,8 +93,11 @@ def cut(dataset: Dataset, steps: int) -> Segments:
     at = [np.minimum(np.arange(a, a + K + 1), b) for _, _, a, b in pieces]
     states = np.stack([run.states[i] for (_, run, _, _), i in zip(pieces, at, strict=True)])
     inputs = np.stack([run.inputs[i] for (_, run, _, _), i in zip(pieces, at, strict=True)])
+    commanded, scale = dataset.actuators == "commanded", (complete(dataset.ship).L / 130.0) ** 0.5
+    back = np.arange(-round(_EARLIER * scale / dataset.dt) if commanded else 0, 0)
     return Segments(
-        dt=dataset.dt, commanded=dataset.actuators == "commanded", states=states, commands=inputs[..., :4],
+        dt=dataset.dt, commanded=commanded, states=states, commands=inputs[..., :4],
+        earlier=np.stack([run.inputs[np.maximum(a + back, 0), :4] for _, run, a, _ in pieces]),
         wind=None if wind_columns is None else inputs[..., wind_columns], mask=np.stack([np.arange(K + 1) <= b - a for _, _, a, b in pieces]),
         run=np.array([p[0] for p in pieces]), start=np.array([p[2] * dataset.dt for p in pieces]), runs=len(dataset),
     )  # fmt: skip
@@ -133,6 +147,12 @@ class Plant:
         plant.drive(self.ordinary | gears)
         return plant
 
+    def without(self, pieces: np.ndarray) -> Plant:
+        """The same runs with nothing to be seen in some pieces."""
+        plant = copy(self)
+        plant.seg = self.seg.without(pieces)
+        return plant
+
     @classmethod
     def of(cls, dataset: Dataset, most_steps: int = MOST_STEPS) -> Plant:
         """The plant of a data set, cut into segments of about 60 s at 130 m (Froude-scaled): over longer ones the motion is far from linear in its
@@ -165,11 +185,11 @@ class Plant:
 
     def _stages(self, i: int, gear: Gear) -> np.ndarray:
         """One actuator behind a gear, (B, steps * substeps, 3). A negative delay means that the record is late."""
-        seg, n = self.seg, 2 * self.substeps
-        fine = np.arange(self.steps * n + 1) / n
+        seg, n, before = self.seg, 2 * self.substeps, self.seg.earlier.shape[1]
+        fine = np.arange(-before * n, self.steps * n + 1) / n
         if seg.commanded:
-            at = np.clip(np.floor(fine - min(gear.delay, 0.0) / seg.dt + 1e-9).astype(int), 0, self.steps - 1)
-            values = seg.commands[:, at, i]
+            at = np.clip(np.floor(fine - min(gear.delay, 0.0) / seg.dt + 1e-9).astype(int), -before, self.steps - 1)
+            values = np.concatenate([seg.earlier[..., i], seg.commands[..., i]], axis=1)[:, before + at]
         else:
             at = np.clip(fine - min(gear.delay, 0.0) / seg.dt, 0, self.steps)
             low = np.minimum(at.astype(int), self.steps - 1)
@@ -178,7 +198,8 @@ class Plant:
             follow = replace(gear, delay=max(gear.delay, 0.0))
             # recorded actuators: the value at the end of the step is what the gear follows; commands are held from its beginning
             wanted = values[:, :-1] if seg.commanded else values[:, 1:]
-            values = gear_path(seg.states[:, 0, 6 + i] if seg.commanded else values[:, 0], wanted, seg.dt / n, follow)
+            values = gear_path(values[:, 0] if before or not seg.commanded else seg.states[:, 0, 6 + i], wanted, seg.dt / n, follow)
+        values = values[:, before * n :]
         return np.stack([values[:, stage : stage + n * self.steps - 1 : 2] for stage in range(3)], axis=-1)
 
     def roll(self, x0: np.ndarray, p: Sequence[Array], active: Sequence[Active], w: np.ndarray, path: np.ndarray | None = None) -> np.ndarray:

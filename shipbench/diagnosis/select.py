@@ -15,6 +15,7 @@ from .model import Linearisation, Scales, Term
 from .plant import Plant
 from .screen import Score, changes, overlap, screen
 from .settle import Fit, Model, evidence_with, settle
+from .strange import strange_pieces
 
 NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error")
 """Found by their own tests: prior width of the hull, gated columns, kinematics."""
@@ -26,6 +27,8 @@ MOST_EFFECTS = 6
 _GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
 _FIRST_COLOURS, _WORTH_A_COLOUR = ((1.0, 2.0), (4.0, 6.0)), 50.0
 """Share and time of noise that is tried first, and the log evidence that it must gain: a cause in the sensors leaves lasting residuals, too."""
+_SEARCHES = 3
+"""For strange pieces."""
 _REFITS = 3
 _REFIT_ITERATIONS = 16
 _WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
@@ -83,7 +86,7 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Se
 
 def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
     """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion; where sensors err
-    for longer than a sample, with such noise."""
+    for longer than a sample, with such noise; without the few pieces that no ship's motion explains."""
     origin = Origin.of(plant, scales)
     found = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion)
     if plant.seg.commanded:
@@ -91,7 +94,13 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
             if np.ptp(plant.seg.commands[..., i]) > 0.0:
                 found = _with_gear(found, name, field)
     scales = found.scales.coloured(colour_of(found))
-    return fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion)
+    found = fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion)
+    for _ in range(_SEARCHES):  # the strangest hide the next ones
+        pieces = strange_pieces(found)
+        if not len(pieces):
+            break
+        found = fit(found.plant.without(pieces), scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion)
+    return found
 
 
 def colour_of(found: Fit) -> Colour:
@@ -152,8 +161,9 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     candidates, first = null.candidates, screen(null)
     now, scores, steps, origin = null, first, [], Origin.of(null.plant, null.scales)
     for round_ in range(most):
-        chosen = worth_a_refit(scores, now, threshold)
-        tried = [with_term(now, score, origin) for score in [*chosen, *absorbed(chosen, now, threshold, origin)]]
+        tried = [with_term(now, score, origin) for score in worth_a_refit(scores, now, threshold)]
+        if all(2.0 * (f.evidence - now.evidence) < threshold for f in tried):
+            tried += [with_term(now, score, origin) for score in absorbed(tried, now, threshold, origin)]
         steps += [Step(round_, f.model.terms[-1], 2.0 * (f.evidence - now.evidence)) for f in tried]
         best = _or_change(now, max(tried, key=lambda f: f.evidence, default=None), origin)
         imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
@@ -215,7 +225,7 @@ def _beside(now: Fit) -> set[str]:
     return present | {label for group in _INSEPARABLE if group & present for label in group}
 
 
-def absorbed(chosen: Sequence[Score], now: Fit, threshold: float, origin: Origin) -> list[Score]:
+def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -> list[Score]:
     """Vectors and values of single runs that are worth a refit as seen from `origin`, where the model has not been fitted yet: in few or short runs
     in calm weather latent force and parameters take a current over so well that nothing is left of it where they rest."""
     terms = [t for t in now.candidates if t.effect.vector or t.per_run]
@@ -227,7 +237,7 @@ def absorbed(chosen: Sequence[Score], now: Fit, threshold: float, origin: Origin
     for s in screen(settle(lin, now.model, origin.hyper, now.log_tau2, terms)):
         best.setdefault(s.term.label, s)
     least = max(threshold, _FAR_BEHIND * max(s.score for s in best.values()))
-    seen = _beside(now) | {s.term.label for s in chosen}
+    seen = _beside(now) | {f.model.terms[-1].label for f in tried}
     return [s for label, s in best.items() if label not in seen and s.score > least][:_RIVALS]
 
 

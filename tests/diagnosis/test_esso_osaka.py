@@ -19,12 +19,12 @@ from shipbench.records import Dataset, Run
 
 @pytest.fixture(scope="module")
 def runs() -> Dataset:
-    """Every third run, wind columns withheld."""
+    """Every third run, wind columns withheld, commands taken for positions: the search for quicker gears has nothing to do with sensors."""
     try:
         data = load_dataset("esso_osaka[wind=false]")
     except InputError as error:
         pytest.skip(str(error))
-    return data.with_runs(data.runs[::3])
+    return replace(data.with_runs(data.runs[::3]), actuators="measured")
 
 
 def _with(data: Dataset, fault: Callable[[np.ndarray], None]) -> Dataset:

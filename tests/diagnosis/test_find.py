@@ -39,7 +39,7 @@ def _trials(*hidden: Hidden, runs: int = 12, samples: int = 90, seed: int = 3) -
 def test_fresh_draws_of_clear_effects_at_their_typical_size_are_named_first(names):
     found = {}
     for index in [i for i, name in enumerate(singles()) if name in names]:
-        case = draw_case("single", index, SEED, "test")
+        case = draw_case("single", index, SEED, "test", Trials(runs=16, samples=80))
         assert case.size == (1.0,)
         verdict = diagnose(case.dataset(), gain=False)
         found[case.truth[0]] = [c.effect for c in verdict.causes]

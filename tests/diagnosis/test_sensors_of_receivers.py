@@ -14,11 +14,13 @@ from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.fit import Origin, fit
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.select import colour_of
+from shipbench.diagnosis.select import colour_of, null_fit
 from shipbench.diagnosis.settle import Model
+from shipbench.diagnosis.strange import left_out
+from shipbench.physics.actuators import gear_path
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
-from shipbench.signals import PSI, U, V
+from shipbench.signals import PSI, R, U, V
 from shipbench.simulate.trials import Trials, sea_trials
 
 LATE = 3.0
@@ -136,3 +138,28 @@ def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):
     assert len(verdict.causes) == 1
     position = next(c for c in verdict.candidates if c.effect == "position_delay")
     assert "put right before the fit" in position.rejected_because
+
+
+def test_a_piece_in_which_the_ship_was_pushed_is_left_out_and_said_so(trials, monkeypatch):
+    monkeypatch.setattr("shipbench.diagnosis.strange._ONE_IN", 20)  # a piece of 24; else it takes 100 of them
+    assert not left_out(null_fit(Plant.of(trials), Scales(Plant.of(trials))).plant, [r.id for r in trials.runs])
+    pushed, push = 4, np.arange(20.0)
+    states = [run.states.copy() for run in trials.runs]
+    states[pushed][80:100, R] += 1e-3 * push
+    states[pushed][80:100, PSI] += 0.5 * 1e-3 * push**2
+    states[pushed][100:, PSI] += 0.5 * 1e-3 * 20.0**2
+    data = trials.with_runs([replace(run, states=S) for run, S in zip(trials.runs, states, strict=True)])
+    found = null_fit(Plant.of(data), Scales(Plant.of(data)))
+    (line,) = left_out(found.plant, [r.id for r in data.runs])
+    assert f"run '{trials.runs[pushed].id}', 60 to 120 s" in line
+    assert found.excess < 5.0
+
+
+def test_actuators_of_a_piece_stand_where_the_commands_before_it_have_brought_them():
+    data = replace(sea_trials(load_mmg_ship("kcs"), 3, (), Trials(runs=2, samples=120)), actuators="commanded")
+    plant = Plant.of(data)
+    slow = plant.ordinary["delta"]
+    second = int(np.flatnonzero(plant.seg.start > 0)[0])
+    run, begins = data.runs[plant.seg.run[second]], round(plant.seg.start[second] / data.dt)
+    whole = gear_path(run.inputs[:1, 1], run.inputs[None, :, 1], data.dt, slow)[0]
+    np.testing.assert_allclose(plant.path[second, :: plant.substeps, 0, 1], whole[begins : begins + plant.steps], atol=1e-4)

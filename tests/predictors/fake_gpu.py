@@ -96,7 +96,7 @@ def predict(model, runs) -> None:
 
 if __name__ == "__main__":
     name = sys.argv[1]
-    harbour = small_harbour(num=16, horizon=40)
+    harbour = small_harbour(num=16, horizon=15)
     train(importlib.import_module(f"shipbench.predictors.{name}"), make_predictor(parse_spec(f"{name}[epochs=1]")), harbour)
     fitted = make_predictor(parse_spec(f"{name}[epochs=1]")).fit(harbour.subset(range(8)), harbour.subset(range(8, 12)))
     if name == "neural_ode":

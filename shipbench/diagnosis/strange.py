@@ -1,0 +1,43 @@
+"""Pieces of runs that no ship's motion explains: held, pushed or aground, a record that jumps. One such piece of ten seconds can speak louder for a
+cause than all others together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .plant import Plant
+from .settle import Fit
+
+_STRANGE = 30.0
+"""Times the square of the latent force in the other pieces (five times their force)."""
+_ONE_IN = 100
+"""At most one piece in so many is left out: what happens more often is a part of these runs."""
+
+
+def strange_pieces(found: Fit) -> np.ndarray:
+    """Pieces whose latent force, in any axis, is far beyond that of the others; the strangest first."""
+    gram, knots, z = found.gram, found.plant.knots, found.estimate
+    squares = np.empty((len(z), 3))
+    for axis in range(3):
+        at = slice(6 + axis * knots, 6 + (axis + 1) * knots)
+        squares[:, axis] = np.sum(z[:, at] @ gram.K_inv * z[:, at], axis=1) + np.sum(gram.K_inv * found.cov[:, at, at], axis=(1, 2))
+    others = (squares.sum(axis=0) - squares) / max(len(z) - 1, 1)
+    worst = np.max(squares / others, axis=1)
+    left = len(z) // _ONE_IN - int(np.sum(~found.plant.seg.mask.any(axis=1)))
+    order = np.argsort(-worst)[: max(left, 0)]
+    return order[worst[order] > _STRANGE]
+
+
+def left_out(plant: Plant, names: Sequence[str]) -> list[str]:
+    """What was left out of the fit, one line per piece; `names` of the runs."""
+    seg = plant.seg
+    found = []
+    for piece in np.flatnonzero(~seg.mask.any(axis=1)):
+        begins = seg.start[piece]
+        found.append(
+            f"left out: run '{names[seg.run[piece]]}', {begins:g} to {begins + plant.steps * seg.dt:g} s; there the missing force is more than "
+            f"{_STRANGE**0.5:.0f} times the ordinary one (ship held or pushed, or a record that jumps?)."
+        )
+    return found
