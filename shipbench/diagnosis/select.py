@@ -15,8 +15,8 @@ from .model import Scales, Term
 from .plant import Plant
 from .screen import Score, changes, overlap, screen
 
-NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error")
-"""Found by their own tests: prior width of the hull, gated columns, kinematics."""
+NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error", "going_astern")
+"""Found by their own tests (prior width of the hull, gated columns, kinematics), or what every ship does."""
 AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft_rate_limit", "shaft_lag", "thruster_lag", "rudder_lag")
 """Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
 WITHOUT_WIND = ("wind", "wind_per_run")
