@@ -18,7 +18,7 @@ def diagnose(
     gain: Annotated[bool, typer.Option(help="Measure the gain on held-out runs (most of the time).")] = True,
     seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
     workers: Annotated[int, typer.Option(help="Processes for the folds.")] = 2,
-    thorough: Annotated[bool, typer.Option("--thorough", help="Use up to four times as much of a long record (some times the time).")] = False,
+    thorough: Annotated[bool, typer.Option("--thorough", help="Use up to twice as much of a long record (twice the time or more).")] = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:

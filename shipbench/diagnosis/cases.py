@@ -28,7 +28,7 @@ from .outside import OUTSIDE, Outside
 
 KINDS = ("single", "pair", "none-same", "none-other", "outside", "change", "unit")
 SIZES = (1.0, 0.3)
-OWN_KINDS = frozenset({"change_point", "unit_or_sign_error", "wind_coefficients"})
+OWN_KINDS = frozenset({"change_point", "going_astern", "unit_or_sign_error", "wind_coefficients", "wind_drift"})
 ONE_SIDED = frozenset(
     {
         "added_resistance", "bank_suction", "cross_flow_drag", "position_delay", "rudder_delay", "rudder_stall", "shallow_water",

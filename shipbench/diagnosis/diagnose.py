@@ -20,7 +20,7 @@ from .clocks import NAMES, check_clocks
 from .gain import FoldGain, fold_gain, summarise
 from .model import NUM_BASE
 from .outcome import Diagnosis, Gain
-from .plant import MOST_STEPS, THOROUGH_STEPS, Plant
+from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant
 from .strange import left_out
 from .trace import trace_of
 from .wrong import what_is_wrong
@@ -44,7 +44,7 @@ def diagnose(
         seed: of the bootstrap and of the folds.
         only: effects to consider (an oracle that knows what is hidden); default all.
         workers: processes for the folds.
-        thorough: use up to four times as much of a long record (the folds do not); 90 runs of 120 s are used whole either way.
+        thorough: use up to twice as much of a long record (the folds use half); 90 runs of 120 s are used whole either way.
 
     Raises:
         InputError: the ship never moves, there are too few samples for any fit, or `workers` is less than one.
@@ -133,7 +133,7 @@ def _one_fold(fold: int, dataset: Dataset, seed: int, only: Sequence[str] | None
     """Selection and fits on the training part of one fold."""
     test = _folds(len(dataset), seed)[fold]
     train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
-    plant = Plant.of(dataset.with_runs(train))
+    plant = Plant.of(dataset.with_runs(train), FOLD_STEPS)
     extension, plain = causes_of(plant, threshold, only, settled)
     return fold_gain(dataset, test, extension, plain, hull)
 

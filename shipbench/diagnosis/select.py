@@ -17,8 +17,8 @@ from .screen import Score, changes, overlap, screen
 from .settle import Fit, Model, evidence_with, settle
 from .strange import strange_pieces
 
-NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error")
-"""Found by their own tests: prior width of the hull, gated columns, kinematics."""
+NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error", "going_astern")
+"""Found by their own tests (prior width of the hull, gated columns, kinematics), or what every ship does."""
 AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft_rate_limit", "shaft_lag", "thruster_lag", "rudder_lag")
 """Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
 WITHOUT_WIND = ("wind", "wind_per_run")
@@ -88,18 +88,23 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
     """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion; where sensors err
     for longer than a sample, with such noise; without the few pieces that no ship's motion explains."""
     origin = Origin.of(plant, scales)
-    found = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion)
+    found = _without_strange(fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion))
     if plant.seg.commanded:
         for i, name, field in ((0, "n", "T"), (1, "delta", "rate"), (1, "delta", "T")):
             if np.ptp(plant.seg.commands[..., i]) > 0.0:
                 found = _with_gear(found, name, field)
     scales = found.scales.coloured(colour_of(found))
-    found = fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion)
-    for _ in range(_SEARCHES):  # the strangest hide the next ones
+    return _without_strange(fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion))
+
+
+def _without_strange(found: Fit) -> Fit:
+    """Fitted again without the strangest pieces, which hide the next ones."""
+    for _ in range(_SEARCHES):
         pieces = strange_pieces(found)
         if not len(pieces):
             break
-        found = fit(found.plant.without(pieces), scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion)
+        plant, candidates = found.plant.without(pieces), found.candidates
+        found = fit(plant, found.scales, found.model, found.point, found.hyper, candidates=candidates, guess=found.motion)
     return found
 
 

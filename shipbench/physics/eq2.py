@@ -183,9 +183,10 @@ def accelerations(
     f = e.hull
     if air is not None:
         air = (air[0] - e.air_u, air[1] - e.air_v)
-    moving = not (is_neutral(e.u_c, 0.0) and is_neutral(e.v_c, 0.0))
+    u_c, v_c = e.water(air, u, v)
+    moving = not (is_neutral(u_c, 0.0) and is_neutral(v_c, 0.0))
     if moving:
-        u, v = u - e.u_c, v - e.v_c
+        u, v = u - u_c, v - v_c
     i = _inertia(c, e)
     speed = sqrt(u * u + v * v + c.eps * c.eps)
     X_n, V_A, race = propulsion(u, n, c, e)
@@ -207,4 +208,4 @@ def accelerations(
         X, Y, N = X + X_W, Y + Y_W, N + N_W
     det = i.m11 * i.m22 - i.m12_Y * i.m12_N
     du, dv, dr = X / i.surge, (i.m22 * Y - i.m12_Y * N) / det, (i.m11 * N - i.m12_N * Y) / det
-    return (du + r * e.v_c, dv - r * e.u_c, dr) if moving else (du, dv, dr)
+    return (du + r * v_c, dv - r * u_c, dr) if moving else (du, dv, dr)

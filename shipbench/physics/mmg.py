@@ -110,16 +110,18 @@ def accelerations(
     Source: Yasukawa & Yoshimura (2015), eq. 4; current as in Fossen (2021), section 10.3.
     """
     e = mods or Modifiers()
-    u_c = env.current_speed * cos(env.current_to - psi) + e.u_c
-    v_c = env.current_speed * sin(env.current_to - psi) + e.v_c
+    u_rw, v_rw = wind.apparent_wind(psi, u, v, env.wind_speed, env.wind_from)
+    u_rw, v_rw = u_rw - e.air_u, v_rw - e.air_v
+    u_m, v_m = e.water((u_rw, v_rw), u, v)
+    u_c = env.current_speed * cos(env.current_to - psi) + u_m
+    v_c = env.current_speed * sin(env.current_to - psi) + v_m
     u_w, v_w = u - u_c, v - v_c
     m_x, m_y, J_z, factors = ship.m_x * e.m_x, ship.m_y * e.m_y, ship.J_z * e.J_z, e.hull
     if env.depth is not None:
         deep = shallow_water.depth_factors(env.depth, ship.L, ship.B, ship.T, ship.Cb)
         m_y, J_z, factors = m_y * deep.m_y, J_z * deep.J_z, factors * deep.hull
     X, Y, N = water_forces(ship, u_w, v_w, r, n / 60.0, delta, F_b, F_s, factors, e)
-    u_rw, v_rw = wind.apparent_wind(psi, u, v, env.wind_speed, env.wind_from)
-    X_W, Y_W, N_W = e.wind_on(*wind.blendermann(u_rw - e.air_u, v_rw - e.air_v, ship.A_F, ship.A_L, ship.L))
+    X_W, Y_W, N_W = e.wind_on(*wind.blendermann(u_rw, v_rw, ship.A_F, ship.A_L, ship.L))
     X, Y, N = X + X_W + e.X, Y + Y_W + e.Y, N + N_W + e.N
     m, x_G = ship.m * e.mass, ship.x_G + e.x_G
     du = (X + (m + m_y) * v_w * r + m * x_G * r * r) / (m + m_x)

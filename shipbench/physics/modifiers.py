@@ -33,19 +33,21 @@ class Flow(NamedTuple):
 class Modifiers:
     """Neutral as constructed: nothing is missing.
 
-    u_c, v_c: velocity of the water in body axes [m/s]. air_u, air_v: velocity of the air beyond the measured wind, body axes [m/s]; wind_X, wind_Y,
-    wind_N: factors of the wind's forces and moment; wind_lever: of its side force, to add [m]. delta: rudder angle to add [rad]; rudder: factor of
-    the rudder's lift; rudder_asymmetry a: factor 1 + a to starboard and 1 - a to port; stall: share of the lift lost beyond `stall_angle` [rad].
-    race, thrust: factors of the race's excess speed and of the thrust; straightening: factor of the sideways flow at the rudder, 1 + its asymmetry
-    where it comes from port (positive) and 1 - where from starboard; straightening_r: factor of its part by yaw alone; backing: share of the flow at
-    the rudder that a reversed propeller stops; wake: added to the wake fraction. bow, stern: factors of the thrusters; lever: shift of the bow
-    thruster [m]; loss: share of side force and moment lost at speed. mass, m_x, m_y, J_z: factors of the ship's mass (with its inertia), of added
-    mass in surge and sway and of added inertia in yaw; coupling: added mass between sway and yaw, to add [kg m]; x_G: shift of the centre of gravity
-    [m]. hull: factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship [N m] to add.
+    u_c, v_c: velocity of the water in body axes [m/s]; drift: share of the wind's velocity that the water has besides. air_u, air_v: velocity of the
+    air beyond the measured wind, body axes [m/s]; wind_X, wind_Y, wind_N: factors of the wind's forces and moment; wind_lever: of its side force, to
+    add [m]. delta: rudder angle to add [rad]; rudder: factor of the rudder's lift; rudder_asymmetry a: factor 1 + a to starboard and 1 - a to port;
+    stall: share of the lift lost beyond `stall_angle` [rad]. race, thrust: factors of the race's excess speed and of the thrust; straightening:
+    factor of the sideways flow at the rudder, 1 + its asymmetry where it comes from port (positive) and 1 - where from starboard; straightening_r:
+    factor of its part by yaw alone; backing: share of the flow at the rudder that a reversed propeller stops; wake: added to the wake fraction. bow,
+    stern: factors of the thrusters; lever: shift of the bow thruster [m]; loss: share of side force and moment lost at speed. mass, m_x, m_y, J_z:
+    factors of the ship's mass (with its inertia), of added mass in surge and sway and of added inertia in yaw; coupling: added mass between sway and
+    yaw, to add [kg m]; x_G: shift of the centre of gravity [m]. hull: factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship
+    [N m] to add.
     """
 
     u_c: Array = 0.0
     v_c: Array = 0.0
+    drift: Array = 0.0
     air_u: Array = 0.0
     air_v: Array = 0.0
     wind_X: Array = 1.0
@@ -86,6 +88,12 @@ class Modifiers:
     def push(self, X: Array = 0.0, Y: Array = 0.0, N: Array = 0.0) -> None:
         """Add a force [N] and a moment [N m] about midship."""
         self.X, self.Y, self.N = self.X + X, self.Y + Y, self.N + N
+
+    def water(self, air: tuple[Array, Array] | None, u: Array, v: Array) -> tuple[Array, Array]:
+        """Velocity of the water in body axes [m/s]; u, v over ground, `air` the same relative to the air, or None where nothing is known of it."""
+        if air is None or is_neutral(self.drift, 0.0):
+            return self.u_c, self.v_c
+        return self.u_c + self.drift * (u - air[0]), self.v_c + self.drift * (v - air[1])
 
     def wind_on(self, X: Array, Y: Array, N: Array) -> tuple[Array, Array, Array]:
         """The wind's force [N] and moment [N m] on this ship, from those on an ordinary superstructure."""

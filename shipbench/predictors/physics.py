@@ -51,13 +51,18 @@ class Physics(PredictorBase):
     Args:
         iterations: most Gauss-Newton steps of the fit.
         tolerance: relative decrease of the cost below which the fit stops.
+        piece: longest rollout in the fit [s], 0 for whole runs: runs are cut into pieces that each start from the measured state. Where gusts push
+            a ship, the end of a long rollout is their work and says little of the parameters.
     """
 
     iterations: int = 30
     tolerance: float = 1e-4
+    piece: float = 0.0
     name: ClassVar[str] = "physics"
 
     def __post_init__(self) -> None:
+        if not 0.0 <= self.piece < np.inf:
+            raise ValueError(f"piece = {self.piece}; accepted: 0 (whole runs), or a time in s")
         self.extension: Extension | None = None
         self.held: dict[int, str] = {}
 
@@ -92,7 +97,7 @@ class Physics(PredictorBase):
 
         data = train.merged(valid)
         self._set_ship(data.ship, data.inputs, data.dt, data.actuators == "commanded")
-        batch = data.batch()
+        batch = self._pieces(data).batch()
         asked, self.extension = self.extension, None
         if not self.commanded:
             self.actuator_params = fit_actuators(batch, self.dt)
@@ -104,6 +109,11 @@ class Physics(PredictorBase):
             raise WorkError(f"the physics fit of '{data.name}' found no finite rollouts; check units and signs with `shipbench data check`.")
         self.p, self.ci95, self.cost = result.p, result.ci95, result.cost
         return self
+
+    def _pieces(self, data: Dataset) -> Dataset:
+        """The runs, cut into pieces of `piece` seconds, or of the shortest run where that is shorter."""
+        steps = min(max(1, round(self.piece / data.dt)), min(len(r) for r in data.runs) - 1)
+        return data.windows(steps) if self.piece else data
 
     def _fit_effects(self, batch: Batch, base: Fit, asked: Extension) -> Fit:
         """Gears first where they are recorded, then everything else together, once for every setting of open shape parameters; the best is kept."""

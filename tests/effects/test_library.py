@@ -180,7 +180,7 @@ def test_no_size_leaves_the_record_as_it_is(name: str):
 
 
 @pytest.mark.parametrize("ship", SHIPS)
-@pytest.mark.parametrize("name", of("force"))
+@pytest.mark.parametrize("name", [name for name in of("force") if name != "wind_drift"])  # there is no wind here: see below
 def test_a_typical_size_is_felt(name: str, ship: str):
     effect = get(name)
     plain, moved = np.array(SHIPS[ship](flow(), None)), np.array(SHIPS[ship](flow(), effect, typical(effect)))
@@ -378,3 +378,43 @@ def test_wind_coefficients_scale_the_wind_alone():
     dN = C.m12_N * (other[1] - one[1]) + C.m22 * (other[2] - one[2])
     np.testing.assert_allclose(dY, -0.2 * Y, rtol=1e-6, atol=1e-3)
     np.testing.assert_allclose(dN, -N + 10.0 * Y, rtol=1e-6, atol=1e-1)
+
+
+def test_the_water_drifts_with_the_wind():
+    """In both ships: a drift of 2 % of the measured wind is the current of that size beside the same wind; without wind it is nothing."""
+    drift, current, s = get("wind_drift"), get("current"), flow()
+    speed, bearing = 8.0, 0.7
+    air = wind.apparent_wind(s.psi, s.u, s.v, speed, bearing)
+    towards = (-0.02 * speed * np.cos(bearing), -0.02 * speed * np.sin(bearing))
+    for effect, q in ((drift, (0.02,)), (current, towards)):
+        e = Modifiers()
+        effect.force(e, s, q, PARTICULARS)
+        one = eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, air, C, list(P), e)
+        env = mmg.Environment(wind_speed=speed, wind_from=bearing)
+        other = mmg.accelerations(CONTAINER, s.psi, s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, env, e)
+        if effect is drift:
+            wanted = one, other
+    np.testing.assert_allclose(one, wanted[0], rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(other, wanted[1], rtol=1e-9, atol=1e-15)
+    for ship in SHIPS.values():
+        np.testing.assert_allclose(ship(s, drift, (0.02,)), ship(s, None), rtol=1e-12, atol=1e-15)
+
+
+def test_going_astern_turns_the_moment_of_drift_over():
+    """At q = 1 the linear moment of drift is that of v u: ahead as it was, astern with its sign changed; alone, without rudder and yaw."""
+    effect, plain = get("going_astern"), np.zeros(11)
+    v, zero = np.array([0.3, 0.3, -0.3, -0.3]), np.zeros(4)
+    u = np.array([5.0, -5.0, 5.0, -5.0])
+    state = Flow(zero, zero, zero, zero, u, v, zero, zero, zero, zero, zero)
+
+    def sway_and_yaw(q: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+        e = Modifiers()
+        effect.force(e, state, q, PARTICULARS)
+        _, dv, dr = eq2.accelerations(u, v, zero, zero, zero, zero, zero, None, C, list(plain), e)
+        return C.m11 * dv + C.m12_Y * dr, C.m12_N * dv + C.m22 * dr
+
+    (Y, N), (Y_turned, N_turned) = sway_and_yaw((0.0, 0.0, 0.0, 0.0)), sway_and_yaw((1.0, 0.0, 0.0, 0.0))
+    np.testing.assert_allclose(N[0], N[1], rtol=1e-9)
+    np.testing.assert_allclose(N_turned[[0, 2]], N[[0, 2]], rtol=0.02)
+    np.testing.assert_allclose(N_turned[[1, 3]], -N[[1, 3]], rtol=0.02)
+    np.testing.assert_allclose(Y_turned, Y, rtol=1e-9)

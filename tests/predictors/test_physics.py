@@ -31,6 +31,18 @@ def _synthetic(harbour: Dataset, p: np.ndarray) -> Dataset:
     return harbour.with_runs(runs)
 
 
+def test_pieces_start_from_the_measured_state(harbour):
+    """Runs cut to 30 s give the fit of the data so cut; a piece as long as the runs changes nothing; a negative one is refused."""
+    few = harbour.subset(range(6))
+    whole = Physics().fit(few)
+    cut = Physics(piece=30.0).fit(few)
+    np.testing.assert_allclose(cut.p, Physics().fit(few.windows(round(30.0 / few.dt))).p, rtol=1e-9)
+    np.testing.assert_allclose(Physics(piece=1e4).fit(few).p, whole.p, rtol=1e-9)
+    assert np.max(np.abs(cut.p - whole.p) / (np.abs(whole.p) + 1e-9)) > 1e-3
+    with pytest.raises(ValueError, match="piece = -1"):
+        Physics(piece=-1.0)
+
+
 def test_known_actuators_are_recovered(fitted):
     """The rudder's rate limit is not asked for: these 16 runs never give it a step that reaches the limit."""
     T_n, rate_n, T_delta, _, T_F, _ = fitted.actuator_params
