@@ -82,6 +82,9 @@ def screen(fit: Fit, refine: int = 12) -> list[Score]:
     before, log_force, _ = evidence(only(gram, base), renumbered, fit.hyper.log_force)
     for place, i in enumerate(order):
         term = candidates[i]
+        if _wrong_way(term, scores[i].estimate):
+            scores[i] = replace(scores[i], score=min(scores[i].score, 0.0))
+            continue
         if place >= refine and not term.per_run:
             continue
         own = term.size if term.per_run else 0
@@ -89,6 +92,12 @@ def screen(fit: Fit, refine: int = 12) -> list[Score]:
         after, _, log_tau2 = evidence(only(gram, np.append(base, columns[i])), prior, log_force, own)
         scores[i] = replace(scores[i], score=2.0 * (after - before) - term.cost(fit.plant.seg.runs), log_tau2=log_tau2)
     return sorted(scores, key=lambda s: -s.score)
+
+
+def _wrong_way(term: Term, estimate: np.ndarray) -> bool:
+    """Whether the data ask for less than nothing of what only slows, delays or narrows: a quicker gear, water deeper than deep."""
+    (*others, last) = (p for p in term.effect.parameters if not p.shape)
+    return not others and not term.per_run and last.low >= 0.0 and float(estimate[0]) < 0.0
 
 
 def _score(fit: Fit, term: Term, at: np.ndarray, null: float, null_runs: np.ndarray, reduced: Reduced) -> Score:

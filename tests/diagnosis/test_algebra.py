@@ -11,6 +11,7 @@ from shipbench.diagnosis.fit import Origin, fit, start
 from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, log_determinant, ornstein_uhlenbeck, solve
 from shipbench.diagnosis.model import Linearisation, Scales, Term, predict
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.screen import _wrong_way
 from shipbench.diagnosis.settle import Model, settle
 from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS, flow_first
@@ -176,3 +177,12 @@ def test_a_fit_that_has_not_come_to_rest_is_charged_with_the_cost_it_has(plant):
     assert short.evidence < short.solution.log_evidence - 5.0
     assert long.excess < 1.0
     assert long.evidence > short.evidence
+
+
+@pytest.mark.parametrize(
+    ("name", "estimate", "wrong"),
+    [("rudder_lag", -0.2, True), ("rudder_lag", 0.2, False), ("shallow_water", -0.1, True), ("heading_bias", -0.2, False), ("rudder_delay", -0.2, False)],
+)
+def test_what_only_slows_or_narrows_is_no_candidate_for_the_contrary(name, estimate, wrong):
+    assert _wrong_way(Term(EFFECTS.get(name)), np.array([estimate])) == wrong
+    assert not _wrong_way(Term(EFFECTS.get("current")), np.array([estimate, estimate]))
