@@ -180,8 +180,9 @@ def _late_cause(rank: int, found: Analysis, late: LateVelocities) -> Cause:
     return Cause("velocity_delay", rank, late.score, _p(found, late.score), parameters, (), "", None, evidence)
 
 
-def describe_candidates(found: Analysis, named: Sequence[str]) -> list[Candidate]:
-    """Every effect of the library once, best first, with why it was not named and the smallest size that would have been."""
+def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -> list[Candidate]:
+    """Every effect of the library once, best first, with why it was not named and the smallest size that would have been; measured: whether held-out
+    gains were."""
     lines: dict[str, Candidate] = {}
     last = {s.term.label: s for s in reversed(found.selection.last)}
     refits = {s.term.label: s.score for s in sorted(found.selection.steps, key=lambda s: s.score)}
@@ -208,7 +209,7 @@ def describe_candidates(found: Analysis, named: Sequence[str]) -> list[Candidate
             )
     for name in EFFECTS.names():
         if name not in lines:
-            lines[name] = _not_screened(found, name, named)
+            lines[name] = _not_screened(found, name, named, measured)
     return sorted(lines.values(), key=lambda c: -c.score if np.isfinite(c.score) else np.inf)
 
 
@@ -246,13 +247,13 @@ def _detectable(found: Analysis, s: Score) -> dict[str, float]:
     return values
 
 
-def _not_screened(found: Analysis, name: str, named: Sequence[str]) -> Candidate:
+def _not_screened(found: Analysis, name: str, named: Sequence[str], measured: bool) -> Candidate:
     effect, plant = EFFECTS.get(name), found.final.plant
     if name in named:
         reason = "named"
     elif name == "hull_derivatives":
-        below = found.hull <= HULL_THRESHOLD
-        reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}" if below else "not shown to pay on held-out runs"
+        unpaid = "not shown to pay on held-out runs" if measured else "named only where it pays on held-out runs, which was not measured"
+        reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}" if found.hull <= HULL_THRESHOLD else unpaid
     elif name in NAMES and "velocity_delay" in named:
         reason = "the clocks of position and velocities were put right before the fit"
     elif name in WITHOUT_WIND and plant.seg.wind is not None:
@@ -265,6 +266,10 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str]) -> Candidate
         reason = "the thrusters are not used in these runs"
     elif not plant.seg.commanded and name in AS_RECORDED:
         reason = "this actuator is not commanded in these runs"
+    elif name in AS_RECORDED:
+        reason = "only commands are recorded: how fast the gears are is fitted"
+    elif name == "going_astern":
+        reason = f"not looked for; fit it with physics+{name}"
     else:
         reason = "not considered"
     score = found.hull if name == "hull_derivatives" else float("nan")

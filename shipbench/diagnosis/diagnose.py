@@ -63,15 +63,17 @@ def diagnose(
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     found = analyse(plant, only=only, seed=seed, cautious=cautious, settled=settled)
     doubts = _doubts(found) if only is None else []
-    warnings += doubts + left_out(found.selection.null.plant, [r.id for r in dataset.runs])
-    worth = _cross_validated(dataset, found, only, seed, workers, settled) if gain and not cautious and not doubts else Worth()
+    warnings += doubts + left_out(found.selection.null.plant, dataset.runs)
+    measured = gain and not cautious and not doubts
+    worth = _cross_validated(dataset, found, only, seed, workers, settled) if measured else Worth()
     causes = [] if doubts else describe_causes(found, units, late, worth.gain, worth.hull, [r.id for r in dataset.runs])
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)
     verdict = "unknown" if doubts or (found.unknown is not None and not units) else "found" if causes else "none"
     names = [c.effect for c in causes if c.effect not in NOT_A_MODEL]
     return Diagnosis(
-        dataset=dataset.name, verdict=verdict, causes=tuple(causes), candidates=tuple(describe_candidates(found, [c.effect for c in causes])),
+        dataset=dataset.name, verdict=verdict, causes=tuple(causes),
+        candidates=tuple(describe_candidates(found, [c.effect for c in causes], measured)),
         what_is_wrong=what_is_wrong(trace), unexplained_after=remaining(found), extended_model="+".join(["physics", *names]),
         fingerprint=dataset.fingerprint, seconds=time.perf_counter() - began, warnings=tuple(warnings), gain=worth.gain if causes else None,
         unknown=unknown_part(found), gain_per_run=worth.per_run if causes else (), trace=trace,

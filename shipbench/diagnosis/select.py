@@ -17,8 +17,9 @@ from .screen import Score, changes, overlap, screen
 from .settle import Fit, Model, evidence_with, settle
 from .strange import strange_pieces
 
-NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error", "going_astern")
-"""Found by their own tests (prior width of the hull, gated columns, kinematics), or what every ship does."""
+NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error", "going_astern", "rudder_rate_limit", "shaft_rate_limit")
+"""Found by their own tests (prior width of the hull, gated columns, kinematics, the record of the gears), or what every ship does. A limit has no
+slope where it does not act: where only commands are recorded, the rates of the gears are fitted instead."""
 AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft_rate_limit", "shaft_lag", "thruster_lag", "rudder_lag")
 """Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
 WITHOUT_WIND = ("wind", "wind_per_run")
@@ -234,7 +235,7 @@ def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -
     """Vectors and values of single runs that are worth a refit as seen from `origin`, where the model has not been fitted yet: in few or short runs
     in calm weather latent force and parameters take a current over so well that nothing is left of it where they rest."""
     terms = [t for t in now.candidates if t.effect.vector or t.per_run]
-    if not terms:
+    if not terms or np.isinf(threshold):
         return []
     at_rest = replace(origin.point, terms=now.model.terms, values=tuple(np.zeros_like(v) for v in now.values))
     lin = Linearisation(now.plant, now.scales, at_rest, origin.motion)

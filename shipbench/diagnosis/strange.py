@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..records import Run
 from .plant import Plant
 from .settle import Fit
 
@@ -30,14 +31,16 @@ def strange_pieces(found: Fit) -> np.ndarray:
     return order[worst[order] > _STRANGE]
 
 
-def left_out(plant: Plant, names: Sequence[str]) -> list[str]:
-    """What was left out of the fit, one line per piece; `names` of the runs."""
+def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
+    """What was left out of the fit, one line per piece, in the times of its run."""
     seg = plant.seg
     found = []
     for piece in np.flatnonzero(~seg.mask.any(axis=1)):
-        begins = seg.start[piece]
+        run = runs[seg.run[piece]]
+        begins = run.t[0] + seg.start[piece]
+        ends = min(begins + plant.steps * seg.dt, run.t[-1])
         found.append(
-            f"left out: run '{names[seg.run[piece]]}', {begins:g} to {begins + plant.steps * seg.dt:g} s; there the missing force is more than "
+            f"left out: run '{run.id}', {begins:g} to {ends:g} s; there the missing force is more than "
             f"{_STRANGE**0.5:.0f} times the ordinary one (ship held or pushed, or a record that jumps?)."
         )
     return found

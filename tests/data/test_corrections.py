@@ -36,7 +36,7 @@ def load(toy_folder) -> Callable[..., Dataset]:
     return read
 
 
-def same(a: Dataset, b: Dataset) -> None:
+def assert_same(a: Dataset, b: Dataset) -> None:
     for one, other in zip(a.runs, b.runs, strict=True):
         np.testing.assert_allclose(one.states, other.states, rtol=1e-9, atol=1e-9)
 
@@ -46,8 +46,8 @@ def east_north(t: pd.DataFrame) -> pd.DataFrame:
 
 
 def test_frames(load):
-    same(load('frame = "east-north"', east_north), load.clean)
-    same(load('frame = "ENU"', lambda t: east_north(t).assign(psi=np.pi / 2 - t["psi"])), load.clean)
+    assert_same(load('frame = "east-north"', east_north), load.clean)
+    assert_same(load('frame = "ENU"', lambda t: east_north(t).assign(psi=np.pi / 2 - t["psi"])), load.clean)
 
 
 def test_velocities_in_earth_axes(load):
@@ -55,8 +55,8 @@ def test_velocities_in_earth_axes(load):
         north, east = np.cos(t["psi"]) * t["u"] - np.sin(t["psi"]) * t["v"], np.sin(t["psi"]) * t["u"] + np.cos(t["psi"]) * t["v"]
         return t.assign(u=north, v=east)
 
-    same(load('velocities = "earth"', turned), load.clean)
-    same(load('velocities = "earth-east-north"', lambda t: turned(t).assign(u=turned(t)["v"], v=turned(t)["u"])), load.clean)
+    assert_same(load('velocities = "earth"', turned), load.clean)
+    assert_same(load('velocities = "earth-east-north"', lambda t: turned(t).assign(u=turned(t)["v"], v=turned(t)["u"])), load.clean)
 
 
 def test_a_current_of_all_runs_and_of_one(load):
@@ -71,7 +71,7 @@ def test_scale_bias_and_antenna(load):
         x, y = 5.0 * np.cos(t["psi"]) + 2.0 * np.sin(t["psi"]), 5.0 * np.sin(t["psi"]) - 2.0 * np.cos(t["psi"])
         return t.assign(u=1.1 * t["u"] + 0.2, x=t["x"] + x, y=t["y"] + y)
 
-    same(load("scale.u = 1.1\nbias.u = 0.2\nantenna = [5.0, -2.0]", change), load.clean)
+    assert_same(load("scale.u = 1.1\nbias.u = 0.2\nantenna = [5.0, -2.0]", change), load.clean)
 
 
 def test_the_bias_of_one_run_stands_for_that_of_all(load):

@@ -142,7 +142,7 @@ def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):
 
 def test_a_piece_in_which_the_ship_was_pushed_is_left_out_and_said_so(trials, monkeypatch):
     monkeypatch.setattr("shipbench.diagnosis.strange._ONE_IN", 20)  # a piece of 24; else it takes 100 of them
-    assert not left_out(null_fit(Plant.of(trials), Scales(Plant.of(trials))).plant, [r.id for r in trials.runs])
+    assert not left_out(null_fit(Plant.of(trials), Scales(Plant.of(trials))).plant, trials.runs)
     pushed, push = 4, np.arange(20.0)
     states = [run.states.copy() for run in trials.runs]
     states[pushed][80:100, R] += 1e-3 * push
@@ -150,7 +150,7 @@ def test_a_piece_in_which_the_ship_was_pushed_is_left_out_and_said_so(trials, mo
     states[pushed][100:, PSI] += 0.5 * 1e-3 * 20.0**2
     data = trials.with_runs([replace(run, states=S) for run, S in zip(trials.runs, states, strict=True)])
     found = null_fit(Plant.of(data), Scales(Plant.of(data)))
-    (line,) = left_out(found.plant, [r.id for r in data.runs])
+    (line,) = left_out(found.plant, data.runs)
     assert f"run '{trials.runs[pushed].id}', 60 to 120 s" in line
     assert found.excess < 5.0
 
