@@ -78,12 +78,13 @@ def shortfalls(rows: Sequence[Row]) -> list[str]:
 def render(rows: Sequence[Row], about: dict[str, Any]) -> str:
     """The page as text."""
     code, machine = about["code"], about["machine"]
-    ships = sorted({r["ship"].rsplit("-", 1)[0] for r in rows if r.get("ship")})
+    ships = sorted({r["ship"].rsplit("-", 1)[0] for r in rows if r.get("ship") and "published" not in r["kind"]})
     head = [
         "# Diagnosis: hidden causes, found or not", "",
         f"{len(rows)} sets of {about['runs']} runs of {about['samples']} samples, with sensor noise and gusts; ships: variants of",
         f"{', '.join(ships)} ({about['which']} ships). A cause is drawn (effect, size, sign, direction, ship) and hidden in data of the MMG",
-        "simulator, which differs in structure from the model that is fitted; sets of the kind `none-same` are made by the fitted model itself.",
+        "simulator, which differs in structure from the model that is fitted; sets of the kind `none-same` are made by the fitted model itself,",
+        "those with `published` by three ships of the literature in their authors' equations (Mariner, a tanker, S175 with heel).",
         "Any set is drawn again from (seed, kind, index).", "",
         f"- Command: `{about['command']}` (seed {about['seed']}, {about['per_effect']} draws of each effect and size)",
         f"- Code: shipbench {code['shipbench']}, source {code['source']}" + (f", {code['git']}" if code["git"] else ""),

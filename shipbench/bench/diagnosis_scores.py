@@ -172,6 +172,12 @@ def figures(rows: Sequence[Row]) -> list[Row]:
     lines.append(rate("two effects, one at least", pairs, lambda r: bool(set(r.get("truth", ())) & set(named(r)))))
     lines.append(rate("false alarms with the hull, same structure", same, alarm, "its hull differs by N(0, 0.2): naming it is right"))
     lines.append(rate("false alarms with the hull, other structure", other, alarm, "its hull truly differs: naming it is right"))
+    published, calm = kinds.get("published", []), kinds.get("none-published", [])
+    lines.append(rate("first-named cause right, ships of the literature", published, lambda r: right(r, True), "typical size"))
+    lines.append(rate("right class, ships of the literature", published, lambda r: right_class(r, True), "typical size"))
+    lines.append(
+        rate("alarms or unknown, ships of the literature", calm, lambda r: alarm(r, True) or says_unknown(r), "hull_derivatives not counted")
+    )
     lines.append(rate("outside: says unknown", kinds.get("outside", []), says_unknown))
     lines.append(rate("outside: a wrong name", kinds.get("outside", []), lambda r: bool(named(r, True))))
     lines.append(rate("change_point named", kinds.get("change", []), lambda r: right(r, True)))

@@ -1,6 +1,7 @@
 """The hidden sets that the diagnosis is judged on: effect, size, sign, ship and seed are drawn; any case is rebuilt from (seed, kind, index).
 
-Data always come from the MMG simulator, never from the fitted model; `none-same` alone is made by the fitted model, to count false alarms on it.
+Data come from the MMG simulator or from ships of the literature in their own equations (kinds with `published`), never from the fitted model;
+`none-same` alone is made by the fitted model, to count false alarms on it.
 """
 
 from __future__ import annotations
@@ -21,12 +22,13 @@ from ..signals import DELTA, PSI, N, R, U, V
 from ..simulate.fitted_ship import fitted_trials
 from ..simulate.hidden import Hidden
 from ..simulate.manoeuvres import self_propulsion_rpm
+from ..simulate.published import PUBLISHED, Published, published_trials
 from ..simulate.simulator import Simulator
 from ..simulate.trials import CRUISE, Trials, sea_trials
 from .case_ships import WHICH, draw_ship
 from .outside import OUTSIDE, Outside
 
-KINDS = ("single", "pair", "none-same", "none-other", "outside", "change", "unit")
+KINDS = ("single", "pair", "none-same", "none-other", "outside", "change", "unit", "published", "none-published")
 SIZES = (1.0, 0.3)
 OWN_KINDS = frozenset({"change_point", "going_astern", "unit_or_sign_error", "wind_coefficients", "wind_drift"})
 ONE_SIDED = frozenset(
@@ -39,6 +41,12 @@ ONE_SIDED = frozenset(
 
 _NOT_CHANGING = frozenset({"hull_derivatives", "bank_suction", "propeller_walk_astern"})
 """No change is made of these, nor of gears, thrusters and per-run effects: they act in few runs, and the first changed one might show nothing."""
+
+ON_PUBLISHED = (
+    "current", "wind", "rudder_offset", "propeller_walk", "thrust_gain", "rudder_rate_limit", "rudder_delay", "shaft_lag", "antenna_offset",
+    "heading_bias", "speed_scale", "yaw_rate_bias", "position_delay", "velocity_delay", "current_per_run", "wind_per_run",
+)  # fmt: skip
+"""What is hidden in published ships: causes that mean something whatever a ship's equations are."""
 
 _RATES = {"rudder_rate_limit": "rate_delta", "shaft_rate_limit": "rate_n"}
 
@@ -62,7 +70,7 @@ class Case:
     index: int
     seed: int
     which: str
-    ship: MMGShip
+    ship: MMGShip | Published
     effects: tuple[Hidden, ...] = ()
     truth: tuple[str, ...] = ()
     size: tuple[float, ...] = ()
@@ -81,7 +89,9 @@ class Case:
 
     def dataset(self) -> Dataset:
         """Sail and record it; nothing in the data set says what was hidden."""
-        if self.kind == "none-same":
+        if isinstance(self.ship, Published):
+            data = published_trials(self.ship, self.data_seed, self.effects, self.plan)
+        elif self.kind == "none-same":
             data = fitted_trials(self.ship, self.data_seed, self.plan)
         else:
             data = sea_trials(self.ship, self.data_seed, self.effects, self.plan)
@@ -119,6 +129,8 @@ def count(kind: str, per_effect: int) -> int:
         "outside": len(OUTSIDE),
         "change": 6,
         "unit": len(UNITS),
+        "published": len(PUBLISHED) * len(ON_PUBLISHED),
+        "none-published": 8 * len(PUBLISHED),
     }
     return per_effect * each[kind]
 
@@ -136,7 +148,7 @@ def draw_case(kind: str, index: int, seed: int, which: str = "test", plan: Trial
     rng, plan = _generator(seed, kind, index, which, 0), plan or Trials()
     names, sizes = _names(kind, index, rng)
     thrusters = any(EFFECTS.get(name).family == "thruster" for name in names)
-    ship = draw_ship(rng, which, thrusters)
+    ship: MMGShip | Published = list(PUBLISHED.values())[index % len(PUBLISHED)] if "published" in kind else draw_ship(rng, which, thrusters)
     case = Case(kind, index, seed, which, ship, plan=plan)
     if kind == "outside":
         return _outside(case, rng)
@@ -152,7 +164,7 @@ def draw_case(kind: str, index: int, seed: int, which: str = "test", plan: Trial
     return replace(case, effects=hidden, truth=tuple(names), size=tuple(sizes))
 
 
-def draw_hidden(rng: np.random.Generator, effect: Effect, ship: MMGShip, size: float, case: Case) -> Hidden:
+def draw_hidden(rng: np.random.Generator, effect: Effect, ship: MMGShip | Published, size: float, case: Case) -> Hidden:
     """Values of an effect at `size` times its typical size: random sign where both have a meaning, random direction, per run N(0, typical)."""
     parameters, runs = effect.sized(ship.L), case.plan.runs
     if effect.per_run:
@@ -166,6 +178,7 @@ def draw_hidden(rng: np.random.Generator, effect: Effect, ship: MMGShip, size: f
         own = getattr(ship.actuators, _RATES[effect.name]) * (60.0 if effect.name == "shaft_rate_limit" else 1.0)
         return Hidden(effect, (1.0 / (1.0 / own + size * max(1.0 / parameters[0].typical - 1.0 / own, 0.5 / own)),))
     if effect.name == "bank_suction":
+        assert isinstance(ship, MMGShip)
         return _bank(rng, effect, ship, size, case)
     q = []
     for p in parameters:
@@ -198,6 +211,8 @@ def _names(kind: str, index: int, rng: np.random.Generator) -> tuple[list[str], 
     names = singles()
     if kind == "single":
         return [names[index % len(names)]], [SIZES[index // len(names) % len(SIZES)]]
+    if kind == "published":
+        return [ON_PUBLISHED[index // len(PUBLISHED) % len(ON_PUBLISHED)]], [1.0]
     if kind == "pair":
         able = [name for name in names if name != "hull_derivatives"]  # another hull is in every set already
         first = str(rng.choice(able))
@@ -225,6 +240,7 @@ def _bank(rng: np.random.Generator, effect: Effect, ship: MMGShip, size: float, 
 
 
 def _outside(case: Case, rng: np.random.Generator) -> Case:
+    assert isinstance(case.ship, MMGShip)
     cause = OUTSIDE[case.index % len(OUTSIDE)]
     scale = (case.ship.L / 130.0) ** 0.5
     products = len(cause.variables) == 2

@@ -11,11 +11,10 @@ from ..effects.base import EFFECTS
 from ..errors import WorkError
 from ..ops import Array
 from ..physics import eq2, wind
-from ..physics.mmg import MMGShip
 from ..physics.modifiers import Flow, Modifiers
 from ..records import Dataset
 from ..ship import Particulars, complete
-from .hidden import Hidden, actuator_paths, integrate
+from .hidden import Hidden, Vessel, actuator_paths, integrate
 from .trials import CRUISE, Trials, draw_sailing, write_down
 
 HULL_SPREAD = 0.2
@@ -79,7 +78,7 @@ def _gusts(rng: np.random.Generator, runs: int, steps: int, dt: float, size: np.
     return size * out
 
 
-def fitted_trials(ship: MMGShip, seed: int, plan: Trials | None = None, name: str = "trials") -> Dataset:
+def fitted_trials(ship: Vessel, seed: int, plan: Trials | None = None, name: str = "trials") -> Dataset:
     """Trials of eq. (2) on the particulars and actuators of `ship`: same orders, sensors and size of gusts as `sea_trials`.
 
     A drawn hull that spins (|r| L over the speed beyond 1.5) is drawn again.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -11,9 +12,22 @@ from ..effects.base import Effect, flow_first
 from ..integrate import kinematics, rk4_step
 from ..ops import Array
 from ..physics.actuators import Gear, gear_path
-from ..physics.mmg import CALM, Environment, MMGShip, accelerations
+from ..physics.mmg import CALM, Environment, MMGActuators, MMGShip, accelerations
 from ..physics.modifiers import Flow, Modifiers
-from ..ship import complete
+from ..ship import Ship, complete
+
+
+class Vessel(Protocol):
+    """What can be sailed in trials."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def L(self) -> float: ...
+    @property
+    def particulars(self) -> Ship: ...
+    @property
+    def actuators(self) -> MMGActuators: ...
 
 
 @dataclass(frozen=True)
@@ -24,7 +38,7 @@ class Hidden:
     q: tuple[Array, ...]
 
 
-def gears_of(ship: MMGShip, hidden: Sequence[Hidden]) -> dict[str, Gear]:
+def gears_of(ship: Vessel, hidden: Sequence[Hidden]) -> dict[str, Gear]:
     """Gears of shaft [rpm], rudder [rad] and thrusters [N], as built and then as the hidden effects leave them."""
     a = ship.actuators
     gears = {"n": Gear(a.T_n, 60.0 * a.rate_n), "delta": Gear(a.T_delta, a.rate_delta), "F": Gear(a.T_F, a.rate_F)}
@@ -33,7 +47,7 @@ def gears_of(ship: MMGShip, hidden: Sequence[Hidden]) -> dict[str, Gear]:
     return gears
 
 
-def actuator_paths(ship: MMGShip, s0: np.ndarray, U: np.ndarray, dt: float, num: int, hidden: Sequence[Hidden] = ()) -> np.ndarray:
+def actuator_paths(ship: Vessel, s0: np.ndarray, U: np.ndarray, dt: float, num: int, hidden: Sequence[Hidden] = ()) -> np.ndarray:
     """Actuators (runs, 2 K num + 1, 4) under commands U (runs, K, 4), at the ends and the middle of `num` integration steps per sample."""
     gears, limit = gears_of(ship, hidden), ship.particulars.thrusters.max_force if ship.particulars.thrusters else 0.0
     command = [U[..., 0], np.clip(U[..., 1], -ship.actuators.delta_max, ship.actuators.delta_max)]

@@ -10,7 +10,7 @@ import numpy as np
 from ..physics.mmg import MMGShip
 from ..records import Dataset, Run
 from ..signals import COMMANDS
-from .hidden import Hidden, record, sail
+from .hidden import Hidden, Vessel, record, sail
 from .manoeuvres import self_propulsion_rpm
 from .simulator import Simulator
 
@@ -36,7 +36,7 @@ class Trials:
     thrusters: bool = True
 
 
-def draw_commands(rng: np.random.Generator, ship: MMGShip, speed: np.ndarray, rpm: np.ndarray, steps: int, dt: float, plan: Trials) -> np.ndarray:
+def draw_commands(rng: np.random.Generator, ship: Vessel, speed: np.ndarray, rpm: np.ndarray, steps: int, dt: float, plan: Trials) -> np.ndarray:
     """Commands (runs, steps, 4): a third of the runs zig-zags by the clock, a third turns, a third random steps; engine orders in half of them."""
     num, scale = len(speed), (ship.L / 130.0) ** 0.5
     U, t = np.zeros((num, steps, 4)), np.arange(steps) * dt / scale
@@ -90,29 +90,30 @@ class Sailing:
         return 0.5 * min(1.0, self.scale)
 
 
-def draw_sailing(rng: np.random.Generator, ship: MMGShip, plan: Trials, rpm: float | None = None) -> Sailing:
-    """Places, speeds and commands of `plan`; `rpm` holds the cruising speed 4.5 m/s (at 130 m; default: that of the MMG ship).
+def draw_sailing(
+    rng: np.random.Generator, ship: Vessel, plan: Trials, rpm: float, cruise: float | None = None, ratios: tuple[float, float] = (0.45, 1.25)
+) -> Sailing:
+    """Places, speeds and commands of `plan`; `rpm` holds the cruising speed (default 4.5 m/s at 130 m), runs begin at `ratios` of it.
 
     One sample per second at 130 m, less for much smaller ships.
     """
     scale = (ship.L / 130.0) ** 0.5
     dt = float(f"{scale:.2g}") if scale < 0.5 else 1.0
-    cruise = CRUISE * scale
-    base = self_propulsion_rpm(Simulator(ship), cruise) if rpm is None else rpm
-    ratio = rng.uniform(0.45, 1.25, plan.runs)
+    cruise = CRUISE * scale if cruise is None else cruise
+    ratio = rng.uniform(*ratios, plan.runs)
     s0 = np.zeros((plan.runs, 10))
     s0[:, :2] = rng.uniform(-600.0, 600.0, (plan.runs, 2)) * ship.L / 130.0
-    s0[:, 2], s0[:, 3], s0[:, 6] = rng.uniform(-np.pi, np.pi, plan.runs), cruise * ratio, base * ratio
+    s0[:, 2], s0[:, 3], s0[:, 6] = rng.uniform(-np.pi, np.pi, plan.runs), cruise * ratio, rpm * ratio
     U = np.zeros((plan.runs, plan.samples + _WARM_UP, 4))
-    U[..., 0] = (base * ratio)[:, None]
-    U[:, _WARM_UP:] = draw_commands(rng, ship, s0[:, 3], base * ratio, plan.samples, dt, plan)
+    U[..., 0] = (rpm * ratio)[:, None]
+    U[:, _WARM_UP:] = draw_commands(rng, ship, s0[:, 3], rpm * ratio, plan.samples, dt, plan)
     # in the warm-up a pilot keeps the heading roughly: small random helm
     U[:, :_WARM_UP, 1] = np.repeat(np.deg2rad(rng.uniform(-4.0, 4.0, (plan.runs, _WARM_UP // 15))), 15, axis=1)
     return Sailing(scale, dt, s0, U)
 
 
 def write_down(
-    ship: MMGShip, sailing: Sailing, S: np.ndarray, hidden: Sequence[Hidden], plan: Trials, rng: np.random.Generator, name: str, source: str
+    ship: Vessel, sailing: Sailing, S: np.ndarray, hidden: Sequence[Hidden], plan: Trials, rng: np.random.Generator, name: str, source: str
 ) -> Dataset:
     """The data set of the true states S (runs, steps + 1, 10): the warm-up cut off, the sensors' faults and noise added."""
     noise = plan.noise * NOISE * (ship.L / 130.0) ** _FROUDE
@@ -133,7 +134,7 @@ def sea_trials(
     """
     plan = plan or Trials()
     rng = np.random.default_rng(seed)
-    sailing = draw_sailing(rng, ship, plan)
+    sailing = draw_sailing(rng, ship, plan, self_propulsion_rpm(Simulator(ship), CRUISE * (ship.L / 130.0) ** 0.5))
     scale, dt = sailing.scale, sailing.dt
     wind = gusts(rng, plan.runs, sailing.U.shape[1], dt, plan.gusts * scale, 20.0 * scale) if plan.gusts else None
     S = sail(ship, sailing.s0, sailing.U, dt, hidden, wind, max_step=sailing.max_step)
