@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,10 +11,10 @@ from ..physics.actuators import Gear
 from .gain import Extension
 from .gears import GearFinding, find_in_gears
 from .generic import Dependence, dependences
-from .model import Linearisation, Scales
+from .model import Scales
 from .plant import Plant
 from .select import Selection, candidates_for, null_fit, select
-from .settle import Fit, settle
+from .settle import Fit, hull_evidence
 
 THRESHOLD = 10.0
 """Least gain of a named cause, 2 log Bayes factor. From nulls on the development ships, whose structure differs from the model's; the bootstrap of
@@ -26,7 +26,6 @@ _GENERIC_OWN = {"revolutions and rudder": 30.0, "heading": 18.0, "time": 18.0, "
 GENERIC_MARGIN = 10.0
 _HULL_ALONE = ("speed", "sway velocity", "yaw rate")
 """A force that follows nothing but the hull's own motion is the hull's: where its derivatives are off, it is no unknown cause."""
-_NARROW = 0.1
 
 
 @dataclass(frozen=True)
@@ -113,14 +112,6 @@ def _unknown(selection: Selection, gears: Sequence[GearFinding], after: Sequence
     if left and first and first[0].score > best + GENERIC_MARGIN:
         return first[0]
     return None
-
-
-def hull_evidence(fit: Fit) -> float:
-    """2 log evidence for a hull that lies off the regressions by the usual 30 %, against one that lies within 3 %."""
-    lin = Linearisation(fit.plant, fit.scales, fit.point, fit.motion)
-    wide = settle(lin, fit.model, fit.hyper, fit.log_tau2)
-    narrow = settle(lin, replace(fit.model, hull=_NARROW), fit.hyper, fit.log_tau2)
-    return 2.0 * (wide.solution.log_evidence - narrow.solution.log_evidence)
 
 
 def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:

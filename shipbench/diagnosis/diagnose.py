@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
 
 import numpy as np
 
 from ..checking.units import check_units, corrected
+from ..effects.base import EFFECTS
 from ..errors import InputError
 from ..records import Dataset
 from .analysis import HULL_THRESHOLD, Analysis, analyse, causes_of
@@ -66,10 +67,13 @@ def diagnose(
     warnings += doubts + left_out(found.selection.null.plant, dataset.runs)
     measured = gain and not cautious and not doubts
     worth = _cross_validated(dataset, found, only, seed, workers, settled) if measured else Worth()
-    causes = [] if doubts else describe_causes(found, units, late, worth.gain, worth.hull, [r.id for r in dataset.runs])
+    causes = describe_causes(found, units, late, worth.gain, worth.hull, [r.id for r in dataset.runs])
+    if doubts:  # faults of sensors show in the kinematics, whatever the ship
+        causes = [replace(c, rank=i + 1) for i, c in enumerate(c for c in causes if EFFECTS.get(c.effect).family == "sensor")]
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)
-    verdict = "unknown" if doubts or (found.unknown is not None and not units) else "found" if causes else "none"
+    unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
+    verdict = "unknown" if unknown else "found" if causes else "none"
     names = [c.effect for c in causes if c.effect not in NOT_A_MODEL]
     return Diagnosis(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes),
@@ -126,8 +130,8 @@ def _doubts(found: Analysis) -> list[str]:
         return []
     text = "; ".join(signs)
     return [
-        f"{text}. Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)? Nothing is named until that is sure; "
-        "the candidates below are ranked as if it were."
+        f"{text}. Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)? Until that is sure, nothing is named but "
+        "faults of sensors, which show in the kinematics; the candidates below are ranked as if it were."
     ]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from .gram import ETA_PRECISION, Gram, Hyper, Prior, Products, Reduced, Solution
 from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, Term
 from .plant import NUM_HULL, Plant
 
-_EM_CYCLES = 3
+_EM_CYCLES, _NARROW = 3, 0.1
 _LOG_FLOOR = np.log(0.1**2)
 """A channel is never taken for better than a tenth of an ordinary sensor, else the latent force follows its noise."""
 
@@ -211,6 +211,14 @@ def evidence_with(found: Fit, colour: Colour) -> float:
     products = products_of(found.plant, scales, found.point, found.columns).without(more)
     hyper, log_tau2 = _variances(products, found.model, found.hyper, found.log_tau2, 1)
     return solve(products.weigh(hyper).reduce(hyper.log_force), found.model.prior(log_tau2)).log_evidence
+
+
+def hull_evidence(found: Fit) -> float:
+    """2 log evidence for a hull that lies off the regressions by the usual 30 %, against one that lies within 3 %."""
+    lin = Linearisation(found.plant, found.scales, found.point, found.motion)
+    wide = settle(lin, found.model, found.hyper, found.log_tau2)
+    narrow = settle(lin, replace(found.model, hull=_NARROW), found.hyper, found.log_tau2)
+    return 2.0 * (wide.solution.log_evidence - narrow.solution.log_evidence)
 
 
 def _variances(

@@ -82,7 +82,7 @@ def _mariner(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, pu
     u, v, r, d = (motion[0] - _SERVICE) / U, motion[1] / U, motion[2] * L / U, -delta
     q = 0.5 * 1025.0 * L * L * U * U
     X, Y, N = (1e-5 * _sum(_MARINER[axis], u=u, v=v, r=r, d=d) for axis in "XYN")
-    X = X + (thrust - 1.0) * 92e-5 * _SERVICE**2 / U**2
+    X = X + (thrust - 1.0) * 57e-5 * _SERVICE**2 / U**2
     X, Y, N = X + push[0] / q, Y + push[1] / q, N + push[2] / (q * L)
     m22, m23, m32, m33 = m + 748e-5, m * x_G + 9.354e-5, m * x_G - 4.646e-5, I_z + 43.8e-5
     det = m22 * m33 - m23 * m32
@@ -151,9 +151,9 @@ def _ordinary(L: float) -> MMGActuators:
 PUBLISHED = {
     "mariner": Published(
         "mariner",
-        Ship(name="Mariner", L=160.93, B=23.17, T=8.23, displacement=18541.0, propeller=Propeller(diameter=6.7), rudder=Rudder(area=30.0),
+        Ship(name="Mariner", L=160.93, B=23.17, T=8.23, displacement=16_630.0, propeller=Propeller(diameter=6.7), rudder=Rudder(area=30.0),
              wind=Wind(frontal_area=450.0, lateral_area=1800.0)),
-        _ordinary(160.93), _SERVICE, (0.8, 1.1), _mariner, rpm=90.0,
+        _ordinary(160.93), _SERVICE, (0.8, 1.1), _mariner, rpm=73.0,
     ),
     "tanker": Published(
         "tanker",
@@ -169,7 +169,8 @@ PUBLISHED = {
         _ordinary(175.0), 7.0, (0.45, 1.25), _s175, more=2,
     ),
 }  # fmt: skip
-"""By name. Diameter and rudder area of mariner and tanker, and areas above water, are round figures for ships of their kind."""
+"""By name; displacement as in the equations. Diameter and rudder area of mariner and tanker, and areas above water, are round figures for ships of
+their kind."""
 
 
 def rpm_at(ship: Published, speed: float) -> float:

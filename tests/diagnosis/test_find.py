@@ -136,6 +136,13 @@ def test_a_ship_file_of_another_ship_names_nothing():
     assert verdict.verdict == "unknown"
 
 
+def test_a_fault_of_a_sensor_is_named_whatever_ship_the_file_describes():
+    trials = published_trials(PUBLISHED["tanker"], 7, (Hidden(EFFECTS.get("speed_scale"), (0.05,)),), Trials(runs=16, samples=100))
+    verdict = diagnose(replace(trials, ship=PUBLISHED["s175"].particulars), gain=False)
+    assert "Is the ship file that of this ship" in verdict.warnings[0]
+    assert [c.effect for c in verdict.causes] == ["speed_scale"]
+
+
 def test_too_few_runs_rank_candidates_but_name_none():
     verdict = diagnose(_trials(Hidden(EFFECTS.get("heading_bias"), (0.05,)), runs=1), gain=False)
     assert verdict.verdict == "none"
