@@ -12,7 +12,8 @@ from ..effects.base import Effect, flow_first
 from ..ops import Array
 from ..predictors._physics_fit import parameter_scale
 from .colour import Colour
-from .plant import HULL, NUM_HULL, Active, Plant
+from .plant import HULL, NUM_HULL, Plant
+from .rolling import Active
 from .structure import STRUCTURE
 
 FREE = (1, 2, 5, 7, 8, 10)
@@ -162,8 +163,7 @@ class Linearisation:
         w = plant.hat @ (scales.w * point.w)
         x0 = plant.seg.states[:, 0, :6] + scales.eta * point.eta
         self.motion = plant.roll(x0, self.p, [*flow_first(self.forces), *self.ship], w, self.path) if guess is None else guess
-        w = np.swapaxes(w, 0, 1)
-        self.push = (w[:-1], w[1:])
+        self.push = plant.pushes(w)
         self.states = np.swapaxes(self.motion[:, :-1], 0, 1)[None]
         self.here = self._steps()[0]
         moved = self._steps(states=self.states + _STEP * np.eye(6)[:, None, None, :] * scales.eta) - self.here
@@ -210,10 +210,12 @@ class Linearisation:
         active = [*flow_first(self.forces if forces is None else forces), *self.ship]
         return self.plant.steps_from(self.states if states is None else states, self.p, active, self.push, self.path if path is None else path)
 
-    def _rates(self, p: Sequence[Array] | None = None, ship: Sequence[Active] | None = None, forces: Sequence[Active] | None = None) -> np.ndarray:
+    def _rates(
+        self, p: Sequence[Array] | None = None, ship: Sequence[Active] | None = None, forces: Sequence[Active] | None = None, often: bool = True
+    ) -> np.ndarray:
         """Accelerations (D, K, B, 3) in the middle of all single steps with something changed."""
         active = [*flow_first(self.forces if forces is None else forces), *(self.ship if ship is None else ship)]
-        return self.plant.rates_from(self.middle, self.p if p is None else p, active, self.path)
+        return self.plant.rates_from(self.middle, self.p if p is None else p, active, self.path, often)
 
     def _ends(self, rates: np.ndarray) -> np.ndarray:
         """Changes of the steps' ends (D, K, B, 6) by changes of the acceleration (D, K, B, 3): one evaluation of the forces instead of the four of a
@@ -282,7 +284,7 @@ class Linearisation:
 
     def _rates_with(self, term: Term, q: Sequence[np.ndarray], side: float) -> np.ndarray:
         """Accelerations in the middle of all single steps with a force that is not in the model."""
-        return self._rates(forces=[*self.forces, Active(term.effect, (*(side * v for v in q), *term.setting))])
+        return self._rates(forces=[*self.forces, Active(term.effect, (*(side * v for v in q), *term.setting))], often=False)
 
     def _moved(self, index: int | None, term: Term, steps: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Columns (B, T, size) of one term, the index-th of the model or one that is not in it, and its sources where it touches the motion."""
