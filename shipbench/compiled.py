@@ -185,12 +185,12 @@ class Lanes:
         self._compiled = compiled
 
     def __call__(self, given: Sequence[np.ndarray], shape: tuple[int, int, int, int], out: np.ndarray, carried: bool = False) -> None:
-        """Write `out` (D, K, B, num) from bundles that spread over (D, K, B, S, size), shape = (D, K, B, S)."""
+        """Write `out` (D, K, B, num) from bundles that spread over (D, K, B, S, size), shape = (D, K, B, S); (D, 1, B, num) keeps the last of K."""
         spread = [np.broadcast_to(np.asarray(a, dtype=float), (*shape, size)) for a, size in zip(given, self.sizes, strict=True)]
-        if out.shape != (*shape[:3], self.num) or out.dtype != float:
+        if out.shape not in ((*shape[:3], self.num), (shape[0], 1, shape[2], self.num)) or out.dtype != float:
             raise ValueError(f"out: {out.dtype} {out.shape}; accepted: float64 {(*shape[:3], self.num)}")
         pointers = np.array([a.ctypes.data for a in spread], dtype=np.uintp)
-        by = np.array([[s // 8 for s in a.strides] for a in (*spread, out[..., None])], dtype=np.int64)
+        by = np.array([[s // 8 for s in a.strides] for a in (*spread, np.broadcast_to(out, (*shape[:3], self.num))[..., None])], dtype=np.int64)
         size = np.array(shape, dtype=np.int64)
         self._compiled(size.ctypes.data, carried, pointers.ctypes.data, by.ctypes.data, out.ctypes.data, by[-1].ctypes.data)
 
