@@ -117,7 +117,7 @@ class Course:
     def _evaluated(self, code: Lanes, num: int, bundles: Sequence[np.ndarray]) -> np.ndarray:
         """(D, K, B, num); D is that of the states or of the values."""
         D = max(a.shape[0] for a in bundles[:2] if a.ndim == 5)
-        out = np.empty((D, *self.t.shape[:2], num))
+        out = np.moveaxis(np.empty((*self.t.shape[:2], num, D)), -1, 0)  # as matrices over the directions, which sensitivities are
         code(bundles, (*out.shape[:3], bundles[3].shape[2]), out)
         return out
 
