@@ -253,6 +253,11 @@ def _compiler() -> tuple[tuple[str, ...], str]:
     return command, "\n".join([found, platform.machine(), platform.libc_ver()[1], flags])
 
 
+def c_function(code: str, name: str, arguments: Sequence[Any]) -> Callable[..., Any] | None:
+    """A C function of other code that treats vectors `v` of W numbers, with what the code above has; None where there is no compiler."""
+    return _machine_code(_HEAD + code, name, arguments)
+
+
 def _machine_code(source: str | None, function: str, arguments: Sequence[Any]) -> Callable[..., Any] | None:
     """The C function of `source`, compiled or taken from the cache folder; None where that cannot be done."""
     command, machine = _compiler()

@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .inverse import inverses, log_determinant
+
 ETA_PRECISION = 1e-4
 """Weak: an initial state may lie 100 units of noise away from its first sample."""
 
@@ -80,15 +82,6 @@ def ornstein_uhlenbeck(knots: int, spacing: float, tau: float) -> tuple[np.ndarr
     return np.linalg.inv(K), float(np.linalg.slogdet(K)[1])
 
 
-def log_determinant(A: np.ndarray) -> np.ndarray:
-    """Of positive definite matrices (..., n, n): half the work of a decomposition that must pivot, which is left for matrices that are only nearly so
-    (sensitivities of a trajectory that blows up)."""
-    try:
-        return 2.0 * np.log(np.diagonal(np.linalg.cholesky(A), axis1=-2, axis2=-1)).sum(axis=-1)
-    except np.linalg.LinAlgError:
-        return np.linalg.slogdet(A)[1]
-
-
 def by_run(values: np.ndarray, run: np.ndarray) -> np.ndarray:
     """Sums (N, ...) over the segments of every run, which stand in the order of their runs (`np.add.reduceat`, but quick for matrices)."""
     first = np.flatnonzero(np.diff(run, prepend=-1))
@@ -128,10 +121,10 @@ class Gram:
         """Integrate eta and w out of every segment and sum over the segments of a run."""
         Z = self.latent
         A = self.G[:, :Z, :Z] + self.precision(log_force)
-        inverse = np.linalg.inv(A)
+        inverse, logdet = inverses(A)
         solved = inverse @ self.G[:, :Z, Z:]
         S = self.G[:, Z:, Z:] - np.swapaxes(self.G[:, :Z, Z:], 1, 2) @ solved
-        logdet = log_determinant(A) + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
+        logdet = logdet + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
         return Reduced(by_run(S, self.run), by_run(logdet, self.run), inverse, solved)
 
 

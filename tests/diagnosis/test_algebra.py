@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.fit import Origin, fit, start
-from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, by_run, log_determinant, ornstein_uhlenbeck, solve
+from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, by_run, ornstein_uhlenbeck, solve
+from shipbench.diagnosis.inverse import inverses, log_determinant
 from shipbench.diagnosis.model import Linearisation, Scales, Term, predict
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import _wrong_way
@@ -188,6 +189,18 @@ def test_log_determinants_of_sound_and_of_blown_up_matrices():
     with pytest.raises(np.linalg.LinAlgError):
         np.linalg.cholesky(blown)
     assert np.isfinite(log_determinant(blown)).all()
+    np.testing.assert_array_equal(inverses(blown)[0], np.linalg.inv(blown))
+
+
+@pytest.mark.parametrize(("count", "size"), [(1, 1), (8, 5), (19, 40)])
+def test_inverses_of_many_matrices_are_those_of_each(count, size):
+    J = np.random.default_rng(size).standard_normal((count, 2 * size, size)) * np.logspace(-4, 4, size)
+    A = np.swapaxes(J, 1, 2) @ J
+    inverse, logdet = inverses(A)
+    unit = np.sqrt(np.diagonal(A, axis1=1, axis2=2))  # columns of very different sizes
+    expected = np.linalg.inv(A / unit[:, :, None] / unit[:, None, :])
+    np.testing.assert_allclose(inverse * unit[:, :, None] * unit[:, None, :], expected, atol=1e-9)
+    np.testing.assert_allclose(logdet, np.linalg.slogdet(A)[1], rtol=1e-10)
 
 
 def test_a_fit_that_has_not_come_to_rest_is_charged_with_the_cost_it_has(plant):
