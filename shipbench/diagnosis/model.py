@@ -180,16 +180,19 @@ class Linearisation:
 
     def columns(self, candidates: Sequence[Term] = ()) -> Columns:
         """All sensitivities."""
-        scales = self.scales
-        p, ship = parameters(scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, None, :])
-        self.base_sources = self._ends((self._rates(p=p, ship=ship) - self.rates) / _STEP)
+        base, own = self.parameter_columns()
         self.pulses = self._pulses()
-        first = np.broadcast_to(np.diag(scales.eta), (self.here.shape[1], 6, 6))
-        eta = self._chained(np.zeros((*self.here.shape, 6)), first)
+        first = np.broadcast_to(np.diag(self.scales.eta), (self.here.shape[1], 6, 6))
+        eta, latent = self._chained(np.zeros((*self.here.shape, 6)), first), self._chained(self.pulses)
+        return Columns(self.predicted, eta, latent, base, own, tuple(self._of_candidates(candidates)))
+
+    def parameter_columns(self) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+        """Those of the base parameters and of the terms in the model alone."""
+        p, ship = parameters(self.scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, None, :])
+        self.base_sources = self._ends((self._rates(p=p, ship=ship) - self.rates) / _STEP)
         self.own_sources: list[np.ndarray | None] = []
-        own = [self._of_term(i, term) for i, term in enumerate(self.point.terms)]
-        base, latent = self._chained(self.base_sources), self._chained(self.pulses)
-        return Columns(self.predicted, eta, latent, base, tuple(own), tuple(self._of_candidates(candidates)))
+        own = tuple(self._of_term(i, term) for i, term in enumerate(self.point.terms))
+        return self._chained(self.base_sources), own
 
     def towards(self, target: Point) -> np.ndarray:
         """The trajectory that the linear model expects at another point, gaps closed: the guess for the next iteration. After `columns`."""
@@ -231,13 +234,14 @@ class Linearisation:
     def _chain(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
         """Change of the motion (B, K + 1, 6, D) from changes of the steps' ends (K, B, 6, D) and of the initial states (B, 6, D)."""
         K, B, _, D = sources.shape
-        S = np.zeros((K + 1, B, 6, D))
-        if first is not None:
-            S[0] = first
+        S, now = np.empty((B, K + 1, 6, D)), np.zeros((B, 6, D)) if first is None else first
+        S[:, 0] = now
         with np.errstate(all="ignore"):
             for k in range(K):
-                np.add(self.jacobian[k] @ S[k], sources[k], out=S[k + 1])
-        return np.swapaxes(S, 0, 1)
+                now = self.jacobian[k] @ now
+                now += sources[k]
+                S[:, k + 1] = now
+        return S
 
     def _chained(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
         """Columns (B, T, D) of the measurement, of the same changes."""

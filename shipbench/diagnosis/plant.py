@@ -111,7 +111,7 @@ class Plant:
     what happens between command and actuator cannot be mistaken for a force; where only commands are recorded, by the held commands.
     """
 
-    def __init__(self, dataset_ship: Particulars, segments: Segments, long: Segments | None = None) -> None:
+    def __init__(self, dataset_ship: Particulars, segments: Segments, long: Segments | None = None, gears: dict[str, Gear] | None = None) -> None:
         self.ship, self.seg, self.long = dataset_ship, segments, segments if long is None else long
         self.c = eq2.coefficients(dataset_ship)
         self.substeps = _substeps(segments.dt, self.c.L)
@@ -128,7 +128,7 @@ class Plant:
         wind = None if segments.wind is None else np.swapaxes(segments.wind[:, :-1], 0, 1)
         self.course = Course(Vessel(dataset_ship, self.c), segments.dt / self.substeps, t, wind)
         self.ordinary: dict[str, Gear] = {}
-        self.drive(ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR))
+        self.drive((ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR)) | (gears or {}))
 
     def drive(self, gears: dict[str, Gear]) -> None:
         """Take these gears for the ordinary ones between the commands and the actuators."""
@@ -192,7 +192,9 @@ class Plant:
             follow = replace(gear, delay=max(gear.delay, 0.0))
             # recorded actuators: the value at the end of the step is what the gear follows; commands are held from its beginning
             wanted = values[:, :-1] if seg.commanded else values[:, 1:]
-            values = gear_path(values[:, 0] if before or not seg.commanded else seg.states[:, 0, 6 + i], wanted, seg.dt / n, follow)
+            begins = values[:, 0] if before or not seg.commanded else seg.states[:, 0, 6 + i]
+            if np.any(wanted != begins[:, None]):  # thrusters are often at rest
+                values = gear_path(begins, wanted, seg.dt / n, follow)
         values = values[:, before * n :]
         return np.stack([values[:, stage : stage + n * self.steps - 1 : 2] for stage in range(3)], axis=-1)
 
