@@ -1,4 +1,4 @@
-"""Rollouts of a step that is written once, as machine code.
+"""Rollouts of a step that is written once, as machine code, and single steps over many lanes.
 
 A step x' = f(x, w, p) comes as a CasADi function, traced from the one formula. Where a C compiler is at hand its instructions are written as C in
 which every number is a vector over runs (CasADi's own C code treats one run at a time and calls scalar sine and cosine), compiled once, and kept in
@@ -18,7 +18,7 @@ import shlex
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 _SECONDS = 120
+_ROLLOUT_ARGUMENTS = (*[ctypes.c_long] * 3, *[ctypes.c_void_p] * 4)
+_LANES_ARGUMENTS = (ctypes.c_void_p, ctypes.c_longlong, *[ctypes.c_void_p] * 4)
 _FLAGS = (
     "-std=gnu11", "-O1", "-ftree-vectorize", "-march=native", "-mprefer-vector-width=512", "-fopenmp-simd",
     "-fno-math-errno", "-fno-trapping-math",  # neither is ever read; without them no square root would be a vector's
@@ -78,6 +80,34 @@ void rollout(long runs, long samples, long substeps, const double *x0, const dou
   }
 }
 """
+_LANES = """
+typedef long long num;
+static void fetch(v *to, const double *from, num size, num across, num along, num n) {
+  for (num i = 0; i < size; i++, from += along)
+    if (across) for (num l = 0; l < W; l++) to[i][l] = from[(l < n ? l : n - 1) * across];
+    else to[i] = K(*from);
+}
+void lanes(const num *shape, num carried, const double *const *in, const num (*by)[5], double *out, const num *out_by) {
+  static const num SIZES[] = {SIZES_IN};
+  for (num d = 0; d < shape[0]; d++) for (num b = 0; b < shape[2]; b += W) {
+    const num n = shape[2] - b < W ? shape[2] - b : W;
+    v g[NG], y[NY];
+    for (num k = 0; k < shape[1]; k++) {
+      for (num s = 0; s < shape[3]; s++) {
+        v *to = g;
+        for (num j = 0; j < NI; to += SIZES[j++]) {
+          const num other = (!k && !s) || by[j][3] || (!s && by[j][1]);  // what is the same as before is not read again
+          if (j ? other : !s && (!k || !carried))
+            fetch(to, in[j] + d * by[j][0] + k * by[j][1] + b * by[j][2] + s * by[j][3], SIZES[j], by[j][2], by[j][4], n);
+        }
+        step(g, y);
+        if (NY == SIZES[0]) for (num i = 0; i < NY; i++) g[i] = y[i];
+      }
+      for (num l = 0; l < n; l++) for (num i = 0; i < NY; i++) out[d * out_by[0] + k * out_by[1] + (b + l) * out_by[2] + i * out_by[3]] = y[i][l];
+    }
+  }
+}
+"""
 _C = {
     "ASSIGN": "{0}", "ADD": "{0} + {1}", "SUB": "{0} - {1}", "MUL": "{0} * {1}", "DIV": "{0} / {1}", "NEG": "-{0}", "INV": "1.0 / {0}",
     "SQ": "{0} * {0}", "TWICE": "{0} + {0}", "FABS": "SEL({0} < 0, -{0}, {0})", "SQRT": "vsqrt({0})", "SIN": "vsin({0})", "COS": "vcos({0})",
@@ -101,7 +131,7 @@ class Rollout:
     def __init__(self, step: casadi.Function, machine_code: bool = True) -> None:
         self.nx, self.nw, self.num = (step.numel_in(i) for i in range(3))
         self._step = step
-        self._compiled = _machine_code(c_source(step)) if machine_code else None
+        self._compiled = _machine_code(c_source(step), "rollout", _ROLLOUT_ARGUMENTS) if machine_code else None
         self._interpreted = cache(lambda steps: step.mapaccum("roll", steps))
 
     @property
@@ -135,28 +165,74 @@ class Rollout:
         return X
 
 
+class Lanes:
+    """A function of bundles of numbers, evaluated over lanes (D, K, B) in S parts each: what numpy's broadcasting does, without its loops.
+
+    Where it has as many results as the first bundle has numbers it is a step: the parts follow each other, and so do the K where they are `carried`.
+
+    Args:
+        function: SX, one vector per bundle, to one vector.
+
+    Raises:
+        NotImplementedError: there is no compiler here, or the function holds an operation that is not known: use the formula itself.
+    """
+
+    def __init__(self, function: casadi.Function) -> None:
+        self.sizes, self.num = tuple(function.numel_in(i) for i in range(function.n_in())), function.numel_out(0)
+        compiled = _machine_code(_lanes_source(function), "lanes", _LANES_ARGUMENTS)
+        if compiled is None:
+            raise NotImplementedError("no machine code here")
+        self._compiled = compiled
+
+    def __call__(self, given: Sequence[np.ndarray], shape: tuple[int, int, int, int], out: np.ndarray, carried: bool = False) -> None:
+        """Write `out` (D, K, B, num) from bundles that spread over (D, K, B, S, size), shape = (D, K, B, S); (D, 1, B, num) keeps the last of K."""
+        spread = [np.broadcast_to(np.asarray(a, dtype=float), (*shape, size)) for a, size in zip(given, self.sizes, strict=True)]
+        if out.shape not in ((*shape[:3], self.num), (shape[0], 1, shape[2], self.num)) or out.dtype != float:
+            raise ValueError(f"out: {out.dtype} {out.shape}; accepted: float64 {(*shape[:3], self.num)}")
+        pointers = np.array([a.ctypes.data for a in spread], dtype=np.uintp)
+        by = np.array([[s // 8 for s in a.strides] for a in (*spread, np.broadcast_to(out, (*shape[:3], self.num))[..., None])], dtype=np.int64)
+        size = np.array(shape, dtype=np.int64)
+        self._compiled(size.ctypes.data, carried, pointers.ctypes.data, by.ctypes.data, out.ctypes.data, by[-1].ctypes.data)
+
+
 def c_source(step: casadi.Function) -> str | None:
     """C code of a rollout of `step`, every number of which is a vector over runs; None where it holds an operation that is not known here."""
+    body = _instructions(step, ("x[{}]", "w[{}]", "K(p[{}])"))
+    if body is None:
+        return None
+    sizes = f"#define NX {step.numel_in(0)}\n#define NW {step.numel_in(1)}\n"
+    return f"{_HEAD}{sizes}static void step(const v *x, const v *w, const double *p, v *y) {{\n{body}\n}}\n{_LOOP}"
+
+
+def _lanes_source(function: casadi.Function) -> str | None:
+    """C code of `Lanes`."""
+    sizes = [function.numel_in(i) for i in range(function.n_in())]
+    body = _instructions(function, [f"g[{sum(sizes[:i])} + {{}}]" for i in range(len(sizes))])
+    if body is None:
+        return None
+    head = f"#define NI {len(sizes)}\n#define NG {sum(sizes)}\n#define NY {function.numel_out(0)}\n#define SIZES_IN {', '.join(map(str, sizes))}\n"
+    return f"{_HEAD}{head}static void step(const v *g, v *y) {{\n{body}\n}}\n{_LANES}"
+
+
+def _instructions(function: casadi.Function, places: Sequence[str]) -> str | None:
+    """The function's instructions in C, its inputs taken from `places`."""
     import casadi
 
     names = {number: name[3:] for name, number in vars(casadi).items() if name.startswith("OP_")}
-    lines = []
-    for k in range(step.n_instructions()):
-        name, given, out = names[step.instruction_id(k)], step.instruction_input(k), step.instruction_output(k)
-        if name == "CONST" and math.isfinite(value := step.instruction_constant(k)):
+    lines = [f"v {', '.join(f'a{i}' for i in range(function.sz_w()))};"]
+    for k in range(function.n_instructions()):
+        name, given, out = names[function.instruction_id(k)], function.instruction_input(k), function.instruction_output(k)
+        if name == "CONST" and math.isfinite(value := function.instruction_constant(k)):
             lines.append(f"a{out[0]} = K({value!r});")
         elif name == "INPUT":
-            lines.append(f"a{out[0]} = {('x[{}]', 'w[{}]', 'K(p[{}])')[given[0]].format(given[1])};")
+            lines.append(f"a{out[0]} = {places[given[0]].format(given[1])};")
         elif name == "OUTPUT":
             lines.append(f"y[{out[1]}] = a{given[0]};")
         elif name in _C:
             lines.append(f"a{out[0]} = {_C[name].format(*(f'a{i}' for i in given))};")
         else:
             return None
-    body = "\n".join(lines)
-    work = ", ".join(f"a{i}" for i in range(step.sz_w()))
-    sizes = f"#define NX {step.numel_in(0)}\n#define NW {step.numel_in(1)}\n"
-    return f"{_HEAD}{sizes}static void step(const v *x, const v *w, const double *p, v *y) {{\nv {work};\n{body}\n}}\n{_LOOP}"
+    return "\n".join(lines)
 
 
 @cache
@@ -177,8 +253,13 @@ def _compiler() -> tuple[tuple[str, ...], str]:
     return command, "\n".join([found, platform.machine(), platform.libc_ver()[1], flags])
 
 
-def _machine_code(source: str | None) -> Callable[..., Any] | None:
-    """The C function `rollout` of `source`, compiled or taken from the cache folder; None where that cannot be done."""
+def c_function(code: str, name: str, arguments: Sequence[Any]) -> Callable[..., Any] | None:
+    """A C function of other code that treats vectors `v` of W numbers, with what the code above has; None where there is no compiler."""
+    return _machine_code(_HEAD + code, name, arguments)
+
+
+def _machine_code(source: str | None, function: str, arguments: Sequence[Any]) -> Callable[..., Any] | None:
+    """The C function of `source`, compiled or taken from the cache folder; None where that cannot be done."""
     command, machine = _compiler()
     if source is None or not command:
         return None
@@ -188,13 +269,13 @@ def _machine_code(source: str | None) -> Callable[..., Any] | None:
         if not kept.is_file():
             kept.parent.mkdir(parents=True, exist_ok=True)
             _compile(command, source, kept)
-        return _function(kept)
+        return _function(kept, function, arguments)
     except (OSError, subprocess.SubprocessError) as error:
         _log.debug("%s: %s", kept, error)
     try:  # the cache folder cannot be written, or holds no code that runs
         with tempfile.TemporaryDirectory(prefix="shipbench-") as folder:
             _compile(command, source, Path(folder) / name)
-            return _function(Path(folder) / name)
+            return _function(Path(folder) / name, function, arguments)
     except (OSError, subprocess.SubprocessError) as error:
         _log.debug("the C compiler %s failed, CasADi interprets instead: %s", command[0], error)
         return None
@@ -209,7 +290,7 @@ def _compile(command: tuple[str, ...], source: str, path: Path) -> None:
         os.replace(made, path)
 
 
-def _function(path: Path) -> Callable[..., Any]:
-    function = ctypes.CDLL(str(path)).rollout
-    function.argtypes, function.restype = [ctypes.c_long] * 3 + [ctypes.c_void_p] * 4, None
+def _function(path: Path, name: str, arguments: Sequence[Any]) -> Callable[..., Any]:
+    function = getattr(ctypes.CDLL(str(path)), name)
+    function.argtypes, function.restype = list(arguments), None
     return function

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipbench import compiled
-from shipbench.compiled import Rollout, c_source
+from shipbench.compiled import Lanes, Rollout, c_source
 
 ca = pytest.importorskip("casadi")
 
@@ -107,3 +107,31 @@ def test_wrong_shapes_are_refused_before_they_reach_machine_code():
     for given in ((x0[:1], w, p), (x0[:, :2], w, p), (x0, w[..., :1], p), (x0, w, p[:1])):
         with pytest.raises(ValueError, match="accepted"):
             Rollout(every_operation())(*given)
+
+
+@pytest.mark.parametrize("carried", [False, True])
+def test_lanes_are_the_function_on_everything_spread_over_them(compiler, carried):
+    """Directions in the values, samples and lanes in the inputs, two parts each; the last vector is not full."""
+    step, rng = every_operation(), np.random.default_rng(0)
+    D, K, B, S = 2, 4, 11, 2
+    x, w, p = rng.normal(size=(K, B, 1, 3)), rng.normal(size=(K, B, S, 2)), rng.normal(size=(D, 1, 1, 1, 2))
+    out = np.empty((D, K, B, 3))
+    Lanes(step)([x, w, p], (D, K, B, S), out, carried)
+    for d, b in ((0, 0), (1, 7), (1, 10)):
+        state = x[0, b, 0]
+        for k in range(K):
+            state = state if carried else x[k, b, 0]
+            for s in range(S):
+                state = step(state, w[k, b, s], p[d, 0, 0, 0]).full().ravel()
+            np.testing.assert_allclose(out[d, k, b], state, rtol=1e-9, atol=1e-11)
+
+
+def test_lanes_that_do_not_fit_are_refused(compiler):
+    given = [np.zeros(3), np.zeros(2), np.zeros(2)]
+    with pytest.raises(ValueError, match="accepted"):
+        Lanes(every_operation())(given, (1, 2, 3, 1), np.empty((1, 2, 3, 2)))
+    with pytest.raises(ValueError, match="broadcast"):
+        Lanes(every_operation())([np.zeros((4, 1, 3)), *given[1:]], (1, 2, 3, 1), np.empty((1, 2, 3, 3)))
+    x = ca.SX.sym("x")
+    with pytest.raises(NotImplementedError):
+        Lanes(ca.Function("erf", [x], [ca.erf(x)]))

@@ -20,7 +20,8 @@ from ..records import Dataset
 from .cases import singles
 from .fit import between, start
 from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, Term, parameters, predict
-from .plant import NUM_HULL, Active, Plant
+from .plant import NUM_HULL, Plant
+from .rolling import Active
 
 _ITERATIONS = 6
 _WINDOW = 9

@@ -6,6 +6,7 @@ multiplied by the inverse of its Cholesky factor; what is left is white again, a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,9 +44,18 @@ class Colour:
     def whitened(self, values: np.ndarray) -> np.ndarray:
         """(B, K + 1, 6, ...) as if their noise were white."""
         out = values.copy()
-        for c in np.flatnonzero(self.share):
-            out[:, :, c] = np.einsum("kl,bl...->bk...", self.factor[c], values[:, :, c], optimize=True)
+        self.whiten(np.moveaxis(out, 2, 0), range(6))
         return out
+
+    def whiten(self, values: np.ndarray, channels: Sequence[int]) -> None:
+        """The same in place, of some channels, which come first: (channels, B, K + 1, ...)."""
+        for at, channel in enumerate(channels):
+            if self.share[channel] > 0.0:
+                values[at] = np.einsum("kl,bl...->bk...", self.factor[channel], values[at], optimize=True)
+
+    def differs(self, other: Colour) -> list[int]:
+        """Channels whose noise is another one."""
+        return [c for c in range(6) if (self.share[c], self.time[c]) != (other.share[c], other.time[c])]
 
     def log_determinant(self, lengths: np.ndarray) -> np.ndarray:
         """(B,) of the covariance of all channels, for pieces of `lengths` samples."""

@@ -44,7 +44,7 @@ def rollout_plant(dataset: Dataset, gears: dict[str, Gear]) -> Plant:
     """Segments of `HORIZON` (Froude-scaled), driven by the commands through `gears` from the actuators' first measured places."""
     ship = complete(dataset.ship)
     segments = cut(dataset, max(20, round(HORIZON * (ship.L / 130.0) ** 0.5 / dataset.dt)))
-    return Plant(ship, replace(segments, commanded=True)).driven(gears)
+    return Plant(ship, replace(segments, commanded=True), gears=gears)
 
 
 def plain_base() -> np.ndarray:
@@ -65,8 +65,8 @@ def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
     lin = _lin(plant, scales, Rollout(plain_base(), terms, start))
     weights = _weights(lin)
     for _ in range(_STEPS):
-        columns = lin.columns()
-        J = np.concatenate([columns.base[..., free], *columns.own], axis=-1) * weights[None, :, None]
+        base, own = lin.parameter_columns()
+        J = np.concatenate([base[..., free], *own], axis=-1) * weights[None, :, None]
         J = J * np.repeat(plant.seg.mask, 6, axis=1)[..., None]
         e = _errors(lin) * weights
         ok = np.isfinite(J).all(axis=(1, 2)) & np.isfinite(e).all(axis=1)

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..physics.actuators import Gear, gear_path
+from ..ops import where
+from ..physics.actuators import Gear, gear_path, gear_step
 from .plant import Plant, Segments, ordinary_gears
+
+if TYPE_CHECKING:
+    from ..compiled import Lanes
 
 _ACTUATORS = {"n": (0,), "delta": (1,), "F": (2, 3)}
 _RATE_POWER = {"n": 2, "delta": 1, "F": 0}
@@ -126,6 +132,9 @@ class _Record:
 
     def paths(self, z: np.ndarray, kind: _Kind | None) -> np.ndarray:
         """Positions (M, P, K) that M gears would give; z (M, values): logarithms of time constant, rate[, the value of `kind`]."""
+        code = _follower(kind and kind.field)
+        if code is not None:
+            return np.swapaxes(self._followed(code, z, kind, self.command.shape[1])[..., 1], 1, 2)
         tiled = np.repeat(np.exp(z), len(self.command), axis=0).T
         gear = Gear(tiled[0], tiled[1])
         if kind is not None:
@@ -136,6 +145,33 @@ class _Record:
     def errors(self, z: np.ndarray, kind: _Kind | None) -> np.ndarray:
         """Record less path (M, P, K), zero where it is not judged."""
         return np.where(self.judged, self.measured[:, 1:] - self.paths(z, kind), 0.0)
+
+    def costs(self, z: np.ndarray, kind: _Kind | None) -> np.ndarray:
+        """Sums of the squared errors (M,)."""
+        code = _follower(kind and kind.field)
+        if code is not None:
+            return self._followed(code, z, kind, 1)[:, 0, :, 2].sum(axis=1)
+        return np.concatenate([np.sum(self.errors(part, kind) ** 2, axis=(1, 2)) for part in np.array_split(z, len(z) // _MOST + 1)])
+
+    def _followed(self, code: Lanes, z: np.ndarray, kind: _Kind | None, kept: int) -> np.ndarray:
+        """Motor, position and sum of squared errors so far, (M, kept, P, 3): at every sample or, if 1 is kept, at the end."""
+        (P, K), values = self.command.shape, np.exp(z)
+        whole = np.zeros(len(z), dtype=int)
+        if kind is not None and kind.field == "delay":
+            shift = values[:, kind.at] / self.dt
+            whole = np.floor(shift).astype(int)
+            values[:, kind.at] = shift - whole
+        most, out = int(whole.max()) + 1, np.empty((len(z), kept, P, 3))
+        held = np.concatenate([np.repeat(self.command[:, :1], most, axis=1), self.command], axis=1)
+        start = np.stack([self.measured[:, 0], self.measured[:, 0], np.zeros(P)], axis=-1)[:, None]
+        for late in np.unique(whole):
+            rows, first = np.flatnonzero(whole == late), most - late
+            record = np.stack([held[:, first : first + K], held[:, first - 1 : first - 1 + K], self.measured[:, 1:], self.judged], axis=-1)
+            found = np.empty((len(rows), kept, P, 3))
+            bundles = [start, values[rows, None, None, None], np.array([self.dt]), np.swapaxes(record, 0, 1)[:, :, None]]
+            code(bundles, (len(rows), K, P, 1), found, carried=True)
+            out[rows] = found
+        return out
 
     def findings(self, usual: Gear) -> tuple[list[GearFinding], Gear]:
         """Every effect beside the best ordinary gear, and that gear."""
@@ -184,7 +220,7 @@ class _Record:
         pattern = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(low))))
         best, center = np.inf, points[0]
         for _ in range(_ROUNDS):
-            costs = np.concatenate([np.sum(self.errors(part, kind) ** 2, axis=(1, 2)) for part in np.array_split(points, len(points) // _MOST + 1)])
+            costs = self.costs(points, kind)
             least, before = float(costs.min()), best
             if least < best:
                 best, center = least, points[int(costs.argmin())]
@@ -194,3 +230,28 @@ class _Record:
                     break
             points = np.unique(np.clip(center + half * pattern, low, high), axis=0)
         return center
+
+
+@cache
+def _follower(field: str | None) -> Lanes | None:
+    """Machine code of a sample of `gear_step`: motor, position, cost; time constant, rate[, value of `field`, of a delay the part of a sample]; dt;
+    command, the one before it, record, whether it is judged. None where there is no compiler."""
+    import casadi as ca
+
+    from ..compiled import Lanes
+
+    beside = field if field not in ("T", "rate") else None
+    sizes = {"state": 3, "values": 2 + (beside is not None), "dt": 1, "record": 4}
+    whole = [ca.SX.sym(name, num) for name, num in sizes.items()]
+    (motor, position, cost), (T, rate, *value), (dt,), (now, before, measured, judged) = (ca.vertsplit(v) for v in whole)
+    gear, wanted = Gear(T, rate), [(now, dt)]
+    if beside == "delay":
+        wanted = [(before, value[0] * dt), (now, (1.0 - value[0]) * dt)]
+    elif beside is not None:
+        gear = replace(gear, **{beside: value[0]})
+    motor, position = gear_step(motor, position, wanted, gear)
+    after = ca.vertcat(motor, position, cost + where(judged, (measured - position) ** 2, 0.0))
+    try:
+        return Lanes(ca.Function("follower", whole, [after], {"cse": True}))
+    except NotImplementedError:
+        return None

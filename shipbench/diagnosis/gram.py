@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .inverse import inverses, log_determinant
+
 ETA_PRECISION = 1e-4
 """Weak: an initial state may lie 100 units of noise away from its first sample."""
 
@@ -44,10 +46,8 @@ class Products:
     def of(
         cls, Z: np.ndarray, mask: np.ndarray, knots: int, spacing: float, run: np.ndarray, runs: int, colour: np.ndarray | None = None
     ) -> Products:
-        """From columns Z (B, T, Z + G + 1), T = 6 (K + 1), channel last; `mask` (B, K + 1) of real samples."""
-        B, T, C = Z.shape
-        Z = np.ascontiguousarray(np.moveaxis(Z.reshape(B, T // 6, 6, C) * mask[:, :, None, None], 2, 0))  # BLAS wants each channel in one piece
-        P = np.swapaxes(Z, 2, 3) @ Z
+        """From columns Z (6, B, K + 1, Z + G + 1), zero where `mask` (B, K + 1) has no real sample."""
+        B, P = len(mask), np.swapaxes(Z, 2, 3) @ Z
         return cls(P, knots, spacing, run, runs, mask.sum(axis=1), np.zeros(B) if colour is None else colour)
 
     @property
@@ -70,7 +70,7 @@ class Products:
 
     def weigh(self, hyper: Hyper) -> Gram:
         """The Gram under given noise."""
-        G = np.einsum("cbij,c->bij", self.P, np.exp(-hyper.log_noise))
+        G = (np.exp(-hyper.log_noise) @ self.P.reshape(6, -1)).reshape(self.P.shape[1:])  # BLAS, which einsum does without
         K_inv, K_logdet = ornstein_uhlenbeck(self.knots, self.spacing, hyper.tau)
         log_noise = self.samples * float(np.sum(hyper.log_noise)) + self.colour
         return Gram(G, self.knots, K_inv, K_logdet, log_noise, self.run, self.runs)
@@ -82,13 +82,14 @@ def ornstein_uhlenbeck(knots: int, spacing: float, tau: float) -> tuple[np.ndarr
     return np.linalg.inv(K), float(np.linalg.slogdet(K)[1])
 
 
-def log_determinant(A: np.ndarray) -> np.ndarray:
-    """Of positive definite matrices (..., n, n): half the work of a decomposition that must pivot, which is left for matrices that are only nearly so
-    (sensitivities of a trajectory that blows up)."""
-    try:
-        return 2.0 * np.log(np.diagonal(np.linalg.cholesky(A), axis1=-2, axis2=-1)).sum(axis=-1)
-    except np.linalg.LinAlgError:
-        return np.linalg.slogdet(A)[1]
+def by_run(values: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Sums (N, ...) over the segments of every run, which stand in the order of their runs (`np.add.reduceat`, but quick for matrices)."""
+    first = np.flatnonzero(np.diff(run, prepend=-1))
+    counts, total = np.diff(first, append=len(run)), values[first]
+    for j in range(1, counts.max()):
+        longer = counts > j
+        total[longer] += values[first[longer] + j]
+    return np.asarray(total)
 
 
 @dataclass(frozen=True)
@@ -120,12 +121,11 @@ class Gram:
         """Integrate eta and w out of every segment and sum over the segments of a run."""
         Z = self.latent
         A = self.G[:, :Z, :Z] + self.precision(log_force)
-        inverse = np.linalg.inv(A)
+        inverse, logdet = inverses(A)
         solved = inverse @ self.G[:, :Z, Z:]
         S = self.G[:, Z:, Z:] - np.swapaxes(self.G[:, :Z, Z:], 1, 2) @ solved
-        logdet = log_determinant(A) + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
-        first = np.flatnonzero(np.diff(self.run, prepend=-1))  # segments stand in the order of their runs
-        return Reduced(np.add.reduceat(S, first), np.add.reduceat(logdet, first), inverse, solved)
+        logdet = logdet + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
+        return Reduced(by_run(S, self.run), by_run(logdet, self.run), inverse, solved)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from ..effects.base import Effect, flow_first
 from ..ops import Array
 from ..predictors._physics_fit import parameter_scale
 from .colour import Colour
-from .plant import HULL, NUM_HULL, Active, Plant
+from .plant import HULL, NUM_HULL, Plant
+from .rolling import Active
 from .structure import STRUCTURE
 
 FREE = (1, 2, 5, 7, 8, 10)
@@ -162,8 +163,7 @@ class Linearisation:
         w = plant.hat @ (scales.w * point.w)
         x0 = plant.seg.states[:, 0, :6] + scales.eta * point.eta
         self.motion = plant.roll(x0, self.p, [*flow_first(self.forces), *self.ship], w, self.path) if guess is None else guess
-        w = np.swapaxes(w, 0, 1)
-        self.push = (w[:-1], w[1:])
+        self.push = plant.pushes(w)
         self.states = np.swapaxes(self.motion[:, :-1], 0, 1)[None]
         self.here = self._steps()[0]
         moved = self._steps(states=self.states + _STEP * np.eye(6)[:, None, None, :] * scales.eta) - self.here
@@ -175,69 +175,73 @@ class Linearisation:
         self.gaps = self.here - np.swapaxes(self.motion[:, 1:], 0, 1)
         self.predicted = plant.measured(self.motion, self.now)
         if guess is not None:
-            closed = self._chain(self.gaps[None], (x0 - guess[:, 0])[None])[..., 0]
+            closed = self._chain(self.gaps[..., None], (x0 - guess[:, 0])[..., None])[..., 0]
             self.predicted = plant.measured(self.motion + closed, self.now)
 
     def columns(self, candidates: Sequence[Term] = ()) -> Columns:
         """All sensitivities."""
-        scales = self.scales
-        p, ship = parameters(scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, None, :])
-        self.base_sources = self._ends((self._rates(p=p, ship=ship) - self.rates) / _STEP)
+        base, own = self.parameter_columns()
         self.pulses = self._pulses()
-        first = np.broadcast_to(np.eye(6)[:, None, :] * scales.eta, (6, self.here.shape[1], 6))
-        eta = self._chained(np.zeros((6, *self.here.shape)), first)
+        first = np.broadcast_to(np.diag(self.scales.eta), (self.here.shape[1], 6, 6))
+        eta, latent = self._chained(np.zeros((*self.here.shape, 6)), first), self._chained(self.pulses)
+        return Columns(self.predicted, eta, latent, base, own, tuple(self._of_candidates(candidates)))
+
+    def parameter_columns(self) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+        """Those of the base parameters and of the terms in the model alone."""
+        p, ship = parameters(self.scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, None, :])
+        self.base_sources = self._ends((self._rates(p=p, ship=ship) - self.rates) / _STEP)
         self.own_sources: list[np.ndarray | None] = []
-        own = [self._of_term(i, term) for i, term in enumerate(self.point.terms)]
-        base, latent = self._chained(self.base_sources), self._chained(self.pulses)
-        return Columns(self.predicted, eta, latent, base, tuple(own), tuple(self._of_candidates(candidates)))
+        own = tuple(self._of_term(i, term) for i, term in enumerate(self.point.terms))
+        return self._chained(self.base_sources), own
 
     def towards(self, target: Point) -> np.ndarray:
         """The trajectory that the linear model expects at another point, gaps closed: the guess for the next iteration. After `columns`."""
         here = self.point
         w = np.moveaxis(target.w - here.w, -1, 1).reshape(len(here.w), -1)
-        sources = self.gaps + np.einsum("dkbi,d->kbi", self.base_sources, target.base - here.base) + np.einsum("dkbi,bd->kbi", self.pulses, w)
+        sources = self.gaps + self.base_sources @ (target.base - here.base) + (self.pulses @ w[..., None])[..., 0]
         run = self.plant.seg.run
         for i, source in enumerate(self.own_sources):
             if source is not None:
                 change = target.values[i] - here.values[i]
                 change = change[run] if here.terms[i].per_run else np.broadcast_to(change, (len(run), len(change)))
-                sources = sources + np.einsum("dkbi,bd->kbi", source, change)
+                sources = sources + (source @ change[..., None])[..., 0]
         x0 = self.plant.seg.states[:, 0, :6] + self.scales.eta * target.eta
-        return self.motion + self._chain(sources[None], (x0 - self.motion[:, 0])[None])[..., 0]
+        return self.motion + self._chain(sources[..., None], (x0 - self.motion[:, 0])[..., None])[..., 0]
 
     def _steps(self, states: np.ndarray | None = None, forces: Sequence[Active] | None = None, path: np.ndarray | None = None) -> np.ndarray:
         """Ends of all single steps (D, K, B, 6) with something changed."""
         active = [*flow_first(self.forces if forces is None else forces), *self.ship]
         return self.plant.steps_from(self.states if states is None else states, self.p, active, self.push, self.path if path is None else path)
 
-    def _rates(self, p: Sequence[Array] | None = None, ship: Sequence[Active] | None = None, forces: Sequence[Active] | None = None) -> np.ndarray:
+    def _rates(
+        self, p: Sequence[Array] | None = None, ship: Sequence[Active] | None = None, forces: Sequence[Active] | None = None, often: bool = True
+    ) -> np.ndarray:
         """Accelerations (D, K, B, 3) in the middle of all single steps with something changed."""
         active = [*flow_first(self.forces if forces is None else forces), *(self.ship if ship is None else ship)]
-        return self.plant.rates_from(self.middle, self.p if p is None else p, active, self.path)
+        return self.plant.rates_from(self.middle, self.p if p is None else p, active, self.path, often)
 
     def _ends(self, rates: np.ndarray) -> np.ndarray:
-        """Changes of the steps' ends (D, K, B, 6) by changes of the acceleration (D, K, B, 3): one evaluation of the forces instead of the four of a
+        """Changes of the steps' ends (K, B, 6, D) by changes of the acceleration (D, K, B, 3): one evaluation of the forces instead of the four of a
         step."""
-        return (self.reach @ rates[..., None])[..., 0]
+        return np.asarray(self.reach @ np.moveaxis(rates, 0, -1))
 
     def _pulses(self) -> np.ndarray:
-        """Change of each step's end by each knot of the latent acceleration, (3 knots, K, B, 6)."""
-        hat, knots = self.plant.hat, self.plant.knots
-        ends = np.moveaxis(self.reach * self.scales.w, -1, 0)  # (3, K, B, 6)
-        middle = 0.5 * (hat[:-1] + hat[1:]).T
-        return (ends[:, None] * middle[None, :, :, None, None]).reshape(3 * knots, *self.here.shape)
+        """Change of each step's end by each knot of the latent acceleration, (K, B, 6, 3 knots)."""
+        middle = 0.5 * (self.plant.hat[:-1] + self.plant.hat[1:])
+        ends = (self.reach * self.scales.w)[..., None] * middle[:, None, None, None, :]
+        return np.asarray(ends.reshape(*self.here.shape, -1))
 
     def _chain(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
-        """Change of the motion (B, K + 1, 6, D) from changes of the steps' ends (D, K, B, 6) and of the initial states (D, B, 6)."""
-        D, K, B, _ = sources.shape
-        S = np.zeros((K + 1, B, 6, D))
-        if first is not None:
-            S[0] = np.moveaxis(first, 0, -1)
-        flow = np.moveaxis(sources, 0, -1)
+        """Change of the motion (B, K + 1, 6, D) from changes of the steps' ends (K, B, 6, D) and of the initial states (B, 6, D)."""
+        K, B, _, D = sources.shape
+        S, now = np.empty((B, K + 1, 6, D)), np.zeros((B, 6, D)) if first is None else first
+        S[:, 0] = now
         with np.errstate(all="ignore"):
             for k in range(K):
-                S[k + 1] = self.jacobian[k] @ S[k] + flow[k]
-        return np.swapaxes(S, 0, 1)
+                now = self.jacobian[k] @ now
+                now += sources[k]
+                S[:, k + 1] = now
+        return S
 
     def _chained(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
         """Columns (B, T, D) of the measurement, of the same changes."""
@@ -272,7 +276,7 @@ class Linearisation:
             change = self._rates_with(term, q, 1.0) - (self._rates_with(term, q, -1.0) if term.effect.vector else self.rates)
             sources.append(self._ends(change / (2.0 * step if term.effect.vector else step)))
         if sources:
-            columns = self._chained(np.concatenate(sources))
+            columns = self._chained(np.concatenate(sources, axis=-1))
             at = 0
             for i, term in enumerate(candidates):
                 if i not in found:
@@ -282,7 +286,7 @@ class Linearisation:
 
     def _rates_with(self, term: Term, q: Sequence[np.ndarray], side: float) -> np.ndarray:
         """Accelerations in the middle of all single steps with a force that is not in the model."""
-        return self._rates(forces=[*self.forces, Active(term.effect, (*(side * v for v in q), *term.setting))])
+        return self._rates(forces=[*self.forces, Active(term.effect, (*(side * v for v in q), *term.setting))], often=False)
 
     def _moved(self, index: int | None, term: Term, steps: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Columns (B, T, size) of one term, the index-th of the model or one that is not in it, and its sources where it touches the motion."""
@@ -297,9 +301,9 @@ class Linearisation:
                 columns.append((moved / unit).reshape(len(moved), -1, 1))
                 continue
             if term.effect.enters == "gear":
-                sources.append((self._steps(path=self.plant.path_of(changed)) - self.here) / unit)
+                sources.append(((self._steps(path=self.plant.path_of(changed))[0] - self.here) / unit)[..., None])
             else:
                 rates = self._rates(forces=[x for x in changed if x.effect.enters == "force"])
                 sources.append(self._ends((rates - self.rates) / unit))
             columns.append(self._chained(sources[-1]))
-        return np.concatenate(columns, axis=-1), np.concatenate(sources) if sources else None
+        return np.concatenate(columns, axis=-1), np.concatenate(sources, axis=-1) if sources else None

@@ -9,18 +9,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..effects.base import Effect
 from ..effects.hull_derivatives import EFFECT as HULL
-from ..integrate import kinematics, rk4_step
 from ..ops import Array
 from ..physics import eq2
 from ..physics.actuators import Gear, gear_path
-from ..physics.modifiers import Flow, Modifiers
-from ..physics.wind import apparent_wind
 from ..predictors._actuator_fit import DEFAULT_ACTUATORS
 from ..records import Dataset
 from ..ship import Particulars, complete
 from ..signals import MOTION
+from .rolling import Active, Course, Vessel
 
 NUM_HULL = len(HULL.parameters)
 NO_GEAR = Gear(1e-3, 1e12)
@@ -103,14 +100,6 @@ def cut(dataset: Dataset, steps: int) -> Segments:
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Active:
-    """An effect in the model and its values: arrays that spread over (directions, segments)."""
-
-    effect: Effect
-    q: tuple[Array, ...]
-
-
 def _substeps(dt: float, L: float) -> int:
     return max(1, int(np.ceil(dt / (0.15 * L**0.5) - 1e-9)))
 
@@ -122,19 +111,24 @@ class Plant:
     what happens between command and actuator cannot be mistaken for a force; where only commands are recorded, by the held commands.
     """
 
-    def __init__(self, dataset_ship: Particulars, segments: Segments, long: Segments | None = None) -> None:
+    def __init__(self, dataset_ship: Particulars, segments: Segments, long: Segments | None = None, gears: dict[str, Gear] | None = None) -> None:
         self.ship, self.seg, self.long = dataset_ship, segments, segments if long is None else long
         self.c = eq2.coefficients(dataset_ship)
         self.substeps = _substeps(segments.dt, self.c.L)
-        self.h = segments.dt / self.substeps
         self.steps = segments.states.shape[1] - 1
         self.knot_time = 5.0 * (self.c.L / 130.0) ** 0.5
         self.knots = int(np.ceil(self.steps * segments.dt / self.knot_time)) + 1
         at = np.minimum(np.arange(self.steps + 1) * segments.dt / self.knot_time, self.knots - 1 - 1e-9)
         self.hat = np.maximum(1.0 - np.abs(at[:, None] - np.arange(self.knots)), 0.0)
         """(K + 1, knots): the latent acceleration at the samples from its knots, linear between them."""
+        self.parts = (np.arange(self.substeps)[:, None] + 0.5 * np.arange(3)) / self.substeps
+        """(substeps, 3): where the stages of the integration steps lie within a sample."""
+        k = np.arange(self.steps)[:, None, None]
+        t = segments.start[:, None, None] + np.minimum(k + self.parts, k + 1.0 - 1e-9)[:, None] * segments.dt
+        wind = None if segments.wind is None else np.swapaxes(segments.wind[:, :-1], 0, 1)
+        self.course = Course(Vessel(dataset_ship, self.c), segments.dt / self.substeps, t, wind)
         self.ordinary: dict[str, Gear] = {}
-        self.drive(ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR))
+        self.drive((ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR)) | (gears or {}))
 
     def drive(self, gears: dict[str, Gear]) -> None:
         """Take these gears for the ordinary ones between the commands and the actuators."""
@@ -198,78 +192,42 @@ class Plant:
             follow = replace(gear, delay=max(gear.delay, 0.0))
             # recorded actuators: the value at the end of the step is what the gear follows; commands are held from its beginning
             wanted = values[:, :-1] if seg.commanded else values[:, 1:]
-            values = gear_path(values[:, 0] if before or not seg.commanded else seg.states[:, 0, 6 + i], wanted, seg.dt / n, follow)
+            begins = values[:, 0] if before or not seg.commanded else seg.states[:, 0, 6 + i]
+            if np.any(wanted != begins[:, None]):  # thrusters are often at rest
+                values = gear_path(begins, wanted, seg.dt / n, follow)
         values = values[:, before * n :]
         return np.stack([values[:, stage : stage + n * self.steps - 1 : 2] for stage in range(3)], axis=-1)
 
     def roll(self, x0: np.ndarray, p: Sequence[Array], active: Sequence[Active], w: np.ndarray, path: np.ndarray | None = None) -> np.ndarray:
         """Motion (B, K + 1, 6) from x0 (B, 6), with parameters p0..p10, effects, and a latent acceleration w (B, K + 1, 3) at the samples."""
-        path = self.path if path is None else path
-        x, n = tuple(x0.T), self.substeps
-        out = np.empty((len(x0), self.steps + 1, 6))
-        out[:, 0] = x0
-        with np.errstate(all="ignore"):
-            for k in range(self.steps):
-                x = self._step(x, p, active, (w[:, k], w[:, k + 1]), path[:, k * n : (k + 1) * n], np.array(k))
-                out[:, k + 1] = np.stack(x, axis=-1)
-        return out
+        return self.course.rolled(x0, p, active, self._by_sample(path), self.pushes(w))
 
     def steps_from(
-        self, states: np.ndarray, p: Sequence[Array], active: Sequence[Active], push: tuple[np.ndarray, np.ndarray], path: np.ndarray | None = None
+        self, states: np.ndarray, p: Sequence[Array], active: Sequence[Active], push: np.ndarray, path: np.ndarray | None = None
     ) -> np.ndarray:
-        """One sample ahead of every state at once: (D, K, B, 6) from states (D or 1, K, B, 6) and accelerations at both ends of the step (.., K,
-        B, 3).
+        """One sample ahead of every state at once: (D, K, B, 6) from states (D or 1, K, B, 6) and `pushes`.
 
         Along a known trajectory this replaces the loop over time: the sensitivities of the single steps are chained afterwards.
         """
+        return self.course.ends(states, p, active, self._by_sample(path), push)
+
+    def rates_from(
+        self, middle: np.ndarray, p: Sequence[Array], active: Sequence[Active], path: np.ndarray | None = None, often: bool = True
+    ) -> np.ndarray:
+        """Accelerations (D, K, B, 3) that forces give in the middle of every step, from the states there (1, K, B, 6); `often` as in
+        `Course.rates`."""
+        return self.course.rates(middle, p, active, self._by_sample(path), often)
+
+    def pushes(self, w: np.ndarray) -> np.ndarray:
+        """The latent acceleration w (B, K + 1, 3) at the stages of every integration step, (K, B, substeps, 3, 3)."""
+        part = self.parts[..., None]
+        ends = np.swapaxes(w, 0, 1)[:, :, None, None]
+        return (1.0 - part) * ends[:-1] + part * ends[1:]
+
+    def _by_sample(self, path: np.ndarray | None) -> np.ndarray:
+        """(K, B, substeps, 3, 4) from a path (B, steps * substeps, 3, 4)."""
         path = self.path if path is None else path
-        stages = np.moveaxis(path.reshape(len(path), self.steps, self.substeps, 3, 4), 1, 0)
-        with np.errstate(all="ignore"):
-            moved = self._step(tuple(np.moveaxis(states, -1, 0)), p, active, push, stages, np.arange(self.steps)[:, None])
-        return np.stack(np.broadcast_arrays(*moved), axis=-1)
-
-    def rates_from(self, middle: np.ndarray, p: Sequence[Array], active: Sequence[Active], path: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (D, K, B, 3) that forces give in the middle of every step, from the states there (1, K, B, 6)."""
-        path = (self.path if path is None else path).reshape(len(self.seg.run), self.steps, self.substeps, 3, 4)
-        act = np.moveaxis(path[:, :, self.substeps // 2, self.substeps % 2], 1, 0)
-        with np.errstate(all="ignore"):
-            found = self._accelerations(tuple(np.moveaxis(middle, -1, 0)), p, active, act, np.arange(self.steps)[:, None] + 0.5)
-        return np.stack(np.broadcast_arrays(*found), axis=-1)
-
-    def _accelerations(
-        self, state: Sequence[Array], p: Sequence[Array], active: Sequence[Active], act: np.ndarray, at: np.ndarray
-    ) -> tuple[Array, ...]:
-        """(du, dv, dr) without the latent force; act (.., 4) actuators, `at` the time in samples since the segment began, one or (K, 1)."""
-        seg = self.seg
-        px, py, psi, u, v, r = state
-        n, delta, F_b, F_s = np.moveaxis(act, -1, 0)
-        air = (u, v)
-        if seg.wind is not None:
-            wind = seg.wind[:, int(at)] if at.ndim == 0 else np.swapaxes(seg.wind[:, :-1], 0, 1)
-            air = apparent_wind(psi, u, v, wind[..., 0], wind[..., 1])
-        e = None
-        if active:
-            e = Modifiers()
-            flow = Flow(px, py, seg.start + at * seg.dt, psi, u, v, r, n, delta, F_b, F_s)
-            for a in active:
-                a.effect.force(e, flow, a.q, self.ship)
-        return eq2.accelerations(u, v, r, n, delta, F_b, F_s, air, self.c, p, e)
-
-    def _step(
-        self, x: tuple[Array, ...], p: Sequence[Array], active: Sequence[Active], push: tuple[np.ndarray, np.ndarray], path: np.ndarray, k: np.ndarray
-    ) -> tuple[Array, ...]:
-        """One sample from x, the k-th of each segment; path (.., substeps, 3, 4). Shapes broadcast over (D, K, B)."""
-        n = self.substeps
-        for sub in range(n):
-
-            def rhs(state: tuple[Array, ...], stage: int, sub: int = sub) -> tuple[Array, ...]:
-                part = (sub + 0.5 * stage) / n
-                du, dv, dr = self._accelerations(state, p, active, path[..., sub, stage, :], np.minimum(k + part, k + 1.0 - 1e-9))
-                force = (1.0 - part) * push[0] + part * push[1]
-                return (*kinematics(state[2], state[3], state[4], state[5]), du + force[..., 0], dv + force[..., 1], dr + force[..., 2])
-
-            x = rk4_step(rhs, x, self.h)
-        return x
+        return np.moveaxis(path.reshape(len(path), self.steps, self.substeps, 3, 4), 1, 0)
 
     def measured(self, motion: np.ndarray, active: Sequence[Active]) -> np.ndarray:
         """What the sensors would have recorded of `motion` (..., B, K + 1, 6)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -104,18 +105,28 @@ class Fit:
         return np.arange(at, at + self.model.terms[index].size)
 
 
-def products_of(plant: Plant, scales: Scales, point: Point, columns: Columns, extra: Sequence[np.ndarray] = ()) -> Products:
-    """Products of [eta, w, base, own, candidates, extra, e]; e is the residual with everything linear added back, so that all of it competes anew."""
-    B, noise = len(point.eta), np.tile(scales.noise, plant.steps + 1)
-    e = (plant.seg.states[..., :6] - columns.predicted).reshape(B, -1)
+def products_of(plant: Plant, scales: Scales, point: Point, columns: Columns, channels: Sequence[int] = range(6)) -> Products:
+    """Products of [eta, w, base, own, candidates, e], of some channels; e is the residual with everything linear added back, so that all of it
+    competes anew."""
+    seg, B = plant.seg, len(point.eta)
+    e = (seg.states[..., :6] - columns.predicted).reshape(B, -1)
     e = e + _times(columns.eta, point.eta) + _times(columns.w, np.moveaxis(point.w, -1, 1).reshape(B, -1)) + columns.base @ point.base
     for term, value, own in zip(point.terms, point.values, columns.own, strict=True):
-        e = e + _times(own, value[plant.seg.run] if term.per_run else np.broadcast_to(value, (B, term.size)))
-    Z = np.concatenate([columns.eta, columns.w, columns.base, *columns.own, *columns.candidates, *extra, e[..., None]], axis=-1)
-    Z = np.nan_to_num(Z / noise[None, :, None], nan=0.0, posinf=0.0, neginf=0.0)
-    Z = scales.colour.whitened(Z.reshape(B, plant.steps + 1, 6, -1)).reshape(Z.shape)
-    logdet = scales.colour.log_determinant(plant.seg.mask.sum(axis=1))
-    return Products.of(Z, plant.seg.mask, plant.knots, plant.knot_time, plant.seg.run, plant.seg.runs, logdet)
+        e = e + _times(own, value[seg.run] if term.per_run else np.broadcast_to(value, (B, term.size)))
+    blocks = [columns.eta, columns.w, columns.base, *columns.own, *columns.candidates, e[..., None]]
+    edges = np.cumsum([0, *(block.shape[-1] for block in blocks)])
+    Z = np.empty((len(channels), B, plant.steps + 1, edges[-1]))
+    for block, (low, high) in zip(blocks, pairwise(edges), strict=True):
+        by_channel = np.moveaxis(block.reshape(B, plant.steps + 1, 6, -1), 2, 0)
+        for at, channel in enumerate(channels):
+            np.divide(by_channel[channel], scales.noise[channel], out=Z[at, ..., low:high])
+    with np.errstate(over="ignore", invalid="ignore"):
+        blown_up = not np.isfinite(np.sum(Z))
+    if blown_up:
+        Z = np.nan_to_num(Z, nan=0.0, posinf=0.0, neginf=0.0)
+    scales.colour.whiten(Z, channels)
+    Z[:, ~seg.mask] = 0.0
+    return Products.of(Z, seg.mask, plant.knots, plant.knot_time, seg.run, seg.runs, scales.colour.log_determinant(seg.mask.sum(axis=1)))
 
 
 def _times(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -207,8 +218,11 @@ def settle(
 
 def evidence_with(found: Fit, colour: Colour) -> float:
     """Log evidence of the same linearisation with noise of another correlation, whose variances are fitted anew."""
-    scales, more = found.scales.coloured(colour), sum(t.size for t in found.candidates)
-    products = products_of(found.plant, scales, found.point, found.columns).without(more)
+    other = colour.differs(found.scales.colour)
+    part = products_of(found.plant, found.scales.coloured(colour), found.point, found.columns, other)
+    P = found.products.P.copy()
+    P[other] = part.P
+    products = replace(found.products, P=P, colour=part.colour).without(sum(t.size for t in found.candidates))
     hyper, log_tau2 = _variances(products, found.model, found.hyper, found.log_tau2, 1)
     return solve(products.weigh(hyper).reduce(hyper.log_force), found.model.prior(log_tau2)).log_evidence
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..ops import Array, absolute, clip, exp, maximum, minimum, sign
+from ..ops import Array, absolute, clip, exp, maximum, minimum, sign, where
+from .modifiers import is_neutral
 
 
 def lag_with_rate_limit(value: Array, command: Array, dt: Array, T: Array, rate: Array) -> Array:
@@ -53,20 +55,25 @@ def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, sub
     part = shift - whole
     held, rows = np.repeat(command, substeps, axis=1), np.arange(runs)
     last = samples * substeps - 1
+    follows = replace(gear, **{name: 0.0 for name in ("deadband", "backlash") if not np.any(getattr(gear, name))})
     for j in range(last + 1):
         now, before = held[rows, np.clip(j - whole, 0, last)], held[rows, np.clip(j - whole - 1, 0, last)]
-        for wanted, time in ((before, part * h), (now, (1.0 - part) * h)):
-            if np.all(time <= 0.0):
-                continue
-            moved = lag_with_rate_limit(motor, wanted, time, gear.T, gear.rate)
-            motor = _stopped_short(motor, moved, wanted, gear.deadband) if np.any(gear.deadband) else moved
-        position = np.clip(position, motor - 0.5 * gear.backlash, motor + 0.5 * gear.backlash) if np.any(gear.backlash) else motor
+        wanted = [(value, time) for value, time in ((before, part * h), (now, (1.0 - part) * h)) if not np.all(time <= 0.0)]
+        motor, position = gear_step(motor, position, wanted, follows)
         out[:, j + 1] = position
     return out
 
 
-def _stopped_short(before: np.ndarray, after: np.ndarray, wanted: np.ndarray, deadband: Array) -> np.ndarray:
+def gear_step(motor: Array, position: Array, wanted: Sequence[tuple[Array, Array]], gear: Gear) -> tuple[Array, Array]:
+    """Motor and actuator after commands that reach the controller one after the other, each with the seconds that it stands there."""
+    for command, time in wanted:
+        moved = lag_with_rate_limit(motor, command, time, gear.T, gear.rate)
+        motor = moved if is_neutral(gear.deadband, 0.0) else _stopped_short(motor, moved, command, gear.deadband)
+    return motor, motor if is_neutral(gear.backlash, 0.0) else clip(position, motor - 0.5 * gear.backlash, motor + 0.5 * gear.backlash)
+
+
+def _stopped_short(before: Array, after: Array, wanted: Array, deadband: Array) -> Array:
     """Where a controller with a deadband leaves the motor that would have moved from `before` to `after`: it stops the moment it is near enough."""
-    side = np.sign(wanted - before)
-    near = np.abs(wanted - before) <= deadband
-    return np.where(near, before, side * np.minimum(side * after, side * wanted - deadband))
+    side = sign(wanted - before)
+    near = absolute(wanted - before) <= deadband
+    return where(near, before, side * minimum(side * after, side * wanted - deadband))

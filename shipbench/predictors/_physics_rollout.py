@@ -83,21 +83,21 @@ class Rolling:
 
 @lru_cache(maxsize=64)
 def _numbers(c: eq2.Coefficients) -> np.ndarray:
-    return np.array(_flat(c))
+    return np.array(numbers_of(c))
 
 
-def _flat(value: Any) -> list[float]:
+def numbers_of(value: Any) -> list[float]:
     """The numbers in a dataclass, in order."""
     if is_dataclass(value):
-        return [number for f in fields(value) for number in _flat(getattr(value, f.name))]
-    return [number for item in value for number in _flat(item)] if isinstance(value, tuple) else [value]
+        return [number for f in fields(value) for number in numbers_of(getattr(value, f.name))]
+    return [number for item in value for number in numbers_of(item)] if isinstance(value, tuple) else [value]
 
 
-def _with(like: Any, numbers: Iterator[Array]) -> Any:
+def with_numbers(like: Any, numbers: Iterator[Array]) -> Any:
     """The dataclass `like` with other numbers in the same places."""
     if is_dataclass(like):
-        return replace(like, **{f.name: _with(getattr(like, f.name), numbers) for f in fields(like)})  # type: ignore[type-var]
-    return tuple(_with(item, numbers) for item in like) if isinstance(like, tuple) else next(numbers)
+        return replace(like, **{f.name: with_numbers(getattr(like, f.name), numbers) for f in fields(like)})  # type: ignore[type-var]
+    return tuple(with_numbers(item, numbers) for item in like) if isinstance(like, tuple) else next(numbers)
 
 
 def _step(like: eq2.Coefficients, commanded: bool, wind: bool, sensitivities: bool) -> casadi.Function:
@@ -106,8 +106,8 @@ def _step(like: eq2.Coefficients, commanded: bool, wind: bool, sensitivities: bo
 
     x, w = ca.SX.sym("x", len(STATES)), ca.SX.sym("w", len(COMMANDS) + 2 * wind)
     p, values, h = ca.SX.sym("p", _P), ca.SX.sym("values", _ACTUATORS), ca.SX.sym("h")
-    numbers = ca.SX.sym("c", len(_flat(like)))
-    c = _with(like, iter(ca.vertsplit(numbers)))
+    numbers = ca.SX.sym("c", len(numbers_of(like)))
+    c = with_numbers(like, iter(ca.vertsplit(numbers)))
     now, commands = ca.vertsplit(x[_MOTION:]), ca.vertsplit(w[: len(COMMANDS)])
     middle, end = (commands if commanded else actuators_after(now, commands, dt, ca.vertsplit(values)) for dt in (0.5 * h, h))
     stages = (commands if commanded else now, middle, end)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from shipbench.diagnosis.fit import Origin, fit, start
-from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, log_determinant, ornstein_uhlenbeck, solve
+from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, by_run, ornstein_uhlenbeck, solve
+from shipbench.diagnosis.inverse import inverses, log_determinant
 from shipbench.diagnosis.model import Linearisation, Scales, Term, predict
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import _wrong_way
-from shipbench.diagnosis.settle import Model, settle
+from shipbench.diagnosis.settle import Model, products_of, settle
 from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS, flow_first
 from shipbench.physics.mmg import load_mmg_ship
@@ -30,7 +32,7 @@ def test_the_evidence_is_that_of_the_joint_gaussian():
     knots, G, T = 3, 2, 6 * 5
     Z = rng.standard_normal((2, T, 6 + 3 * knots + G + 1))
     hyper = Hyper(np.array([0.1, -0.3, 0.2]), rng.normal(0.0, 0.2, 6), 2.0)
-    gram = Products.of(Z, np.ones((2, 5), dtype=bool), knots, 1.0, np.array([0, 1]), 2).weigh(hyper)
+    gram = Products.of(np.moveaxis(Z.reshape(2, 5, 6, -1), 2, 0), np.ones((2, 5), dtype=bool), knots, 1.0, np.array([0, 1]), 2).weigh(hyper)
     prior = Prior(np.array([0]), np.array([0.7]), np.array([1]), np.array([0.4]))
     found = solve(gram.reduce(hyper.log_force), prior).log_evidence
     K = np.linalg.inv(ornstein_uhlenbeck(knots, 1.0, 2.0)[0])
@@ -154,6 +156,28 @@ def test_thrust_astern_and_coupling_are_ordinary_differences(plant):
     assert mods.coupling == pytest.approx(0.0)
 
 
+def test_sums_by_run_are_those_of_reduceat():
+    run = np.array([0, 1, 1, 1, 2, 2, 5])
+    values = np.random.default_rng(0).standard_normal((7, 3, 3))
+    np.testing.assert_allclose(by_run(values, run), np.add.reduceat(values, [0, 1, 4, 6]), rtol=1e-12)
+
+
+def test_products_of_some_channels_are_rows_of_those_of_all(plant):
+    """With noise that lasts in one of them, and a piece that ends early."""
+    scales = Scales(plant)
+    seg = replace(plant.seg, mask=plant.seg.mask & (np.arange(plant.steps + 1) < plant.steps - 3 * (np.arange(len(plant.seg.run)) == 1)[:, None]))
+    short = copy(plant)
+    short.seg = seg
+    point, _ = start(plant)
+    columns, coloured = Linearisation(short, scales, point).columns(), scales.coloured(scales.colour.with_channel(2, 4.0, 6.0))
+    whole, some = products_of(short, coloured, point, columns), products_of(short, coloured, point, columns, [2, 5])
+    assert coloured.colour.differs(scales.colour) == [2]
+    np.testing.assert_allclose(some.P, whole.P[[2, 5]], rtol=1e-12)
+    e = (seg.states[..., 2] - columns.predicted[..., 2]) / scales.noise[2]
+    white = np.where(seg.mask, e @ coloured.colour.factor[2].T, 0.0)
+    np.testing.assert_allclose(whole.P[2, :, -1, -1], np.sum(white**2, axis=1), rtol=1e-9)
+
+
 def test_log_determinants_of_sound_and_of_blown_up_matrices():
     rng = np.random.default_rng(0)
     J = rng.standard_normal((5, 12, 8))
@@ -165,6 +189,18 @@ def test_log_determinants_of_sound_and_of_blown_up_matrices():
     with pytest.raises(np.linalg.LinAlgError):
         np.linalg.cholesky(blown)
     assert np.isfinite(log_determinant(blown)).all()
+    np.testing.assert_array_equal(inverses(blown)[0], np.linalg.inv(blown))
+
+
+@pytest.mark.parametrize(("count", "size"), [(1, 1), (8, 5), (19, 40)])
+def test_inverses_of_many_matrices_are_those_of_each(count, size):
+    J = np.random.default_rng(size).standard_normal((count, 2 * size, size)) * np.logspace(-4, 4, size)
+    A = np.swapaxes(J, 1, 2) @ J
+    inverse, logdet = inverses(A)
+    unit = np.sqrt(np.diagonal(A, axis1=1, axis2=2))  # columns of very different sizes
+    expected = np.linalg.inv(A / unit[:, :, None] / unit[:, None, :])
+    np.testing.assert_allclose(inverse * unit[:, :, None] * unit[:, None, :], expected, atol=1e-9)
+    np.testing.assert_allclose(logdet, np.linalg.slogdet(A)[1], rtol=1e-10)
 
 
 def test_a_fit_that_has_not_come_to_rest_is_charged_with_the_cost_it_has(plant):

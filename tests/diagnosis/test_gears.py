@@ -1,0 +1,55 @@
+"""Gears followed by machine code against `gear_path`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipbench import compiled
+from shipbench.diagnosis import gears
+from shipbench.diagnosis.gears import _kinds, _Record, find_in_gears
+from shipbench.diagnosis.plant import Plant
+from shipbench.effects.base import EFFECTS
+from shipbench.physics.actuators import Gear
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.simulate.hidden import Hidden
+from shipbench.simulate.trials import Trials, sea_trials
+
+
+@pytest.fixture
+def compiler():
+    if not compiled._compiler()[0]:
+        pytest.skip("no C compiler here")
+
+
+def trials(name: str, *values: float) -> Plant:
+    return Plant.of(sea_trials(load_mmg_ship("kcs"), 4, (Hidden(EFFECTS.get(name), values),), Trials(runs=4, samples=70)))
+
+
+@pytest.mark.parametrize("which", range(6))
+def test_machine_code_follows_as_numpy_does(compiler, which, monkeypatch):
+    plant, rng = trials("rudder_backlash", 0.03), np.random.default_rng(which)
+    record = _Record.of(plant.long, plant.c.L, "delta", np.array([(b, 1) for b in range(len(plant.long.run))]))
+    kind = (None, *_kinds("delta", record.scale, 0.6, Gear(1.0, 0.1)))[which]
+    low, high = np.log([0.1, 0.02]), np.log([3.0, 0.2])
+    z = rng.uniform(low, high, (9, 2))
+    if kind is not None:
+        z = np.resize(z, (9, max(2, kind.at + 1)))
+        z[:, kind.at] = rng.uniform(np.log(kind.low), np.log(kind.high), 9)
+    paths, costs = record.paths(z, kind), record.costs(z, kind)
+    monkeypatch.setattr(gears, "_follower", lambda field: None)
+    np.testing.assert_allclose(paths, record.paths(z, kind), rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(costs, record.costs(z, kind), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "value"), [("rudder_delay", 2.5), ("rudder_deadband", 0.04)])
+def test_findings_do_not_depend_on_the_compiler(compiler, name, value, monkeypatch):
+    plant = trials(name, value)
+    found, ordinary = find_in_gears(plant)
+    monkeypatch.setattr(gears, "_follower", lambda field: None)
+    expected, as_before = find_in_gears(plant)
+    assert [f.effect for f in found] == [f.effect for f in expected]
+    assert found[0].effect == name
+    np.testing.assert_allclose([f.value for f in found], [f.value for f in expected], rtol=1e-3)
+    np.testing.assert_allclose([f.score for f in found], [f.score for f in expected], rtol=1e-2)
+    assert ordinary.keys() == as_before.keys()

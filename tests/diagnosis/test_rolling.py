@@ -1,0 +1,131 @@
+"""Rollouts and single steps as machine code against numpy's loops over the same formula."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipbench import compiled
+from shipbench.diagnosis import rolling
+from shipbench.diagnosis.model import NUM_BASE, Linearisation, Point, Scales, Term
+from shipbench.diagnosis.plant import Plant, cut
+from shipbench.effects.base import EFFECTS, Effect, Parameter
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.records import Dataset, Run
+from shipbench.ship import complete
+from shipbench.simulate.trials import Trials, sea_trials
+
+FORCES = tuple(name for name in EFFECTS.names() if name != "change_point" and EFFECTS.get(name).enters == "force" and not EFFECTS.get(name).channels)
+
+
+@pytest.fixture(scope="module", params=["kcs", "windy kcs", "every 6 s"])
+def data(request) -> Dataset:
+    """Runs of a ship; with measured wind; and with samples so far apart that each takes several integration steps."""
+    made = sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=3, samples=60))
+    if request.param == "windy kcs":
+        wind = np.stack([4.0 + np.sin(np.arange(61) / 9.0), np.arange(61) / 20.0], axis=1)
+        runs = [
+            Run(r.id, r.t, r.states, np.concatenate([r.inputs, wind[: len(r)]], axis=1), (*r.inputs_names, "wind_speed", "wind_from"))
+            for r in made.runs
+        ]
+        made = replace(made, runs=tuple(runs))
+    if request.param == "every 6 s":
+        runs = [Run(r.id, r.t[::6], r.states[::6], r.inputs[::6]) for r in made.runs]
+        made = replace(made, runs=tuple(runs), dt=6.0)
+    return made
+
+
+@pytest.fixture(params=[False, True], ids=["recorded", "commanded"])
+def plant(request, data) -> Plant:
+    return Plant(complete(data.ship), replace(cut(data, 40), commanded=request.param))
+
+
+def point(plant: Plant, *names: str, since: int | None = None, size: float = 0.3) -> Point:
+    rng = np.random.default_rng(0)
+    terms = []
+    for name in names:
+        effect = EFFECTS.get(name)
+        begins = since if effect.enters == "force" and not effect.per_run else None
+        terms.append(Term(effect, tuple(effect.settings(plant.seg.states[..., :2], plant.ship)[0]), effect.per_run, begins))
+    values = tuple(size * rng.standard_normal((plant.seg.runs, t.size) if t.per_run else t.size) for t in terms)
+    eta, w = (size * rng.standard_normal((len(plant.seg.run), *shape)) for shape in ((6,), (plant.knots, 3)))
+    return Point(size * rng.standard_normal(NUM_BASE), eta, w, tuple(terms), values)
+
+
+@pytest.fixture
+def compiler(monkeypatch):
+    """Nothing built before the test."""
+    if not compiled._compiler()[0]:
+        pytest.skip("no C compiler here")
+    monkeypatch.setattr(rolling, "_built", {})
+
+
+def both(plant: Plant, at: Point, monkeypatch) -> tuple[Linearisation, Linearisation]:
+    """The linearisation with machine code and without."""
+    found = Linearisation(plant, Scales(plant), at)
+    found.columns()
+    assert sum(code is not None for code in rolling._built.values()) == 2  # a step, and its accelerations
+    monkeypatch.setattr(rolling.Course, "_code", lambda *_, **__: None)
+    loops = Linearisation(plant, Scales(plant), at)
+    loops.columns()
+    return found, loops
+
+
+def agree(code: np.ndarray, loops: np.ndarray, within: float = 1e-9) -> None:
+    np.testing.assert_array_equal(np.isfinite(code), np.isfinite(loops))
+    axes = tuple(range(code.ndim - 1))
+    size = np.maximum(np.max(np.abs(loops), axis=axes, where=np.isfinite(loops), initial=0.0), 1e-300)
+    np.testing.assert_allclose(code / size, loops / size, rtol=within, atol=within)
+
+
+@pytest.mark.parametrize("names", [(), ("current",), ("current_per_run", "bank_suction", "rudder_lag"), ("cross_flow_drag", "wave_drift")])
+def test_machine_code_and_numpy_agree(compiler, plant, names, monkeypatch):
+    code, loops = both(plant, point(plant, *names, since=1), monkeypatch)
+    for name in ("motion", "here", "rates"):
+        agree(getattr(code, name), getattr(loops, name))
+    for name in ("jacobian", "base_sources"):  # differences over small steps
+        agree(getattr(code, name), getattr(loops, name), 1e-5)
+
+
+@pytest.mark.parametrize("name", FORCES)
+def test_every_force_of_the_library_becomes_machine_code(compiler, name, monkeypatch):
+    made = sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=2, samples=30))
+    code, loops = both(plant := Plant.of(made), point(plant, name), monkeypatch)
+    agree(code.motion, loops.motion)
+
+
+def test_a_run_that_blows_up_is_not_finite_in_either(compiler, plant, monkeypatch):
+    wild = point(plant, size=0.0)
+    wild.w[0], wild.base[1] = 1e9, -80.0
+    code, loops = both(plant, wild, monkeypatch)
+    assert not np.isfinite(code.motion[0]).all()
+    np.testing.assert_array_equal(np.isfinite(code.motion), np.isfinite(loops.motion))
+
+
+def test_one_compilation_serves_all_ships(compiler):
+    plants = [Plant.of(sea_trials(load_mmg_ship(ship), 5, (), Trials(runs=2, samples=30))) for ship in ("kcs", "container130")]
+    for plant in plants:
+        Linearisation(plant, Scales(plant), point(plant))
+    assert len(rolling._built) == 2
+
+
+class Stubborn(Effect):
+    """Looks at its value, as no effect should: symbols have none."""
+
+    name, family, parameters = "stubborn", "hull", (Parameter("amplitude", "1", 1.0, -5.0, 5.0),)
+
+    def force(self, e, s, q, ship):
+        if q[0] > 0.0:
+            e.push(q[0] * ship.mass)
+
+
+def test_an_effect_that_takes_no_symbols_goes_through_numpy(plant):
+    course = plant.course
+    active = [rolling.Active(Stubborn(), (1e-3,))]
+    x0, push = plant.seg.states[:, 0, :6], plant.pushes(np.zeros((len(plant.seg.run), plant.steps + 1, 3)))
+    assert course._code(active, steps=True) is None
+    moved = plant.roll(x0, [0.0] * 11, active, np.zeros((len(x0), plant.steps + 1, 3)))
+    assert moved[0, 1, 3] > plant.roll(x0, [0.0] * 11, [], np.zeros((len(x0), plant.steps + 1, 3)))[0, 1, 3]
+    assert push.shape == (plant.steps, len(x0), plant.substeps, 3, 3)
