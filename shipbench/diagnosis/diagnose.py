@@ -30,6 +30,9 @@ FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
 STRANGE, STRANGE_SUM, STRANGE_SIZE = 6.5, 130.0, 3.0
 """Of the fit's parameters in units of their ordinary spreads, beside the causes; their sum of squares; and the size of a cause in typical sizes."""
+CARRIED = ("current", "current_per_run")
+"""Seen in the kinematics whatever the ship, as faults of sensors are: with files of other ships neither was named where there was none, and a current
+was found with its size (8 pairs of trials and file, with wind, helm and walk of the propeller hidden)."""
 NOT_A_MODEL = ("unit_or_sign_error", "change_point")
 """They describe the data, not the ship: correct the data, or fit the runs before and after the change apart."""
 
@@ -68,8 +71,9 @@ def diagnose(
     measured = gain and not cautious and not doubts
     worth = _cross_validated(dataset, found, only, seed, workers, settled) if measured else Worth()
     causes = describe_causes(found, units, late, worth.gain, worth.hull, [r.id for r in dataset.runs])
-    if doubts:  # faults of sensors show in the kinematics, whatever the ship
-        causes = [replace(c, rank=i + 1) for i, c in enumerate(c for c in causes if EFFECTS.get(c.effect).family == "sensor")]
+    if doubts:
+        sure = [c for c in causes if EFFECTS.get(c.effect).family == "sensor" or c.effect in CARRIED]
+        causes = [replace(c, rank=i + 1) for i, c in enumerate(sure)]
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
@@ -131,7 +135,7 @@ def _doubts(found: Analysis) -> list[str]:
     text = "; ".join(signs)
     return [
         f"{text}. Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)? Until that is sure, nothing is named but "
-        "faults of sensors, which show in the kinematics; the candidates below are ranked as if it were."
+        "currents and faults of sensors, which show whatever the ship is; the candidates below are ranked as if it were."
     ]
 
 

@@ -136,11 +136,15 @@ def test_a_ship_file_of_another_ship_names_nothing():
     assert verdict.verdict == "unknown"
 
 
-def test_a_fault_of_a_sensor_is_named_whatever_ship_the_file_describes():
-    trials = published_trials(PUBLISHED["tanker"], 7, (Hidden(EFFECTS.get("speed_scale"), (0.05,)),), Trials(runs=16, samples=100))
+@pytest.mark.parametrize("name", ["speed_scale", "current"])
+def test_what_shows_in_the_kinematics_is_named_whatever_ship_the_file_describes(name):
+    hidden = Hidden(EFFECTS.get(name), (0.05,) if name == "speed_scale" else (0.3, -0.2))
+    trials = published_trials(PUBLISHED["tanker"], 7, (hidden,), Trials(runs=16, samples=100))
     verdict = diagnose(replace(trials, ship=PUBLISHED["s175"].particulars), gain=False)
     assert "Is the ship file that of this ship" in verdict.warnings[0]
-    assert [c.effect for c in verdict.causes] == ["speed_scale"]
+    assert [(c.effect, c.rank) for c in verdict.causes] == [(name, 1)]
+    true_size = 0.05 if name == "speed_scale" else np.hypot(0.3, 0.2)
+    assert next(iter(verdict.causes[0].parameters.values())).value == pytest.approx(true_size, rel=0.25)
 
 
 def test_too_few_runs_rank_candidates_but_name_none():
