@@ -130,7 +130,9 @@ def _causes(d: Diagnosis) -> str:
         )
     if not d.causes:
         return paragraph("None is named.")
-    return "".join(_cause(c) for c in d.causes) + paragraph(gain_words(d.gain) + (" All causes together." if len(d.causes) > 1 else ""))
+    return "".join(_cause(c) for c in d.causes) + paragraph(
+        gain_words(d.gain) + (" All causes together." if d.gain is not None and len(d.causes) > 1 else "")
+    )
 
 
 def _cause(c: Cause) -> str:

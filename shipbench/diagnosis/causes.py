@@ -173,7 +173,8 @@ def _late_cause(rank: int, found: Analysis, late: LateVelocities) -> Cause:
     }  # fmt: skip
     how = "behind a filter of first order" if late.filtered else "as they were"
     evidence = (
-        f"u and v follow the track {late.delay:.2g} s late, {how}, as a vector in the earth's axes: seen by kinematics and taken out before the fit. "
+        f"surge and sway velocity follow the track {late.delay:.2g} s late, {how}, as a vector in the earth's axes: seen by kinematics and taken out "
+        "before the fit. "
         f"The plain model agrees: {0.5 * late.score:.0f} of log evidence over the runs as recorded, {0.5 * late.over_position:.0f} over a position "
         "that is early"
     )

@@ -18,7 +18,7 @@ INPUTS = ("revolutions", "rudder", "bow thruster", "stern thruster")
 FORCE_UNITS = (("mm/s^2", 1e3), ("mm/s^2", 1e3), ("mdeg/s^2", 57.29578e3))
 LAGS = 10
 _AXES_OF = {"position": (0, 1, 2), "heading": (2,), "surge": (0,), "sway": (1,), "yaw rate": (2,)}
-_LEVEL = 0.02
+_LEVEL, _LEAST_FOLLOWED = 0.02, 0.01
 _SMALLEST_SHARE = 0.05
 _WORTH_SAYING = 1.3
 _MOST_RUNS = 12
@@ -147,7 +147,7 @@ def what_is_wrong(trace: Trace) -> tuple[Wrong, ...]:
     for channel, share in sorted(tables.share.items(), key=lambda item: -item[1]):
         if share < _SMALLEST_SHARE:
             continue
-        known = [(f, axis) for axis in _AXES_OF[channel] for f in tables.follows[AXES[axis]] if f.p <= _LEVEL]
+        known = [(f, axis) for axis in _AXES_OF[channel] for f in tables.follows[AXES[axis]] if f.p <= _LEVEL and f.share >= _LEAST_FOLLOWED]
         best, axis = max(known, key=lambda item: item[0].share) if known else (None, 0)
         text = _error_words(tables, channel, best.variable if best else "")
         if best is not None:

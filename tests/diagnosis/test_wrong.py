@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.follows import follows, with_speed
+from shipbench.diagnosis import wrong
+from shipbench.diagnosis.follows import Follows, follows, with_speed
 from shipbench.diagnosis.outcome import Trace
 from shipbench.diagnosis.wrong import _whiteness, error_tables, what_is_wrong
 
@@ -88,6 +89,18 @@ def test_a_force_that_is_each_runs_own_is_not_taken_for_a_dependence():
 def test_a_force_without_cause_follows_nothing():
     follows = [next(w for w in what_is_wrong(make_trace(seed=s)) if w.channel == "sway").depends_on for s in range(6)]
     assert sum(bool(f) for f in follows) <= 1
+
+
+def test_a_dependence_that_is_sure_but_tiny_is_not_spoken_of(monkeypatch):
+    """Long records make a share of the variance that rounds to nothing significant."""
+    trace = make_trace()
+    found = error_tables(trace)
+    for share, said in ((0.004, False), (0.3, True)):
+        tables = replace(found, follows={axis: [Follows("rudder", share, 0.001)] for axis in found.follows})
+        monkeypatch.setattr(wrong, "error_tables", lambda _, tables=tables: tables)
+        lines = what_is_wrong(trace)
+        assert lines
+        assert all(("follows rudder" in line.when) is said for line in lines)
 
 
 def test_the_shares_are_those_of_the_planted_channel():
