@@ -175,7 +175,7 @@ def figures(rows: Sequence[Row]) -> list[Row]:
     published, calm = kinds.get("published", []), kinds.get("none-published", [])
     lines.append(rate("first-named cause right, ships of the literature", published, lambda r: right(r, True), "typical size"))
     lines.append(rate("right class, ships of the literature", published, lambda r: right_class(r, True), "typical size"))
-    lines.append(rate("nothing hidden, a wrong name, ships of the literature", calm, lambda r: alarm(r, True), "hull_derivatives not counted"))
+    lines.append(rate("nothing hidden, a wrong name, ships of the literature", calm, lambda r: bool(named(r, True)), "hull_derivatives skipped"))
     lines.append(
         rate("nothing hidden, unknown, ships of the literature", calm, says_unknown, "the fit leaves what is ordinary, or a force is missing")
     )
