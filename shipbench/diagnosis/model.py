@@ -146,6 +146,10 @@ vector goes both ways, because its sign differs from heading to heading. So does
 force has no slope, would be held there."""
 
 
+_quiet = np.errstate(over="ignore", invalid="ignore")
+"""A trial whose trajectory blows up is judged by its cost, which is not finite."""
+
+
 class Linearisation:
     """A trajectory and its sensitivities: forward differences of all single steps at once, chained by the steps' Jacobians.
 
@@ -154,6 +158,7 @@ class Linearisation:
     fit comes to rest where it is best, but does not leave the place where a vector is zero.
     """
 
+    @_quiet
     def __init__(self, plant: Plant, scales: Scales, point: Point, guess: np.ndarray | None = None, coarse: bool = True) -> None:
         self.plant, self.scales, self.point, self.coarse = plant, scales, point, coarse
         self.now = actives(plant, scales, point)
@@ -186,6 +191,7 @@ class Linearisation:
         eta, latent = self._chained(np.zeros((*self.here.shape, 6)), first), self._chained(self.pulses)
         return Columns(self.predicted, eta, latent, base, own, tuple(self._of_candidates(candidates)))
 
+    @_quiet
     def parameter_columns(self) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         """Those of the base parameters and of the terms in the model alone."""
         p, ship = parameters(self.scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, None, :])
@@ -262,6 +268,7 @@ class Linearisation:
         self.own_sources.append(sources)
         return columns
 
+    @_quiet
     def _of_candidates(self, candidates: Sequence[Term]) -> list[np.ndarray]:
         """Columns (B, T, size) of terms that are not in the model; those that act as forces share one batch."""
         found: dict[int, np.ndarray] = {}
@@ -288,6 +295,7 @@ class Linearisation:
         """Accelerations in the middle of all single steps with a force that is not in the model."""
         return self._rates(forces=[*self.forces, Active(term.effect, (*(side * v for v in q), *term.setting))], often=False)
 
+    @_quiet
     def _moved(self, index: int | None, term: Term, steps: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Columns (B, T, size) of one term, the index-th of the model or one that is not in it, and its sources where it touches the motion."""
         columns, sources = [], []

@@ -9,6 +9,7 @@ import pytest
 
 from shipbench import compiled
 from shipbench.diagnosis import rolling
+from shipbench.diagnosis.gain import plain_base, rollout_plant
 from shipbench.diagnosis.model import NUM_BASE, Linearisation, Point, Scales, Term
 from shipbench.diagnosis.plant import Plant, cut
 from shipbench.effects.base import EFFECTS, Effect, Parameter
@@ -102,6 +103,16 @@ def test_a_run_that_blows_up_is_not_finite_in_either(compiler, plant, monkeypatc
     code, loops = both(plant, wild, monkeypatch)
     assert not np.isfinite(code.motion[0]).all()
     np.testing.assert_array_equal(np.isfinite(code.motion), np.isfinite(loops.motion))
+
+
+def test_a_trial_that_blows_up_is_not_warned_of():
+    """Numbers that are infinite, and not merely not numbers, come out of some of these; a warning is an error in these tests."""
+    part = rollout_plant(sea_trials(load_mmg_ship("kcs"), 3, (), Trials(runs=4, samples=100)), {})
+    base = plain_base() + 20.0 * np.random.default_rng(0).standard_normal(NUM_BASE)
+    still = Point(base, np.zeros((4, 6)), np.zeros((4, part.knots, 3)))
+    lin = Linearisation(part, Scales(part), still)
+    lin.parameter_columns()
+    assert not np.isfinite(lin.motion).all()
 
 
 def test_one_compilation_serves_all_ships(compiler):
