@@ -182,8 +182,11 @@ class Plant:
         seg, n, before = self.seg, 2 * self.substeps, self.seg.earlier.shape[1]
         fine = np.arange(-before * n, self.steps * n + 1) / n
         if seg.commanded:
-            at = np.clip(np.floor(fine - min(gear.delay, 0.0) / seg.dt + 1e-9).astype(int), -before, self.steps - 1)
-            values = np.concatenate([seg.earlier[..., i], seg.commands[..., i]], axis=1)[:, before + at]
+            # between stages linear: else a record that is late by less than the next stage would have no slope to find it by
+            whole, part = divmod(-min(gear.delay, 0.0) / seg.dt * n, 1.0)
+            orders = np.concatenate([seg.earlier[..., i], seg.commands[..., i]], axis=1)
+            at = [np.clip(np.floor(fine + (whole + k) / n + 1e-9).astype(int), -before, self.steps - 1) for k in (0, 1)]
+            values = orders[:, before + at[0]] * (1.0 - part) + orders[:, before + at[1]] * part
         else:
             at = np.clip(fine - min(gear.delay, 0.0) / seg.dt, 0, self.steps)
             low = np.minimum(at.astype(int), self.steps - 1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from shipbench import compiled
 from shipbench.diagnosis import gears
 from shipbench.diagnosis.gears import _kinds, _Record, find_in_gears
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.rolling import Active
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.actuators import Gear
 from shipbench.physics.mmg import load_mmg_ship
@@ -53,3 +56,13 @@ def test_findings_do_not_depend_on_the_compiler(compiler, name, value, monkeypat
     np.testing.assert_allclose([f.value for f in found], [f.value for f in expected], rtol=1e-3)
     np.testing.assert_allclose([f.score for f in found], [f.score for f in expected], rtol=1e-2)
     assert ordinary.keys() == as_before.keys()
+
+
+def test_a_record_that_is_late_by_less_than_a_stage_has_a_slope_to_be_found_by():
+    """Orders alone: held for a sample each, they would else not move at all with a small delay, and the fit would rest at none."""
+    data = sea_trials(load_mmg_ship("kcs"), 3, (), Trials(runs=2, samples=60))
+    plant = Plant.of(replace(data, actuators="commanded"))
+    still, effect = plant.path_of([]), EFFECTS.get("rudder_delay")
+    moved = [plant.path_of([Active(effect, (late,))]) - still for late in (-0.01, -0.02)]
+    assert np.abs(moved[0][..., 1]).max() > 0.0
+    np.testing.assert_allclose(moved[1], 2.0 * moved[0], atol=1e-9)
