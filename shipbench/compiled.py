@@ -171,18 +171,20 @@ class Lanes:
     Where it has as many results as the first bundle has numbers it is a step: the parts follow each other, and so do the K where they are `carried`.
 
     Args:
-        function: SX, one vector per bundle, to one vector.
-
-    Raises:
-        NotImplementedError: there is no compiler here, or the function holds an operation that is not known: use the formula itself.
+        sizes: of the bundles.
+        num: of results.
+        compiled: the machine code; see `of`.
     """
 
-    def __init__(self, function: casadi.Function) -> None:
-        self.sizes, self.num = tuple(function.numel_in(i) for i in range(function.n_in())), function.numel_out(0)
+    def __init__(self, sizes: tuple[int, ...], num: int, compiled: Callable[..., Any]) -> None:
+        self.sizes, self.num, self._compiled = sizes, num, compiled
+
+    @classmethod
+    def of(cls, function: casadi.Function) -> Lanes | None:
+        """Of a function in SX, one vector per bundle, to one vector. None where there is no compiler, or it holds an operation that is not known: use
+        the formula itself."""
         compiled = _machine_code(_lanes_source(function), "lanes", _LANES_ARGUMENTS)
-        if compiled is None:
-            raise NotImplementedError("no machine code here")
-        self._compiled = compiled
+        return None if compiled is None else cls(tuple(function.numel_in(i) for i in range(function.n_in())), function.numel_out(0), compiled)
 
     def __call__(self, given: Sequence[np.ndarray], shape: tuple[int, int, int, int], out: np.ndarray, carried: bool = False) -> None:
         """Write `out` (D, K, B, num) from bundles that spread over (D, K, B, S, size), shape = (D, K, B, S); (D, 1, B, num) keeps the last of K."""

@@ -186,8 +186,8 @@ def _compiled(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool,
     from ..compiled import Lanes
 
     try:
-        return Lanes(_traced(active, vessel, wind, steps, any_ship))
-    except (NotImplementedError, RuntimeError, TypeError, ValueError):
+        return Lanes.of(_traced(active, vessel, wind, steps, any_ship))
+    except (RuntimeError, TypeError, ValueError):
         return None
 
 

@@ -74,7 +74,7 @@ def both(plant: Plant, at: Point, monkeypatch) -> tuple[Linearisation, Linearisa
     return found, loops
 
 
-def agree(code: np.ndarray, loops: np.ndarray, within: float = 1e-9) -> None:
+def assert_agree(code: np.ndarray, loops: np.ndarray, within: float = 1e-9) -> None:
     np.testing.assert_array_equal(np.isfinite(code), np.isfinite(loops))
     axes = tuple(range(code.ndim - 1))
     size = np.maximum(np.max(np.abs(loops), axis=axes, where=np.isfinite(loops), initial=0.0), 1e-300)
@@ -85,16 +85,16 @@ def agree(code: np.ndarray, loops: np.ndarray, within: float = 1e-9) -> None:
 def test_machine_code_and_numpy_agree(compiler, plant, names, monkeypatch):
     code, loops = both(plant, point(plant, *names, since=1), monkeypatch)
     for name in ("motion", "here", "rates"):
-        agree(getattr(code, name), getattr(loops, name))
+        assert_agree(getattr(code, name), getattr(loops, name))
     for name in ("jacobian", "base_sources"):  # differences over small steps
-        agree(getattr(code, name), getattr(loops, name), 1e-5)
+        assert_agree(getattr(code, name), getattr(loops, name), 1e-5)
 
 
 @pytest.mark.parametrize("name", FORCES)
 def test_every_force_of_the_library_becomes_machine_code(compiler, name, monkeypatch):
     made = sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=2, samples=30))
     code, loops = both(plant := Plant.of(made), point(plant, name), monkeypatch)
-    agree(code.motion, loops.motion)
+    assert_agree(code.motion, loops.motion)
 
 
 def test_a_run_that_blows_up_is_not_finite_in_either(compiler, plant, monkeypatch):
