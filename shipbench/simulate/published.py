@@ -91,7 +91,7 @@ def _mariner(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, pu
 
 
 def _tanker(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, push: Push) -> Motion:
-    """Van Berlekom & Goddard (1972), SNAME Trans. 80, deep water: a 190,000 dwt tanker; accelerations in units of g cancel out."""
+    """Van Berlekom & Goddard (1972), SNAME Trans. 80, deep water: a 190,000 dwt tanker; forces by mass (bis system)."""
     L, mass = 304.8, 220_000.0 * 1025.0
     u, v, r = motion
     rps, d = np.maximum(n, 0.0) / 60.0, -delta
@@ -225,9 +225,7 @@ def published_trials(ship: Published, seed: int, hidden: Sequence[Hidden] = (), 
     if ship.rpm is not None:
         sailing.s0[:, 6] = sailing.U[..., 0] = ship.rpm
     steps, forces = sailing.U.shape[1], flow_first(hidden)
-    wind = (
-        gusts(rng, plan.runs, steps, sailing.dt, plan.gusts * sailing.scale, 20.0 * sailing.scale) if plan.gusts else np.zeros((plan.runs, steps, 2))
-    )
+    wind = gusts(rng, plan.runs, steps, sailing.dt, plan.gusts * sailing.scale, 20.0 * sailing.scale)
     path = actuator_paths(ship, sailing.s0, sailing.U, sailing.dt, _SUBSTEPS, hidden)
     x: Motion = (*sailing.s0[:, :6].T, *np.zeros((ship.more, plan.runs)))
     S = np.empty((plan.runs, steps + 1, 10))
