@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 _SECONDS = 120
-_ROLLOUT_ARGUMENTS = (*[ctypes.c_long] * 3, *[ctypes.c_void_p] * 4)
 _LANES_ARGUMENTS = (ctypes.c_void_p, ctypes.c_longlong, *[ctypes.c_void_p] * 4)
 _FLAGS = (
     "-std=gnu11", "-O1", "-ftree-vectorize", "-march=native", "-mprefer-vector-width=512", "-fopenmp-simd",
@@ -65,20 +64,6 @@ SIMD double atan2(double, double); SIMD double pow(double, double);
 #define ONE(f) static inline v v##f(v a) { v y; LANES y[l] = f(a[l]); return y; }
 #define TWO(f) static inline v v##f(v a, v b) { v y; LANES y[l] = f(a[l], b[l]); return y; }
 ONE(sin) ONE(cos) ONE(exp) ONE(log) ONE(tanh) ONE(sqrt) TWO(atan2) TWO(pow)
-"""
-_LOOP = """
-void rollout(long runs, long samples, long substeps, const double *x0, const double *w, const double *p, double *X) {
-  for (long b = 0; b < runs; b += W) {
-    v x[NX], y[NX], in[NW];
-    const long n = runs - b < W ? runs - b : W;
-    for (long l = 0; l < W; l++) for (long i = 0; i < NX; i++) x[i][l] = x0[(b + (l < n ? l : n - 1)) * NX + i];
-    for (long k = 0; k < samples; k++) {
-      for (long l = 0; l < W; l++) for (long i = 0; i < NW; i++) in[i][l] = w[((b + (l < n ? l : n - 1)) * samples + k) * NW + i];
-      for (long s = 0; s < substeps; s++) { step(x, in, p, y); for (long i = 0; i < NX; i++) x[i] = y[i]; }
-      for (long l = 0; l < n; l++) for (long i = 0; i < NX; i++) X[((b + l) * samples + k) * NX + i] = x[i][l];
-    }
-  }
-}
 """
 _LANES = """
 typedef long long num;
@@ -131,13 +116,13 @@ class Rollout:
     def __init__(self, step: casadi.Function, machine_code: bool = True) -> None:
         self.nx, self.nw, self.num = (step.numel_in(i) for i in range(3))
         self._step = step
-        self._compiled = _machine_code(c_source(step), "rollout", _ROLLOUT_ARGUMENTS) if machine_code else None
+        self._lanes = Lanes.of(step) if machine_code else None
         self._interpreted = cache(lambda steps: step.mapaccum("roll", steps))
 
     @property
     def compiled(self) -> bool:
         """Whether it runs as machine code; else CasADi interprets it."""
-        return self._compiled is not None
+        return self._lanes is not None
 
     def __call__(self, x0: np.ndarray, w: np.ndarray, p: np.ndarray, substeps: int = 1) -> np.ndarray:
         """States (runs, K, nx) at t_1..t_K from x0 (runs, nx), `substeps` steps a sample under inputs w (runs, K, nw) held over it; p (num,)."""
@@ -145,10 +130,10 @@ class Rollout:
         runs, samples = w.shape[:2]
         if x0.shape != (runs, self.nx) or w.shape[2] != self.nw or p.shape != (self.num,):
             raise ValueError(f"shapes {x0.shape}, {w.shape}, {p.shape}; accepted: (runs, {self.nx}), (runs, samples, {self.nw}), ({self.num},)")
-        if self._compiled is None:
+        if self._lanes is None:
             return self._interpret(x0, np.repeat(w, substeps, axis=1), p)[:, substeps - 1 :: substeps]
         X = np.empty((runs, samples, self.nx))
-        self._compiled(runs, samples, substeps, x0.ctypes.data, w.ctypes.data, p.ctypes.data, X.ctypes.data)
+        self._lanes([x0[:, None], np.swapaxes(w, 0, 1)[:, :, None], p], (1, samples, runs, substeps), np.swapaxes(X, 0, 1)[None], carried=True)
         return X
 
     def _interpret(self, x0: np.ndarray, w: np.ndarray, p: np.ndarray) -> np.ndarray:
@@ -183,7 +168,7 @@ class Lanes:
     def of(cls, function: casadi.Function) -> Lanes | None:
         """Of a function in SX, one vector per bundle, to one vector. None where there is no compiler, or it holds an operation that is not known: use
         the formula itself."""
-        compiled = _machine_code(_lanes_source(function), "lanes", _LANES_ARGUMENTS)
+        compiled = _machine_code(c_source(function), "lanes", _LANES_ARGUMENTS)
         return None if compiled is None else cls(tuple(function.numel_in(i) for i in range(function.n_in())), function.numel_out(0), compiled)
 
     def __call__(self, given: Sequence[np.ndarray], shape: tuple[int, int, int, int], out: np.ndarray, carried: bool = False) -> None:
@@ -197,17 +182,8 @@ class Lanes:
         self._compiled(size.ctypes.data, carried, pointers.ctypes.data, by.ctypes.data, out.ctypes.data, by[-1].ctypes.data)
 
 
-def c_source(step: casadi.Function) -> str | None:
-    """C code of a rollout of `step`, every number of which is a vector over runs; None where it holds an operation that is not known here."""
-    body = _instructions(step, ("x[{}]", "w[{}]", "K(p[{}])"))
-    if body is None:
-        return None
-    sizes = f"#define NX {step.numel_in(0)}\n#define NW {step.numel_in(1)}\n"
-    return f"{_HEAD}{sizes}static void step(const v *x, const v *w, const double *p, v *y) {{\n{body}\n}}\n{_LOOP}"
-
-
-def _lanes_source(function: casadi.Function) -> str | None:
-    """C code of `Lanes`."""
+def c_source(function: casadi.Function) -> str | None:
+    """C code of `Lanes`; None where the function holds an operation that is not known here."""
     sizes = [function.numel_in(i) for i in range(function.n_in())]
     body = _instructions(function, [f"g[{sum(sizes[:i])} + {{}}]" for i in range(len(sizes))])
     if body is None:
