@@ -17,11 +17,12 @@ from .model import FREE, HULL_SPREAD, Term
 from .outcome import Candidate, Cause, Estimate, Gain
 from .plant import HULL, NUM_HULL
 from .screen import Score
-from .select import AS_RECORDED, WITHOUT_WIND
+from .select import AS_RECORDED, AS_SHIPS_DIFFER, WITHOUT_WIND
 from .settle import Fit
 
 _TIE = 10.0
 """Candidates within this of the winner's score (2 log Bayes factor) are called confused with it."""
+_DOUBT = "in the model, but not named while the ship file is in doubt"
 
 
 def describe_causes(
@@ -193,7 +194,7 @@ def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -
             continue
         score = max(s.score, refits.get(label, -np.inf))
         lines[label] = Candidate(
-            label, float(score), _p(found, score), _reason(found, s, score, last.get(label), named), _shown(s, found.selection.null),
+            label, float(score), _p(found, score), _reason(found, s, last.get(label), named), _shown(s, found.selection.null),
             _detectable(found, s),
             s.term.effect.units(), s.term.effect.family,
         )  # fmt: skip
@@ -203,7 +204,7 @@ def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -
             reason = "named" if g.effect in named else f"score {g.score:.0f} below the threshold {found.threshold:.0f}"
             if g.effect not in named and g.score > found.threshold:
                 best = next(x for x in found.all_gears if x.actuator == g.actuator)
-                reason = f"{best.effect} explains the same actuator better ({best.score:.0f} against {g.score:.0f})"
+                reason = f"{best.effect} explains the same actuator better ({best.score:.0f} against {g.score:.0f})" if best is not g else _DOUBT
             name = effect.parameters[0].name
             lines[g.effect] = Candidate(
                 g.effect, g.score, _p(found, g.score), reason, {name: g.value}, {}, {name: effect.parameters[0].unit}, effect.family
@@ -214,19 +215,29 @@ def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -
     return sorted(lines.values(), key=lambda c: -c.score if np.isfinite(c.score) else np.inf)
 
 
-def _reason(found: Analysis, s: Score, score: float, last: Score | None, named: Sequence[str]) -> str:
-    label, threshold = s.term.label, found.threshold
+def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str]) -> str:
+    """Why a candidate that was screened is not named; last: its score beside the causes found."""
+    label, steps, inside = s.term.label, found.selection.steps, [t.label for t in found.final.model.terms]
+    odd = found.selection.off_form if label in AS_SHIPS_DIFFER else 0.0
+    asked, score = found.threshold + odd, max([s.score, *(x.score for x in steps if x.term.label == label)])
     if label in named:
         return "named"
-    if found.unknown is not None and score > threshold:
+    if found.unknown is not None and score > found.threshold:
         return f"a dependence on {found.unknown.variable} explains more ({found.unknown.score:.0f} against {score:.0f})"
+    if label in inside:
+        return _DOUBT
     if not s.term.per_run and float(np.trace(s.information)) < 1.0:
         return "cannot be told from the fitted coefficients with these data"
-    if score <= threshold:
-        return f"score {score:.1f} below the threshold {threshold:.0f}"
-    left = f", {last.score:.0f} beside it" if last is not None else ""
-    first = named[0] if named else "a stronger cause"
-    return f"explained by {first} ({score:.0f} alone{left})"
+    if score <= found.threshold:
+        return f"score {score:.1f} below the threshold {found.threshold:.0f}"
+    if score <= asked:
+        return f"score {score:.1f} below {asked:.1f}: {odd:.1f} more is asked of what ships differ in, since this hull is far off the regressions"
+    if inside and (last is None or last.score <= asked):
+        left = f", {last.score:.0f} beside it" if last is not None else ""
+        return f"explained by {next((n for n in named if n in inside), inside[0])} ({score:.0f} alone{left})"
+    fitted = [x.score for x in steps if x.term.label == label and x.round == steps[-1].round]
+    what = f"{fitted[0]:.0f} once it is fitted" if fitted else "but what is ahead of it gains nothing once fitted"
+    return f"score {s.score if last is None else last.score:.0f}{' beside the causes found' if inside else ''}, {what}"
 
 
 def _shown(s: Score, fit: Fit) -> dict[str, float]:

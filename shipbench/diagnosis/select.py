@@ -38,7 +38,7 @@ _RIVAL, _RIVALS = 0.25, 4
 _IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
 """What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
 _OFF_FORM = 0.02
-_AS_SHIPS_DIFFER = (
+AS_SHIPS_DIFFER = (
     "added_resistance", "center_of_gravity_shift", "cross_flow_drag", "mass_change", "race_gain", "rudder_gain", "rudder_stall", "shallow_water",
     "thrust_gain", "thruster_gain", "thruster_lever", "thruster_speed_loss", "wake_variation",
 )  # fmt: skip
@@ -66,13 +66,15 @@ class Step:
 
 @dataclass(frozen=True)
 class Selection:
-    """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final model."""
+    """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final one; off_form:
+    what `AS_SHIPS_DIFFER` must be worth besides the threshold."""
 
     null: Fit
     final: Fit
     first: list[Score]
     last: list[Score]
     steps: list[Step]
+    off_form: float = 0.0
 
 
 def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Sequence[str] = ()) -> list[Term]:
@@ -178,7 +180,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     now, scores, steps, origin = null, first, [], Origin.of(null.plant, null.scales)
 
     def gain(tried: Fit) -> float:
-        return 2.0 * (tried.evidence - now.evidence) - off_form * (tried.model.terms[-1].label in _AS_SHIPS_DIFFER)
+        return 2.0 * (tried.evidence - now.evidence) - off_form * (tried.model.terms[-1].label in AS_SHIPS_DIFFER)
 
     for round_ in range(most):
         tried = [with_term(now, score, origin) for score in worth_a_refit(scores, now, threshold)]
@@ -197,7 +199,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     if pruned is not now:
         now = fit(pruned.plant, pruned.scales, pruned.model, pruned.point, pruned.hyper, pruned.log_tau2, candidates=candidates, guess=pruned.motion)
         scores = screen(now)
-    return Selection(null, now, first, scores, steps)
+    return Selection(null, now, first, scores, steps, off_form)
 
 
 def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:

@@ -72,6 +72,14 @@ def test_causes_are_found_on_ships_of_the_literature_in_their_own_equations(ship
     assert named[:1] == [effect], f"seed {SEED}: {named} on {case.ship.name}"
 
 
+def test_what_ships_differ_in_is_not_named_for_a_hull_of_another_form():
+    verdict = diagnose(published_trials(PUBLISHED["mariner"], 41), gain=False)
+    race = next(c for c in verdict.candidates if c.effect == "race_gain")
+    assert race.score > THRESHOLD
+    assert "more is asked of what ships differ in" in race.rejected_because
+    assert not verdict.causes
+
+
 def test_a_change_that_one_run_alone_speaks_for_is_none():
     """A container ship that heels, with nothing hidden: one run of 24 carries a score of 16 for a centre of gravity that moved."""
     data = published_trials(PUBLISHED["s175"], 25)
@@ -143,6 +151,9 @@ def test_what_shows_in_the_kinematics_is_named_whatever_ship_the_file_describes(
     verdict = diagnose(replace(trials, ship=PUBLISHED["s175"].particulars), gain=False)
     assert "Is the ship file that of this ship" in verdict.warnings[0]
     assert [(c.effect, c.rank) for c in verdict.causes] == [(name, 1)]
+    reasons = {c.effect: c.rejected_because for c in verdict.candidates}
+    assert reasons[name] == "named"
+    assert any(r == "in the model, but not named while the ship file is in doubt" for r in reasons.values())
     true_size = 0.05 if name == "speed_scale" else np.hypot(0.3, 0.2)
     assert next(iter(verdict.causes[0].parameters.values())).value == pytest.approx(true_size, rel=0.25)
 
