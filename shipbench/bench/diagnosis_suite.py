@@ -6,7 +6,6 @@ import inspect
 import json
 import math
 import multiprocessing
-import os
 import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -14,6 +13,8 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from threadpoolctl import threadpool_limits
 
 from ..diagnosis.cases import KINDS, Case, count, draw_case
 from ..diagnosis.outcome import Diagnosis
@@ -27,7 +28,6 @@ from .results import write_json
 Diagnose = Callable[..., Diagnosis]
 SCHEMA = 1
 _FAILURES = (ShipbenchError, ArithmeticError, AttributeError, LookupError, MemoryError, RuntimeError, TypeError, ValueError)
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,7 @@ class Job:
         return {"schema": SCHEMA, "source": code_version()["source"], **options}
 
 
+@threadpool_limits.wrap(limits=1)  # workers share the cores, and sums in another number of threads round differently
 def run_case(job: Job) -> dict[str, Any]:
     """The row of one case; whatever fails in it is its row's reason."""
     row: dict[str, Any] = {"key": job.key, "kind": job.kind, "index": job.index, "seed": job.seed, "which": job.which, "signature": job.signature()}
@@ -158,8 +159,6 @@ def run_suite(
 
 
 def _in_processes(jobs: Sequence[Job], workers: int, keep: Callable[[Job, dict[str, Any]], None]) -> None:
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))  # read by the workers when they load numpy
     try:
         with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
             waiting = {pool.submit(run_case, job): job for job in jobs}
@@ -173,12 +172,6 @@ def _in_processes(jobs: Sequence[Job], workers: int, keep: Callable[[Job, dict[s
         raise WorkError(
             "a worker process of the suite ended by itself (out of memory?). Finished cases are kept: start again with --resume."
         ) from None
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
 
 
 def _kept(out: Path, job: Job) -> dict[str, Any] | None:
