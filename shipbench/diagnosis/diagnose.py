@@ -31,9 +31,6 @@ FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
 STRANGE, STRANGE_SUM, STRANGE_SIZE = 6.5, 130.0, 3.0
 """Of the fit's parameters in units of their ordinary spreads, beside the causes; their sum of squares; and the size of a cause in typical sizes."""
-CARRIED = ("current", "current_per_run")
-"""Seen in the kinematics whatever the ship, as faults of sensors are: with files of other ships neither was named where there was none, and a current
-was found with its size (8 pairs of trials and file, with wind, helm and walk of the propeller hidden)."""
 NOT_A_MODEL = ("unit_or_sign_error", "change_point")
 """They describe the data, not the ship: correct the data, or fit the runs before and after the change apart."""
 
@@ -74,8 +71,7 @@ def diagnose(
     worth = _cross_validated(dataset, found, only, seed, workers, settled) if measured else Worth()
     causes = describe_causes(found, units, late, worth.gain, worth.hull, [r.id for r in dataset.runs])
     if doubts:
-        sure = [c for c in causes if EFFECTS.get(c.effect).family == "sensor" or c.effect in CARRIED]
-        causes = [replace(c, rank=i + 1) for i, c in enumerate(sure)]
+        causes = [replace(c, rank=i + 1) for i, c in enumerate(c for c in causes if _whatever_the_ship(c.effect, found))]
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
@@ -137,8 +133,16 @@ def _doubts(found: Analysis) -> list[str]:
     text = "; ".join(signs)
     return [
         f"{text}. Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)? Until that is sure, nothing is named but "
-        "currents and faults of sensors, which show whatever the ship is; the candidates below are ranked as if it were."
+        "what shows whatever the ship is (faults of sensors, gears seen in their own record, and forces that know port from starboard or a direction "
+        "of the earth, with their sizes on the ship of the file); the candidates below are ranked as if it were."
     ]
+
+
+def _whatever_the_ship(name: str, found: Analysis) -> bool:
+    """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, a gear seen in its own record, a force that breaks a
+    symmetry which every ship has."""
+    effect = EFFECTS.get(name)
+    return effect.family == "sensor" or effect.breaks_symmetry or any(g.effect == name for g in found.gears)
 
 
 @threadpool_limits.wrap(limits=1)  # a process of its own

@@ -28,9 +28,10 @@ _FOLLOWING, _HALVINGS = 6, 5
 
 def fit(
     plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 20,
-    candidates: Sequence[Term] = (), guess: np.ndarray | None = None,
+    candidates: Sequence[Term] = (), guess: np.ndarray | None = None, hope: float = -np.inf,
 ) -> Fit:  # fmt: skip
-    """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), until it rests.
+    """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), until it rests or promises
+    less log evidence than `hope`, when it is not worth its time.
 
     A step is at first halved only where the cost explodes: the cost of a step that is right for the parameters rises until the latent force has
     followed, and the path would else end where parameters compensate each other. The best point of the path is kept, by its evidence once the force
@@ -40,10 +41,12 @@ def fit(
     if len(point.terms) < len(model.terms):
         new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
         point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
-    lin, best, before, stale = Linearisation(plant, scales, point, guess), None, -np.inf, 0
+    lin, best, before, stale, seen = Linearisation(plant, scales, point, guess), None, -np.inf, 0, None
     for number in range(iterations):
         free = number < _FREE_STEPS
-        found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP)
+        found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP, seen=seen)
+        if number and found.promise < hope:
+            return found
         hyper, log_tau2 = found.hyper, found.log_tau2
         worth = found.evidence if free else found.evidence_followed
         stale = 0 if free or best is None or worth > best[0] + _AT_REST_EVIDENCE else stale + 1
@@ -52,7 +55,7 @@ def fit(
         if stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
             break
         before = found.evidence
-        after = _step(lin, found, number + 1 < _FREE_STEPS) if number < iterations - 1 else None
+        after, seen = _step(lin, found, number + 1 < _FREE_STEPS) if number < iterations - 1 else (None, None)
         if after is None:
             break
         lin = after
@@ -61,8 +64,9 @@ def fit(
     return settle(lin, model, found.hyper, found.log_tau2, candidates, leap=0.0) if candidates else found
 
 
-def _step(lin: Linearisation, found: Fit, free: bool) -> Linearisation | None:
-    """Towards the point that the linear model thinks best; None where no part of the way is any better (the first steps are `free`).
+def _step(lin: Linearisation, found: Fit, free: bool) -> tuple[Linearisation | None, Fit | None]:
+    """Towards the point that the linear model thinks best, and the fit there if one was made; None where no part of the way is any better (the first
+    steps are `free`).
 
     A point is better if its cost is lower, or would be once the latent force has followed: on exact sensors the trajectory of a new point is nearly
     always dearer than that of the old one, whose force has been fitted.
@@ -75,12 +79,13 @@ def _step(lin: Linearisation, found: Fit, free: bool) -> Linearisation | None:
         trial = Linearisation(plant, scales, part, lin.towards(part), coarse=free)
         cost = objective(trial, model, found.hyper, found.log_tau2, found.gram)
         if cost < may_rise * at:
-            return trial
-        if cost < _MAY_FOLLOW * at and at_point(settle(trial, model, found.hyper, found.log_tau2, leap=0.0), part) < followed:
-            return trial
+            return trial, None
+        seen = settle(trial, model, found.hyper, found.log_tau2, leap=0.0) if cost < _MAY_FOLLOW * at else None
+        if seen is not None and at_point(seen, part) < followed:
+            return trial, seen
         share *= 0.5
         if share < _LEAST_SHARE:
-            return trial if free else None
+            return (trial, seen) if free else (None, None)
 
 
 def _followed(found: Fit, lin: Linearisation) -> tuple[Fit, Linearisation]:
@@ -98,9 +103,11 @@ def _followed(found: Fit, lin: Linearisation) -> tuple[Fit, Linearisation]:
                 break
             share[worse] *= 0.5
         after = settle(trial, found.model, found.hyper, found.log_tau2, leap=0.0)
-        if after.evidence < found.evidence:
+        gained = after.evidence - found.evidence
+        if gained > 0.0:
+            found, lin = after, trial
+        if gained < _AT_REST_EVIDENCE:
             break
-        found, lin = after, trial
     return found, lin
 
 

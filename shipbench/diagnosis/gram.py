@@ -236,9 +236,9 @@ def update_noise(
     Given the shared coefficients: theirs are few beside the samples, and their errors are cancelled by those of the force that they cause.
     """
     theta = coefficients_of(gram, prior, solution, estimate, products.P.shape[-1])
-    Z = gram.latent
-    fitted = np.einsum("cbi,bi->c", (products.P @ theta[:, :, None])[..., 0], theta)
-    squares = fitted + np.array([np.vdot(P[:, :Z, :Z], reduced.inverse) for P in products.P])
+    second = theta[:, :, None] * theta[:, None, :]
+    second[:, : gram.latent, : gram.latent] += reduced.inverse
+    squares = products.P.reshape(6, -1) @ second.ravel()
     return np.maximum(np.log(squares / np.sum(products.samples)), floor)
 
 

@@ -76,7 +76,12 @@ class Fit:
 
         Laplace's: with the cost that the point has, not the lower one that the linear model promises. Where the fit rests they are the same.
         """
-        return self.solution.log_evidence - 0.5 * (self.excess + sum(t.cost(self.plant.seg.runs) for t in self.model.terms))
+        return self.promise - 0.5 * self.excess
+
+    @property
+    def promise(self) -> float:
+        """Log evidence where the linear model expects its optimum."""
+        return self.solution.log_evidence - 0.5 * sum(t.cost(self.plant.seg.runs) for t in self.model.terms)
 
     @property
     def evidence_followed(self) -> float:
@@ -197,11 +202,12 @@ def prior_squares(model: Model, point: Point, log_tau2: dict[int, float]) -> flo
 
 def settle(
     lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (), cycles: int = _EM_CYCLES,
-    leap: float = np.inf,
+    leap: float = np.inf, seen: Fit | None = None,
 ) -> Fit:  # fmt: skip
-    """Variances, whose logarithms move by `leap` at most, and posterior on one linearisation."""
-    plant, scales, point, columns = lin.plant, lin.scales, lin.point, lin.columns(candidates)
-    products = products_of(plant, scales, point, columns)
+    """Variances, whose logarithms move by `leap` at most, and posterior on one linearisation; seen: an earlier fit on it, whose products hold."""
+    plant, scales, point = lin.plant, lin.scales, lin.point
+    columns = lin.columns(candidates) if seen is None else seen.columns
+    products = products_of(plant, scales, point, columns) if seen is None else seen.products
     if leap > 0.0:
         hyper, log_tau2 = _variances(products.without(sum(t.size for t in candidates)), model, hyper, log_tau2, cycles, leap)
     gram = products.weigh(hyper)

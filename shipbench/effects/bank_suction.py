@@ -26,6 +26,7 @@ class BankSuction(Effect):
         Parameter("bearing", "rad", 0.5 * math.pi, 0.0, 2.0 * math.pi, shape=True),
         Parameter("line", "m", 200.0, -1e6, 1e6, scaling="length", shape=True),
     )
+    breaks_symmetry = True
     separate = "pass the same place at another distance and speed"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

@@ -18,6 +18,7 @@ class List(Effect):
     summary = "heel angle"
     source = "N'_phi of physics reference, section 5, H51"
     parameters = (Parameter("heel", "rad", math.radians(4.0), -0.35, 0.35),)
+    breaks_symmetry = True
     separate = "vary the revolutions at one speed: a list acts with the ship's speed alone"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

@@ -18,6 +18,7 @@ class PropellerWalk(Effect):
     summary = "side force of the propeller ahead"
     source = "physics reference, section 5, P36; the form of p0 in eq. (6)"
     parameters = (Parameter("share", "1", 0.05, -0.3, 0.3),)
+    breaks_symmetry = True
     separate = "straight runs at one speed with the revolutions up and down"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

@@ -18,6 +18,7 @@ class PropellerWalkAstern(Effect):
     summary = "side force of the propeller astern"
     source = "Hachii form, Esso Osaka values (physics reference, section 5, P36)"
     parameters = (Parameter("size", "1", 1.0, -4.0, 4.0),)
+    breaks_symmetry = True
     separate = "astern revolutions at rest"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

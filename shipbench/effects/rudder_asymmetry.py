@@ -15,6 +15,7 @@ class RudderAsymmetry(Effect):
     summary = "unequal lift to port and starboard"
     source = "physics reference, section 5, R19"
     parameters = (Parameter("asymmetry", "1", 0.2, -0.8, 0.8),)
+    breaks_symmetry = True
     separate = "turns of equal amplitude to both sides, small and large: an offset matters most at small angles"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

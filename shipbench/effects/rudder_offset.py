@@ -16,6 +16,7 @@ class RudderOffset(Effect):
     summary = "zero error of the rudder angle"
     source = "physics reference, section 5, R15"
     parameters = (Parameter("offset", "rad", math.radians(2.0), -0.15, 0.15),)
+    breaks_symmetry = True
     separate = "vary the revolutions at one speed: the offset acts with the race, propeller walk with the thrust, wind with neither"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

@@ -17,6 +17,7 @@ class Wind(Effect):
     summary = "mean wind, the same in all runs"
     source = "Blendermann (1994) in the simulator, lowest harmonics in the fitted model (physics reference, section 5, E03)"
     parameters = (Parameter("north", "m/s", 7.0, -30.0, 30.0, scaling="speed"), Parameter("east", "m/s", 7.0, -30.0, 30.0, scaling="speed"))
+    breaks_symmetry = True
     vector = ("speed", "from")
     separate = "the same manoeuvre at two speeds and on reciprocal courses: wind forces do not grow with the ship's speed"
     stretch: tuple[float, float] | None = None

@@ -228,6 +228,15 @@ def test_port_and_starboard_are_mirror_images(name: str):
     np.testing.assert_allclose(mr, -dr, rtol=1e-9, atol=1e-17)
 
 
+@pytest.mark.parametrize("name", of("force"))
+def test_what_breaks_a_symmetry_is_not_its_own_mirror_image(name: str):
+    """The same values on both sides: a symmetric effect is its own mirror image."""
+    q, _ = mirrored_values(name)
+    here, there = (on_eq2(s, get(name), q) for s in (flow(), mirrored(flow())))
+    alike = all(np.allclose(b, sign * a, rtol=1e-9, atol=1e-15) for a, b, sign in zip(here, there, (1.0, -1.0, -1.0), strict=True))
+    assert get(name).breaks_symmetry != alike
+
+
 @pytest.mark.parametrize("name", of("sensor"))
 def test_sensors_see_mirror_images(name: str):
     q, image = mirrored_values(name)
