@@ -35,8 +35,8 @@ _REFIT_ITERATIONS = 16
 _WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
 """Least linear score of what is refitted: of the threshold, and of the best."""
 _RIVAL, _RIVALS = 0.25, 4
-_HOPE, _HOPE_MARGIN = 0.5, 30.0
-"""A refit is given up where it promises less than this share of the best so far, less the margin. (169 refits on development ships: promises at the
+_HOPE, _HOPE_MARGIN = 0.6, 30.0
+"""A refit is given up where it promises less than this share of the best so far, less the margin. (198 refits on development ships: promises at the
 second linearisation fell short of the end by at most 27 % and 60, and none was lower whose end came within 6 of the best.)"""
 _IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
 """What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""

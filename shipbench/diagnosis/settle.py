@@ -162,10 +162,10 @@ def objective(lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int
 def by_segment(lin: Linearisation, hyper: Hyper, gram: Gram) -> np.ndarray:
     """Twice the negative log posterior of every segment (B,) given the parameters: errors, initial state, latent force; infinite if it diverges."""
     plant, point = lin.plant, lin.point
-    error = np.where(plant.seg.mask[..., None], (plant.seg.states[..., :6] - lin.predicted) / lin.scales.noise, 0.0)
-    error = np.where(plant.seg.mask[..., None], lin.scales.colour.whitened(error), 0.0)
     w = np.moveaxis(point.w, -1, 1)
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = np.where(plant.seg.mask[..., None], (plant.seg.states[..., :6] - lin.predicted) / lin.scales.noise, 0.0)
+        error = np.where(plant.seg.mask[..., None], lin.scales.colour.whitened(error), 0.0)
         cost = np.sum(error**2 * np.exp(-hyper.log_noise), axis=(1, 2)) + ETA_PRECISION * np.sum(point.eta**2, axis=1)
     cost += np.sum(w @ gram.K_inv * w, axis=2) @ np.exp(-hyper.log_force)
     return np.where(np.isfinite(cost), cost, np.inf)
