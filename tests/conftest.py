@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy and torch load: pytest's workers share the cores
+
 import pytest
 
 from shipbench.contract.small import small_harbour
