@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
 
@@ -13,7 +13,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..checking.units import check_units, corrected
-from ..effects.base import EFFECTS
 from ..errors import InputError
 from ..records import Dataset
 from .analysis import HULL_THRESHOLD, Analysis, analyse, causes_of
@@ -35,7 +34,7 @@ NOT_A_MODEL = ("unit_or_sign_error", "change_point")
 """They describe the data, not the ship: correct the data, or fit the runs before and after the change apart."""
 
 
-@threadpool_limits.wrap(limits=1)  # its matrices are small: beside other processes, threads only wait for each other (24 runs: 81 s, alone 25 s)
+@threadpool_limits.wrap(limits=1)  # its matrices are small: the threads of two processes on two cores wait for each other (24 runs: 81 s, now 36 s)
 def diagnose(
     dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequence[str] | None = None, workers: int = 1, thorough: bool = False
 ) -> Diagnosis:
@@ -69,9 +68,7 @@ def diagnose(
     warnings += doubts + left_out(found.selection.null.plant, dataset.runs)
     measured = gain and not cautious and not doubts
     worth = _cross_validated(dataset, found, only, seed, workers, settled) if measured else Worth()
-    causes = describe_causes(found, units, late, worth.gain, worth.hull, [r.id for r in dataset.runs])
-    if doubts:
-        causes = [replace(c, rank=i + 1) for i, c in enumerate(c for c in causes if _whatever_the_ship(c.effect, found))]
+    causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
@@ -136,13 +133,6 @@ def _doubts(found: Analysis) -> list[str]:
         "what shows whatever the ship is (faults of sensors, gears seen in their own record, and forces that know port from starboard or a direction "
         "of the earth, with their sizes on the ship of the file); the candidates below are ranked as if it were."
     ]
-
-
-def _whatever_the_ship(name: str, found: Analysis) -> bool:
-    """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, a gear seen in its own record, a force that breaks a
-    symmetry which every ship has."""
-    effect = EFFECTS.get(name)
-    return effect.family == "sensor" or effect.breaks_symmetry or any(g.effect == name for g in found.gears)
 
 
 @threadpool_limits.wrap(limits=1)  # a process of its own

@@ -41,10 +41,12 @@ def fit(
     if len(point.terms) < len(model.terms):
         new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
         point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
-    lin, best, before, stale, seen = Linearisation(plant, scales, point, guess), None, -np.inf, 0, None
+    lin, best, before, stale, seen, early = Linearisation(plant, scales, point, guess), None, -np.inf, 0, None, np.nan
     for number in range(iterations):
         free = number < _FREE_STEPS
         found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP, seen=seen)
+        if number < 2:
+            early = found.promise
         if number and found.promise < hope:
             return found
         hyper, log_tau2 = found.hyper, found.log_tau2
@@ -61,7 +63,7 @@ def fit(
         lin = after
     assert best is not None
     found, lin = _followed(*best[1:])
-    return settle(lin, model, found.hyper, found.log_tau2, candidates, leap=0.0) if candidates else found
+    return replace(settle(lin, model, found.hyper, found.log_tau2, candidates, leap=0.0) if candidates else found, early=early)
 
 
 def _step(lin: Linearisation, found: Fit, free: bool) -> tuple[Linearisation | None, Fit | None]:

@@ -36,8 +36,9 @@ _WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
 """Least linear score of what is refitted: of the threshold, and of the best."""
 _RIVAL, _RIVALS = 0.25, 4
 _HOPE, _HOPE_MARGIN = 0.6, 30.0
-"""A refit is given up where it promises less than this share of the best so far, less the margin. (198 refits on development ships: promises at the
-second linearisation fell short of the end by at most 27 % and 60, and none was lower whose end came within 6 of the best.)"""
+"""A refit is given up where it promises less than this share of what the best so far has gained, less the margin. (198 refits on development ships:
+promises at the second linearisation fell short of the end by at most 27 % and 60, and none was lower whose end came within 6 of the best. With the
+file of another ship every fit creeps, that of the plain model, too, and they fell short by 200.)"""
 _IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
 """What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
 _OFF_FORM = 0.02
@@ -165,22 +166,22 @@ def with_term(before: Fit, score: Score, origin: Origin, least: float = -np.inf)
     return fit(before.plant, before.scales, model, point, origin.hyper, log_tau2, iterations=_REFIT_ITERATIONS, guess=origin.motion, hope=hope)
 
 
-def refits(now: Fit, scores: Sequence[Score], origin: Origin, needed: float) -> list[tuple[Fit, float]]:
-    """`now` with each of the candidates, and what it gains (2 log evidence), or promised to gain when it was given up: far less than `needed` or than
-    the best before it."""
-    found = []
+def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) -> list[tuple[Fit, float]]:
+    """`now` with each of the candidates, and what it gains (2 log evidence), or promised to gain when it was given up beside a better one that gains
+    more than the threshold."""
+    found, best, least = [], threshold, -np.inf
     for score in scores:
-        least = _least(needed)
         tried = with_term(now, score, origin, least)
         gained, promised = 2.0 * (tried.evidence - now.evidence), 2.0 * (tried.promise - now.evidence)
         found.append((tried, promised if promised < least else gained))
-        needed = max(needed, gained)
+        if gained > best:
+            best, least = gained, _least(tried, now)
     return found
 
 
-def _least(needed: float) -> float:
-    """What a refit must promise to gain where so much is needed."""
-    return _HOPE * needed - _HOPE_MARGIN
+def _least(best: Fit, now: Fit) -> float:
+    """What a refit must promise to gain beside the best one; less by as much as that one's own promise fell short."""
+    return 2.0 * (_HOPE * (best.evidence - now.evidence) - max(best.promise - best.early, 0.0)) - _HOPE_MARGIN
 
 
 def likely_first(scores: list[Score], now: Fit, origin: Origin) -> list[Score]:
@@ -248,7 +249,7 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
     out, least = (*(t.label for t in now.model.terms), *_LASTING), max(_CHANGE_MARGIN, _FAR_BEHIND * gain)
     late = [s for s in changes(now) if s.score > least and s.term.label not in out][:_CHANGES]
     for score in late:
-        found = with_term(now, score, origin, _least(gain))
+        found = with_term(now, score, origin, _least(best, now) if best is not None and gain > _CHANGE_MARGIN else -np.inf)
         own = plain is not None and plain.model.terms[-1].label == score.term.label
         if 2.0 * (found.evidence - now.evidence) > gain + (_OWN_MARGIN if own else _CHANGE_MARGIN):
             best, gain = found, 2.0 * (found.evidence - now.evidence)

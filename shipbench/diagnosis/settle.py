@@ -50,7 +50,8 @@ def base_precision(model: Model) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate, cov: of [eta, w] per segment."""
+    """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate, cov: of [eta, w] per segment;
+    early: what the fit promised at its second linearisation."""
 
     plant: Plant
     scales: Scales
@@ -69,6 +70,7 @@ class Fit:
     estimate: np.ndarray
     cov: np.ndarray
     excess: float
+    early: float = np.nan
 
     @property
     def evidence(self) -> float:

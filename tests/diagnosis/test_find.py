@@ -163,6 +163,14 @@ def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship
     assert next(iter(verdict.causes[0].parameters.values())).value == pytest.approx(np.linalg.norm(values), rel=0.25)
 
 
+def test_where_every_fit_creeps_no_refit_is_given_up_for_its_first_promise():
+    """With another ship's file the current's refit promises less than nothing at first; it ends far ahead."""
+    trials = sea_trials(load_mmg_ship("container130"), 0, (Hidden(EFFECTS.get("current"), (0.3, 0.2)),), Trials(runs=12, samples=100))
+    verdict = diagnose(replace(trials, ship=PUBLISHED["s175"].particulars), gain=False)
+    assert [c.effect for c in verdict.causes] == ["current"]
+    assert verdict.causes[0].parameters["speed"].value == pytest.approx(np.hypot(0.3, 0.2), rel=0.2)
+
+
 def test_too_few_runs_rank_candidates_but_name_none():
     verdict = diagnose(_trials(Hidden(EFFECTS.get("heading_bias"), (0.05,)), runs=1), gain=False)
     assert verdict.verdict == "none"
