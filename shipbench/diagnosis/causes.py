@@ -50,7 +50,8 @@ def describe_causes(
 def _whatever_the_ship(name: str, found: Analysis) -> bool:
     """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, a gear seen in its own record, a force that breaks a
     symmetry which every ship has. (46 trials, with nothing, wind, a rudder offset or a current hidden, each diagnosed with another ship's file: no
-    sensor and no such force was named but those that were there, while thrust, mass and others were.)"""
+    sensor and no such force was named but those that were there, while thrust, mass and others were. A gear is measured against the ordinary one of
+    the file's length: three times a tanker's rudder was called slow with the file of a ship of half her length.)"""
     effect = EFFECTS.get(name)
     return effect.family == "sensor" or effect.breaks_symmetry or any(g.effect == name for g in found.gears)
 
