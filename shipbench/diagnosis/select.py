@@ -231,6 +231,8 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         # what a fit that does not rest could still gain by itself is no gain of the next cause
         if best is None or gain(best) < threshold + imprecise + now.excess:
             break
+        if best.model.terms[-1].since is not None:
+            steps.append(Step(round_, best.model.terms[-1], 2.0 * (best.evidence - now.evidence)))
         now = _backward(best, threshold)
         now = fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates, guess=now.motion)
         scores = screen(now)
