@@ -158,6 +158,8 @@ def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship
     assert [(c.effect, c.rank) for c in verdict.causes] == [(name, 1)]
     reasons = {c.effect: c.rejected_because for c in verdict.candidates}
     assert reasons[name] == "named"
+    # no more than a refit gained, which the ranking shows (the linear model said up to fifteen times as much)
+    assert verdict.causes[0].score <= next(c.score for c in verdict.candidates if c.effect == name)
     if ship != file:
         assert any(r == "in the model, but not named while the ship file is in doubt" for r in reasons.values())
     assert next(iter(verdict.causes[0].parameters.values())).value == pytest.approx(np.linalg.norm(values), rel=0.25)
