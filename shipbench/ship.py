@@ -156,6 +156,10 @@ class Particulars(BaseModel):
     A_L: float
     notes: tuple[str, ...]
 
+    def lacks(self, key: str) -> bool:
+        """Whether the file did not give `key`, such as "xG" or "propeller.kt", which an estimate stands in for."""
+        return any(note.startswith(f"{key} not given: ") for note in self.notes)
+
 
 def complete(ship: Ship) -> Particulars:
     """Fill in what `ship` does not give from published regressions and rules of thumb, each named in `notes`.
@@ -197,7 +201,9 @@ def complete(ship: Ship) -> Particulars:
     rudder = ship.rudder or Rudder(area=ship.L * ship.T / 55.0)
     if ship.rudder is None:
         notes.append(f"rudder not given: area {rudder.area:.4g} m^2 from L T / 55")
-    thrusters = ship.thrusters or Thrusters()
+    thrusters = ship.thrusters or Thrusters(x_bow=0.4 * ship.L, x_stern=-0.4 * ship.L)
+    if ship.thrusters is None:
+        notes.append(f"thrusters not given: {thrusters.x_bow:.4g} m ahead and astern of midship from 0.4 L")
     wind = ship.wind or Wind(frontal_area=0.6 * ship.B**2, lateral_area=ship.L * 0.08 * ship.L)
     if ship.wind is None:
         notes.append(f"wind areas not given: frontal {wind.frontal_area:.4g} m^2 from 0.6 B^2, lateral {wind.lateral_area:.4g} m^2 from 0.08 L^2")

@@ -23,13 +23,16 @@ from .model import NUM_BASE
 from .outcome import Diagnosis, Gain
 from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant
 from .strange import left_out
+from .structure import STRUCTURE
 from .trace import trace_of
 from .wrong import what_is_wrong
 
 FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
-STRANGE, STRANGE_SUM, STRANGE_SIZE = 6.5, 130.0, 3.0
+STRANGE, STRANGE_SUM, STRANGE_SIZE = 8.0, 130.0, 3.0
 """Of the fit's parameters in units of their ordinary spreads, beside the causes; their sum of squares; and the size of a cause in typical sizes."""
+ODD_THRUST = 1.3
+"""Factor of the thrust of an estimated propeller from which it is spoken of."""
 NOT_A_MODEL = ("unit_or_sign_error", "change_point")
 """They describe the data, not the ship: correct the data, or fit the runs before and after the change apart."""
 
@@ -65,7 +68,7 @@ def diagnose(
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     found = analyse(plant, only=only, seed=seed, cautious=cautious, settled=settled)
     doubts = _doubts(found) if only is None else []
-    warnings += doubts + left_out(found.selection.null.plant, dataset.runs)
+    warnings += doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
     measured = gain and not cautious and not doubts
     worth = _cross_validated(dataset, found, only, seed, workers, settled) if measured else Worth()
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
@@ -132,6 +135,20 @@ def _doubts(found: Analysis) -> list[str]:
         f"{text}. Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)? Until that is sure, nothing is named but "
         "what shows whatever the ship is (faults of sensors, gears seen in their own record, and forces that know port from starboard or a direction "
         "of the earth, with their sizes on the ship of the file); the candidates below are ranked as if it were."
+    ]
+
+
+def _own_propeller(found: Analysis) -> list[str]:
+    """What the runs say of a propeller that the ship file leaves open."""
+    fit, ship = found.final, found.final.plant.ship
+    at = [p.name for p in STRUCTURE.parameters].index("log_thrust")
+    factor = float(np.exp(fit.scales.structure[at] * fit.solution.mean[NUM_BASE - len(STRUCTURE.parameters) + at]))
+    if max(factor, 1.0 / factor) < ODD_THRUST:
+        return []
+    what = "diameter, kt" if ship.lacks("propeller") else "kt"
+    return [
+        f"the ship file does not give the propeller's {what}: the runs suggest {factor:.2g} times the thrust of the estimate, by which the model "
+        f"`physics` goes; give [propeller] {what}. Causes are judged with the thrust that suits the runs."
     ]
 
 

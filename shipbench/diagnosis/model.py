@@ -81,7 +81,7 @@ class Scales:
         self.p = parameter_scale(plant.c)
         self.eta = np.array([0.5 * froude**2, 0.5 * froude**2, 5e-3, 0.05 * froude, 0.05 * froude, 1e-3 / froude])
         self.w = np.array([5e-3, 5e-3, 1e-4 / froude**2])  # accelerations do not scale; yaw acceleration goes with 1/L
-        self.structure = STRUCTURE.spreads(measured_wind=plant.seg.wind is not None)
+        self.structure = STRUCTURE.spreads(plant.ship, measured_wind=plant.seg.wind is not None)
         self.noise = np.array([0.3 * froude**2, 0.3 * froude**2, 4e-3, 0.04 * froude, 0.04 * froude, 7e-4 / froude])
         self.colour = Colour.white(plant.steps + 1)
 

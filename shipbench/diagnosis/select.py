@@ -12,6 +12,7 @@ from ..effects.base import EFFECTS
 from .colour import SHARES, TIMES, Colour
 from .fit import Origin, fit
 from .model import Linearisation, Scales, Term
+from .ordinary import widened
 from .plant import Plant
 from .screen import Score, changes, overlap, screen
 from .settle import Fit, Model, evidence_with, hull_evidence, settle
@@ -26,6 +27,7 @@ WITHOUT_WIND = ("wind", "wind_per_run")
 """Only where the wind is not measured."""
 MOST_EFFECTS = 6
 _GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
+_FINER, _FINER_STEPS = 1.2, 3
 _FIRST_COLOURS, _WORTH_A_COLOUR = ((1.0, 2.0), (4.0, 6.0)), 50.0
 """Share and time of noise that is tried first, and the log evidence that it must gain: a cause in the sensors leaves lasting residuals, too."""
 _SEARCHES = 3
@@ -110,7 +112,8 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
             if np.ptp(plant.seg.commands[..., i]) > 0.0:
                 found = _with_gear(found, name, field)
     scales = found.scales.coloured(colour_of(found))
-    return _without_strange(fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion))
+    found = _without_strange(fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion))
+    return widened(found)
 
 
 def _without_strange(found: Fit) -> Fit:
@@ -140,19 +143,31 @@ def colour_of(found: Fit) -> Colour:
 
 def _with_gear(found: Fit, name: str, field: str) -> Fit:
     """`found` behind a gear whose time constant or rate is that of an ordinary one times the factor that suits the motion (servos of models are
-    quicker than Froude's law makes an ordinary gear)."""
-    gear = found.plant.ordinary[name]
+    quicker than Froude's law makes an ordinary gear; what remains of a gear that is a little off passes for a delay)."""
+    first = found
     for factors in _GEAR_FACTORS:
-        before = found
         for factor in factors:
-            plant = found.plant.driven({name: replace(gear, **{field: getattr(gear, field) * factor})})
-            tried = fit(plant, found.scales, found.model, found.point, found.hyper, iterations=_REFIT_ITERATIONS, guess=found.motion)
+            tried = _behind(found, name, field, getattr(first.plant.ordinary[name], field) * factor)
             if 2.0 * (tried.evidence - found.evidence) < _WORTH_A_GEAR:
+                break
+            found = tried
+        if found is not first:
+            break
+    for factor in (_FINER, 1.0 / _FINER):
+        before = found
+        for _ in range(_FINER_STEPS):
+            tried = _behind(found, name, field, getattr(found.plant.ordinary[name], field) * factor)
+            if tried.evidence <= found.evidence:
                 break
             found = tried
         if found is not before:
             break
     return found
+
+
+def _behind(found: Fit, name: str, field: str, value: float) -> Fit:
+    plant = found.plant.driven({name: replace(found.plant.ordinary[name], **{field: value})})
+    return fit(plant, found.scales, found.model, found.point, found.hyper, iterations=_REFIT_ITERATIONS, guess=found.motion)
 
 
 def with_term(before: Fit, score: Score, origin: Origin, least: float = -np.inf) -> Fit:
@@ -234,7 +249,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         if best.model.terms[-1].since is not None:
             steps.append(Step(round_, best.model.terms[-1], 2.0 * (best.evidence - now.evidence)))
         now = _backward(best, threshold)
-        now = fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates, guess=now.motion)
+        now = widened(fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates, guess=now.motion))
         scores = screen(now)
     pruned = _backward(now, threshold, spare_last=False)
     if pruned is not now:

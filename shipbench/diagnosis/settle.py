@@ -21,11 +21,12 @@ _LOG_FLOOR = np.log(0.1**2)
 @dataclass(frozen=True)
 class Model:
     """Structure: terms, and how far the hull may lie from the regressions and the other parameters from their centres (factors of the prior
-    standard deviations)."""
+    standard deviations), and each base parameter besides (`widths`: such a factor for each, none for 1)."""
 
     terms: tuple[Term, ...] = ()
     hull: float = 1.0
     base: float = 1.0
+    widths: tuple[float, ...] = ()
 
     def prior(self, log_tau2: dict[int, float]) -> Prior:
         """Columns in the order base, own terms; candidates stay outside."""
@@ -45,7 +46,8 @@ class Model:
 
 def base_precision(model: Model) -> np.ndarray:
     """Prior precisions of the base parameters in units of their spreads."""
-    return np.repeat([model.base**-2, model.hull**-2, model.base**-2], [len(FREE), NUM_HULL, NUM_BASE - len(FREE) - NUM_HULL])
+    usual = np.repeat([model.base**-2, model.hull**-2, model.base**-2], [len(FREE), NUM_HULL, NUM_BASE - len(FREE) - NUM_HULL])
+    return usual / np.square(model.widths or 1.0)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..effects.base import Effect, Parameter
 from ..effects.cross_flow_drag import EFFECT as CROSS_FLOW
+from ..effects.going_astern import EFFECT as GOING_ASTERN
 from ..effects.propeller_walk_astern import EFFECT as ASTERN
 from ..effects.race_gain import EFFECT as RACE
 from ..effects.thruster_gain import EFFECT as THRUSTERS
@@ -29,7 +30,11 @@ class Structure(Effect):
     regressions hardly know and the MMG form leaves out (of m L); flow at the rudder that a reversed propeller stops, from none to all (Kitagawa
     et al., physics reference 2.6); thrust astern, of which eq. (2) knows one level (0.65 of ahead at rest; four-quadrant curves 0.5 to 0.8); wind on
     superstructures of all kinds (Blendermann 1994, physics reference E03); added mass in surge, for which charts (Zhou et al. 1983) and ships of the
-    literature have 0.4 to 0.75 of Soeding's value (physics reference 3.2: 0.036 and 0.071 of the mass).
+    literature have 0.4 to 0.75 of Soeding's value (physics reference 3.2: 0.036 and 0.071 of the mass); N_v and Y_r of a ship that goes astern,
+    which eq. (2) takes for those ahead (from there, as in cubic polynomials, to the change of sign of theory: Yoshimura, Nakao & Ishibashi 2009),
+    and her rudder, which then works from its trailing edge; thrust of a propeller that the ship file leaves open (log of the factor): K_T goes with
+    the pitch, 0.6 to 1.1 of the diameter, and thrust with the fourth power of the diameter, for which 0.6 T is 20 % too much or too little (KVLCC2,
+    KCS).
     """
 
     family = "hull"
@@ -61,19 +66,27 @@ class Structure(Effect):
         Parameter("wind_N", "1", 0.4, -2.0, 3.0),
         Parameter("wind_lever", "1", 0.04, -0.3, 0.3),
         Parameter("m_x", "1", 0.25, -0.5, 2.0),
+        Parameter("N_v_astern", "1", 0.4, -1.0, 2.0),
+        Parameter("Y_r_astern", "1", 0.4, -1.0, 2.0),
+        Parameter("reversal", "1", 0.3, -0.6, 0.6),
+        Parameter("log_thrust", "1", 1.0, -3.0, 3.0),
     )
-    backing, m_x = 0.5, -0.4
+    backing, m_x, astern = 0.5, -0.4, 0.7
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
 
-    def spreads(self, measured_wind: bool) -> np.ndarray:
-        """Standard deviations of the values. What a wind that is not measured does to this ship cannot be told from the wind itself."""
-        return np.array([p.typical * (measured_wind or not p.name.startswith("wind_")) for p in self.parameters])
+    def spreads(self, ship: Particulars, measured_wind: bool) -> np.ndarray:
+        """Standard deviations of the values. The side force of a wind that is not measured cannot be told from the wind itself."""
+        thrust = np.hypot(0.8 * ship.lacks("propeller"), 0.2 * ship.lacks("propeller.kt"))
+        own = {"wind_Y": float(measured_wind), "log_thrust": float(thrust)}
+        return np.array([p.typical * own.get(p.name, 1.0) for p in self.parameters])
 
     def plain(self) -> np.ndarray:
         """Values, in units of their spreads, at which it adds nothing to eq. (2)."""
         centres = np.zeros(len(self.parameters))
         centres[: len(self.parts)] = [c for _, c in self.parts]
         names = [p.name for p in self.parameters]
+        for name in ("N_v_astern", "Y_r_astern", "reversal"):
+            centres[names.index(name)] = self.astern
         centres[names.index("backing")], centres[names.index("m_x")] = self.backing, self.m_x
         return np.array([-c / p.typical for c, p in zip(centres, self.parameters, strict=True)])
 
@@ -81,10 +94,15 @@ class Structure(Effect):
         for (effect, centre), value in zip(self.parts, q[:6], strict=True):
             effect.force(e, s, (centre + value,), ship)
         e.straightening, e.straightening_asymmetry, e.straightening_r = 1.0 + q[6], q[7], 1.0 + q[17]
-        e.coupling, e.backing = q[16] * ship.mass * ship.L, self.backing + q[19]
+        e.coupling = q[16] * ship.mass * ship.L
         e.m_x = 1.0 + self.m_x + q[24]
         WIND.force(e, s, (*q[20:23], q[23] * ship.L), ship)
-        e.thrust = e.thrust * (1.0 + q[18] * smoothstep(-s.n, 0.0, 1.0))
+        # with headway the race reaches the rudder and a reversed propeller stops the flow there; astern the rudder leads
+        ahead = smoothstep(s.u - e.u_c, -0.02 * (9.81 * ship.L) ** 0.5, 0.0)
+        e.race = 1.0 + ahead * (e.race - 1.0)
+        GOING_ASTERN.force(e, s, (self.astern + q[25], self.astern + q[26], 0.0, ahead * (self.backing + q[19])), ship)
+        e.reversal = self.astern + q[27]
+        e.thrust = e.thrust * exp(q[28]) * (1.0 + q[18] * smoothstep(-s.n, 0.0, 1.0))
         unit = 0.5 * ship.rho * ship.L * ship.T
         u, v, r = s.u - e.u_c, s.v - e.v_c, s.r * ship.L
         drift = clip(v / sqrt(u * u + v * v + 1e-3 * ship.L), -0.5, 0.5)

@@ -122,7 +122,10 @@ def rudder(
     u_R = sqrt(u2 + 1e-6)
     w_R = e.sideways(0.364 * v + 0.66 * c.x_R * r * e.straightening_r)
     beta = arctan2(w_R, u_R)
-    a = clip(delta + e.delta + beta, -ALPHA_MAX, ALPHA_MAX)
+    angle = delta + e.delta
+    if not is_neutral(e.reversal, 0.0):
+        angle = angle * (1.0 - 2.0 * e.reversal * smoothstep(-V_A, 0.0, 0.02 * (9.81 * c.L) ** 0.5))
+    a = clip(angle + beta, -ALPHA_MAX, ALPHA_MAX)
     q = 0.5 * c.rho * c.A_R * (u2 + w_R * w_R)
     lift = q * (p[4] + a * (p[5] + a * (p[6] + a * p[7]))) * e.lift_factor(a)
     drag = q * (p[8] + a * (p[9] + a * p[10]))

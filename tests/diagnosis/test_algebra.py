@@ -17,6 +17,7 @@ from shipbench.diagnosis.screen import _wrong_way
 from shipbench.diagnosis.settle import Model, products_of, settle
 from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS, flow_first
+from shipbench.physics import eq2
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.physics.modifiers import Flow, Modifiers
 from shipbench.simulate.trials import Trials, sea_trials
@@ -139,21 +140,29 @@ def test_what_was_chosen_among_many_costs_more():
     assert Term(wind, (), per_run=True).cost(24) > np.log(24.0)
 
 
-def test_thrust_astern_and_coupling_are_ordinary_differences(plant):
-    """Each has a place in the fit's own parameters, at which eq. (2) alone is one value."""
-    names = [p.name for p in STRUCTURE.parameters]
-    plain = dict(zip(names, STRUCTURE.plain(), strict=True))
-    assert plain["thrust_astern"] == plain["coupling"] == plain["straightening_r"] == 0.0
-    mods = Modifiers()
-    STRUCTURE.force(
-        mods,
-        Flow(*([0.0] * 4), 2.0, 0.3, 0.01, -60.0, 0.0, 0.0, 0.0),
-        tuple(p.typical * v for p, v in zip(STRUCTURE.parameters, STRUCTURE.plain(), strict=True)),
-        plant.ship,
-    )
-    assert mods.backing == pytest.approx(0.0)
-    assert mods.thrust == pytest.approx(1.0)
-    assert mods.coupling == pytest.approx(0.0)
+@pytest.mark.parametrize("u", [2.0, -2.0])
+def test_ordinary_differences_have_a_value_at_which_eq_2_is_alone(plant, u):
+    """Astern, too, where the race does not reach the rudder and hull and rudder have parameters of their own."""
+    flow = Flow(*([0.0] * 4), u, 0.3, 0.01, -60.0, 0.2, 0.0, 0.0)
+    found, alone = Modifiers(), Modifiers()
+    STRUCTURE.force(found, flow, tuple(p.typical * v for p, v in zip(STRUCTURE.parameters, STRUCTURE.plain(), strict=True)), plant.ship)
+    p = (0.0,) + (1e3,) * 3 + (1.0,) * 7
+    changed, usual = (eq2.accelerations(u, 0.3, 0.01, -60.0, 0.2, 0.0, 0.0, None, plant.c, p, m) for m in (found, alone))
+    assert changed == pytest.approx(usual, rel=1e-9)
+
+
+def test_the_race_is_that_of_headway_and_the_rudder_leads_astern(plant):
+    def of(u, name, value):
+        mods = Modifiers()
+        values = [value * p.typical * (p.name == name) for p in STRUCTURE.parameters]
+        STRUCTURE.force(mods, Flow(*([0.0] * 4), u, 0.3, 0.01, -60.0, 0.2, 0.0, 0.0), values, plant.ship)
+        return mods
+
+    assert of(2.0, "race", 1.0).race > of(2.0, "race", 0.0).race
+    assert of(-2.0, "race", 1.0).race == of(-2.0, "race", 0.0).race == 1.0
+    assert of(2.0, "backing", 1.0).backing > of(2.0, "backing", 0.0).backing > of(-2.0, "backing", 1.0).backing == 0.0
+    assert of(-2.0, "N_v_astern", 1.0).hull.N_v < of(-2.0, "N_v_astern", 0.0).hull.N_v < 0.0
+    assert of(2.0, "N_v_astern", 1.0).hull.N_v == pytest.approx(1.0, abs=0.02)
 
 
 def test_sums_by_run_are_those_of_reduceat():

@@ -298,6 +298,18 @@ def test_a_reversed_propeller_takes_the_rudders_flow_in_eq2():
     assert turn(astern, still) == pytest.approx(0.0, abs=1e-3 * turn(astern, Modifiers()))
 
 
+@pytest.mark.parametrize(("share", "turned"), [(0.5, 0.0), (1.0, -1.0)])
+def test_a_rudder_in_flow_from_astern_works_from_its_trailing_edge(share, turned):
+    def turn(u, mods):
+        sides = [eq2.accelerations(u, 0.0, 0.0, 0.0, s * 0.3, 0.0, 0.0, None, C, P_SYMMETRIC, mods)[2] for s in (1.0, -1.0)]
+        return sides[0] - sides[1]
+
+    plain, changed = Modifiers(), Modifiers(reversal=share)
+    assert turn(2.0, changed) == pytest.approx(turn(2.0, plain))
+    assert turn(-2.0, plain) > 0.0
+    assert turn(-2.0, changed) == pytest.approx(turned * turn(-2.0, plain), abs=1e-9 * turn(-2.0, plain))
+
+
 def test_added_mass_between_sway_and_yaw_couples_both_ways():
     """(m + m_y) dv + (m x_G + c) dr = Y, (m x_G + c) dv + (I + J) dr = N."""
     args = (2.0, 0.3, 0.01, 60.0, 0.1, 0.0, 0.0, None, C, P)

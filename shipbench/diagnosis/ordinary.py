@@ -1,0 +1,42 @@
+"""How far single parameters of a ship may lie from what is ordinary. A normal spread has no room for one that lies far off, and what it holds back
+passes for a cause."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .fit import fit
+from .gram import solve
+from .model import NUM_BASE
+from .settle import Fit
+
+_FAR = 3.5
+"""In spreads: up to here a parameter is ordinary, beyond its prior falls by Huber's linear tail instead of the square."""
+_SOLVES, _FITS, _SAME = 20, 3, 0.05
+
+
+def widths_of(found: Fit) -> np.ndarray:
+    """(NUM_BASE,) factors of the spreads, 1 for what is ordinary: Huber's weights, at the optimum of this linearisation (iteratively reweighted)."""
+    widths = np.ones(NUM_BASE)
+    for _ in range(_SOLVES):
+        prior = replace(found.model, widths=tuple(widths)).prior(found.log_tau2)
+        new = np.sqrt(np.maximum(np.abs(solve(found.reduced, prior).mean[:NUM_BASE]) / _FAR, 1.0))
+        if np.max(np.abs(new / widths - 1.0)) < 0.1 * _SAME:
+            break
+        widths = new
+    return widths
+
+
+def widened(found: Fit) -> Fit:
+    """The same model, fitted with as wide a spread for each parameter as it needs."""
+    for _ in range(_FITS):
+        widths = widths_of(found)
+        if np.max(np.abs(widths / np.asarray(found.model.widths or 1.0) - 1.0)) < _SAME:
+            break
+        model = replace(found.model, widths=tuple(widths))
+        found = fit(
+            found.plant, found.scales, model, found.point, found.hyper, found.log_tau2, candidates=found.candidates, guess=found.motion
+        )  # fmt: skip
+    return found

@@ -1,0 +1,56 @@
+"""Parameters far from what is ordinary: wide enough a spread for them, none for the others, and no cause named in their place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.model import FREE, NUM_BASE, Linearisation, Scales
+from shipbench.diagnosis.ordinary import widths_of
+from shipbench.diagnosis.plant import NUM_HULL, Plant
+from shipbench.diagnosis.screen import screen
+from shipbench.diagnosis.select import candidates_for, null_fit
+from shipbench.diagnosis.settle import settle
+from shipbench.diagnosis.structure import STRUCTURE
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.simulate.published import PUBLISHED, published_trials
+from shipbench.simulate.trials import Trials, sea_trials
+
+RACE = len(FREE) + NUM_HULL + [p.name for p in STRUCTURE.parameters].index("race")
+
+
+@pytest.fixture(scope="module")
+def mariner():
+    """Her rudder's force falls with the speed twice over: the race of eq. (2) would have to work against it."""
+    plant = Plant.of(published_trials(PUBLISHED["mariner"], 41, plan=Trials(runs=12, samples=100)))
+    return null_fit(plant, Scales(plant), candidates_for(plant, ("race_gain",)))
+
+
+def test_only_what_lies_far_off_gets_a_wider_spread(mariner):
+    widths = np.array(mariner.model.widths)
+    assert widths.shape == (NUM_BASE,)
+    assert widths[RACE] > 1.1
+    assert np.sum(widths > 1.0) <= 3
+    far = np.abs(mariner.solution.mean[:NUM_BASE]) > 3.5
+    np.testing.assert_array_equal(widths > 1.0, far)
+
+
+def test_with_it_less_is_left_for_a_cause_of_the_same_kind(mariner):
+    lin = Linearisation(mariner.plant, mariner.scales, mariner.point, mariner.motion)
+    narrow = settle(lin, replace(mariner.model, widths=()), mariner.hyper, {}, mariner.candidates, leap=0.0)
+    assert screen(mariner)[0].score < screen(narrow)[0].score
+
+
+def test_an_ordinary_ship_keeps_its_spreads():
+    plant = Plant.of(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=8, samples=80)))
+    found = null_fit(plant, Scales(plant))
+    assert not found.model.widths
+    np.testing.assert_array_equal(widths_of(found), 1.0)
+
+
+def test_a_ship_of_the_literature_with_an_odd_rudder_is_neither_doubted_nor_explained():
+    verdict = diagnose(published_trials(PUBLISHED["mariner"], 42), gain=False)
+    assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
