@@ -108,6 +108,9 @@ def test_what_a_ship_file_leaves_out_is_estimated_and_said_so():
     assert known.Cb == pytest.approx(0.625)
     assert len(known.notes) >= 6
     assert all("from" in note for note in known.notes)
+    assert known.lacks("propeller")
+    assert not complete(SHIP.model_copy(update={"xG": 0.0})).lacks("xG")
+    assert (known.x_bow, known.x_stern) == (0.4 * known.L, -0.4 * known.L)
 
 
 def test_a_ship_that_contradicts_itself_is_refused():

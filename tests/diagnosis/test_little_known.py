@@ -1,0 +1,62 @@
+"""What most users have: a trial and main dimensions, or commands without the places of the actuators; and ships that go astern for long."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipbench.diagnosis.case_ships import draw_ship
+from shipbench.diagnosis.diagnose import diagnose
+from shipbench.effects.base import EFFECTS
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.records import Dataset
+from shipbench.ship import Ship
+from shipbench.simulate.hidden import Hidden
+from shipbench.simulate.trials import Trials, sea_trials
+
+CURRENT = Hidden(EFFECTS.get("current"), (0.25, -0.2))
+
+
+def trials(*hidden: Hidden, ship: str = "kcs", **plan: int) -> Dataset:
+    return sea_trials(load_mmg_ship(ship), 17, hidden, Trials(**{"runs": 16, "samples": 100, **plan}))
+
+
+def with_main_dimensions_alone(data: Dataset) -> Dataset:
+    own = data.ship
+    return replace(data, ship=Ship(name=own.name, L=own.L, B=own.B, T=own.T, displacement=own.displacement))
+
+
+def with_commands_alone(data: Dataset) -> Dataset:
+    runs = [replace(run, states=np.concatenate([run.states[:, :6], run.inputs[:, :4]], axis=1)) for run in data.runs]
+    return replace(data.with_runs(runs), actuators="commanded")
+
+
+@pytest.mark.parametrize("ship", ["kcs", "kvlcc2_l7"])
+@pytest.mark.parametrize("known", [with_main_dimensions_alone, with_commands_alone])
+def test_nothing_is_named_where_nothing_is_hidden(ship, known):
+    verdict = diagnose(known(trials(ship=ship)), gain=False)
+    assert (verdict.verdict, [c.effect for c in verdict.causes]) == ("none", [])
+
+
+@pytest.mark.parametrize("known", [with_main_dimensions_alone, with_commands_alone])
+def test_a_current_is_found_with_its_size(known):
+    verdict = diagnose(known(trials(CURRENT)), gain=False)
+    assert [c.effect for c in verdict.causes] == ["current"]
+    assert verdict.causes[0].parameters["speed"].value == pytest.approx(np.hypot(0.25, 0.2), rel=0.1)
+
+
+def test_a_warning_says_how_far_off_an_estimated_propeller_is():
+    full, bare = trials(), with_main_dimensions_alone(trials())
+    assert not diagnose(full, gain=False).warnings
+    (warning,) = diagnose(bare, gain=False).warnings
+    assert warning.startswith("the ship file does not give the propeller's diameter, kt: the runs suggest ")
+
+
+def test_a_ship_that_goes_astern_for_long_has_nothing_missing():
+    """Six minutes astern in one run of six: the rudder works from its trailing edge, the hull the other way round."""
+    data = sea_trials(draw_ship(np.random.default_rng(77), "test", False), 40, (), Trials(runs=6, samples=600))
+    assert np.mean(data.runs[5].states[:, 3] < -1.0) > 0.5
+    verdict = diagnose(data, gain=False)
+    assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
