@@ -57,6 +57,6 @@ def test_a_warning_says_how_far_off_an_estimated_propeller_is():
 def test_a_ship_that_goes_astern_for_long_has_nothing_missing():
     """Six minutes astern in one run of six: the rudder works from its trailing edge, the hull the other way round."""
     data = sea_trials(draw_ship(np.random.default_rng(77), "test", False), 40, (), Trials(runs=6, samples=600))
-    assert np.mean(data.runs[5].states[:, 3] < -1.0) > 0.5
+    assert np.mean(data.runs[5].states[:, 3] < 0.0) > 0.5
     verdict = diagnose(data, gain=False)
     assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
