@@ -44,23 +44,24 @@ def every(num: int) -> Callable[[Dataset], Dataset]:
     """Every num-th sample."""
 
     def thin(data: Dataset) -> Dataset:
-        runs = [replace(r, t=r.t[::num], states=r.states[::num], inputs=r.inputs[::num]) for r in data.runs]
-        return replace(data.with_runs(runs), dt=data.dt * num)
+        runs = tuple(replace(r, t=r.t[::num], states=r.states[::num], inputs=r.inputs[::num]) for r in data.runs)
+        return replace(data, runs=runs, dt=data.dt * num)
 
     return thin
 
 
 def quick_samples(data: Dataset) -> Dataset:
-    """Five samples for one, with noise of their own (the plan has none)."""
-    rng, noise = np.random.default_rng(1), NOISE.copy()
+    """Five samples for one, with noise of their own (the plan has none); actuators move steadily between theirs."""
+    rng, noise = np.random.default_rng(1), NOISE
 
     def finer(run: Run) -> Run:
         t = np.arange(5 * (len(run) - 1) + 1) * data.dt / 5
         held = np.minimum(np.arange(len(t)) // 5, len(run) - 1)
-        states = CubicSpline(run.t, run.states)(t) + noise * rng.standard_normal((len(t), 10))
+        motion, actuators = CubicSpline(run.t, run.states[:, :6])(t), [np.interp(t, run.t, a) for a in run.states[:, 6:].T]
+        states = np.column_stack([motion, *actuators]) + noise * rng.standard_normal((len(t), 10))
         return replace(run, t=t, states=states, inputs=run.inputs[held])
 
-    return replace(data.with_runs([finer(r) for r in data.runs]), dt=data.dt / 5)
+    return replace(data, runs=tuple(finer(r) for r in data.runs), dt=data.dt / 5)
 
 
 def wandering(data: Dataset) -> Dataset:

@@ -237,7 +237,8 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
     if found.unknown is not None and score > found.threshold:
         return f"a dependence on {found.unknown.variable} explains more ({found.unknown.score:.0f} against {score:.0f})"
     if label in inside:
-        return _DOUBT
+        late = any(t.label == label and t.since is not None for t in found.final.model.terms)
+        return "named as a change_point" if late and "change_point" in named else _DOUBT
     if not s.term.per_run and float(np.trace(s.information)) < 1.0:
         return "cannot be told from the fitted coefficients with these data"
     if score <= found.threshold:

@@ -176,7 +176,7 @@ class _Record:
     def findings(self, usual: Gear) -> tuple[list[GearFinding], Gear]:
         """Every effect beside the best ordinary gear, and that gear."""
         span = float(np.percentile(np.abs(self.command), 98))
-        rate = max(_least_rate(self.name, self.scale), 0.01 * span / self.dt)
+        rate = max(_least_rate(self.name, self.scale), 0.01 * span / self.scale)
         most = max(10.0 * span / self.dt, 2.0 * rate)
         low, high = np.log([0.02 * self.scale, rate]), np.log([ORDINARY[self.name].T * self.scale, most])
         ordinary = self._least(None, low, high)

@@ -36,7 +36,5 @@ def widened(found: Fit) -> Fit:
         if np.max(np.abs(widths / np.asarray(found.model.widths or 1.0) - 1.0)) < _SAME:
             break
         model = replace(found.model, widths=tuple(widths))
-        found = fit(
-            found.plant, found.scales, model, found.point, found.hyper, found.log_tau2, candidates=found.candidates, guess=found.motion
-        )  # fmt: skip
+        found = fit(found.plant, found.scales, model, found.point, found.hyper, found.log_tau2, candidates=found.candidates, guess=found.motion)
     return found

@@ -122,8 +122,10 @@ def test_two_effects_at_once_are_both_named():
 
 def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
     values = np.where(np.arange(12) >= 6, 0.04, 0.0)
-    cause = diagnose(_trials(Hidden(EFFECTS.get("heading_bias"), (values,))), gain=False).causes[0]
+    verdict = diagnose(_trials(Hidden(EFFECTS.get("heading_bias"), (values,))), gain=False)
+    cause = verdict.causes[0]
     assert cause.effect == "change_point"
+    assert next(c for c in verdict.candidates if c.effect == "heading_bias").rejected_because == "named as a change_point"
     assert "heading_bias" in cause.evidence
     assert abs(cause.parameters["from_run"].value - 6) <= 1
     assert not np.isfinite(cause.parameters["from_run"].ci95).any()  # none is known: no width of zero is claimed

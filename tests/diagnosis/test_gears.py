@@ -13,7 +13,7 @@ from shipbench.diagnosis.gears import _kinds, _Record, find_in_gears
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.rolling import Active
 from shipbench.effects.base import EFFECTS
-from shipbench.physics.actuators import Gear
+from shipbench.physics.actuators import Gear, gear_path
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
@@ -56,6 +56,25 @@ def test_findings_do_not_depend_on_the_compiler(compiler, name, value, monkeypat
     np.testing.assert_allclose([f.value for f in found], [f.value for f in expected], rtol=1e-3)
     np.testing.assert_allclose([f.score for f in found], [f.score for f in expected], rtol=1e-2)
     assert ordinary.keys() == as_before.keys()
+
+
+@pytest.mark.parametrize("dt", [0.1, 1.0])
+def test_an_ordinary_gear_is_found_at_any_sampling(dt):
+    """Ten samples a second are no reason for quicker gears: the least rate that is looked for was one of the samples, and every gear seemed slow."""
+    data, rng = sea_trials(load_mmg_ship("kcs"), 4, (), Trials(runs=4, samples=90)), np.random.default_rng(0)
+    each = round(data.dt / dt)
+    runs = []
+    for run in data.runs:
+        inputs = np.repeat(run.inputs, each, axis=0)
+        states = np.repeat(run.states, each, axis=0)
+        for channel, gear, noise in ((0, Gear(8.0, 3.0), 0.3), (1, Gear(1.5, np.deg2rad(2.5)), np.deg2rad(0.2))):
+            path = gear_path(inputs[:1, channel], inputs[None, :-1, channel], dt, gear)[0]
+            states[:, 6 + channel] = path + noise * rng.standard_normal(len(path))
+        runs.append(replace(run, t=dt * np.arange(len(inputs)), states=states, inputs=inputs))
+    found, ordinary = find_in_gears(Plant.of(replace(data, runs=tuple(runs), dt=dt)))
+    assert max(f.score for f in found if f.actuator != "F") < 0.0
+    assert ordinary["n"].rate == pytest.approx(3.0, rel=0.02)
+    assert ordinary["delta"].rate == pytest.approx(np.deg2rad(2.5), rel=0.02)
 
 
 def test_a_record_that_is_late_by_less_than_a_stage_has_a_slope_to_be_found_by():
