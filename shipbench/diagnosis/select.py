@@ -28,6 +28,7 @@ WITHOUT_WIND = ("wind", "wind_per_run")
 MOST_EFFECTS = 6
 _GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
 _FINER, _FINER_STEPS = 1.2, 3
+"""Factor of the steps that follow, and the most of them."""
 _FIRST_COLOURS, _WORTH_A_COLOUR = ((1.0, 2.0), (4.0, 6.0)), 50.0
 """Share and time of noise that is tried first, and the log evidence that it must gain: a cause in the sensors leaves lasting residuals, too."""
 _SEARCHES = 3
