@@ -53,6 +53,13 @@ class Colour:
             if self.share[channel] > 0.0:
                 values[at] = np.einsum("kl,bl...->bk...", self.factor[channel], values[at], optimize=True)
 
+    def unwhitened(self, values: np.ndarray) -> np.ndarray:
+        """(B, K + 1, 6, ...), multiplied by the transposes of the factors that whiten."""
+        out = values.copy()
+        for channel in np.flatnonzero(self.share > 0.0):
+            out[:, :, channel] = np.einsum("kl,bk...->bl...", self.factor[channel], values[:, :, channel], optimize=True)
+        return out
+
     def differs(self, other: Colour) -> list[int]:
         """Channels whose noise is another one."""
         return [c for c in range(6) if (self.share[c], self.time[c]) != (other.share[c], other.time[c])]

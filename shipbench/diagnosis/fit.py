@@ -10,7 +10,7 @@ import numpy as np
 from .gram import Hyper
 from .model import NUM_BASE, Linearisation, Point, Scales, Term
 from .plant import Plant
-from .settle import Fit, Model, at_point, by_segment, objective, point_from, settle, suiting
+from .settle import Fit, Model, at_point, by_segment, leaning, objective, point_from, settle, suiting
 
 _MAY_RISE, _FREE_STEPS, _LEAST_SHARE = 1.1, 5, 0.05
 """Factor by which a step may raise the cost, on the first steps; later ones must lower it."""
@@ -80,10 +80,10 @@ def _step(lin: Linearisation, found: Fit, free: bool) -> tuple[Linearisation | N
         part = between(lin.point, target, share)
         trial = Linearisation(plant, scales, part, lin.towards(part), coarse=free)
         cost = objective(trial, model, found.hyper, found.log_tau2, found.gram)
-        if cost < may_rise * at:
+        if cost + leaning(found, part) < may_rise * at:
             return trial, None
         seen = settle(trial, model, found.hyper, found.log_tau2, leap=0.0) if cost < _MAY_FOLLOW * at else None
-        if seen is not None and at_point(seen, part) < followed:
+        if seen is not None and at_point(seen, part) + np.sum(seen.reduced.logdet - found.reduced.logdet) < followed:
             return trial, seen
         share *= 0.5
         if share < _LEAST_SHARE:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .columns import ASIDE
 from .gram import Gram, solve
 from .plant import Plant
 from .screen import evidence
@@ -15,6 +16,8 @@ AXES = ("surge", "sway", "yaw")
 _PRIOR_SD = 0.5
 """Of a feature's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m)."""
 _WORTH_MORE = 2.0
+_AWAY = 0.01
+"""Step of the derivatives of features by the motion, in units of the scales."""
 
 
 @dataclass(frozen=True)
@@ -28,19 +31,22 @@ class Dependence:
     share: float
 
 
-def features(plant: Plant) -> dict[str, np.ndarray]:
-    """Features (B, knots, F) of every variable at the knots of the latent force, of order one and without mean."""
+def features(plant: Plant, aside: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    """Features (B, knots, F) of every variable at the knots of the latent force, of order one and without mean; with `aside` (M, 6) of M motions
+    more, each moved by one row, (B + M B, knots, F)."""
     seg, froude = plant.seg, (plant.c.L / 130.0) ** 0.5
     at = np.clip(np.round(np.arange(plant.knots) * plant.knot_time / seg.dt).astype(int), 0, plant.steps)
-    psi, u, v, r, n, delta, F_b, F_s = np.moveaxis(seg.states[:, at, 2:], -1, 0)
-    t = seg.start[:, None] + at[None, :] * seg.dt
+    moves = np.zeros((1, 10)) if aside is None else np.pad(aside, ((1, 0), (0, 4)))
+    states = np.concatenate([seg.states[:, at] + move for move in moves])
+    psi, u, v, r, n, delta, F_b, F_s = np.moveaxis(states[..., 2:], -1, 0)
+    t = np.tile(seg.start[:, None] + at[None, :] * seg.dt, (len(moves), 1))
 
     def unit(x: np.ndarray) -> np.ndarray:
         return x / max(float(np.sqrt(np.mean(x**2))), 1e-12)
 
     u1, v1, r1, n1, d1 = unit(u), unit(v), unit(r), unit(n), unit(delta)
     minute = 2.0 * np.pi * t / (60.0 * froude)
-    order = np.broadcast_to((seg.run / max(seg.runs - 1, 1))[:, None], t.shape)
+    order = np.broadcast_to(np.tile(seg.run / max(seg.runs - 1, 1), len(moves))[:, None], t.shape)
     found = {
         "heading": [f(k * psi) for k in (1, 2, 3) for f in (np.cos, np.sin)],
         "speed": [u1, u1 * np.abs(u1)],
@@ -70,12 +76,15 @@ def dependences(fit: Fit) -> list[Dependence]:
     """Every variable on every axis, best first; judged beside the model of `fit`."""
     base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
     prior = replace(fit.prior, shared=np.arange(len(fit.prior.shared)), random=np.arange(len(fit.prior.shared), len(base)))
-    lean = _columns(fit.gram, base)
+    lean, B = fit.gram.only(base), len(fit.gram.run)
+    aside = _AWAY * np.diag(fit.scales.eta)[list(ASIDE)]
     null = solve(lean.reduce(fit.hyper.log_force), prior).log_evidence
     found = []
-    for variable, phi in features(fit.plant).items():
+    for variable, moved in features(fit.plant, aside).items():
+        phi, *others = moved.reshape(len(ASIDE) + 1, B, *moved.shape[1:])
+        bent = np.stack([other - phi for other in others]) / aside[range(len(ASIDE)), ASIDE][:, None, None, None]
         for j, axis in enumerate(AXES):
-            gram = _with_features(lean, phi, j)
+            gram = _with_features(lean, phi, j, np.einsum("bmi,ibmf->bf", fit.by_force[:, :, j, list(ASIDE)], bent))
             more = replace(
                 prior, shared=np.append(prior.shared, len(base) + np.arange(phi.shape[-1])),
                 precision=np.append(prior.precision, np.full(phi.shape[-1], _PRIOR_SD**-2)),
@@ -89,13 +98,9 @@ def dependences(fit: Fit) -> list[Dependence]:
     return sorted(found, key=lambda d: -d.score)
 
 
-def _columns(gram: Gram, columns: np.ndarray) -> Gram:
-    keep = np.concatenate([np.arange(gram.latent), gram.latent + columns, [gram.G.shape[-1] - 1]])
-    return replace(gram, G=np.ascontiguousarray(gram.G[:, keep][:, :, keep]))
-
-
-def _with_features(gram: Gram, phi: np.ndarray, axis: int) -> Gram:
-    """The Gram with the columns S_w phi before the residual: linear combinations of columns that it has."""
+def _with_features(gram: Gram, phi: np.ndarray, axis: int, slopes: np.ndarray) -> Gram:
+    """The Gram with the columns S_w phi before the residual, linear combinations of columns that it has, and how the log determinants depend on
+    their coefficients."""
     at = slice(6 + axis * gram.knots, 6 + (axis + 1) * gram.knots)
     rows = np.swapaxes(phi, 1, 2) @ gram.G[:, at]  # (B, F, Z + G + 1)
     corner = rows[:, :, at] @ phi
@@ -108,4 +113,4 @@ def _with_features(gram: Gram, phi: np.ndarray, axis: int) -> Gram:
     G[:, -1, :last], G[:, :last, -1] = gram.G[:, -1, :last], gram.G[:, :last, -1]
     G[:, -1, last : last + F] = G[:, last : last + F, -1] = rows[:, :, last]
     G[:, -1, -1] = gram.G[:, -1, -1]
-    return replace(gram, G=G)
+    return replace(gram, G=G, slope=np.insert(gram.slope, [gram.slope.shape[1] - 1], -0.5 * slopes, axis=1))

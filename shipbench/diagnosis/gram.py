@@ -31,7 +31,8 @@ class Hyper:
 class Products:
     """Products of columns [eta, w, shared, e] per channel and segment, (6, B, Z + G + 1, Z + G + 1), before the noise is known.
 
-    run (B,): the segment's run; samples (B,): of real samples; colour (B,): log determinant of the noise's correlations.
+    run (B,): the segment's run; samples (B,): of real samples; colour (B,): log determinant of the noise's correlations; slope (B, G + 1): as in
+    `sloped`.
     """
 
     P: np.ndarray
@@ -41,6 +42,7 @@ class Products:
     runs: int
     samples: np.ndarray
     colour: np.ndarray
+    slope: np.ndarray
 
     @classmethod
     def of(
@@ -48,7 +50,8 @@ class Products:
     ) -> Products:
         """From columns Z (6, B, K + 1, Z + G + 1), zero where `mask` (B, K + 1) has no real sample."""
         B, P = len(mask), np.swapaxes(Z, 2, 3) @ Z
-        return cls(P, knots, spacing, run, runs, mask.sum(axis=1), np.zeros(B) if colour is None else colour)
+        slope = np.zeros((B, P.shape[-1] - 6 - 3 * knots))
+        return cls(P, knots, spacing, run, runs, mask.sum(axis=1), np.zeros(B) if colour is None else colour, slope)
 
     @property
     def latent(self) -> int:
@@ -61,19 +64,23 @@ class Products:
     def take(self, rows: np.ndarray, runs: np.ndarray) -> Products:
         """Some segments; `runs` are the numbers of the runs that are kept, which are numbered anew."""
         new = np.searchsorted(runs, self.run[rows])
-        return replace(self, P=self.P[:, rows], run=new, runs=len(runs), samples=self.samples[rows], colour=self.colour[rows])
+        return replace(self, P=self.P[:, rows], run=new, runs=len(runs), samples=self.samples[rows], colour=self.colour[rows], slope=self.slope[rows])
 
     def without(self, num: int) -> Products:
         """Without the last `num` shared columns."""
         keep = np.delete(np.arange(self.P.shape[-1]), np.arange(self.P.shape[-1] - 1 - num, self.P.shape[-1] - 1))
-        return replace(self, P=self.P[:, :, keep][:, :, :, keep]) if num else self
+        return replace(self, P=self.P[:, :, keep][:, :, :, keep], slope=self.slope[:, keep[self.latent :] - self.latent]) if num else self
+
+    def sloped(self, slopes: np.ndarray, at: np.ndarray) -> Products:
+        """With derivatives (B, G) of the segments' log determinants by the shared columns, which stand at coefficients `at` (B, G)."""
+        return replace(self, slope=np.concatenate([-0.5 * slopes, -np.sum(slopes * at, axis=1, keepdims=True)], axis=1))
 
     def weigh(self, hyper: Hyper) -> Gram:
         """The Gram under given noise."""
         G = (np.exp(-hyper.log_noise) @ self.P.reshape(6, -1)).reshape(self.P.shape[1:])  # BLAS, which einsum does without
         K_inv, K_logdet = ornstein_uhlenbeck(self.knots, self.spacing, hyper.tau)
         log_noise = self.samples * float(np.sum(hyper.log_noise)) + self.colour
-        return Gram(G, self.knots, K_inv, K_logdet, log_noise, self.run, self.runs)
+        return Gram(G, self.knots, K_inv, K_logdet, log_noise, self.slope, self.run, self.runs)
 
 
 def ornstein_uhlenbeck(knots: int, spacing: float, tau: float) -> tuple[np.ndarray, float]:
@@ -101,12 +108,18 @@ class Gram:
     K_inv: np.ndarray
     K_logdet: float
     log_noise: np.ndarray
+    slope: np.ndarray
     run: np.ndarray
     runs: int
 
     @property
     def latent(self) -> int:
         return 6 + 3 * self.knots
+
+    def only(self, columns: np.ndarray) -> Gram:
+        """The Gram of some shared columns (the residual is kept)."""
+        keep = np.concatenate([np.arange(self.latent), self.latent + columns, [self.G.shape[-1] - 1]])
+        return replace(self, G=np.ascontiguousarray(self.G[:, keep][:, :, keep]), slope=self.slope[:, keep[self.latent :] - self.latent])
 
     def precision(self, log_force: np.ndarray) -> np.ndarray:
         """Prior precision of [eta, w]."""
@@ -124,6 +137,8 @@ class Gram:
         inverse, logdet = inverses(A)
         solved = inverse @ self.G[:, :Z, Z:]
         S = self.G[:, Z:, Z:] - np.swapaxes(self.G[:, :Z, Z:], 1, 2) @ solved
+        S[:, :-1, -1] += self.slope[:, :-1]
+        S[:, -1, :] += self.slope
         logdet = logdet + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
         return Reduced(by_run(S, self.run), by_run(logdet, self.run), inverse, solved)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..effects.base import Effect, flow_first
 from ..ops import Array
 from ..predictors._physics_fit import parameter_scale
 from .colour import Colour
+from .columns import ASIDE, Bend, Columns
 from .plant import HULL, NUM_HULL, Plant
 from .rolling import Active
 from .structure import STRUCTURE
@@ -127,23 +129,14 @@ def _since(plant: Plant, term: Term, value: float) -> float | np.ndarray:
     return value if term.since is None else np.where(plant.seg.run >= term.since, value, 0.0)
 
 
-@dataclass(frozen=True)
-class Columns:
-    """Sensitivities about a point, T = 6 (K + 1) with the channel last: eta (B, T, 6), w (B, T, 3 knots), base (B, T, NUM_BASE), one (B, T, size) per
-    term of the point (`own`) and per candidate; predicted (B, K + 1, 6)."""
-
-    predicted: np.ndarray
-    eta: np.ndarray
-    w: np.ndarray
-    base: np.ndarray
-    own: tuple[np.ndarray, ...]
-    candidates: tuple[np.ndarray, ...]
-
-
 _STEP, _OWN_STEP, _OWN_VECTOR_STEP, CANDIDATE_STEP, VECTOR_STEP = 1e-4, 0.02, 0.5, 0.5, 1.0
 """Steps in units of the scales. A candidate's is finite: some (wind, deadband) act with the square of their size or not at all below one; that of a
 vector goes both ways, because its sign differs from heading to heading. So does that of a vector in the model, or a wind near zero, where its
 force has no slope, would be held there."""
+
+
+_AWAY = 0.01
+"""Step aside from the trajectory, in units of the scales."""
 
 
 _quiet = np.errstate(over="ignore", invalid="ignore")
@@ -189,13 +182,15 @@ class Linearisation:
         self.pulses = self._pulses()
         first = np.broadcast_to(np.diag(self.scales.eta), (self.here.shape[1], 6, 6))
         eta, latent = self._chained(np.zeros((*self.here.shape, 6)), first), self._chained(self.pulses)
-        return Columns(self.predicted, eta, latent, base, own, tuple(self._of_candidates(candidates)))
+        return Columns(self.predicted, eta, latent, base, own, tuple(self._of_candidates(candidates)), tuple(self.bends))
 
     @_quiet
     def parameter_columns(self) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         """Those of the base parameters and of the terms in the model alone."""
+        self._look_aside()
         p, ship = parameters(self.scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, None, :])
-        self.base_sources = self._ends((self._rates(p=p, ship=ship) - self.rates) / _STEP)
+        changed, bent = self._changed(_STEP, p=p, ship=ship)
+        self.base_sources, self.bends = self._ends(changed), [Bend(bent)]
         self.own_sources: list[np.ndarray | None] = []
         own = tuple(self._of_term(i, term) for i, term in enumerate(self.point.terms))
         return self._chained(self.base_sources), own
@@ -220,11 +215,26 @@ class Linearisation:
         return self.plant.steps_from(self.states if states is None else states, self.p, active, self.push, self.path if path is None else path)
 
     def _rates(
-        self, p: Sequence[Array] | None = None, ship: Sequence[Active] | None = None, forces: Sequence[Active] | None = None, often: bool = True
-    ) -> np.ndarray:
+        self, p: Sequence[Array] | None = None, ship: Sequence[Active] | None = None, forces: Sequence[Active] | None = None,
+        path: np.ndarray | None = None, often: bool = True, states: np.ndarray | None = None,
+    ) -> np.ndarray:  # fmt: skip
         """Accelerations (D, K, B, 3) in the middle of all single steps with something changed."""
         active = [*flow_first(self.forces if forces is None else forces), *(self.ship if ship is None else ship)]
-        return self.plant.rates_from(self.middle, self.p if p is None else p, active, self.path, often)
+        at, way = self.middle if states is None else states, self.path if path is None else path
+        return self.plant.rates_from(at, self.p if p is None else p, active, way, often)
+
+    def _look_aside(self) -> None:
+        """A point beside the middle of every step, in one direction after the other, for what the forces' derivatives by the motion change with."""
+        K, B = self.middle.shape[1:3]
+        self.turn = np.take(ASIDE, np.add.outer(np.arange(K), np.arange(B)) % len(ASIDE))
+        self.away = _AWAY * self.scales.eta[self.turn]
+        self.aside = self.middle + self.away[..., None] * (self.turn[..., None] == np.arange(6))
+        self.rates_aside = self._rates(states=self.aside)
+
+    def _changed(self, unit: float, **change: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Changes (D, K, B, 3) of the accelerations by a change of something, per unit: on the trajectory, and beside it less those."""
+        on, aside = self._rates(**change) - self.rates, self._rates(**change, states=self.aside) - self.rates_aside
+        return on / unit, (aside - on) / unit
 
     def _ends(self, rates: np.ndarray) -> np.ndarray:
         """Changes of the steps' ends (K, B, 6, D) by changes of the acceleration (D, K, B, 3): one evaluation of the forces instead of the four of a
@@ -261,11 +271,12 @@ class Linearisation:
         """Columns of a term that is in the model."""
         step = _OWN_VECTOR_STEP if term.effect.vector and self.coarse else _OWN_STEP
         steps = step * self.scales.amplitudes(term, self.plant.c.L)
-        columns, sources = self._moved(index, term, steps, step)
-        if term.effect.vector and sources is not None:
-            back, sources_back = self._moved(index, term, -steps, -step)
-            columns, sources = 0.5 * (columns + back), 0.5 * (sources + sources_back)
+        columns, sources, bend = self._moved(index, term, steps, step)
+        if term.effect.vector and sources is not None and bend.rates is not None:
+            back, sources_back, bend_back = self._moved(index, term, -steps, -step)
+            columns, sources, bend = 0.5 * (columns + back), 0.5 * (sources + sources_back), Bend(0.5 * (bend.rates + bend_back.rates))
         self.own_sources.append(sources)
+        self.bends.append(bend)
         return columns
 
     @_quiet
@@ -277,11 +288,14 @@ class Linearisation:
             step = VECTOR_STEP if term.effect.vector else CANDIDATE_STEP
             unit = step * self.scales.amplitudes(term, self.plant.c.L)
             if term.effect.enters != "force":
-                found[i], _ = self._moved(None, term, unit, step)
+                found[i], _, bend = self._moved(None, term, unit, step)
+                self.bends.append(bend)
                 continue
             q = [np.where(np.arange(term.size) == a, unit[a], 0.0)[:, None, None] for a in range(term.size)]
-            change = self._rates_with(term, q, 1.0) - (self._rates_with(term, q, -1.0) if term.effect.vector else self.rates)
-            sources.append(self._ends(change / (2.0 * step if term.effect.vector else step)))
+            sides = (1.0, -1.0) if term.effect.vector else (1.0,)
+            change, bent = np.mean([self._changed(side * step, forces=self._beside(term, q, side), often=False) for side in sides], axis=0)
+            sources.append(self._ends(change))
+            self.bends.append(Bend(bent))
         if sources:
             columns = self._chained(np.concatenate(sources, axis=-1))
             at = 0
@@ -291,14 +305,14 @@ class Linearisation:
                     at += term.size
         return [found[i] for i in range(len(candidates))]
 
-    def _rates_with(self, term: Term, q: Sequence[np.ndarray], side: float) -> np.ndarray:
-        """Accelerations in the middle of all single steps with a force that is not in the model."""
-        return self._rates(forces=[*self.forces, Active(term.effect, (*(side * v for v in q), *term.setting))], often=False)
+    def _beside(self, term: Term, q: Sequence[np.ndarray], side: float) -> list[Active]:
+        """The model's forces and one that is not in it."""
+        return [*self.forces, Active(term.effect, (*(side * v for v in q), *term.setting))]
 
     @_quiet
-    def _moved(self, index: int | None, term: Term, steps: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray | None]:
+    def _moved(self, index: int | None, term: Term, steps: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray | None, Bend]:
         """Columns (B, T, size) of one term, the index-th of the model or one that is not in it, and its sources where it touches the motion."""
-        columns, sources = [], []
+        columns, sources, bends, sensors = [], [], [], []
         seen = self.plant.measured(self.motion, self.now)
         for a in range(term.size):
             old = (*(0.0 for _ in range(term.size)), *term.setting) if index is None else self.now[index].q
@@ -307,11 +321,16 @@ class Linearisation:
             if term.effect.enters == "sensor":
                 moved = self.plant.measured(self.motion, changed) - seen
                 columns.append((moved / unit).reshape(len(moved), -1, 1))
+                sensors.append(tuple(changed))
                 continue
             if term.effect.enters == "gear":
-                sources.append(((self._steps(path=self.plant.path_of(changed))[0] - self.here) / unit)[..., None])
+                path = self.plant.path_of(changed)
+                sources.append(((self._steps(path=path)[0] - self.here) / unit)[..., None])
+                bends.append(self._changed(unit, path=path)[1])
             else:
-                rates = self._rates(forces=[x for x in changed if x.effect.enters == "force"])
-                sources.append(self._ends((rates - self.rates) / unit))
+                change, bent = self._changed(unit, forces=[x for x in changed if x.effect.enters == "force"])
+                sources.append(self._ends(change))
+                bends.append(bent)
             columns.append(self._chained(sources[-1]))
-        return np.concatenate(columns, axis=-1), np.concatenate(sources, axis=-1) if sources else None
+        bend = Bend(np.concatenate(bends)) if bends else Bend(None, tuple(sensors), unit)
+        return np.concatenate(columns, axis=-1), np.concatenate(sources, axis=-1) if sources else None, bend

@@ -35,12 +35,6 @@ class Score:
     log_tau2: float = 0.0
 
 
-def only(gram: Gram, columns: np.ndarray) -> Gram:
-    """The Gram of some shared columns (the residual is kept)."""
-    keep = np.concatenate([np.arange(gram.latent), gram.latent + columns, [gram.G.shape[-1] - 1]])
-    return replace(gram, G=gram.G[:, keep][:, :, keep])
-
-
 def with_columns(prior: Prior, at: np.ndarray, term: Term, log_tau2: float, width: float = 1.0) -> Prior:
     """The prior of a model that holds the columns `at` as well."""
     if term.per_run:
@@ -82,7 +76,7 @@ def screen(fit: Fit, refine: int = 12) -> list[Score]:
     order = sorted(range(len(scores)), key=lambda i: -scores[i].score)
     base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
     renumbered = replace(fit.prior, shared=np.arange(len(fit.prior.shared)), random=np.arange(len(fit.prior.shared), len(base)))
-    before, log_force, _ = evidence(only(gram, base), renumbered, fit.hyper.log_force)
+    before, log_force, _ = evidence(gram.only(base), renumbered, fit.hyper.log_force)
     for place, i in enumerate(order):
         term = candidates[i]
         if _wrong_way(term, scores[i].estimate):
@@ -92,7 +86,7 @@ def screen(fit: Fit, refine: int = 12) -> list[Score]:
             continue
         own = term.size if term.per_run else 0
         prior = with_columns(renumbered, len(base) + np.arange(term.size), term, max(scores[i].log_tau2, _LEAST_START))
-        after, _, log_tau2 = evidence(only(gram, np.append(base, columns[i])), prior, log_force, own)
+        after, _, log_tau2 = evidence(gram.only(np.append(base, columns[i])), prior, log_force, own)
         scores[i] = replace(scores[i], score=2.0 * (after - before) - term.cost(fit.plant.seg.runs), log_tau2=log_tau2)
     return sorted(scores, key=lambda s: -s.score)
 

@@ -9,9 +9,11 @@ from itertools import pairwise
 import numpy as np
 
 from .colour import Colour
-from .gram import ETA_PRECISION, Gram, Hyper, Prior, Products, Reduced, Solution, accelerated, background, solve, update_force, update_noise
-from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, Term
+from .columns import Columns
+from .gram import ETA_PRECISION, Gram, Hyper, Prior, Products, Reduced, Solution, accelerated, background, by_run, solve, update_force, update_noise
+from .model import FREE, NUM_BASE, Linearisation, Point, Scales, Term
 from .plant import NUM_HULL, Plant
+from .slope import slopes
 
 _EM_CYCLES, _NARROW = 3, 0.1
 _LOG_FLOOR = np.log(0.1**2)
@@ -53,7 +55,7 @@ def base_precision(model: Model) -> np.ndarray:
 @dataclass(frozen=True)
 class Fit:
     """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate, cov: of [eta, w] per segment;
-    early: what the fit promised at its second linearisation."""
+    by_force: see `slopes`; early: what the fit promised at its second linearisation."""
 
     plant: Plant
     scales: Scales
@@ -72,6 +74,7 @@ class Fit:
     estimate: np.ndarray
     cov: np.ndarray
     excess: float
+    by_force: np.ndarray
     early: float = np.nan
 
     @property
@@ -189,6 +192,12 @@ def at_point(found: Fit, point: Point) -> float:
     return float(np.einsum("ni,nij,nj", theta, found.reduced.S, theta)) + prior_squares(found.model, point, found.log_tau2)
 
 
+def leaning(found: Fit, point: Point) -> float:
+    """How much higher the log determinant of the force is at a point, as the linearisation of `found` expects it."""
+    slope = by_run(found.gram.slope, found.gram.run)
+    return -2.0 * float(np.sum(_coefficients(found, point)[:, :-1] * slope[:, :-1])) + float(np.sum(slope[:, -1]))
+
+
 def _coefficients(found: Fit, point: Point) -> np.ndarray:
     """(N, G + 1): parameters and values of a point by run, -1 for the residual."""
     runs = found.plant.seg.runs
@@ -212,6 +221,7 @@ def settle(
     plant, scales, point = lin.plant, lin.scales, lin.point
     columns = lin.columns(candidates) if seen is None else seen.columns
     products = products_of(plant, scales, point, columns) if seen is None else seen.products
+    products, by_force = _sloped(lin, columns, products, hyper)
     if leap > 0.0:
         hyper, log_tau2 = _variances(products.without(sum(t.size for t in candidates)), model, hyper, log_tau2, cycles, leap)
     gram = products.weigh(hyper)
@@ -222,8 +232,17 @@ def settle(
     excess = max(objective(lin, model, hyper, log_tau2, gram) - solution.squares, 0.0)
     return Fit(
         plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), lin.motion, products, gram, reduced, solution, estimate, cov,
-        excess,
+        excess, by_force,
     )  # fmt: skip
+
+
+def _sloped(lin: Linearisation, columns: Columns, products: Products, hyper: Hyper) -> tuple[Products, np.ndarray]:
+    """Products that know how the log determinants depend on what is shared, and how these depend on the force at the knots."""
+    gram, point, B = products.weigh(hyper), lin.point, len(products.run)
+    by_column, by_force = slopes(lin, columns, gram.reduce(hyper.log_force).inverse, hyper)
+    own = [v[products.run] if t.per_run else np.broadcast_to(v, (B, t.size)) for t, v in zip(point.terms, point.values, strict=True)]
+    candidates = np.zeros((B, sum(c.shape[-1] for c in columns.candidates)))
+    return products.sloped(by_column, np.concatenate([np.broadcast_to(point.base, (B, NUM_BASE)), *own, candidates], axis=1)), by_force
 
 
 def evidence_with(found: Fit, colour: Colour) -> float:

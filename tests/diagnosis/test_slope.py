@@ -1,0 +1,122 @@
+"""How the log determinant of the latent force depends on parameters, and what estimates gain by it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipbench.diagnosis import settle as settling
+from shipbench.diagnosis.fit import Origin, fit, start
+from shipbench.diagnosis.model import NUM_BASE, Linearisation, Point, Scales, Term
+from shipbench.diagnosis.plant import HULL, Plant
+from shipbench.diagnosis.settle import Fit, Model, settle
+from shipbench.diagnosis.slope import slopes
+from shipbench.effects.base import EFFECTS
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.simulate.trials import Trials, sea_trials
+
+N_R = 6 + [p.name for p in HULL.parameters].index("N_r")
+
+
+@pytest.fixture(scope="module")
+def plant() -> Plant:
+    return Plant.of(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=4, samples=60)))
+
+
+@pytest.fixture(scope="module")
+def fitted(plant) -> Fit:
+    scales = Scales(plant)
+    coloured = scales.coloured(scales.colour.with_channel(2, 4.0, 6.0))
+    origin = Origin.of(plant, coloured)
+    return fit(plant, coloured, Model(), origin.point, origin.hyper, guess=origin.motion)
+
+
+def _log_determinant(fitted: Fit, point: Point) -> float:
+    lin = Linearisation(fitted.plant, fitted.scales, point, fitted.motion, coarse=False)
+    return float(np.sum(settle(lin, Model(point.terms), fitted.hyper, {}, leap=0.0).reduced.logdet))
+
+
+def _by_column(fitted: Fit, candidates: list[Term]) -> tuple[np.ndarray, np.ndarray]:
+    lin = Linearisation(fitted.plant, fitted.scales, fitted.point, fitted.motion, coarse=False)
+    found, by_force = slopes(lin, lin.columns(candidates), fitted.reduced.inverse, fitted.hyper)
+    return found.sum(axis=0), by_force
+
+
+def test_slopes_by_parameters_are_those_of_the_log_determinant(fitted):
+    found, _ = _by_column(fitted, [])
+    numeric = np.zeros(NUM_BASE)
+    for i in range(NUM_BASE):
+        ends = [replace(fitted.point, base=fitted.point.base + step * np.eye(NUM_BASE)[i]) for step in (0.05, -0.05)]
+        numeric[i] = (_log_determinant(fitted, ends[0]) - _log_determinant(fitted, ends[1])) / 0.1
+    assert np.abs(numeric).max() > 1.0
+    assert np.abs(found - numeric).max() < 0.05 * np.abs(numeric).max()
+
+
+CAUSES = ("mass_change", "rudder_gain", "added_resistance", "speed_scale", "antenna_offset", "rudder_delay", "velocity_delay")
+
+
+def _term(name: str) -> Term:
+    return Term(EFFECTS.get(name), (0.0,) if name == "velocity_delay" else ())
+
+
+@pytest.mark.parametrize("name", CAUSES)
+def test_slopes_by_causes_of_every_kind_are_those_of_the_log_determinant(fitted, name):
+    term = _term(name)
+    found = _by_column(fitted, [term])[0][NUM_BASE:]
+    for a in range(term.size):
+        ends = [replace(fitted.point, terms=(term,), values=(step * np.eye(term.size)[a],)) for step in (0.1, -0.1)]
+        numeric = (_log_determinant(fitted, ends[0]) - _log_determinant(fitted, ends[1])) / 0.2
+        assert found[a] == pytest.approx(numeric, rel=0.1, abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["speed_scale", "velocity_delay"])
+def test_slopes_by_a_sensor_that_errs_already_are_those_of_the_log_determinant(fitted, name):
+    """What it does already must not count as the change."""
+    term = _term(name)
+    at = replace(fitted.point, terms=(term,), values=(np.full(term.size, 0.7),))
+    lin = Linearisation(fitted.plant, fitted.scales, at, fitted.motion, coarse=False)
+    now = settle(lin, Model((term,)), fitted.hyper, {}, leap=0.0)
+    found = slopes(lin, now.columns, now.reduced.inverse, fitted.hyper)[0].sum(axis=0)[NUM_BASE:]
+    for a in range(term.size):
+        ends = [_log_determinant(fitted, replace(at, values=(at.values[0] + step * np.eye(term.size)[a],))) for step in (0.1, -0.1)]
+        assert found[a] == pytest.approx((ends[0] - ends[1]) / 0.2, rel=0.15, abs=0.5)
+
+
+def test_slopes_by_a_force_at_the_knots_agree_with_those_by_a_parameter(fitted):
+    """A moment that goes with the yaw rate, as the motion's and as the force's."""
+    found, by_force = _by_column(fitted, [])
+    lin = Linearisation(fitted.plant, fitted.scales, fitted.point, fitted.motion, coarse=False)
+    lin.columns()
+    at_r = lin.turn == 5
+    damping = np.mean((lin.bends[0].rates[N_R, ..., 2] / lin.away)[at_r])
+    share = np.sum(by_force[:, :, 2, 5]) * damping / fitted.scales.w[2]
+    assert share == pytest.approx(found[N_R], rel=0.25)
+
+
+def test_estimates_are_nearer_to_the_truth_where_the_log_determinant_counts(monkeypatch):
+    """Motions of the fitted model itself under drawn forces, with little noise: squares alone make the ship less damped than she is."""
+    plant = Plant.of(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=8, samples=120)))
+    rng, scales, (still, hyper) = np.random.default_rng(4), Scales(plant), start(plant)
+    true = 0.3 * rng.standard_normal(NUM_BASE)
+    lag = np.abs(np.subtract.outer(np.arange(plant.knots), np.arange(plant.knots))) * plant.knot_time / hyper.tau
+    w = 0.5 * np.linalg.cholesky(np.exp(-lag)) @ rng.standard_normal((len(still.eta), plant.knots, 3))
+    states = plant.seg.states.copy()
+    states[..., :6] = Linearisation(plant, scales, replace(still, base=true, w=w)).predicted
+    states[..., :6] += 0.1 * scales.noise * rng.standard_normal(states[..., :6].shape)
+    drawn = Plant(plant.ship, replace(plant.seg, states=states), plant.long)
+    origin = Origin.of(drawn, scales)
+
+    def fitted() -> Fit:
+        return fit(drawn, scales, Model(), origin.point, origin.hyper, guess=origin.motion)
+
+    def off(found: Fit) -> float:
+        error = found.solution.mean[:NUM_BASE] - true
+        return float(error @ np.linalg.solve(found.solution.cov[:NUM_BASE, :NUM_BASE], error))
+
+    counts = fitted()
+    monkeypatch.setattr(settling, "slopes", lambda *given: tuple(0.0 * x for x in slopes(*given)))
+    squares = fitted()
+    assert counts.evidence > squares.evidence + 0.5
+    assert off(counts) < 0.9 * off(squares)
