@@ -16,6 +16,9 @@ from .plant import NUM_HULL, Plant
 from .slope import slopes
 
 _EM_CYCLES, _NARROW = 3, 0.1
+_RUNS_LEAP = 0.5
+"""Most that the logarithm of the variance of values per run moves at once: far from rest the linear model may want none of them, and a variance that
+has vanished hardly returns."""
 _LOG_FLOOR = np.log(0.1**2)
 """A channel is never taken for better than a tenth of an ordinary sensor, else the latent force follows its noise."""
 
@@ -280,7 +283,8 @@ def _variances(
         return solution.log_evidence, np.concatenate([force, noise, _random_variances(model, solution)])
 
     first = np.concatenate([hyper.log_force, hyper.log_noise, [log_tau2.get(i, 0.0) for i in random]])
-    theta = np.clip(accelerated(step, first, cycles), first - leap, first + leap)
+    leaps = np.append(np.full(9, leap), np.full(len(random), min(leap, _RUNS_LEAP)))
+    theta = np.clip(accelerated(step, first, cycles), first - leaps, first + leaps)
     return Hyper(theta[:3], theta[3:9], hyper.tau), dict(zip(random, (float(v) for v in theta[9:]), strict=True))
 
 
