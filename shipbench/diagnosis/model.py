@@ -170,6 +170,7 @@ class Linearisation:
         self.reach = 0.5 * plant.seg.dt * half[..., 3:]  # (K, B, 6, 3): end of a step from an acceleration that lasts it
         self.middle = 0.5 * (self.states + self.here)
         self.rates = self._rates()
+        self.aside: np.ndarray | None = None
         self.gaps = self.here - np.swapaxes(self.motion[:, 1:], 0, 1)
         self.predicted = plant.measured(self.motion, self.now)
         if guess is not None:
@@ -178,6 +179,7 @@ class Linearisation:
 
     def columns(self, candidates: Sequence[Term] = ()) -> Columns:
         """All sensitivities."""
+        self._look_aside()
         base, own = self.parameter_columns()
         self.pulses = self._pulses()
         first = np.broadcast_to(np.diag(self.scales.eta), (self.here.shape[1], 6, 6))
@@ -187,7 +189,6 @@ class Linearisation:
     @_quiet
     def parameter_columns(self) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         """Those of the base parameters and of the terms in the model alone."""
-        self._look_aside()
         p, ship = parameters(self.scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, None, :])
         changed, bent = self._changed(_STEP, p=p, ship=ship)
         self.base_sources, self.bends = self._ends(changed), [Bend(bent)]
@@ -232,8 +233,10 @@ class Linearisation:
         self.rates_aside = self._rates(states=self.aside)
 
     def _changed(self, unit: float, **change: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Changes (D, K, B, 3) of the accelerations by a change of something, per unit: on the trajectory, and beside it less those."""
-        on, aside = self._rates(**change) - self.rates, self._rates(**change, states=self.aside) - self.rates_aside
+        """Changes (D, K, B, 3) of the accelerations by a change of something, per unit: on the trajectory, and beside it less those (none
+        where the derivatives of the log determinant are not asked for)."""
+        on = self._rates(**change) - self.rates
+        aside = on if self.aside is None else self._rates(**change, states=self.aside) - self.rates_aside
         return on / unit, (aside - on) / unit
 
     def _ends(self, rates: np.ndarray) -> np.ndarray:

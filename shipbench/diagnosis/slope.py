@@ -22,14 +22,15 @@ _MOVE = 1e-4
 """Share of the sensitivities by which the motion is moved to see what sensors make of them."""
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyper) -> tuple[np.ndarray, np.ndarray]:
     """Derivatives of the log determinants of the segments, for trajectories that stay where they are: (B, G) by base, own terms and candidates, and
     (B, knots, 3, 6) by what the force at each knot changes by when each part of the motion does (in units of the scales of the force).
 
     With Phi the sensitivities to [eta, w], R the noise and A = Phi' R^-1 Phi + P, `inverse` (B, Z, Z) its inverse: d log det A = 2 tr(A^-1 Phi' R^-1
-    d Phi). Phi is a chain of single steps, so that the derivative by the Jacobian of each comes from an adjoint one.
+    d Phi). Phi is a chain of single steps, so that the derivative by the Jacobian of each comes from an adjoint one. A trial that blows up has none.
     """
-    phi = np.nan_to_num(np.concatenate([columns.eta, columns.w], axis=-1), nan=0.0, posinf=0.0, neginf=0.0)
+    phi = _finite(np.concatenate([columns.eta, columns.w], axis=-1))
     B, _, Z = phi.shape
     phi = phi.reshape(B, -1, 6, Z)
     weight = _by_noise(lin, hyper, phi) @ inverse[:, None]
@@ -37,7 +38,12 @@ def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyp
     turned = len(ASIDE) * np.take_along_axis(by_rate, lin.turn[..., None, None], axis=-1)[..., 0] / lin.away[..., None]
     found = [_of_sensors(lin, bend, phi, weight) if bend.rates is None else np.einsum("kbi,ckbi->bc", turned, bend.rates) for bend in columns.bends]
     middle = 0.5 * (lin.plant.hat[:-1] + lin.plant.hat[1:])
-    return 2.0 * np.concatenate(found, axis=1), 2.0 * lin.scales.w[:, None] * np.einsum("km,kbij->bmij", middle, by_rate)
+    by_force = lin.scales.w[:, None] * np.einsum("km,kbij->bmij", middle, by_rate)
+    return _finite(2.0 * np.concatenate(found, axis=1)), _finite(2.0 * by_force)
+
+
+def _finite(values: np.ndarray) -> np.ndarray:
+    return np.nan_to_num(values, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def _by_noise(lin: Linearisation, hyper: Hyper, phi: np.ndarray) -> np.ndarray:

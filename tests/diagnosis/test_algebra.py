@@ -96,6 +96,16 @@ def test_an_effect_with_one_value_per_run_has_its_own_columns_in_every_run(plant
     assert np.isfinite(settled.evidence)
 
 
+def test_the_variance_of_values_per_run_does_not_vanish_at_once(plant):
+    """Far from rest the linear model may want none of them."""
+    scales = Scales(plant)
+    point, hyper = start(plant)
+    term = Term(EFFECTS.get("current_per_run"), per_run=True)
+    point = replace(point, terms=(term,), values=(np.full((plant.seg.runs, 2), 0.5),))
+    found = settle(Linearisation(plant, scales, point), Model((term,)), hyper, {0: 3.0})
+    assert found.log_tau2[0] == pytest.approx(2.5)
+
+
 def test_accelerated_steps_reach_the_rest_of_a_creeping_iteration():
     """Steps that close 2 % of the distance: as many plain ones would be 60 % short."""
     rest = np.array([1.0, -3.0])
