@@ -63,11 +63,11 @@ def _p(found: Analysis, score: float) -> float:
 def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs: Sequence[str]) -> Cause:
     fit, effect = found.final, term.effect
     # the linear model, asked for the fit without it, does not hold so far from its point: what a refit has gained is an upper bound, or all there is
-    score, added = fit.worth(index), max((s.score for s in found.selection.steps if s.term == term), default=np.inf)
-    beside = "beside the other causes"
-    if score < found.threshold or score > added:
-        score, beside = added, "where it was added"
+    score, beside = fit.worth(index), "beside the other causes"
     supporters = int(np.sum(fit.solution.per_run > fit.solution_without(index).per_run))
+    added = max((s for s in found.selection.steps if s.term == term), key=lambda s: s.score, default=None)
+    if added is not None and (score < found.threshold or score > added.score):
+        score, supporters, beside = added.score, added.supporters, "where it was added"
     rivals = rivals_of(found, term)
     evidence = f"adds {0.5 * score:.0f} to the log evidence {beside}; {supporters} of {fit.plant.seg.runs} runs support it"
     if term.since is not None:

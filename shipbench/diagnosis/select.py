@@ -64,12 +64,17 @@ _LASTING = (
 
 @dataclass(frozen=True)
 class Step:
-    """A candidate that was refitted in a round, and its score at its own optimum (2 log evidence over the model before), or what it promised when it
-    was given up."""
+    """A candidate that was refitted in a round, its score at its own optimum (2 log evidence over the model before), or what it promised when it
+    was given up, and the number of runs that are likelier there than by the model before."""
 
     round: int
     term: Term
     score: float
+    supporters: int
+
+    @classmethod
+    def of(cls, number: int, tried: Fit, now: Fit, score: float) -> Step:
+        return cls(number, tried.model.terms[-1], score, int(np.sum(tried.solution.per_run > now.solution.per_run)))
 
 
 @dataclass(frozen=True)
@@ -241,14 +246,14 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         tried = refits(now, likely_first(worth_a_refit(scores, now, threshold), now, origin), origin, threshold)
         if all(2.0 * (f.evidence - now.evidence) < threshold for f, _ in tried):
             tried += refits(now, absorbed([f for f, _ in tried], now, threshold, origin), origin, threshold)
-        steps += [Step(round_, f.model.terms[-1], score) for f, score in tried]
+        steps += [Step.of(round_, f, now, score) for f, score in tried]
         best = _or_change(now, max((f for f, _ in tried), key=gain, default=None), origin)
         imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
         # what a fit that does not rest could still gain by itself is no gain of the next cause
         if best is None or gain(best) < threshold + imprecise + now.excess:
             break
         if best.model.terms[-1].since is not None:
-            steps.append(Step(round_, best.model.terms[-1], 2.0 * (best.evidence - now.evidence)))
+            steps.append(Step.of(round_, best, now, 2.0 * (best.evidence - now.evidence)))
         now = _backward(best, threshold)
         now = widened(fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates, guess=now.motion))
         scores = screen(now)

@@ -6,6 +6,7 @@ Draws are fresh: the seed is in the message, and `SHIPBENCH_SEED=n` sets it.
 from __future__ import annotations
 
 import os
+import re
 import secrets
 from dataclasses import replace
 
@@ -104,6 +105,8 @@ def test_a_hidden_current_is_sized_and_pays_on_runs_that_were_not_fitted():
     assert verdict.verdict == "found"
     assert cause.effect == "current"
     assert verdict.extended_model.startswith("physics+current")
+    supporters, runs = re.search(r"(\d+) of (\d+) runs support it", cause.evidence).groups()
+    assert int(supporters) > 0.8 * int(runs)
     assert cause.parameters["speed"].value == pytest.approx(np.hypot(0.25, 0.2), rel=0.15)
     assert np.sin(cause.parameters["to"].value - np.arctan2(-0.2, 0.25)) == pytest.approx(0.0, abs=0.15)
     assert verdict.gain is not None
