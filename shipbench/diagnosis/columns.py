@@ -8,8 +8,8 @@ import numpy as np
 
 from .rolling import Active
 
-ASIDE = (2, 3, 4, 5)
-"""Heading and velocities: what the forces' derivatives by the motion are taken by, one in turn at every step."""
+ASIDE, AWAY = (2, 3, 4, 5), 0.01
+"""Heading and velocities: what forces are derived by to see how the motion's sensitivities change; and the step, in units of the scales."""
 
 
 @dataclass(frozen=True)

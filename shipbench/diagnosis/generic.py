@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .columns import ASIDE
+from .columns import ASIDE, AWAY
 from .gram import Gram, solve
 from .plant import Plant
 from .screen import evidence
@@ -16,8 +16,6 @@ AXES = ("surge", "sway", "yaw")
 _PRIOR_SD = 0.5
 """Of a feature's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m)."""
 _WORTH_MORE = 2.0
-_AWAY = 0.01
-"""Step of the derivatives of features by the motion, in units of the scales."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,7 @@ def dependences(fit: Fit) -> list[Dependence]:
     base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
     prior = replace(fit.prior, shared=np.arange(len(fit.prior.shared)), random=np.arange(len(fit.prior.shared), len(base)))
     lean, B = fit.gram.only(base), len(fit.gram.run)
-    aside = _AWAY * np.diag(fit.scales.eta)[list(ASIDE)]
+    aside = AWAY * np.diag(fit.scales.eta)[list(ASIDE)]
     null = solve(lean.reduce(fit.hyper.log_force), prior).log_evidence
     found = []
     for variable, moved in features(fit.plant, aside).items():

@@ -13,7 +13,7 @@ from ..effects.base import Effect, flow_first
 from ..ops import Array
 from ..predictors._physics_fit import parameter_scale
 from .colour import Colour
-from .columns import ASIDE, Bend, Columns
+from .columns import ASIDE, AWAY, Bend, Columns
 from .plant import HULL, NUM_HULL, Plant
 from .rolling import Active
 from .structure import STRUCTURE
@@ -135,10 +135,6 @@ vector goes both ways, because its sign differs from heading to heading. So does
 force has no slope, would be held there."""
 
 
-_AWAY = 0.01
-"""Step aside from the trajectory, in units of the scales."""
-
-
 _quiet = np.errstate(over="ignore", invalid="ignore")
 """A trial whose trajectory blows up is judged by its cost, which is not finite."""
 
@@ -228,7 +224,7 @@ class Linearisation:
         """A point beside the middle of every step, in one direction after the other, for what the forces' derivatives by the motion change with."""
         K, B = self.middle.shape[1:3]
         self.turn = np.take(ASIDE, np.add.outer(np.arange(K), np.arange(B)) % len(ASIDE))
-        self.away = _AWAY * self.scales.eta[self.turn]
+        self.away = AWAY * self.scales.eta[self.turn]
         self.aside = self.middle + self.away[..., None] * (self.turn[..., None] == np.arange(6))
         self.rates_aside = self._rates(states=self.aside)
 
