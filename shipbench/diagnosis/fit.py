@@ -14,8 +14,9 @@ from .settle import Fit, Model, at_point, by_segment, leaning, objective, point_
 
 _MAY_RISE, _FREE_STEPS, _LEAST_SHARE = 1.1, 5, 0.05
 """Factor by which a step may raise the cost, on the first steps; later ones must lower it."""
-_MAY_FOLLOW = 100.0
-"""Factor of the cost beyond which the latent force is not asked whether it could follow: the trajectory blows up."""
+_MAY_FOLLOW, _LEAST_OF_ALL = 100.0, 1e-3
+"""Factor of the cost beyond which the latent force is not asked whether it could follow: the trajectory blows up, and even a first step is halved to
+this share before it is given up."""
 _LEAP = 0.3
 """Most that the logarithm of a variance moves between those later steps: two linearisations may else call the other's variance wrong for ever."""
 _AT_REST, _AT_REST_EVIDENCE = 0.5, 0.1
@@ -86,8 +87,10 @@ def _step(lin: Linearisation, found: Fit, free: bool) -> tuple[Linearisation | N
         if seen is not None and at_point(seen, part) + np.sum(seen.reduced.logdet - found.reduced.logdet) < followed:
             return trial, seen
         share *= 0.5
-        if share < _LEAST_SHARE:
-            return (trial, seen) if free else (None, None)
+        if share < _LEAST_SHARE and free and cost < _MAY_FOLLOW * at:
+            return trial, seen
+        if share < (_LEAST_OF_ALL if free else _LEAST_SHARE):
+            return None, None
 
 
 def _followed(found: Fit, lin: Linearisation) -> tuple[Fit, Linearisation]:

@@ -31,8 +31,8 @@ class Hyper:
 class Products:
     """Products of columns [eta, w, shared, e] per channel and segment, (6, B, Z + G + 1, Z + G + 1), before the noise is known.
 
-    run (B,): the segment's run; samples (B,): of real samples; colour (B,): log determinant of the noise's correlations; slope (B, G + 1): as in
-    `sloped`.
+    run (B,): the segment's run; samples (B,): of real samples; colour (B,): log determinant of the noise's correlations; initial (B,), slope
+    (B, G + 1): as in `sloped`.
     """
 
     P: np.ndarray
@@ -42,6 +42,7 @@ class Products:
     runs: int
     samples: np.ndarray
     colour: np.ndarray
+    initial: np.ndarray
     slope: np.ndarray
 
     @classmethod
@@ -51,7 +52,7 @@ class Products:
         """From columns Z (6, B, K + 1, Z + G + 1), zero where `mask` (B, K + 1) has no real sample."""
         B, P = len(mask), np.swapaxes(Z, 2, 3) @ Z
         slope = np.zeros((B, P.shape[-1] - 6 - 3 * knots))
-        return cls(P, knots, spacing, run, runs, mask.sum(axis=1), np.zeros(B) if colour is None else colour, slope)
+        return cls(P, knots, spacing, run, runs, mask.sum(axis=1), np.zeros(B) if colour is None else colour, np.zeros(B), slope)
 
     @property
     def latent(self) -> int:
@@ -64,22 +65,31 @@ class Products:
     def take(self, rows: np.ndarray, runs: np.ndarray) -> Products:
         """Some segments; `runs` are the numbers of the runs that are kept, which are numbered anew."""
         new = np.searchsorted(runs, self.run[rows])
-        return replace(self, P=self.P[:, rows], run=new, runs=len(runs), samples=self.samples[rows], colour=self.colour[rows], slope=self.slope[rows])
+        return replace(
+            self, P=self.P[:, rows], run=new, runs=len(runs), samples=self.samples[rows], colour=self.colour[rows], initial=self.initial[rows],
+            slope=self.slope[rows],
+        )  # fmt: skip
 
     def without(self, num: int) -> Products:
         """Without the last `num` shared columns."""
         keep = np.delete(np.arange(self.P.shape[-1]), np.arange(self.P.shape[-1] - 1 - num, self.P.shape[-1] - 1))
         return replace(self, P=self.P[:, :, keep][:, :, :, keep], slope=self.slope[:, keep[self.latent :] - self.latent]) if num else self
 
-    def sloped(self, slopes: np.ndarray, at: np.ndarray) -> Products:
-        """With derivatives (B, G) of the segments' log determinants by the shared columns, which stand at coefficients `at` (B, G)."""
-        return replace(self, slope=np.concatenate([-0.5 * slopes, -np.sum(slopes * at, axis=1, keepdims=True)], axis=1))
+    def sloped(self, slopes: np.ndarray, at: np.ndarray, initial: np.ndarray) -> Products:
+        """With the part (B,) of initial states in the segments' log determinants taken off, and derivatives (B, G) of what is left by the shared
+        columns, which stand at coefficients `at` (B, G).
+
+        Nothing is known of initial states, and integrated out so they would favour parameters by which a ship forgets hers: such a likelihood depends
+        on the parameters by more than the data (Francke, Koopman & de Vos, J. Time Ser. Anal. 31 (2010) 407). Without that part they are fixed but
+        unknown (Durbin & Koopman, Time Series Analysis by State Space Methods, 2nd ed., 2012, 7.2.4).
+        """
+        return replace(self, initial=initial, slope=np.concatenate([-0.5 * slopes, -np.sum(slopes * at, axis=1, keepdims=True)], axis=1))
 
     def weigh(self, hyper: Hyper) -> Gram:
         """The Gram under given noise."""
         G = (np.exp(-hyper.log_noise) @ self.P.reshape(6, -1)).reshape(self.P.shape[1:])  # BLAS, which einsum does without
         K_inv, K_logdet = ornstein_uhlenbeck(self.knots, self.spacing, hyper.tau)
-        log_noise = self.samples * float(np.sum(hyper.log_noise)) + self.colour
+        log_noise = self.samples * float(np.sum(hyper.log_noise)) + self.colour - self.initial
         return Gram(G, self.knots, K_inv, K_logdet, log_noise, self.slope, self.run, self.runs)
 
 
@@ -101,7 +111,7 @@ def by_run(values: np.ndarray, run: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Gram:
-    """Whitened products per segment, (B, Z + G + 1, Z + G + 1); log_noise (B,): sums of log variances of the samples."""
+    """Whitened products per segment, (B, Z + G + 1, Z + G + 1); log_noise (B,): sums of log variances of the samples, less `Products.initial`."""
 
     G: np.ndarray
     knots: int

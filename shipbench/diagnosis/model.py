@@ -14,6 +14,7 @@ from ..ops import Array
 from ..predictors._physics_fit import parameter_scale
 from .colour import Colour
 from .columns import ASIDE, AWAY, Bend, Columns
+from .gram import Hyper
 from .plant import HULL, NUM_HULL, Plant
 from .rolling import Active
 from .structure import STRUCTURE
@@ -75,7 +76,10 @@ class Point:
 
 
 class Scales:
-    """Units of everything that is free, for one ship: chosen so that one unit is a typical size."""
+    """Units of everything that is free, for one ship: chosen so that one unit is a typical size. background: the variances at which all fits that are
+    compared take initial states and slopes; none before there is a first fit."""
+
+    background: Hyper | None = None
 
     def __init__(self, plant: Plant) -> None:
         L = plant.c.L
@@ -91,6 +95,12 @@ class Scales:
         """The same with another correlation of the noise."""
         new = copy(self)
         new.colour = colour
+        return new
+
+    def with_background(self, background: Hyper) -> Scales:
+        """The same for fits that are compared."""
+        new = copy(self)
+        new.background = background
         return new
 
     def amplitudes(self, term: Term, L: float) -> np.ndarray:

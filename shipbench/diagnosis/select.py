@@ -113,6 +113,7 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
     for longer than a sample, with such noise; without the few pieces that no ship's motion explains."""
     origin = Origin.of(plant, scales)
     found = _without_strange(fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion))
+    found = replace(found, scales=scales.with_background(found.hyper))
     if plant.seg.commanded:
         for i, name, field in ((0, "n", "T"), (1, "delta", "rate"), (1, "delta", "T")):
             if np.ptp(plant.seg.commands[..., i]) > 0.0:

@@ -11,6 +11,7 @@ import numpy as np
 from .colour import Colour
 from .columns import Columns
 from .gram import ETA_PRECISION, Gram, Hyper, Prior, Products, Reduced, Solution, accelerated, background, by_run, solve, update_force, update_noise
+from .inverse import log_determinant
 from .model import FREE, NUM_BASE, Linearisation, Point, Scales, Term
 from .plant import NUM_HULL, Plant
 from .slope import slopes
@@ -240,12 +241,19 @@ def settle(
 
 
 def _sloped(lin: Linearisation, columns: Columns, products: Products, hyper: Hyper) -> tuple[Products, np.ndarray]:
-    """Products that know how the log determinants depend on what is shared, and how these depend on the force at the knots."""
-    gram, point, B = products.weigh(hyper), lin.point, len(products.run)
-    by_column, by_force = slopes(lin, columns, gram.reduce(hyper.log_force).inverse, hyper)
+    """Products that know how the log determinants depend on what is shared, and how these depend on the force at the knots.
+
+    What initial states take off is seen at the same variances in all fits of a diagnosis: it would else reward lower ones.
+    """
+    point, B = lin.point, len(products.run)
+    inverse = products.weigh(hyper).reduce(hyper.log_force).inverse
+    by_column, by_force = slopes(lin, columns, inverse, hyper)
+    if lin.scales.background is not None:
+        inverse = products.weigh(lin.scales.background).reduce(lin.scales.background.log_force).inverse
     own = [v[products.run] if t.per_run else np.broadcast_to(v, (B, t.size)) for t, v in zip(point.terms, point.values, strict=True)]
     candidates = np.zeros((B, sum(c.shape[-1] for c in columns.candidates)))
-    return products.sloped(by_column, np.concatenate([np.broadcast_to(point.base, (B, NUM_BASE)), *own, candidates], axis=1)), by_force
+    at = np.concatenate([np.broadcast_to(point.base, (B, NUM_BASE)), *own, candidates], axis=1)
+    return products.sloped(by_column, at, -log_determinant(inverse[:, :6, :6])), by_force
 
 
 def evidence_with(found: Fit, colour: Colour) -> float:

@@ -1,4 +1,4 @@
-"""How the log determinant of initial states and latent force depends on the parameters.
+"""How the log determinant of the latent force depends on the parameters.
 
 The evidence of parameters is the posterior with the force integrated out: besides the squares it holds the log determinant of the force's precision,
 and a ship that is more damped answers the force less. Squares alone take the ship for one that is less damped and moves with little force: by a few
@@ -27,13 +27,16 @@ def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyp
     """Derivatives of the log determinants of the segments, for trajectories that stay where they are: (B, G) by base, own terms and candidates, and
     (B, knots, 3, 6) by what the force at each knot changes by when each part of the motion does (in units of the scales of the force).
 
-    With Phi the sensitivities to [eta, w], R the noise and A = Phi' R^-1 Phi + P, `inverse` (B, Z, Z) its inverse: d log det A = 2 tr(A^-1 Phi' R^-1
-    d Phi). Phi is a chain of single steps, so that the derivative by the Jacobian of each comes from an adjoint one. A trial that blows up has none.
+    With Phi the sensitivities to w, R the noise and A = Phi' R^-1 Phi + P: d log det A = 2 tr(A^-1 Phi' R^-1 d Phi). `inverse` (B, Z, Z) is that of
+    [eta, w], which holds A^-1 once eta is known. Phi is a chain of single steps, so that the derivative by the Jacobian of each comes from an adjoint
+    one. A trial that blows up has none.
     """
     phi = _finite(np.concatenate([columns.eta, columns.w], axis=-1))
     B, _, Z = phi.shape
     phi = phi.reshape(B, -1, 6, Z)
-    weight = _by_noise(lin, hyper, phi) @ inverse[:, None]
+    from_eta = inverse[:, :6]
+    of_force = inverse - np.swapaxes(from_eta, 1, 2) @ np.linalg.solve(from_eta[:, :, :6], from_eta)
+    weight = _by_noise(lin, hyper, phi) @ of_force[:, None]
     by_rate = _by_rate(lin, phi, weight)
     turned = len(ASIDE) * np.take_along_axis(by_rate, lin.turn[..., None, None], axis=-1)[..., 0] / lin.away[..., None]
     found = [_of_sensors(lin, bend, phi, weight) if bend.rates is None else np.einsum("kbi,ckbi->bc", turned, bend.rates) for bend in columns.bends]

@@ -9,15 +9,19 @@ import pytest
 
 from shipbench.diagnosis import settle as settling
 from shipbench.diagnosis.fit import Origin, fit, start
-from shipbench.diagnosis.model import NUM_BASE, Linearisation, Point, Scales, Term
+from shipbench.diagnosis.model import FREE, NUM_BASE, Linearisation, Point, Scales, Term
 from shipbench.diagnosis.plant import HULL, Plant
+from shipbench.diagnosis.select import null_fit
 from shipbench.diagnosis.settle import Fit, Model, settle
 from shipbench.diagnosis.slope import slopes
+from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
+from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
 
-N_R = 6 + [p.name for p in HULL.parameters].index("N_r")
+BASE = [*(f"p{number}" for number in FREE), *(p.name for p in HULL.parameters), *(p.name for p in STRUCTURE.parameters)]
+N_R = BASE.index("N_r")
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +54,7 @@ def test_slopes_by_parameters_are_those_of_the_log_determinant(fitted):
     for i in range(NUM_BASE):
         ends = [replace(fitted.point, base=fitted.point.base + step * np.eye(NUM_BASE)[i]) for step in (0.05, -0.05)]
         numeric[i] = (_log_determinant(fitted, ends[0]) - _log_determinant(fitted, ends[1])) / 0.1
-    assert np.abs(numeric).max() > 1.0
+    assert np.abs(numeric).max() > 0.5
     assert np.abs(found - numeric).max() < 0.05 * np.abs(numeric).max()
 
 
@@ -120,3 +124,12 @@ def test_estimates_are_nearer_to_the_truth_where_the_log_determinant_counts(monk
     squares = fitted()
     assert counts.evidence > squares.evidence + 0.5
     assert off(counts) < 0.9 * off(squares)
+
+
+def test_evidence_does_not_favour_a_ship_that_forgets_how_a_run_began():
+    """A tanker in many short runs, whose initial states nobody knows: integrated out like the force, they gave her a negative added mass."""
+    plant = Plant.of(published_trials(PUBLISHED["tanker"], 54, (), Trials(runs=60, samples=40)))
+    found = null_fit(plant, Scales(plant))
+    inertia = found.point.base[[BASE.index(name) for name in ("m_y", "J_z", "coupling")]]
+    assert np.abs(inertia).max() < 3.0
+    assert found.excess < 0.5
