@@ -1,6 +1,6 @@
 """The wind that the diagnosis sees in the motion of the Esso Osaka alone, beside the anemometer.
 
-    python benchmarks/esso_osaka_wind.py  # 7 minutes of one core; reads the local copy of the data
+    python benchmarks/esso_osaka_wind.py  # 15 to 40 minutes of one core; reads the local copy of the data
 
 The diagnosis is given the runs without their wind channels. Where it names a wind per run, its value for every run (north and east, of where the wind
 comes from) is compared with the mean of the anemometer over that run, which it has not seen.
