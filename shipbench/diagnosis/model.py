@@ -77,7 +77,7 @@ class Point:
 
 class Scales:
     """Units of everything that is free, for one ship: chosen so that one unit is a typical size. background: the variances at which all fits that are
-    compared take initial states and slopes; none before there is a first fit."""
+    compared see what initial states take off the evidence; none before there is a first fit."""
 
     background: Hyper | None = None
 

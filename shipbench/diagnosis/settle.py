@@ -245,15 +245,14 @@ def _sloped(lin: Linearisation, columns: Columns, products: Products, hyper: Hyp
 
     What initial states take off is seen at the same variances in all fits of a diagnosis: it would else reward lower ones.
     """
-    point, B = lin.point, len(products.run)
-    inverse = products.weigh(hyper).reduce(hyper.log_force).inverse
-    by_column, by_force = slopes(lin, columns, inverse, hyper)
-    if lin.scales.background is not None:
-        inverse = products.weigh(lin.scales.background).reduce(lin.scales.background.log_force).inverse
+    point, B, alone = lin.point, len(products.run), products.without(products.shared)
+    seen = lin.scales.background or hyper
+    by_column, by_force = slopes(lin, columns, alone.weigh(hyper).reduce(hyper.log_force).inverse, hyper)
+    initial = -log_determinant(alone.weigh(seen).reduce(seen.log_force).inverse[:, :6, :6])
     own = [v[products.run] if t.per_run else np.broadcast_to(v, (B, t.size)) for t, v in zip(point.terms, point.values, strict=True)]
     candidates = np.zeros((B, sum(c.shape[-1] for c in columns.candidates)))
     at = np.concatenate([np.broadcast_to(point.base, (B, NUM_BASE)), *own, candidates], axis=1)
-    return products.sloped(by_column, at, -log_determinant(inverse[:, :6, :6])), by_force
+    return products.sloped(by_column, at, initial), by_force
 
 
 def evidence_with(found: Fit, colour: Colour) -> float:

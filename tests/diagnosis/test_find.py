@@ -92,7 +92,7 @@ def test_a_change_that_one_run_alone_speaks_for_is_none():
 def test_a_current_that_the_plain_model_has_absorbed_is_refitted():
     plant = Plant.of(_trials(Hidden(EFFECTS.get("current"), (0.25, -0.2))))
     null = null_fit(plant, Scales(plant), candidates_for(plant, ("current", "heading_bias", "speed_scale")))
-    assert max(s.score for s in screen(null)) < THRESHOLD  # too little of it is left where the plain model rests
+    assert max(s.score for s in screen(null)) < 0.5 * THRESHOLD  # nothing of it is left where the plain model rests
     found = select(null, THRESHOLD)
     assert [t.label for t in found.final.model.terms] == ["current"]
     assert found.final.evidence - found.null.evidence > 50.0
