@@ -15,11 +15,12 @@ from threadpoolctl import threadpool_limits
 from ..checking.units import check_units, corrected
 from ..errors import InputError
 from ..records import Dataset
-from .analysis import HULL_THRESHOLD, Analysis, analyse, causes_of
+from .analysis import HULL_THRESHOLD, NOTICEABLE, Analysis, analyse, causes_of
 from .causes import describe_candidates, describe_causes, remaining, unknown_part
 from .clocks import NAMES, check_clocks
 from .gain import FoldGain, fold_gain, summarise
 from .model import NUM_BASE
+from .ordinary import needed
 from .outcome import Diagnosis, Gain
 from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant
 from .strange import left_out
@@ -121,7 +122,7 @@ def _check(dataset: Dataset) -> list[str]:
 
 def _doubts(found: Analysis) -> list[str]:
     """Signs that the model does not belong to the data: the fit leaves what is ordinary, or hull or propeller would be another ship's."""
-    z = found.final.solution.mean[:NUM_BASE]
+    z = needed(found.final, NOTICEABLE)
     signs = []
     if np.max(np.abs(z)) > STRANGE or np.sum(z**2) > STRANGE_SUM:
         signs.append(f"the fit moves a parameter by {np.max(np.abs(z)):.1f} times its ordinary spread (all together {np.sum(z**2) ** 0.5:.0f} times)")

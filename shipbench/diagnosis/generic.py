@@ -21,12 +21,13 @@ _WORTH_MORE = 2.0
 @dataclass(frozen=True)
 class Dependence:
     """The latent force of one axis follows one variable. score: 2 log Bayes factor; share: of the variance of that axis's latent force that it
-    takes."""
+    takes; size: root mean square of what it takes, in units of the scales of the latent force."""
 
     variable: str
     axis: str
     score: float
     share: float
+    size: float
 
 
 def features(plant: Plant, aside: np.ndarray | None = None) -> dict[str, np.ndarray]:
@@ -92,7 +93,8 @@ def dependences(fit: Fit) -> list[Dependence]:
             if quick - null > _WORTH_MORE:
                 score, log_force, _ = evidence(gram, more, log_force)
             share = 1.0 - float(np.exp(log_force[j] - fit.hyper.log_force[j]))
-            found.append(Dependence(variable, axis, 2.0 * (score - null), share))
+            size = float(np.sqrt(max(share, 0.0) * np.exp(fit.hyper.log_force[j])))
+            found.append(Dependence(variable, axis, 2.0 * (score - null), share, size))
     return sorted(found, key=lambda d: -d.score)
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .fit import fit
-from .gram import solve
+from .gram import Reduced, solve
 from .model import NUM_BASE
 from .settle import Fit
 
@@ -17,16 +17,26 @@ _FAR = 3.5
 _SOLVES, _FITS, _SAME = 20, 3, 0.05
 
 
-def widths_of(found: Fit) -> np.ndarray:
+def widths_of(found: Fit, reduced: Reduced | None = None) -> np.ndarray:
     """(NUM_BASE,) factors of the spreads, 1 for what is ordinary: Huber's weights, at the optimum of this linearisation (iteratively reweighted)."""
     widths = np.ones(NUM_BASE)
     for _ in range(_SOLVES):
-        prior = replace(found.model, widths=tuple(widths)).prior(found.log_tau2)
-        new = np.sqrt(np.maximum(np.abs(solve(found.reduced, prior).mean[:NUM_BASE]) / _FAR, 1.0))
+        new = np.sqrt(np.maximum(np.abs(_base(found, reduced or found.reduced, widths)) / _FAR, 1.0))
         if np.max(np.abs(new / widths - 1.0)) < 0.1 * _SAME:
             break
         widths = new
     return widths
+
+
+def needed(found: Fit, least: float) -> np.ndarray:
+    """(NUM_BASE,) parameters in spreads, as they would be beside a latent force of at least the size `least`: what so small a force could stand for
+    need not be the ship's."""
+    reduced = found.gram.reduce(np.maximum(found.hyper.log_force, 2.0 * np.log(least)))
+    return _base(found, reduced, widths_of(found, reduced))
+
+
+def _base(found: Fit, reduced: Reduced, widths: np.ndarray) -> np.ndarray:
+    return solve(reduced, replace(found.model, widths=tuple(widths)).prior(found.log_tau2)).mean[:NUM_BASE]
 
 
 def widened(found: Fit) -> Fit:

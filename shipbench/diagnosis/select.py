@@ -35,6 +35,8 @@ _SEARCHES = 3
 """For strange pieces."""
 _REFITS = 3
 _REFIT_ITERATIONS = 16
+_FIRST_ITERATIONS = 8
+"""Of the first fit, which gives the background: until that stands, lower variances are rewarded, and a fit creeps towards them for ever."""
 _WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
 """Least linear score of what is refitted: of the threshold, and of the best."""
 _RIVAL, _RIVALS = 0.25, 4
@@ -112,7 +114,7 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
     """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion; where sensors err
     for longer than a sample, with such noise; without the few pieces that no ship's motion explains."""
     origin = Origin.of(plant, scales)
-    found = _without_strange(fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion))
+    found = _without_strange(fit(plant, scales, Model(), origin.point, origin.hyper, iterations=_FIRST_ITERATIONS, guess=origin.motion))
     found = replace(found, scales=scales.with_background(found.hyper))
     if plant.seg.commanded:
         for i, name, field in ((0, "n", "T"), (1, "delta", "rate"), (1, "delta", "T")):

@@ -7,15 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.analysis import NOTICEABLE
+from shipbench.diagnosis.diagnose import STRANGE, STRANGE_SUM, diagnose
 from shipbench.diagnosis.model import FREE, NUM_BASE, Linearisation, Scales
-from shipbench.diagnosis.ordinary import widths_of
+from shipbench.diagnosis.ordinary import needed, widths_of
 from shipbench.diagnosis.plant import NUM_HULL, Plant
 from shipbench.diagnosis.screen import screen
 from shipbench.diagnosis.select import candidates_for, null_fit
 from shipbench.diagnosis.settle import settle
 from shipbench.diagnosis.structure import STRUCTURE
+from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
+from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
 
@@ -54,3 +57,31 @@ def test_an_ordinary_ship_keeps_its_spreads():
 def test_a_ship_of_the_literature_with_an_odd_rudder_is_neither_doubted_nor_explained():
     verdict = diagnose(published_trials(PUBLISHED["mariner"], 42), gain=False)
     assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
+
+
+EXACT = Trials(noise=0.0, gusts=0.0)
+
+
+def test_what_a_small_force_could_stand_for_is_not_asked_of_the_ship():
+    plant = Plant.of(published_trials(PUBLISHED["mariner"], 41, plan=EXACT))
+    found = null_fit(plant, Scales(plant))
+    moved, less = found.solution.mean[:NUM_BASE], needed(found, NOTICEABLE)
+    assert np.sum(less**2) < 0.9 * np.sum(moved**2)
+    np.testing.assert_allclose(needed(found, 1e-6), moved, atol=0.2)  # where the force is as it was, so are the parameters
+    assert np.max(np.abs(less)) < STRANGE
+    assert np.sum(less**2) < STRANGE_SUM
+
+
+@pytest.mark.parametrize("ship", ["mariner", "tanker"])
+def test_exact_sensors_in_a_calm_make_no_cause_of_the_form_of_a_hull(ship):
+    """Before a least force: Mariner `unknown` and her ship file doubted, the tanker's mass five times its typical change."""
+    verdict = diagnose(published_trials(PUBLISHED[ship], 43, plan=EXACT), gain=False)
+    assert (verdict.verdict, verdict.causes) == ("none", ())
+    assert not any("Is the ship file" in w for w in verdict.warnings)
+
+
+def test_exact_sensors_in_a_calm_still_show_a_small_cause():
+    hidden = Hidden(EFFECTS.get("rudder_offset"), (0.01,))
+    verdict = diagnose(published_trials(PUBLISHED["mariner"], 43, (hidden,), EXACT), gain=False)
+    assert [c.effect for c in verdict.causes] == ["rudder_offset"]
+    assert verdict.causes[0].parameters["offset"].value == pytest.approx(0.01, rel=0.25)
