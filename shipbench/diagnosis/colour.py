@@ -42,7 +42,9 @@ class Colour:
         return new
 
     def whitened(self, values: np.ndarray) -> np.ndarray:
-        """(B, K + 1, 6, ...) as if their noise were white."""
+        """(B, K + 1, 6, ...) as if their noise were white; themselves where it is."""
+        if not self.share.any():
+            return values
         out = values.copy()
         self.whiten(np.moveaxis(out, 2, 0), range(6))
         return out
@@ -54,7 +56,9 @@ class Colour:
                 values[at] = np.einsum("kl,bl...->bk...", self.factor[channel], values[at], optimize=True)
 
     def unwhitened(self, values: np.ndarray) -> np.ndarray:
-        """(B, K + 1, 6, ...), multiplied by the transposes of the factors that whiten."""
+        """(B, K + 1, 6, ...), multiplied by the transposes of the factors that whiten; themselves where there is nothing to whiten."""
+        if not self.share.any():
+            return values
         out = values.copy()
         for channel in np.flatnonzero(self.share > 0.0):
             out[:, :, channel] = np.einsum("kl,bk...->bl...", self.factor[channel], values[:, :, channel], optimize=True)

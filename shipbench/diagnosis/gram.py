@@ -72,8 +72,13 @@ class Products:
 
     def without(self, num: int) -> Products:
         """Without the last `num` shared columns."""
-        keep = np.delete(np.arange(self.P.shape[-1]), np.arange(self.P.shape[-1] - 1 - num, self.P.shape[-1] - 1))
-        return replace(self, P=self.P[:, :, keep][:, :, :, keep], slope=self.slope[:, keep[self.latent :] - self.latent]) if num else self
+        if not num:
+            return self
+        end = self.P.shape[-1] - 1 - num
+        P = np.empty((*self.P.shape[:2], end + 1, end + 1))  # in the order of its axes, in which it is read often
+        P[..., :end, :end], P[..., end, end] = self.P[..., :end, :end], self.P[..., -1, -1]
+        P[..., :end, end], P[..., end, :end] = self.P[..., :end, -1], self.P[..., -1, :end]
+        return replace(self, P=P, slope=np.delete(self.slope, np.s_[-1 - num : -1], axis=1))
 
     def sloped(self, slopes: np.ndarray, at: np.ndarray, initial: np.ndarray) -> Products:
         """With the part (B,) of initial states in the segments' log determinants taken off, and derivatives (B, G) of what is left by the shared

@@ -51,9 +51,8 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 def _by_noise(lin: Linearisation, hyper: Hyper, phi: np.ndarray) -> np.ndarray:
     """R^-1 Phi, (B, K + 1, 6, Z)."""
-    scale, mask, colour = lin.scales.noise[:, None], lin.plant.seg.mask[..., None, None], lin.scales.colour
-    white = np.where(mask, colour.whitened(phi / scale), 0.0) * np.exp(-hyper.log_noise)[:, None]
-    return np.asarray(colour.unwhitened(white) / scale)
+    colour, precision = lin.scales.colour, np.exp(-hyper.log_noise) / lin.scales.noise**2
+    return colour.unwhitened(colour.whitened(phi) * (lin.plant.seg.mask[..., None] * precision)[..., None])
 
 
 def _by_rate(lin: Linearisation, phi: np.ndarray, weight: np.ndarray) -> np.ndarray:
