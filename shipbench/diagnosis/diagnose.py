@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
@@ -15,7 +16,7 @@ from threadpoolctl import threadpool_limits
 from ..checking.units import check_units, corrected
 from ..errors import InputError
 from ..records import Dataset
-from .analysis import HULL_THRESHOLD, NOTICEABLE, Analysis, analyse, causes_of
+from .analysis import HULL_THRESHOLD, NOTICEABLE, THRESHOLD, Analysis, analyse, causes_of
 from .causes import describe_candidates, describe_causes, remaining, unknown_part
 from .clocks import NAMES, check_clocks
 from .gain import FoldGain, fold_gain, summarise
@@ -67,11 +68,16 @@ def diagnose(
     settled = NAMES if late is not None else ()
     plant = Plant.of(dataset, THOROUGH_STEPS if thorough else MOST_STEPS)
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
-    found = analyse(plant, only=only, seed=seed, cautious=cautious, settled=settled)
-    doubts = _doubts(found) if only is None else []
+    wanted = gain and not cautious
+    work = partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) if wanted and workers > 1 else nullcontext() as pool:
+        # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
+        ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
+        found = analyse(plant, only=only, seed=seed, cautious=cautious, settled=settled)
+        doubts = _doubts(found) if only is None else []
+        measured = wanted and not doubts
+        worth = _cross_validated(dataset, found, seed, work, pool, ahead) if measured else Worth()
     warnings += doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
-    measured = gain and not cautious and not doubts
-    worth = _cross_validated(dataset, found, only, seed, workers, settled) if measured else Worth()
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)
@@ -154,7 +160,9 @@ def _own_propeller(found: Analysis) -> list[str]:
 
 
 @threadpool_limits.wrap(limits=1)  # a process of its own
-def _one_fold(fold: int, dataset: Dataset, seed: int, only: Sequence[str] | None, threshold: float, hull: bool, settled: Sequence[str]) -> FoldGain:
+def _one_fold(
+    fold: int, threshold: float, hull: bool, *, dataset: Dataset, seed: int, only: Sequence[str] | None, settled: Sequence[str]
+) -> FoldGain:
     """Selection and fits on the training part of one fold."""
     test = _folds(len(dataset), seed)[fold]
     train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
@@ -167,18 +175,19 @@ def _folds(num: int, seed: int) -> list[np.ndarray]:
     return [np.sort(part) for part in np.array_split(np.random.default_rng(seed).permutation(num), min(FOLDS, num))]
 
 
-def _cross_validated(dataset: Dataset, found: Analysis, only: Sequence[str] | None, seed: int, workers: int, settled: Sequence[str]) -> Worth:
-    """Held-out gain of the causes, and of the hull's derivatives beside them."""
+def _cross_validated(
+    dataset: Dataset, found: Analysis, seed: int, work: Callable[..., FoldGain], pool: Executor | None, ahead: Future[FoldGain] | None
+) -> Worth:
+    """Held-out gain of the causes, and of the hull's derivatives beside them; ahead: the first part, as it is with the usual threshold."""
     hull = found.hull > HULL_THRESHOLD
     if not (found.final.model.terms or found.gears or hull) or found.unknown is not None:
         return Worth()
-    work = partial(_one_fold, dataset=dataset, seed=seed, only=only, threshold=found.threshold, hull=hull, settled=settled)
-    folds = range(len(_folds(len(dataset), seed)))
-    if workers > 1:
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            parts = list(pool.map(work, folds))
-    else:
-        parts = [work(k) for k in folds]
+    folds = list(range(len(_folds(len(dataset), seed))))
+    usual = ahead is not None and found.threshold == THRESHOLD
+    fold = partial(work, threshold=found.threshold, hull=hull)
+    parts = list((pool.map if pool else map)(fold, folds[1:] if usual else folds))
+    if ahead is not None and usual:
+        parts.append(ahead.result())
     before, after, with_hull = (np.zeros(len(dataset)) for _ in range(3))
     for part in parts:
         before[part.test], after[part.test], with_hull[part.test] = part.before, part.after, part.with_hull

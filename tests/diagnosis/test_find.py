@@ -54,6 +54,15 @@ def test_no_workers_are_refused_before_any_work():
         diagnose(_trials(runs=2, samples=20), workers=0)
 
 
+def test_two_processes_say_what_one_says():
+    """The first part is fitted beside the whole there, before it is known whether anything is found and what the threshold is."""
+    for hidden in ((Hidden(EFFECTS.get("heading_bias"), (0.04,)),), ()):
+        data = _trials(*hidden, runs=8, samples=50)
+        one, two = (replace(diagnose(data, workers=w), seconds=0.0, trace=None).document() for w in (1, 2))
+        assert [c["effect"] for c in one["causes"]] == [h.effect.name for h in hidden]
+        assert two == one
+
+
 def test_nothing_is_named_on_most_fresh_ships_without_a_hidden_effect():
     named = {}
     for kind, index in (("none-same", 0), ("none-other", 0), ("none-published", 0), ("none-published", 1), ("none-published", 2)):
