@@ -25,9 +25,9 @@ _GENERIC_OWN = {"revolutions and rudder": 30.0, "heading": 18.0, "time": 18.0, "
 """Race and rudder together are where ordinary ships differ most from eq. (2); no ship's structure depends on heading, time or number of the run."""
 GENERIC_MARGIN = 10.0
 NOTICEABLE = 0.15
-"""Least size of an unknown force, and of one that would doubt the ship file, in units of the latent force: 0.75 mm/s^2 at 130 m, a third of what a
-wind of 7 m/s gives. Exact sensors or many samples show with certainty that ships differ in form from eq. (2). (Mariner and KVLCC2 with nothing
-hidden: 0.02 to 0.11; outside causes on development ships: from 0.20.)"""
+"""Least size of an unknown force, and of one that would doubt the ship file, in units of the latent force: 0.75 mm/s^2, a third of what a wind of
+7 m/s gives; in yaw 1.5e-5 rad/s^2 at 130 m. Exact sensors or many samples show with certainty that ships differ in form from eq. (2). (Mariner and
+KVLCC2 with nothing hidden: 0.02 to 0.11; outside causes on development ships: from 0.20.)"""
 _HULL_ALONE = ("speed", "sway velocity", "yaw rate")
 """A force that follows nothing but the hull's own motion is the hull's: where its derivatives are off, it is no unknown cause."""
 

@@ -50,7 +50,7 @@ def diagnose(
             the regressions is named only where fitting it pays on runs that were not fitted.
         seed: of the bootstrap and of the folds.
         only: effects to consider (an oracle that knows what is hidden); default all.
-        workers: processes for the folds.
+        workers: processes for the folds; from two on, a script that calls this needs `if __name__ == "__main__":`.
         thorough: use up to twice as much of a long record (the folds use half); 90 runs of 120 s are used whole either way.
 
     Raises:
@@ -182,12 +182,10 @@ def _cross_validated(
     hull = found.hull > HULL_THRESHOLD
     if not (found.final.model.terms or found.gears or hull) or found.unknown is not None:
         return Worth()
-    folds = list(range(len(_folds(len(dataset), seed))))
-    usual = ahead is not None and found.threshold == THRESHOLD
-    fold = partial(work, threshold=found.threshold, hull=hull)
-    parts = list((pool.map if pool else map)(fold, folds[1:] if usual else folds))
-    if ahead is not None and usual:
-        parts.append(ahead.result())
+    ready = [ahead] if ahead is not None and found.threshold == THRESHOLD else []
+    rest = range(len(ready), len(_folds(len(dataset), seed)))
+    parts = list((pool.map if pool else map)(partial(work, threshold=found.threshold, hull=hull), rest))
+    parts += [part.result() for part in ready]
     before, after, with_hull = (np.zeros(len(dataset)) for _ in range(3))
     for part in parts:
         before[part.test], after[part.test], with_hull[part.test] = part.before, part.after, part.with_hull

@@ -74,7 +74,7 @@ def test_what_a_small_force_could_stand_for_is_not_asked_of_the_ship():
 
 @pytest.mark.parametrize("ship", ["mariner", "tanker"])
 def test_exact_sensors_in_a_calm_make_no_cause_of_the_form_of_a_hull(ship):
-    """Before a least force: Mariner `unknown` and her ship file doubted, the tanker's mass five times its typical change."""
+    """Before a least force both were `unknown` and their ship files doubted: a parameter at 12.5 spreads, a mass changed by 3.3 typical sizes."""
     verdict = diagnose(published_trials(PUBLISHED[ship], 43, plan=EXACT), gain=False)
     assert (verdict.verdict, verdict.causes) == ("none", ())
     assert not any("Is the ship file" in w for w in verdict.warnings)
