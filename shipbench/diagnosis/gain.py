@@ -11,6 +11,7 @@ import numpy as np
 from ..physics.actuators import Gear
 from ..records import Dataset
 from ..ship import complete
+from .averaging import averaged
 from .model import FREE, NUM_BASE, Linearisation, Point, Scales, Term
 from .outcome import Gain
 from .plant import NUM_HULL, Plant, cut
@@ -41,8 +42,8 @@ class Rollout:
 
 
 def rollout_plant(dataset: Dataset, gears: dict[str, Gear]) -> Plant:
-    """Segments of `HORIZON` (Froude-scaled), driven by the commands through `gears` from the actuators' first measured places."""
-    ship = complete(dataset.ship)
+    """Segments of `HORIZON` (Froude-scaled), fast records averaged; driven by the commands through `gears` from where the actuators begin."""
+    ship, dataset = complete(dataset.ship), averaged(dataset)
     segments = cut(dataset, max(20, round(HORIZON * (ship.L / 130.0) ** 0.5 / dataset.dt)))
     return Plant(ship, replace(segments, commanded=True), gears=gears)
 

@@ -17,6 +17,7 @@ from ..predictors._actuator_fit import DEFAULT_ACTUATORS
 from ..records import Dataset
 from ..ship import Particulars, complete
 from ..signals import MOTION
+from .averaging import averaged
 from .rolling import Active, Course, Vessel
 
 NUM_HULL = len(HULL.parameters)
@@ -150,11 +151,11 @@ class Plant:
     @classmethod
     def of(cls, dataset: Dataset, most_steps: int = MOST_STEPS) -> Plant:
         """The plant of a data set, cut into segments of about 60 s at 130 m (Froude-scaled): over longer ones the motion is far from linear in its
-        parameters, and little is learnt from the place where the next one begins. Long data are thinned to `most_steps` integration steps. `long` are
-        longer pieces for what has no such limit: the gears."""
-        ship = complete(dataset.ship)
-        samples = max(20, round(SEGMENT * (ship.L / 130.0) ** 0.5 / dataset.dt))
-        segments, long = cut(dataset, samples), cut(dataset, _LONG * samples)
+        parameters, and little is learnt from the place where the next one begins. Fast records are averaged, long ones thinned to `most_steps`
+        integration steps. `long` are longer pieces, with every sample, for what has no such limit: the gears."""
+        ship, motion = complete(dataset.ship), averaged(dataset)
+        length = SEGMENT * (ship.L / 130.0) ** 0.5
+        segments, long = cut(motion, max(20, round(length / motion.dt))), cut(dataset, _LONG * max(20, round(length / dataset.dt)))
         steps = (segments.states.shape[1] - 1) * _substeps(segments.dt, ship.L)
         most = max(len(dataset), most_steps // steps)
         return cls(ship, segments.thinned(most), long.thinned(max(len(dataset), most // _LONG)))

@@ -1,5 +1,5 @@
-"""Pieces of runs that no ship's motion explains: held, pushed or aground, a record that jumps. One such piece of ten seconds can speak louder for a
-cause than all others together."""
+"""What of a record is not fitted: what a long one has too much of, and pieces that no ship's motion explains: held, pushed or aground, a record that
+jumps. One such piece of ten seconds can speak louder for a cause than all others together."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ _STRANGE = 30.0
 """Times the square of the latent force in the other pieces (five times their force)."""
 _ONE_IN = 100
 """At most one piece in so many is left out: what happens more often is a part of these runs."""
+_MOST = 0.95
+"""Share of the record below which it is said how much is fitted."""
 
 
 def strange_pieces(found: Fit) -> np.ndarray:
@@ -32,9 +34,15 @@ def strange_pieces(found: Fit) -> np.ndarray:
 
 
 def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
-    """What was left out of the fit, one line per piece, in the times of its run."""
+    """What was left out of the fit: the share of a long record, and one line per strange piece, in the times of its run."""
     seg = plant.seg
+    fitted, whole = seg.dt * float(np.maximum(seg.mask.sum(axis=1) - 1, 0).sum()), float(sum(run.t[-1] - run.t[0] for run in runs))
     found = []
+    if fitted < _MOST * whole:
+        found.append(
+            f"{fitted / whole:.0%} of the record is fitted, {len(seg.run)} pieces of {plant.steps * seg.dt:.0f} s, spread over all runs, as it is long; "
+            "`--thorough` fits up to twice as much."
+        )
     for piece in np.flatnonzero(~seg.mask.any(axis=1)):
         run = runs[seg.run[piece]]
         begins = run.t[0] + seg.start[piece]
