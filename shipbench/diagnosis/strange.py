@@ -40,7 +40,7 @@ def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
     found = []
     if fitted < _MOST * whole:
         found.append(
-            f"{fitted / whole:.0%} of the record is fitted, {len(seg.run)} pieces of {plant.steps * seg.dt:.0f} s, spread over all runs, as it is long; "
+            f"{fitted / whole:.0%} of the record is fitted, {len(seg.run)} pieces of {plant.steps * seg.dt:.0f} s, spread over all runs; "
             "`--thorough` fits up to twice as much."
         )
     for piece in np.flatnonzero(~seg.mask.any(axis=1)):
