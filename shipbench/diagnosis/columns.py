@@ -30,8 +30,8 @@ class Columns:
 class Bend:
     """How the motion's own sensitivities change with columns of base, own terms or candidates: through forces, by `rates` (size, K, B, 3), the change
     of the acceleration in the middle of every step beside the trajectory (`Linearisation.aside`) less that on it; through sensors, by `sensors`, what
-    they are when each is moved by `unit`."""
+    they are when each is moved by `unit`, or None where that changes nothing."""
 
     rates: np.ndarray | None
-    sensors: tuple[tuple[Active, ...], ...] = ()
+    sensors: tuple[tuple[Active, ...] | None, ...] = ()
     unit: float = 1.0

@@ -330,7 +330,7 @@ class Linearisation:
             if term.effect.enters == "sensor":
                 moved = self.plant.measured(self.motion, changed) - seen
                 columns.append((moved / unit).reshape(len(moved), -1, 1))
-                sensors.append(tuple(changed))
+                sensors.append(None if term.effect.late else tuple(changed))  # it tells as much of a force, but where a piece was cut
                 continue
             if term.effect.enters == "gear":
                 path = self.plant.path_of(changed)

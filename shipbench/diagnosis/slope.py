@@ -76,6 +76,8 @@ def _of_sensors(lin: Linearisation, bend: Bend, phi: np.ndarray, weight: np.ndar
     def seen(active: Sequence[Active]) -> np.ndarray:
         return lin.plant.measured(lin.motion + moves, active) - lin.plant.measured(lin.motion, active)
 
-    now = seen(lin.now)
-    changes = [np.moveaxis(seen(active) - now, 0, -1) / (_MOVE * bend.unit) for active in bend.sensors]
-    return np.stack([np.sum(weight * change, axis=(1, 2, 3)) for change in changes], axis=1)
+    found, changed = np.zeros((len(phi), len(bend.sensors))), [(i, active) for i, active in enumerate(bend.sensors) if active is not None]
+    now = seen(lin.now) if changed else np.zeros(0)
+    for i, active in changed:
+        found[:, i] = np.sum(weight * np.moveaxis(seen(active) - now, 0, -1), axis=(1, 2, 3)) / (_MOVE * bend.unit)
+    return found

@@ -55,7 +55,8 @@ class Effect:
     Class attributes: `family` (environment, rudder, propulsion, thruster, hull, sensor, time), `summary`, `source`, `parameters`, `per_run`
     (every run has its own values), `vector` (names of size and direction that two earth-fixed components are reported as), `separate` (the
     manoeuvre that tells it from its look-alikes), `channels` (measured inputs without which it means nothing), `breaks_symmetry` (a force that knows
-    port from starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that are wrong).
+    port from starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that are wrong), `late` (a sensor
+    that tells of another time: as much of the motion as one in time, but where a record begins or ends).
     """
 
     name: str = ""
@@ -68,6 +69,7 @@ class Effect:
     separate: ClassVar[str] = ""
     channels: ClassVar[tuple[str, ...]] = ()
     breaks_symmetry: ClassVar[bool] = False
+    late: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         cls.name = cls.__module__.rsplit(".", 1)[-1]

@@ -13,6 +13,7 @@ from .base import Effect, Parameter, delayed
 
 class PositionDelay(Effect):
     family = "sensor"
+    late = True
     summary = "latency of the position"
     source = "physics reference, section 5, S64"
     parameters = (Parameter("delay", "s", 2.0, -10.0, 10.0, scaling="time"),)

@@ -14,6 +14,7 @@ from .base import Effect, Parameter, body_axes, delayed, per_run
 
 class VelocityDelay(Effect):
     family = "sensor"
+    late = True
     summary = "latency of the velocities"
     source = "physics reference, section 5, S64"
     parameters = (Parameter("delay", "s", 2.0, -10.0, 10.0, scaling="time"), Parameter("earth_axes", "1", 0.0, 0.0, 1.0, shape=True))
