@@ -79,7 +79,7 @@ def wandering(data: Dataset) -> Dataset:
 
 
 def in_waves(data: Dataset) -> Dataset:
-    """Motion at the waves' own frequencies on top: 8 s (Froude-scaled), standard deviations 0.15 m in surge, 0.2 m in sway, 0.35 deg of yaw (130 m)."""
+    """Motion at the waves' own frequencies on top, at 130 m: 8 s, standard deviations 0.15 m in surge, 0.2 m in sway, 0.35 deg of yaw."""
     rng, scale = np.random.default_rng(1), (data.ship.L / 130.0) ** 0.5
     ratio = np.linspace(0.75, 1.5, 25)
     omega, share = 2.0 * np.pi / (8.0 * scale) * ratio, ratio**-5 * np.exp(-1.25 * ratio**-4)

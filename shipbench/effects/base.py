@@ -55,8 +55,8 @@ class Effect:
     Class attributes: `family` (environment, rudder, propulsion, thruster, hull, sensor, time), `summary`, `source`, `parameters`, `per_run`
     (every run has its own values), `vector` (names of size and direction that two earth-fixed components are reported as), `separate` (the
     manoeuvre that tells it from its look-alikes), `channels` (measured inputs without which it means nothing), `breaks_symmetry` (a force that knows
-    port from starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that are wrong), `late` (a sensor
-    that tells of another time: as much of the motion as one in time, but where a record begins or ends).
+    port from starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that are wrong), `late` (tells
+    of another time, and as much of the motion as a sensor in time, but where a record begins or ends).
     """
 
     name: str = ""
