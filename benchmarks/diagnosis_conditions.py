@@ -122,10 +122,10 @@ CHANGES: dict[str, tuple[Trials, Callable[[Dataset], Dataset]]] = {
     "every 4th sample": (Trials(), every(4)),
     "5 samples for one": (Trials(noise=0.0), quick_samples),
     "wandering position": (Trials(), wandering),
-    "motion in waves": (Trials(), in_waves),
     "rounded as on displays": (Trials(), rounded),
     "main dimensions alone": (Trials(), bare),
     "commands alone": (Trials(), commands),
+    "motion in waves": (Trials(), in_waves),
 }
 CONDITIONS = [*PLANS, *CHANGES]
 
