@@ -78,27 +78,6 @@ def wandering(data: Dataset) -> Dataset:
     return data.with_runs([off(r) for r in data.runs])
 
 
-def in_waves(data: Dataset) -> Dataset:
-    """Motion at the waves' own frequencies on top, at 130 m: 8 s, standard deviations 0.15 m in surge, 0.2 m in sway, 0.35 deg of yaw."""
-    rng, scale = np.random.default_rng(1), (data.ship.L / 130.0) ** 0.5
-    ratio = np.linspace(0.75, 1.5, 25)
-    omega, share = 2.0 * np.pi / (8.0 * scale) * ratio, ratio**-5 * np.exp(-1.25 * ratio**-4)
-    amplitudes = np.sqrt(2.0 * share / share.sum())
-
-    def swell(t: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-        """A motion of that standard deviation, and its rate."""
-        phase = np.outer(t, omega) + rng.uniform(0.0, 2.0 * np.pi, len(omega))
-        return size * np.sin(phase) @ amplitudes, size * np.cos(phase) @ (omega * amplitudes)
-
-    def moved(run: Run) -> Run:
-        (surge, du), (sway, dv), (yaw, dr) = (swell(run.t, size) for size in (0.15 * scale**2, 0.2 * scale**2, np.deg2rad(0.35)))
-        c, s = np.cos(run.states[:, 2]), np.sin(run.states[:, 2])
-        motion = np.column_stack([c * surge - s * sway, s * surge + c * sway, yaw, du, dv, dr])
-        return replace(run, states=run.states + np.pad(motion, ((0, 0), (0, 4))))
-
-    return data.with_runs([moved(r) for r in data.runs])
-
-
 def rounded(data: Dataset) -> Dataset:
     """What a display shows: 0.1 m, 0.1 deg, 0.01 m/s, 0.01 deg/s, 1 rpm, 0.5 deg of rudder, 1 kN."""
     step = np.array([0.1, 0.1, np.deg2rad(0.1), 0.01, 0.01, np.deg2rad(0.01), 1.0, np.deg2rad(0.5), 1e3, 1e3])
@@ -117,7 +96,7 @@ def commands(data: Dataset) -> Dataset:
     return replace(data.with_runs(runs), actuators="commanded")
 
 
-CHANGES: dict[str, tuple[Trials, Callable[[Dataset], Dataset]]] = {
+CHANGES: dict[str, tuple[Trials, Callable[[Dataset], Dataset] | None]] = {
     "every 2nd sample": (Trials(), every(2)),
     "every 4th sample": (Trials(), every(4)),
     "5 samples for one": (Trials(noise=0.0), quick_samples),
@@ -125,7 +104,7 @@ CHANGES: dict[str, tuple[Trials, Callable[[Dataset], Dataset]]] = {
     "rounded as on displays": (Trials(), rounded),
     "main dimensions alone": (Trials(), bare),
     "commands alone": (Trials(), commands),
-    "motion in waves": (Trials(), in_waves),
+    "motion in waves": (Trials(waves=1.0), None),
 }
 CONDITIONS = [*PLANS, *CHANGES]
 

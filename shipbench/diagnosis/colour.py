@@ -1,7 +1,10 @@
 """Sensor noise whose samples go together: a compass or a receiver that filters errs for seconds, and samples taken as independent would say too much.
+A ship in waves moves at their frequency besides: samples taken as independent would say too little of her slow motion.
 
-Noise of a channel: white, and `share` times as much variance that forgets itself like exp(-|t - s| / time). Both sides of the linear model are
-multiplied by the inverse of its Cholesky factor; what is left is white again, also in a piece that ends early, as the factor is triangular.
+Noise of a channel: white, and `share` times as much variance that forgets itself like exp(-|t - s| / time), or moves to and fro with a `period`, as
+the output of a damped oscillator that has nothing at frequency zero (T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, Wiley,
+2011, 8.2.6: linear wave response). Both sides of the linear model are multiplied by the inverse of its Cholesky factor; what is left is white again,
+also in a piece that ends early, as the factor is triangular.
 """
 
 from __future__ import annotations
@@ -11,32 +14,32 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-SHARES, TIMES = (1.0, 4.0, 16.0, 64.0), (2.0, 6.0, 20.0)
-"""Tried; times in samples."""
-
 
 @dataclass(frozen=True)
 class Colour:
-    """share (6,), variance of the part that lasts over that of the white part; time (6,) in samples; factor (6, K + 1, K + 1) that whitens; logdet
-    (6, K + 2) of the covariance of the first k samples."""
+    """share (6,), variance of the part that lasts over that of the white part; time, period (6,) in samples, no period is infinity; factor
+    (6, K + 1, K + 1) that whitens; logdet (6, K + 2) of the covariance of the first k samples."""
 
     share: np.ndarray
     time: np.ndarray
+    period: np.ndarray
     factor: np.ndarray
     logdet: np.ndarray
 
     @classmethod
     def white(cls, samples: int) -> Colour:
         """Independent samples, in pieces of `samples`."""
-        return cls(np.zeros(6), np.ones(6), np.tile(np.eye(samples), (6, 1, 1)), np.zeros((6, samples + 1)))
+        return cls(np.zeros(6), np.ones(6), np.full(6, np.inf), np.tile(np.eye(samples), (6, 1, 1)), np.zeros((6, samples + 1)))
 
-    def with_channel(self, channel: int, share: float, time: float) -> Colour:
+    def with_channel(self, channel: int, share: float, time: float, period: float = np.inf) -> Colour:
         """The same with another noise in one channel."""
         samples = self.factor.shape[1]
         lag = np.abs(np.subtract.outer(np.arange(samples), np.arange(samples)))
-        root = np.linalg.cholesky(np.eye(samples) + share * np.exp(-lag / time))
-        new = replace(self, share=self.share.copy(), time=self.time.copy(), factor=self.factor.copy(), logdet=self.logdet.copy())
-        new.share[channel], new.time[channel] = share, time
+        root = np.linalg.cholesky(np.eye(samples) + share * _correlation(lag, time, period))
+        new = replace(
+            self, share=self.share.copy(), time=self.time.copy(), period=self.period.copy(), factor=self.factor.copy(), logdet=self.logdet.copy()
+        )
+        new.share[channel], new.time[channel], new.period[channel] = share, time, period
         new.factor[channel] = np.linalg.inv(root)
         new.logdet[channel, 1:] = 2.0 * np.cumsum(np.log(np.diag(root)))
         return new
@@ -66,8 +69,18 @@ class Colour:
 
     def differs(self, other: Colour) -> list[int]:
         """Channels whose noise is another one."""
-        return [c for c in range(6) if (self.share[c], self.time[c]) != (other.share[c], other.time[c])]
+        ours, theirs = (np.stack([c.share, c.time, c.period]) for c in (self, other))
+        return [int(c) for c in np.flatnonzero(np.any(ours != theirs, axis=0))]
 
     def log_determinant(self, lengths: np.ndarray) -> np.ndarray:
         """(B,) of the covariance of all channels, for pieces of `lengths` samples."""
         return np.asarray(self.logdet[:, lengths].sum(axis=0))
+
+
+def _correlation(lag: np.ndarray, time: float, period: float) -> np.ndarray:
+    """Of the part that lasts, at lags in samples."""
+    decay = np.exp(-lag / time)
+    if np.isinf(period):
+        return decay
+    omega = 2.0 * np.pi / period
+    return decay * (np.cos(omega * lag) - np.sin(omega * lag) / (omega * time))

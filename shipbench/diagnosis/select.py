@@ -9,13 +9,13 @@ from itertools import product
 import numpy as np
 
 from ..effects.base import EFFECTS
-from .colour import SHARES, TIMES, Colour
 from .fit import Origin, fit
 from .model import Linearisation, Scales, Term
+from .noise import colour_of
 from .ordinary import widened
 from .plant import Plant
 from .screen import Score, changes, overlap, screen
-from .settle import Fit, Model, evidence_with, hull_evidence, settle
+from .settle import Fit, Model, hull_evidence, settle
 from .strange import strange_pieces
 
 NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error", "going_astern", "rudder_rate_limit", "shaft_rate_limit")
@@ -29,8 +29,6 @@ MOST_EFFECTS = 6
 _GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
 _FINER, _FINER_STEPS = 1.2, 3
 """Factor of the steps that follow, and the most of them."""
-_FIRST_COLOURS, _WORTH_A_COLOUR = ((1.0, 2.0), (4.0, 6.0)), 50.0
-"""Share and time of noise that is tried first, and the log evidence that it must gain: a cause in the sensors leaves lasting residuals, too."""
 _SEARCHES = 3
 """For strange pieces."""
 _REFITS = 3
@@ -134,20 +132,6 @@ def _without_strange(found: Fit) -> Fit:
         plant, candidates = found.plant.without(pieces), found.candidates
         found = fit(plant, found.scales, found.model, found.point, found.hyper, candidates=candidates, guess=found.motion)
     return found
-
-
-def colour_of(found: Fit) -> Colour:
-    """Correlation of the noise of each channel that suits the residuals by far better than none."""
-    colour = Colour.white(found.plant.steps + 1)
-    best = evidence_with(found, colour)
-    for channel in range(6):
-        first = [colour.with_channel(channel, share, time) for share, time in _FIRST_COLOURS]
-        if max(evidence_with(found, way) for way in first) < best + _WORTH_A_COLOUR:
-            continue
-        ways = [colour.with_channel(channel, share, time) for share, time in product(SHARES, TIMES)]
-        worth = [evidence_with(found, way) for way in ways]
-        best, colour = max(worth), ways[int(np.argmax(worth))]
-    return colour
 
 
 def _with_gear(found: Fit, name: str, field: str) -> Fit:

@@ -17,6 +17,9 @@ from .simulator import Simulator
 NOISE = np.array([0.5, 0.5, np.deg2rad(0.3), 0.05, 0.05, np.deg2rad(0.05), 0.5, np.deg2rad(0.2), 0.01, 0.01])
 """Standard deviations on a 130 m ship: 0.5 m, 0.3 deg, 0.05 m/s, 0.05 deg/s, 0.5 rpm, 0.2 deg, 1 % of the thruster force."""
 
+WAVES, WAVE_PERIOD = (0.15, 0.2, np.deg2rad(0.35)), 8.0
+"""Motion in waves of a 130 m ship: standard deviations in surge and sway [m] and yaw [rad], peak period [s]."""
+
 _FROUDE = np.array([1.0, 1.0, 0.0, 0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0])
 _WARM_UP = 60
 CRUISE = 4.5
@@ -26,7 +29,7 @@ CRUISE = 4.5
 @dataclass(frozen=True)
 class Trials:
     """What is sailed: number of runs, samples after the first, gusts (standard deviation per axis [m/s] on a 130 m ship; 0: calm), noise factor,
-    and whether runs go astern and use thrusters."""
+    whether runs go astern and use thrusters, and motion in waves, as a factor of `WAVES`."""
 
     runs: int = 24
     samples: int = 120
@@ -34,6 +37,7 @@ class Trials:
     noise: float = 1.0
     astern: bool = True
     thrusters: bool = True
+    waves: float = 0.0
 
 
 def draw_commands(rng: np.random.Generator, ship: Vessel, speed: np.ndarray, rpm: np.ndarray, steps: int, dt: float, plan: Trials) -> np.ndarray:
@@ -76,6 +80,21 @@ def gusts(rng: np.random.Generator, num: int, steps: int, dt: float, sigma: floa
     return np.stack([np.hypot(wind[..., 0], wind[..., 1]), np.arctan2(wind[..., 1], wind[..., 0])], axis=-1)
 
 
+def in_waves(rng: np.random.Generator, states: np.ndarray, dt: float, scale: float, size: float) -> np.ndarray:
+    """States (runs, samples, 10) with first-order motion in waves on top: surge, sway and yaw by themselves, each a sum of 25 sines with random
+    phases and the spectrum of Pierson & Moskowitz (J. Geophys. Res. 69 (1964) 5181); velocities are their rates."""
+    ratio = np.linspace(0.75, 1.5, 25)
+    omega, share = 2.0 * np.pi / (WAVE_PERIOD * scale) * ratio, ratio**-5 * np.exp(-1.25 * ratio**-4)
+    phase = dt * np.arange(states.shape[1])[:, None] * omega + rng.uniform(0.0, 2.0 * np.pi, (3, len(states), 1, len(omega)))
+    amplitude = size * np.array(WAVES) * [scale**2, scale**2, 1.0]
+    waves = np.sqrt(2.0 * share / share.sum())
+    (surge, sway, yaw), rates = (amplitude[:, None, None] * v for v in (np.sin(phase) @ waves, np.cos(phase) @ (omega * waves)))
+    c, s = np.cos(states[..., 2]), np.sin(states[..., 2])
+    moved = states.copy()
+    moved[..., :6] += np.stack([c * surge - s * sway, s * surge + c * sway, yaw, *rates], axis=-1)
+    return moved
+
+
 @dataclass(frozen=True)
 class Sailing:
     """One set of trials as ordered, warm-up included: scale is sqrt(L/130), s0 (runs, 10), U (runs, steps, 4), max_step [s]."""
@@ -115,9 +134,12 @@ def draw_sailing(
 def write_down(
     ship: Vessel, sailing: Sailing, S: np.ndarray, hidden: Sequence[Hidden], plan: Trials, rng: np.random.Generator, name: str, source: str
 ) -> Dataset:
-    """The data set of the true states S (runs, steps + 1, 10): the warm-up cut off, the sensors' faults and noise added."""
+    """The data set of the true states S (runs, steps + 1, 10): the warm-up cut off, motion in waves, the sensors' faults and noise added."""
     noise = plan.noise * NOISE * (ship.L / 130.0) ** _FROUDE
-    S = record(S[:, _WARM_UP:], sailing.dt, hidden, noise, rng)
+    S = S[:, _WARM_UP:]
+    if plan.waves:
+        S = in_waves(rng, S, sailing.dt, sailing.scale, plan.waves)
+    S = record(S, sailing.dt, hidden, noise, rng)
     U, t = sailing.U[:, _WARM_UP:], np.arange(plan.samples + 1) * sailing.dt
     U = np.concatenate([U, U[:, -1:]], axis=1)
     runs = tuple(Run(f"run{i:02d}", t, S[i], U[i], COMMANDS) for i in range(plan.runs))

@@ -13,15 +13,18 @@ from shipbench.diagnosis.colour import Colour
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.fit import Origin, fit
 from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.noise import colour_of
 from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.select import colour_of, null_fit
+from shipbench.diagnosis.select import null_fit
 from shipbench.diagnosis.settle import Model
 from shipbench.diagnosis.strange import left_out
+from shipbench.effects.base import EFFECTS
 from shipbench.physics.actuators import gear_path
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
 from shipbench.signals import PSI, R, U, V
-from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.simulate.hidden import Hidden
+from shipbench.simulate.trials import WAVE_PERIOD, Trials, sea_trials
 
 LATE = 3.0
 
@@ -56,10 +59,18 @@ def filtered(trials) -> Dataset:
     return _filter_in_earth_axes(trials, LATE)
 
 
-def test_whitened_noise_is_white_and_its_determinant_right():
-    colour = Colour.white(7).with_channel(2, 16.0, 6.0)
+OMEGA = 2.0 * np.pi / 5.0
+LASTING = (
+    (6.0, np.inf, lambda lag: np.exp(-lag / 6.0)),
+    (8.0, 5.0, lambda lag: np.exp(-lag / 8.0) * (np.cos(OMEGA * lag) - np.sin(OMEGA * lag) / (8.0 * OMEGA))),
+)
+
+
+@pytest.mark.parametrize(("time", "period", "correlation"), LASTING)
+def test_whitened_noise_is_white_and_its_determinant_right(time, period, correlation):
+    colour = Colour.white(7).with_channel(2, 16.0, time, period)
     lag = np.abs(np.subtract.outer(np.arange(7), np.arange(7)))
-    covariance = np.eye(7) + 16.0 * np.exp(-lag / 6.0)
+    covariance = np.eye(7) + 16.0 * correlation(lag)
     assert colour.factor[2] @ covariance @ colour.factor[2].T == pytest.approx(np.eye(7), abs=1e-9)
     for length in (3, 7):
         assert colour.log_determinant(np.array([length]))[0] == pytest.approx(np.linalg.slogdet(covariance[:length, :length])[1])
@@ -87,6 +98,32 @@ def test_a_compass_whose_errors_last_is_told_from_independent_ones(trials):
     share = _colour(_changed(trials, change)).share
     assert share[PSI] > 0.0
     assert not np.any(np.delete(share, PSI))
+
+
+def test_noise_that_swings_has_nothing_at_frequency_zero():
+    lag = np.arange(200.0)
+    swings = np.linalg.inv(Colour.white(200).with_channel(0, 1.0, 9.0, 6.0).factor[0])[:, 0]
+    correlation = swings * swings[0] - (lag == 0)
+    # of a sampled signal what folds back from higher frequencies remains; at its period 20 times as much
+    assert abs(correlation[0] + 2.0 * np.sum(correlation[1:])) < 0.5
+    assert correlation[0] + 2.0 * np.sum(correlation[1:] * np.cos(2.0 * np.pi / 6.0 * lag[1:])) > 8.0
+
+
+@pytest.mark.parametrize("ship", ["kcs", "container130"])
+def test_motion_with_the_waves_is_told_from_the_ships_own(ship):
+    data = sea_trials(load_mmg_ship(ship), 11, (), Trials(runs=12, samples=120, waves=1.0))
+    found = _colour(data)
+    assert found.period[[U, V, R]] == pytest.approx(WAVE_PERIOD * (data.ship.L / 130.0) ** 0.5 / data.dt, rel=0.25)
+    assert np.all(found.share[[U, V, R]] > 10.0)
+
+
+def test_a_cause_is_seen_through_the_motion_with_the_waves():
+    """Its score is 17 where that motion passes for errors that last."""
+    hidden = [Hidden(EFFECTS.get("rudder_offset"), (0.05,))]
+    found = diagnose(sea_trials(load_mmg_ship("container130"), 11, hidden, Trials(runs=12, samples=120, waves=1.0)), gain=False)
+    (cause,) = found.causes
+    assert cause.effect == "rudder_offset"
+    assert cause.score > 30.0
 
 
 def test_velocities_filtered_in_the_earths_axes_are_seen_and_put_back(trials, filtered):

@@ -1,0 +1,51 @@
+"""Which correlation of the sensors' noise suits a fit."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from .colour import Colour
+from .settle import Fit, evidence_with
+
+_SHARES, _TIMES = (1.0, 4.0, 16.0, 64.0), (2.0, 6.0, 20.0)
+"""Tried; times in samples."""
+_FIRST, _WORTH = ((1.0, 2.0), (4.0, 6.0)), 50.0
+"""Share and time of noise that is tried first, and the log evidence that it must gain: a cause in the sensors leaves lasting residuals, too."""
+_SWINGS, _MOST_LAG = -0.1, 12
+"""Correlation of residuals below which they swing (independent ones: above -0.08), and the lag [samples] up to which that is looked for."""
+_PERIODS, _DAMPING = (1.7, 2.0, 2.3), (0.1, 0.25)
+"""Periods tried, in lags of the lowest correlation, and damping ratios."""
+
+
+def colour_of(found: Fit) -> Colour:
+    """Correlation of the noise of each channel that suits the residuals by far better than none."""
+    colour = Colour.white(found.plant.steps + 1)
+    best = evidence_with(found, colour)
+    for channel in range(6):
+        ways = _lasting(found, colour, channel, best) + _swinging(found, colour, channel)
+        worth = [evidence_with(found, way) for way in ways]
+        if worth and max(worth) > best + _WORTH:
+            best, colour = max(worth), ways[int(np.argmax(worth))]
+    return colour
+
+
+def _lasting(found: Fit, colour: Colour, channel: int, best: float) -> list[Colour]:
+    """Errors that last for seconds, where there are any."""
+    if max(evidence_with(found, colour.with_channel(channel, share, time)) for share, time in _FIRST) < best + _WORTH:
+        return []
+    return [colour.with_channel(channel, share, time) for share, time in product(_SHARES, _TIMES)]
+
+
+def _swinging(found: Fit, colour: Colour, channel: int) -> list[Colour]:
+    """Motion with the waves, where the residuals swing."""
+    seg = found.plant.seg
+    e = np.where(seg.mask, seg.states[..., channel] - found.columns.predicted[..., channel], 0.0)
+    lags = range(1, min(_MOST_LAG, e.shape[1] - 1) + 1)
+    correlation = [float(np.sum(e[:, lag:] * e[:, :-lag]) / np.sum(e**2)) for lag in lags]
+    if min(correlation) > _SWINGS:
+        return []
+    half = 1 + int(np.argmin(correlation))
+    ways = [(share, factor * half, damping) for share, factor, damping in product(_SHARES, _PERIODS, _DAMPING)]
+    return [colour.with_channel(channel, share, period / (2.0 * np.pi * damping), period) for share, period, damping in ways]
