@@ -94,6 +94,7 @@ class Dataset:
         source, licence: where the data come from and under which terms.
         simulation: name of the simulator's ship file when the data are simulated without a hidden cause, else None.
         notes: what a reader must know (estimated or missing channels).
+        derived: names of the speeds (u, v, r) that were derived from positions and headings, not measured.
     """
 
     name: str
@@ -105,6 +106,7 @@ class Dataset:
     licence: str = ""
     simulation: str | None = None
     notes: tuple[str, ...] = ()
+    derived: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.runs:

@@ -62,7 +62,7 @@ def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
         raise InputError(f"{where}: no run has two samples with all values; there is nothing to check.{without}")
     dataset = Dataset(
         name=description.name, ship=ship, dt=dt, runs=tuple(runs), actuators=description.actuators, source=description.source,
-        licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)),
+        licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)), derived=tuple(description.derived),
     )  # fmt: skip
     return Recording(dataset, read_toml(folder / "dataset.toml"), recorded, wrapped, parent), found
 

@@ -42,6 +42,7 @@ class Description(Corrections):
     licence: str = ""
     simulation: str | None = None
     notes: list[str] = Field(default_factory=list)
+    derived: list[Literal["u", "v", "r"]] = Field(default_factory=list)
     units: dict[str, str] = Field(default_factory=dict)
     signs: dict[str, str] = Field(default_factory=dict)
     columns: dict[str, str] = Field(default_factory=dict)
@@ -70,7 +71,7 @@ def read_dataset(folder: str | Path) -> Dataset:
     runs = tuple(run for name, rows in table.groupby("trajectory", sort=False) for run in _runs(str(name), rows, inputs, description, where))
     return Dataset(
         name=description.name, ship=ship, dt=description.dt, runs=runs, actuators=description.actuators, source=description.source,
-        licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)),
+        licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)), derived=tuple(description.derived),
     )  # fmt: skip
 
 
@@ -245,6 +246,7 @@ def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz"
     description = {
         "name": dataset.name, "ship": "ship.toml", "dt": dataset.dt, "actuators": dataset.actuators, "source": dataset.source,
         "licence": dataset.licence, **({"simulation": dataset.simulation} if dataset.simulation else {}), "notes": list(dataset.notes),
+        **({"derived": list(dataset.derived)} if dataset.derived else {}),
         "runs": {run.id: run.meta for run in dataset.runs if run.meta},
     }  # fmt: skip
     try:

@@ -83,7 +83,7 @@ def write_mat(dataset: Dataset, path: str | Path) -> None:
     ]  # fmt: skip
     about = {
         "name": dataset.name, "dt": float(dataset.dt), "actuators": dataset.actuators, "source": dataset.source, "licence": dataset.licence,
-        "simulation": dataset.simulation or "", "notes": cells(dataset.notes), "fingerprint": dataset.fingerprint,
+        "simulation": dataset.simulation or "", "notes": cells(dataset.notes), "derived": cells(dataset.derived), "fingerprint": dataset.fingerprint,
         "ship": dataset.ship.model_dump(exclude_none=True),
     }  # fmt: skip
     save_mat(Path(path), {"dataset": about, "runs": struct_array(runs)})
@@ -108,10 +108,14 @@ def read_mat(path: str | Path) -> Dataset:
         runs = tuple(_run(element, str(path)) for element in np.atleast_1d(found["runs"].squeeze()))
         given = {key: str(about[key]) for key in ("name", "actuators", "source", "licence")}
         dt, notes, simulation, ship = float(about["dt"]), tuple(about["notes"]), about["simulation"] or None, about["ship"]
+        derived = tuple(str(name) for name in about.get("derived", ()))
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         fields = f"accepted: the variables dataset and runs, each run with {', '.join(_RUN_FIELDS)}"
         raise InputError(f"{path} does not have the form that `data export` writes ({type(error).__name__}: {error}); {fields}.") from None
-    return Dataset(ship=Ship.from_dict(ship, f"{path}: dataset.ship"), dt=dt, runs=runs, notes=notes, simulation=simulation, **given)
+    return Dataset(
+        ship=Ship.from_dict(ship, f"{path}: dataset.ship"), dt=dt, runs=runs, notes=notes, simulation=simulation, derived=derived,
+        name=given["name"], actuators=given["actuators"], source=given["source"], licence=given["licence"],
+    )  # fmt: skip
 
 
 def _run(element: Any, where: str) -> Run:

@@ -19,6 +19,7 @@ from ..records import Dataset
 from .analysis import HULL_THRESHOLD, NOTICEABLE, THRESHOLD, Analysis, analyse, causes_of
 from .causes import describe_candidates, describe_causes, remaining, unknown_part
 from .clocks import NAMES, check_clocks
+from .derived import faults, marked, said
 from .gain import FoldGain, fold_gain, summarise
 from .model import NUM_BASE
 from .ordinary import needed
@@ -62,10 +63,11 @@ def diagnose(
     warnings = _check(dataset)
     units = check_units(dataset) if only is None else []
     dataset = corrected(dataset, units)
-    late = check_clocks(dataset) if only is None else None
+    dataset = marked(dataset)
+    late = check_clocks(dataset) if only is None and not dataset.derived else None
     if late is not None:
         dataset = late.mended
-    settled = NAMES if late is not None else ()
+    settled = NAMES if late is not None else faults(dataset)
     plant = Plant.of(dataset, THOROUGH_STEPS if thorough else MOST_STEPS)
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     wanted = gain and not cautious
@@ -77,7 +79,7 @@ def diagnose(
         doubts = _doubts(found) if only is None else []
         measured = wanted and not doubts
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if measured else Worth()
-    warnings += doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
+    warnings += said(dataset) + doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)

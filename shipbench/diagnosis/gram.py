@@ -266,7 +266,7 @@ def coefficients_of(gram: Gram, prior: Prior, solution: Solution, estimate: np.n
 def update_noise(
     products: Products, gram: Gram, reduced: Reduced, prior: Prior, solution: Solution, estimate: np.ndarray, floor: float
 ) -> np.ndarray:
-    """One EM step for the variances of the noise, log (6,).
+    """One EM step for the variances of the noise, log (6,); of a channel that is not seen, 0.
 
     Given the shared coefficients: theirs are few beside the samples, and their errors are cancelled by those of the force that they cause.
     """
@@ -274,7 +274,8 @@ def update_noise(
     second = theta[:, :, None] * theta[:, None, :]
     second[:, : gram.latent, : gram.latent] += reduced.inverse
     squares = products.P.reshape(6, -1) @ second.ravel()
-    return np.maximum(np.log(squares / np.sum(products.samples)), floor)
+    variances = np.where(squares > 0.0, squares / np.sum(products.samples), 1.0)
+    return np.maximum(np.log(variances), floor)
 
 
 _AT_REST, _LEAP, _LEAST = 0.003, 16.0, -20.0

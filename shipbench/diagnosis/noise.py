@@ -23,7 +23,7 @@ def colour_of(found: Fit) -> Colour:
     """Correlation of the noise of each channel that suits the residuals by far better than none."""
     colour = Colour.white(found.plant.steps + 1)
     best = evidence_with(found, colour)
-    for channel in range(6):
+    for channel in np.flatnonzero(found.plant.seg.seen).tolist():
         ways = _lasting(found, colour, channel, best) + _swinging(found, colour, channel)
         worth = [evidence_with(found, way) for way in ways]
         if worth and max(worth) > best + _WORTH:

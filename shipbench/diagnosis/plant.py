@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..physics.actuators import Gear, gear_path
 from ..predictors._actuator_fit import DEFAULT_ACTUATORS
 from ..records import Dataset
 from ..ship import Particulars, complete
-from ..signals import MOTION
+from ..signals import MOTION, STATES
 from .averaging import averaged
 from .rolling import Active, Course, Vessel
 
@@ -45,7 +45,7 @@ class Segments:
 
     Shapes: states (B, K + 1, 10), commands (B, K + 1, 4), wind (B, K + 1, 2) or None, mask (B, K + 1) of real samples, run (B,) index of the run,
     start (B,) time since the run began [s]; earlier (B, P, 4): the commands before the piece (the first, before the run), without any where actuators
-    are recorded.
+    are recorded; seen (6,): what of the motion was measured.
     """
 
     dt: float
@@ -58,6 +58,7 @@ class Segments:
     run: np.ndarray
     start: np.ndarray
     runs: int
+    seen: np.ndarray = field(default_factory=lambda: np.ones(6, dtype=bool))
 
     def thinned(self, most: int) -> Segments:
         """At most `most` segments, evenly spread; every run keeps at least one."""
@@ -98,6 +99,7 @@ def cut(dataset: Dataset, steps: int) -> Segments:
         earlier=np.stack([run.inputs[np.maximum(a + back, 0), :4] for _, run, a, _ in pieces]),
         wind=None if wind_columns is None else inputs[..., wind_columns], mask=np.stack([np.arange(K + 1) <= b - a for _, _, a, b in pieces]),
         run=np.array([p[0] for p in pieces]), start=np.array([p[2] * dataset.dt for p in pieces]), runs=len(dataset),
+        seen=~np.isin(STATES[MOTION], dataset.derived),
     )  # fmt: skip
 
 

@@ -142,6 +142,7 @@ def products_of(plant: Plant, scales: Scales, point: Point, columns: Columns, ch
         Z = np.nan_to_num(Z, nan=0.0, posinf=0.0, neginf=0.0)
     scales.colour.whiten(Z, channels)
     Z[:, ~seg.mask] = 0.0
+    Z[~seg.seen[list(channels)]] = 0.0
     return Products.of(Z, seg.mask, plant.knots, plant.knot_time, seg.run, seg.runs, scales.colour.log_determinant(seg.mask.sum(axis=1)))
 
 
@@ -176,7 +177,7 @@ def by_segment(lin: Linearisation, hyper: Hyper, gram: Gram) -> np.ndarray:
     w = np.moveaxis(point.w, -1, 1)
     with np.errstate(over="ignore", invalid="ignore"):
         error = np.where(plant.seg.mask[..., None], (plant.seg.states[..., :6] - lin.predicted) / lin.scales.noise, 0.0)
-        error = np.where(plant.seg.mask[..., None], lin.scales.colour.whitened(error), 0.0)
+        error = np.where(plant.seg.mask[..., None] & plant.seg.seen, lin.scales.colour.whitened(error), 0.0)
         cost = np.sum(error**2 * np.exp(-hyper.log_noise), axis=(1, 2)) + ETA_PRECISION * np.sum(point.eta**2, axis=1)
     cost += np.sum(w @ gram.K_inv * w, axis=2) @ np.exp(-hyper.log_force)
     return np.where(np.isfinite(cost), cost, np.inf)

@@ -52,7 +52,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 def _by_noise(lin: Linearisation, hyper: Hyper, phi: np.ndarray) -> np.ndarray:
     """R^-1 Phi, (B, K + 1, 6, Z)."""
     colour, precision = lin.scales.colour, np.exp(-hyper.log_noise) / lin.scales.noise**2
-    return colour.unwhitened(colour.whitened(phi) * (lin.plant.seg.mask[..., None] * precision)[..., None])
+    return colour.unwhitened(colour.whitened(phi) * (lin.plant.seg.mask[..., None] * lin.plant.seg.seen * precision)[..., None])
 
 
 def _by_rate(lin: Linearisation, phi: np.ndarray, weight: np.ndarray) -> np.ndarray:

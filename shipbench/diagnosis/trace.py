@@ -34,6 +34,7 @@ def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
     sd = np.sqrt(np.maximum(np.diagonal(null.cov, axis1=1, axis2=2), 0.0))
     unit = null.scales.noise * np.exp(0.5 * null.hyper.log_noise)
     white = null.scales.colour.whitened((short.seg.states[..., :6] - null.columns.predicted) / unit)
+    white[..., ~short.seg.seen] = np.nan
     lines = [_along(short.seg, v, seg) for v in (force(null.estimate), force(sd), force(final.estimate), white)]
     hide = seg.mask[..., None]
     t = np.arange(plain.steps + 1) * seg.dt

@@ -219,6 +219,8 @@ def _whiteness(trace: Trace) -> dict[str, float]:
     found = {}
     for i, name in enumerate(RESIDUALS):
         whole = int(np.isfinite(trace.white[..., i]).sum())
+        if not whole:  # not measured
+            continue
         terms = [correlation(trace.white[..., i], trace.white[..., i], lag) for lag in range(1, LAGS + 1)]
         statistic = sum(rho**2 * num * (whole + 2) / max(whole, 1) for rho, num in terms)
         found[name] = float(statistic / chi2.ppf(0.95, LAGS))
@@ -233,7 +235,7 @@ def _against_inputs(trace: Trace) -> dict[tuple[str, str], float]:
     found = {}
     for i, name in enumerate(RESIDUALS):
         for j, label in enumerate(INPUTS):
-            if not np.any(np.nan_to_num(trace.inputs[..., j])):
+            if not (np.any(np.nan_to_num(trace.inputs[..., j])) and np.any(np.isfinite(trace.white[..., i]))):
                 continue
             pairs = [correlation(trace.white[..., i], trace.inputs[..., j], lag) for lag in range(LAGS + 1)]
             found[(name, label)] = max(abs(rho) * num**0.5 / bound for rho, num in pairs)

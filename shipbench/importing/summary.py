@@ -134,10 +134,11 @@ class Summary:
     def description(self) -> dict[str, Any]:
         """The content of dataset.toml."""
         files = ", ".join(self.met.forms)
+        derived = [name for name in "uvr" if name in self.times]
         source = self.mapping.source or f"imported from {files if len(files) < 200 else f'{len(self.met.forms)} logs'}"
         return {
             "name": self.mapping.name, "ship": "ship.toml", "dt": self.mapping.dt, "actuators": self.actuators(), "source": source,
-            "licence": self.mapping.licence, "notes": self.notes(), "runs": self.meta,
+            "licence": self.mapping.licence, "notes": self.notes(), **({"derived": derived} if derived else {}), "runs": self.meta,
         }  # fmt: skip
 
     def no_runs(self) -> str:

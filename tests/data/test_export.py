@@ -39,12 +39,12 @@ def odd() -> Dataset:
         name="Ørsted 7", L=50.0, B=8.0, T=3.0, mass=9e5, propeller=Propeller(diameter=2.0, blades=4, kt=(0.3, -0.3, -0.1)),
         rudder=Rudder(area=4.0, x=-24.0), thrusters=Thrusters(x_bow=20.0, max_force=1e4),
     )  # fmt: skip
-    return Dataset("odd set", ship, 0.7, tuple(runs), "commanded", "a formula", "CC BY 4.0", "container130", ("one — note", "two"))
+    return Dataset("odd set", ship, 0.7, tuple(runs), "commanded", "a formula", "CC BY 4.0", "container130", ("one — note", "two"), ("u", "r"))
 
 
 def assert_same(ours: Dataset, theirs: Dataset) -> None:
     assert theirs.fingerprint == ours.fingerprint  # every sample, run name, dt, the inputs and the ship, bit for bit
-    for field in ("name", "source", "licence", "simulation", "notes", "actuators"):
+    for field in ("name", "source", "licence", "simulation", "notes", "actuators", "derived"):
         assert getattr(theirs, field) == getattr(ours, field), field
     assert [r.meta for r in theirs.runs] == [r.meta for r in ours.runs]
 

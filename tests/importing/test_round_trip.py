@@ -153,6 +153,7 @@ def test_measured_speeds_come_back(trial_import, tmp_path, simulated):
     result = trial_import(instruments(tmp_path, states, commands, 0.0), MAPPING.format(speeds=SPEEDS, rate=RATE))
     assert result.exit_code == 0, result.output
     data = load_dataset("out")
+    assert data.derived == ()
     assert [run.t[-1] - run.t[0] for run in data.runs] == pytest.approx([LENGTH, 120, 90], abs=1.5)
     for run in data.runs:
         for name, error in errors(run, states, commands).items():
@@ -174,6 +175,7 @@ def test_derived_speeds_agree_within_the_stated_tolerance(trial_import, tmp_path
     assert result.exit_code == 0, result.output
     assert "u, v from x, y and psi by a cubic smoothing spline" in result.stdout
     data = load_dataset("out")
+    assert data.derived == ("u", "v", "r")
     assert len(data.runs) == 3
     every = [errors(run, states, commands) for run in data.runs]
     for name, within, worst in (("u", 0.015, 0.08), ("v", 0.015, 0.08), ("r", np.deg2rad(0.005), np.deg2rad(0.05))):  # r.m.s. and largest, m/s, rad/s
