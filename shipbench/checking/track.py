@@ -23,6 +23,8 @@ LEAST_ARM = 0.02
 """Share of the ship's length."""
 LEAST_SCALE, LEAST_SWAY_SCALE, LEAST_HEADING, LEAST_CURRENT, LEAST_LAG = 0.02, 0.15, np.deg2rad(1.0), 0.03, 0.8
 """What matters at all: shares, rad, share of the speed, s at 130 m (and a quarter of a sample)."""
+_SURE = 6.0
+"""Standard errors from which a drift is taken out unasked."""
 _LAGS = {"lag of u, v": (U, V), "lag of position": (X, Y), "lag of heading": (PSI,)}
 _SCALES = frozenset({"scale of u and v", "scale of u", "scale of v"})
 _LATE = frozenset({"lag of u, v", "lag of position"})
@@ -135,6 +137,16 @@ def late_velocities(recording: Recording) -> tuple[float, float] | None:
         return None
     lag = -found.late.get(X, 0.0)
     return (lag, float(found.first.sd["lag of position"][0])) if lag >= _least_lag(recording) else None
+
+
+def through_water(recording: Recording) -> tuple[float, float] | None:
+    """Velocity [m/s] north and east of the water that the velocities are through, the same in all runs; None if they are over ground."""
+    found = explain(recording)
+    if found is None or "through water" not in found.chosen.names:
+        return None
+    (north, east), sd = found.chosen.value["through water"], found.chosen.sd["through water"]
+    sure = max(LEAST_CURRENT * recording.speed, _SURE * float(np.hypot(*sd)))
+    return (float(north), float(east)) if np.hypot(north, east) > sure else None
 
 
 def _least_lag(recording: Recording) -> float:

@@ -24,6 +24,7 @@ from .gain import FoldGain, fold_gain, summarise
 from .model import NUM_BASE
 from .ordinary import needed
 from .outcome import Diagnosis, Gain
+from .over_ground import over_ground
 from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant
 from .strange import left_out
 from .structure import STRUCTURE
@@ -63,7 +64,7 @@ def diagnose(
     warnings = _check(dataset)
     units = check_units(dataset) if only is None else []
     dataset = corrected(dataset, units)
-    dataset = marked(dataset)
+    dataset, drift = over_ground(marked(dataset)) if only is None else (dataset, [])
     late = check_clocks(dataset) if only is None and not dataset.derived else None
     if late is not None:
         dataset = late.mended
@@ -79,7 +80,7 @@ def diagnose(
         doubts = _doubts(found) if only is None else []
         measured = wanted and not doubts
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if measured else Worth()
-    warnings += said(dataset) + doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
+    warnings += said(dataset) + drift + doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)

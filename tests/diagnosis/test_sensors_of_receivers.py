@@ -14,6 +14,7 @@ from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.fit import Origin, fit
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.noise import colour_of
+from shipbench.diagnosis.over_ground import over_ground
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.select import null_fit
 from shipbench.diagnosis.settle import Model
@@ -107,6 +108,28 @@ def test_noise_that_swings_has_nothing_at_frequency_zero():
     # of a sampled signal what folds back from higher frequencies remains; at its period 20 times as much
     assert abs(correlation[0] + 2.0 * np.sum(correlation[1:])) < 0.5
     assert correlation[0] + 2.0 * np.sum(correlation[1:] * np.cos(2.0 * np.pi / 6.0 * lag[1:])) > 8.0
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_a_log_through_water_is_seen_and_put_over_ground(number):
+    """It had been a current, and three faults of sensors besides."""
+    drift = np.array([0.4, -0.3])
+
+    def through_water(S: np.ndarray) -> None:
+        c, s = np.cos(S[:, PSI]), np.sin(S[:, PSI])
+        S[:, U], S[:, V] = S[:, U] - c * drift[0] - s * drift[1], S[:, V] - c * drift[1] + s * drift[0]
+
+    data = sea_trials(load_mmg_ship("container130"), 20 + number, [Hidden(EFFECTS.get("current"), tuple(drift))], Trials(runs=12))
+    assert over_ground(data)[1] == []
+    logged = _changed(data, through_water)
+    mended, (line,) = over_ground(logged)
+    assert "through water" in line
+    for run, true in zip(mended.runs, data.runs, strict=True):
+        assert np.abs(run.states[:, [U, V]] - true.states[:, [U, V]]).max() < 0.05
+    if number == 0:
+        found = diagnose(logged, gain=False)
+        assert [c.effect for c in found.causes] == ["current"]
+        assert line in found.warnings
 
 
 @pytest.mark.parametrize("ship", ["kcs", "container130"])
