@@ -20,7 +20,7 @@ in simulated trials, derived speeds 0.004 to 0.14), with few runs as low as chan
 _LEAST_TRACK, _LEAST_HEADING = 0.02, np.deg2rad(0.02)
 """Quick errors [m at 130 m, rad] below which they are those of the integration."""
 _LEAST_SAMPLES = 20
-_FAULTS = {"u": ("velocity_delay", "speed_scale"), "v": ("velocity_delay", "speed_scale"), "r": ("yaw_rate_bias",)}
+_FAULTS = {"velocity_delay": {"u", "v"}, "speed_scale": {"u", "v"}, "yaw_rate_bias": {"r"}}
 
 
 def marked(dataset: Dataset) -> Dataset:
@@ -39,7 +39,12 @@ def marked(dataset: Dataset) -> Dataset:
 
 def faults(dataset: Dataset) -> tuple[str, ...]:
     """Faults of sensors that are not there."""
-    return tuple({name: None for channel in dataset.derived for name in _FAULTS[channel]})
+    return tuple(name for name, channels in _FAULTS.items() if channels <= set(dataset.derived))
+
+
+def has_speeds(dataset: Dataset) -> bool:
+    """Whether surge and sway are measured, so that the track can be held against them."""
+    return not {"u", "v"} & set(dataset.derived)
 
 
 def said(dataset: Dataset) -> list[str]:

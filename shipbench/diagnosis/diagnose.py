@@ -19,7 +19,7 @@ from ..records import Dataset
 from .analysis import HULL_THRESHOLD, NOTICEABLE, THRESHOLD, Analysis, analyse, causes_of
 from .causes import describe_candidates, describe_causes, remaining, unknown_part
 from .clocks import NAMES, check_clocks
-from .derived import faults, marked, said
+from .derived import faults, has_speeds, marked, said
 from .gain import FoldGain, fold_gain, summarise
 from .model import NUM_BASE
 from .ordinary import needed
@@ -65,10 +65,10 @@ def diagnose(
     units = check_units(dataset) if only is None else []
     dataset = corrected(dataset, units)
     dataset, drift = over_ground(marked(dataset)) if only is None else (dataset, [])
-    late = check_clocks(dataset) if only is None and not dataset.derived else None
+    late = check_clocks(dataset) if only is None and has_speeds(dataset) else None
     if late is not None:
         dataset = late.mended
-    settled = NAMES if late is not None else faults(dataset)
+    settled = (*(NAMES if late is not None else ()), *faults(dataset))
     plant = Plant.of(dataset, THOROUGH_STEPS if thorough else MOST_STEPS)
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     wanted = gain and not cautious

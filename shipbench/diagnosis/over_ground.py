@@ -11,11 +11,12 @@ from ..checking.recording import Recording
 from ..checking.track import through_water
 from ..records import Dataset, Run
 from ..signals import PSI, U, V
+from .derived import has_speeds
 
 
 def over_ground(dataset: Dataset) -> tuple[Dataset, list[str]]:
     """The data set with velocities over ground, and a line for the reader where it had others. What is derived from positions is over ground."""
-    found = None if dataset.derived else through_water(Recording(dataset))
+    found = through_water(Recording(dataset)) if has_speeds(dataset) else None
     if found is None:
         return dataset, []
     north, east = found
