@@ -189,9 +189,11 @@ def _short(value: float) -> str:
 
 
 def autocorrelations(trace: Trace) -> list[Panel]:
-    """Of the residuals, with 95 % bounds, at lags of one sample and more."""
+    """Of the residuals of what was measured, with 95 % bounds, at lags of one sample and more."""
     found = []
     for i, name in enumerate(RESIDUALS):
+        if not np.any(np.isfinite(trace.white[..., i])):
+            continue
         rho, bound = correlogram(trace.white[..., i], trace.white[..., i])
         found.append(panel(partial(_stems, rho=rho[1:], bound=bound[1:], first=1), f"{name} with itself", height=1.9))
     return found
