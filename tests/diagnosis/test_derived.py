@@ -33,12 +33,11 @@ def with_derived_speeds(data: Dataset) -> Dataset:
     return data.with_runs([run(r) for r in data.runs])
 
 
-@pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("ship", ["kcs", "container130", "tanker"])
-def test_sensors_are_told_from_derivatives(ship, seed):
+def test_sensors_are_told_from_derivatives(ship):
     def sail(**plan: float) -> Dataset:
         trials = Trials(runs=6, **plan)
-        return published_trials(PUBLISHED[ship], seed, (), trials) if ship in PUBLISHED else sea_trials(load_mmg_ship(ship), seed, (), trials)
+        return published_trials(PUBLISHED[ship], 1, (), trials) if ship in PUBLISHED else sea_trials(load_mmg_ship(ship), 1, (), trials)
 
     for noise, waves in ((1.0, 0.0), (0.3, 1.0), (0.0, 0.0), (0.0, 1.0)):
         assert marked(sail(noise=noise, waves=waves)).derived == (), (noise, waves)
