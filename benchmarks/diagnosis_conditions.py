@@ -1,6 +1,6 @@
 """The diagnosis under other conditions than those of its suite: another quality or length of the record, less known of the ship. About 15 minutes.
 
-    python benchmarks/diagnosis_conditions.py [--runs DRAWS] [--quick] [--json FILE]
+    python benchmarks/diagnosis_conditions.py [--runs DRAWS] [--only CONDITION ...] [--quick] [--json FILE]
 
 Six ships (drawn variants of KCS and KVLCC2; Mariner, a tanker and S175 in their authors' equations). Under every condition each of them sails once
 with nothing hidden, where nothing must be named, and once with a cause that any ship shows, which must be named first.
@@ -124,9 +124,9 @@ def outcome(job: tuple[str, int, str], draw: int) -> tuple[str, list[str]]:
 
 def main() -> None:
     """One line a condition, and what was wrong."""
-    given = measure.options(__doc__, runs=1)
+    given = measure.options(__doc__, runs=1, cases=CONDITIONS)
     measure.header(given)
-    conditions = CONDITIONS[-1:] if given.quick else CONDITIONS
+    conditions = given.only or (CONDITIONS[-1:] if given.quick else CONDITIONS)
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         for condition in conditions:
             for draw in range(given.runs):

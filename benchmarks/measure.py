@@ -16,7 +16,7 @@ import os
 import platform
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -30,11 +30,13 @@ ALWAYS = ("shipbench", "numpy", "scipy", "casadi", "torch")
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line asked for: interleaved runs of both sides, a small case for a test of the script itself, a file for the figures."""
+    """What the command line asked for: interleaved runs of both sides, a small case for a test of the script itself, a file for the figures, and some of
+    the cases (none: all)."""
 
     runs: int
     quick: bool
     json: Path | None
+    only: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -62,14 +64,16 @@ class Comparison:
     target: float | None
 
 
-def options(doc: str | None, runs: int = 5) -> Options:
-    """`--runs N`, `--quick` and `--json FILE`; `doc` is the script's docstring, shown by `--help`."""
+def options(doc: str | None, runs: int = 5, cases: Sequence[str] = ()) -> Options:
+    """`--runs N`, `--quick`, `--json FILE`, and `--only CASE ...` where there are `cases`; `doc` is the script's docstring, shown by `--help`."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=runs, help=f"interleaved runs of both sides (default {runs})")
     parser.add_argument("--quick", action="store_true", help="a small case, to see that the script runs and both sides agree; its times say nothing")
     parser.add_argument("--json", type=Path, metavar="FILE", help="append machine and figures to FILE, one JSON document a line")
+    if cases:
+        parser.add_argument("--only", nargs="+", choices=cases, default=[], metavar="CASE", help=f"some of: {'; '.join(cases)}")
     given = parser.parse_args()
-    return Options(1 if given.quick else max(1, given.runs), given.quick, given.json)
+    return Options(1 if given.quick else max(1, given.runs), given.quick, given.json, tuple(given.only) if cases else ())
 
 
 def machine() -> dict[str, Any]:
