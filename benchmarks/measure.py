@@ -30,8 +30,8 @@ ALWAYS = ("shipbench", "numpy", "scipy", "casadi", "torch")
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line asked for: interleaved runs of both sides, a small case for a test of the script itself, a file for the figures, and some of
-    the cases (none: all)."""
+    """What the command line asked for: interleaved runs of both sides, a small case for a test of the script itself, a file for the figures, and some
+    of the cases (none: all)."""
 
     runs: int
     quick: bool
