@@ -28,6 +28,8 @@ _WINDOW, _RUDDER_WINDOW = 15.0, 6.0
 """Seconds at 130 m, Froude-scaled."""
 _LAGS = (0.0, 2.0, 5.0, 10.0)
 """Seconds by which an actuator may follow its command."""
+_LEAST_PUSH = 0.05
+"""Of the greatest force, which a thruster that is used reaches."""
 _MOST_WINDOWS, _FEWEST_WINDOWS = 1500, 12
 _POOR = 0.15
 _SWAPPED = "exchanged with y"
@@ -318,7 +320,8 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
     greatest = ship.thrusters.max_force if ship.thrusters else 0.0
     for channel in (F_B, F_S):
         push = float(np.max(np.abs(S[:, channel])))
-        if 0.0 < push < 2e-3 * greatest and push * 1e3 < 1.5 * greatest:
+        ordered = any(np.any(run.inputs[:, channel - N]) for run in runs)  # else it is the noise of a thruster at rest
+        if ordered and _LEAST_PUSH * greatest < push * 1e3 and push < 1.5e-3 * greatest:
             text = f"The greatest force recorded is {push:.3g}, that of the ship file {greatest:.4g} N."
             found.append(_finding(STATES[channel], FACTORS["F_b"]["kN"], text))
     return found

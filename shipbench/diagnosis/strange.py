@@ -36,7 +36,7 @@ def strange_pieces(found: Fit) -> np.ndarray:
 def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
     """What was left out of the fit: the share of a long record, and one line per strange piece, in the times of its run."""
     seg = plant.seg
-    fitted, whole = seg.dt * float(np.maximum(seg.mask.sum(axis=1) - 1, 0).sum()), float(sum(run.t[-1] - run.t[0] for run in runs))
+    fitted, whole = seg.dt * float(np.maximum(seg.mask.sum(axis=1) - 1, 0).sum()), float(sum(run.t[-1] - run.t[0] - seg.dt for run in runs))
     found = []
     if fitted < _MOST * whole:
         found.append(

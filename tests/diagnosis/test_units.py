@@ -136,3 +136,14 @@ def test_hardly_any_data_and_no_motion_raise_no_finding():
     still = misread(data, dict.fromkeys(range(10), 0.0))
     assert check_units(short) == []
     assert check_units(still) == []
+
+
+def test_the_noise_of_a_thruster_at_rest_is_no_unit():
+    """Its 50 N had been a thousandth of the ship file's force, and so kilonewtons beyond doubt."""
+    data, rng = trials("container130"), np.random.default_rng(0)
+
+    def at_rest(run):
+        still = np.pad(50.0 * rng.uniform(-1.0, 1.0, (len(run), 2)), ((0, 0), (8, 0)))
+        return replace(run, states=np.where(np.arange(10) < 8, run.states, still), inputs=np.where(np.arange(4) < 2, run.inputs, 0.0))
+
+    assert check_units(data.with_runs([at_rest(run) for run in data.runs])) == []
