@@ -286,9 +286,8 @@ def _rudder_side(dataset: Dataset, runs: Sequence[Run]) -> _Side:
     agree = sum(np.sign(b) == sign for b in own)
     if abs(slope[0]) < 10.0 * sd or agree < 0.85 * len(own):
         return _Side()
-    return _Side(
-        sign, f"In {agree} of {len(own)} runs the yaw rate goes to the other side after the rudder (pooled slope {abs(slope[0]) / sd:.0f} sigma)."
-    )
+    text = f"In {agree} of {len(own)} runs the yaw rate goes to the other side after the rudder (pooled slope {abs(slope[0]) / sd:.0f} sigma)."
+    return _Side(sign, text)
 
 
 def _slopes(block: np.ndarray) -> tuple[np.ndarray, float]:
