@@ -105,5 +105,10 @@ FAULTS: tuple[Fault, ...] = (
     Fault("log cut in two", plant.cut_log, _any("pieces of one log")),
     Fault("commands beside commands", plant.commands, _any("commands"), also=("quantised",)),
     Fault("commands for actuators", plant.commands_only, _any("commands"), also=("quantised",)),
-    Fault("wind to", plant.wind_to, _any("wind to"), wind=True, size="gusts of 10 m/s"),
+    Fault("wind to", plant.wind_to, _any("wind to"), wind=True, size="12 m/s with gusts of 2 m/s"),
+    Fault("wind in degrees", plant.times(wind_from=DEG), _of("unit", "wind_from"), wind=True),
+    Fault("wind as felt", plant.felt_wind("apparent"), _any("wind not true"), wind=True, size="off the bow, ship's motion in it"),
+    Fault("wind as felt, in knots and degrees", plant.felt_wind("apparent", KNOT, DEG), _any("wind not true"), wind=True, size="off the bow"),
+    Fault("wind as felt, from north", plant.felt_wind("apparent-north"), _any("wind not true"), wind=True, size="ship's motion in it"),
+    Fault("true wind off the bow", plant.felt_wind("true-bow"), _any("wind not true"), wind=True),
 )

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..physics.wind import KINDS
 from ..records import Dataset
 from ..signals import wrap_angle
 
@@ -270,6 +271,19 @@ def commands_only(p: Planting) -> None:
 
 def wind_to(p: Planting) -> None:
     p.table["wind_from"] = wrap_angle(p.table["wind_from"].to_numpy() + np.pi)
+
+
+def felt_wind(kind: str, speed: float = 1.0, angle: float = 1.0) -> Callable[[Planting], None]:
+    """The wind as an instrument of `kind` (of `KINDS`) shows it, in other units."""
+
+    def plant(p: Planting) -> None:
+        psi, u, v, come_from = (p.table[c].to_numpy() for c in ("psi", "u", "v", "wind_from"))
+        from_bow, moving = KINDS[kind]
+        wind = p.table["wind_speed"].to_numpy() * np.exp(1j * come_from) + moving * (u + 1j * v) * np.exp(1j * psi)
+        p.table["wind_speed"] = np.abs(wind) * speed
+        p.table["wind_from"] = np.remainder(np.angle(wind) - from_bow * psi, 2.0 * np.pi) * angle
+
+    return plant
 
 
 def wrapped(p: Planting) -> None:

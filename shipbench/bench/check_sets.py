@@ -19,7 +19,7 @@ SHIPS = ("container130", "kcs", "kvlcc2_l7")
 EQUATION, HARBOUR = "eq. (2)", "harbour90_noisy"
 SOURCES = (*SHIPS, EQUATION, HARBOUR)
 """Sea trials of three MMG ships of 130, 230 and 7 m; sea trials of drawn hulls of the fitted model, on container130; port manoeuvres."""
-_WINDY = Trials(gusts=10.0)
+_WINDY = Trials(gusts=2.0, wind=(-8.0, 9.0))
 _CALM = Trials(noise=0.0, gusts=0.0)
 _CALM_SETS = 3
 _NOT_HIDDEN = ("going_astern", "wind_drift")
@@ -28,7 +28,7 @@ _NOT_HIDDEN = ("going_astern", "wind_drift")
 
 @lru_cache(maxsize=32)
 def base_set(source: str, seed: int, wind: bool = False) -> Dataset:
-    """The clean set into which a fault is planted; wind: in strong gusts that are recorded, of an MMG ship only."""
+    """The clean set into which a fault is planted; wind: in a gale that is recorded, of an MMG ship only."""
     if source == EQUATION:
         return fitted_trials(load_mmg_ship(SHIPS[0]), seed)
     if source == HARBOUR:
@@ -42,7 +42,7 @@ def sources_of(wind: bool) -> tuple[str, ...]:
 
 
 def _windy(name: str, seed: int) -> Dataset:
-    """Trials in strong recorded gusts, of a ship that has its area above water (the published KCS and KVLCC2 models have none)."""
+    """Trials in a recorded gale, of a ship that has its area above water (the published KCS and KVLCC2 models have none)."""
     ship = load_mmg_ship(name)
     areas = complete(ship.particulars)
     return sea_trials(replace(ship, A_F=areas.A_F, A_L=areas.A_L), seed, (), _WINDY, wind_recorded=True)

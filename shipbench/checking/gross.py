@@ -1,7 +1,7 @@
 """Errors that touch every figure: frames (ENU, heading from east), earth-fixed velocities, units, signs. They are taken out before finer checks.
 
 Readings of frame and velocities are compared by the share of the track, and of the heading's change, that they leave unexplained; a reading other
-than ours is believed only if it leaves a quarter or less of the squares. Units and signs are `units`.
+than ours is believed only if it leaves a quarter or less of the squares. Units and signs are `units`, those of the wind `wind_reading`.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
 from .track import WINDOW
 from .units import BETTER, UnitFinding, check_units, corrected
+from .wind_reading import mend_wind
 
 _POOR = 0.15
 _FLIPPED = {
@@ -130,7 +131,8 @@ def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
             recording = recording.with_dataset(dataset)
             units = check_units(recording.dataset)
     findings += [_unit_finding(recording, f, units) for f in units if not _follows(f, units)]
-    return recording.with_dataset(corrected(recording.dataset, units)), findings
+    recording, wind = mend_wind(recording.with_dataset(corrected(recording.dataset, units)))
+    return recording, findings + wind
 
 
 def _best_reading(recording: Recording, plain: _Misfit, units: list[UnitFinding]) -> tuple[_Reading, Dataset, _Misfit] | None:

@@ -6,6 +6,8 @@ with the wind coming from the recorded direction and once going to it. The side 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..physics.wind import apparent_wind
@@ -52,24 +54,43 @@ def _fits(recording: Recording, turn: float) -> tuple[list[Fit], np.ndarray, np.
     return fits, wind, changes
 
 
-def check(recording: Recording) -> list[Finding]:
-    """At most one finding; none without wind channels or where the wind does too little."""
+@dataclass(frozen=True)
+class _Turned:
+    """t of the wind's push on surge and sway, as recorded and turned; push and change across the ship (W,)."""
+
+    t_from: np.ndarray
+    t_to: np.ndarray
+    push: np.ndarray
+    change: np.ndarray
+
+
+def blows_to(recording: Recording) -> _Turned | None:
+    """Evidence that wind_from is where the wind blows to; None if it is not, without wind channels or where the wind does too little."""
     if not {"wind_speed", "wind_from"} <= set(recording.dataset.inputs):
-        return []
+        return None
     if len(_rows(recording, 0.0)[0]) < 60:
-        return []
+        return None
     (as_from, wind, changes), (as_to, _, _) = _fits(recording, 0.0), _fits(recording, np.pi)
     t_from, t_to = (np.array([f.value[-1] / f.sd[-1] for f in fits]) for fits in (as_from, as_to))
     clear = int(np.argmax(np.abs(t_from)))
     if t_to[clear] < 5.0 or as_to[clear].p[-1] > CHANCE or t_from[clear] > -3.0 or t_to[1 - clear] < -2.0:
+        return None
+    return _Turned(t_from, t_to, wind[:, 1], changes[:, 1])
+
+
+def check(recording: Recording) -> list[Finding]:
+    """At most one finding."""
+    found = blows_to(recording)
+    if found is None:
         return []
+    t_from, t_to = found.t_from, found.t_to
     text = (
         f"wind_from is where the wind blows to: read as it stands it pushes the ship to windward (t = {t_from[0]:.1f} along, {t_from[1]:.1f} across);"
         f" turned by 180 deg it pushes to leeward (t = {t_to[0]:.1f}, {t_to[1]:.1f})."
     )
     picture = Picture(
         "Change of sway against the wind's push as recorded", "push across the ship, speed squared [m^2/s^2]", "change of v [m/s]",
-        (Curve("windows", wind[:, 1], changes[:, 1], "."),),
+        (Curve("windows", found.push, found.change, "."),),
     )  # fmt: skip
     return [Finding(
         "wind", "error", "wind to", text, toml_line({"signs": {"wind_from": "to"}}), channels=("wind_from",),

@@ -1,7 +1,7 @@
 """What dataset.toml may say of how a record departs from ours, beyond units and signs: frames, clocks, biases, bad samples, gaps.
 
 `shipbench data check` finds these and prints the lines; the loader applies them in this order: frame, bad samples, biases and scales, kind of
-velocities, cuts and gaps, delays, antenna. Values are in our units and signs, after `[units]` and `[signs]`.
+velocities, cuts and gaps, delays, kind of wind, antenna. Values are in our units and signs, after `[units]` and `[signs]`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import pandas as pd
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ..errors import InputError, unknown_name
+from ..physics.wind import true_wind
 from ..signals import COMMANDS, ENVIRONMENT, STATES, wrap_angle
 
 SIGNALS = (*STATES, *COMMANDS, *ENVIRONMENT)
@@ -39,14 +40,17 @@ class Corrections(BaseModel):
 
     frame: "east-north" where x is east and y north; "ENU" where psi besides is counterclockwise from east. velocities: what stands in u and v: "body"
     over ground (ours), "earth" (north and east), "earth-east-north" (east and north), or "water" (body, through water; `current` = [north, east] m/s
-    is added). antenna: [forward, starboard] m from midship of the point whose position is recorded. gaps: "refuse", or "split" runs at gaps in time
-    and at rows that lack values. scale: recorded over true. bias: recorded less true. delay: s by which the record of a signal is late; "velocity"
-    is the vector of u and v in earth axes (late or filtered there, then turned by the heading of the moment).
+    is added). wind: what stands in wind_speed and wind_from: "true" (ours), "apparent" (as felt on board, its direction from the bow),
+    "apparent-north" (as felt on board, from north), "true-bow" (the true wind, its direction from the bow). antenna: [forward, starboard] m from
+    midship of the point whose position is recorded. gaps: "refuse", or "split" runs at gaps in time and at rows that lack values. scale: recorded
+    over true. bias: recorded less true. delay: s by which the record of a signal is late; "velocity" is the vector of u and v in earth axes (late or
+    filtered there, then turned by the heading of the moment).
     """
 
     frame: Literal["NED", "ENU", "east-north"] = "NED"
     velocities: Literal["body", "earth", "earth-east-north", "water"] = "body"
     current: tuple[float, float] | None = None
+    wind: Literal["true", "apparent", "apparent-north", "true-bow"] = "true"
     antenna: tuple[float, float] | None = None
     gaps: Literal["refuse", "split"] = "refuse"
     scale: dict[str, float] = {}
@@ -127,7 +131,15 @@ def correct_run(frame: pd.DataFrame, corrections: Corrections, own: RunCorrectio
             frame[signal] /= scale
     _to_body_over_ground(frame, corrections, own, where)
     parts = [undelayed(part, corrections.delay, dt) for part in _pieces(frame, corrections, own, dt)]  # nothing is interpolated over a gap or a cut
-    return [_at_midship(part, corrections.antenna) for part in parts if len(part) >= _SPLIT_FEWEST]
+    return [_at_midship(_with_true_wind(part, corrections.wind), corrections.antenna) for part in parts if len(part) >= _SPLIT_FEWEST]
+
+
+def _with_true_wind(frame: pd.DataFrame, kind: str) -> pd.DataFrame:
+    if kind == "true" or not {"wind_speed", "wind_from"} <= set(frame):
+        return frame
+    psi, u, v, speed, come_from = (frame[c].to_numpy() for c in ("psi", "u", "v", "wind_speed", "wind_from"))
+    north, east = true_wind(psi, u, v, speed, come_from, kind)
+    return frame.assign(wind_speed=np.hypot(north, east), wind_from=np.arctan2(east, north))
 
 
 def _at_midship(frame: pd.DataFrame, antenna: tuple[float, float] | None) -> pd.DataFrame:

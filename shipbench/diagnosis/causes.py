@@ -16,6 +16,7 @@ from .gears import GearFinding
 from .model import FREE, HULL_SPREAD, Term
 from .outcome import Candidate, Cause, Estimate, Gain
 from .plant import HULL, NUM_HULL
+from .robust import covariance, inflation
 from .screen import Score
 from .select import AS_RECORDED, AS_SHIPS_DIFFER, WITHOUT_WIND
 from .settle import Fit
@@ -105,12 +106,7 @@ def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
         low, high = np.sqrt(num / chi2.ppf(0.975, num)), np.sqrt(num / chi2.ppf(0.025, num))
         names = [p.name for p in effect.parameters if not p.shape]
         return {f"{n}_rms": Estimate(float(r), effect.parameters[0].unit, (float(r * low), float(r * high))) for n, r in zip(names, rms, strict=True)}
-    columns = fit.columns_of(index)
-    at = np.flatnonzero(np.isin(fit.prior.shared, columns))
-    cov = (
-        np.maximum(1.0, _inflation(fit, at))[:, None] ** 0.5 * fit.solution.cov[np.ix_(at, at)] * np.maximum(1.0, _inflation(fit, at))[None, :] ** 0.5
-    )
-    cov = cov * np.outer(unit, unit)
+    cov = covariance(fit, index) * np.outer(unit, unit)
     half = float(t.ppf(0.975, max(num - 1, 1)))
     q = (*value, *term.setting)
     reported, units = effect.public(q), effect.units()
@@ -136,17 +132,6 @@ def _spread(effect: Effect, q: Sequence[float], name: str, cov: np.ndarray, num:
     return float(np.sqrt(max(slopes @ cov @ slopes, 0.0)))
 
 
-def _inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
-    """Clustered over model variance of some coefficients."""
-    S, mean = fit.reduced.S, fit.solution.mean
-    keep = fit.prior.shared
-    scores = S[:, keep, -1] - np.einsum("nij,j->ni", S[:, keep][:, :, keep], mean)
-    bread = fit.solution.cov
-    num = len(S)
-    sandwich = bread @ (scores.T @ scores * num / max(num - 1, 1)) @ bread
-    return np.diag(sandwich)[at] / np.diag(bread)[at]
-
-
 def _gear_cause(found: Analysis, g: GearFinding, gain: Gain | None) -> Cause:
     effect = EFFECTS.get(g.effect)
     parameter = effect.parameters[0]
@@ -165,8 +150,8 @@ def _hull_cause(found: Analysis, gain: Gain | None) -> Cause:
     fit = found.final
     at = np.arange(len(FREE), len(FREE) + NUM_HULL)
     half = float(t.ppf(0.975, max(fit.plant.seg.runs - 1, 1)))
-    inflation = np.maximum(1.0, _inflation(fit, at)) ** 0.5
-    values, sd = HULL_SPREAD * fit.solution.mean[at], HULL_SPREAD * np.sqrt(np.diag(fit.solution.cov)[at]) * inflation
+    wider = np.maximum(1.0, inflation(fit, at)) ** 0.5
+    values, sd = HULL_SPREAD * fit.solution.mean[at], HULL_SPREAD * np.sqrt(np.diag(fit.solution.cov)[at]) * wider
     parameters = {
         p.name: Estimate(float(v), p.unit, (float(v - half * s), float(v + half * s))) for p, v, s in zip(HULL.parameters, values, sd, strict=True)
     }
@@ -239,6 +224,8 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
     if label in inside:
         late = any(t.label == label and t.since is not None for t in found.final.model.terms)
         return "named as a change_point" if late and "change_point" in named else _DOUBT
+    if label in found.selection.unsure:
+        return "its 95 % interval over the runs holds zero"
     if not s.term.per_run and float(np.trace(s.information)) < 1.0:
         return "cannot be told from the fitted coefficients with these data"
     if score <= found.threshold:

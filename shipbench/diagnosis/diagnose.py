@@ -20,6 +20,7 @@ from .analysis import HULL_THRESHOLD, NOTICEABLE, THRESHOLD, Analysis, analyse, 
 from .causes import describe_candidates, describe_causes, remaining, unknown_part
 from .clocks import NAMES, check_clocks
 from .derived import faults, has_speeds, marked, said
+from .felt_wind import with_true_wind
 from .gain import FoldGain, fold_gain, summarise
 from .model import NUM_BASE
 from .ordinary import needed
@@ -65,6 +66,7 @@ def diagnose(
     units = check_units(dataset) if only is None else []
     dataset = corrected(dataset, units)
     dataset, drift = over_ground(marked(dataset)) if only is None else (dataset, [])
+    dataset, wind = with_true_wind(dataset) if only is None else (dataset, [])
     late = check_clocks(dataset) if only is None and has_speeds(dataset) else None
     if late is not None:
         dataset = late.mended
@@ -80,7 +82,7 @@ def diagnose(
         doubts = _doubts(found) if only is None else []
         measured = wanted and not doubts
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if measured else Worth()
-    warnings += said(dataset) + drift + doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
+    warnings += said(dataset) + drift + wind + doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     trace = trace_of(dataset, found, worth.hull)

@@ -14,6 +14,7 @@ from .model import Linearisation, Scales, Term
 from .noise import colour_of
 from .ordinary import widened
 from .plant import Plant
+from .robust import is_sure
 from .screen import Score, changes, overlap, screen
 from .settle import Fit, Model, hull_evidence, settle
 from .strange import strange_pieces
@@ -80,7 +81,7 @@ class Step:
 @dataclass(frozen=True)
 class Selection:
     """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final one; off_form:
-    what `AS_SHIPS_DIFFER` must be worth besides the threshold."""
+    what `AS_SHIPS_DIFFER` must be worth besides the threshold; unsure: effects taken out again, since over the runs their size may be zero."""
 
     null: Fit
     final: Fit
@@ -88,6 +89,7 @@ class Selection:
     last: list[Score]
     steps: list[Step]
     off_form: float = 0.0
+    unsure: tuple[str, ...] = ()
 
 
 def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Sequence[str] = ()) -> list[Term]:
@@ -245,10 +247,11 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         now = widened(fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates, guess=now.motion))
         scores = screen(now)
     pruned = _backward(now, threshold, spare_last=False)
+    pruned, unsure = _sure(pruned) if threshold > 0.0 else (pruned, ())
     if pruned is not now:
         now = fit(pruned.plant, pruned.scales, pruned.model, pruned.point, pruned.hyper, pruned.log_tau2, candidates=candidates, guess=pruned.motion)
         scores = screen(now)
-    return Selection(null, now, first, scores, steps, off_form)
+    return Selection(null, now, first, scores, steps, off_form, unsure)
 
 
 def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
@@ -321,3 +324,12 @@ def _backward(found: Fit, threshold: float, spare_last: bool = True) -> Fit:
                 continue
         index += 1
     return found
+
+
+def _sure(found: Fit) -> tuple[Fit, tuple[str, ...]]:
+    """Without the terms, the last first, whose size may be zero over the runs, and their effects."""
+    unsure: tuple[str, ...] = ()
+    while doubtful := [i for i in range(len(found.model.terms)) if not is_sure(found, i)]:
+        unsure += (found.model.terms[doubtful[-1]].label,)
+        found = without(found, doubtful[-1])
+    return found, unsure

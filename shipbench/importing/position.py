@@ -54,13 +54,3 @@ def velocity_at_midship(u: np.ndarray, v: np.ndarray, r: np.ndarray, lever: tupl
 def to_body(north: np.ndarray, east: np.ndarray, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forward and starboard components of a horizontal vector."""
     return north * np.cos(psi) + east * np.sin(psi), -north * np.sin(psi) + east * np.cos(psi)
-
-
-def true_wind(speed: np.ndarray, come_from: np.ndarray, psi: np.ndarray, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """North and east components of where the true wind comes from, times its speed [m/s].
-
-    What is felt on board is true wind plus the ship's own motion: UA (cos gA, sin gA) = UT (cos(gT - psi), sin(gT - psi)) + (u, v), with directions
-    where the wind comes from, gA clockwise from the bow.
-    """
-    forward, starboard = speed * np.cos(come_from) - u, speed * np.sin(come_from) - v
-    return forward * np.cos(psi) - starboard * np.sin(psi), forward * np.sin(psi) + starboard * np.cos(psi)

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..physics.wind import true_wind
 from ..ship import Ship
 from ..signals import COMMANDS, ENVIRONMENT, STATES
 from .mapping import ANGLES, Mapping, Point
-from .position import to_body, to_midship, to_plane, true_wind, velocity_at_midship
+from .position import to_body, to_midship, to_plane, velocity_at_midship
 from .resample import interval_means, interval_values, sample
 from .speeds import Smoothed, derivative
 from .stretches import Stretch
@@ -136,7 +137,7 @@ def _environment(series: Series, columns: dict[str, np.ndarray], mapping: Mappin
     elif "apparent_wind_speed" in series:
         t, speed, come_from = _together(series["apparent_wind_speed"], series["apparent_wind_from"])
         u, v = (np.interp(t, stretch.start + mapping.dt * np.arange(count), columns[name]) for name in "uv")
-        wind = tuple(inputs(t, component) for component in true_wind(speed, come_from, _heading_at(series, t), u, v))  # type: ignore[assignment]
+        wind = tuple(inputs(t, component) for component in true_wind(_heading_at(series, t), u, v, speed, come_from, "apparent"))  # type: ignore[assignment]
     if wind is not None:
         columns["wind_speed"] = np.hypot(*wind)
         columns["wind_from"] = np.unwrap(np.arctan2(wind[1], wind[0]))

@@ -16,6 +16,21 @@ def apparent_wind(psi: Array, u: Array, v: Array, wind_speed: Array, wind_from: 
     return u + wind_speed * cos(angle), v + wind_speed * sin(angle)
 
 
+KINDS = {"true": (0.0, 0.0), "true-bow": (1.0, 0.0), "apparent-north": (0.0, 1.0), "apparent": (1.0, 1.0)}
+"""How a wind may be recorded -> whether its direction counts from the bow, and whether the ship's own motion is in it."""
+
+
+def true_wind(psi: Array, u: Array, v: Array, speed: Array, come_from: Array, kind: str) -> tuple[Array, Array]:
+    """North and east component of W (cos, sin)(wind_from), the true wind [m/s], of one recorded as `kind` (of `KINDS`).
+
+    "apparent" is what an anemometer on board shows, W_A (cos, sin)(angle off the bow): the inverse of `apparent_wind`.
+    """
+    from_bow, moving = KINDS[kind]
+    direction = come_from + from_bow * psi
+    north, east = speed * cos(direction), speed * sin(direction)
+    return north - moving * (u * cos(psi) - v * sin(psi)), east - moving * (u * sin(psi) + v * cos(psi))
+
+
 def blendermann(u_rw: Array, v_rw: Array, A_F: float, A_L: float, L: float) -> tuple[Array, Array, Array]:
     """Wind force (X, Y, N) about midship of a loaded container ship.
 

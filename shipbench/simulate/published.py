@@ -225,7 +225,8 @@ def published_trials(ship: Published, seed: int, hidden: Sequence[Hidden] = (), 
     if ship.rpm is not None:
         sailing.s0[:, 6] = sailing.U[..., 0] = ship.rpm
     steps, forces = sailing.U.shape[1], flow_first(hidden)
-    wind = gusts(rng, plan.runs, steps, sailing.dt, plan.gusts * sailing.scale, 20.0 * sailing.scale)
+    mean = (plan.wind[0] * sailing.scale, plan.wind[1] * sailing.scale)
+    wind = gusts(rng, plan.runs, steps, sailing.dt, plan.gusts * sailing.scale, 20.0 * sailing.scale, mean)
     path = actuator_paths(ship, sailing.s0, sailing.U, sailing.dt, _SUBSTEPS, hidden)
     x: Motion = (*sailing.s0[:, :6].T, *np.zeros((ship.more, plan.runs)))
     S = np.empty((plan.runs, steps + 1, 10))

@@ -29,7 +29,8 @@ CRUISE = 4.5
 @dataclass(frozen=True)
 class Trials:
     """What is sailed: number of runs, samples after the first, gusts (standard deviation per axis [m/s] on a 130 m ship; 0: calm), noise factor,
-    whether runs go astern and use thrusters, and motion in waves, as a factor of `WAVES`."""
+    whether runs go astern and use thrusters, motion in waves, as a factor of `WAVES`, and the mean wind under the gusts (from north and from east
+    [m/s] on a 130 m ship)."""
 
     runs: int = 24
     samples: int = 120
@@ -38,6 +39,7 @@ class Trials:
     astern: bool = True
     thrusters: bool = True
     waves: float = 0.0
+    wind: tuple[float, float] = (0.0, 0.0)
 
 
 def draw_commands(rng: np.random.Generator, ship: Vessel, speed: np.ndarray, rpm: np.ndarray, steps: int, dt: float, plan: Trials) -> np.ndarray:
@@ -70,13 +72,14 @@ def draw_commands(rng: np.random.Generator, ship: Vessel, speed: np.ndarray, rpm
     return U
 
 
-def gusts(rng: np.random.Generator, num: int, steps: int, dt: float, sigma: float, tau: float) -> np.ndarray:
-    """Ornstein-Uhlenbeck wind vectors as (speed, from), (num, steps, 2)."""
+def gusts(rng: np.random.Generator, num: int, steps: int, dt: float, sigma: float, tau: float, mean: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+    """Ornstein-Uhlenbeck wind vectors about a mean (from north, from east) as (speed, from), (num, steps, 2)."""
     keep = np.exp(-dt / tau)
     wind = np.empty((num, steps, 2))
     wind[:, 0] = sigma * rng.standard_normal((num, 2))
     for k in range(1, steps):
         wind[:, k] = keep * wind[:, k - 1] + sigma * np.sqrt(1.0 - keep * keep) * rng.standard_normal((num, 2))
+    wind += mean
     return np.stack([np.hypot(wind[..., 0], wind[..., 1]), np.arctan2(wind[..., 1], wind[..., 0])], axis=-1)
 
 
@@ -158,7 +161,8 @@ def sea_trials(
     rng = np.random.default_rng(seed)
     sailing = draw_sailing(rng, ship, plan, self_propulsion_rpm(Simulator(ship), CRUISE * (ship.L / 130.0) ** 0.5))
     scale, dt = sailing.scale, sailing.dt
-    wind = gusts(rng, plan.runs, sailing.U.shape[1], dt, plan.gusts * scale, 20.0 * scale) if plan.gusts else None
+    mean = (plan.wind[0] * scale, plan.wind[1] * scale)
+    wind = gusts(rng, plan.runs, sailing.U.shape[1], dt, plan.gusts * scale, 20.0 * scale, mean) if plan.gusts else None
     S = sail(ship, sailing.s0, sailing.U, dt, hidden, wind, max_step=sailing.max_step)
     data = write_down(ship, sailing, S, hidden, plan, rng, name, f"shipbench sea trials of {ship.name}, seed {seed}")
     if not wind_recorded or wind is None:

@@ -71,6 +71,14 @@ def test_healed_gross_errors_give_the_clean_samples(name: str, case):
         np.testing.assert_allclose(b.states - turn * (np.arange(len(STATES)) == PSI), a.states, rtol=1e-5, atol=1e-6 * np.max(np.abs(a.states)))
 
 
+@pytest.mark.parametrize("name", [n for n, fault in BY_NAME.items() if fault.wind])
+def test_healed_wind_is_the_true_one(name: str, case):
+    clean, loaded = base_set(SHIP, SEED, wind=True), read_dataset(case(name)[1])
+    for a, b in zip(clean.runs, loaded.runs, strict=True):
+        true, read = (run.inputs[:, -2] * np.exp(1j * run.inputs[:, -1]) for run in (a, b))
+        np.testing.assert_allclose(read, true, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("name", "channel", "within"),
     [("speeds 8 % high", U, 0.08), ("heading bias", PSI, np.deg2rad(0.5)), ("yaw rate bias", R, np.deg2rad(0.01)), ("speeds through water", V, 0.12)],

@@ -8,11 +8,12 @@ from scipy.interpolate import CubicSpline
 from trial import motion
 
 from shipbench.importing.channels import Block
-from shipbench.importing.position import to_body, to_midship, to_plane, true_wind, velocity_at_midship
+from shipbench.importing.position import to_body, to_midship, to_plane, velocity_at_midship
 from shipbench.importing.resample import interval_means, interval_values, sample
 from shipbench.importing.speeds import derivative
 from shipbench.importing.stretches import Feed, Stretches
 from shipbench.physics.mmg import load_mmg_ship
+from shipbench.physics.wind import true_wind
 from shipbench.simulate.harbour import draw_plan, fly
 
 
@@ -43,7 +44,7 @@ def test_antenna_is_moved_to_midship_and_its_velocity_with_it():
 
 
 def test_wind_felt_on_a_ship_that_makes_way_in_calm_air_is_no_wind():
-    north, east = true_wind(np.array([5.0]), np.array([0.0]), np.array([1.0]), np.array([5.0]), np.array([0.0]))
+    north, east = true_wind(np.array([1.0]), np.array([5.0]), np.array([0.0]), np.array([5.0]), np.array([0.0]), "apparent")
     np.testing.assert_allclose([north, east], 0.0, atol=1e-12)
 
 

@@ -1,0 +1,185 @@
+"""Wind as an instrument on board shows it, in place of the true wind: the true wind does not change because the ship turns or speeds up.
+
+Every way to record a wind (off the bow or from north, with the ship's own motion in it or without, clockwise or not, where it comes from or blows to,
+m/s, knots, km/h) is turned back into a true wind. One is believed if it changes less than the wind as recorded, within 40 s (at 130 m, Froude-scaled)
+and from run to run, by what heading and motion of the ship would have put in, and beyond doubt. A ship on one steady course tells nothing.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..data.units import unit_factor
+from ..ops import Array
+from ..physics.wind import KINDS, true_wind
+from ..records import Dataset, Run
+from ..signals import PSI, U, V
+from .finding import Curve, Finding, Picture, toml_line
+from .recording import Recording
+from .statistics import clustered_fit, clusters
+
+CHANNELS = ("wind_speed", "wind_from")
+_WINDOW = 40.0
+_ALIKE, _SURE, _AGAINST = 0.1, 3.0, -1.0
+"""Log of the ratio of squares within which readings are alike; joint t of what is believed (true winds read otherwise: negative, or up to 1.6 on
+63 sets of development ships); least t of changes and of departures each."""
+_FEWEST, _LEAST = 20, 0.05
+"""Windows, and root mean square change of the recorded wind [m/s]."""
+_WORDS = {
+    "true": "the true wind from north", "true-bow": "the true wind off the bow", "apparent": "the wind felt on board, off the bow",
+    "apparent-north": "the wind felt on board, from north",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class WindReading:
+    """A way to read the wind channels: kind of `KINDS`; sign: of `[signs]`, "clockwise" for ours; angle, speed: units."""
+
+    kind: str = "true"
+    sign: str = "clockwise"
+    angle: str = "rad"
+    speed: str = "m/s"
+
+    @property
+    def errors(self) -> int:
+        """Number of separate departures from ours."""
+        ours = WindReading()
+        return sum(a != b for a, b in ((self.kind, ours.kind), (self.sign, ours.sign), (self.angle, ours.angle), (self.speed, ours.speed)))
+
+    def wind(self, run: Run) -> tuple[Array, Array]:
+        """North and east component W (cos, sin)(wind_from) of the true wind [m/s], (T,) each."""
+        speed, come_from = (run.inputs[:, run.inputs_names.index(c)] for c in CHANNELS)
+        angle = come_from * unit_factor("wind_from", self.angle) * (-1.0 if self.sign == "counterclockwise" else 1.0)
+        if self.sign == "to":
+            angle = angle + np.pi
+        psi, u, v = run.states[:, [PSI, U, V]].T
+        return true_wind(psi, u, v, speed * unit_factor("wind_speed", self.speed), angle, self.kind)
+
+    def applied(self, dataset: Dataset) -> Dataset:
+        """The data set with the true wind in its channels."""
+        runs = []
+        for run in dataset.runs:
+            north, east = self.wind(run)
+            inputs = run.inputs.copy()
+            for channel, values in zip(CHANNELS, (np.hypot(north, east), np.arctan2(east, north)), strict=True):
+                inputs[:, run.inputs_names.index(channel)] = values
+            runs.append(replace(run, inputs=inputs))
+        return replace(dataset, runs=tuple(runs))
+
+    def lines(self) -> dict[str, Any]:
+        """For dataset.toml."""
+        units = {c: u for c, u, ours in (("wind_from", self.angle, "rad"), ("wind_speed", self.speed, "m/s")) if u != ours}
+        return {
+            **({"wind": self.kind} if self.kind != "true" else {}), **({"units": units} if units else {}),
+            **({"signs": {"wind_from": self.sign}} if self.sign != "clockwise" else {}),
+        }  # fmt: skip
+
+
+def _readings(angle: str) -> list[WindReading]:
+    """All that changes of the wind can tell apart: sense and unit of speed show only where heading or motion of the ship are in it."""
+    found = []
+    for kind in KINDS:
+        signs = {"true": ("clockwise",), "true-bow": ("clockwise", "counterclockwise")}.get(kind, ("clockwise", "counterclockwise", "to"))
+        speeds = ("m/s", "kn", "km/h") if kind.startswith("apparent") else ("m/s",)
+        found += [WindReading(kind, sign, angle, speed) for sign, speed in itertools.product(signs, speeds)]
+    return found
+
+
+@dataclass(frozen=True)
+class _Windows:
+    """Of windows (W,) that overlap by half: wind at their beginnings and ends (east as imaginary part, by any reading), heading there, and run."""
+
+    begin: np.ndarray
+    end: np.ndarray
+    psi: np.ndarray
+    owner: np.ndarray
+
+    @property
+    def changes(self) -> np.ndarray:
+        return self.end - self.begin
+
+    @property
+    def departures(self) -> np.ndarray:
+        """From the mean of all runs."""
+        return self.begin - self.begin.mean()
+
+
+def _windows(recording: Recording, reading: WindReading) -> _Windows:
+    ahead = max(1, round(_WINDOW * recording.froude / recording.dt))
+    parts = []
+    for i, run in enumerate(recording.runs):
+        north, east = reading.wind(run)
+        wind = np.asarray(north) + 1j * np.asarray(east)
+        at = np.arange(0, len(run) - ahead, max(1, ahead // 2))
+        parts.append((wind[at], wind[at + ahead], run.states[at, PSI], np.full(len(at), i)))
+    return _Windows(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def _evidence(plain: _Windows, reading: WindReading, read: _Windows) -> tuple[float, float]:
+    """Sum of the logs of the ratios of squares, and joint t, of changes and departures: by how much they are smaller `read` so than `plain`."""
+    size = unit_factor("wind_speed", reading.speed)  # a smaller unit alone makes every change smaller
+    before, bow = size * plain.changes, KINDS[reading.kind][0]
+    seen = before if reading.sign == "clockwise" else -before if reading.sign == "to" else np.conj(before)
+    put_in = np.abs(seen * np.exp(1j * bow * plain.psi) - read.changes) + 1e-3  # had the ship kept the heading of the beginning
+    gain, cluster = np.abs(before) ** 2 - np.abs(read.changes) ** 2, clusters(plain.owner)
+    within = clustered_fit(gain / put_in, put_in[:, None], cluster)
+    gain = np.abs(size * plain.departures) ** 2 - np.abs(read.departures) ** 2
+    between = clustered_fit(gain, np.ones((len(gain), 1)), cluster)
+    t = [float(f.value[0] / f.sd[0]) for f in (within, between)]
+    ratios = [_squares(size * a) / max(_squares(b), 1e-12) for a, b in ((plain.changes, read.changes), (plain.departures, read.departures))]
+    return float(np.sum(np.log(ratios))), float(np.sum(t) / 2.0**0.5) if min(t) > _AGAINST else 0.0
+
+
+def _squares(change: np.ndarray) -> float:
+    return float(np.mean(np.abs(change) ** 2))
+
+
+def wind_reading(recording: Recording) -> tuple[WindReading, _Windows, _Windows] | None:
+    """How the wind channels are to be read, and their windows as recorded and so; None where that is as ours."""
+    if not set(CHANNELS) <= set(recording.dataset.inputs):
+        return None
+    first = [run.inputs[0, run.inputs_names.index("wind_from")] for run in recording.runs]  # later it may be continuous beyond a turn
+    angle = "deg" if np.max(np.abs(first)) > 2.0 * np.pi + 0.01 else "rad"
+    ours = WindReading(angle=angle)
+    plain = _windows(recording, ours)
+    if len(plain.changes) >= _FEWEST and _squares(plain.changes) > _LEAST**2:
+        read = {reading: _windows(recording, reading) for reading in _readings(angle)}
+        found = {reading: _evidence(plain, reading, windows) for reading, windows in read.items() if reading != ours}
+        best = max(log for log, _ in found.values())
+        chosen = min((k for k, (log, _) in found.items() if log > best - _ALIKE), key=lambda k: (k.errors, -found[k][0]))
+        if found[chosen][1] > _SURE:
+            return chosen, plain, read[chosen]
+    return None if angle == "rad" else (ours, plain, plain)
+
+
+def mend_wind(recording: Recording) -> tuple[Recording, list[Finding]]:
+    """The recording with the true wind in its channels, and what was there."""
+    found = wind_reading(recording)
+    if found is None:
+        return recording, []
+    reading, plain, read = found
+    size = unit_factor("wind_speed", reading.speed)
+    text = f"wind_speed and wind_from are {said(reading)}"
+    if reading.kind != "true":
+        text += f": as the ship turns and speeds up, the wind as recorded changes by {size * _squares(plain.changes) ** 0.5:.3g} m/s over "
+        text += f"{_WINDOW * recording.froude:.3g} s, read so by {_squares(read.changes) ** 0.5:.3g} m/s, and departs from its mean over all runs "
+        text += f"by {size * _squares(plain.departures) ** 0.5:.3g} m/s, read so by {_squares(read.departures) ** 0.5:.3g} m/s"
+    declared = recording.given.get("wind")
+    todo = f'dataset.toml says wind = "{declared}", which the data contradict: try without it first.' if declared else ""
+    curves = tuple(Curve(label, c.begin.imag, c.begin.real, ".") for label, c in (("as recorded", plain), ("as proposed", read)))
+    finding = Finding(
+        "gross", "error", "wind not true" if reading.kind != "true" else "unit", f"{text}.", "" if declared else toml_line(reading.lines()), todo,
+        CHANNELS if reading.kind != "true" else ("wind_from",), picture=Picture("The wind", "from east [m/s]", "from north [m/s]", curves),
+    )  # fmt: skip
+    return recording.with_dataset(reading.applied(recording.dataset)), [finding]
+
+
+def said(reading: WindReading) -> str:
+    """In words, with the units that are not ours."""
+    units = [u for u, ours in ((reading.angle, "rad"), (reading.speed, "m/s")) if u != ours]
+    sense = {"counterclockwise": " counterclockwise", "to": ", where it blows to"}.get(reading.sign, "")
+    return _WORDS[reading.kind] + sense + (f", in {' and '.join(units)}" if units else "")

@@ -1,0 +1,26 @@
+"""Wind channels that do not hold the true wind: an instrument on board feels the ship's own motion too. Read as true, that is a current, a drag of
+waves or another ship's superstructure."""
+
+from __future__ import annotations
+
+from ..checking.recording import Recording
+from ..checking.wind import blows_to
+from ..checking.wind_reading import CHANNELS, WindReading, said, wind_reading
+from ..records import Dataset
+
+_ADVICE = "`shipbench data check` has the lines for dataset.toml."
+
+
+def with_true_wind(dataset: Dataset) -> tuple[Dataset, list[str]]:
+    """The data set with the true wind in its channels, and a line for the reader where it had another."""
+    if not set(CHANNELS) <= set(dataset.inputs):
+        return dataset, []
+    lines = []
+    found = wind_reading(Recording(dataset))
+    if found is not None:
+        dataset = found[0].applied(dataset)
+        lines.append(f"wind_speed and wind_from are {said(found[0])}: they are read so. {_ADVICE}")
+    if blows_to(Recording(dataset)) is not None:
+        dataset = WindReading(sign="to").applied(dataset)
+        lines.append(f"wind_from is where the wind blows to: it is turned. {_ADVICE}")
+    return dataset, lines

@@ -1,0 +1,39 @@
+"""How sure the size of a cause is if runs are independent, not samples: of a model that is not the ship's, its own errors are too small."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .settle import Fit
+
+_LEVEL = 0.95
+
+
+def inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
+    """Variance of the shared coefficients `at` (P,) by the sandwich clustered by run, over the model's."""
+    S, mean = fit.reduced.S, fit.solution.mean
+    keep = fit.prior.shared
+    scores = S[:, keep, -1] - np.einsum("nij,j->ni", S[:, keep][:, :, keep], mean)
+    bread = fit.solution.cov
+    num = len(S)
+    sandwich = bread @ (scores.T @ scores * num / max(num - 1, 1)) @ bread
+    return np.diag(sandwich)[at] / np.diag(bread)[at]
+
+
+def covariance(fit: Fit, index: int) -> np.ndarray:
+    """Of the values of a cause that all runs share, (P, P) in typical sizes: the model's, widened to the sandwich where that is wider."""
+    at = np.flatnonzero(np.isin(fit.prior.shared, fit.columns_of(index)))
+    wider = np.maximum(1.0, inflation(fit, at)) ** 0.5
+    return fit.solution.cov[np.ix_(at, at)] * np.outer(wider, wider)
+
+
+def is_sure(fit: Fit, index: int) -> bool:
+    """Whether the values of a cause differ from zero (Hotelling's test over the runs); always where each run has its own."""
+    from scipy.stats import f
+
+    if fit.model.terms[index].per_run:
+        return True
+    value, num = fit.values[index], fit.plant.seg.runs
+    size, free = len(value), max(num - len(value), 1)
+    squares = float(value @ np.linalg.solve(covariance(fit, index), value))
+    return bool(squares * free > f.ppf(_LEVEL, size, free) * size * max(num - 1, 1))

@@ -1,0 +1,43 @@
+"""A size is sure if the runs agree on it, whatever the model's own error says."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shipbench.diagnosis.robust import covariance, inflation, is_sure
+
+RUNS = 20
+
+
+def fit_of(estimates: np.ndarray, per_run: bool = False) -> SimpleNamespace:
+    """Runs (N,) with information 9 each, whose own least squares estimates are given; prior N(0, 1)."""
+    information, num = 9.0, len(estimates)
+    S = np.empty((num, 2, 2))
+    S[:, 0, 0], S[:, 0, 1], S[:, 1, 0], S[:, 1, 1] = information, information * estimates, information * estimates, 1.0
+    cov = np.array([[1.0 / (1.0 + num * information)]])
+    mean = cov[0] * information * estimates.sum()
+    return SimpleNamespace(
+        reduced=SimpleNamespace(S=S), solution=SimpleNamespace(mean=mean, cov=cov), prior=SimpleNamespace(shared=np.array([0])), values=(mean,),
+        columns_of=lambda index: np.array([0]), plant=SimpleNamespace(seg=SimpleNamespace(runs=num)),
+        model=SimpleNamespace(terms=(SimpleNamespace(per_run=per_run),)),
+    )  # fmt: skip
+
+
+def test_runs_that_scatter_as_the_model_says_are_not_inflated():
+    estimates = np.random.default_rng(3).standard_normal(2000) / 3.0
+    assert inflation(fit_of(estimates), np.array([0]))[0] == pytest.approx(1.0, abs=0.1)
+    np.testing.assert_allclose(covariance(fit_of(0.1 * estimates), 0), 1.0 / 18001.0)
+
+
+@pytest.mark.parametrize(("scatter", "sure"), [(0.3, True), (3.0, False)])
+def test_the_same_mean_is_sure_only_if_the_runs_agree(scatter: float, sure: bool):
+    fit = fit_of(0.5 + scatter * np.resize([1.0, -1.0], RUNS))
+    assert fit.values[0][0] ** 2 / fit.solution.cov[0, 0] > 40.0  # by the model's own error it is sure beyond doubt
+    assert is_sure(fit, 0) is sure
+
+
+def test_values_of_single_runs_have_no_common_size_to_doubt():
+    assert is_sure(fit_of(np.resize([3.0, -3.0], RUNS), per_run=True), 0)
