@@ -29,7 +29,8 @@ NOTICEABLE = 0.15
 7 m/s gives; in yaw 1.5e-5 rad/s^2 at 130 m. Exact sensors or many samples show with certainty that ships differ in form from eq. (2). (Mariner and
 KVLCC2 with nothing hidden: 0.02 to 0.11; outside causes on development ships: from 0.20.)"""
 _HULL_ALONE = ("speed", "sway velocity", "yaw rate")
-"""A force that follows nothing but the hull's own motion is the hull's: where its derivatives are off, it is no unknown cause."""
+"""A force that follows nothing but the hull's own motion is the hull's: where its derivatives are off, it is no unknown cause, and others are judged
+beside it (in turns the rudder, too, follows the yaw rate)."""
 
 
 @dataclass(frozen=True)
@@ -96,26 +97,25 @@ def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, c
     generic = tuple(dependences(selection.final))
     unknown = None
     if only is None and not cautious:
-        unknown = _unknown(selection, gears, generic, null, hull > HULL_THRESHOLD)
+        unknown = _unknown(selection, gears, _HULL_ALONE if hull > HULL_THRESHOLD else ())
     return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown)
 
 
-def _unknown(selection: Selection, gears: Sequence[GearFinding], after: Sequence[Dependence], null: Fit, hull: bool) -> Dependence | None:
-    """The dependence that beats every named cause, if one does; hull: its derivatives are known to be off."""
+def _unknown(selection: Selection, gears: Sequence[GearFinding], ordinary: Sequence[str]) -> Dependence | None:
+    """The dependence that beats every named cause, if one does; ordinary: variables that a force may follow on this ship."""
 
-    def above(found: Sequence[Dependence]) -> list[Dependence]:
-        strange = [d for d in found if d.size > NOTICEABLE and not (hull and d.variable in _HULL_ALONE)]
-        return [d for d in strange if d.score > _GENERIC_OWN.get(d.variable, GENERIC_THRESHOLD)]
+    def above(fit: Fit) -> list[Dependence]:
+        found = dependences(fit, ordinary)
+        return [d for d in found if d.size > NOTICEABLE and d.score > _GENERIC_OWN.get(d.variable, GENERIC_THRESHOLD)]
 
-    terms = selection.final.model.terms
     best = max([*(s.score for s in selection.steps if s.round == 0), *(g.score for g in gears)], default=-np.inf)
-    left = above(after)
-    if not terms and not gears:
-        return left[0] if left else None
-    first = above(dependences(null))
-    if left and first and first[0].score > best + GENERIC_MARGIN:
-        return first[0]
-    return None
+    left = above(selection.final)
+    if not left:
+        return None
+    if not selection.final.model.terms and not gears:
+        return left[0]
+    first = above(selection.null)
+    return first[0] if first and first[0].score > best + GENERIC_MARGIN else None
 
 
 def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:

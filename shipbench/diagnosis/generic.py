@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .columns import ASIDE, AWAY
-from .gram import Gram, solve
+from .gram import Gram, Prior, solve
 from .plant import Plant
 from .screen import evidence
 from .settle import Fit
@@ -71,29 +72,40 @@ def _centred(x: np.ndarray) -> np.ndarray:
     return x / np.maximum(np.sqrt(np.mean(x**2, axis=(0, 1))), 1e-9)
 
 
-def dependences(fit: Fit) -> list[Dependence]:
-    """Every variable on every axis, best first; judged beside the model of `fit`."""
+def dependences(fit: Fit, beside: Collection[str] = ()) -> list[Dependence]:
+    """Every variable on every axis, best first; judged beside the model of `fit`, and beside forces that follow the variables `beside`."""
     base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
     prior = replace(fit.prior, shared=np.arange(len(fit.prior.shared)), random=np.arange(len(fit.prior.shared), len(base)))
     lean, B = fit.gram.only(base), len(fit.gram.run)
     aside = AWAY * np.diag(fit.scales.eta)[list(ASIDE)]
-    null = solve(lean.reduce(fit.hyper.log_force), prior).log_evidence
-    found = []
+    columns: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for variable, moved in features(fit.plant, aside).items():
         phi, *others = moved.reshape(len(ASIDE) + 1, B, *moved.shape[1:])
-        bent = np.stack([other - phi for other in others]) / aside[range(len(ASIDE)), ASIDE][:, None, None, None]
+        columns[variable] = phi, np.stack([other - phi for other in others]) / aside[range(len(ASIDE)), ASIDE][:, None, None, None]
+
+    def following(gram: Gram, prior: Prior, variable: str, axis: int) -> tuple[Gram, Prior]:
+        phi, bent = columns[variable]
+        more = gram.G.shape[-1] - 1 - gram.latent + np.arange(phi.shape[-1])
+        precision = np.append(prior.precision, np.full(phi.shape[-1], _PRIOR_SD**-2))
+        slopes = np.einsum("bmi,ibmf->bf", fit.by_force[:, :, axis, list(ASIDE)], bent)
+        return _with_features(gram, phi, axis, slopes), replace(prior, shared=np.append(prior.shared, more), precision=precision)
+
+    usual = fit.hyper.log_force
+    for variable in beside:
+        for j in range(len(AXES)):
+            lean, prior = following(lean, prior, variable, j)
+    null = solve(lean.reduce(usual), prior).log_evidence
+    if beside:
+        null, usual, _ = evidence(lean, prior, usual)
+    found = []
+    for variable in (v for v in columns if v not in beside):
         for j, axis in enumerate(AXES):
-            gram = _with_features(lean, phi, j, np.einsum("bmi,ibmf->bf", fit.by_force[:, :, j, list(ASIDE)], bent))
-            more = replace(
-                prior, shared=np.append(prior.shared, len(base) + np.arange(phi.shape[-1])),
-                precision=np.append(prior.precision, np.full(phi.shape[-1], _PRIOR_SD**-2)),
-            )  # fmt: skip
-            quick = solve(gram.reduce(fit.hyper.log_force), more).log_evidence
-            log_force, score = fit.hyper.log_force, quick
-            if quick - null > _WORTH_MORE:
+            gram, more = following(lean, prior, variable, j)
+            score, log_force = solve(gram.reduce(usual), more).log_evidence, usual
+            if score - null > _WORTH_MORE:
                 score, log_force, _ = evidence(gram, more, log_force)
-            share = 1.0 - float(np.exp(log_force[j] - fit.hyper.log_force[j]))
-            size = float(np.sqrt(max(share, 0.0) * np.exp(fit.hyper.log_force[j])))
+            share = 1.0 - float(np.exp(log_force[j] - usual[j]))
+            size = float(np.sqrt(max(share, 0.0) * np.exp(usual[j])))
             found.append(Dependence(variable, axis, 2.0 * (score - null), share, size))
     return sorted(found, key=lambda d: -d.score)
 
