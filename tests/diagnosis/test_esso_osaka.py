@@ -23,7 +23,8 @@ FILTER = 0.93
 
 @pytest.fixture(scope="module")
 def recorded() -> Dataset:
-    """The first 300 s of every eighth run, wind columns withheld, commands taken for positions: the search for quicker gears has nothing to do with sensors."""
+    """The first 300 s of every eighth run, wind columns withheld, commands taken for positions (the search for quicker gears has nothing to do with
+    sensors)."""
     try:
         data = load_dataset("esso_osaka[wind=false]")
     except InputError as error:
