@@ -84,6 +84,7 @@ def check(recording: Recording) -> list[Finding]:
     if found is None:
         return []
     t_from, t_to = found.t_from, found.t_to
+    sign = "clockwise" if recording.given.get("signs", {}).get("wind_from") == "to" else "to"
     text = (
         f"wind_from is where the wind blows to: read as it stands it pushes the ship to windward (t = {t_from[0]:.1f} along, {t_from[1]:.1f} across);"
         f" turned by 180 deg it pushes to leeward (t = {t_to[0]:.1f}, {t_to[1]:.1f})."
@@ -93,7 +94,7 @@ def check(recording: Recording) -> list[Finding]:
         (Curve("windows", found.push, found.change, "."),),
     )  # fmt: skip
     return [Finding(
-        "wind", "error", "wind to", text, toml_line({"signs": {"wind_from": "to"}}), channels=("wind_from",),
+        "wind", "error", "wind to", text, toml_line({"signs": {"wind_from": sign}}), channels=("wind_from",),
         evidence={"t_from_along": t_from[0], "t_from_across": t_from[1], "t_to_along": t_to[0], "t_to_across": t_to[1]}, picture=picture,
     )]  # fmt: skip
 

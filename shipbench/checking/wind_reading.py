@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from ..data.units import unit_factor
-from ..ops import Array
 from ..physics.wind import KINDS, true_wind
 from ..records import Dataset, Run
 from ..signals import PSI, U, V
@@ -50,22 +49,20 @@ class WindReading:
         ours = WindReading()
         return sum(a != b for a, b in ((self.kind, ours.kind), (self.sign, ours.sign), (self.angle, ours.angle), (self.speed, ours.speed)))
 
-    def wind(self, run: Run) -> tuple[Array, Array]:
-        """North and east component W (cos, sin)(wind_from) of the true wind [m/s], (T,) each."""
-        speed, come_from = (run.inputs[:, run.inputs_names.index(c)] for c in CHANNELS)
+    def wind(self, psi: np.ndarray, u: np.ndarray, v: np.ndarray, speed: np.ndarray, come_from: np.ndarray) -> np.ndarray:
+        """True wind W exp(i wind_from) [m/s], east as imaginary part, (T,)."""
         angle = come_from * unit_factor("wind_from", self.angle) * (-1.0 if self.sign == "counterclockwise" else 1.0)
         if self.sign == "to":
             angle = angle + np.pi
-        psi, u, v = run.states[:, [PSI, U, V]].T
-        return true_wind(psi, u, v, speed * unit_factor("wind_speed", self.speed), angle, self.kind)
+        north, east = true_wind(psi, u, v, speed * unit_factor("wind_speed", self.speed), angle, self.kind)
+        return np.asarray(north) + 1j * np.asarray(east)
 
     def applied(self, dataset: Dataset) -> Dataset:
         """The data set with the true wind in its channels."""
         runs = []
         for run in dataset.runs:
-            north, east = self.wind(run)
-            inputs = run.inputs.copy()
-            for channel, values in zip(CHANNELS, (np.hypot(north, east), np.arctan2(east, north)), strict=True):
+            wind, inputs = self.wind(*_recorded(run)), run.inputs.copy()
+            for channel, values in zip(CHANNELS, (np.abs(wind), np.angle(wind)), strict=True):
                 inputs[:, run.inputs_names.index(channel)] = values
             runs.append(replace(run, inputs=inputs))
         return replace(dataset, runs=tuple(runs))
@@ -77,6 +74,11 @@ class WindReading:
             **({"wind": self.kind} if self.kind != "true" else {}), **({"units": units} if units else {}),
             **({"signs": {"wind_from": self.sign}} if self.sign != "clockwise" else {}),
         }  # fmt: skip
+
+
+def _recorded(run: Run) -> np.ndarray:
+    """psi, u, v, wind_speed and wind_from, (5, T)."""
+    return np.vstack([run.states[:, [PSI, U, V]].T, *(run.inputs[:, run.inputs_names.index(c)] for c in CHANNELS)])
 
 
 def _readings(angle: str) -> list[WindReading]:
@@ -108,15 +110,17 @@ class _Windows:
         return self.begin - self.begin.mean()
 
 
-def _windows(recording: Recording, reading: WindReading) -> _Windows:
+def _ends(recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What is recorded at the beginnings and at the ends of all windows, (5, W) each, and the run of each, (W,)."""
     ahead = max(1, round(_WINDOW * recording.froude / recording.dt))
-    parts = []
+    begins, ends, owner = [], [], []
     for i, run in enumerate(recording.runs):
-        north, east = reading.wind(run)
-        wind = np.asarray(north) + 1j * np.asarray(east)
         at = np.arange(0, len(run) - ahead, max(1, ahead // 2))
-        parts.append((wind[at], wind[at + ahead], run.states[at, PSI], np.full(len(at), i)))
-    return _Windows(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+        rows = _recorded(run)
+        begins.append(rows[:, at])
+        ends.append(rows[:, at + ahead])
+        owner.append(np.full(len(at), i))
+    return np.hstack(begins), np.hstack(ends), np.concatenate(owner)
 
 
 def _evidence(plain: _Windows, reading: WindReading, read: _Windows) -> tuple[float, float]:
@@ -145,10 +149,15 @@ def wind_reading(recording: Recording) -> tuple[WindReading, _Windows, _Windows]
     first = [run.inputs[0, run.inputs_names.index("wind_from")] for run in recording.runs]  # later it may be continuous beyond a turn
     angle = "deg" if np.max(np.abs(first)) > 2.0 * np.pi + 0.01 else "rad"
     ours = WindReading(angle=angle)
-    plain = _windows(recording, ours)
+    begin, end, owner = _ends(recording)
+
+    def windows(reading: WindReading) -> _Windows:
+        return _Windows(reading.wind(*begin), reading.wind(*end), begin[0], owner)
+
+    plain = windows(ours)
     if len(plain.changes) >= _FEWEST and _squares(plain.changes) > _LEAST**2:
-        read = {reading: _windows(recording, reading) for reading in _readings(angle)}
-        found = {reading: _evidence(plain, reading, windows) for reading, windows in read.items() if reading != ours}
+        read = {reading: windows(reading) for reading in _readings(angle)}
+        found = {reading: _evidence(plain, reading, w) for reading, w in read.items() if reading != ours}
         best = max(log for log, _ in found.values())
         chosen = min((k for k, (log, _) in found.items() if log > best - _ALIKE), key=lambda k: (k.errors, -found[k][0]))
         if found[chosen][1] > _SURE:
@@ -168,14 +177,23 @@ def mend_wind(recording: Recording) -> tuple[Recording, list[Finding]]:
         text += f": as the ship turns and speeds up, the wind as recorded changes by {size * _squares(plain.changes) ** 0.5:.3g} m/s over "
         text += f"{_WINDOW * recording.froude:.3g} s, read so by {_squares(read.changes) ** 0.5:.3g} m/s, and departs from its mean over all runs "
         text += f"by {size * _squares(plain.departures) ** 0.5:.3g} m/s, read so by {_squares(read.departures) ** 0.5:.3g} m/s"
-    declared = recording.given.get("wind")
-    todo = f'dataset.toml says wind = "{declared}", which the data contradict: try without it first.' if declared else ""
+    declared = _declared(recording, reading)
+    todo = f"dataset.toml says {' and '.join(declared)}, which the data contradict: try without that first." if declared else ""
     curves = tuple(Curve(label, c.begin.imag, c.begin.real, ".") for label, c in (("as recorded", plain), ("as proposed", read)))
     finding = Finding(
         "gross", "error", "wind not true" if reading.kind != "true" else "unit", f"{text}.", "" if declared else toml_line(reading.lines()), todo,
         CHANNELS if reading.kind != "true" else ("wind_from",), picture=Picture("The wind", "from east [m/s]", "from north [m/s]", curves),
     )  # fmt: skip
     return recording.with_dataset(reading.applied(recording.dataset)), [finding]
+
+
+def _declared(recording: Recording, reading: WindReading) -> list[str]:
+    """What dataset.toml says already of what the reading changes."""
+    given = {"wind": recording.given.get("wind")}
+    given |= {f"[{table}] {c}": recording.given.get(table, {}).get(c) for table in ("units", "signs") for c in CHANNELS}
+    lines = reading.lines()
+    wanted = {"wind"} & set(lines) | {f"[{table}] {c}" for table in ("units", "signs") for c in lines.get(table, {})}
+    return [f'{key} = "{given[key]}"' for key in sorted(wanted) if given[key] is not None]
 
 
 def said(reading: WindReading) -> str:

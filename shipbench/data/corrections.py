@@ -111,7 +111,7 @@ def correct_run(frame: pd.DataFrame, corrections: Corrections, own: RunCorrectio
     unwrap: make the heading continuous (not where it may not be in rad yet).
 
     Raises:
-        InputError: a fill has no samples to stand on, or velocities through water lack their current.
+        InputError: a fill has no samples to stand on, velocities through water lack their current, or a kind of wind its columns.
     """
     frame = frame.reset_index(drop=True).copy()
     t = frame["t"].to_numpy()
@@ -131,12 +131,14 @@ def correct_run(frame: pd.DataFrame, corrections: Corrections, own: RunCorrectio
             frame[signal] /= scale
     _to_body_over_ground(frame, corrections, own, where)
     parts = [undelayed(part, corrections.delay, dt) for part in _pieces(frame, corrections, own, dt)]  # nothing is interpolated over a gap or a cut
-    return [_at_midship(_with_true_wind(part, corrections.wind), corrections.antenna) for part in parts if len(part) >= _SPLIT_FEWEST]
+    return [_at_midship(_with_true_wind(part, corrections.wind, where), corrections.antenna) for part in parts if len(part) >= _SPLIT_FEWEST]
 
 
-def _with_true_wind(frame: pd.DataFrame, kind: str) -> pd.DataFrame:
-    if kind == "true" or not {"wind_speed", "wind_from"} <= set(frame):
+def _with_true_wind(frame: pd.DataFrame, kind: str, where: str) -> pd.DataFrame:
+    if kind == "true":
         return frame
+    if not {"wind_speed", "wind_from"} <= set(frame):
+        raise InputError(f'{where}: wind = "{kind}" needs the columns wind_speed and wind_from. Add them, or remove that line of dataset.toml.')
     psi, u, v, speed, come_from = (frame[c].to_numpy() for c in ("psi", "u", "v", "wind_speed", "wind_from"))
     north, east = true_wind(psi, u, v, speed, come_from, kind)
     return frame.assign(wind_speed=np.hypot(north, east), wind_from=np.arctan2(east, north))

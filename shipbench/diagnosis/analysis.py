@@ -36,8 +36,7 @@ beside it (in turns the rudder, too, follows the yaw rate)."""
 @dataclass(frozen=True)
 class Analysis:
     """What was found in one set of runs. threshold: that was used; hull: 2 log evidence that the hull is off the regressions, or 0; unknown: the
-    dependence
-    that no named cause covers; gears: named findings; plain_gears: the ordinary gears that fit best."""
+    dependence that no named cause covers; gears: named findings; plain_gears: the ordinary gears that fit best."""
 
     selection: Selection
     threshold: float
@@ -97,24 +96,24 @@ def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, c
     generic = tuple(dependences(selection.final))
     unknown = None
     if only is None and not cautious:
-        unknown = _unknown(selection, gears, _HULL_ALONE if hull > HULL_THRESHOLD else ())
+        unknown = _unknown(selection, gears, generic, _HULL_ALONE if hull > HULL_THRESHOLD else ())
     return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown)
 
 
-def _unknown(selection: Selection, gears: Sequence[GearFinding], ordinary: Sequence[str]) -> Dependence | None:
-    """The dependence that beats every named cause, if one does; ordinary: variables that a force may follow on this ship."""
+def _unknown(selection: Selection, gears: Sequence[GearFinding], after: Sequence[Dependence], ordinary: Sequence[str]) -> Dependence | None:
+    """The dependence that beats every named cause, if one does; after: those beside the causes; ordinary: variables that a force may follow on this
+    ship, beside which all are judged again."""
 
-    def above(fit: Fit) -> list[Dependence]:
-        found = dependences(fit, ordinary)
+    def above(found: Sequence[Dependence]) -> list[Dependence]:
         return [d for d in found if d.size > NOTICEABLE and d.score > _GENERIC_OWN.get(d.variable, GENERIC_THRESHOLD)]
 
     best = max([*(s.score for s in selection.steps if s.round == 0), *(g.score for g in gears)], default=-np.inf)
-    left = above(selection.final)
+    left = above(dependences(selection.final, ordinary) if ordinary else after)
     if not left:
         return None
     if not selection.final.model.terms and not gears:
         return left[0]
-    first = above(selection.null)
+    first = above(dependences(selection.null, ordinary))
     return first[0] if first and first[0].score > best + GENERIC_MARGIN else None
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..effects.base import EFFECTS
-from ..errors import WorkError
+from ..errors import InputError, WorkError
 from ..ops import Array
 from ..physics import eq2, wind
 from ..physics.modifiers import Flow, Modifiers
@@ -84,9 +84,12 @@ def fitted_trials(ship: Vessel, seed: int, plan: Trials | None = None, name: str
     A drawn hull that spins (|r| L over the speed beyond 1.5) is drawn again.
 
     Raises:
+        InputError: the plan has a mean wind, which eq. (2) does not know.
         WorkError: no drawn hull of 50 is one that can be sailed.
     """
     plan = plan or Trials()
+    if any(plan.wind):
+        raise InputError(f"trials of eq. (2) have no mean wind (value: {plan.wind}); accepted: gusts alone, or `sea_trials` of an MMG ship.")
     rng = np.random.default_rng(seed)
     particulars = complete(ship.particulars)
     c = eq2.coefficients(particulars)

@@ -162,7 +162,7 @@ def sea_trials(
     sailing = draw_sailing(rng, ship, plan, self_propulsion_rpm(Simulator(ship), CRUISE * (ship.L / 130.0) ** 0.5))
     scale, dt = sailing.scale, sailing.dt
     mean = (plan.wind[0] * scale, plan.wind[1] * scale)
-    wind = gusts(rng, plan.runs, sailing.U.shape[1], dt, plan.gusts * scale, 20.0 * scale, mean) if plan.gusts else None
+    wind = gusts(rng, plan.runs, sailing.U.shape[1], dt, plan.gusts * scale, 20.0 * scale, mean) if plan.gusts or any(mean) else None
     S = sail(ship, sailing.s0, sailing.U, dt, hidden, wind, max_step=sailing.max_step)
     data = write_down(ship, sailing, S, hidden, plan, rng, name, f"shipbench sea trials of {ship.name}, seed {seed}")
     if not wind_recorded or wind is None:

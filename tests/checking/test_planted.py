@@ -15,6 +15,7 @@ from shipbench.bench.check_sets import EQUATION, SHIPS, base_set, clean_sets
 from shipbench.bench.check_suite import Outcome, apply_lines, run_case, write_planted
 from shipbench.checking.base import check_dataset, check_path
 from shipbench.data.files import read_dataset
+from shipbench.errors import InputError
 from shipbench.signals import DELTA, PSI, STATES, R, U, V, X, Y
 
 SEED = 311  # neither one on which thresholds were set nor one that the suite reports
@@ -77,6 +78,20 @@ def test_healed_wind_is_the_true_one(name: str, case):
     for a, b in zip(clean.runs, loaded.runs, strict=True):
         true, read = (run.inputs[:, -2] * np.exp(1j * run.inputs[:, -1]) for run in (a, b))
         np.testing.assert_allclose(read, true, atol=1e-6)
+
+
+@pytest.mark.parametrize(("wrong", "right"), [({"wind": "apparent"}, "wind = "), ({"signs": {"wind_from": "to"}}, "clockwise")])
+def test_a_declaration_that_makes_the_wind_wrong_is_what_the_finding_speaks_of(wrong: dict, right: str, tmp_path):
+    folder = write_planted(base_set(SHIP, SEED, wind=True), Fault("declared", lambda p: p.toml.update(wrong), []), SEED, tmp_path / "set")
+    (finding,) = check_path(str(folder))[1]
+    assert finding.channels[-1] == "wind_from"
+    assert right in finding.line + finding.todo
+
+
+def test_a_kind_of_wind_without_a_wind_is_refused(tmp_path):
+    folder = write_planted(base_set(SHIP, SEED), Fault("declared", lambda p: p.toml.update(wind="apparent"), []), SEED, tmp_path / "set")
+    with pytest.raises(InputError, match="needs the columns wind_speed and wind_from"):
+        read_dataset(folder)
 
 
 @pytest.mark.parametrize(
