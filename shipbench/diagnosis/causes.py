@@ -16,7 +16,7 @@ from .gears import GearFinding
 from .model import FREE, HULL_SPREAD, Term
 from .outcome import Candidate, Cause, Estimate, Gain
 from .plant import HULL, NUM_HULL
-from .robust import covariance, inflation
+from .robust import NEGLIGIBLE, covariance, inflation
 from .screen import Score
 from .select import AS_RECORDED, AS_SHIPS_DIFFER, WITHOUT_WIND
 from .settle import Fit
@@ -226,6 +226,8 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
         return "named as a change_point" if late and "change_point" in named else _DOUBT
     if label in found.selection.unsure:
         return "its 95 % interval over the runs holds zero"
+    if label in found.selection.tiny:
+        return f"score {score:.0f}, but less than {NEGLIGIBLE:.0%} of its typical size: too small to matter"
     if not s.term.per_run and float(np.trace(s.information)) < 1.0:
         return "cannot be told from the fitted coefficients with these data"
     if score <= found.threshold:
@@ -246,7 +248,7 @@ def _shown(s: Score, fit: Fit) -> dict[str, float]:
 
 
 def _detectable(found: Analysis, s: Score) -> dict[str, float]:
-    """Size whose expected score is the threshold, along each amplitude: x^2 V - log(1 + V) - cost = T."""
+    """Size whose expected score is the threshold, along each amplitude: x^2 V - log(1 + V) - cost = T; none that is `NEGLIGIBLE`."""
     unit = found.selection.null.scales.amplitudes(s.term, found.selection.null.plant.c.L)
     if s.term.per_run:
         return {}
@@ -254,7 +256,7 @@ def _detectable(found: Analysis, s: Score) -> dict[str, float]:
     values, needed = {}, found.threshold + s.term.cost(found.selection.null.plant.seg.runs)
     for i, name in enumerate(names):
         V = float(s.information[i, i])
-        size = float(unit[i] * np.sqrt((needed + np.log1p(max(V, 0.0))) / V)) if V > 1e-6 else float("nan")
+        size = float(unit[i] * max(np.sqrt((needed + np.log1p(max(V, 0.0))) / V), NEGLIGIBLE)) if V > 1e-6 else float("nan")
         values[name] = s.term.effect.public((size, 0.0))[s.term.effect.vector[0]] if s.term.effect.vector else size
     return values
 

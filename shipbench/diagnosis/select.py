@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -14,7 +14,7 @@ from .model import Linearisation, Scales, Term
 from .noise import colour_of
 from .ordinary import widened
 from .plant import Plant
-from .robust import is_sure
+from .robust import is_sure, matters
 from .screen import Score, changes, overlap, screen
 from .settle import Fit, Model, hull_evidence, settle
 from .strange import strange_pieces
@@ -81,7 +81,8 @@ class Step:
 @dataclass(frozen=True)
 class Selection:
     """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final one; off_form:
-    what `AS_SHIPS_DIFFER` must be worth besides the threshold; unsure: effects taken out again, since over the runs their size may be zero."""
+    what `AS_SHIPS_DIFFER` must be worth besides the threshold; unsure: effects taken out again, since over the runs their size may be zero; tiny:
+    effects that gain more than the threshold, but are too small to matter."""
 
     null: Fit
     final: Fit
@@ -90,6 +91,7 @@ class Selection:
     steps: list[Step]
     off_form: float = 0.0
     unsure: tuple[str, ...] = ()
+    tiny: tuple[str, ...] = ()
 
 
 def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Sequence[str] = ()) -> list[Term]:
@@ -224,11 +226,13 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     `null` must carry the candidates. Candidates are refitted if their linear score is among the best, or the best of their family.
     """
     candidates, first = null.candidates, screen(null)
-    # who is told the names, with a threshold of zero, needs no such care
-    off_form = _OFF_FORM * max(hull_evidence(null), 0.0) if threshold > 0.0 else 0.0
-    now, scores, steps, origin = null, first, [], Origin.of(null.plant, null.scales)
+    careful = threshold > 0.0  # who is told the names needs no such care
+    off_form = _OFF_FORM * max(hull_evidence(null), 0.0) if careful else 0.0
+    now, scores, steps, tiny, origin = null, first, [], set[str](), Origin.of(null.plant, null.scales)
 
     def gain(tried: Fit) -> float:
+        if careful and not matters(tried, -1):
+            return -np.inf
         return 2.0 * (tried.evidence - now.evidence) - off_form * (tried.model.terms[-1].label in AS_SHIPS_DIFFER)
 
     for round_ in range(most):
@@ -236,6 +240,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         if all(2.0 * (f.evidence - now.evidence) < threshold for f, _ in tried):
             tried += refits(now, absorbed([f for f, _ in tried], now, threshold, origin), origin, threshold)
         steps += [Step.of(round_, f, now, score) for f, score in tried]
+        tiny |= {f.model.terms[-1].label for f, score in tried if score > threshold and not matters(f, -1)}
         best = _or_change(now, max((f for f, _ in tried), key=gain, default=None), origin)
         imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
         # what a fit that does not rest could still gain by itself is no gain of the next cause
@@ -247,11 +252,12 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         now = widened(fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates, guess=now.motion))
         scores = screen(now)
     pruned = _backward(now, threshold, spare_last=False)
-    pruned, unsure = _sure(pruned) if threshold > 0.0 else (pruned, ())
+    pruned, unsure = _without(pruned, is_sure) if careful else (pruned, ())
+    pruned, small = _without(pruned, matters) if careful else (pruned, ())
     if pruned is not now:
         now = fit(pruned.plant, pruned.scales, pruned.model, pruned.point, pruned.hyper, pruned.log_tau2, candidates=candidates, guess=pruned.motion)
         scores = screen(now)
-    return Selection(null, now, first, scores, steps, off_form, unsure)
+    return Selection(null, now, first, scores, steps, off_form, unsure, (*tiny, *small))
 
 
 def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
@@ -326,10 +332,10 @@ def _backward(found: Fit, threshold: float, spare_last: bool = True) -> Fit:
     return found
 
 
-def _sure(found: Fit) -> tuple[Fit, tuple[str, ...]]:
-    """Without the terms, the last first, whose size may be zero over the runs, and their effects."""
-    unsure: tuple[str, ...] = ()
-    while doubtful := [i for i in range(len(found.model.terms)) if not is_sure(found, i)]:
-        unsure += (found.model.terms[doubtful[-1]].label,)
-        found = without(found, doubtful[-1])
-    return found, unsure
+def _without(found: Fit, wanted: Callable[[Fit, int], bool]) -> tuple[Fit, tuple[str, ...]]:
+    """Without the terms that are not `wanted`, the last first, and their effects."""
+    dropped: tuple[str, ...] = ()
+    while others := [i for i in range(len(found.model.terms)) if not wanted(found, i)]:
+        dropped += (found.model.terms[others[-1]].label,)
+        found = without(found, others[-1])
+    return found, dropped

@@ -60,3 +60,14 @@ def test_a_ship_that_goes_astern_for_long_has_nothing_missing():
     assert np.mean(data.runs[5].states[:, 3] < 0.0) > 0.5
     verdict = diagnose(data, gain=False)
     assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
+
+
+@pytest.mark.parametrize(("typical", "named"), [(0.045, False), (0.1, True)])
+def test_what_is_certain_but_tiny_is_not_named(typical: float, named: bool):
+    """Exact sensors in a calm see a gyro that is 0.1 deg off."""
+    bias = EFFECTS.get("heading_bias")
+    verdict = diagnose(trials(Hidden(bias, (typical * bias.parameters[0].typical,)), runs=8, noise=0, gusts=0), gain=False)
+    (line,) = (c for c in verdict.candidates if c.effect == "heading_bias")
+    assert line.score > 30.0
+    assert ("too small to matter" in line.rejected_because, "heading_bias" in [c.effect for c in verdict.causes]) == (not named, named)
+    assert line.detectable["bias"] >= 0.05 * bias.parameters[0].typical

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.robust import covariance, inflation, is_sure
+from shipbench.diagnosis.robust import NEGLIGIBLE, covariance, inflation, is_sure, matters
 
 RUNS = 20
 
@@ -41,3 +41,11 @@ def test_the_same_mean_is_sure_only_if_the_runs_agree(scatter: float, sure: bool
 
 def test_values_of_single_runs_have_no_common_size_to_doubt():
     assert is_sure(fit_of(np.resize([3.0, -3.0], RUNS), per_run=True), 0)
+
+
+@pytest.mark.parametrize("per_run", [False, True])
+def test_a_size_matters_from_its_least_on(per_run: bool):
+    for factor, wanted in ((0.9, False), (1.1, True)):
+        size = factor * NEGLIGIBLE * np.array([0.6, -0.8])
+        values = (np.outer([1.0, -1.0, 1.0], size) if per_run else size,)
+        assert matters(SimpleNamespace(values=values), 0) is wanted
