@@ -13,9 +13,10 @@ import measure
 
 from shipbench.diagnosis.fit import Origin, fit
 from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import screen
-from shipbench.diagnosis.select import candidates_for, likely_first, null_fit, refits, with_term, worth_a_refit
+from shipbench.diagnosis.select import candidates_for, likely_first, refits, with_term, worth_a_refit
 from shipbench.diagnosis.settle import Fit, Model
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship

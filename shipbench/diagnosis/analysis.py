@@ -12,8 +12,9 @@ from .gain import Extension
 from .gears import GearFinding, find_in_gears
 from .generic import Dependence, dependences
 from .model import Scales
+from .plain import null_fit
 from .plant import Plant
-from .select import Selection, candidates_for, null_fit, select
+from .select import Selection, candidates_for, select
 from .settle import Fit, hull_evidence
 
 THRESHOLD = 10.0

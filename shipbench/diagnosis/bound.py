@@ -10,8 +10,8 @@ from ..effects.base import Effect
 from ..records import Dataset
 from .gears import find_in_gears
 from .model import Linearisation, Scales, Term
+from .plain import null_fit
 from .plant import Plant
-from .select import null_fit
 from .settle import Fit, settle
 
 LEVEL = 0.05

@@ -18,7 +18,7 @@ from ..records import Dataset, Run
 from ..signals import PSI, STATES, U, V
 from .fit import Origin, fit
 from .model import Scales
-from .plant import Plant
+from .plant import FEW_PIECES, Plant
 from .settle import Model
 
 NAMES = ("velocity_delay", "position_delay")
@@ -90,7 +90,7 @@ def unfiltered(dataset: Dataset, delay: float) -> tuple[Dataset, float]:
 
 def _evidence(dataset: Dataset, noise_gain: float) -> float:
     """Log evidence of the plain model for the recorded samples, where those of u and v were stretched by `noise_gain`."""
-    plant = Plant.of(dataset)
+    plant = Plant.of(dataset).thinned(FEW_PIECES)
     scales = Scales(plant)
     origin = Origin.of(plant, scales)
     found = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion)

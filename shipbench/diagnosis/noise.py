@@ -12,28 +12,30 @@ from .settle import Fit, evidence_with
 _SHARES, _TIMES = (1.0, 4.0, 16.0, 64.0), (2.0, 6.0, 20.0)
 """Tried; times in samples."""
 _FIRST, _WORTH = ((1.0, 2.0), (4.0, 6.0)), 50.0
-"""Share and time of noise that is tried first, and the log evidence that it must gain: a cause in the sensors leaves lasting residuals, too."""
+"""Share and time of noise that is tried first, and the log evidence that it must gain in all pieces together: a cause in the sensors leaves lasting
+residuals, too."""
 _SWINGS, _MOST_LAG = -0.1, 12
 """Correlation of residuals below which they swing (independent ones: above -0.08), and the lag [samples] up to which that is looked for."""
 _PERIODS, _DAMPING = (1.7, 2.0, 2.3), (0.1, 0.25)
 """Periods tried, in lags of the lowest correlation, and damping ratios."""
 
 
-def colour_of(found: Fit) -> Colour:
-    """Correlation of the noise of each channel that suits the residuals by far better than none."""
+def colour_of(found: Fit, share: float = 1.0) -> Colour:
+    """Correlation of the noise of each channel that suits the residuals by far better than none; found: of this share of the pieces."""
+    worth = _WORTH * share
     colour = Colour.white(found.plant.steps + 1)
     best = evidence_with(found, colour)
     for channel in np.flatnonzero(found.plant.seg.seen).tolist():
-        ways = _lasting(found, colour, channel, best) + _swinging(found, colour, channel)
-        worth = [evidence_with(found, way) for way in ways]
-        if worth and max(worth) > best + _WORTH:
-            best, colour = max(worth), ways[int(np.argmax(worth))]
+        ways = _lasting(found, colour, channel, best + worth) + _swinging(found, colour, channel)
+        tried = [evidence_with(found, way) for way in ways]
+        if tried and max(tried) > best + worth:
+            best, colour = max(tried), ways[int(np.argmax(tried))]
     return colour
 
 
-def _lasting(found: Fit, colour: Colour, channel: int, best: float) -> list[Colour]:
-    """Errors that last for seconds, where there are any."""
-    if max(evidence_with(found, colour.with_channel(channel, share, time)) for share, time in _FIRST) < best + _WORTH:
+def _lasting(found: Fit, colour: Colour, channel: int, least: float) -> list[Colour]:
+    """Errors that last for seconds, where such noise reaches the `least` evidence."""
+    if max(evidence_with(found, colour.with_channel(channel, share, time)) for share, time in _FIRST) < least:
         return []
     return [colour.with_channel(channel, share, time) for share, time in product(_SHARES, _TIMES)]
 

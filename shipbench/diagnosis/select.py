@@ -10,14 +10,13 @@ import numpy as np
 
 from ..effects.base import EFFECTS
 from .fit import Origin, fit
-from .model import Linearisation, Scales, Term
-from .noise import colour_of
+from .model import Linearisation, Term
 from .ordinary import widened
+from .plain import REFIT_ITERATIONS
 from .plant import Plant
 from .robust import is_sure, matters
 from .screen import Score, changes, overlap, screen
-from .settle import Fit, Model, hull_evidence, settle
-from .strange import strange_pieces
+from .settle import Fit, hull_evidence, settle
 
 NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error", "going_astern", "rudder_rate_limit", "shaft_rate_limit")
 """Found by their own tests (prior width of the hull, gated columns, kinematics, the record of the gears), or what every ship does. A limit has no
@@ -27,15 +26,7 @@ AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft
 WITHOUT_WIND = ("wind", "wind_per_run")
 """Only where the wind is not measured."""
 MOST_EFFECTS = 6
-_GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
-_FINER, _FINER_STEPS = 1.2, 3
-"""Factor of the steps that follow, and the most of them."""
-_SEARCHES = 3
-"""For strange pieces."""
 _REFITS = 3
-_REFIT_ITERATIONS = 16
-_FIRST_ITERATIONS = 8
-"""Of the first fit, which gives the background: until that stands, lower variances are rewarded, and a fit creeps towards them for ever."""
 _WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
 """Least linear score of what is refitted: of the threshold, and of the best."""
 _RIVAL, _RIVALS = 0.25, 4
@@ -112,61 +103,6 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Se
     return found
 
 
-def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
-    """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion; where sensors err
-    for longer than a sample, with such noise; without the few pieces that no ship's motion explains."""
-    origin = Origin.of(plant, scales)
-    found = _without_strange(fit(plant, scales, Model(), origin.point, origin.hyper, iterations=_FIRST_ITERATIONS, guess=origin.motion))
-    found = replace(found, scales=scales.with_background(found.hyper))
-    if plant.seg.commanded:
-        for i, name, field in ((0, "n", "T"), (1, "delta", "rate"), (1, "delta", "T")):
-            if np.ptp(plant.seg.commands[..., i]) > 0.0:
-                found = _with_gear(found, name, field)
-    scales = found.scales.coloured(colour_of(found))
-    found = _without_strange(fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion))
-    return widened(found)
-
-
-def _without_strange(found: Fit) -> Fit:
-    """Fitted again without the strangest pieces, which hide the next ones."""
-    for _ in range(_SEARCHES):
-        pieces = strange_pieces(found)
-        if not len(pieces):
-            break
-        plant, candidates = found.plant.without(pieces), found.candidates
-        found = fit(plant, found.scales, found.model, found.point, found.hyper, candidates=candidates, guess=found.motion)
-    return found
-
-
-def _with_gear(found: Fit, name: str, field: str) -> Fit:
-    """`found` behind a gear whose time constant or rate is that of an ordinary one times the factor that suits the motion (servos of models are
-    quicker than Froude's law makes an ordinary gear; what remains of a gear that is a little off passes for a delay)."""
-    first = found
-    for factors in _GEAR_FACTORS:
-        for factor in factors:
-            tried = _behind(found, name, field, getattr(first.plant.ordinary[name], field) * factor)
-            if 2.0 * (tried.evidence - found.evidence) < _WORTH_A_GEAR:
-                break
-            found = tried
-        if found is not first:
-            break
-    for factor in (_FINER, 1.0 / _FINER):
-        before = found
-        for _ in range(_FINER_STEPS):
-            tried = _behind(found, name, field, getattr(found.plant.ordinary[name], field) * factor)
-            if tried.evidence <= found.evidence:
-                break
-            found = tried
-        if found is not before:
-            break
-    return found
-
-
-def _behind(found: Fit, name: str, field: str, value: float) -> Fit:
-    plant = found.plant.driven({name: replace(found.plant.ordinary[name], **{field: value})})
-    return fit(plant, found.scales, found.model, found.point, found.hyper, iterations=_REFIT_ITERATIONS, guess=found.motion)
-
-
 def with_term(before: Fit, score: Score, origin: Origin, least: float = -np.inf) -> Fit:
     """`before` with one more term, fitted from `origin` and the one-step estimate; given up where it does not promise to gain `least`."""
     term = score.term
@@ -175,7 +111,7 @@ def with_term(before: Fit, score: Score, origin: Origin, least: float = -np.inf)
     point = replace(origin.point, terms=model.terms, values=(*before.values, value))
     log_tau2 = before.log_tau2 | ({len(before.model.terms): score.log_tau2} if term.per_run else {})
     hope = before.evidence + 0.5 * least
-    return fit(before.plant, before.scales, model, point, origin.hyper, log_tau2, iterations=_REFIT_ITERATIONS, guess=origin.motion, hope=hope)
+    return fit(before.plant, before.scales, model, point, origin.hyper, log_tau2, iterations=REFIT_ITERATIONS, guess=origin.motion, hope=hope)
 
 
 def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) -> list[tuple[Fit, float]]:
@@ -217,7 +153,7 @@ def without(before: Fit, index: int) -> Fit:
     values = tuple(v for i, v in enumerate(before.point.values) if i != index)
     log_tau2 = {i - (i > index): v for i, v in before.log_tau2.items() if i != index}
     model, point = replace(before.model, terms=terms), replace(before.point, terms=terms, values=values)
-    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=_REFIT_ITERATIONS, guess=before.motion)
+    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=REFIT_ITERATIONS, guess=before.motion)
 
 
 def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selection:

@@ -8,8 +8,8 @@ from scipy.stats import norm
 
 from shipbench.diagnosis.bound import LEVEL, bound, expected_ratio, power
 from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.select import null_fit
 from shipbench.diagnosis.settle import Fit
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship

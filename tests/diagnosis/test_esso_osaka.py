@@ -11,9 +11,10 @@ import pytest
 from shipbench.data.base import load_dataset
 from shipbench.diagnosis.clocks import put_back, unfiltered
 from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import screen
-from shipbench.diagnosis.select import candidates_for, null_fit
+from shipbench.diagnosis.select import candidates_for
 from shipbench.errors import InputError
 from shipbench.records import Dataset, Run
 

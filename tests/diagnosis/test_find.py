@@ -16,9 +16,10 @@ from shipbench.diagnosis.analysis import THRESHOLD
 from shipbench.diagnosis.cases import ON_PUBLISHED, draw_case, singles
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import changes, screen
-from shipbench.diagnosis.select import candidates_for, null_fit, select
+from shipbench.diagnosis.select import candidates_for, select
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship

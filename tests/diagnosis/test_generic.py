@@ -7,8 +7,8 @@ import pytest
 
 from shipbench.diagnosis.generic import dependences
 from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.select import null_fit
 from shipbench.diagnosis.settle import Fit
 from shipbench.simulate.published import PUBLISHED, published_trials
 

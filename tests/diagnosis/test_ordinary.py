@@ -11,9 +11,10 @@ from shipbench.diagnosis.analysis import NOTICEABLE
 from shipbench.diagnosis.diagnose import STRANGE, STRANGE_SUM, diagnose
 from shipbench.diagnosis.model import FREE, NUM_BASE, Linearisation, Scales
 from shipbench.diagnosis.ordinary import needed, widths_of
+from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import NUM_HULL, Plant
 from shipbench.diagnosis.screen import screen
-from shipbench.diagnosis.select import candidates_for, null_fit
+from shipbench.diagnosis.select import candidates_for
 from shipbench.diagnosis.settle import settle
 from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS

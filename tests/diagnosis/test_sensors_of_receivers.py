@@ -15,8 +15,8 @@ from shipbench.diagnosis.fit import Origin, fit
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.noise import colour_of
 from shipbench.diagnosis.over_ground import over_ground
+from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.select import null_fit
 from shipbench.diagnosis.settle import Model
 from shipbench.diagnosis.strange import left_out
 from shipbench.effects.base import EFFECTS

@@ -10,9 +10,9 @@ import pytest
 from shipbench.diagnosis import settle as settling
 from shipbench.diagnosis.fit import Origin, fit, start
 from shipbench.diagnosis.model import FREE, NUM_BASE, Linearisation, Point, Scales, Term
+from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import HULL, Plant
 from shipbench.diagnosis.screen import screen
-from shipbench.diagnosis.select import null_fit
 from shipbench.diagnosis.settle import Fit, Model, settle
 from shipbench.diagnosis.slope import slopes
 from shipbench.diagnosis.structure import STRUCTURE

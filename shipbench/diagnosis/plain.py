@@ -1,0 +1,90 @@
+"""The plain model fitted to all runs, beside which causes are looked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .fit import Origin, fit
+from .model import Scales, Term
+from .noise import colour_of
+from .ordinary import widened
+from .plant import FEW_PIECES, Plant
+from .settle import Fit, Model
+from .strange import strange_pieces
+
+_GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
+_FINER, _FINER_STEPS = 1.2, 3
+"""Factor of the steps that follow, and the most of them."""
+_SEARCHES = 3
+"""For strange pieces."""
+_FIRST_ITERATIONS = 8
+"""Of the first fit, which gives the background: until that stands, lower variances are rewarded, and a fit creeps towards them for ever."""
+REFIT_ITERATIONS = 16
+"""Of a fit that begins beside another one."""
+
+
+def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
+    """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion; where sensors err
+    for longer than a sample, with such noise; without the few pieces that no ship's motion explains."""
+    few = plant.thinned(FEW_PIECES)
+    found = _begun(few, scales)
+    if plant.seg.commanded:
+        for i, name, field in ((0, "n", "T"), (1, "delta", "rate"), (1, "delta", "T")):
+            if np.ptp(plant.seg.commands[..., i]) > 0.0:
+                found = _with_gear(found, name, field)
+    colour = colour_of(found, len(few.seg.run) / len(plant.seg.run))
+    if few is not plant:
+        found = _begun(plant.driven(found.plant.ordinary), scales)
+    scales = found.scales.coloured(colour)
+    found = _without_strange(fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion))
+    return widened(found)
+
+
+def _begun(plant: Plant, scales: Scales) -> Fit:
+    """The first fit, of which the others take the background."""
+    origin = Origin.of(plant, scales)
+    found = _without_strange(fit(plant, scales, Model(), origin.point, origin.hyper, iterations=_FIRST_ITERATIONS, guess=origin.motion))
+    return replace(found, scales=scales.with_background(found.hyper))
+
+
+def _without_strange(found: Fit) -> Fit:
+    """Fitted again without the strangest pieces, which hide the next ones."""
+    for _ in range(_SEARCHES):
+        pieces = strange_pieces(found)
+        if not len(pieces):
+            break
+        plant, candidates = found.plant.without(pieces), found.candidates
+        found = fit(plant, found.scales, found.model, found.point, found.hyper, candidates=candidates, guess=found.motion)
+    return found
+
+
+def _with_gear(found: Fit, name: str, field: str) -> Fit:
+    """`found` behind a gear whose time constant or rate is that of an ordinary one times the factor that suits the motion (servos of models are
+    quicker than Froude's law makes an ordinary gear; what remains of a gear that is a little off passes for a delay)."""
+    first = found
+    for factors in _GEAR_FACTORS:
+        for factor in factors:
+            tried = _behind(found, name, field, getattr(first.plant.ordinary[name], field) * factor)
+            if 2.0 * (tried.evidence - found.evidence) < _WORTH_A_GEAR:
+                break
+            found = tried
+        if found is not first:
+            break
+    for factor in (_FINER, 1.0 / _FINER):
+        before = found
+        for _ in range(_FINER_STEPS):
+            tried = _behind(found, name, field, getattr(found.plant.ordinary[name], field) * factor)
+            if tried.evidence <= found.evidence:
+                break
+            found = tried
+        if found is not before:
+            break
+    return found
+
+
+def _behind(found: Fit, name: str, field: str, value: float) -> Fit:
+    plant = found.plant.driven({name: replace(found.plant.ordinary[name], **{field: value})})
+    return fit(plant, found.scales, found.model, found.point, found.hyper, iterations=REFIT_ITERATIONS, guess=found.motion)
