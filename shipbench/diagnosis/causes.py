@@ -16,9 +16,9 @@ from .gears import GearFinding
 from .model import FREE, HULL_SPREAD, Term
 from .outcome import Candidate, Cause, Estimate, Gain
 from .plant import HULL, NUM_HULL
-from .robust import NEGLIGIBLE, covariance, inflation
+from .robust import covariance, inflation, least_size
 from .screen import Score
-from .select import AS_RECORDED, AS_SHIPS_DIFFER, WITHOUT_WIND
+from .select import AS_RECORDED, WITHOUT_WIND, passes_for_form
 from .settle import Fit
 
 _TIE = 10.0
@@ -176,7 +176,10 @@ def _late_cause(rank: int, found: Analysis, late: LateVelocities) -> Cause:
         f"The plain model agrees: {0.5 * late.score:.0f} of log evidence over the runs as recorded, {0.5 * late.over_position:.0f} over a position "
         "that is early"
     )
-    return Cause("velocity_delay", rank, late.score, _p(found, late.score), parameters, (), "", None, evidence)
+    if late.over_position < 0.0:
+        evidence += ", on which the runs do not agree"
+    confused = ("position_delay",) if late.over_position < 0.0 else ()
+    return Cause("velocity_delay", rank, late.score, _p(found, late.score), parameters, confused, "", None, evidence)
 
 
 def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -> list[Candidate]:
@@ -215,7 +218,7 @@ def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -
 def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str]) -> str:
     """Why a candidate that was screened is not named; last: its score beside the causes found."""
     label, steps, inside = s.term.label, found.selection.steps, [t.label for t in found.final.model.terms]
-    odd = found.selection.off_form if label in AS_SHIPS_DIFFER else 0.0
+    odd = found.selection.off_form if passes_for_form(s.term) else 0.0
     asked, score = found.threshold + odd, max([s.score, *(x.score for x in steps if x.term.label == label)])
     if label in named:
         return "named"
@@ -227,7 +230,7 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
     if label in found.selection.unsure:
         return "its 95 % interval over the runs holds zero"
     if label in found.selection.tiny:
-        return f"score {score:.0f}, but less than {NEGLIGIBLE:.0%} of its typical size: too small to matter"
+        return f"score {score:.0f}, but less than {least_size(label):.0%} of its typical size: too small to matter"
     if not s.term.per_run and float(np.trace(s.information)) < 1.0:
         return "cannot be told from the fitted coefficients with these data"
     if score <= found.threshold:
@@ -248,7 +251,7 @@ def _shown(s: Score, fit: Fit) -> dict[str, float]:
 
 
 def _detectable(found: Analysis, s: Score) -> dict[str, float]:
-    """Size whose expected score is the threshold, along each amplitude: x^2 V - log(1 + V) - cost = T; none that is `NEGLIGIBLE`."""
+    """Size whose expected score is the threshold, along each amplitude: x^2 V - log(1 + V) - cost = T; none below `least_size`."""
     unit = found.selection.null.scales.amplitudes(s.term, found.selection.null.plant.c.L)
     if s.term.per_run:
         return {}
@@ -256,7 +259,7 @@ def _detectable(found: Analysis, s: Score) -> dict[str, float]:
     values, needed = {}, found.threshold + s.term.cost(found.selection.null.plant.seg.runs)
     for i, name in enumerate(names):
         V = float(s.information[i, i])
-        size = float(unit[i] * max(np.sqrt((needed + np.log1p(max(V, 0.0))) / V), NEGLIGIBLE)) if V > 1e-6 else float("nan")
+        size = float(unit[i] * max(np.sqrt((needed + np.log1p(max(V, 0.0))) / V), least_size(s.term.label))) if V > 1e-6 else float("nan")
         values[name] = s.term.effect.public((size, 0.0))[s.term.effect.vector[0]] if s.term.effect.vector else size
     return values
 

@@ -30,7 +30,7 @@ MOST_STEPS, FOLD_STEPS, THOROUGH_STEPS = 24_000, 12_000, 48_000
 """Of all segments together, per stage: more cost many minutes. What differs from run to run, such as the wind, may show only in all of a long record
 (3.5 h of a 3 m model: 48,000)."""
 FEW_PIECES = 200
-"""Segments from which gears, clocks and the noise of sensors are told: 100 runs of 120 s at 130 m."""
+"""Segments from which gears and the noise of sensors are told: 100 runs of 120 s at 130 m."""
 
 
 def ordinary_gears(L: float) -> dict[str, Gear]:

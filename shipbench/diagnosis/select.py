@@ -38,12 +38,13 @@ _IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
 """What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
 _OFF_FORM = 0.02
 AS_SHIPS_DIFFER = (
-    "added_resistance", "center_of_gravity_shift", "cross_flow_drag", "mass_change", "race_gain", "rudder_gain", "rudder_stall", "shallow_water",
-    "thrust_gain", "thruster_gain", "thruster_lever", "thruster_speed_loss", "wake_variation",
+    "added_resistance", "center_of_gravity_shift", "cross_flow_drag", "mass_change", "race_gain", "rudder_delay", "rudder_gain", "rudder_stall",
+    "shallow_water", "thrust_gain", "thruster_gain", "thruster_lever", "thruster_speed_loss", "wake_variation",
 )  # fmt: skip
 """A hull that lies off the regressions is not of the fitted form either, and what its form lacks passes for these, in which ships differ anyhow:
 they must be worth this share of the evidence for such a hull besides. (Mariner, nothing hidden: 600 to 1200 for the hull, 13 to 18 for a wrong name;
-thrust or mass off by their typical size on development ships: 80 to 290, and 28 to 31.)"""
+thrust or mass off by their typical size on development ships: 80 to 290, and 28 to 31.) So must a cause with a value for each run or one that
+begins with a run: where each run is another manoeuvre, what the form lacks differs from run to run."""
 _CHANGES, _CHANGE_MARGIN, _OWN_MARGIN = 2, 14.0, 4.0
 """A beginning is chosen among all effects: it must beat the best cause without one by this; the second where that is the same effect."""
 _INSEPARABLE = ({"wind", "wind_per_run", "wave_drift"},)
@@ -72,8 +73,8 @@ class Step:
 @dataclass(frozen=True)
 class Selection:
     """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final one; off_form:
-    what `AS_SHIPS_DIFFER` must be worth besides the threshold; unsure: effects taken out again, since over the runs their size may be zero; tiny:
-    effects that gain more than the threshold, but are too small to matter."""
+    what a cause that `passes_for_form` must be worth besides the threshold; unsure: effects taken out again, since over the runs their size may be
+    zero; tiny: effects that gain more than the threshold, but are too small to matter."""
 
     null: Fit
     final: Fit
@@ -83,6 +84,11 @@ class Selection:
     off_form: float = 0.0
     unsure: tuple[str, ...] = ()
     tiny: tuple[str, ...] = ()
+
+
+def passes_for_form(term: Term) -> bool:
+    """Whether what the form of a hull lacks could pass for it."""
+    return term.per_run or term.since is not None or term.label in AS_SHIPS_DIFFER
 
 
 def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Sequence[str] = ()) -> list[Term]:
@@ -169,7 +175,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     def gain(tried: Fit) -> float:
         if careful and not matters(tried, -1):
             return -np.inf
-        return 2.0 * (tried.evidence - now.evidence) - off_form * (tried.model.terms[-1].label in AS_SHIPS_DIFFER)
+        return 2.0 * (tried.evidence - now.evidence) - off_form * passes_for_form(tried.model.terms[-1])
 
     for round_ in range(most):
         tried = refits(now, likely_first(worth_a_refit(scores, now, threshold), now, origin), origin, threshold)

@@ -7,7 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.robust import NEGLIGIBLE, covariance, inflation, is_sure, matters
+from shipbench.diagnosis.model import Term
+from shipbench.diagnosis.robust import covariance, inflation, is_sure, least_size, matters
+from shipbench.diagnosis.select import passes_for_form
+from shipbench.effects.base import EFFECTS
 
 RUNS = 20
 
@@ -44,8 +47,17 @@ def test_values_of_single_runs_have_no_common_size_to_doubt():
 
 
 @pytest.mark.parametrize("per_run", [False, True])
-def test_a_size_matters_from_its_least_on(per_run: bool):
+@pytest.mark.parametrize("effect", ["current", "rudder_delay"])
+def test_a_size_matters_from_its_least_on(effect: str, per_run: bool):
     for factor, wanted in ((0.9, False), (1.1, True)):
-        size = factor * NEGLIGIBLE * np.array([0.6, -0.8])
+        size = factor * least_size(effect) * np.array([0.6, -0.8])
         values = (np.outer([1.0, -1.0, 1.0], size) if per_run else size,)
-        assert matters(SimpleNamespace(values=values), 0) is wanted
+        fit = SimpleNamespace(values=values, model=SimpleNamespace(terms=(SimpleNamespace(label=effect),)))
+        assert matters(fit, 0) is wanted
+
+
+def test_more_is_asked_of_what_the_form_of_a_hull_could_be():
+    """Where each run is another manoeuvre, what a polynomial lacks differs from run to run and passes for winds of single runs."""
+    current, thrust = EFFECTS.get("current"), EFFECTS.get("thrust_gain")
+    assert [passes_for_form(t) for t in (Term(current), Term(current, since=3), Term(thrust))] == [False, True, True]
+    assert passes_for_form(Term(EFFECTS.get("wind_per_run"), per_run=True))

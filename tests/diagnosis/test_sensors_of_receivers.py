@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from shipbench.diagnosis import clocks
 from shipbench.diagnosis.clocks import check_clocks
 from shipbench.diagnosis.colour import Colour
 from shipbench.diagnosis.diagnose import diagnose
@@ -187,6 +188,15 @@ def test_clocks_that_agree_or_a_late_position_are_left_to_the_model(trials):
 
     behind = _changed(trials, late)
     assert check_clocks(behind.with_runs([replace(r, t=r.t[by:], states=r.states[by:], inputs=r.inputs[by:]) for r in behind.runs])) is None
+
+
+@pytest.mark.parametrize(("scatter", "late"), [(60.0, True), (1.0, False)])
+def test_a_position_that_is_early_is_believed_only_where_the_runs_agree(filtered, monkeypatch, scatter: float, late: bool):
+    num = len(filtered.runs)
+    early = 5.0 + scatter * np.resize([1.0, -1.0], num)
+    shares = iter([np.zeros(num), -np.ones(num), early, np.full(num, -50.0)])  # filtered, late, position early, as recorded
+    monkeypatch.setattr(clocks, "_evidence", lambda *_: next(shares))
+    assert (check_clocks(filtered) is not None) is late
 
 
 def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):
