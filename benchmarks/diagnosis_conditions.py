@@ -105,6 +105,7 @@ CHANGES: dict[str, tuple[Trials, Callable[[Dataset], Dataset] | None]] = {
     "main dimensions alone": (Trials(), bare),
     "commands alone": (Trials(), commands),
     "motion in waves": (Trials(waves=1.0), None),
+    "standard manoeuvres": (Trials(runs=10, samples=600, standard=True), None),
 }
 CONDITIONS = [*PLANS, *CHANGES]
 

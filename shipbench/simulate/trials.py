@@ -26,11 +26,19 @@ CRUISE = 4.5
 """Speed [m/s] of the trials on a 130 m ship, where one is needed for orientation; runs begin at 0.45 to 1.25 of it."""
 
 
+STANDARD = (
+    ("turn", 35.0), ("turn", -35.0), ("zig-zag", 10.0), ("zig-zag", -10.0), ("zig-zag", 20.0), ("zig-zag", -20.0), ("stop", 0.0), ("pull-out", 25.0),
+    ("turn", 15.0), ("turn", -15.0),
+)  # fmt: skip
+"""What a yard's trials consist of (IMO MSC.137(76)), with the rudder in degrees."""
+_QUICK_LEG, _SLOW_LEG = 45.0, 65.0
+
+
 @dataclass(frozen=True)
 class Trials:
     """What is sailed: number of runs, samples after the first, gusts (standard deviation per axis [m/s] on a 130 m ship; 0: calm), noise factor,
-    whether runs go astern and use thrusters, motion in waves, as a factor of `WAVES`, and the mean wind under the gusts (from north and from east
-    [m/s] on a 130 m ship)."""
+    whether runs go astern and use thrusters, motion in waves, as a factor of `WAVES`, the mean wind under the gusts (from north and from east
+    [m/s] on a 130 m ship), and whether the runs are `STANDARD` manoeuvres from cruising speed on opposite courses."""
 
     runs: int = 24
     samples: int = 120
@@ -40,6 +48,19 @@ class Trials:
     thrusters: bool = True
     waves: float = 0.0
     wind: tuple[float, float] = (0.0, 0.0)
+    standard: bool = False
+
+
+def standard_commands(rpm: np.ndarray, steps: int, dt: float, scale: float) -> np.ndarray:
+    """Commands (runs, steps, 4) of `STANDARD` in turn, from 20 s on: a turn lasts, a zig-zag reverses six times by the clock, a pull-out ends after
+    200 s, a stop is ordered with 0.6 of the revolutions astern. Times at 130 m."""
+    U, t = np.zeros((len(rpm), steps, 4)), np.arange(steps) * dt / scale - 20.0
+    for i, (kind, degrees) in enumerate(STANDARD[k % len(STANDARD)] for k in range(len(rpm))):
+        leg = np.floor(t / (_SLOW_LEG if abs(degrees) > 15.0 else _QUICK_LEG) + 0.5)  # the first one half as long
+        side = {"zig-zag": np.where(leg < 7, (-1.0) ** leg, 0.0), "pull-out": np.where(t < 200.0, 1.0, 0.0)}.get(kind, 1.0)
+        U[i, :, 0] = np.where((t >= 0.0) & (kind == "stop"), -0.6, 1.0) * rpm[i]
+        U[i, :, 1] = np.where(t >= 0.0, np.deg2rad(degrees) * side, 0.0)
+    return U
 
 
 def draw_commands(rng: np.random.Generator, ship: Vessel, speed: np.ndarray, rpm: np.ndarray, steps: int, dt: float, plan: Trials) -> np.ndarray:
@@ -122,13 +143,17 @@ def draw_sailing(
     scale = (ship.L / 130.0) ** 0.5
     dt = float(f"{scale:.2g}") if scale < 0.5 else 1.0
     cruise = CRUISE * scale if cruise is None else cruise
-    ratio = rng.uniform(*ratios, plan.runs)
+    ratio = rng.uniform(*((0.98, 1.02) if plan.standard else ratios), plan.runs)
     s0 = np.zeros((plan.runs, 10))
     s0[:, :2] = rng.uniform(-600.0, 600.0, (plan.runs, 2)) * ship.L / 130.0
     s0[:, 2], s0[:, 3], s0[:, 6] = rng.uniform(-np.pi, np.pi, plan.runs), cruise * ratio, rpm * ratio
     U = np.zeros((plan.runs, plan.samples + _WARM_UP, 4))
     U[..., 0] = (rpm * ratio)[:, None]
-    U[:, _WARM_UP:] = draw_commands(rng, ship, s0[:, 3], rpm * ratio, plan.samples, dt, plan)
+    if plan.standard:
+        s0[:, 2] = rng.uniform(-np.pi, np.pi) + np.pi * (np.arange(plan.runs) // 2 % 2)  # to port and to starboard on the same course
+        U[:, _WARM_UP:] = standard_commands(rpm * ratio, plan.samples, dt, scale)
+    else:
+        U[:, _WARM_UP:] = draw_commands(rng, ship, s0[:, 3], rpm * ratio, plan.samples, dt, plan)
     # in the warm-up a pilot keeps the heading roughly: small random helm
     U[:, :_WARM_UP, 1] = np.repeat(np.deg2rad(rng.uniform(-4.0, 4.0, (plan.runs, _WARM_UP // 15))), 15, axis=1)
     return Sailing(scale, dt, s0, U)
