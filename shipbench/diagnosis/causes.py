@@ -228,7 +228,7 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
         late = any(t.label == label and t.since is not None for t in found.final.model.terms)
         return "named as a change_point" if late and "change_point" in named else _DOUBT
     if label in found.selection.unsure:
-        return "its 95 % interval over the runs holds zero"
+        return "the runs do not agree that its size is not zero"
     if label in found.selection.tiny:
         return f"score {score:.0f}, but less than {least_size(label):.0%} of its typical size: too small to matter"
     if not s.term.per_run and float(np.trace(s.information)) < 1.0:

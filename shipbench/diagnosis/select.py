@@ -212,7 +212,7 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
     for score in late:
         found = with_term(now, score, origin, _least(best, now) if best is not None and gain > _CHANGE_MARGIN else -np.inf)
         own = plain is not None and plain.model.terms[-1].label == score.term.label
-        if 2.0 * (found.evidence - now.evidence) > gain + (_OWN_MARGIN if own else _CHANGE_MARGIN):
+        if 2.0 * (found.evidence - now.evidence) > gain + (_OWN_MARGIN if own else _CHANGE_MARGIN) and is_sure(found, -1):
             best, gain = found, 2.0 * (found.evidence - now.evidence)
     return best
 

@@ -15,7 +15,7 @@ from shipbench.effects.base import EFFECTS
 RUNS = 20
 
 
-def fit_of(estimates: np.ndarray, per_run: bool = False) -> SimpleNamespace:
+def fit_of(estimates: np.ndarray, per_run: bool = False, since: int | None = None) -> SimpleNamespace:
     """Runs (N,) with information 9 each, whose own least squares estimates are given; prior N(0, 1)."""
     information, num = 9.0, len(estimates)
     S = np.empty((num, 2, 2))
@@ -25,7 +25,7 @@ def fit_of(estimates: np.ndarray, per_run: bool = False) -> SimpleNamespace:
     return SimpleNamespace(
         reduced=SimpleNamespace(S=S), solution=SimpleNamespace(mean=mean, cov=cov), prior=SimpleNamespace(shared=np.array([0])), values=(mean,),
         columns_of=lambda index: np.array([0]), plant=SimpleNamespace(seg=SimpleNamespace(runs=num)),
-        model=SimpleNamespace(terms=(SimpleNamespace(per_run=per_run),)),
+        model=SimpleNamespace(terms=(SimpleNamespace(per_run=per_run, since=since),)),
     )  # fmt: skip
 
 
@@ -40,6 +40,13 @@ def test_the_same_mean_is_sure_only_if_the_runs_agree(scatter: float, sure: bool
     fit = fit_of(0.5 + scatter * np.resize([1.0, -1.0], RUNS))
     assert fit.values[0][0] ** 2 / fit.solution.cov[0, 0] > 40.0  # by the model's own error it is sure beyond doubt
     assert is_sure(fit, 0) is sure
+
+
+@pytest.mark.parametrize(("scatter", "sure"), [(0.2, True), (0.5, False)])
+def test_a_beginning_needs_runs_that_agree_much_better(scatter: float, sure: bool):
+    estimates = 0.5 + scatter * np.resize([1.0, -1.0], RUNS)
+    assert is_sure(fit_of(estimates), 0)
+    assert is_sure(fit_of(estimates, since=4), 0) is sure
 
 
 def test_values_of_single_runs_have_no_common_size_to_doubt():
