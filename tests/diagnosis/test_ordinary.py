@@ -86,3 +86,9 @@ def test_exact_sensors_in_a_calm_still_show_a_small_cause():
     verdict = diagnose(published_trials(PUBLISHED["mariner"], 43, (hidden,), EXACT), gain=False)
     assert [c.effect for c in verdict.causes] == ["rudder_offset"]
     assert verdict.causes[0].parameters["offset"].value == pytest.approx(0.01, rel=0.25)
+
+
+def test_standard_manoeuvres_make_no_cause_and_no_doubt_of_the_form_of_a_hull():
+    """Ten runs of 600 s at the limits of the rudder, S175 with heel: a `rudder_delay` and a doubt of her ship file once."""
+    verdict = diagnose(published_trials(PUBLISHED["s175"], 185, plan=Trials(runs=10, samples=600, standard=True)), gain=False)
+    assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
