@@ -17,6 +17,7 @@ from multiprocessing import get_context
 import measure
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
 
 from shipbench.diagnosis.case_ships import draw_ship
 from shipbench.diagnosis.diagnose import diagnose
@@ -84,6 +85,17 @@ def rounded(data: Dataset) -> Dataset:
     return data.with_runs([replace(r, states=np.round(r.states / step) * step) for r in data.runs])
 
 
+def low_passed(data: Dataset) -> Dataset:
+    """Motion behind a Butterworth filter of second order, forth and back, 6 dB down at 10 s on a ship of 130 m."""
+    smooth = butter(2, 2.0 * data.dt / (10.0 * (data.ship.L / 130.0) ** 0.5), output="sos")
+
+    def filtered(run: Run) -> Run:
+        motion = np.column_stack([run.states[:, :2], np.unwrap(run.states[:, 2]), run.states[:, 3:6]])
+        return replace(run, states=np.hstack([sosfiltfilt(smooth, motion, axis=0), run.states[:, 6:]]))
+
+    return data.with_runs([filtered(r) for r in data.runs])
+
+
 def bare(data: Dataset) -> Dataset:
     """A ship file of main dimensions (and places of thrusters)."""
     own = data.ship
@@ -106,6 +118,7 @@ CHANGES: dict[str, tuple[Trials, Callable[[Dataset], Dataset] | None]] = {
     "commands alone": (Trials(), commands),
     "motion in waves": (Trials(waves=1.0), None),
     "standard manoeuvres": (Trials(runs=10, samples=600, standard=True), None),
+    "low-pass filtered": (Trials(), low_passed),
 }
 CONDITIONS = [*PLANS, *CHANGES]
 

@@ -3,43 +3,44 @@ A ship in waves moves at their frequency besides: samples taken as independent w
 
 Noise of a channel: white, and `share` times as much variance that forgets itself like exp(-|t - s| / time), or moves to and fro with a `period`, as
 the output of a damped oscillator that has nothing at frequency zero (T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, Wiley,
-2011, 8.2.6: linear wave response). Both sides of the linear model are multiplied by the inverse of its Cholesky factor; what is left is white again,
-also in a piece that ends early, as the factor is triangular.
+2011, 8.2.6: linear wave response), or is smooth, as in a record that was filtered: Matern's correlation of order 5/2 (C. E. Rasmussen and
+C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press, 2006, eq. 4.17). Both sides of the linear model are multiplied by the
+inverse of its Cholesky factor; what is left is white again, also in a piece that ends early, as the factor is triangular.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 
 @dataclass(frozen=True)
 class Colour:
-    """share (6,), variance of the part that lasts over that of the white part; time, period (6,) in samples, no period is infinity; factor
-    (6, K + 1, K + 1) that whitens; logdet (6, K + 2) of the covariance of the first k samples."""
+    """share (6,), variance of the part that lasts over that of the white part; time, period (6,) in samples, no period is infinity; smooth (6,),
+    whether it was filtered; factor (6, K + 1, K + 1) that whitens; logdet (6, K + 2) of the covariance of the first k samples."""
 
     share: np.ndarray
     time: np.ndarray
     period: np.ndarray
+    smooth: np.ndarray
     factor: np.ndarray
     logdet: np.ndarray
 
     @classmethod
     def white(cls, samples: int) -> Colour:
         """Independent samples, in pieces of `samples`."""
-        return cls(np.zeros(6), np.ones(6), np.full(6, np.inf), np.tile(np.eye(samples), (6, 1, 1)), np.zeros((6, samples + 1)))
+        nothing, never = np.zeros(6), np.full(6, np.inf)
+        return cls(nothing, np.ones(6), never, nothing > 0.0, np.tile(np.eye(samples), (6, 1, 1)), np.zeros((6, samples + 1)))
 
-    def with_channel(self, channel: int, share: float, time: float, period: float = np.inf) -> Colour:
+    def with_channel(self, channel: int, share: float, time: float, period: float = np.inf, smooth: bool = False) -> Colour:
         """The same with another noise in one channel."""
         samples = self.factor.shape[1]
         lag = np.abs(np.subtract.outer(np.arange(samples), np.arange(samples)))
-        root = np.linalg.cholesky(np.eye(samples) + share * _correlation(lag, time, period))
-        new = replace(
-            self, share=self.share.copy(), time=self.time.copy(), period=self.period.copy(), factor=self.factor.copy(), logdet=self.logdet.copy()
-        )
-        new.share[channel], new.time[channel], new.period[channel] = share, time, period
+        root = np.linalg.cholesky(np.eye(samples) + share * _correlation(lag, time, period, smooth))
+        new = replace(self, **{f.name: getattr(self, f.name).copy() for f in fields(self)})
+        new.share[channel], new.time[channel], new.period[channel], new.smooth[channel] = share, time, period, smooth
         new.factor[channel] = np.linalg.inv(root)
         new.logdet[channel, 1:] = 2.0 * np.cumsum(np.log(np.diag(root)))
         return new
@@ -69,7 +70,7 @@ class Colour:
 
     def differs(self, other: Colour) -> list[int]:
         """Channels whose noise is another one."""
-        ours, theirs = (np.stack([c.share, c.time, c.period]) for c in (self, other))
+        ours, theirs = (np.stack([c.share, c.time, c.period, c.smooth]) for c in (self, other))
         return [int(c) for c in np.flatnonzero(np.any(ours != theirs, axis=0))]
 
     def log_determinant(self, lengths: np.ndarray) -> np.ndarray:
@@ -77,9 +78,11 @@ class Colour:
         return np.asarray(self.logdet[:, lengths].sum(axis=0))
 
 
-def _correlation(lag: np.ndarray, time: float, period: float) -> np.ndarray:
+def _correlation(lag: np.ndarray, time: float, period: float, smooth: bool) -> np.ndarray:
     """Of the part that lasts, at lags in samples."""
     decay = np.exp(-lag / time)
+    if smooth:
+        return (1.0 + lag / time + (lag / time) ** 2 / 3.0) * decay
     if np.isinf(period):
         return decay
     omega = 2.0 * np.pi / period

@@ -240,6 +240,8 @@ def background(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -
 _LEAST_FORCE = float(np.log(0.1**2))
 """No model follows a ship closer than a tenth of the unit of the latent force (0.5 mm/s^2, and 1e-5 rad/s^2 at 130 m): exact sensors in a calm would
 else show with certainty that every hull differs in form from a polynomial, and what the form lacks passes for a cause."""
+_MOST_FORCE = float(np.log(30.0**2))
+"""Nor is a force larger than 0.15 m/s^2 and 3e-3 rad/s^2 at 130 m: where a trajectory of the refit runs away, the variance would run after it."""
 
 
 def update_force(gram: Gram, estimate: np.ndarray, cov: np.ndarray) -> np.ndarray:
@@ -250,7 +252,7 @@ def update_force(gram: Gram, estimate: np.ndarray, cov: np.ndarray) -> np.ndarra
         w = estimate[:, at]
         quad = np.sum(w @ gram.K_inv * w) + np.sum(gram.K_inv * cov[:, at, at].sum(axis=0))
         log_force[j] = np.log(quad / (len(w) * gram.knots))
-    return np.maximum(log_force, _LEAST_FORCE)
+    return np.clip(log_force, _LEAST_FORCE, _MOST_FORCE)
 
 
 def coefficients_of(gram: Gram, prior: Prior, solution: Solution, estimate: np.ndarray, size: int) -> np.ndarray:

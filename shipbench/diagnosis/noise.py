@@ -10,7 +10,8 @@ from .colour import Colour
 from .settle import Fit, evidence_with
 
 _SHARES, _TIMES = (1.0, 4.0, 16.0, 64.0), (2.0, 6.0, 20.0)
-"""Tried; times in samples."""
+_SMOOTH_SHARES, _SMOOTH_TIMES = (16.0, 64.0), (0.5, 1.0, 2.0, 4.0)
+"""Tried, of errors that last and of filtered noise; times in samples."""
 _FIRST, _WORTH = ((1.0, 2.0), (4.0, 6.0)), 50.0
 """Share and time of noise that is tried first, and the log evidence that it must gain in all pieces together: a cause in the sensors leaves lasting
 residuals, too."""
@@ -34,10 +35,11 @@ def colour_of(found: Fit, share: float = 1.0) -> Colour:
 
 
 def _lasting(found: Fit, colour: Colour, channel: int, least: float) -> list[Colour]:
-    """Errors that last for seconds, where such noise reaches the `least` evidence."""
+    """Errors that last for seconds, or were filtered, where such noise reaches the `least` evidence."""
     if max(evidence_with(found, colour.with_channel(channel, share, time)) for share, time in _FIRST) < least:
         return []
-    return [colour.with_channel(channel, share, time) for share, time in product(_SHARES, _TIMES)]
+    lasting = [colour.with_channel(channel, share, time) for share, time in product(_SHARES, _TIMES)]
+    return lasting + [colour.with_channel(channel, share, time, smooth=True) for share, time in product(_SMOOTH_SHARES, _SMOOTH_TIMES)]
 
 
 def _swinging(found: Fit, colour: Colour, channel: int) -> list[Colour]:

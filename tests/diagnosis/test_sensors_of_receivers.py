@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from shipbench.diagnosis import clocks
 from shipbench.diagnosis.clocks import check_clocks
@@ -26,6 +26,7 @@ from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
 from shipbench.signals import PSI, R, U, V
 from shipbench.simulate.hidden import Hidden
+from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import WAVE_PERIOD, Trials, sea_trials
 
 LATE = 3.0
@@ -63,14 +64,15 @@ def filtered(trials) -> Dataset:
 
 OMEGA = 2.0 * np.pi / 5.0
 LASTING = (
-    (6.0, np.inf, lambda lag: np.exp(-lag / 6.0)),
-    (8.0, 5.0, lambda lag: np.exp(-lag / 8.0) * (np.cos(OMEGA * lag) - np.sin(OMEGA * lag) / (8.0 * OMEGA))),
+    (6.0, np.inf, False, lambda lag: np.exp(-lag / 6.0)),
+    (8.0, 5.0, False, lambda lag: np.exp(-lag / 8.0) * (np.cos(OMEGA * lag) - np.sin(OMEGA * lag) / (8.0 * OMEGA))),
+    (2.0, np.inf, True, lambda lag: np.exp(-lag / 2.0) * (1.0 + lag / 2.0 + lag**2 / 12.0)),
 )
 
 
-@pytest.mark.parametrize(("time", "period", "correlation"), LASTING)
-def test_whitened_noise_is_white_and_its_determinant_right(time, period, correlation):
-    colour = Colour.white(7).with_channel(2, 16.0, time, period)
+@pytest.mark.parametrize(("time", "period", "smooth", "correlation"), LASTING)
+def test_whitened_noise_is_white_and_its_determinant_right(time, period, smooth, correlation):
+    colour = Colour.white(7).with_channel(2, 16.0, time, period, smooth)
     lag = np.abs(np.subtract.outer(np.arange(7), np.arange(7)))
     covariance = np.eye(7) + 16.0 * correlation(lag)
     assert colour.factor[2] @ covariance @ colour.factor[2].T == pytest.approx(np.eye(7), abs=1e-9)
@@ -100,6 +102,26 @@ def test_a_compass_whose_errors_last_is_told_from_independent_ones(trials):
     share = _colour(_changed(trials, change)).share
     assert share[PSI] > 0.0
     assert not np.any(np.delete(share, PSI))
+
+
+def _low_passed(data: Dataset) -> Dataset:
+    """Motion behind a Butterworth filter of second order at 0.1 Hz, forth and back, as logs are often handed on."""
+    filtered = butter(2, 2.0 * data.dt * 0.1, output="sos")
+
+    def change(S: np.ndarray) -> None:
+        S[:, PSI] = np.unwrap(S[:, PSI])
+        S[:, :6] = sosfiltfilt(filtered, S[:, :6], axis=0)
+
+    return _changed(data, change)
+
+
+def test_a_record_that_was_filtered_has_nothing_missing_and_still_shows_a_cause():
+    """Its smooth errors had been an `unknown` force, with a cause and without."""
+    hidden = Hidden(EFFECTS.get("rudder_offset"), (0.03,))
+    plain, odd = (diagnose(_low_passed(published_trials(PUBLISHED["mariner"], 5015, how)), gain=False) for how in ((), (hidden,)))
+    assert (plain.verdict, plain.causes) == ("none", ())
+    assert [c.effect for c in odd.causes] == ["rudder_offset"]
+    assert odd.causes[0].parameters["offset"].value == pytest.approx(0.03, rel=0.35), "the filter takes of the motion, too"
 
 
 def test_noise_that_swings_has_nothing_at_frequency_zero():
