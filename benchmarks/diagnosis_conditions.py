@@ -1,8 +1,8 @@
-"""The diagnosis under other conditions than those of its suite: another quality or length of the record, less known of the ship. About 15 minutes.
+"""The diagnosis under other conditions than those of its suite: another quality or length of the record, less known of the ship. About 20 minutes.
 
     python benchmarks/diagnosis_conditions.py [--runs DRAWS] [--only CONDITION ...] [--quick] [--json FILE]
 
-Six ships (drawn variants of KCS and KVLCC2; Mariner, a tanker and S175 in their authors' equations). Under every condition each of them sails once
+Seven ships (drawn variants of KCS and KVLCC2; Mariner, a tanker, S175 and a navy ship in their authors' equations). Under every condition each of them sails once
 with nothing hidden, where nothing must be named, and once with a cause that any ship shows, which must be named first.
 """
 
@@ -121,6 +121,7 @@ CHANGES: dict[str, tuple[Trials, Callable[[Dataset], Dataset] | None]] = {
     "low-pass filtered": (Trials(), low_passed),
 }
 CONDITIONS = [*PLANS, *CHANGES]
+SHIPS = 3 + len(PUBLISHED)
 
 
 def outcome(job: tuple[str, int, str], draw: int) -> tuple[str, list[str]]:
@@ -144,15 +145,15 @@ def main() -> None:
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         for condition in conditions:
             for draw in range(given.runs):
-                causes = [list(HIDDEN)[(number + CONDITIONS.index(condition) + draw) % len(HIDDEN)] for number in range(6)]
+                causes = [list(HIDDEN)[(number + CONDITIONS.index(condition) + draw) % len(HIDDEN)] for number in range(SHIPS)]
                 jobs = [(condition, number, name) for number, cause in enumerate(causes) for name in ("", cause)]
                 found = dict(zip(jobs, pool.map(partial(outcome, draw=draw), jobs), strict=True))
                 silent = [j for j in jobs if not j[2] and found[j][0] == "none"]
                 right = [j for j in jobs if j[2] and found[j][1][:1] == [j[2]]]
                 odd = [j for j in jobs if j not in silent and j not in right]
                 wrong = [f"ship {j[1]}, {j[2] or 'nothing'}: {', '.join(found[j][1]) or found[j][0]}" for j in odd]
-                measure.record(given, {"condition": condition, "draw": draw, "silent": len(silent), "right": len(right), "of": 6, "wrong": wrong})
-                print(f"{condition}: of 6 without a cause {len(silent)} none, of 6 with one {len(right)} right", *wrong, sep="; ", flush=True)
+                measure.record(given, {"condition": condition, "draw": draw, "silent": len(silent), "right": len(right), "of": SHIPS, "wrong": wrong})
+                print(f"{condition}: of {SHIPS} without a cause {len(silent)} none, of {SHIPS} with one {len(right)} right", *wrong, sep="; ", flush=True)
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ from ..simulate.published import PUBLISHED, Published, published_trials
 from ..simulate.simulator import Simulator
 from ..simulate.trials import CRUISE, Trials, sea_trials
 from .case_ships import WHICH, draw_ship
+from .gears import least_rate
 from .outside import OUTSIDE, Outside
 
 KINDS = ("single", "pair", "none-same", "none-other", "outside", "change", "unit", "published", "none-published")
@@ -48,7 +49,9 @@ ON_PUBLISHED = (
 )  # fmt: skip
 """What is hidden in published ships: causes that mean something whatever a ship's equations are."""
 
-_RATES = {"rudder_rate_limit": "rate_delta", "shaft_rate_limit": "rate_n"}
+_RATES = {"rudder_rate_limit": ("delta", "rate_delta", 1.0), "shaft_rate_limit": ("n", "rate_n", 60.0)}
+_LIMITED = 0.65
+"""Of the least ordinary rate of a gear: a limit above it is none (SOLAS asks no faster rudder of a short ship, whatever Froude's law says)."""
 
 UNITS: tuple[tuple[str, tuple[int, ...], float], ...] = (
     ("speeds in knots", (U, V), 1.0 / 0.514444), ("sway velocity to port", (V,), -1.0), ("yaw rate to port", (R,), -1.0),
@@ -175,8 +178,10 @@ def draw_hidden(rng: np.random.Generator, effect: Effect, ship: MMGShip | Publis
     if effect.name == "hull_derivatives":
         return Hidden(effect, tuple(float(np.clip(size * p.typical * rng.standard_normal(), -0.6, 1.0)) for p in parameters))
     if effect.name in _RATES:
-        own = getattr(ship.actuators, _RATES[effect.name]) * (60.0 if effect.name == "shaft_rate_limit" else 1.0)
-        return Hidden(effect, (1.0 / (1.0 / own + size * max(1.0 / parameters[0].typical - 1.0 / own, 0.5 / own)),))
+        actuator, field, unit = _RATES[effect.name]
+        own = getattr(ship.actuators, field) * unit
+        typical = min(parameters[0].typical, _LIMITED * least_rate(actuator, (ship.L / 130.0) ** 0.5))
+        return Hidden(effect, (1.0 / (1.0 / own + size * max(1.0 / typical - 1.0 / own, 0.5 / own)),))
     if effect.name == "bank_suction":
         assert isinstance(ship, MMGShip)
         return _bank(rng, effect, ship, size, case)

@@ -98,6 +98,6 @@ def _evidence(dataset: Dataset, noise_gain: float) -> np.ndarray:
     plant = Plant.of(dataset)
     scales = Scales(plant)
     origin = Origin.of(plant, scales)
-    found = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion)
+    found = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion, far=True)
     samples = by_run(plant.seg.mask.sum(axis=1), plant.seg.run)
     return found.solution.per_run + 2.0 * samples * float(np.log(noise_gain))

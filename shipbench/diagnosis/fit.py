@@ -22,21 +22,21 @@ _LEAP = 0.3
 _AT_REST, _AT_REST_EVIDENCE = 0.5, 0.1
 """Excess of the cost over what the linear model promises, and change of the evidence, at which a fit rests."""
 _STALE = 3
-"""Later steps without a better point, after which a fit rests, too: two linearisations may lead to and fro for ever."""
+"""Later steps without a better point, each half of the one before, after which a fit rests, too: two linearisations may lead to and fro for ever."""
 _FOLLOWING, _HALVINGS = 6, 5
 """Steps of initial states and latent force alone at the end, and trials of each."""
 
 
 def fit(
     plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 20,
-    candidates: Sequence[Term] = (), guess: np.ndarray | None = None, hope: float = -np.inf,
+    candidates: Sequence[Term] = (), guess: np.ndarray | None = None, hope: float = -np.inf, far: bool = False,
 ) -> Fit:  # fmt: skip
     """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), until it rests or promises
     less log evidence than `hope`, when it is not worth its time.
 
     A step is at first halved only where the cost explodes: the cost of a step that is right for the parameters rises until the latent force has
     followed, and the path would else end where parameters compensate each other. The best point of the path is kept, by its evidence once the force
-    has followed; there it does. `candidates` get columns there.
+    has followed; there it does. `candidates` get columns there. far: `point` is that of an `Origin`.
     """
     log_tau2 = dict(log_tau2 or {})
     if len(point.terms) < len(model.terms):
@@ -45,7 +45,7 @@ def fit(
     lin, best, before, stale, seen, early = Linearisation(plant, scales, point, guess), None, -np.inf, 0, None, np.nan
     for number in range(iterations):
         free = number < _FREE_STEPS
-        found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP, seen=seen)
+        found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP, seen=seen, far=far and not number)
         if number < 2:
             early = found.promise
         if number and found.promise < hope:
@@ -58,7 +58,7 @@ def fit(
         if stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
             break
         before = found.evidence
-        after, seen = _step(lin, found, number + 1 < _FREE_STEPS) if number < iterations - 1 else (None, None)
+        after, seen = _step(lin, found, number + 1 < _FREE_STEPS, 0.5**stale) if number < iterations - 1 else (None, None)
         if after is None:
             break
         lin = after
@@ -67,16 +67,16 @@ def fit(
     return replace(settle(lin, model, found.hyper, found.log_tau2, candidates, leap=0.0) if candidates else found, early=early)
 
 
-def _step(lin: Linearisation, found: Fit, free: bool) -> tuple[Linearisation | None, Fit | None]:
-    """Towards the point that the linear model thinks best, and the fit there if one was made; None where no part of the way is any better (the first
-    steps are `free`).
+def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Linearisation | None, Fit | None]:
+    """Towards the point that the linear model thinks best, and the fit there if one was made; None where no part of the way, from `share` on, is any
+    better (the first steps are `free`).
 
     A point is better if its cost is lower, or would be once the latent force has followed: on exact sensors the trajectory of a new point is nearly
     always dearer than that of the old one, whose force has been fitted.
     """
     plant, scales, model, may_rise = lin.plant, lin.scales, found.model, _MAY_RISE if free else 1.0
     target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
-    at, followed, share = objective(lin, model, found.hyper, found.log_tau2, found.gram), at_point(found, lin.point), 1.0
+    at, followed, share = objective(lin, model, found.hyper, found.log_tau2, found.gram), at_point(found, lin.point), share
     while True:
         part = between(lin.point, target, share)
         trial = Linearisation(plant, scales, part, lin.towards(part), coarse=free)

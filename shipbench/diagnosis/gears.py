@@ -69,7 +69,7 @@ class _Kind:
         return {"T": 0, "rate": 1}.get(self.field, 2)
 
 
-def _least_rate(actuator: str, scale: float) -> float:
+def least_rate(actuator: str, scale: float) -> float:
     """Least rate of an ordinary gear, by Froude's law; a full-scale rudder under 130 m need be no faster (SOLAS)."""
     if actuator == "delta" and scale > 0.4:
         scale = max(scale, 1.0)
@@ -78,7 +78,7 @@ def _least_rate(actuator: str, scale: float) -> float:
 
 def _kinds(actuator: str, scale: float, span: float, ordinary: Gear) -> list[_Kind]:
     """What may be wrong with an actuator; `span` is the range of its commands."""
-    T, rate = ORDINARY[actuator].T * scale, _least_rate(actuator, scale)
+    T, rate = ORDINARY[actuator].T * scale, least_rate(actuator, scale)
     lag = _Kind({"n": "shaft_lag", "delta": "rudder_lag", "F": "thruster_lag"}[actuator], "T", T, 60.0 * scale, ordinary.T)
     if actuator == "n":
         return [lag, _Kind("shaft_rate_limit", "rate", 0.02 * rate, rate)]
@@ -176,7 +176,7 @@ class _Record:
     def findings(self, usual: Gear) -> tuple[list[GearFinding], Gear]:
         """Every effect beside the best ordinary gear, and that gear."""
         span = float(np.percentile(np.abs(self.command), 98))
-        rate = max(_least_rate(self.name, self.scale), 0.01 * span / self.scale)
+        rate = max(least_rate(self.name, self.scale), 0.01 * span / self.scale)
         most = max(10.0 * span / self.dt, 2.0 * rate)
         low, high = np.log([0.02 * self.scale, rate]), np.log([ORDINARY[self.name].T * self.scale, most])
         ordinary = self._least(None, low, high)

@@ -46,7 +46,7 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
 def _begun(plant: Plant, scales: Scales) -> Fit:
     """The first fit, of which the others take the background."""
     origin = Origin.of(plant, scales)
-    found = _without_strange(fit(plant, scales, Model(), origin.point, origin.hyper, iterations=_FIRST_ITERATIONS, guess=origin.motion))
+    found = _without_strange(fit(plant, scales, Model(), origin.point, origin.hyper, iterations=_FIRST_ITERATIONS, guess=origin.motion, far=True))
     return replace(found, scales=scales.with_background(found.hyper))
 
 

@@ -117,7 +117,9 @@ def with_term(before: Fit, score: Score, origin: Origin, least: float = -np.inf)
     point = replace(origin.point, terms=model.terms, values=(*before.values, value))
     log_tau2 = before.log_tau2 | ({len(before.model.terms): score.log_tau2} if term.per_run else {})
     hope = before.evidence + 0.5 * least
-    return fit(before.plant, before.scales, model, point, origin.hyper, log_tau2, iterations=REFIT_ITERATIONS, guess=origin.motion, hope=hope)
+    return fit(
+        before.plant, before.scales, model, point, origin.hyper, log_tau2, iterations=REFIT_ITERATIONS, guess=origin.motion, hope=hope, far=True
+    )
 
 
 def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) -> list[tuple[Fit, float]]:
@@ -150,7 +152,7 @@ def seen_from(origin: Origin, now: Fit, terms: Sequence[Term]) -> list[Score]:
     """Scores of candidates at `origin`, where the model has not been fitted yet."""
     at_rest = replace(origin.point, terms=now.model.terms, values=tuple(np.zeros_like(v) for v in now.values))
     lin = Linearisation(now.plant, now.scales, at_rest, origin.motion)
-    return screen(settle(lin, now.model, origin.hyper, now.log_tau2, terms))
+    return screen(settle(lin, now.model, origin.hyper, now.log_tau2, terms, far=True))
 
 
 def without(before: Fit, index: int) -> Fit:

@@ -220,13 +220,14 @@ def prior_squares(model: Model, point: Point, log_tau2: dict[int, float]) -> flo
 
 def settle(
     lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (), cycles: int = _EM_CYCLES,
-    leap: float = np.inf, seen: Fit | None = None,
+    leap: float = np.inf, seen: Fit | None = None, far: bool = False,
 ) -> Fit:  # fmt: skip
-    """Variances, whose logarithms move by `leap` at most, and posterior on one linearisation; seen: an earlier fit on it, whose products hold."""
+    """Variances, whose logarithms move by `leap` at most, and posterior on one linearisation; seen: an earlier fit on it, whose products hold; far:
+    see `_sloped`."""
     plant, scales, point = lin.plant, lin.scales, lin.point
     columns = lin.columns(candidates) if seen is None else seen.columns
     products = products_of(plant, scales, point, columns) if seen is None else seen.products
-    products, by_force = _sloped(lin, columns, products, hyper)
+    products, by_force = _sloped(lin, columns, products, hyper, far)
     if leap > 0.0:
         hyper, log_tau2 = _variances(products.without(sum(t.size for t in candidates)), model, hyper, log_tau2, cycles, leap)
     gram = products.weigh(hyper)
@@ -241,14 +242,18 @@ def settle(
     )  # fmt: skip
 
 
-def _sloped(lin: Linearisation, columns: Columns, products: Products, hyper: Hyper) -> tuple[Products, np.ndarray]:
+def _sloped(lin: Linearisation, columns: Columns, products: Products, hyper: Hyper, far: bool) -> tuple[Products, np.ndarray]:
     """Products that know how the log determinants depend on what is shared, and how these depend on the force at the knots.
 
-    What initial states take off is seen at the same variances in all fits of a diagnosis: it would else reward lower ones.
+    What initial states take off is seen at the same variances in all fits of a diagnosis: it would else reward lower ones. Where the force does what
+    the parameters should (`far`), the slopes mean nothing: followed from there, they made the yaw inertia of a navy ship negative.
     """
     point, B, alone = lin.point, len(products.run), products.without(products.shared)
     seen = lin.scales.background or hyper
-    by_column, by_force = slopes(lin, columns, alone.weigh(hyper).reduce(hyper.log_force).inverse, hyper)
+    if far:
+        by_column, by_force = np.zeros((B, products.slope.shape[1] - 1)), np.zeros((B, products.knots, 3, 6))
+    else:
+        by_column, by_force = slopes(lin, columns, alone.weigh(hyper).reduce(hyper.log_force).inverse, hyper)
     initial = -log_determinant(alone.weigh(seen).reduce(seen.log_force).inverse[:, :6, :6])
     own = [v[products.run] if t.per_run else np.broadcast_to(v, (B, t.size)) for t, v in zip(point.terms, point.values, strict=True)]
     candidates = np.zeros((B, sum(c.shape[-1] for c in columns.candidates)))

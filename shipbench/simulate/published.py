@@ -1,8 +1,9 @@
-"""Three ships of the literature in their authors' own equations, which neither the MMG simulator nor the fitted model shares with them.
+"""Four ships of the literature in their authors' own equations, which neither the MMG simulator nor the fitted model shares with them.
 
 What is told from trials of these ships is told of hulls, propellers and rudders that the fit does not know: cubic hull forces with products of rudder
-and drift (Mariner), thrust and rudder flow as quadratics of speed and revolutions (tanker), a hull that heels in turns (S175). Side forces of the
-propeller and of zero helm are left out: they are causes with names, which may be hidden here.
+and drift (Mariner), thrust and rudder flow as quadratics of speed and revolutions (tanker), a hull that heels in turns (S175), a small fast one that
+heels, with absolute values in its hull forces and rudders beside the races that stall (navy). Side forces of the propeller and of zero helm are left
+out: they are causes with names, which may be hidden here.
 """
 
 from __future__ import annotations
@@ -141,6 +142,35 @@ def _s175(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, push:
     return X * U * U / (m + m_x) / L, dv * U * U / L, dr * U * U / L**2, dp * U * U / L**2, motion[3]
 
 
+_NAVY: dict[str, dict[str, float]] = {
+    "Y": {"Uv": -11800, "ur": 131000, "Vv": -3700, "vR": -794000, "rV": -182000, "fUV": 10800, "fUR": 251000, "fuu": -74},
+    "K": {"Uv": 9260, "ur": -102000, "Vv": 29300, "vR": 621000, "rV": 142000, "fUV": -8400, "fUR": -196000, "fuu": -1180, "Up": -15500,
+          "Pp": -416000, "p": -500000},
+    "N": {"Uv": -92000, "Ur": -4710000, "Rr": -202e6, "rV": -15.6e6, "fUV": -214000, "fuR": -4980000, "fuU": -8000},
+}  # fmt: skip
+_STALL = 23.0
+
+
+def _navy(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, push: Push) -> Motion:
+    """Blanke & Christensen (1993), 10th Ship Control Systems Symposium, Ottawa: a multipurpose navy ship at 8 m/s, SI, about midship; in capitals the
+    absolute values. Two rudders of 1.5 m^2 whose lift grows by 0.054 a degree up to the stall. The propellers are not in the source: two of 1.6 m
+    with K_T = 0.45 - 0.40 J, bilinear in revolutions and speed, as are linear propeller models."""
+    rho, volume, x_G, z_G, x_R, z_R, D = 1014.0, 357.0, -3.38, -1.06, -23.79, 1.5, 1.6
+    m, (u, v, r, p, f), rps = rho * volume, motion, np.maximum(n, 0.0) / 60.0
+    values = {"u": u, "v": v, "r": r, "p": p, "f": f, "U": np.abs(u), "V": np.abs(v), "R": np.abs(r), "P": np.abs(p)}
+    Y, K, N = (_sum(_NAVY[axis], **values) for axis in "YKN")
+    angle = delta + np.arctan2(v + x_R * r, np.maximum(u, 0.1))
+    lift = 0.5 * rho * 3.0 * (u * u + v * v) * 0.054 * np.clip(np.rad2deg(angle), -_STALL, _STALL)
+    T = thrust * 2.0 * rho * D**4 * (0.45 * rps * rps - 0.40 * rps * 0.95 * u / D)
+    X = 0.95 * T - 1960.0 * u * np.abs(u) + 1.33 * m * v * r + m * (x_G * r * r - z_G * p * r) - np.abs(lift * np.sin(delta)) + push[0]
+    Y = Y - m * u * r - lift * np.cos(delta) + push[1]
+    K = K + m * z_G * u * r + z_R * lift * np.cos(delta) - m * 9.81 * (1.1 * f + 0.325 * f**3)
+    N = N - m * x_G * u * r - x_R * lift * np.cos(delta) + push[2]
+    inertia = np.array([[m + 393e3, 296e3 - m * z_G, m * x_G + 1.4e6], [-296e3 - m * z_G, 3.1503e6, 0.0], [m * x_G - 538e3, 0.0, 86.634e6]])
+    dv, dp, dr = np.linalg.solve(inertia, np.array([Y, K, N]))
+    return X / (m + 17.4e3), dv, dr, dp, p
+
+
 def _ordinary(L: float) -> MMGActuators:
     k = (L / 130.0) ** 0.5
     return MMGActuators(
@@ -168,9 +198,15 @@ PUBLISHED = {
              rudder=Rudder(area=33.04, height=7.76, x=-87.5), wind=Wind(frontal_area=600.0, lateral_area=2500.0)),
         _ordinary(175.0), 7.0, (0.45, 1.25), _s175, more=2,
     ),
+    "navy": Published(
+        "navy",
+        Ship(name="Navy ship", L=51.5, B=8.6, T=2.3, displacement=357.0, rho=1014.0, xG=-3.38, propeller=Propeller(diameter=1.9),
+             rudder=Rudder(area=3.0, height=1.5, x=-23.79), wind=Wind(frontal_area=50.0, lateral_area=220.0)),
+        replace(_ordinary(51.5), rate_n=0.5), 8.0, (0.6, 1.1), _navy, more=2,
+    ),
 }  # fmt: skip
 """By name; displacement as in the equations. Diameter and rudder area of mariner and tanker, and areas above water, are round figures for ships of
-their kind."""
+their kind; the diameter of the navy ship is that of one propeller with the thrust of both."""
 
 
 def rpm_at(ship: Published, speed: float) -> float:
@@ -182,7 +218,7 @@ def rpm_at(ship: Published, speed: float) -> float:
     def surge(rpm: float) -> float:
         return float(ship.rates((np.array([speed]), *(none for _ in range(2 + ship.more))), np.array([rpm]), none, 1.0, (none, none, none))[0][0])
 
-    return float(brentq(surge, 1.0, 400.0))
+    return float(brentq(surge, 1.0, 1000.0))
 
 
 def wind_force(ship: Published, u_rw: np.ndarray, v_rw: np.ndarray) -> Push:

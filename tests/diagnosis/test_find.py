@@ -84,7 +84,7 @@ def test_causes_are_found_on_ships_of_the_literature_in_their_own_equations(ship
 
 def test_what_ships_differ_in_is_not_named_for_a_hull_of_another_form():
     """A container ship that heels, with nothing hidden: what her rudder loses by it looks like a stall."""
-    verdict = diagnose(draw_case("none-published", 20, 1).dataset(), gain=False)
+    verdict = diagnose(published_trials(PUBLISHED["s175"], 440334393), gain=False)
     stall = next(c for c in verdict.candidates if c.effect == "rudder_stall")
     assert stall.score > THRESHOLD
     assert "more is asked of what ships differ in" in stall.rejected_because
@@ -110,7 +110,7 @@ def test_a_current_that_the_plain_model_has_absorbed_is_refitted():
 
 def test_a_strong_wind_in_every_run_is_found_on_a_ship_far_from_the_regressions():
     """Her fit is far from linear in it: the variance of its values vanished, and no run seemed to support it."""
-    cause = diagnose(draw_case("published", 45, 0).dataset(), gain=False).causes[0]
+    cause = diagnose(draw_case("published", 60, 0).dataset(), gain=False).causes[0]
     assert cause.effect == "wind_per_run"
     assert "24 of 24 runs support it" in cause.evidence
 

@@ -19,6 +19,7 @@ from shipbench.diagnosis.settle import settle
 from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
+from shipbench.ship import Propeller
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
@@ -92,3 +93,14 @@ def test_standard_manoeuvres_make_no_cause_and_no_doubt_of_the_form_of_a_hull():
     """Ten runs of 600 s at the limits of the rudder, S175 with heel: a `rudder_delay` and a doubt of her ship file once."""
     verdict = diagnose(published_trials(PUBLISHED["s175"], 185, plan=Trials(runs=10, samples=600, standard=True)), gain=False)
     assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
+
+
+@pytest.mark.parametrize("diameter", [1.9, 2.26, 2.6])
+def test_a_fit_finds_its_way_from_regressions_that_are_far_off(diameter: float):
+    """A small fast ship whose two screws the file gives as one: of the right size, or with up to three times the thrust. Her rudders have no race."""
+    navy = PUBLISHED["navy"]
+    ship = replace(navy, particulars=navy.particulars.model_copy(update={"propeller": Propeller(diameter=diameter)}))
+    plant = Plant.of(published_trials(ship, 1, (), Trials(runs=12, samples=80)))
+    found = null_fit(plant, Scales(plant))
+    assert found.excess < 1.0
+    assert np.exp(0.5 * found.hyper.log_force[2]) < 1.0
