@@ -2,8 +2,8 @@
 
     python benchmarks/diagnosis_conditions.py [--runs DRAWS] [--only CONDITION ...] [--quick] [--json FILE]
 
-Seven ships (drawn variants of KCS and KVLCC2; Mariner, a tanker, S175 and a navy ship in their authors' equations). Under every condition each of them sails once
-with nothing hidden, where nothing must be named, and once with a cause that any ship shows, which must be named first.
+Seven ships (drawn variants of KCS and KVLCC2; Mariner, a tanker, S175 and a navy ship in their authors' equations). Under every condition each of
+them sails once with nothing hidden, where nothing must be named, and once with a cause that any ship shows, which must be named first.
 """
 
 from __future__ import annotations
@@ -153,7 +153,8 @@ def main() -> None:
                 odd = [j for j in jobs if j not in silent and j not in right]
                 wrong = [f"ship {j[1]}, {j[2] or 'nothing'}: {', '.join(found[j][1]) or found[j][0]}" for j in odd]
                 measure.record(given, {"condition": condition, "draw": draw, "silent": len(silent), "right": len(right), "of": SHIPS, "wrong": wrong})
-                print(f"{condition}: of {SHIPS} without a cause {len(silent)} none, of {SHIPS} with one {len(right)} right", *wrong, sep="; ", flush=True)
+                score = f"of {SHIPS} without a cause {len(silent)} none, of {SHIPS} with one {len(right)} right"
+                print(f"{condition}: {score}", *wrong, sep="; ", flush=True)
 
 
 if __name__ == "__main__":
