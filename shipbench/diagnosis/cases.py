@@ -34,8 +34,8 @@ SIZES = (1.0, 0.3)
 OWN_KINDS = frozenset({"change_point", "going_astern", "unit_or_sign_error", "wind_coefficients", "wind_drift"})
 ONE_SIDED = frozenset(
     {
-        "added_resistance", "bank_suction", "cross_flow_drag", "position_delay", "rudder_delay", "rudder_stall", "shallow_water",
-        "thruster_speed_loss", "velocity_delay",
+        "added_resistance", "bank_suction", "cross_flow_drag", "position_delay", "rudder_delay", "shallow_water", "thruster_speed_loss",
+        "velocity_delay",
     }
 )  # fmt: skip
 """Effects that nature makes in one direction only, beyond those whose lower bound is zero."""

@@ -16,7 +16,7 @@ class RudderStall(Effect):
     family = "rudder"
     summary = "stall of the rudder at large angles"
     source = "physics reference, section 5, R18"
-    parameters = (Parameter("lost_share", "1", 0.5, -0.8, 0.95), Parameter("angle", "rad", 0.3, 0.1, 0.7, shape=True))
+    parameters = (Parameter("lost_share", "1", 0.5, 0.0, 0.95), Parameter("angle", "rad", 0.3, 0.1, 0.7, shape=True))
     separate = "turns at 10, 20, 30 and 35 deg of rudder"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

@@ -2,8 +2,8 @@
 
 What is told from trials of these ships is told of hulls, propellers and rudders that the fit does not know: cubic hull forces with products of rudder
 and drift (Mariner), thrust and rudder flow as quadratics of speed and revolutions (tanker), a hull that heels in turns (S175), a small fast one that
-heels, with absolute values in its hull forces and rudders beside the races that stall (navy). Side forces of the propeller and of zero helm are left
-out: they are causes with names, which may be hidden here.
+heels, with absolute values in its hull forces and rudders beside the races (navy). Side forces of the propeller and of zero helm and a rudder's stall
+are left out: they are causes with names.
 """
 
 from __future__ import annotations
@@ -148,19 +148,18 @@ _NAVY: dict[str, dict[str, float]] = {
           "Pp": -416000, "p": -500000},
     "N": {"Uv": -92000, "Ur": -4710000, "Rr": -202e6, "rV": -15.6e6, "fUV": -214000, "fuR": -4980000, "fuU": -8000},
 }  # fmt: skip
-_STALL = 23.0
 
 
 def _navy(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, push: Push) -> Motion:
     """Blanke & Christensen (1993), 10th Ship Control Systems Symposium, Ottawa: a multipurpose navy ship at 8 m/s, SI, about midship; in capitals the
-    absolute values. Two rudders of 1.5 m^2 whose lift grows by 0.054 a degree up to the stall. The propellers are not in the source: two of 1.6 m
-    with K_T = 0.45 - 0.40 J, bilinear in revolutions and speed, as are linear propeller models."""
+    absolute values. Two rudders of 1.5 m^2 whose lift grows by 0.054 a degree; stall at 23 degrees is left out. The propellers are not in the
+    source: two of 1.6 m with K_T = 0.45 - 0.40 J, bilinear in revolutions and speed, as are linear propeller models."""
     rho, volume, x_G, z_G, x_R, z_R, D = 1014.0, 357.0, -3.38, -1.06, -23.79, 1.5, 1.6
     m, (u, v, r, p, f), rps = rho * volume, motion, np.maximum(n, 0.0) / 60.0
     values = {"u": u, "v": v, "r": r, "p": p, "f": f, "U": np.abs(u), "V": np.abs(v), "R": np.abs(r), "P": np.abs(p)}
     Y, K, N = (_sum(_NAVY[axis], **values) for axis in "YKN")
     angle = delta + np.arctan2(v + x_R * r, np.maximum(u, 0.1))
-    lift = 0.5 * rho * 3.0 * (u * u + v * v) * 0.054 * np.clip(np.rad2deg(angle), -_STALL, _STALL)
+    lift = 0.5 * rho * 3.0 * (u * u + v * v) * 0.054 * np.rad2deg(angle)
     T = thrust * 2.0 * rho * D**4 * (0.45 * rps * rps - 0.40 * rps * 0.95 * u / D)
     X = 0.95 * T - 1960.0 * u * np.abs(u) + 1.33 * m * v * r + m * (x_G * r * r - z_G * p * r) - np.abs(lift * np.sin(delta)) + push[0]
     Y = Y - m * u * r - lift * np.cos(delta) + push[1]

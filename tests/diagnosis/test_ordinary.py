@@ -18,8 +18,10 @@ from shipbench.diagnosis.select import candidates_for
 from shipbench.diagnosis.settle import settle
 from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS
+from shipbench.physics.eq2 import coefficients
 from shipbench.physics.mmg import load_mmg_ship
-from shipbench.ship import Propeller
+from shipbench.predictors._physics_fit import parameter_scale
+from shipbench.ship import Propeller, complete
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
@@ -93,6 +95,19 @@ def test_standard_manoeuvres_make_no_cause_and_no_doubt_of_the_form_of_a_hull():
     """Ten runs of 600 s at the limits of the rudder, S175 with heel: a `rudder_delay` and a doubt of her ship file once."""
     verdict = diagnose(published_trials(PUBLISHED["s175"], 185, plan=Trials(runs=10, samples=600, standard=True)), gain=False)
     assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
+
+
+def test_resistance_that_grows_with_the_speed_itself_is_no_sign_of_a_wrong_ship_file():
+    """As in the linear models of control engineers. With the spread of ships (1 of the units) instead: doubt, and a current in each run."""
+    tanker = PUBLISHED["tanker"]
+    drag = 9.0 * parameter_scale(coefficients(complete(tanker.particulars)))[1]
+
+    def rates(motion, n, delta, thrust, push):
+        return tanker.rates(motion, n, delta, thrust, (push[0] - drag * motion[0], *push[1:]))
+
+    found = diagnose(published_trials(replace(tanker, rates=rates), 1), gain=False)
+    assert found.verdict == "none"
+    assert not found.warnings
 
 
 @pytest.mark.parametrize("diameter", [1.9, 2.26, 2.6])
