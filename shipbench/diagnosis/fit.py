@@ -22,7 +22,8 @@ _LEAP = 0.3
 _AT_REST, _AT_REST_EVIDENCE = 0.5, 0.1
 """Excess of the cost over what the linear model promises, and change of the evidence, at which a fit rests."""
 _STALE = 3
-"""Later steps without a better point, each half of the one before, after which a fit rests, too: two linearisations may lead to and fro for ever."""
+"""Later steps with neither a better point nor the promise of one, each half of the one before, after which a fit rests, too: two linearisations may
+lead to and fro for ever."""
 _FOLLOWING, _HALVINGS = 6, 5
 """Steps of initial states and latent force alone at the end, and trials of each."""
 
@@ -42,7 +43,7 @@ def fit(
     if len(point.terms) < len(model.terms):
         new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
         point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
-    lin, best, before, stale, seen, early = Linearisation(plant, scales, point, guess), None, -np.inf, 0, None, np.nan
+    lin, best, before, promised, stale, seen, early = Linearisation(plant, scales, point, guess), None, -np.inf, -np.inf, 0, None, np.nan
     for number in range(iterations):
         free = number < _FREE_STEPS
         found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP, seen=seen, far=far and not number)
@@ -52,7 +53,11 @@ def fit(
             return found
         hyper, log_tau2 = found.hyper, found.log_tau2
         worth = found.evidence if free else found.evidence_followed
-        stale = 0 if free or best is None or worth > best[0] + _AT_REST_EVIDENCE else stale + 1
+        if free or best is None or worth > best[0] + _AT_REST_EVIDENCE or found.promise > promised + _AT_REST_EVIDENCE:
+            stale = 0
+        else:
+            stale += 1
+        promised = -np.inf if free else max(promised, found.promise)
         if best is None or worth > best[0]:
             best = worth, found, lin
         if stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):

@@ -22,6 +22,8 @@ _SEARCHES = 3
 """For strange pieces."""
 _FIRST_ITERATIONS = 8
 """Of the first fit, which gives the background: until that stands, lower variances are rewarded, and a fit creeps towards them for ever."""
+_CREEPS = 20.0
+"""Excess of a first fit that has not come to rest."""
 REFIT_ITERATIONS = 16
 """Of a fit that begins beside another one."""
 
@@ -44,10 +46,22 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
 
 
 def _begun(plant: Plant, scales: Scales) -> Fit:
-    """The first fit, of which the others take the background."""
-    origin = Origin.of(plant, scales)
-    found = _without_strange(fit(plant, scales, Model(), origin.point, origin.hyper, iterations=_FIRST_ITERATIONS, guess=origin.motion, far=True))
+    """The first fit, of which the others take the background.
+
+    A push may drag it so far that nothing looks strange where it ends: a fit that creeps is made again without what is strange where it began, and
+    kept if it rests then.
+    """
+    found = _without_strange(_first(plant, scales))
+    if found.excess > _CREEPS:
+        pieces = strange_pieces(_first(plant, scales, iterations=1))
+        calm = _without_strange(_first(plant.without(pieces), scales)) if len(pieces) else found
+        found = calm if calm.excess < _CREEPS else found
     return replace(found, scales=scales.with_background(found.hyper))
+
+
+def _first(plant: Plant, scales: Scales, iterations: int = _FIRST_ITERATIONS) -> Fit:
+    origin = Origin.of(plant, scales)
+    return fit(plant, scales, Model(), origin.point, origin.hyper, iterations=iterations, guess=origin.motion, far=True)
 
 
 def _without_strange(found: Fit) -> Fit:

@@ -83,11 +83,11 @@ def test_causes_are_found_on_ships_of_the_literature_in_their_own_equations(ship
 
 
 def test_what_ships_differ_in_is_not_named_for_a_hull_of_another_form():
-    """A container ship that heels, with nothing hidden: what her rudder loses by it looks like a stall."""
-    verdict = diagnose(published_trials(PUBLISHED["s175"], 440334393), gain=False)
-    stall = next(c for c in verdict.candidates if c.effect == "rudder_stall")
-    assert stall.score > THRESHOLD
-    assert "more is asked of what ships differ in" in stall.rejected_because
+    """A container ship that heels, with nothing hidden: what her forces lack of the fit's form looks like a rudder that answers late."""
+    verdict = diagnose(published_trials(PUBLISHED["s175"], 40), gain=False)
+    late = next(c for c in verdict.candidates if c.effect == "rudder_delay")
+    assert late.score > THRESHOLD
+    assert "more is asked of what ships differ in" in late.rejected_because
     assert not verdict.causes
 
 
@@ -167,7 +167,7 @@ def test_a_ship_file_of_another_ship_names_nothing():
 @pytest.mark.parametrize(
     ("name", "values", "ship", "file"),
     [
-        ("speed_scale", (0.05,), "tanker", "s175"), ("current", (0.3, -0.2), "tanker", "s175"), ("rudder_offset", (0.035,), "mariner", "tanker"),
+        ("speed_scale", (0.05,), "tanker", "s175"), ("current", (0.3, -0.2), "tanker", "s175"), ("rudder_offset", (0.035,), "navy", "tanker"),
     ],
 )  # fmt: skip
 def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship, file):
