@@ -156,6 +156,12 @@ class Particulars(BaseModel):
     A_L: float
     notes: tuple[str, ...]
 
+    def resized(self, factor: float) -> Particulars:
+        """A geometrically similar ship whose lengths are `factor` times these; thrusters keep their force."""
+        powers = dict.fromkeys(("L", "B", "T", "xG", "D_P", "x_P", "H_R", "x_R", "x_bow", "x_stern"), 1)
+        powers |= {"A_R": 2, "A_F": 2, "A_L": 2, "mass": 3, "Izz": 5}
+        return self.model_copy(update={key: getattr(self, key) * factor**power for key, power in powers.items()})
+
     def lacks(self, key: str) -> bool:
         """Whether the file did not give `key`, such as "xG" or "propeller.kt", which an estimate stands in for."""
         return any(note.startswith(f"{key} not given: ") for note in self.notes)

@@ -23,6 +23,7 @@ from .settle import Fit
 
 _TIE = 10.0
 """Candidates within this of the winner's score (2 log Bayes factor) are called confused with it."""
+_SLOW = ("rudder_lag", "rudder_rate_limit", "shaft_lag", "shaft_rate_limit", "thruster_lag")
 _DOUBT = "in the model, but not named while the ship file is in doubt"
 
 
@@ -49,12 +50,13 @@ def describe_causes(
 
 
 def _whatever_the_ship(name: str, found: Analysis) -> bool:
-    """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, a gear seen in its own record, a force that breaks a
-    symmetry which every ship has. (46 trials, with nothing, wind, a rudder offset or a current hidden, each diagnosed with another ship's file: no
-    sensor and no such force was named but those that were there, while thrust, mass and others were. A gear is measured against the ordinary one of
-    the file's length: three times a tanker's rudder was called slow with the file of a ship of half her length.)"""
+    """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, delay or play of a gear seen in its own record, a force
+    that breaks a symmetry which every ship has. (46 trials, with nothing, wind, a rudder offset or a current hidden, each diagnosed with another
+    ship's file: no sensor and no such force was named but those that were there, while thrust, mass and others were.) How slow a gear may be goes
+    with the length of the ship: with the file of a shorter one an ordinary rudder or shaft is slow."""
     effect = EFFECTS.get(name)
-    return effect.family == "sensor" or effect.breaks_symmetry or any(g.effect == name for g in found.gears)
+    in_record = any(g.effect == name for g in found.gears) and name not in _SLOW
+    return effect.family == "sensor" or effect.breaks_symmetry or in_record
 
 
 def _p(found: Analysis, score: float) -> float:

@@ -25,6 +25,7 @@ from .fit import Fit
 from .gain import FoldGain, fold_gain, summarise
 from .model import NUM_BASE
 from .ordinary import needed
+from .other_size import better_size
 from .outcome import Diagnosis, Gain
 from .over_ground import over_ground
 from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant
@@ -37,8 +38,8 @@ FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
 STRANGE, STRANGE_SUM, STRANGE_SIZE = 8.0, 160.0, 3.0
 """Of the fit's parameters in units of their ordinary spreads, beside the causes; their sum of squares; and the size of a cause in typical sizes.
-(Sums with right ship files: 15 to 63 on MMG ships, up to 148 on ships of the literature and on the Esso Osaka; with wrong ones from 22 on, so that
-not every wrong file is doubted.)"""
+(Sums with right ship files: 15 to 63 on MMG ships, up to 148 on ships of the literature and on the Esso Osaka; with wrong ones from 22 on; what
+is not seen here may be seen by `better_size`.)"""
 _MOST = 100.0
 STRANGE_THRUST = 4.0
 """Of the thrust the fit asks for, in units of what the ship file leaves open of it (of kt a factor of 1.2, of the diameter 2.2 besides)."""
@@ -144,7 +145,8 @@ def _check(dataset: Dataset) -> list[str]:
 
 
 def _doubts(found: Analysis) -> list[str]:
-    """Signs that the model does not belong to the data: the fit leaves what is ordinary, or hull or propeller would be another ship's."""
+    """Signs that the model does not belong to the data: the fit leaves what is ordinary, hull or propeller would be another ship's, or a ship of
+    another size explains the runs better."""
     z = needed(found.final, NOTICEABLE)
     signs = []
     if np.max(np.abs(z)) > STRANGE or np.sum(z**2) > STRANGE_SUM:
@@ -155,13 +157,14 @@ def _doubts(found: Analysis) -> list[str]:
     for term, value in zip(found.final.model.terms, found.final.values, strict=True):
         if term.effect.family in ("hull", "propulsion") and np.max(np.abs(value)) > STRANGE_SIZE:
             signs.append(f"{term.label} would have to be {np.max(np.abs(value)):.1f} times its typical size")
+    signs = signs or better_size(found.selection.null)
     if not signs:
         return []
     text = "; ".join(signs)
     return [
         f"{text}. Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)? Until that is sure, nothing is named but "
-        "what shows whatever the ship is (faults of sensors, gears seen in their own record, and forces that know port from starboard or a direction "
-        "of the earth, with their sizes on the ship of the file); the candidates below are ranked as if it were."
+        "what shows whatever the ship is (faults of sensors, delay and play of gears seen in their own record, and forces that know port from "
+        "starboard or a direction of the earth, with their sizes on the ship of the file); the candidates below are ranked as if it were."
     ]
 
 

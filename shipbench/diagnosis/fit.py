@@ -108,10 +108,13 @@ def _followed(found: Fit, lin: Linearisation) -> tuple[Fit, Linearisation]:
         for _ in range(_HALVINGS):
             part = replace(here, eta=here.eta + share[:, None] * (eta - here.eta), w=here.w + share[:, None, None] * (w - here.w))
             trial = Linearisation(found.plant, found.scales, part, lin.towards(part), coarse=False)
-            worse = by_segment(trial, found.hyper, found.gram) > before
+            costs = by_segment(trial, found.hyper, found.gram)
+            worse = ~(costs <= before)
             if not worse.any():
                 break
             share[worse] *= 0.5
+        if not costs.sum() < before.sum():  # an unstable ship's trajectory may blow up from its own point
+            break
         after = settle(trial, found.model, found.hyper, found.log_tau2, leap=0.0)
         gained = after.evidence - found.evidence
         if gained > 0.0:
@@ -147,7 +150,7 @@ def within_bounds(plant: Plant, scales: Scales, point: Point) -> Point:
 def start(plant: Plant) -> tuple[Point, Hyper]:
     """Regressions, no effect, no latent force."""
     B = len(plant.seg.run)
-    hyper = Hyper(np.zeros(3), np.zeros(6), 12.0 * (plant.c.L / 130.0) ** 0.5)
+    hyper = Hyper(np.zeros(3), np.zeros(6), 12.0 * plant.froude)
     return Point(np.zeros(NUM_BASE), np.zeros((B, 6)), np.zeros((B, plant.knots, 3))), hyper
 
 

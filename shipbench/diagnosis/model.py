@@ -84,8 +84,7 @@ class Scales:
     background: Hyper | None = None
 
     def __init__(self, plant: Plant) -> None:
-        L = plant.c.L
-        froude = (L / 130.0) ** 0.5
+        froude = plant.froude
         self.p = parameter_scale(plant.c)
         self.eta = np.array([0.5 * froude**2, 0.5 * froude**2, 5e-3, 0.05 * froude, 0.05 * froude, 1e-3 / froude])
         self.w = np.array([5e-3, 5e-3, 1e-4 / froude**2])  # accelerations do not scale; yaw acceleration goes with 1/L

@@ -116,12 +116,17 @@ class Plant:
     what happens between command and actuator cannot be mistaken for a force; where only commands are recorded, by the held commands.
     """
 
-    def __init__(self, dataset_ship: Particulars, segments: Segments, long: Segments | None = None, gears: dict[str, Gear] | None = None) -> None:
+    def __init__(
+        self, dataset_ship: Particulars, segments: Segments, long: Segments | None = None, gears: dict[str, Gear] | None = None,
+        froude: float | None = None,
+    ) -> None:  # fmt: skip
         self.ship, self.seg, self.long = dataset_ship, segments, segments if long is None else long
         self.c = eq2.coefficients(dataset_ship)
+        self.froude = (self.c.L / 130.0) ** 0.5 if froude is None else froude
+        """Factor of times and speeds against those of a ship of 130 m."""
         self.substeps = _substeps(segments.dt, self.c.L)
         self.steps = segments.states.shape[1] - 1
-        self.knot_time = 5.0 * (self.c.L / 130.0) ** 0.5
+        self.knot_time = 5.0 * self.froude
         self.knots = int(np.ceil(self.steps * segments.dt / self.knot_time)) + 1
         at = np.minimum(np.arange(self.steps + 1) * segments.dt / self.knot_time, self.knots - 1 - 1e-9)
         self.hat = np.maximum(1.0 - np.abs(at[:, None] - np.arange(self.knots)), 0.0)
@@ -155,6 +160,10 @@ class Plant:
     def thinned(self, most: int) -> Plant:
         """At most `most` of its segments, evenly spread; every run keeps at least one."""
         return self if len(self.seg.run) <= most else Plant(self.ship, self.seg.thinned(most), self.long, self.ordinary)
+
+    def resized(self, factor: float) -> Plant:
+        """The same runs of a similar ship; pieces, latent force and units stay, so that evidence can be compared."""
+        return Plant(self.ship.resized(factor), self.seg, self.long, froude=self.froude)
 
     @classmethod
     def of(cls, dataset: Dataset, most_steps: int = MOST_STEPS) -> Plant:

@@ -184,6 +184,19 @@ def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship
     assert next(iter(verdict.causes[0].parameters.values())).value == pytest.approx(np.linalg.norm(values), rel=0.25)
 
 
+def test_the_file_of_a_ship_of_another_size_is_doubted():
+    """A container ship with the file of a navy ship of a third of her length: no parameter of the fit is out of the ordinary there. That her ordinary
+    rudder is slow for so short a ship is not named."""
+    trials = replace(published_trials(PUBLISHED["s175"], 1, (), Trials(runs=16, samples=100)), ship=PUBLISHED["navy"].particulars)
+    verdict = diagnose(trials, gain=False)
+    assert verdict.warnings[0].startswith("a similar ship of 2.5 times the size explains the runs better")
+    assert "Is the ship file that of this ship" in verdict.warnings[0]
+    slow = next(c for c in verdict.candidates if c.effect == "rudder_lag")
+    assert slow.score > THRESHOLD
+    assert slow.rejected_because == "in the model, but not named while the ship file is in doubt"
+    assert "rudder_lag" not in [c.effect for c in verdict.causes]
+
+
 def test_where_every_fit_creeps_no_refit_is_given_up_for_its_first_promise():
     """With another ship's file the current's refit promises less than nothing at first; it ends far ahead."""
     trials = sea_trials(load_mmg_ship("container130"), 0, (Hidden(EFFECTS.get("current"), (0.3, 0.2)),), Trials(runs=12, samples=100))

@@ -1,0 +1,28 @@
+"""Whether a similar ship of quite another size would explain the runs better than that of the ship file: a slip in it, or another ship's file."""
+
+from __future__ import annotations
+
+from .model import Scales
+from .plain import null_fit
+from .settle import Fit
+
+_FACTORS = (0.4, 2.5)
+_PIECES = 99
+"""Of a long record, spread over all runs: so few that none of them is left out of a fit as strange."""
+_LEAST = 60.0
+"""Log evidence over the ship of the file. (Right files: below -40 on MMG ships with a cause or none, -20 to 40 on ships of the literature and in
+control engineers' models; files of ships of less than 0.6 or more than 1.7 times the length: up to 550, most of them above 60.)"""
+
+
+def better_size(null: Fit) -> list[str]:
+    """A line if a smaller or a larger ship, with masses, inertia and forces of her size, is far better beside no cause; none if not."""
+    few = null.plant.thinned(_PIECES)
+    own = null if few is null.plant else null_fit(few, Scales(few))
+    gains = {}
+    for factor in _FACTORS:
+        plant = few.resized(factor)
+        gains[factor] = null_fit(plant, Scales(plant)).evidence - own.evidence
+    best = max(gains, key=lambda factor: gains[factor])
+    if not gains[best] > _LEAST:
+        return []
+    return [f"a similar ship of {best:g} times the size explains the runs better (by {gains[best]:.0f} of log evidence)"]
