@@ -50,10 +50,10 @@ def describe_causes(
 
 
 def _whatever_the_ship(name: str, found: Analysis) -> bool:
-    """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, delay or play of a gear seen in its own record, a force
-    that breaks a symmetry which every ship has. (46 trials, with nothing, wind, a rudder offset or a current hidden, each diagnosed with another
-    ship's file: no sensor and no such force was named but those that were there, while thrust, mass and others were.) How slow a gear may be goes
-    with the length of the ship: with the file of a shorter one an ordinary rudder or shaft is slow."""
+    """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, delay or play of a gear seen in its own record, a
+    force that breaks a symmetry which every ship has. (46 trials, with nothing, wind, a rudder offset or a current hidden, each diagnosed with
+    another ship's file: no sensor and no such force was named but those that were there, while thrust, mass and others were.) How slow a gear may
+    be goes with the length of the ship: with the file of a shorter one an ordinary rudder or shaft is slow."""
     effect = EFFECTS.get(name)
     in_record = any(g.effect == name for g in found.gears) and name not in _SLOW
     return effect.family == "sensor" or effect.breaks_symmetry or in_record
