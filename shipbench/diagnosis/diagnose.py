@@ -40,9 +40,9 @@ STRANGE, STRANGE_SUM, STRANGE_SIZE = 8.0, 160.0, 3.0
 """Of the fit's parameters in units of their ordinary spreads, beside the causes; their sum of squares; and the size of a cause in typical sizes.
 (Sums with right ship files: 15 to 63 on MMG ships, up to 148 on ships of the literature and on the Esso Osaka; with wrong ones from 18 on; what
 is not seen here may be seen by `better_size`.)"""
-ORDINARY_SUM = 30.0
+ORDINARY_SUM = 20.0
 """Sum of squares below which no other size is tried, which takes as long as the first fit. (With the files of ships of less than 0.6 or more than 1.7
-times the length: 31 and more.)"""
+times the length: 22 and more.)"""
 _MOST = 100.0
 STRANGE_THRUST = 4.0
 """Of the thrust the fit asks for, in units of what the ship file leaves open of it (of kt a factor of 1.2, of the diameter 2.2 besides)."""
