@@ -18,15 +18,14 @@ import measure
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
+from seven_ships import SHIPS, trials
 
-from shipbench.diagnosis.case_ships import draw_ship
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.effects.base import EFFECTS
 from shipbench.records import Dataset, Run
 from shipbench.ship import Ship
 from shipbench.simulate.hidden import Hidden
-from shipbench.simulate.published import PUBLISHED, published_trials
-from shipbench.simulate.trials import NOISE, Trials, sea_trials
+from shipbench.simulate.trials import NOISE, Trials
 
 PLANS = {
     "as in the suite": Trials(),
@@ -121,18 +120,15 @@ CHANGES: dict[str, tuple[Trials, Callable[[Dataset], Dataset] | None]] = {
     "low-pass filtered": (Trials(), low_passed),
 }
 CONDITIONS = [*PLANS, *CHANGES]
-SHIPS = 3 + len(PUBLISHED)
 
 
 def outcome(job: tuple[str, int, str], draw: int) -> tuple[str, list[str]]:
     """Verdict and names, for (condition, ship, what is hidden)."""
     condition, number, name = job
     plan, change = CHANGES.get(condition, (PLANS.get(condition), None))
-    rng = np.random.default_rng(draw)
-    ships = [draw_ship(rng, "test", False) for _ in range(3)]
     seed = 1000 * draw + 10 * CONDITIONS.index(condition) + number
     hidden = [Hidden(EFFECTS.get(name), HIDDEN[name])] if name else []
-    data = sea_trials(ships[number], seed, hidden, plan) if number < 3 else published_trials(list(PUBLISHED.values())[number - 3], seed, hidden, plan)
+    data = trials(number, draw, seed, hidden, plan)
     found = diagnose(change(data) if change else data, gain=False)
     return found.verdict, [c.effect for c in found.causes if c.effect != "hull_derivatives"]
 
@@ -145,15 +141,18 @@ def main() -> None:
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         for condition in conditions:
             for draw in range(given.runs):
-                causes = [list(HIDDEN)[(number + CONDITIONS.index(condition) + draw) % len(HIDDEN)] for number in range(SHIPS)]
+                first = CONDITIONS.index(condition) + draw
+                causes = [list(HIDDEN)[(first + number) % len(HIDDEN)] for number in range(len(SHIPS))]
                 jobs = [(condition, number, name) for number, cause in enumerate(causes) for name in ("", cause)]
                 found = dict(zip(jobs, pool.map(partial(outcome, draw=draw), jobs), strict=True))
                 silent = [j for j in jobs if not j[2] and found[j][0] == "none"]
                 right = [j for j in jobs if j[2] and found[j][1][:1] == [j[2]]]
                 odd = [j for j in jobs if j not in silent and j not in right]
                 wrong = [f"ship {j[1]}, {j[2] or 'nothing'}: {', '.join(found[j][1]) or found[j][0]}" for j in odd]
-                measure.record(given, {"condition": condition, "draw": draw, "silent": len(silent), "right": len(right), "of": SHIPS, "wrong": wrong})
-                score = f"of {SHIPS} without a cause {len(silent)} none, of {SHIPS} with one {len(right)} right"
+                measure.record(
+                    given, {"condition": condition, "draw": draw, "silent": len(silent), "right": len(right), "of": len(SHIPS), "wrong": wrong}
+                )
+                score = f"of {len(SHIPS)} without a cause {len(silent)} none, of {len(SHIPS)} with one {len(right)} right"
                 print(f"{condition}: {score}", *wrong, sep="; ", flush=True)
 
 

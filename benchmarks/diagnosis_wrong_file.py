@@ -14,26 +14,15 @@ from dataclasses import replace
 from multiprocessing import get_context
 
 import measure
-import numpy as np
+from seven_ships import SHIPS, particulars, trials
 
-from shipbench.diagnosis.case_ships import draw_ship
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.simulate.published import PUBLISHED, published_trials
-from shipbench.simulate.trials import sea_trials
-
-DRAWN = 3
-SHIPS = [*(f"drawn {i + 1}" for i in range(DRAWN)), *PUBLISHED]
 
 
 def outcome(job: tuple[int, int, int]) -> tuple[bool, list[str]]:
     """Whether the ship file is doubted, and what is named, for (ship, file, draw)."""
     sails, file, draw = job
-    rng = np.random.default_rng(draw)
-    drawn = [draw_ship(rng, "test", False) for _ in range(DRAWN)]
-    literature = list(PUBLISHED.values())
-    particulars = [*(s.particulars for s in drawn), *(s.particulars for s in literature)][file]
-    data = sea_trials(drawn[sails], draw, ()) if sails < DRAWN else published_trials(literature[sails - DRAWN], draw)
-    found = diagnose(replace(data, ship=particulars), gain=False)
+    found = diagnose(replace(trials(sails, draw, draw), ship=particulars(file, draw)), gain=False)
     return any("Is the ship file" in w for w in found.warnings), [c.effect for c in found.causes if c.effect != "hull_derivatives"]
 
 

@@ -24,6 +24,7 @@ from .settle import Fit
 _TIE = 10.0
 """Candidates within this of the winner's score (2 log Bayes factor) are called confused with it."""
 _SLOW = ("rudder_lag", "rudder_rate_limit", "shaft_lag", "shaft_rate_limit", "thruster_lag")
+"""Slow against the ordinary gears of a ship of the file's length."""
 _DOUBT = "in the model, but not named while the ship file is in doubt"
 
 

@@ -18,11 +18,10 @@ def better_size(null: Fit) -> list[str]:
     """A line if a smaller or a larger ship, with masses, inertia and forces of her size, is far better beside no cause; none if not."""
     few = null.plant.thinned(_PIECES)
     own = null if few is null.plant else null_fit(few, Scales(few))
-    gains = {}
+    best, most = 1.0, _LEAST
     for factor in _FACTORS:
         plant = few.resized(factor)
-        gains[factor] = null_fit(plant, Scales(plant)).evidence - own.evidence
-    best = max(gains, key=lambda factor: gains[factor])
-    if not gains[best] > _LEAST:
-        return []
-    return [f"a similar ship of {best:g} times the size explains the runs better (by {gains[best]:.0f} of log evidence)"]
+        gain = null_fit(plant, Scales(plant)).evidence - own.evidence
+        if gain > most:
+            best, most = factor, gain
+    return [] if best == 1.0 else [f"a similar ship of {best:g} times the size explains the runs better (by {most:.0f} of log evidence)"]

@@ -23,7 +23,7 @@ _SEARCHES = 3
 _FIRST_ITERATIONS = 8
 """Of the first fit, which gives the background: until that stands, lower variances are rewarded, and a fit creeps towards them for ever."""
 _CREEPS = 20.0
-"""Excess of a first fit that has not come to rest."""
+"""Excess of a first fit that has not come to rest. (124 development sets: 31 to 3659 in nine, at most 19 in the others.)"""
 REFIT_ITERATIONS = 16
 """Of a fit that begins beside another one."""
 
@@ -52,10 +52,10 @@ def _begun(plant: Plant, scales: Scales) -> Fit:
     kept if it rests then.
     """
     found = _without_strange(_first(plant, scales))
-    if found.excess > _CREEPS:
-        pieces = strange_pieces(_first(plant, scales, iterations=1))
-        calm = _without_strange(_first(plant.without(pieces), scales)) if len(pieces) else found
-        found = calm if calm.excess < _CREEPS else found
+    if found.excess > _CREEPS and len(pieces := strange_pieces(_first(plant, scales, iterations=1))):
+        calm = _without_strange(_first(plant.without(pieces), scales))
+        if calm.excess < _CREEPS:
+            found = calm
     return replace(found, scales=scales.with_background(found.hyper))
 
 

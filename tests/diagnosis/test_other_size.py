@@ -1,0 +1,43 @@
+"""Whether a similar ship of another size explains the runs better."""
+
+from __future__ import annotations
+
+import pytest
+
+from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.other_size import better_size
+from shipbench.diagnosis.plain import null_fit
+from shipbench.diagnosis.plant import Plant
+from shipbench.ship import complete
+from shipbench.simulate.published import PUBLISHED, published_trials
+from shipbench.simulate.trials import Trials
+
+
+@pytest.fixture(scope="module")
+def plant():
+    return Plant.of(published_trials(PUBLISHED["s175"], 3, (), Trials(runs=8, samples=100)))
+
+
+def test_particulars_scale_with_their_power_of_the_length():
+    ship = complete(PUBLISHED["s175"].particulars)
+    double = ship.resized(2.0)
+    for key, power in (("L", 1), ("xG", 1), ("D_P", 1), ("A_R", 2), ("A_L", 2), ("mass", 3), ("Izz", 5)):
+        assert getattr(double, key) == pytest.approx(2.0**power * getattr(ship, key)), key
+    assert double.Cb == ship.Cb
+
+
+def test_evidence_of_the_same_size_is_the_same(plant):
+    """So that what is gained by another size is of the size alone, not of the pieces or of their units."""
+    same = plant.resized(1.0)
+    assert null_fit(same, Scales(same)).evidence == pytest.approx(null_fit(plant, Scales(plant)).evidence, abs=1e-6)
+
+
+def test_a_right_file_is_not_doubted(plant):
+    assert better_size(null_fit(plant, Scales(plant))) == []
+
+
+@pytest.mark.parametrize(("factor", "better"), [(0.4, "2.5"), (2.5, "0.4")])
+def test_a_file_of_a_smaller_or_larger_similar_ship_is_doubted(plant, factor, better):
+    wrong = plant.resized(factor)
+    (line,) = better_size(null_fit(wrong, Scales(wrong)))
+    assert line.startswith(f"a similar ship of {better} times the size explains the runs better (by ")
