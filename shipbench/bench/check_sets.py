@@ -6,10 +6,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 
+import numpy as np
+
 from ..data import harbour90, harbour90_noisy
 from ..effects.base import EFFECTS, Effect
 from ..physics.mmg import MMGShip, load_mmg_ship
-from ..records import Dataset
+from ..records import Dataset, Run
 from ..ship import complete
 from ..simulate.fitted_ship import fitted_trials
 from ..simulate.hidden import Hidden
@@ -22,6 +24,11 @@ SOURCES = (*SHIPS, EQUATION, HARBOUR)
 _WINDY = Trials(gusts=2.0, wind=(-8.0, 9.0))
 _CALM = Trials(noise=0.0, gusts=0.0)
 _CALM_SETS = 3
+_STEPS = {
+    "instruments": (0.2, 0.2, np.deg2rad(0.1), 0.05, 0.05, np.deg2rad(0.1 / 60.0), 1.0),
+    "a display": (0.2, 0.2, np.deg2rad(1.0), 0.05, 0.05, np.deg2rad(1.0 / 60.0), 1.0),
+}
+"""Last digits of x, y, psi, u, v, r, n on a ship of 130 m: positions in 0.0001', speeds in 0.1 kn."""
 _NOT_HIDDEN = ("going_astern", "wind_drift")
 """Effects of measured ships that came later: the published sets keep their numbers."""
 
@@ -52,7 +59,7 @@ def clean_sets(seeds: Sequence[int]) -> Iterator[tuple[str, Callable[[], Dataset
     """(kind, maker) of sets in which nothing is to be found.
 
     Trials of MMG ships in gusts, the same with strong wind recorded, without any noise, and under every effect that is no sensor's; trials of the
-    fitted model; port manoeuvres with and without noise.
+    fitted model; port manoeuvres with and without noise; some of these with their last digits as instruments and displays have them.
     """
     for name in SHIPS:
         ship = load_mmg_ship(name)
@@ -69,6 +76,25 @@ def clean_sets(seeds: Sequence[int]) -> Iterator[tuple[str, Callable[[], Dataset
     for seed in seeds:
         for make in (harbour90.make, harbour90_noisy.make):
             yield "port manoeuvres", partial(make, seed)
+    for seed in seeds[:_CALM_SETS]:
+        for steps in _STEPS.values():
+            for name in SHIPS:
+                for trials in (Trials(), _CALM):
+                    yield "MMG ships, rounded", partial(_rounded, partial(sea_trials, load_mmg_ship(name), seed, (), trials), steps)
+            for make in (harbour90.make, harbour90_noisy.make):
+                yield "port manoeuvres, rounded", partial(_rounded, partial(make, seed), steps)
+
+
+def _rounded(make: Callable[[], Dataset], steps: Sequence[float]) -> Dataset:
+    """As instruments or displays give it: in steps of lengths, angles and times of the ship's size."""
+    data = make()
+    L = data.ship.L / 130.0
+    step = np.array(steps) * L ** np.array([1.0, 1.0, 0.0, 0.5, 0.5, -0.5, -0.5])
+
+    def coarse(run: Run) -> Run:
+        return replace(run, states=np.hstack([np.round(run.states[:, :7] / step) * step, run.states[:, 7:]]))
+
+    return data.with_runs([coarse(run) for run in data.runs])
 
 
 def _with_effect(ship: MMGShip, seed: int, effect: Effect) -> Dataset:

@@ -13,7 +13,7 @@ from ..records import Run
 from ..signals import PSI, R, U, V, X, Y
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
-from .statistics import some, spread
+from .statistics import some, spread, stretches
 
 _WINDOW = 8
 _DIGITS = 1e-5
@@ -21,7 +21,7 @@ _DIGITS = 1e-5
 _REST = 1e-3
 """Froude number of a ship at rest."""
 _FEWEST = 20
-"""Equal samples that make two runs copies."""
+"""Equal samples without a break, each other than the one before, that make two runs copies."""
 
 
 def _hashes(run: Run, size: np.ndarray) -> np.ndarray:
@@ -63,10 +63,17 @@ def overlaps(recording: Recording) -> dict[tuple[int, int], tuple[int, int]]:
 
 
 def _alike(a: Run, b: Run, offset: int, size: np.ndarray) -> int:
-    """Number of samples that are equal to rounding where `a` begins `offset` samples before `b` (a hash breaks where rounding falls on an edge)."""
+    """Number of samples that are equal to rounding where `a` begins `offset` samples before `b` (a hash breaks where rounding falls on an edge).
+
+    0 where no unbroken part of them holds enough changes: records in coarse steps agree here and there by chance.
+    """
     i, j = max(offset, 0), max(-offset, 0)
     n = min(len(a) - i, len(b) - j)
-    return int(np.sum(np.all(np.abs(a.states[i : i + n, [U, V, R]] - b.states[j : j + n, [U, V, R]]) <= 2.0 * size, axis=1)))
+    mine, other = a.states[i : i + n, [U, V, R]], b.states[j : j + n, [U, V, R]]
+    same = np.all(np.abs(mine - other) <= 2.0 * size, axis=1)
+    changes = np.any(np.abs(np.diff(mine, axis=0)) > 2.0 * size, axis=1)
+    most = max((int(changes[start : stop - 1].sum()) for start, stop in stretches(same)), default=0)
+    return int(same.sum()) if most >= _FEWEST - 1 else 0
 
 
 def _group(recording: Recording, run: Run) -> str:

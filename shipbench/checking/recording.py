@@ -51,6 +51,18 @@ class Recording:
         """Typical yaw rate [rad/s]: root mean square over all samples."""
         return float(np.sqrt(np.mean(np.concatenate([r.states[:, R] for r in self.runs]) ** 2))) + 1e-12
 
+    @cached_property
+    def steps(self) -> np.ndarray:
+        """(10,) step in which each state is recorded, or less: of the changes between neighbours one in a hundred is smaller; 0: none."""
+        changes = np.abs(np.concatenate([np.diff(run.states, axis=0) for run in self.runs]))
+        return np.array([np.quantile(c[c > 0.0], 0.01) if np.any(c > 0.0) else 0.0 for c in changes.T])
+
+    def rounded(self, channel: int) -> bool:
+        """Whether a state is recorded in steps of the size of its changes, so that it may well repeat itself (1 % of the changes in noise are smaller
+        than a fiftieth of the median)."""
+        changes = np.abs(np.concatenate([np.diff(run.states[:, channel]) for run in self.runs]))
+        return bool(np.any(changes > 0.0) and self.steps[channel] > 0.1 * np.median(changes[changes > 0.0]))
+
     def name_of(self, run: Run) -> str:
         """The id under which the user knows a run."""
         return self.parent.get(run.id, run.id)

@@ -10,12 +10,14 @@ from ..records import Run
 from ..signals import DELTA, PSI, STATES, N, R, U, V, X, Y
 from .finding import Curve, Finding, Picture, labelled, toml_line
 from .recording import Recording
-from .statistics import times
+from .statistics import spread, stretches, times
 
 _REPEATED = 0.005
 """Share of repeated samples that is reported."""
 _FEWEST, _FROZEN = 5, 3.0
 """Samples, and s at 130 m, for which a channel must stand still to be frozen."""
+_HIDES, _SURE = 2.0, 5.0
+"""Steps of a record within which a channel may move unseen; deviations of the noise of position or heading beyond them."""
 _RARE = 1e-6
 """Chance of as many repeats in a row, from the channel's usual share of repeats, that makes them a standstill."""
 _RARELY, _OFTEN = 0.02, 0.4
@@ -26,12 +28,6 @@ _CHANNELS = {"x, y": (X, Y), "psi": (PSI,), "u": (U,), "v": (V,), "r": (R,)}
 def _equal(run: Run, channels: Sequence[int]) -> np.ndarray:
     """(samples - 1,): the sample repeats the one before in all channels."""
     return np.all(np.diff(run.states[:, list(channels)], axis=0) == 0.0, axis=1)
-
-
-def stretches(flags: np.ndarray) -> list[tuple[int, int]]:
-    """(start, stop) of every unbroken stretch of True, stop excluded."""
-    edges = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
-    return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
 
 
 def _moving(recording: Recording, run: Run, channels: Sequence[int]) -> np.ndarray:
@@ -71,7 +67,7 @@ def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[F
     if not steps:
         return []
     needed = max(_FEWEST, round(_FROZEN * recording.froude / recording.dt))
-    still = [_standstills(recording, run, channels, r, m, needed) for run, r, m in zip(recording.runs, repeats, moving, strict=True)]
+    still = [_standstills(r, m, needed) for r, m in zip(repeats, moving, strict=True)]
     single, shares = 0, {}
     for run, r, m, stops in zip(recording.runs, repeats, moving, still, strict=True):
         alone = r & m
@@ -82,7 +78,10 @@ def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[F
             shares[recording.name_of(run)] = float(alone.sum() / m.sum())
     usual = single / steps
     allowed = max(needed, int(np.ceil(np.log(_RARE) / np.log(usual))) if 0.0 < usual < 1.0 else 0)
-    frozen = {run.id: [s for s in stops if s[1] - s[0] >= allowed] for run, stops in zip(recording.runs, still, strict=True)}
+    frozen = {
+        run.id: [(a, b) for a, b in stops if b - a >= allowed and _visible(recording, run, channels, a, b)]
+        for run, stops in zip(recording.runs, still, strict=True)
+    }
     findings = _frozen(recording, name, channels, frozen)
     if usual > _REPEATED and name == "x, y":
         worst = max(shares, key=lambda k: shares[k]) if shares else ""
@@ -98,15 +97,30 @@ def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[F
     return findings
 
 
-def _standstills(
-    recording: Recording, run: Run, channels: Sequence[int], repeated: np.ndarray, moving: np.ndarray, needed: int
-) -> list[tuple[int, int]]:
-    """Stretches of at least `needed` repeats, most of them while the ship moves, over which the channel ought to have changed visibly."""
-    found = []
-    for a, b in stretches(repeated):
-        if b - a >= needed and np.mean(moving[a:b]) > 0.7:
-            found.append((a, b))
-    return found
+def _standstills(repeated: np.ndarray, moving: np.ndarray, needed: int) -> list[tuple[int, int]]:
+    """Stretches of at least `needed` repeats, most of them while the ship moves."""
+    return [(a, b) for a, b in stretches(repeated) if b - a >= needed and np.mean(moving[a:b]) > 0.7]
+
+
+def _visible(recording: Recording, run: Run, channels: Sequence[int], a: int, b: int) -> bool:
+    """Whether more happened from sample a to b than a record in such steps hides, as the other channels have it."""
+    S, dt, step = run.states, recording.dt, float(np.max(recording.steps[list(channels)]))
+    if X in channels:
+        return float(np.sum(np.hypot(S[a:b, U], S[a:b, V])) * dt) > _HIDES * step
+    if PSI in channels:
+        return float(np.ptp(np.cumsum(S[a:b, R]) * dt)) > _HIDES * step
+    if not recording.rounded(channels[0]):
+        return True
+    way = np.diff(S[:, X] + 1j * S[:, Y]) * np.exp(-1j * S[:-1, PSI])
+    moved = {U: way.real, V: way.imag, R: np.diff(S[:, PSI])}[channels[0]]
+    rounding = float(recording.steps[PSI] if R in channels else np.hypot(*recording.steps[[X, Y]]))
+    apart = np.concatenate([[0.0], np.cumsum(moved - dt * 0.5 * (S[1:, channels[0]] + S[:-1, channels[0]]))])
+    first, last = max(a - (b - a), 0), min(b + (b - a), len(S) - 1)
+    beside = last - b + a - first
+    usual = float(apart[last] - apart[b] + apart[a] - apart[first]) / max(beside, 1)  # of a current, of a bias
+    ends = 1.0 + 2.0 * (b - a) / max(beside, 1)
+    hidden = _HIDES * step * (b - a) * dt + ends * (rounding + _SURE * spread(np.diff(apart, 2)) / np.sqrt(6.0))
+    return abs(float(apart[b] - apart[a]) - (b - a) * usual) > hidden
 
 
 def _frozen(recording: Recording, name: str, channels: Sequence[int], stops: dict[str, list[tuple[int, int]]]) -> list[Finding]:

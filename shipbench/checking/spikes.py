@@ -39,11 +39,14 @@ def _levels(recording: Recording, run: Run, actuators: bool = False) -> dict[int
 
 
 def _least(recording: Recording, channel: int, values: list[np.ndarray]) -> float:
+    """Smallest spike: above one step of a record in steps, which may go to and fro between two of them."""
     if channel in (X, Y):
-        return _LEAST[channel] * recording.dataset.ship.L
-    if channel == PSI:
-        return _LEAST[PSI]
-    return _LEAST_SHARE * float(np.ptp(np.concatenate([np.quantile(v, [0.02, 0.98]) for v in values])))
+        own = _LEAST[channel] * recording.dataset.ship.L
+    elif channel == PSI:
+        own = _LEAST[PSI]
+    else:
+        own = _LEAST_SHARE * float(np.ptp(np.concatenate([np.quantile(v, [0.02, 0.98]) for v in values])))
+    return max(own, 1.5 * float(recording.steps[channel]))
 
 
 def _off(values: np.ndarray) -> np.ndarray:

@@ -59,6 +59,12 @@ def spread(values: np.ndarray) -> float:
     return float(1.4826 * np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
 
 
+def stretches(flags: np.ndarray) -> list[tuple[int, int]]:
+    """(start, stop) of every unbroken stretch of True, stop excluded."""
+    edges = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
+    return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
+
+
 def inliers(residual: np.ndarray, groups: int = 1, limit: float = 6.0) -> np.ndarray:
     """Rows (T,) whose residual lies within `limit` robust deviations; with `groups` of 2, equations (2 T/2) of one window go together."""
     size = np.sqrt(np.sum(residual.reshape(groups, -1) ** 2, axis=0))

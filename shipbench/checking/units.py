@@ -18,6 +18,7 @@ import numpy as np
 from ..effects.unit_or_sign_error import FACTORS
 from ..records import Dataset, Run
 from ..signals import COMMANDS, DELTA, F_B, F_S, PSI, STATES, N, R, U, V, X, Y
+from .statistics import stretches
 
 BETTER = 4.0
 """How much larger the plain reading's sum of squares must be than that of the reading believed."""
@@ -26,6 +27,10 @@ _SWAY_BETTER, _LOG_ODDS = 1.3, 60.0
 _ALIKE = 1.1
 _WINDOW, _RUDDER_WINDOW = 15.0, 6.0
 """Seconds at 130 m, Froude-scaled."""
+_TURN, _TURN_WINDOW, _TURN_LAG = np.deg2rad(10.0), 30.0, 5.0
+"""Least turn that shows the side of the rudder, within so many seconds at 130 m, which begin so long after those of the rudder."""
+_FEWEST_TURNS, _ALIKE_TURNS, _SURE = 5, 0.6, 5.0
+"""Turns (windows overlap by half), cosine of their angles and their rudder that makes a side, and deviations of the slope just after the rudder."""
 _LAGS = (0.0, 2.0, 5.0, 10.0)
 """Seconds by which an actuator may follow its command."""
 _LEAST_PUSH = 0.05
@@ -58,7 +63,8 @@ def check_units(dataset: Dataset) -> list[UnitFinding]:
     if not runs:
         return []
     findings = _actuator_units(dataset, runs)
-    motion, side = _motion(dataset, runs), _rudder_side(dataset, runs)
+    motion = _motion(dataset, runs)
+    side = _rudder_side(dataset, runs, abs(motion.choose(_Side()).r))
     chosen = motion.choose(side)
     findings += motion.findings(chosen)
     if side.sign * np.sign(chosen.r) < 0:
@@ -265,28 +271,37 @@ class _Side:
     evidence: str = ""
 
 
-def _rudder_side(dataset: Dataset, runs: Sequence[Run]) -> _Side:
-    """Which way the yaw rate goes after the rudder: r(t + 6 s) - r(t) against delta(t), given r(t), ahead and without thrusters."""
-    ahead = max(1, round(_RUDDER_WINDOW * (dataset.ship.L / 130.0) ** 0.5 / dataset.dt))
-    rows = []
-    for run in runs:
-        S = run.states
+def _rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> _Side:
+    """Which way the ship turns under a rudder, ahead and without thrusters: in turns by a visible angle, which no gust makes against the rudder, and
+    just after it, r(t + 6 s) - r(t) against delta(t), given r(t). On a straight course the rudder answers the motion, and that alone would mislead.
+    unit: of the recorded yaw rate, over rad/s.
+    """
+    froude = (dataset.ship.L / 130.0) ** 0.5
+    ahead, width, lag = (max(1, round(seconds * froude / dataset.dt)) for seconds in (_RUDDER_WINDOW, _TURN_WINDOW, _TURN_LAG))
+    rows, turns = [], []
+    for S in (run.states for run in runs):
         idle = (S[:, F_B] == 0.0) & (S[:, F_S] == 0.0) & (S[:, U] * np.sign(np.median(S[:, U])) > 0.0) & (S[:, N] >= 0.0)
-        at = np.arange(0, len(S) - ahead, max(1, ahead // 2))
-        at = at[np.array([bool(np.all(idle[a : a + ahead + 1])) for a in at], dtype=bool)]
-        if len(at) < 6 or np.std(S[at, DELTA]) <= 1e-9:
-            continue
-        block = np.stack([S[at + ahead, R] - S[at, R], S[at, R], S[at, DELTA]], axis=-1)
-        rows.append(block - block.mean(axis=0))
-    if len(rows) < 3:
+        for a, b in stretches(idle):
+            at = np.arange(a, b - ahead, max(1, ahead // 2))
+            if len(at):
+                block = np.stack([S[at + ahead, R] - S[at, R], S[at, R], S[at, DELTA]], axis=-1)
+                rows.append(block - block.mean(axis=0))
+            at = np.arange(a + lag, b - width, max(1, width // 2))
+            turned, helm = (np.concatenate([[0.0], np.cumsum(S[:, channel])]) for channel in (R, DELTA))
+            turns.append(np.stack([(turned[at + width] - turned[at]) * dataset.dt, (helm[at + width - lag] - helm[at - lag]) / width], axis=-1))
+    turn, helm = np.concatenate(turns).T if turns else np.zeros((2, 0))
+    turn, helm = turn[np.abs(turn) > _TURN * unit], helm[np.abs(turn) > _TURN * unit]
+    if len(turn) < _FEWEST_TURNS or not np.any(helm):
         return _Side()
-    own = [_slopes(block)[0][0] for block in rows]
+    likeness = float(turn @ helm / np.sqrt((turn @ turn) * (helm @ helm)))
     slope, sd = _slopes(np.concatenate(rows))
-    sign = float(np.sign(slope[0]))
-    agree = sum(np.sign(b) == sign for b in own)
-    if abs(slope[0]) < 10.0 * sd or agree < 0.85 * len(own):
+    sign = float(np.sign(likeness))
+    if abs(likeness) < _ALIKE_TURNS or slope[0] * sign < _SURE * sd:
         return _Side()
-    text = f"In {agree} of {len(own)} runs the yaw rate goes to the other side after the rudder (pooled slope {abs(slope[0]) / sd:.0f} sigma)."
+    text = (
+        f"The {len(turn)} turns by more than {np.rad2deg(_TURN):.0f} degrees in {width * dataset.dt:.3g} s go to the other side than their rudder "
+        f"(cosine {likeness:.2f}), and just after it the yaw rate does ({abs(slope[0]) / sd:.0f} sigma)."
+    )
     return _Side(sign, text)
 
 

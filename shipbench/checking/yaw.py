@@ -109,9 +109,10 @@ def _biases(recording: Recording, made: tuple, first: Chosen, chosen: Chosen) ->
     left = rows[:, 0] - rows[:, 1] - known
     drifts = {int(i): -left[run == i] / span for i in np.unique(run) if np.sum(run == i) >= 3}
     shared = float(np.median([d.mean() for d in drifts.values()])) if drifts else np.inf
+    least = max(_LEAST_BIAS * recording.turning, 0.5 * float(recording.steps[R]))  # a record in steps is off by half of one for as long as it stands
     if "bias" in chosen.names and abs(shared) > 0.5 * abs(float(chosen.value["bias"][0])):
         bias, sd = -float(chosen.value["bias"][0]), float(chosen.sd["bias"][0])
-        if abs(bias) < _LEAST_BIAS * recording.turning:
+        if abs(bias) < least:
             return []
         text = f"r reads {np.rad2deg(bias):+.4f} deg/s too much (standard error {np.rad2deg(sd):.4f}) in all runs: {_shares(first, chosen)}."
         line = toml_line({"bias": {"r": bias}})
@@ -124,7 +125,7 @@ def _biases(recording: Recording, made: tuple, first: Chosen, chosen: Chosen) ->
         blocks = np.array([part.mean() for part in np.array_split(mine, min(len(mine), _BLOCKS))])
         mean = float(np.mean(mine))
         sd = max(usual / np.sqrt(len(mine)), float(np.std(blocks, ddof=1)) / np.sqrt(len(blocks)) / 2.0)
-        if abs(mean) > _SURE * sd and abs(mean) > _LEAST_BIAS * recording.turning:
+        if abs(mean) > _SURE * sd and abs(mean) > least:
             found[recording.name_of(recording.runs[i])] = mean
     if not found:
         return []

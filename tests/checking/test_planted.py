@@ -16,7 +16,9 @@ from shipbench.bench.check_suite import Outcome, apply_lines, run_case, write_pl
 from shipbench.checking.base import check_dataset, check_path
 from shipbench.data.files import read_dataset
 from shipbench.errors import InputError
-from shipbench.signals import DELTA, PSI, STATES, R, U, V, X, Y
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.signals import DELTA, PSI, STATES, N, R, U, V, X, Y
+from shipbench.simulate.trials import Trials, sea_trials
 
 SEED = 311  # neither one on which thresholds were set nor one that the suite reports
 SHIP = "kcs"
@@ -58,6 +60,53 @@ def test_a_clean_set_gives_no_finding_from_its_files(tmp_path):
 def test_what_is_real_is_no_fault(kind: str):
     make = [make for k, make in clean_sets([SEED]) if k == kind][-1]
     assert check_dataset(replace(make(), simulation=None)) == []
+
+
+@pytest.mark.parametrize("kind", ["MMG ships, rounded", "port manoeuvres, rounded"])
+def test_values_that_repeat_themselves_for_their_last_digit_are_no_fault(kind: str):
+    """Where there is little noise, a yaw rate in steps of a degree a minute stands still for half a minute, and runs agree for some samples."""
+    for make in [make for k, make in clean_sets([SEED]) if k == kind]:
+        assert check_dataset(replace(make(), simulation=None)) == []
+
+
+@pytest.mark.parametrize("channels", [("r",), ("psi",), ("x", "y")])
+def test_what_stands_still_in_a_rounded_record_is_found(channels: tuple[str, ...]):
+    data = [make for k, make in clean_sets([SEED]) if k == "MMG ships, rounded"][2]()  # KCS, as instruments have it
+    run = max(data.runs, key=lambda run: np.ptp(run.states[:, R]))
+    at = int(np.argmax([np.ptp(run.states[a : a + 20, R]) for a in range(len(run) - 20)]))
+    states = run.states.copy()
+    states[at : at + 20, [STATES.index(c) for c in channels]] = states[at, [STATES.index(c) for c in channels]]
+    found = check_dataset(data.with_runs([replace(run, states=states) if r.id == run.id else r for r in data.runs]))
+    assert [(f.kind, f.channels, f.runs) for f in found] == [("frozen", channels, (run.id,))]
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_side_of_the_rudder_shows_in_a_single_log(sign: float, seed: int):
+    data = sea_trials(load_mmg_ship(SHIP), seed, (), Trials(runs=1, samples=1200))
+    states, inputs = data.runs[0].states.copy(), data.runs[0].inputs.copy()
+    states[:, DELTA] *= sign
+    inputs[:, data.inputs.index("delta_c")] *= sign
+    found = check_dataset(data.with_runs([replace(data.runs[0], states=states, inputs=inputs)]))
+    assert [(f.kind, f.channels) for f in found] == ([] if sign > 0.0 else [("sign", ("delta",))])
+
+
+def test_a_rudder_that_answers_the_motion_on_a_straight_course_does_not_seem_to_lie_on_the_other_side():
+    """A ship of Nomoto's first order in gusts and waves, whose autopilot works against the yaw rate: just after a rudder she turns against it."""
+    rng = np.random.default_rng(SEED)
+    S = np.zeros((3600, len(STATES)))
+    gust = psi = r = delta = 0.0
+    for k, state in enumerate(S):
+        gust += -gust / 20.0 + 0.001 * rng.normal()
+        r += (0.06 * delta + gust - r) / 25.0
+        psi += r
+        delta += 0.4 * (-0.5 * psi - 40.0 * r - delta)
+        state[[PSI, U, R, N, DELTA]] = psi, 7.0, r + 0.002 * np.sin(0.45 * k), 100.0, delta
+    S[:, X], S[:, Y] = np.cumsum(7.0 * np.cos(S[:, PSI])), np.cumsum(7.0 * np.sin(S[:, PSI]))
+    data = base_set(SHIP, SEED)
+    logs = [replace(data.runs[0], id=f"log{i}", t=np.arange(300.0), states=part, inputs=part[:, N:]) for i, part in enumerate(np.split(S, 12))]
+    assert np.rad2deg(np.std(S[:, DELTA])) > 1.0
+    assert "sign" not in [f.kind for f in check_dataset(data.with_runs(logs))]
 
 
 @pytest.mark.parametrize(
