@@ -44,6 +44,8 @@ _RULES: tuple[tuple[str, str], ...] = (
     ("v", r"\b(v|vm|v velo|vm velo|sway( speed| velocity)?|v vel\w*)\b"),
 )  # fmt: skip
 _TIME_RULE = r"\b(t|time|timestamp|date ?time|utc|datetime|time ?stamp|clock|seconds|secs?|unix ?time|epoch)\b"
+_SIDED = ("v", "r", "delta", "delta_c", "F_b", "F_b_c", "F_s", "F_s_c")
+_TO_PORT = r"\b(port|ps) ?(is|=)? ?(\+|pos(itive)?\b)|(\+|\bpos(itive)?) ?(is|=|to)? ?(port|ps)\b"
 _ACCEPTED = {"m": "m, km, ft, nmi", "m/s": "m/s, kn, km/h, ft/s", "rad": "rad, deg", "rad/s": "rad/s, deg/s, deg/min", "rpm": "rpm, rev/s, rad/s",
              "N": "N, kN, MN, tf"}  # fmt: skip
 _ROWS = 4000
@@ -193,7 +195,10 @@ class _Draft:
             seen.add(channel)
             unit, why = _guess_unit(channel, column)
             gap = f", gap = {3 * self.step:g}" if self.step > _SLOW else ""
-            entry = f"{channel} = {{ column = {_quoted(column.name)}, unit = {_quoted(unit)}{gap} }}"
+            sign = ""
+            if channel in _SIDED and re.search(_TO_PORT, column.name.lower().replace("_", " ")):
+                sign, why = ', sign = "port"', f"{why}; positive to port, from the name"
+            entry = f"{channel} = {{ column = {_quoted(column.name)}, unit = {_quoted(unit)}{sign}{gap} }}"
             lines.append(f"{entry}  # GUESS: {why}; {_range(column.values)}")
         if left:
             lines.append(f"# not taken: {', '.join(_quoted(name) for name in left[:40])}{' and more' if len(left) > 40 else ''}")

@@ -54,6 +54,16 @@ def test_the_draft_of_a_clear_log_imports_as_it_is(propose, tmp_path):
     assert len(load_dataset("out")) == 1
 
 
+@pytest.mark.parametrize("name", ["Rudder angle [deg] (port +)", "Rudder [deg], + = PS", "rudder (deg) positive to port", "rudder_deg_port_positive"])
+def test_a_rudder_that_is_positive_to_port_by_its_name_is_drafted_so(propose, tmp_path, name):
+    table = logged(np.arange(0.0, 60.0, 0.5)).rename(columns={"rudder": name, "rudder order": "rudder order, starboard + [deg]"})
+    assert propose(write(tmp_path, "log.csv", table)).exit_code == 0
+    channels = tomllib.loads((tmp_path / "draft.toml").read_text())["channels"]
+    assert channels["delta"]["column"] == name
+    assert channels["delta"]["sign"] == "port"
+    assert "sign" not in channels["delta_c"]
+
+
 @pytest.mark.parametrize(
     ("stamps", "expected"),
     [
