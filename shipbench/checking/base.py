@@ -13,7 +13,7 @@ from .gross import mend
 from .reading import read_recording
 from .recording import Recording
 
-_HELPERS = frozenset({"base", "finding", "gross", "reading", "recording", "selection", "statistics", "units", "wind_reading"})
+_HELPERS = frozenset({"base", "finding", "gross", "reading", "recording", "rudder_side", "selection", "statistics", "units", "wind_reading"})
 CHECKS = Registry("check", "checking", "CHECK", helpers=_HELPERS, group="checks")
 
 

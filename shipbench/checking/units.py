@@ -18,19 +18,15 @@ import numpy as np
 from ..effects.unit_or_sign_error import FACTORS
 from ..records import Dataset, Run
 from ..signals import COMMANDS, DELTA, F_B, F_S, PSI, STATES, N, R, U, V, X, Y
-from .statistics import stretches
+from .rudder_side import Side, rudder_side
 
 BETTER = 4.0
 """How much larger the plain reading's sum of squares must be than that of the reading believed."""
 _SWAY_BETTER, _LOG_ODDS = 1.3, 60.0
 """The same for a reading that changes the sway alone, which is a small part of the way; and least twice the log likelihood ratio of it."""
 _ALIKE = 1.1
-_WINDOW, _RUDDER_WINDOW = 15.0, 6.0
+_WINDOW = 15.0
 """Seconds at 130 m, Froude-scaled."""
-_TURN, _TURN_WINDOW, _TURN_LAG = np.deg2rad(10.0), 30.0, 5.0
-"""Least turn that shows the side of the rudder, within so many seconds at 130 m, which begin so long after those of the rudder."""
-_FEWEST_TURNS, _ALIKE_TURNS, _SURE = 5, 0.6, 5.0
-"""Turns (windows overlap by half), cosine of their angles and their rudder that makes a side, and deviations of the slope just after the rudder."""
 _LAGS = (0.0, 2.0, 5.0, 10.0)
 """Seconds by which an actuator may follow its command."""
 _LEAST_PUSH = 0.05
@@ -64,7 +60,7 @@ def check_units(dataset: Dataset) -> list[UnitFinding]:
         return []
     findings = _actuator_units(dataset, runs)
     motion = _motion(dataset, runs)
-    side = _rudder_side(dataset, runs, abs(motion.choose(_Side()).r))
+    side = rudder_side(dataset, runs, abs(motion.choose(Side()).r))
     chosen = motion.choose(side)
     findings += motion.findings(chosen)
     if side.sign * np.sign(chosen.r) < 0:
@@ -144,7 +140,7 @@ class _Motion:
     window: float
     windows: int
 
-    def choose(self, side: _Side) -> _Reading:
+    def choose(self, side: Side) -> _Reading:
         """The reading with the fewest errors among those that explain the data as well as any; the plain one unless it fails by far."""
         plain = _Reading()
         suits = self._tracks(plain) if self.track else [replace(plain, psi=psi) for psi in self._headings()]
@@ -261,57 +257,6 @@ def _bounded_squares(target: np.ndarray, columns: np.ndarray, limits: np.ndarray
             slope = b[:, i] - np.einsum("hp,hp->h", G[:, i], x) + G[:, i, i] * x[:, i]
             x[:, i] = np.clip(slope / np.maximum(G[:, i, i], 1e-30), -1.0, 1.0)
     return np.sum((target - np.einsum("htp,hp->ht", scaled, x)) ** 2, axis=1)
-
-
-@dataclass(frozen=True)
-class _Side:
-    """sign: +1 where the recorded rudder turns the recorded yaw rate to its own side, -1 to the other, 0 where it is not clear."""
-
-    sign: float = 0.0
-    evidence: str = ""
-
-
-def _rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> _Side:
-    """Which way the ship turns under a rudder, ahead and without thrusters: in turns by a visible angle, which no gust makes against the rudder, and
-    just after it, r(t + 6 s) - r(t) against delta(t), given r(t). On a straight course the rudder answers the motion, and that alone would mislead.
-    unit: of the recorded yaw rate, over rad/s.
-    """
-    froude = (dataset.ship.L / 130.0) ** 0.5
-    ahead, width, lag = (max(1, round(seconds * froude / dataset.dt)) for seconds in (_RUDDER_WINDOW, _TURN_WINDOW, _TURN_LAG))
-    rows, turns = [], []
-    for S in (run.states for run in runs):
-        idle = (S[:, F_B] == 0.0) & (S[:, F_S] == 0.0) & (S[:, U] * np.sign(np.median(S[:, U])) > 0.0) & (S[:, N] >= 0.0)
-        for a, b in stretches(idle):
-            at = np.arange(a, b - ahead, max(1, ahead // 2))
-            if len(at):
-                block = np.stack([S[at + ahead, R] - S[at, R], S[at, R], S[at, DELTA]], axis=-1)
-                rows.append(block - block.mean(axis=0))
-            at = np.arange(a + lag, b - width, max(1, width // 2))
-            turned, helm = (np.concatenate([[0.0], np.cumsum(S[:, channel])]) for channel in (R, DELTA))
-            turns.append(np.stack([(turned[at + width] - turned[at]) * dataset.dt, (helm[at + width - lag] - helm[at - lag]) / width], axis=-1))
-    turn, helm = np.concatenate(turns).T if turns else np.zeros((2, 0))
-    turn, helm = turn[np.abs(turn) > _TURN * unit], helm[np.abs(turn) > _TURN * unit]
-    if len(turn) < _FEWEST_TURNS or not np.any(helm):
-        return _Side()
-    likeness = float(turn @ helm / np.sqrt((turn @ turn) * (helm @ helm)))
-    slope, sd = _slopes(np.concatenate(rows))
-    sign = float(np.sign(likeness))
-    if abs(likeness) < _ALIKE_TURNS or slope[0] * sign < _SURE * sd:
-        return _Side()
-    text = (
-        f"The {len(turn)} turns by more than {np.rad2deg(_TURN):.0f} degrees in {width * dataset.dt:.3g} s go to the other side than their rudder "
-        f"(cosine {likeness:.2f}), and just after it the yaw rate does ({abs(slope[0]) / sd:.0f} sigma)."
-    )
-    return _Side(sign, text)
-
-
-def _slopes(block: np.ndarray) -> tuple[np.ndarray, float]:
-    """(slope of column 0 on column 2, on column 1) and the first one's standard error."""
-    A, y = block[:, [2, 1]], block[:, 0]
-    G = A.T @ A + 1e-12 * np.trace(A.T @ A) * np.eye(2)
-    slope = np.linalg.solve(G, A.T @ y)
-    variance = float(np.mean((y - A @ slope) ** 2))
-    return slope, float(np.sqrt(2.0 * variance * np.linalg.inv(G)[0, 0])) + 1e-300
 
 
 def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:

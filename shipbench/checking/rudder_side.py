@@ -1,0 +1,70 @@
+"""The side to which the recorded rudder turns the recorded yaw rate: a reversed rudder, and a mirrored heading, are told by it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..records import Dataset, Run
+from ..signals import DELTA, F_B, F_S, N, R, U
+from .statistics import stretches
+
+_WINDOW = 6.0
+"""Seconds after the rudder at 130 m, Froude-scaled."""
+_TURN, _TURN_WINDOW, _TURN_LAG = np.deg2rad(10.0), 30.0, 5.0
+"""Least turn that shows the side of the rudder, within so many seconds at 130 m, which begin so long after those of the rudder."""
+_FEWEST_TURNS, _ALIKE_TURNS, _SURE = 5, 0.6, 5.0
+"""Turns (windows overlap by half), cosine of their angles and their rudder that makes a side, and deviations of the slope just after the rudder."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """sign: +1 where the recorded rudder turns the recorded yaw rate to its own side, -1 to the other, 0 where it is not clear."""
+
+    sign: float = 0.0
+    evidence: str = ""
+
+
+def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
+    """Which way the ship turns under a rudder, ahead and without thrusters: in turns by a visible angle, which no gust makes against the rudder, and
+    just after it, r(t + 6 s) - r(t) against delta(t), given r(t). On a straight course the rudder answers the motion, and that alone would mislead.
+    unit: of the recorded yaw rate, over rad/s.
+    """
+    froude = (dataset.ship.L / 130.0) ** 0.5
+    ahead, width, lag = (max(1, round(seconds * froude / dataset.dt)) for seconds in (_WINDOW, _TURN_WINDOW, _TURN_LAG))
+    rows, turns = [], []
+    for S in (run.states for run in runs):
+        idle = (S[:, F_B] == 0.0) & (S[:, F_S] == 0.0) & (S[:, U] * np.sign(np.median(S[:, U])) > 0.0) & (S[:, N] >= 0.0)
+        for a, b in stretches(idle):
+            at = np.arange(a, b - ahead, max(1, ahead // 2))
+            if len(at):
+                block = np.stack([S[at + ahead, R] - S[at, R], S[at, R], S[at, DELTA]], axis=-1)
+                rows.append(block - block.mean(axis=0))
+            at = np.arange(a + lag, b - width, max(1, width // 2))
+            turned, helm = (np.concatenate([[0.0], np.cumsum(S[:, channel])]) for channel in (R, DELTA))
+            turns.append(np.stack([(turned[at + width] - turned[at]) * dataset.dt, (helm[at + width - lag] - helm[at - lag]) / width], axis=-1))
+    turn, helm = np.concatenate(turns).T if turns else np.zeros((2, 0))
+    turn, helm = turn[np.abs(turn) > _TURN * unit], helm[np.abs(turn) > _TURN * unit]
+    if len(turn) < _FEWEST_TURNS or not np.any(helm):
+        return Side()
+    likeness = float(turn @ helm / np.sqrt((turn @ turn) * (helm @ helm)))
+    slope, sd = _slopes(np.concatenate(rows))
+    sign = float(np.sign(likeness))
+    if abs(likeness) < _ALIKE_TURNS or slope[0] * sign < _SURE * sd:
+        return Side()
+    text = (
+        f"The {len(turn)} turns by more than {np.rad2deg(_TURN):.0f} degrees in {width * dataset.dt:.3g} s go to the other side than their rudder "
+        f"(cosine {likeness:.2f}), and just after it the yaw rate does ({abs(slope[0]) / sd:.0f} sigma)."
+    )
+    return Side(sign, text)
+
+
+def _slopes(block: np.ndarray) -> tuple[np.ndarray, float]:
+    """(slope of column 0 on column 2, on column 1) and the first one's standard error."""
+    A, y = block[:, [2, 1]], block[:, 0]
+    G = A.T @ A + 1e-12 * np.trace(A.T @ A) * np.eye(2)
+    slope = np.linalg.solve(G, A.T @ y)
+    variance = float(np.mean((y - A @ slope) ** 2))
+    return slope, float(np.sqrt(2.0 * variance * np.linalg.inv(G)[0, 0])) + 1e-300
