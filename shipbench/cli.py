@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import shlex
 from pathlib import Path
 from typing import Annotated, Any
@@ -31,7 +32,7 @@ class _Group(TyperGroup):
         except ShipbenchError as error:
             code, text = 1, str(error)
         except OSError as error:
-            if error.errno is None:
+            if error.errno in (None, errno.EPIPE):  # a reader that has read enough (| head) is no error; typer ends quietly
                 raise
             code, text = 1, f"{error.filename or 'a file'}: {error.strerror}."
         typer.echo(f"error: {text}", err=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -30,7 +31,7 @@ def diagnose(
     from .diagnosis.diagnose import diagnose as run
 
     data = load_dataset(dataset)
-    found = run(data, gain=gain, seed=seed, workers=workers, thorough=thorough)
+    found = replace(run(data, gain=gain, seed=seed, workers=workers, thorough=thorough), spec=dataset)
     written = write_diagnosis(found, out or Path("diagnoses") / slug(Path(data.name).name))
     if as_json:
         print_json(found.document())

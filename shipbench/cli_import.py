@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -59,7 +60,7 @@ def data_import(
     elif not quiet:
         for line in summary.lines():
             typer.echo(line)
-        typer.echo(f"Written: {folder} ({summary.table.name}, dataset.toml, ship.toml). Next: shipbench data check {folder}")
+        typer.echo(f"Written: {folder} ({summary.table.name}, dataset.toml, ship.toml). Next: shipbench data check {shlex.quote(str(folder))}")
 
 
 def register(data_app: typer.Typer) -> None:

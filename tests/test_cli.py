@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -37,6 +38,15 @@ def test_version(cli):
 def test_python_m_is_the_same_command():
     done = subprocess.run([sys.executable, "-m", "shipbench", "--version"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout.strip()) == (0, f"shipbench {version('shipbench')}")
+
+
+@pytest.mark.parametrize("arguments", [["effects"], ["effects", "--json"], ["models"]])
+def test_a_reader_that_has_read_enough_is_no_error(arguments):
+    reader, writer = os.pipe()
+    os.close(reader)  # as `| head` does, sooner
+    done = subprocess.run([sys.executable, "-m", "shipbench", *arguments], stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (1, "")
 
 
 @pytest.mark.parametrize("command", ["run", "leaderboard", "models", "validate", "predict", "data"])

@@ -221,7 +221,7 @@ looked for in the actuator alone. Gains are measured on runs that neither select
 
 
 def _method(d: Diagnosis) -> str:
-    command = f"shipbench diagnose {shlex.quote(d.dataset)}"
+    command = f"shipbench diagnose {shlex.quote(d.spec or d.dataset)}"
     return (
         f"<p>{_METHOD.strip()}</p><pre tabindex='0'>{escape(command)}</pre>"
         f"<p class='small'>Data fingerprint <code>{escape(d.fingerprint)}</code>; {d.seconds:.0f} s.</p>"

@@ -83,7 +83,7 @@ def next_command(d: Diagnosis) -> str:
     """The command that compares the plain model with the extended one."""
     inside = [c.effect for c in d.causes if c.effect not in _NO_MODEL]
     model = "+".join(["physics", *inside])
-    return f"shipbench run --model physics --model {shlex.quote(model)} --dataset {shlex.quote(d.dataset)}" if inside else ""
+    return f"shipbench run --model physics --model {shlex.quote(model)} --dataset {shlex.quote(d.spec or d.dataset)}" if inside else ""
 
 
 def detectable(c: Candidate) -> str:

@@ -103,7 +103,10 @@ class Trace:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The verdict and its evidence; `document` is what `diagnosis.json` holds."""
+    """The verdict and its evidence; `document` is what `diagnosis.json` holds.
+
+    spec: how commands name the data set, a folder or name[key=value]; "" where that is its own name.
+    """
 
     dataset: str
     verdict: str
@@ -119,6 +122,7 @@ class Diagnosis:
     unknown: dict[str, Any] | None = None
     gain_per_run: tuple[tuple[str, float, float], ...] = ()
     trace: Trace | None = None
+    spec: str = ""
 
     def document(self) -> dict[str, Any]:
         """The contract's JSON, plus `warnings`, the gain of all causes together, and `unknown` (channel and variable) where that is the verdict."""

@@ -6,6 +6,7 @@ import itertools
 import json
 import os
 import re
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -111,7 +112,8 @@ def write_proposal(logs: Sequence[Path], path: Path, force: bool = False) -> lis
         os.replace(fresh, path)
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}. Give --propose a path that can be written.") from None
-    return [*lines, f"Draft: {path}. Check every line marked GUESS, then: shipbench data import LOG --map {path} --ship ship.toml --out FOLDER"]
+    command = f"shipbench data import LOG --map {shlex.quote(str(path))} --ship ship.toml --out FOLDER"
+    return [*lines, f"Draft: {path}. Check every line marked GUESS, then: {command}"]
 
 
 def _guess_dt(drafts: list[_Draft]) -> float:

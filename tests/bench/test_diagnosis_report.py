@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
+import shlex
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from shipbench.bench.diagnosis_plots import changed, telling
 from shipbench.bench.diagnosis_report import page, write_diagnosis, write_report
 from shipbench.bench.diagnosis_text import WIDTH, gain_words, headline, summary_lines
+from shipbench.cli import app
 from shipbench.diagnosis.outcome import Candidate, Cause, Diagnosis, Estimate, Gain, Wrong
 from tests.diagnosis.test_wrong import make_trace
 
@@ -93,6 +98,21 @@ def test_the_summary_says_the_verdict_with_sizes_and_the_next_command():
     assert "shipbench run --model physics --model physics+current" in text
     assert "reciprocal courses" in text
     assert "WARNING: few runs" in text
+
+
+@pytest.mark.parametrize("spec", ["{folder}", "calm[seed=3]"])
+def test_the_commands_name_the_data_as_the_user_did(spec, tmp_path, monkeypatch):
+    """A folder's data set has a name of its own, and one with parameters is not found without them."""
+    spec = spec.format(folder=tmp_path / "my trial")
+    loaded = []
+    monkeypatch.setattr("shipbench.data.base.load_dataset", lambda given: loaded.append(given) or SimpleNamespace(name="bridge"))
+    monkeypatch.setattr("shipbench.diagnosis.diagnose.diagnose", lambda data, **options: in_words(make_diagnosis(name=data.name)))
+    result = CliRunner().invoke(app, ["diagnose", spec, "--out", str(tmp_path / "out")])
+    assert loaded == [spec]
+    assert f"--model physics+current --dataset {shlex.quote(spec)}" in " ".join(result.stdout.split())
+    page = html.unescape((tmp_path / "out/report.html").read_text())
+    assert f"--model physics+current --dataset {shlex.quote(spec)}<" in page
+    assert f"shipbench diagnose {shlex.quote(spec)}<" in page
 
 
 def test_a_size_without_interval_is_written_without_one():
