@@ -59,6 +59,11 @@ class Run:
         """Sample time [s]."""
         return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
 
+    @property
+    def group(self) -> str:
+        """Runs of one group (pieces of one log, copies of one manoeuvre, windows of one run) must not be split; a run without one is its own."""
+        return str(self.meta.get("group", self.meta.get("parent", self.id)))
+
     def slice(self, start: int, stop: int, suffix: str = "") -> Run:
         """Samples [start, stop) as a run that keeps the metadata and names its parent."""
         return Run(

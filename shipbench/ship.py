@@ -15,6 +15,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from .errors import InputError
 
+_LEAST_FULLNESS = 0.1
+"""Block coefficient over the whole breadth below which a unit is wrong."""
+
 
 class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -171,7 +174,7 @@ def complete(ship: Ship) -> Particulars:
     """Fill in what `ship` does not give from published regressions and rules of thumb, each named in `notes`.
 
     Raises:
-        InputError: mass, displacement and Cb contradict one another by more than 10 %.
+        InputError: mass, displacement and Cb contradict one another by more than 10 %, or no hull is so full or so slender.
     """
     notes: list[str] = []
 
@@ -184,7 +187,13 @@ def complete(ship: Ship) -> Particulars:
     box = ship.L * ship.B * ship.T
     mass = ship.mass if ship.mass is not None else ship.rho * float(ship.displacement or 0.0)
     Cb = take(ship.Cb, mass / (ship.rho * box), "Cb", "mass / (rho L B T)")
-    if not 0.9 < mass / (ship.rho * box * Cb) < 1.1 or Cb > 1.0:
+    if not _LEAST_FULLNESS < mass / (ship.rho * box) <= 1.1:
+        raise InputError(
+            f"ship '{ship.name}': mass {mass:.4g} kg, rho {ship.rho:g} kg/m^3 and L B T = {ship.L:g} x {ship.B:g} x {ship.T:g} m give a block "
+            f"coefficient of {mass / (ship.rho * box):.3g}; hulls have 0.3 to 0.9, catamarans over all {_LEAST_FULLNESS:g} at least. Check units "
+            "(m, m^3, kg; 1000 t are mass = 1e6)."
+        )
+    if not 0.9 < mass / (ship.rho * box * Cb) < 1.1:
         raise InputError(
             f"ship '{ship.name}': mass {mass:.4g} kg, rho {ship.rho:g} kg/m^3 and L B T = {box:.4g} m^3 give a block coefficient of "
             f"{mass / (ship.rho * box):.3f}, the file says {Cb:.3f}; they must agree within 10 %. Check units (kg, m, m^3)."

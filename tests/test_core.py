@@ -118,6 +118,13 @@ def test_a_ship_that_contradicts_itself_is_refused():
         complete(SHIP.model_copy(update={"Cb": 0.9}))
 
 
+@pytest.mark.parametrize("wrong", [{"L": 12_000.0}, {"displacement": None, "mass": 6150.0}, {"displacement": 6.15e6}])
+def test_a_ship_in_other_units_is_refused_with_the_figures(wrong):
+    """Length in cm, mass in t, displacement in kg."""
+    with pytest.raises(InputError, match=r"give a block coefficient of [0-9.e+-]+; hulls have"):
+        complete(SHIP.model_copy(update=wrong))
+
+
 def test_rk4_is_of_fourth_order_on_an_oscillator():
     def error(h: float) -> float:
         state = (1.0, 0.0)

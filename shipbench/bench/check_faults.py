@@ -82,6 +82,8 @@ FAULTS: tuple[Fault, ...] = (
     Fault("frozen position", plant.frozen("x", "y"), _of("frozen", "x", "y"), size="15 s", also=("jump",)),
     Fault("frozen surge", plant.frozen("u"), _of("frozen", "u"), size="15 s"),
     Fault("stuck rudder", plant.stuck_rudder, _of("frozen", "delta"), size="25 s"),
+    Fault("rudder dead", plant.times(delta=0.0), _of("actuator never moves", "delta"), size="0 throughout"),
+    Fault("revolutions dead", plant.times(n=0.0), _of("actuator never moves", "n"), size="0 throughout"),
     Fault("outliers of x", plant.spiked("x", 15.0, 1.0), _of("outliers", "x"), size="15 m"),
     Fault("outliers of heading", plant.spiked("psi", np.deg2rad(8.0), 0.0), _of("outliers", "psi"), size="8 deg"),
     Fault("outliers of surge", plant.spiked("u", 1.5, 0.5), _of("outliers", "u"), size="1.5 m/s"),

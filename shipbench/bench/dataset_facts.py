@@ -19,7 +19,7 @@ def dataset_facts(dataset: Dataset) -> dict[str, Any]:
         values = [str(r.meta[key]) for r in dataset.runs if key in r.meta]
         return ", ".join(f"{v} {values.count(v)}" for v in dict.fromkeys(values)) or "not given"
 
-    groups = {r.meta.get("group", r.id) for r in dataset.runs}
+    groups = {r.group for r in dataset.runs}
     return {
         "name": dataset.name,
         "ship": f"{dataset.ship.name}, L = {dataset.ship.L:g} m, B = {dataset.ship.B:g} m, T = {dataset.ship.T:g} m",

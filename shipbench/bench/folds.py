@@ -41,23 +41,18 @@ def select_runs(dataset: Dataset, task: Task) -> tuple[Dataset, tuple[str, ...]]
         notes.append(f"max_runs = {task.max_runs}: {task.max_runs} of {len(usable)} runs are used, evenly spread")
         usable = [usable[i] for i in np.linspace(0, len(usable) - 1, task.max_runs).round().astype(int)]
     if task.split == "published":
-        sides = {side: {group_of(r) for r in usable if r.meta.get("split") == side} for side in ("train", "test")}
+        sides = {side: {r.group for r in usable if r.meta.get("split") == side} for side in ("train", "test")}
         for group in sorted(sides["train"] & sides["test"]):
             notes.append(f"the published split has pieces of '{group}' both in training and in test")
     selected = dataset.with_runs(usable)
     return selected, (*notes, *split_notes(selected, task))
 
 
-def group_of(run: Run) -> str:
-    """Runs with the same group (pieces of one log, copies of one manoeuvre) must not be split; a run without one is its own."""
-    return str(run.meta.get("group", run.id))
-
-
 def _groups(runs: Sequence[Run], rng: np.random.Generator) -> list[list[Run]]:
     """Runs by group, groups in random order."""
     groups: dict[str, list[Run]] = {}
     for run in runs:
-        groups.setdefault(group_of(run), []).append(run)
+        groups.setdefault(run.group, []).append(run)
     ordered = list(groups.values())
     return [ordered[i] for i in rng.permutation(len(ordered))]
 
@@ -101,6 +96,11 @@ def _by_folds(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]
     groups = _groups(dataset.runs, np.random.default_rng(task.fold_seed))
     if task.folds > len(groups):
         what = "runs" if len(groups) == len(dataset) else "groups of runs"
+        if len(groups) == 1:
+            raise InputError(
+                f"data set '{dataset.name}' is one run or one group of runs, which no fold may part: nothing could be held out. "
+                "Cut a long log into windows (shipbench data import --window 300), remove `group` from dataset.toml, or add runs."
+            )
         raise InputError(f"folds = {task.folds}, but data set '{dataset.name}' has {len(groups)} {what}; give at most {len(groups)} folds.")
     parts = [{r.id for r in part} for part in _deal(groups, task.folds)]
     return [([r for r in dataset.runs if r.id not in ids], [r for r in dataset.runs if r.id in ids]) for ids in parts]
@@ -113,8 +113,8 @@ def kinds_of(dataset: Dataset) -> list[str]:
 
 def _parted(dataset: Dataset, test: list[Run]) -> tuple[list[Run], list[Run]]:
     """(rest, test): runs of a group that is scored train nothing."""
-    scored = {group_of(r) for r in test}
-    return [r for r in dataset.runs if group_of(r) not in scored], test
+    scored = {r.group for r in test}
+    return [r for r in dataset.runs if r.group not in scored], test
 
 
 def _by_kind(dataset: Dataset) -> list[tuple[list[Run], list[Run]]]:
@@ -139,7 +139,7 @@ def _by_speed(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]
     """Whole groups by their mean speed: the fastest are scored, until they are one `folds`-th of the runs."""
     groups: dict[str, list[Run]] = {}
     for run in dataset.runs:
-        groups.setdefault(group_of(run), []).append(run)
+        groups.setdefault(run.group, []).append(run)
     if len(groups) < 2:
         raise InputError(
             f"split = 'speed', but data set '{dataset.name}' has one group of runs only; two or more are needed. Use split = 'published'."
@@ -163,7 +163,7 @@ def _fewer(rest: list[Run], task: Task, index: int) -> tuple[list[Run], int | No
     for group in _groups(rest, np.random.default_rng([task.fold_seed, index, 2])):
         if len(kept) + len(group) <= task.train_runs:
             kept += group
-    if len({group_of(r) for r in kept}) < 2:
+    if len({r.group for r in kept}) < 2:
         raise InputError(
             f"train_runs = {task.train_runs}: in fold {index} that is fewer than two groups of runs, one to fit and one for early stopping; "
             "give more runs."

@@ -185,7 +185,7 @@ def _rows(study: Study, cell: Cell, statuses: list[str], reasons: list[str], val
     per_run = {
         "run": [r.id for r in runs],
         "parent": [str(r.meta.get("parent", r.id)) for r in runs],
-        "group": [str(r.meta.get("group", r.meta.get("parent", r.id))) for r in runs],  # windows of one run belong together
+        "group": [r.group for r in runs],
         "kind": [str(r.meta.get("manoeuvre", "")) for r in runs],
         "status": statuses,
         "reason": reasons,

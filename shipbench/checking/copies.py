@@ -76,21 +76,17 @@ def _alike(a: Run, b: Run, offset: int, size: np.ndarray) -> int:
     return int(same.sum()) if most >= _FEWEST - 1 else 0
 
 
-def _group(recording: Recording, run: Run) -> str:
-    return str(run.meta.get("group", run.id))
-
-
 def check(recording: Recording) -> list[Finding]:
     """Copies and pieces, then logs that were cut; what shares a group already is not reported. All runs that hang together get one group."""
-    shared = {pair: part for pair, part in overlaps(recording).items() if _apart(recording, [recording.runs[i] for i in pair])}
-    chains = [chain for chain in _chains(recording) if _apart(recording, chain)]
+    shared = {pair: part for pair, part in overlaps(recording).items() if _apart([recording.runs[i] for i in pair])}
+    chains = [chain for chain in _chains(recording) if _apart(chain)]
     families = _families(recording, [*([recording.runs[i] for i in pair] for pair in shared), *chains])
     found = [_copy(recording, recording.runs[i], recording.runs[j], *part, families) for (i, j), part in shared.items()]
     return found + [_log(recording, chain, families) for chain in chains]
 
 
-def _apart(recording: Recording, runs: list[Run]) -> bool:
-    return len({_group(recording, run) for run in runs}) > 1
+def _apart(runs: list[Run]) -> bool:
+    return len({run.group for run in runs}) > 1
 
 
 def _families(recording: Recording, sets: list[list[Run]]) -> dict[str, tuple[str, ...]]:
@@ -98,7 +94,7 @@ def _families(recording: Recording, sets: list[list[Run]]) -> dict[str, tuple[st
     family: dict[str, set[str]] = {}
     given: dict[str, list[Run]] = {}
     for run in recording.runs:
-        given.setdefault(_group(recording, run), []).append(run)
+        given.setdefault(run.group, []).append(run)
     for runs in [*given.values(), *sets]:
         names = set(recording.names(runs)).union(*(family.get(recording.name_of(run), ()) for run in runs))
         family |= dict.fromkeys(names, names)
@@ -186,10 +182,13 @@ def _log(recording: Recording, pieces: list[Run], families: dict[str, tuple[str,
     gaps = [float(b.t[0] - a.t[-1]) for a, b in pairwise(pieces)]
     clock = f", {min(gaps):g} to {max(gaps):g} s later by their own t" if min(gaps) > 0.0 else ""
     text = f"runs {some(names, 8)} follow one another: each begins where the one before ends{clock}. They are pieces of one log."
+    family = families[names[0]]
+    alone = len(family) == len(recording.runs)
+    todo = "Nothing: it is the only log, and as one group nothing of it could be held out. What is held out has the same day, weather and load."
     curves = tuple(Curve(recording.name_of(run), run.states[:, Y], run.states[:, X]) for run in pieces)
     return Finding(
-        "copies", "warning", "pieces of one log", text, _lines(families[names[0]]), runs=names, evidence={"pieces": len(pieces)},
-        picture=Picture("Tracks", "y [m]", "x [m]", curves),
+        "copies", "note" if alone else "warning", "pieces of one log", text, "" if alone else _lines(family), todo if alone else "", runs=names,
+        evidence={"pieces": len(pieces)}, picture=Picture("Tracks", "y [m]", "x [m]", curves),
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from ..signals import DELTA, F_B, F_S, N, R, U, V
 from .actuators import check as command_like
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
+from .standing import standing
 from .statistics import inliers
 
 _AHEAD, _EDGE = 8.0, 2.0
@@ -142,14 +143,19 @@ def _changes(values: np.ndarray, windows: np.ndarray, ahead: int, edge: int) -> 
 
 
 def check(recording: Recording) -> list[Finding]:
-    """At most one finding for each pair; none where actuators are commands: the lag is that of the gear then."""
+    """At most one finding for each pair; none where actuators are commands: the lag is that of the gear then.
+
+    Where rudder or revolutions are missing from the record, what they do is laid on the other's lag: the motion is not asked.
+    """
     if recording.dataset.actuators != "measured" or command_like(recording):
         return []
-    searches = {pair.cause: _search(recording, pair) for pair in _PAIRS if pair.cause in recording.recorded}
+    missing = standing(recording.dataset)
+    asked = [pair for pair in _PAIRS if pair.cause in recording.recorded and (pair.order or not missing)]
+    searches = {pair.cause: _search(recording, pair) for pair in asked}
     waits = {cause: -float(s.lags[s.best]) for cause, s in searches.items() if s is not None and s.gain >= _WAITS_GAIN}
     found = [
-        f for pair in _PAIRS
-        if (s := searches.get(pair.cause)) is not None and (f := _judge(recording, pair, s, waits.get(f"{pair.cause}_c", 0.0))) is not None
+        f for pair in asked
+        if (s := searches[pair.cause]) is not None and (f := _judge(recording, pair, s, waits.get(f"{pair.cause}_c", 0.0))) is not None
     ]  # fmt: skip
     motion = [f for f in found if f.channels == _MOTION]  # rudder and shaft may both say it
     return [f for f in found if f not in motion] + sorted(motion, key=lambda f: -f.evidence["gain"])[:1]

@@ -244,7 +244,9 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
         left = f", {last.score:.0f} beside it" if last is not None else ""
         return f"explained by {next((n for n in named if n in inside), inside[0])} ({score:.0f} alone{left})"
     fitted = [x.score for x in steps if x.term.label == label and x.round == steps[-1].round]
-    what = f"{fitted[0]:.0f} once it is fitted" if fitted else "but what is ahead of it gains nothing once fitted"
+    what = "but what is ahead of it gains nothing once fitted"
+    if fitted:
+        what = f"{f'{fitted[0]:.0f}' if fitted[0] > 0.0 else 'below zero'} once it is fitted"
     return f"score {s.score if last is None else last.score:.0f}{' beside the causes found' if inside else ''}, {what}"
 
 

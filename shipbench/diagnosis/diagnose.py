@@ -13,6 +13,7 @@ from multiprocessing import get_context
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from ..checking.standing import standing
 from ..checking.units import check_units, corrected
 from ..errors import InputError
 from ..records import Dataset
@@ -85,7 +86,10 @@ def diagnose(
     settled = (*(NAMES if late is not None else ()), *faults(dataset))
     plant = Plant.of(dataset, THOROUGH_STEPS if thorough else MOST_STEPS)
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
-    wanted = gain and not cautious
+    apart = len({run.group for run in dataset.runs}) > 1
+    if not apart and len(dataset) > 1:
+        warnings.append("all runs are one group (pieces of one log, say): no gain can be measured on runs that are held out.")
+    wanted = gain and apart and not cautious
     work = partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) if wanted and workers > 1 else nullcontext() as pool:
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
@@ -94,6 +98,7 @@ def diagnose(
         doubts = _doubts(found) if only is None else []
         measured = wanted and not doubts
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if measured else Worth()
+    warnings += [text for text, _ in standing(dataset).values()]
     warnings += said(dataset) + drift + wind + doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"{c.evidence}: fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
@@ -194,15 +199,23 @@ def _one_fold(
     fold: int, threshold: float, hull: bool, *, dataset: Dataset, seed: int, only: Sequence[str] | None, settled: Sequence[str]
 ) -> FoldGain:
     """Selection and fits on the training part of one fold."""
-    test = _folds(len(dataset), seed)[fold]
+    test = _folds(dataset, seed)[fold]
     train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
     plant = Plant.of(dataset.with_runs(train), FOLD_STEPS)
     extension, plain = causes_of(plant, threshold, only, settled)
     return fold_gain(dataset, test, extension, plain, hull)
 
 
-def _folds(num: int, seed: int) -> list[np.ndarray]:
-    return [np.sort(part) for part in np.array_split(np.random.default_rng(seed).permutation(num), min(FOLDS, num))]
+def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
+    """Places of the runs of each fold: groups in random order, whole, each where its middle run falls among equal parts."""
+    members: dict[str, list[int]] = {}
+    for i, run in enumerate(dataset.runs):
+        members.setdefault(run.group, []).append(i)
+    groups = [*members.values()]
+    groups = [groups[i] for i in np.random.default_rng(seed).permutation(len(groups))]
+    size = np.array([len(g) for g in groups])
+    part = np.repeat(np.arange(FOLDS), [len(p) for p in np.array_split(np.arange(len(dataset)), FOLDS)])[np.cumsum(size) - 1 - size // 2]
+    return [np.sort(np.concatenate([g for g, k in zip(groups, part, strict=True) if k == fold])) for fold in np.unique(part)]
 
 
 def _cross_validated(
@@ -213,14 +226,15 @@ def _cross_validated(
     if not (found.final.model.terms or found.gears or hull) or found.unknown is not None:
         return Worth()
     ready = [ahead] if ahead is not None and found.threshold == THRESHOLD else []
-    rest = range(len(ready), len(_folds(len(dataset), seed)))
+    rest = range(len(ready), len(_folds(dataset, seed)))
     parts = list((pool.map if pool else map)(partial(work, threshold=found.threshold, hull=hull), rest))
     parts += [part.result() for part in ready]
     before, after, with_hull = (np.zeros(len(dataset)) for _ in range(3))
     for part in parts:
         before[part.test], after[part.test], with_hull[part.test] = part.before, part.after, part.with_hull
-    name_hull = hull and summarise(after, with_hull, seed).ci95[0] > 0.0
+    groups = [run.group for run in dataset.runs]
+    name_hull = hull and summarise(after, with_hull, seed, groups).ci95[0] > 0.0
     if name_hull:
         after = with_hull
     rows = tuple((run.id, float(b), float(a)) for run, b, a in zip(dataset.runs, before, after, strict=True))
-    return Worth(summarise(before, after, seed), rows, name_hull)
+    return Worth(summarise(before, after, seed, groups), rows, name_hull)

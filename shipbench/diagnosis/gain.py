@@ -175,11 +175,14 @@ def fold_gain(dataset: Dataset, test: np.ndarray, extension: Extension, plain: d
     return FoldGain(test, before, after, with_hull, names)
 
 
-def summarise(before: np.ndarray, after: np.ndarray, seed: int) -> Gain:
-    """Paired gain with a bootstrap interval over runs."""
+def summarise(before: np.ndarray, after: np.ndarray, seed: int, groups: Sequence[str]) -> Gain:
+    """Paired gain with a bootstrap interval over groups of runs."""
     rng = np.random.default_rng(seed)
-    draws = rng.integers(0, len(before), (_BOOTSTRAP, len(before)))
-    relative = 1.0 - after[draws].mean(axis=1) / np.maximum(before[draws].mean(axis=1), 1e-12)
+    place = {group: i for i, group in enumerate(dict.fromkeys(groups))}
+    member = np.array([place[group] for group in groups])
+    draws = rng.integers(0, len(place), (_BOOTSTRAP, len(place)))
+    plain, extended = (np.bincount(member, ed)[draws].sum(axis=1) for ed in (before, after))
+    relative = 1.0 - extended / np.maximum(plain, 1e-12)
     low, high = np.quantile(relative, [0.025, 0.975])
     better = int(np.sum(after < before))
     mean_b, mean_a = float(before.mean()), float(after.mean())

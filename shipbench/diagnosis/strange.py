@@ -22,14 +22,16 @@ _MOST = 0.95
 def strange_pieces(found: Fit) -> np.ndarray:
     """Pieces whose latent force, in any axis, is far beyond that of the others; the strangest first."""
     gram, knots, z = found.gram, found.plant.knots, found.estimate
+    left = len(z) // _ONE_IN - int(np.sum(~found.plant.seg.mask.any(axis=1)))
+    if left <= 0:
+        return np.zeros(0, dtype=int)
     squares = np.empty((len(z), 3))
     for axis in range(3):
         at = slice(6 + axis * knots, 6 + (axis + 1) * knots)
         squares[:, axis] = np.sum(z[:, at] @ gram.K_inv * z[:, at], axis=1) + np.sum(gram.K_inv * found.cov[:, at, at], axis=(1, 2))
-    others = (squares.sum(axis=0) - squares) / max(len(z) - 1, 1)
+    others = (squares.sum(axis=0) - squares) / (len(z) - 1)
     worst = np.max(squares / others, axis=1)
-    left = len(z) // _ONE_IN - int(np.sum(~found.plant.seg.mask.any(axis=1)))
-    order = np.argsort(-worst)[: max(left, 0)]
+    order = np.argsort(-worst)[:left]
     return order[worst[order] > _STRANGE]
 
 

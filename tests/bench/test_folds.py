@@ -116,6 +116,7 @@ def test_a_group_on_both_sides_of_the_published_split_is_told(toy):
 @pytest.mark.parametrize(
     ("changes", "meta", "message"),
     [
+        ({"folds": 5}, lambda i: {"group": "log"}, r"'toy' is one run or one group of runs.*remove `group`"),
         ({"folds": 11}, lambda i: {}, r"folds = 11, but data set 'toy' has 10 runs; give at most 10"),
         ({"folds": 3}, lambda i: {"group": i % 2}, r"has 2 groups of runs"),
         ({"horizon_s": 21}, lambda i: {}, r"no run is as long as the horizon.*\(21 s\).*Shorten the horizon"),

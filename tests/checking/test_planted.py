@@ -192,3 +192,16 @@ def test_ships_at_rest_at_one_berth_are_no_pieces_of_one_log():
         S[:5, [X, Y, PSI, U, V, R]] = 0.0
         still.append(replace(run, states=S))
     assert "pieces of one log" not in {f.kind for f in check_dataset(data.with_runs(still))}
+
+
+def test_windows_of_the_only_log_stay_apart():
+    """As one group nothing of them could be held out."""
+    data = base_set(SHIP, SEED)
+    log = data.runs[0]
+    half = len(log) // 2
+    pieces = tuple(replace(log, id=name, t=log.t[part], states=log.states[part], inputs=log.inputs[part])
+                   for name, part in (("a", slice(half)), ("b", slice(half, None))))  # fmt: skip
+    alone = [f for f in check_dataset(data.with_runs(pieces)) if f.kind == "pieces of one log"]
+    among = [f for f in check_dataset(data.with_runs((*pieces, *data.runs[1:]))) if f.kind == "pieces of one log"]
+    assert [(f.severity, f.line) for f in alone] == [("note", "")]
+    assert [(f.severity, "group" in f.line) for f in among] == [("warning", True)]
