@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from functools import cached_property
 from typing import Any
 
@@ -25,7 +26,7 @@ class Run:
         states: (samples, 10), order and units of `signals.STATES`; heading unwrapped.
         inputs: (samples, inputs), the four commands, then the environment channels; row k is held on [t_k, t_k+1).
         inputs_names: names of the columns of `inputs`.
-        meta: anything known of the run (manoeuvre, group, split, parent).
+        meta: anything known of the run (manoeuvre, group, split, parent, from: date and time at which it began).
     """
 
     id: str
@@ -63,6 +64,21 @@ class Run:
     def group(self) -> str:
         """Runs of one group (pieces of one log, copies of one manoeuvre, windows of one run) must not be split; a run without one is its own."""
         return str(self.meta.get("group", self.meta.get("parent", self.id)))
+
+    @property
+    def kind(self) -> str:
+        """Kind of manoeuvre, "" where it is not given."""
+        return str(self.meta.get("manoeuvre", ""))
+
+    @property
+    def began(self) -> datetime | None:
+        """Date and time at which it began (UTC where no zone is given); None where they are not given."""
+        given = self.meta.get("from")
+        try:
+            began = given if isinstance(given, datetime) else datetime.fromisoformat(str(given))
+        except ValueError:
+            return None
+        return began if began.tzinfo else began.replace(tzinfo=UTC)
 
     def slice(self, start: int, stop: int, suffix: str = "") -> Run:
         """Samples [start, stop) as a run that keeps the metadata and names its parent."""

@@ -108,7 +108,7 @@ def _by_folds(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]
 
 def kinds_of(dataset: Dataset) -> list[str]:
     """The kinds of manoeuvre of a data set, in the order of the folds of split = "kind"."""
-    return sorted({str(r.meta.get("manoeuvre", "")) for r in dataset.runs})
+    return sorted({r.kind for r in dataset.runs})
 
 
 def _parted(dataset: Dataset, test: list[Run]) -> tuple[list[Run], list[Run]]:
@@ -119,7 +119,7 @@ def _parted(dataset: Dataset, test: list[Run]) -> tuple[list[Run], list[Run]]:
 
 def _by_kind(dataset: Dataset) -> list[tuple[list[Run], list[Run]]]:
     kinds = kinds_of(dataset)
-    pairs = [_parted(dataset, [r for r in dataset.runs if str(r.meta.get("manoeuvre", "")) == kind]) for kind in kinds]
+    pairs = [_parted(dataset, [r for r in dataset.runs if r.kind == kind]) for kind in kinds]
     empty = [kind for kind, (rest, _) in zip(kinds, pairs, strict=True) if not rest]
     if len(kinds) < 2 or empty:
         why = f"without '{empty[0]}' no run is left to train on" if empty and len(kinds) > 1 else f"every run has manoeuvre = '{kinds[0]}'"

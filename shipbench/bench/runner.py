@@ -186,7 +186,7 @@ def _rows(study: Study, cell: Cell, statuses: list[str], reasons: list[str], val
         "run": [r.id for r in runs],
         "parent": [str(r.meta.get("parent", r.id)) for r in runs],
         "group": [r.group for r in runs],
-        "kind": [str(r.meta.get("manoeuvre", "")) for r in runs],
+        "kind": [r.kind for r in runs],
         "status": statuses,
         "reason": reasons,
     }

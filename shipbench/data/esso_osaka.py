@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import os
 import zlib
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -195,7 +196,8 @@ def _read_run(file: Path, stem: str, every: int, wind: bool, kind: str, test: bo
     # Files of one log carry its time stamp and a number: they stay in one fold.
     head, _, last = stem.rpartition("_")
     group = head if kind == "random" and len(last) == 1 else stem.replace("_cut", "")
-    return Run(stem, t, states, inputs, names, {"manoeuvre": kind, "group": group, "split": "test" if test else "train"})
+    began = datetime.strptime(group[-20:], "%d-%b-%Y_%H_%M_%S").isoformat()
+    return Run(stem, t, states, inputs, names, {"manoeuvre": kind, "group": group, "split": "test" if test else "train", "from": began})
 
 
 SUMMARY = "measured free-running tests of a 3 m tanker model in wind (downloaded, or your own copy)"

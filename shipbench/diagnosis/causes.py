@@ -17,7 +17,7 @@ from .model import FREE, HULL_SPREAD, Term
 from .outcome import Candidate, Cause, Estimate, Gain
 from .plant import HULL, NUM_HULL
 from .robust import covariance, inflation, least_size
-from .screen import Score
+from .screen import Score, other_kinds_from, places
 from .select import AS_RECORDED, WITHOUT_WIND, passes_for_form
 from .settle import Fit
 
@@ -282,6 +282,9 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str], measured: bo
         reason = "the wind is measured and in the model already"
     elif effect.channels and plant.seg.wind is None:
         reason = f"{' and '.join(effect.channels)} are not measured"
+    elif name == "change_point" and (barred := other_kinds_from(plant.seg.kinds)):
+        where = f"{len(barred)} of {len(places(plant.seg.runs))} places"
+        reason = f"no sign of it; not looked for at {where} where other kinds of manoeuvre follow, in which the model may lack something"
     elif name in ("change_point", "unit_or_sign_error"):
         reason = "no sign of it"
     elif effect.family == "thruster":

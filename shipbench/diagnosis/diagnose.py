@@ -80,6 +80,7 @@ def diagnose(
     dataset = corrected(dataset, units)
     dataset, drift = over_ground(marked(dataset)) if only is None else (dataset, [])
     dataset, wind = with_true_wind(dataset) if only is None else (dataset, [])
+    dataset = _in_time(dataset)
     late = check_clocks(dataset) if only is None and has_speeds(dataset) else None
     if late is not None:
         dataset = late.mended
@@ -195,6 +196,13 @@ def _thrust_factor(fit: Fit) -> float:
 
 
 @threadpool_limits.wrap(limits=1)  # a process of its own
+def _in_time(dataset: Dataset) -> Dataset:
+    """Runs in the order in which they were sailed, where all say when they began: a change begins with one of them."""
+    began = {run.id: run.began for run in dataset.runs}
+    known = {name: moment for name, moment in began.items() if moment is not None}
+    return dataset.with_runs(sorted(dataset.runs, key=lambda run: known[run.id])) if len(known) == len(began) else dataset
+
+
 def _one_fold(
     fold: int, threshold: float, hull: bool, *, dataset: Dataset, seed: int, only: Sequence[str] | None, settled: Sequence[str]
 ) -> FoldGain:

@@ -47,7 +47,7 @@ class Segments:
 
     Shapes: states (B, K + 1, 10), commands (B, K + 1, 4), wind (B, K + 1, 2) or None, mask (B, K + 1) of real samples, run (B,) index of the run,
     start (B,) time since the run began [s]; earlier (B, P, 4): the commands before the piece (the first, before the run), without any where actuators
-    are recorded; seen (6,): what of the motion was measured.
+    are recorded; kinds: of manoeuvre, by run, "" where not given; seen (6,): what of the motion was measured.
     """
 
     dt: float
@@ -60,6 +60,7 @@ class Segments:
     run: np.ndarray
     start: np.ndarray
     runs: int
+    kinds: tuple[str, ...]
     seen: np.ndarray = field(default_factory=lambda: np.ones(6, dtype=bool))
 
     def thinned(self, most: int) -> Segments:
@@ -101,6 +102,7 @@ def cut(dataset: Dataset, steps: int) -> Segments:
         earlier=np.stack([run.inputs[np.maximum(a + back, 0), :4] for _, run, a, _ in pieces]),
         wind=None if wind_columns is None else inputs[..., wind_columns], mask=np.stack([np.arange(K + 1) <= b - a for _, _, a, b in pieces]),
         run=np.array([p[0] for p in pieces]), start=np.array([p[2] * dataset.dt for p in pieces]), runs=len(dataset),
+        kinds=tuple(run.kind for run in dataset.runs),
         seen=~np.isin(STATES[MOTION], dataset.derived),
     )  # fmt: skip
 

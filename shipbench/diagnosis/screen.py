@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,8 @@ _CYCLES, _LEAST_START = 6, float(np.log(0.1**2))
 _BORNE_BY_OTHERS = 0.25
 """Share of a change's score that must be left when any one run is taken away. On ships of other equations changes that were none kept 0.13 at most;
 hidden ones (development cases) a third at least."""
+_ALIKE = 0.5
+"""Share of the runs before and after a change that are of the same kinds, at least."""
 
 
 @dataclass(frozen=True)
@@ -143,10 +146,11 @@ def changes(fit: Fit) -> list[Score]:
     """For every candidate with one value for all runs: its best beginning at a run, if that is better than from the first run on; best first.
 
     Two coefficients, one for all runs and one from run k on, are free; the score is that of the second beside the first, less 2 log N for the choice
-    of k. The order of the runs is taken for their order in time. What the run that speaks most for it carries nearly alone is no change: a hull or
+    of k. The order of the runs is taken for their order in time. Where the kinds of manoeuvre change with it, a change is not told from what the
+    model lacks in one of them, and none is looked for. What the run that speaks most for it carries nearly alone is no change: a hull or
     propeller that is not of the fitted form does that.
     """
-    S, runs = fit.reduced.S, np.arange(len(fit.reduced.S))
+    S, runs, barred = fit.reduced.S, np.arange(len(fit.reduced.S)), other_kinds_from(fit.plant.seg.kinds)
     base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
     prior = np.concatenate([fit.prior.precision, np.exp(-fit.prior.log_tau2)])
     at = S.shape[1] - 1 - sum(t.size for t in fit.candidates)
@@ -156,13 +160,32 @@ def changes(fit: Fit) -> list[Score]:
         at += term.size
         if term.per_run or term.effect.enters == "gear" or len(S) < 8:
             continue
-        begins = {k: _change(S, base, prior, cols, k) for k in range(3, len(S) - 2)}
+        begins = {k: _change(S, base, prior, cols, k) for k in places(len(S)) if k not in barred}
+        if not begins:
+            continue
         k, (score, mean) = max(begins.items(), key=lambda item: item[1][0])
         least = min(_change(np.where(runs[:, None, None] == j, 0.0, S), base, prior, cols, k)[0] for j in runs) if score > 0.0 else score
         if least >= _BORNE_BY_OTHERS * score:
             nan = np.full(term.size, np.nan)
             found.append(Score(replace(term, since=k), score, mean, nan, np.zeros((term.size, term.size)), np.zeros(len(S))))
     return sorted(found, key=lambda s: -s.score)
+
+
+def places(runs: int) -> range:
+    """Runs with which a change may begin: three or more are sailed on either side."""
+    return range(3, runs - 2)
+
+
+def other_kinds_from(kinds: Sequence[str]) -> list[int]:
+    """Of `places` those from which on mostly other kinds of manoeuvre are sailed than before; none where the kind of a run is not known."""
+    if not all(kinds):
+        return []
+    of = np.array([[kind == one for one in sorted(set(kinds))] for kind in kinds])
+
+    def alike(k: int) -> float:
+        return float(np.minimum(of[:k].mean(axis=0), of[k:].mean(axis=0)).sum())
+
+    return [k for k in places(len(kinds)) if alike(k) < _ALIKE]
 
 
 def _change(S: np.ndarray, base: np.ndarray, prior: np.ndarray, cols: np.ndarray, k: int) -> tuple[float, np.ndarray]:
