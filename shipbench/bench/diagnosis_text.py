@@ -35,6 +35,8 @@ def interval(e: Estimate) -> str:
     """Such as `0.31 m/s [0.28, 0.34]`; without interval where there is none."""
     factor = display_unit(e.unit)[1]
     known = all(v is not None and math.isfinite(v) for v in e.ci95)
+    if not known and e.unit == "1" and e.value is not None and e.value == round(e.value):
+        return f"{e.value:.0f}"  # a choice: the number of a run, a side
     return quantity(e.value, e.unit) + (f" [{figure(factor * e.ci95[0])}, {figure(factor * e.ci95[1])}]" if known else "")
 
 

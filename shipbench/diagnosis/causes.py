@@ -84,11 +84,10 @@ def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs
 
 
 def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
-    """Effects that were refitted in its place and came within `_TIE` of it."""
-    rounds = {s.round: s for s in sorted(found.selection.steps, key=lambda s: s.score) if s.term.label == term.label}
-    near = []
-    for number, own in rounds.items():
-        near += [s.term.label for s in found.selection.steps if s.round == number and s.term.label != term.label and s.score > own.score - _TIE]
+    """Effects that were refitted in its place, when it was added, and came within `_TIE` of it."""
+    steps = found.selection.steps
+    own = max((s for s in steps if s.term.label == term.label), key=lambda s: (s.round, s.score), default=None)
+    near = [s.term.label for s in steps if own is not None and s.round == own.round and s.score > own.score - _TIE]
     present = {t.label for t in found.final.model.terms}
     return tuple(dict.fromkeys(n for n in near if n not in present))
 

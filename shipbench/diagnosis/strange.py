@@ -36,7 +36,7 @@ def strange_pieces(found: Fit) -> np.ndarray:
 
 
 def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
-    """What was left out of the fit: the share of a long record, and one line per strange piece, in the times of its run."""
+    """What was left out of the fit: the share of a long record, and strange pieces, in the times of their runs."""
     seg = plant.seg
     fitted, whole = seg.dt * float(np.maximum(seg.mask.sum(axis=1) - 1, 0).sum()), float(sum(run.t[-1] - run.t[0] - seg.dt for run in runs))
     found = []
@@ -45,12 +45,14 @@ def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
             f"{fitted / whole:.0%} of the record is fitted, {len(seg.run)} pieces of {plant.steps * seg.dt:.0f} s, spread over all runs; "
             "`--thorough` fits up to twice as much."
         )
+    pieces = []
     for piece in np.flatnonzero(~seg.mask.any(axis=1)):
         run = runs[seg.run[piece]]
         begins = run.t[0] + seg.start[piece]
-        ends = min(begins + plant.steps * seg.dt, run.t[-1])
+        pieces.append(f"run '{run.id}', {begins:g} to {min(begins + plant.steps * seg.dt, run.t[-1]):g} s")
+    if pieces:
         found.append(
-            f"left out: run '{run.id}', {begins:g} to {ends:g} s; there the missing force is more than "
-            f"{_STRANGE**0.5:.0f} times the ordinary one (ship held or pushed, or a record that jumps?)."
+            f"left out, since the missing force is more than {_STRANGE**0.5:.0f} times the ordinary one there (ship held or pushed, or a record that "
+            f"jumps?): {'; '.join(pieces)}."
         )
     return found

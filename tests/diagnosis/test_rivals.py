@@ -1,0 +1,20 @@
+"""What a cause could not be told from: what stood beside it when it was added, not what was better before and was dropped."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+from shipbench.diagnosis.causes import rivals_of
+
+
+def step(number: int, label: str, score: float) -> SimpleNamespace:
+    return SimpleNamespace(round=number, term=SimpleNamespace(label=label), score=score)
+
+
+def test_only_what_came_near_in_the_round_in_which_a_cause_was_added_is_its_rival():
+    steps = [step(0, "speed_scale", 90.0), step(0, "wind", 60.0), step(1, "wind", 40.0), step(1, "wave_drift", 38.0), step(1, "list", 12.0)]
+    named = [SimpleNamespace(label="wind")]
+    found = SimpleNamespace(selection=SimpleNamespace(steps=steps), final=SimpleNamespace(model=SimpleNamespace(terms=named)))
+    assert rivals_of(found, named[0]) == ("wave_drift",)
+    named.append(SimpleNamespace(label="wave_drift"))
+    assert rivals_of(found, named[0]) == ()
