@@ -118,6 +118,7 @@ CHANGES: dict[str, tuple[Trials, Callable[[Dataset], Dataset] | None]] = {
     "motion in waves": (Trials(waves=1.0), None),
     "standard manoeuvres": (Trials(runs=10, samples=600, standard=True), None),
     "low-pass filtered": (Trials(), low_passed),
+    "5 standard manoeuvres": (Trials(runs=5, samples=600, standard=True), None),
 }
 CONDITIONS = [*PLANS, *CHANGES]
 
