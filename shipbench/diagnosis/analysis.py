@@ -23,7 +23,10 @@ each diagnosis may raise it."""
 HULL_THRESHOLD = 30.0
 GENERIC_THRESHOLD = 25.0
 _GENERIC_OWN = {"revolutions and rudder": 30.0, "heading": 18.0, "time": 18.0, "run": 18.0}
-"""Race and rudder together are where ordinary ships differ most from eq. (2); no ship's structure depends on heading, time or number of the run."""
+_NO_FORM = ("heading", "time", "run")
+"""Race and rudder together are where ordinary ships differ most from eq. (2); no ship's form depends on heading, time or number of the run. What
+follows anything else must be worth `Selection.off_form` besides. (A navy ship with nothing hidden, under six conditions: up to 40, where 39 to 44
+are asked then.)"""
 GENERIC_MARGIN = 10.0
 NOTICEABLE = 0.15
 """Least size of an unknown force, and of one that would doubt the ship file, in units of the latent force: 0.75 mm/s^2, a third of what a wind of
@@ -105,8 +108,11 @@ def _unknown(selection: Selection, gears: Sequence[GearFinding], after: Sequence
     """The dependence that beats every named cause, if one does; after: those beside the causes; ordinary: variables that a force may follow on this
     ship, beside which all are judged again."""
 
+    def asked(variable: str) -> float:
+        return _GENERIC_OWN.get(variable, GENERIC_THRESHOLD) + selection.off_form * (variable not in _NO_FORM)
+
     def above(found: Sequence[Dependence]) -> list[Dependence]:
-        return [d for d in found if d.size > NOTICEABLE and d.score > _GENERIC_OWN.get(d.variable, GENERIC_THRESHOLD)]
+        return [d for d in found if d.size > NOTICEABLE and d.score > asked(d.variable)]
 
     best = max([*(s.score for s in selection.steps if s.round == 0), *(g.score for g in gears)], default=-np.inf)
     left = above(dependences(selection.final, ordinary) if ordinary else after)

@@ -19,9 +19,10 @@ from ..physics.wind import apparent_wind
 from ..records import Dataset
 from .cases import singles
 from .fit import between, start
-from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, Term, parameters, predict
+from .model import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, parameters, predict
 from .plant import NUM_HULL, Plant
 from .rolling import Active
+from .term import Term
 
 _ITERATIONS = 6
 _WINDOW = 9

@@ -9,10 +9,11 @@ import numpy as np
 from ..effects.base import Effect
 from ..records import Dataset
 from .gears import find_in_gears
-from .model import Linearisation, Scales, Term
+from .model import Linearisation, Scales
 from .plain import null_fit
 from .plant import Plant
 from .settle import Fit, settle
+from .term import Term
 
 LEVEL = 0.05
 

@@ -13,13 +13,14 @@ from ..effects.base import EFFECTS, Effect
 from .analysis import HULL_THRESHOLD, Analysis
 from .clocks import NAMES, LateVelocities
 from .gears import GearFinding
-from .model import FREE, HULL_SPREAD, Term
+from .model import FREE, HULL_SPREAD
 from .outcome import Candidate, Cause, Estimate, Gain
 from .plant import HULL, NUM_HULL
 from .robust import covariance, inflation, least_size
 from .screen import Score, other_kinds_from, places
 from .select import AS_RECORDED, WITHOUT_WIND, passes_for_form
 from .settle import Fit
+from .term import Term
 
 _TIE = 10.0
 """Candidates within this of the winner's score (2 log Bayes factor) are called confused with it."""

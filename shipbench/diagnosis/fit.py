@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .gram import Hyper
-from .model import NUM_BASE, Linearisation, Point, Scales, Term
+from .model import NUM_BASE, Linearisation, Point, Scales
 from .plant import Plant
 from .settle import Fit, Model, at_point, by_segment, leaning, objective, point_from, settle, suiting
+from .term import Term
 
 _MAY_RISE, _FREE_STEPS, _LEAST_SHARE = 1.1, 5, 0.05
 """Factor by which a step may raise the cost, on the first steps; later ones must lower it."""
@@ -31,19 +32,22 @@ _FOLLOWING, _HALVINGS = 6, 5
 def fit(
     plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 20,
     candidates: Sequence[Term] = (), guess: np.ndarray | None = None, hope: float = -np.inf, far: bool = False,
+    begun: tuple[Linearisation, Fit] | None = None,
 ) -> Fit:  # fmt: skip
     """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), until it rests or promises
     less log evidence than `hope`, when it is not worth its time.
 
     A step is at first halved only where the cost explodes: the cost of a step that is right for the parameters rises until the latent force has
     followed, and the path would else end where parameters compensate each other. The best point of the path is kept, by its evidence once the force
-    has followed; there it does. `candidates` get columns there. far: `point` is that of an `Origin`.
+    has followed; there it does. `candidates` get columns there. far: `point` is that of an `Origin`; begun: its linearisation, and a fit there
+    whose products hold.
     """
     log_tau2 = dict(log_tau2 or {})
     if len(point.terms) < len(model.terms):
         new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
         point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
-    lin, best, before, promised, stale, seen, early = Linearisation(plant, scales, point, guess), None, -np.inf, -np.inf, 0, None, np.nan
+    lin, seen = begun or (Linearisation(plant, scales, point, guess), None)
+    best, before, promised, stale, early = None, -np.inf, -np.inf, 0, np.nan
     for number in range(iterations):
         free = number < _FREE_STEPS
         found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP, seen=seen, far=far and not number)
@@ -70,6 +74,14 @@ def fit(
     assert best is not None
     found, lin = _followed(*best[1:])
     return replace(settle(lin, model, found.hyper, found.log_tau2, candidates, leap=0.0) if candidates else found, early=early)
+
+
+def looking_at(found: Fit, candidates: Sequence[Term]) -> Fit:
+    """`found` with columns of `candidates`, fitted on if it does not rest yet."""
+    plant, scales, model, hyper, log_tau2 = found.plant, found.scales, found.model, found.hyper, found.log_tau2
+    if found.excess < _AT_REST:
+        return settle(Linearisation(plant, scales, found.point, found.motion, coarse=False), model, hyper, log_tau2, candidates, leap=0.0)
+    return fit(plant, scales, model, found.point, hyper, log_tau2, candidates=candidates, guess=found.motion)
 
 
 def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Linearisation | None, Fit | None]:

@@ -12,10 +12,11 @@ from ..physics.actuators import Gear
 from ..records import Dataset
 from ..ship import complete
 from .averaging import averaged
-from .model import FREE, NUM_BASE, Linearisation, Point, Scales, Term
+from .model import FREE, NUM_BASE, Linearisation, Point, Scales
 from .outcome import Gain
 from .plant import NUM_HULL, Plant, cut
 from .structure import STRUCTURE
+from .term import Term
 
 HORIZON = 120.0
 _STEPS = 8

@@ -80,6 +80,11 @@ class Products:
         P[..., :end, end], P[..., end, :end] = self.P[..., :end, -1], self.P[..., -1, :end]
         return replace(self, P=P, slope=np.delete(self.slope, np.s_[-1 - num : -1], axis=1))
 
+    def only(self, columns: np.ndarray) -> Products:
+        """With some shared columns alone (and the residual)."""
+        keep = np.concatenate([np.arange(self.latent), self.latent + columns, [self.P.shape[-1] - 1]])
+        return replace(self, P=self.P[:, :, keep][..., keep].copy(), slope=self.slope[:, keep[self.latent :] - self.latent])
+
     def sloped(self, slopes: np.ndarray, at: np.ndarray, initial: np.ndarray) -> Products:
         """With the part (B,) of initial states in the segments' log determinants taken off, and derivatives (B, G) of what is left by the shared
         columns, which stand at coefficients `at` (B, G).
@@ -222,19 +227,19 @@ def solve(reduced: Reduced, prior: Prior) -> Solution:
     return Solution(float(log_evidence), float(quad), mean, cov, means, covs + spread, per_run)
 
 
-def background(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
-    """Estimates (B, Z) of [eta, w] and their covariances (B, Z, Z), with the uncertainty of the shared coefficients."""
+def background(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -> np.ndarray:
+    """Estimates (B, Z) of [eta, w]."""
     B, G = len(reduced.solved), reduced.S.shape[1] - 1
     coefficients = np.zeros((B, G))
     coefficients[:, prior.shared] = solution.mean
     coefficients[:, prior.random] = solution.means[gram.run]
-    estimate = reduced.solved[:, :, -1] - (reduced.solved[:, :, :-1] @ coefficients[:, :, None])[..., 0]
-    J = reduced.solved[:, :, prior.shared]
-    cov = reduced.inverse + J @ solution.cov @ np.swapaxes(J, 1, 2)
-    if len(prior.random):
-        R = reduced.solved[:, :, prior.random]
-        cov = cov + R @ solution.covs[gram.run] @ np.swapaxes(R, 1, 2)
-    return estimate, cov
+    return np.asarray(reduced.solved[:, :, -1] - (reduced.solved[:, :, :-1] @ coefficients[:, :, None])[..., 0])
+
+
+def background_cov(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -> np.ndarray:
+    """Covariances (B, Z, Z) of [eta, w], with the uncertainty of the shared coefficients."""
+    J, R = reduced.solved[:, :, prior.shared], reduced.solved[:, :, prior.random]
+    return reduced.inverse + J @ solution.cov @ np.swapaxes(J, 1, 2) + R @ solution.covs[gram.run] @ np.swapaxes(R, 1, 2)
 
 
 _LEAST_FORCE = float(np.log(0.1**2))
@@ -244,14 +249,20 @@ _MOST_FORCE = float(np.log(30.0**2))
 """Nor is a force larger than 0.15 m/s^2 and 3e-3 rad/s^2 at 130 m: where a trajectory of the refit runs away, the variance would run after it."""
 
 
-def update_force(gram: Gram, estimate: np.ndarray, cov: np.ndarray) -> np.ndarray:
-    """One EM step for the variances of the latent force, log (3,)."""
-    log_force = np.empty(3)
+def update_force(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution, estimate: np.ndarray) -> np.ndarray:
+    """One EM step for the variances of the latent force, log (3,).
+
+    Of the force's covariance (`background_cov`) it takes the trace with K^-1 alone, for which no matrix of a segment is made.
+    """
+    B, covs, log_force = len(estimate), solution.covs[gram.run], np.empty(3)
     for j in range(3):
         at = slice(6 + j * gram.knots, 6 + (j + 1) * gram.knots)
-        w = estimate[:, at]
-        quad = np.sum(w @ gram.K_inv * w) + np.sum(gram.K_inv * cov[:, at, at].sum(axis=0))
-        log_force[j] = np.log(quad / (len(w) * gram.knots))
+        w, solved = estimate[:, at], reduced.solved[:, at]
+        J, R = solved[:, :, prior.shared], solved[:, :, prior.random]
+        shared = J.reshape(B * gram.knots, -1).T @ (gram.K_inv @ J).reshape(B * gram.knots, -1)
+        own = np.swapaxes(R, 1, 2) @ (gram.K_inv @ R)
+        spread = np.sum(gram.K_inv * reduced.inverse[:, at, at].sum(axis=0)) + np.sum(shared * solution.cov) + np.sum(own * covs)
+        log_force[j] = np.log((np.sum(w @ gram.K_inv * w) + spread) / (B * gram.knots))
     return np.clip(log_force, _LEAST_FORCE, _MOST_FORCE)
 
 

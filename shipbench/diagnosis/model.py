@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from ..effects.base import Effect, flow_first
+from ..effects.base import flow_first
 from ..ops import Array
 from ..predictors._physics_fit import parameter_scale
 from .colour import Colour
@@ -18,6 +18,7 @@ from .gram import Hyper
 from .plant import HULL, NUM_HULL, Plant
 from .rolling import Active
 from .structure import STRUCTURE
+from .term import Term
 
 FREE = (1, 2, 5, 7, 8, 10)
 """Of p0..p10 what a symmetric ship has: resistance, lift and drag of the rudder. A side force at zero rudder is an effect with a name."""
@@ -30,36 +31,6 @@ Fossen, Sagatun & Sorensen, Control Eng. Practice 4 (1996) 369)."""
 HULL_SPREAD = 0.3
 """Standard deviation of the relative error of the regressions (10 to 50 % is what comparisons with tests find; physics reference, section 3.3)."""
 NUM_BASE = len(FREE) + NUM_HULL + len(STRUCTURE.parameters)
-
-
-_PER_RUN = 20.0
-"""From nulls on the development ships: a value for every run takes up so much of what single manoeuvres do beyond the model."""
-
-
-@dataclass(frozen=True)
-class Term:
-    """An effect in the model: shape parameters fixed, one of `choices`; amplitudes free, one set or one per run; `since`: absent before that run."""
-
-    effect: Effect
-    setting: tuple[float, ...] = ()
-    per_run: bool = False
-    since: int | None = None
-    choices: int = 1
-
-    @property
-    def size(self) -> int:
-        """Number of free amplitudes."""
-        return len(self.effect.parameters) - len(self.setting)
-
-    @property
-    def label(self) -> str:
-        return self.effect.name
-
-    def cost(self, runs: int) -> float:
-        """Twice the log odds against it before any data: for the choice of a beginning or of shape parameters, for variances of values per run."""
-        if self.since is not None:
-            return 2.0 * float(np.log(runs))
-        return 2.0 * float(np.log(self.choices)) + (_PER_RUN + float(np.log(runs)) if self.per_run else 0.0)
 
 
 @dataclass
@@ -136,7 +107,7 @@ def actives(plant: Plant, scales: Scales, point: Point) -> list[Active]:
     return found
 
 
-def _since(plant: Plant, term: Term, value: float) -> float | np.ndarray:
+def _since(plant: Plant, term: Term, value: Array) -> Array:
     return value if term.since is None else np.where(plant.seg.run >= term.since, value, 0.0)
 
 
@@ -293,27 +264,38 @@ class Linearisation:
     def _of_candidates(self, candidates: Sequence[Term]) -> list[np.ndarray]:
         """Columns (B, T, size) of terms that are not in the model; those that act as forces share one batch."""
         found: dict[int, np.ndarray] = {}
-        sources = []
+        self.candidate_sources: list[np.ndarray | None] = []
         for i, term in enumerate(candidates):
             step = VECTOR_STEP if term.effect.vector else CANDIDATE_STEP
             unit = step * self.scales.amplitudes(term, self.plant.c.L)
             if term.effect.enters != "force":
-                found[i], _, bend = self._moved(None, term, unit, step)
+                found[i], source, bend = self._moved(None, term, unit, step)
+                self.candidate_sources.append(source)
                 self.bends.append(bend)
                 continue
-            q = [np.where(np.arange(term.size) == a, unit[a], 0.0)[:, None, None] for a in range(term.size)]
+            own = [np.where(np.arange(term.size) == a, unit[a], 0.0)[:, None, None] for a in range(term.size)]
+            q = [_since(self.plant, term, value) for value in own]
             sides = (1.0, -1.0) if term.effect.vector else (1.0,)
             change, bent = np.mean([self._changed(side * step, forces=self._beside(term, q, side), often=False) for side in sides], axis=0)
-            sources.append(self._ends(change))
+            self.candidate_sources.append(self._ends(change))
             self.bends.append(Bend(bent))
-        if sources:
-            columns = self._chained(np.concatenate(sources, axis=-1))
+        forces = [source for i, source in enumerate(self.candidate_sources) if i not in found and source is not None]
+        if forces:
+            columns = self._chained(np.concatenate(forces, axis=-1))
             at = 0
             for i, term in enumerate(candidates):
                 if i not in found:
                     found[i] = columns[..., at : at + term.size]
                     at += term.size
         return [found[i] for i in range(len(candidates))]
+
+    def holding(self, index: int, term: Term) -> Linearisation:
+        """The same with a candidate in the model that has no size yet. After `columns`, of which it was the index-th candidate."""
+        new, runs = copy(self), self.plant.seg.runs
+        value = np.zeros((runs, term.size)) if term.per_run else np.zeros(term.size)
+        new.point = replace(self.point, terms=(*self.point.terms, term), values=(*self.point.values, value))
+        new.own_sources = [*self.own_sources, self.candidate_sources[index]]
+        return new
 
     def _beside(self, term: Term, q: Sequence[np.ndarray], side: float) -> list[Active]:
         """The model's forces and one that is not in it."""

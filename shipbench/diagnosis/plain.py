@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from .fit import Origin, fit
-from .model import Scales, Term
+from .model import Scales
 from .noise import colour_of
 from .ordinary import widened
 from .plant import FEW_PIECES, Plant
 from .settle import Fit, Model
 from .strange import strange_pieces
+from .term import Term
 
 _GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
 _FINER, _FINER_STEPS = 1.2, 3

@@ -9,14 +9,15 @@ from itertools import product
 import numpy as np
 
 from ..effects.base import EFFECTS
-from .fit import Origin, fit
-from .model import Linearisation, Term
+from .fit import Origin, fit, looking_at
+from .model import Linearisation
 from .ordinary import widened
 from .plain import REFIT_ITERATIONS
 from .plant import Plant
 from .robust import is_sure, matters
 from .screen import Score, changes, overlap, screen
 from .settle import Fit, hull_evidence, settle
+from .term import Term
 
 NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error", "going_astern", "rudder_rate_limit", "shaft_rate_limit")
 """Found by their own tests (prior width of the hull, gated columns, kinematics, the record of the gears), or what every ship does. A limit has no
@@ -38,13 +39,13 @@ _IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
 """What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
 _OFF_FORM = 0.02
 AS_SHIPS_DIFFER = (
-    "added_resistance", "center_of_gravity_shift", "cross_flow_drag", "mass_change", "race_gain", "rudder_delay", "rudder_gain", "rudder_stall",
-    "shallow_water", "thrust_gain", "thruster_gain", "thruster_lever", "thruster_speed_loss", "wake_variation",
+    "added_resistance", "bank_suction", "center_of_gravity_shift", "cross_flow_drag", "mass_change", "race_gain", "rudder_delay", "rudder_gain",
+    "rudder_stall", "shallow_water", "thrust_gain", "thruster_gain", "thruster_lever", "thruster_speed_loss", "wake_variation",
 )  # fmt: skip
 """A hull that lies off the regressions is not of the fitted form either, and what its form lacks passes for these, in which ships differ anyhow:
 they must be worth this share of the evidence for such a hull besides. (Mariner, nothing hidden: 600 to 1200 for the hull, 13 to 18 for a wrong name;
-thrust or mass off by their typical size on development ships: 80 to 290, and 28 to 31.) So must a cause with a value for each run or one that
-begins with a run: where each run is another manoeuvre, what the form lacks differs from run to run."""
+thrust or mass off by their typical size on development ships: 80 to 290, and 28 to 31.) So must a cause with a value for each run, one that
+begins with a run, and a bank: where each run is another manoeuvre elsewhere, what the form lacks differs from run to run."""
 _CHANGES, _CHANGE_MARGIN, _OWN_MARGIN = 2, 14.0, 4.0
 """A beginning is chosen among all effects: it must beat the best cause without one by this; the second where that is the same effect."""
 _INSEPARABLE = ({"wind", "wind_per_run", "wave_drift"},)
@@ -109,25 +110,56 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Se
     return found
 
 
-def with_term(before: Fit, score: Score, origin: Origin, least: float = -np.inf) -> Fit:
-    """`before` with one more term, fitted from `origin` and the one-step estimate; given up where it does not promise to gain `least`."""
-    term = score.term
-    model = replace(before.model, terms=(*before.model.terms, term))
-    value = np.zeros((before.plant.seg.runs, term.size)) if term.per_run else np.clip(score.estimate, -2.0, 2.0)
-    point = replace(origin.point, terms=model.terms, values=(*before.values, value))
-    log_tau2 = before.log_tau2 | ({len(before.model.terms): score.log_tau2} if term.per_run else {})
-    hope = before.evidence + 0.5 * least
-    return fit(
-        before.plant, before.scales, model, point, origin.hyper, log_tau2, iterations=REFIT_ITERATIONS, guess=origin.motion, hope=hope, far=True
-    )
+@dataclass(frozen=True)
+class Beginning:
+    """A model and candidates at an `Origin`, where it has not been fitted yet: one linearisation `lin`, at which they are `seen`, and from which a
+    refit with any of them starts."""
+
+    now: Fit
+    origin: Origin
+    lin: Linearisation
+    seen: Fit
+
+    @classmethod
+    def of(cls, now: Fit, origin: Origin, terms: Sequence[Term]) -> Beginning:
+        at = replace(origin.point, terms=now.model.terms, values=now.values)
+        lin = Linearisation(now.plant, now.scales, at, origin.motion)
+        return cls(now, origin, lin, settle(lin, now.model, origin.hyper, now.log_tau2, terms, far=True))
+
+    def scores(self) -> list[Score]:
+        return screen(self.seen)
+
+    def refit(self, score: Score, least: float = -np.inf) -> Fit:
+        """The model with one more term, given up where it does not promise to gain `least`."""
+        now, term, columns = self.now, score.term, self.seen.columns
+        place, own = self.seen.candidates.index(term), len(now.model.terms)
+        at = self.seen.products.shared - sum(t.size for t in self.seen.candidates[place:])
+        known = np.arange(self.seen.products.shared - sum(t.size for t in self.seen.candidates))
+        held = replace(
+            self.seen, products=self.seen.products.only(np.append(known, at + np.arange(term.size))), candidates=(),
+            columns=replace(columns, own=(*columns.own, columns.candidates[place]), candidates=()),
+        )  # fmt: skip
+        lin, model = self.lin.holding(place, term), replace(now.model, terms=(*now.model.terms, term))
+        log_tau2 = now.log_tau2 | ({own: score.log_tau2} if term.per_run else {})
+        hope = now.evidence + 0.5 * least
+        return fit(
+            now.plant, now.scales, model, lin.point, self.origin.hyper, log_tau2, iterations=REFIT_ITERATIONS, hope=hope, far=True, begun=(lin, held)
+        )
 
 
 def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) -> list[tuple[Fit, float]]:
     """`now` with each of the candidates, and what it gains (2 log evidence), or promised to gain when it was given up beside a better one that gains
-    more than the threshold."""
+    more than the threshold.
+
+    In the order of their scores at `origin`, where refits begin: what comes first is mostly the best, beside which others are given up soon.
+    """
+    if not scores:
+        return []
+    start = Beginning.of(now, origin, [s.term for s in scores])
+    rank = {s.term: i for i, s in enumerate(start.scores() if len(scores) > 1 else scores)}
     found, best, least = [], threshold, -np.inf
-    for score in scores:
-        tried = with_term(now, score, origin, least)
+    for score in sorted(scores, key=lambda s: rank[s.term]):
+        tried = start.refit(score, least)
         gained, promised = 2.0 * (tried.evidence - now.evidence), 2.0 * (tried.promise - now.evidence)
         found.append((tried, promised if promised < least else gained))
         if gained > best:
@@ -138,21 +170,6 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
 def _least(best: Fit, now: Fit) -> float:
     """What a refit must promise to gain beside the best one; less by as much as that one's own promise fell short."""
     return 2.0 * (_HOPE * (best.evidence - now.evidence) - max(best.promise - best.early, 0.0)) - _HOPE_MARGIN
-
-
-def likely_first(scores: list[Score], now: Fit, origin: Origin) -> list[Score]:
-    """In the order of their scores at `origin`, where refits begin: what comes first is mostly the best, beside which others are given up soon."""
-    if len(scores) < 2:
-        return scores
-    rank = {s.term: i for i, s in enumerate(seen_from(origin, now, [s.term for s in scores]))}
-    return sorted(scores, key=lambda s: rank[s.term])
-
-
-def seen_from(origin: Origin, now: Fit, terms: Sequence[Term]) -> list[Score]:
-    """Scores of candidates at `origin`, where the model has not been fitted yet."""
-    at_rest = replace(origin.point, terms=now.model.terms, values=tuple(np.zeros_like(v) for v in now.values))
-    lin = Linearisation(now.plant, now.scales, at_rest, origin.motion)
-    return screen(settle(lin, now.model, origin.hyper, now.log_tau2, terms, far=True))
 
 
 def without(before: Fit, index: int) -> Fit:
@@ -180,7 +197,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         return 2.0 * (tried.evidence - now.evidence) - off_form * passes_for_form(tried.model.terms[-1])
 
     for round_ in range(most):
-        tried = refits(now, likely_first(worth_a_refit(scores, now, threshold), now, origin), origin, threshold)
+        tried = refits(now, worth_a_refit(scores, now, threshold), origin, threshold)
         if all(2.0 * (f.evidence - now.evidence) < threshold for f, _ in tried):
             tried += refits(now, absorbed([f for f, _ in tried], now, threshold, origin), origin, threshold)
         steps += [Step.of(round_, f, now, score) for f, score in tried]
@@ -192,14 +209,13 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
             break
         if best.model.terms[-1].since is not None:
             steps.append(Step.of(round_, best, now, 2.0 * (best.evidence - now.evidence)))
-        now = _backward(best, threshold)
-        now = widened(fit(now.plant, now.scales, now.model, now.point, now.hyper, now.log_tau2, candidates=candidates, guess=now.motion))
+        now = widened(looking_at(_backward(best, threshold), candidates))
         scores = screen(now)
     pruned = _backward(now, threshold, spare_last=False)
     pruned, unsure = _without(pruned, is_sure) if careful else (pruned, ())
     pruned, small = _without(pruned, matters) if careful else (pruned, ())
     if pruned is not now:
-        now = fit(pruned.plant, pruned.scales, pruned.model, pruned.point, pruned.hyper, pruned.log_tau2, candidates=candidates, guess=pruned.motion)
+        now = looking_at(pruned, candidates)
         scores = screen(now)
     return Selection(null, now, first, scores, steps, off_form, unsure, (*tiny, *small))
 
@@ -211,8 +227,10 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
     plain, gain = best, 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
     out, least = (*(t.label for t in now.model.terms), *_LASTING), max(_CHANGE_MARGIN, _FAR_BEHIND * gain)
     late = [s for s in changes(now) if s.score > least and s.term.label not in out][:_CHANGES]
+    start = Beginning.of(now, origin, [s.term for s in late]) if late else None
     for score in late:
-        found = with_term(now, score, origin, _least(best, now) if best is not None and gain > _CHANGE_MARGIN else -np.inf)
+        assert start is not None
+        found = start.refit(score, _least(best, now) if best is not None and gain > _CHANGE_MARGIN else -np.inf)
         own = plain is not None and plain.model.terms[-1].label == score.term.label
         if 2.0 * (found.evidence - now.evidence) > gain + (_OWN_MARGIN if own else _CHANGE_MARGIN) and is_sure(found, -1):
             best, gain = found, 2.0 * (found.evidence - now.evidence)
@@ -256,7 +274,7 @@ def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -
     if not terms or np.isinf(threshold):
         return []
     best: dict[str, Score] = {}
-    for s in seen_from(origin, now, terms):
+    for s in Beginning.of(now, origin, terms).scores():
         best.setdefault(s.term.label, s)
     least = max(threshold, _FAR_BEHIND * max(s.score for s in best.values()))
     seen = _beside(now) | {f.model.terms[-1].label for f in tried}

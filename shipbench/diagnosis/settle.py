@@ -4,17 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from .colour import Colour
 from .columns import Columns
-from .gram import ETA_PRECISION, Gram, Hyper, Prior, Products, Reduced, Solution, accelerated, background, by_run, solve, update_force, update_noise
+from .gram import (
+    ETA_PRECISION,
+    Gram,
+    Hyper,
+    Prior,
+    Products,
+    Reduced,
+    Solution,
+    accelerated,
+    background,
+    background_cov,
+    by_run,
+    solve,
+    update_force,
+    update_noise,
+)
 from .inverse import log_determinant
-from .model import FREE, NUM_BASE, Linearisation, Point, Scales, Term
+from .model import FREE, NUM_BASE, Linearisation, Point, Scales
 from .plant import NUM_HULL, Plant
 from .slope import slopes
+from .term import Term
 
 _EM_CYCLES, _NARROW = 3, 0.1
 _RUNS_LEAP = 0.5
@@ -58,7 +75,7 @@ def base_precision(model: Model) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate, cov: of [eta, w] per segment;
+    """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate: of [eta, w] per segment;
     by_force: see `slopes`; early: what the fit promised at its second linearisation."""
 
     plant: Plant
@@ -76,7 +93,6 @@ class Fit:
     reduced: Reduced
     solution: Solution
     estimate: np.ndarray
-    cov: np.ndarray
     excess: float
     by_force: np.ndarray
     early: float = np.nan
@@ -98,6 +114,11 @@ class Fit:
     def evidence_followed(self) -> float:
         """Log evidence once initial states and latent force have followed the parameters of the point, as the linear model expects it."""
         return self.evidence + 0.5 * (self.excess - at_point(self, self.point) + self.solution.squares)
+
+    @cached_property
+    def cov(self) -> np.ndarray:
+        """Covariances (B, Z, Z) of `estimate`."""
+        return background_cov(self.gram, self.reduced, self.prior, self.solution)
 
     @property
     def values(self) -> tuple[np.ndarray, ...]:
@@ -234,10 +255,10 @@ def settle(
     reduced = gram.reduce(hyper.log_force)
     prior = model.prior(log_tau2)
     solution = solve(reduced, prior)
-    estimate, cov = background(gram, reduced, prior, solution)
+    estimate = background(gram, reduced, prior, solution)
     excess = max(objective(lin, model, hyper, log_tau2, gram) - solution.squares, 0.0)
     return Fit(
-        plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), lin.motion, products, gram, reduced, solution, estimate, cov,
+        plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), lin.motion, products, gram, reduced, solution, estimate,
         excess, by_force,
     )  # fmt: skip
 
@@ -274,10 +295,14 @@ def evidence_with(found: Fit, colour: Colour) -> float:
 
 def hull_evidence(found: Fit) -> float:
     """2 log evidence for a hull that lies off the regressions by the usual 30 %, against one that lies within 3 %."""
-    lin = Linearisation(found.plant, found.scales, found.point, found.motion)
-    wide = settle(lin, found.model, found.hyper, found.log_tau2)
-    narrow = settle(lin, replace(found.model, hull=_NARROW), found.hyper, found.log_tau2)
-    return 2.0 * (wide.solution.log_evidence - narrow.solution.log_evidence)
+    products = found.products.without(sum(t.size for t in found.candidates))
+
+    def with_hull(width: float) -> float:
+        model = replace(found.model, hull=width)
+        hyper, log_tau2 = _variances(products, model, found.hyper, found.log_tau2, _EM_CYCLES)
+        return solve(products.weigh(hyper).reduce(hyper.log_force), model.prior(log_tau2)).log_evidence
+
+    return 2.0 * (with_hull(1.0) - with_hull(_NARROW))
 
 
 def _variances(
@@ -291,8 +316,9 @@ def _variances(
         gram, prior = products.weigh(now), model.prior(tau2)
         reduced = gram.reduce(now.log_force)
         solution = solve(reduced, prior)
-        estimate, cov = background(gram, reduced, prior, solution)
-        force, noise = update_force(gram, estimate, cov), update_noise(products, gram, reduced, prior, solution, estimate, _LOG_FLOOR)
+        estimate = background(gram, reduced, prior, solution)
+        force = update_force(gram, reduced, prior, solution, estimate)
+        noise = update_noise(products, gram, reduced, prior, solution, estimate, _LOG_FLOOR)
         return solution.log_evidence, np.concatenate([force, noise, _random_variances(model, solution)])
 
     first = np.concatenate([hyper.log_force, hyper.log_noise, [log_tau2.get(i, 0.0) for i in random]])

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.model import Term
 from shipbench.diagnosis.robust import covariance, inflation, is_sure, least_size, matters
 from shipbench.diagnosis.select import passes_for_form
+from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
 
 RUNS = 20

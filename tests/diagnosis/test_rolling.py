@@ -10,8 +10,9 @@ import pytest
 from shipbench import compiled
 from shipbench.diagnosis import rolling
 from shipbench.diagnosis.gain import plain_base, rollout_plant
-from shipbench.diagnosis.model import NUM_BASE, Linearisation, Point, Scales, Term
+from shipbench.diagnosis.model import NUM_BASE, Linearisation, Point, Scales
 from shipbench.diagnosis.plant import Plant, cut
+from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS, Effect, Parameter
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset, Run

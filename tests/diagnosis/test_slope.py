@@ -9,13 +9,14 @@ import pytest
 
 from shipbench.diagnosis import settle as settling
 from shipbench.diagnosis.fit import Origin, fit, start
-from shipbench.diagnosis.model import FREE, NUM_BASE, Linearisation, Point, Scales, Term
+from shipbench.diagnosis.model import FREE, NUM_BASE, Linearisation, Point, Scales
 from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import HULL, Plant
 from shipbench.diagnosis.screen import screen
 from shipbench.diagnosis.settle import Fit, Model, settle
 from shipbench.diagnosis.slope import slopes
 from shipbench.diagnosis.structure import STRUCTURE
+from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.published import PUBLISHED, published_trials
