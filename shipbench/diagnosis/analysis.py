@@ -21,17 +21,15 @@ THRESHOLD = 10.0
 """Least gain of a named cause, 2 log Bayes factor. From nulls on the development ships, whose structure differs from the model's; the bootstrap of
 each diagnosis may raise it."""
 HULL_THRESHOLD = 30.0
-GENERIC_THRESHOLD = 25.0
-_GENERIC_OWN = {"revolutions and rudder": 30.0, "heading": 18.0, "time": 18.0, "run": 18.0}
-_NO_FORM = ("heading", "time", "run")
-"""Race and rudder together are where ordinary ships differ most from eq. (2); no ship's form depends on heading, time or number of the run. What
-follows anything else must be worth `Selection.off_form` besides. (A navy ship with nothing hidden, under six conditions: up to 40, where 39 to 44
-are asked then.)"""
+GENERIC_THRESHOLD, _NO_FORM_THRESHOLD, _NO_FORM = 25.0, 18.0, ("heading", "time", "run")
+"""Least score of an unknown force. No ship's form depends on heading, time or number of the run; what follows anything else must be worth
+`Selection.off_form` besides. (64 sets with nothing hidden, eight ships under seven conditions, forces that are noticeable: beyond that at most 21,
+by MMG ships 6.)"""
 GENERIC_MARGIN = 10.0
-NOTICEABLE = 0.15
-"""Least size of an unknown force, and of one that would doubt the ship file, in units of the latent force: 0.75 mm/s^2, a third of what a wind of
-7 m/s gives; in yaw 1.5e-5 rad/s^2 at 130 m. Exact sensors or many samples show with certainty that ships differ in form from eq. (2). (Mariner and
-KVLCC2 with nothing hidden: 0.02 to 0.11; outside causes on development ships: from 0.20.)"""
+NOTICEABLE = 0.14
+"""Least size of an unknown force, and of one that would doubt the ship file, in units of the latent force: 0.7 mm/s^2, a third of what a wind of
+7 m/s gives; in yaw 1.4e-5 rad/s^2 at 130 m. Exact sensors or many samples show with certainty that ships differ in form from eq. (2). (With nothing
+hidden Mariner and KVLCC2 0.02 to 0.11, the navy ship 0.13; outside causes on development ships mostly from 0.15.)"""
 _HULL_ALONE = ("speed", "sway velocity", "yaw rate")
 """A force that follows nothing but the hull's own motion is the hull's: where its derivatives are off, it is no unknown cause, and others are judged
 beside it (in turns the rudder, too, follows the yaw rate)."""
@@ -108,11 +106,9 @@ def _unknown(selection: Selection, gears: Sequence[GearFinding], after: Sequence
     """The dependence that beats every named cause, if one does; after: those beside the causes; ordinary: variables that a force may follow on this
     ship, beside which all are judged again."""
 
-    def asked(variable: str) -> float:
-        return _GENERIC_OWN.get(variable, GENERIC_THRESHOLD) + selection.off_form * (variable not in _NO_FORM)
-
     def above(found: Sequence[Dependence]) -> list[Dependence]:
-        return [d for d in found if d.size > NOTICEABLE and d.score > asked(d.variable)]
+        asked = GENERIC_THRESHOLD + selection.off_form
+        return [d for d in found if d.size > NOTICEABLE and d.score > (_NO_FORM_THRESHOLD if d.variable in _NO_FORM else asked)]
 
     best = max([*(s.score for s in selection.steps if s.round == 0), *(g.score for g in gears)], default=-np.inf)
     left = above(dependences(selection.final, ordinary) if ordinary else after)

@@ -14,7 +14,7 @@ from .term import Term
 
 _TAUS = np.log(np.array([0.03, 0.1, 0.3, 1.0, 3.0]) ** 2)
 _CYCLES, _LEAST_START = 6, float(np.log(0.1**2))
-_HOPELESS_PER_RUN = 20.0
+_HOPELESS_PER_RUN = 14.0
 """A score below zero, or so much lower for values per run, whose cost is high, is left as it is under the variances of the null. (On development
 ships, where the plain model rests and at an `Origin`: of 3,821 such scores none rose above 4.)"""
 _BORNE_BY_OTHERS = 0.25
