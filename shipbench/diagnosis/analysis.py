@@ -23,8 +23,8 @@ each diagnosis may raise it."""
 HULL_THRESHOLD = 30.0
 GENERIC_THRESHOLD, _NO_FORM_THRESHOLD, _NO_FORM = 25.0, 18.0, ("heading", "time", "run")
 """Least score of an unknown force. No ship's form depends on heading, time or number of the run; what follows anything else must be worth
-`Selection.off_form` besides. (64 sets with nothing hidden, eight ships under seven conditions, forces that are noticeable: beyond that at most 21,
-by MMG ships 6.)"""
+`Selection.off_form` besides. (64 sets with nothing hidden, MMG ships and those of the literature under seven conditions, forces that are noticeable:
+beyond that at most 21, on MMG ships 6.)"""
 GENERIC_MARGIN = 10.0
 NOTICEABLE = 0.14
 """Least size of an unknown force, and of one that would doubt the ship file, in units of the latent force: 0.7 mm/s^2, a third of what a wind of

@@ -77,10 +77,11 @@ def fit(
 
 
 def looking_at(found: Fit, candidates: Sequence[Term]) -> Fit:
-    """`found` with columns of `candidates`, fitted on if it does not rest yet."""
+    """`found` with columns of `candidates`, fitted on if it does not rest on the linearisation with which fits begin."""
     plant, scales, model, hyper, log_tau2 = found.plant, found.scales, found.model, found.hyper, found.log_tau2
-    if found.excess < _AT_REST:
-        return settle(Linearisation(plant, scales, found.point, found.motion, coarse=False), model, hyper, log_tau2, candidates, leap=0.0)
+    again = settle(Linearisation(plant, scales, found.point, found.motion), model, hyper, log_tau2, candidates, leap=0.0)
+    if again.excess < _AT_REST:
+        return again
     return fit(plant, scales, model, found.point, hyper, log_tau2, candidates=candidates, guess=found.motion)
 
 
