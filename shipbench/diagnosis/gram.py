@@ -83,7 +83,7 @@ class Products:
     def only(self, columns: np.ndarray) -> Products:
         """With some shared columns alone (and the residual)."""
         keep = np.concatenate([np.arange(self.latent), self.latent + columns, [self.P.shape[-1] - 1]])
-        return replace(self, P=self.P[:, :, keep][..., keep].copy(), slope=self.slope[:, keep[self.latent :] - self.latent])
+        return replace(self, P=self.P.take(keep, axis=2).take(keep, axis=3), slope=self.slope[:, keep[self.latent :] - self.latent])
 
     def sloped(self, slopes: np.ndarray, at: np.ndarray, initial: np.ndarray) -> Products:
         """With the part (B,) of initial states in the segments' log determinants taken off, and derivatives (B, G) of what is left by the shared

@@ -248,7 +248,7 @@ def settle(
     plant, scales, point = lin.plant, lin.scales, lin.point
     columns = lin.columns(candidates) if seen is None else seen.columns
     products = products_of(plant, scales, point, columns) if seen is None else seen.products
-    products, by_force = _sloped(lin, columns, products, hyper, far)
+    products, by_force = _sloped(lin, columns, products, hyper, far, known=seen is not None)
     if leap > 0.0:
         hyper, log_tau2 = _variances(products.without(sum(t.size for t in candidates)), model, hyper, log_tau2, cycles, leap)
     gram = products.weigh(hyper)
@@ -263,19 +263,26 @@ def settle(
     )  # fmt: skip
 
 
-def _sloped(lin: Linearisation, columns: Columns, products: Products, hyper: Hyper, far: bool) -> tuple[Products, np.ndarray]:
+def _sloped(
+    lin: Linearisation, columns: Columns, products: Products, hyper: Hyper, far: bool, known: bool
+) -> tuple[Products, np.ndarray]:  # fmt: skip
     """Products that know how the log determinants depend on what is shared, and how these depend on the force at the knots.
 
     What initial states take off is seen at the same variances in all fits of a diagnosis: it would else reward lower ones. Where the force does what
-    the parameters should (`far`), the slopes mean nothing: followed from there, they made the yaw inertia of a navy ship negative.
+    the parameters should (`far`), the slopes mean nothing: followed from there, they made the yaw inertia of a navy ship negative. known: the
+    products are of an earlier fit on this linearisation.
     """
     point, B, alone = lin.point, len(products.run), products.without(products.shared)
-    seen = lin.scales.background or hyper
+
+    def taken_off() -> np.ndarray:
+        seen = lin.scales.background or hyper
+        return -log_determinant(alone.weigh(seen).reduce(seen.log_force).inverse[:, :6, :6])
+
     if far:
         by_column, by_force = np.zeros((B, products.slope.shape[1] - 1)), np.zeros((B, products.knots, 3, 6))
     else:
         by_column, by_force = slopes(lin, columns, alone.weigh(hyper).reduce(hyper.log_force).inverse, hyper)
-    initial = -log_determinant(alone.weigh(seen).reduce(seen.log_force).inverse[:, :6, :6])
+    initial = products.initial if known and lin.scales.background else taken_off()
     own = [v[products.run] if t.per_run else np.broadcast_to(v, (B, t.size)) for t, v in zip(point.terms, point.values, strict=True)]
     candidates = np.zeros((B, sum(c.shape[-1] for c in columns.candidates)))
     at = np.concatenate([np.broadcast_to(point.base, (B, NUM_BASE)), *own, candidates], axis=1)
