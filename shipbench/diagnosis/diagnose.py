@@ -195,7 +195,6 @@ def _thrust_factor(fit: Fit) -> float:
     return float(np.exp(scale * fit.solution.mean[_LOG_THRUST]))
 
 
-@threadpool_limits.wrap(limits=1)  # a process of its own
 def _in_time(dataset: Dataset) -> Dataset:
     """Runs in the order in which they were sailed, where all say when they began: a change begins with one of them."""
     began = {run.id: run.began for run in dataset.runs}
@@ -203,6 +202,7 @@ def _in_time(dataset: Dataset) -> Dataset:
     return dataset.with_runs(sorted(dataset.runs, key=lambda run: known[run.id])) if len(known) == len(began) else dataset
 
 
+@threadpool_limits.wrap(limits=1)  # a process of its own
 def _one_fold(
     fold: int, threshold: float, hull: bool, *, dataset: Dataset, seed: int, only: Sequence[str] | None, settled: Sequence[str]
 ) -> FoldGain:

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
-from shipbench.diagnosis.diagnose import _folds, diagnose
+from shipbench.diagnosis.diagnose import _folds, _one_fold, diagnose
 from shipbench.diagnosis.gain import summarise
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
@@ -50,3 +51,18 @@ def test_of_a_single_group_nothing_is_held_out_and_it_is_said():
     assert [c.effect for c in verdict.causes] == ["heading_bias"]
     assert verdict.gain is None
     assert any("all runs are one group" in w for w in verdict.warnings)
+
+
+def test_a_part_in_a_process_of_its_own_takes_one_thread(monkeypatch):
+    """Two processes on two cores with two threads each wait for each other: 24 runs with a current took 85 s, 12 s with one."""
+    threads: list[int] = []
+
+    def counted(*_: object) -> None:
+        threads.extend(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+        raise InterruptedError
+
+    monkeypatch.setattr("shipbench.diagnosis.diagnose.causes_of", counted)
+    with threadpool_limits(limits=2), pytest.raises(InterruptedError):
+        _one_fold(0, 10.0, False, dataset=grouped("-" * 6), seed=0, only=None, settled=())
+    assert threads
+    assert set(threads) == {1}
