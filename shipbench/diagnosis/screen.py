@@ -70,17 +70,26 @@ def evidence(gram: Gram, prior: Prior, log_force: np.ndarray, own_random: int = 
     return step(theta)[0], theta[:3], float(theta[3]) if own_random else 0.0
 
 
+def _columns(fit: Fit) -> list[np.ndarray]:
+    """Where the columns of the candidates stand that `fit` was given."""
+    at, columns = fit.reduced.S.shape[1] - 1 - sum(t.size for t in fit.candidates), []
+    for term in fit.candidates:
+        columns.append(np.arange(at, at + term.size))
+        at += term.size
+    return columns
+
+
+def glance(fit: Fit) -> list[Score]:
+    """Scores of the candidates that `fit` was given, in their order, under the variances of `fit`."""
+    null = solve(fit.reduced, fit.prior)
+    terms = zip(fit.candidates, _columns(fit), strict=True)
+    return [_score(fit, term, at, null.log_evidence, null.per_run, fit.reduced) for term, at in terms]
+
+
 def screen(fit: Fit) -> list[Score]:
     """Scores of the candidates that `fit` was given, best first; for those that are not hopeless the variances are re-estimated: the force of the
     plain model has absorbed part of whatever is missing."""
-    candidates = fit.candidates
-    gram, at = fit.gram, fit.reduced.S.shape[1] - 1 - sum(t.size for t in candidates)
-    columns = []
-    for term in candidates:
-        columns.append(np.arange(at, at + term.size))
-        at += term.size
-    null = solve(fit.reduced, fit.prior)
-    scores = [_score(fit, term, cols, null.log_evidence, null.per_run, fit.reduced) for term, cols in zip(candidates, columns, strict=True)]
+    gram, candidates, columns, scores = fit.gram, fit.candidates, _columns(fit), glance(fit)
     base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
     renumbered = replace(fit.prior, shared=np.arange(len(fit.prior.shared)), random=np.arange(len(fit.prior.shared), len(base)))
     before, log_force, _ = evidence(gram.only(base), renumbered, fit.hyper.log_force)
@@ -124,10 +133,7 @@ def overlap(fit: Fit, term: Term, value: np.ndarray) -> dict[str, float]:
 
     gap is the expected log likelihood ratio left between the two (diagnosis methods, A6); base parameters are projected out of both.
     """
-    columns, at = {}, fit.reduced.S.shape[1] - 1 - sum(t.size for t in fit.candidates)
-    for candidate in fit.candidates:
-        columns[candidate] = np.arange(at, at + candidate.size)
-        at += candidate.size
+    columns = dict(zip(fit.candidates, _columns(fit), strict=True))
     S = fit.reduced.S.sum(axis=0)
     base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
     P = np.concatenate([fit.prior.precision, np.exp(-fit.prior.log_tau2)])
@@ -160,11 +166,8 @@ def changes(fit: Fit) -> list[Score]:
     total, from_run = S.sum(axis=0), np.cumsum(S[::-1], axis=0)[::-1]
     base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
     prior = np.concatenate([fit.prior.precision, np.exp(-fit.prior.log_tau2)])
-    at, cost = S.shape[1] - 1 - sum(t.size for t in fit.candidates), 2.0 * float(np.log(len(S)))
-    found = []
-    for term in fit.candidates:
-        cols = np.arange(at, at + term.size)
-        at += term.size
+    cost, found = 2.0 * float(np.log(len(S))), []
+    for term, cols in zip(fit.candidates, _columns(fit), strict=True):
         if term.per_run or term.effect.enters == "gear":
             continue
         scores, means = _changes(total, from_run[begins], base, prior, cols, cost)

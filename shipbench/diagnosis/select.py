@@ -15,7 +15,7 @@ from .ordinary import widened
 from .plain import REFIT_ITERATIONS
 from .plant import Plant
 from .robust import is_sure, matters
-from .screen import Score, changes, overlap, screen
+from .screen import Score, changes, glance, overlap, screen
 from .settle import Fit, hull_evidence, settle
 from .term import Term
 
@@ -128,9 +128,6 @@ class Beginning:
         lin = Linearisation(now.plant, now.scales, at, origin.motion)
         return cls(now, origin, lin, settle(lin, now.model, origin.hyper, now.log_tau2, terms, far=True))
 
-    def scores(self) -> list[Score]:
-        return screen(self.seen)
-
     def refit(self, score: Score, least: float = -np.inf) -> Fit:
         """The model with one more term, given up where it does not promise to gain `least`."""
         now, term, columns, candidates = self.now, score.term, self.seen.columns, self.seen.candidates
@@ -152,14 +149,15 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
     """`now` with each of the candidates, and what it gains (2 log evidence), or promised to gain when it was given up beside a better one that gains
     more than the threshold.
 
-    In the order of their scores at `origin`, where refits begin: what comes first is mostly the best, beside which others are given up soon.
+    In the order of their scores at `origin`, where refits begin, at a glance: what comes first is mostly the best, beside which others are given up
+    soon.
     """
     if not scores:
         return []
     start = Beginning.of(now, origin, [s.term for s in scores])
-    rank = {s.term: i for i, s in enumerate(start.scores() if len(scores) > 1 else scores)}
+    seen = {s.term: s.score for s in glance(start.seen)}
     found, best, least = [], threshold, -np.inf
-    for score in sorted(scores, key=lambda s: rank[s.term]):
+    for score in sorted(scores, key=lambda s: -seen[s.term]):
         tried = start.refit(score, least)
         if threshold - _NEAR < 2.0 * (tried.evidence - now.evidence) < threshold:
             tried = fit(tried.plant, tried.scales, tried.model, tried.point, tried.hyper, tried.log_tau2, guess=tried.motion)
@@ -278,7 +276,7 @@ def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -
     if not terms or np.isinf(threshold):
         return []
     best: dict[str, Score] = {}
-    for s in Beginning.of(now, origin, terms).scores():
+    for s in screen(Beginning.of(now, origin, terms).seen):
         best.setdefault(s.term.label, s)
     least = max(threshold, _FAR_BEHIND * max(s.score for s in best.values()))
     seen = _beside(now) | {f.model.terms[-1].label for f in tried}
