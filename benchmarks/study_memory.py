@@ -4,12 +4,14 @@
 
 Makes the data set (the simulator's harbour runs, 1 s apart; a smaller --dt interpolates them), writes it as Parquet, and runs `shipbench run` on
 it in a process of its own for each number of models: five folds, windows of 120 s, every network for one epoch, since epochs take time and no memory.
-The figure is the greatest sum of the resident memory of that process and all that it started, looked at every 50 ms.
+The figure is the greatest sum of the resident memory of that process and all that it started, looked at every 50 ms, or the most that the system saw
+one of them hold, if that is more: the fit of the physics needs its memory for a moment only.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import tempfile
@@ -30,6 +32,8 @@ MODELS = (
 )  # fmt: skip
 """The one that needs most comes first: what more models add is then what is left behind by those before."""
 LIMIT_GB = 4.0
+_KILO = 1 if sys.platform == "darwin" else 1024
+"""Bytes of a unit in which the system counts."""
 GROWTH = 1.1
 """Accepted ratio of the peak with most models to that with one: flat, but for what the allocator leaves."""
 
@@ -51,9 +55,9 @@ def make(runs: int, seconds: int, dt: float) -> Dataset:
 
 def peak_of(command: list[str]) -> tuple[float, float, int]:
     """(GB, seconds, exit code) of a process and all that it starts."""
-    began, peak = time.perf_counter(), 0
+    began, peak, ended, status = time.perf_counter(), 0, 0, 0
     process = psutil.Popen(command)
-    while process.poll() is None:
+    while not ended:
         total = 0
         for one in [process, *_children(process)]:
             try:
@@ -62,7 +66,9 @@ def peak_of(command: list[str]) -> tuple[float, float, int]:
                 continue
         peak = max(peak, total)
         time.sleep(0.05)
-    return peak / 1e9, time.perf_counter() - began, process.returncode
+        ended, status, usage = os.wait4(process.pid, os.WNOHANG)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return max(peak, _KILO * usage.ru_maxrss) / 1e9, time.perf_counter() - began, process.returncode
 
 
 def _children(process: psutil.Popen) -> list[psutil.Process]:

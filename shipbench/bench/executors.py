@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import logging
 import pickle
 import platform
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -100,7 +102,16 @@ class _Local(Workers):
 
     def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
         # Copies, as a child process gets them, each fold's apart: what a model writes into them stays its own.
-        return self.executor.submit(work, job, [pickle.loads(pickle.dumps(fold)) for fold in folds])
+        answer = self.executor.submit(work, job, [pickle.loads(pickle.dumps(fold)) for fold in folds])
+        _give_back_memory()
+        return answer
+
+
+def _give_back_memory() -> None:
+    """What a job has freed goes back to the system, where the C library can do that: the next job's memory would else come on top of it."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
+    if trim is not None:
+        trim(0)
 
 
 class _Processes(Workers):
