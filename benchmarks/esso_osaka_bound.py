@@ -28,8 +28,8 @@ PIECES = (50, 100)
 def errors(model: str, train: Dataset, windows: Dataset) -> dict[str, float]:
     """Mean of the windows' position RMSE, of all and by kind of manoeuvre [m]."""
     batch = windows.batch()
-    predicted = make_predictor(parse_spec(model)).fit(train).predict(batch.s0, batch.U)[:, 1:, :2]
-    off = np.sqrt(np.mean(np.sum((predicted - batch.truth[:, 1:, :2]) ** 2, axis=-1), axis=1))
+    predicted = make_predictor(parse_spec(model)).fit(train).predict(batch.s0, batch.U)[..., :2]
+    off = np.sqrt(np.mean(np.sum((predicted - batch.truth[..., :2]) ** 2, axis=-1), axis=1))
     kinds = np.array([run.kind for run in windows.runs])
     return {"all": float(off.mean())} | {str(kind): float(off[kinds == kind].mean()) for kind in np.unique(kinds)}
 
