@@ -16,6 +16,7 @@ import numpy as np
 from shipbench import load_dataset
 from shipbench.bench.folds import make_folds, select_runs
 from shipbench.bench.task import Task
+from shipbench.metrics.position_rmse import position_rmse
 from shipbench.predictors.base import make_predictor
 from shipbench.records import Dataset
 from shipbench.specs import parse_spec
@@ -28,8 +29,7 @@ PIECES = (50, 100)
 def errors(model: str, train: Dataset, windows: Dataset) -> dict[str, float]:
     """Mean of the windows' position RMSE, of all and by kind of manoeuvre [m]."""
     batch = windows.batch()
-    predicted = make_predictor(parse_spec(model)).fit(train).predict(batch.s0, batch.U)[..., :2]
-    off = np.sqrt(np.mean(np.sum((predicted - batch.truth[..., :2]) ** 2, axis=-1), axis=1))
+    off = position_rmse(true=batch.truth, pred=make_predictor(parse_spec(model)).fit(train).predict(batch.s0, batch.U))
     kinds = np.array([run.kind for run in windows.runs])
     return {"all": float(off.mean())} | {str(kind): float(off[kinds == kind].mean()) for kind in np.unique(kinds)}
 
