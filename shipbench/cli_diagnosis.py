@@ -65,7 +65,9 @@ def suite_diagnosis(
     ctx: typer.Context,
     seed: Annotated[int, typer.Option(help="Everything is drawn from it.")] = 0,
     per_effect: Annotated[int, typer.Option(help="Sets per effect and size.")] = 3,
-    kinds: Annotated[str | None, typer.Option(help="single,pair,none-same,none-other,outside,change,unit (default all).")] = None,
+    kinds: Annotated[
+        str | None, typer.Option(help="single,pair,none-same,none-other,outside,change,unit,published,none-published (default all).")
+    ] = None,
     development: Annotated[bool, typer.Option("--development", help="The ships on which thresholds are set.")] = False,
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the rows.")] = Path("runs/suite-diagnosis"),
     gain: Annotated[bool, typer.Option(help="Also the held-out gain of every diagnosis and of the oracle (four times the time).")] = True,

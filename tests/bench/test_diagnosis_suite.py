@@ -7,11 +7,13 @@ import math
 from pathlib import Path
 
 import pytest
+from typer.main import get_command
 
 from shipbench.bench import diagnosis_scores as scores
 from shipbench.bench.diagnosis_page import read_rows, render, tables, write_page
 from shipbench.bench.diagnosis_suite import Job, run_case, run_suite, suite_command
-from shipbench.diagnosis.cases import count, draw_case
+from shipbench.cli import app
+from shipbench.diagnosis.cases import KINDS, count, draw_case
 from shipbench.diagnosis.outcome import Cause, Diagnosis, Estimate, Gain
 from shipbench.errors import InputError
 from shipbench.simulate.trials import Trials
@@ -122,6 +124,11 @@ def test_an_unknown_kind_and_no_draws_are_told(tmp_path):
         run_suite(tmp_path, diagnose=nothing, kinds=("singles",))
     with pytest.raises(InputError, match="draws per effect: 0"):
         run_suite(tmp_path, diagnose=nothing, seeds_per_effect=0)
+
+
+def test_the_help_names_every_kind():
+    (option,) = (o for o in get_command(app).commands["suite"].commands["diagnosis"].params if o.name == "kinds")
+    assert option.help.split(" ")[0].split(",") == list(KINDS)
 
 
 def test_wilsons_interval_is_the_published_one():
