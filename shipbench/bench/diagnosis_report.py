@@ -125,8 +125,8 @@ def _causes(d: Diagnosis) -> str:
         share = d.unknown.get("share")
         taken = f" It takes {100 * share:.0f} % of the variance of that force." if isinstance(share, float) and math.isfinite(share) else ""
         return paragraph(
-            f"No effect of the library explains the runs as well as a free force in {d.unknown['axis']} that depends on {d.unknown['variable']}."
-            f"{taken} The pictures of the missing force below show its shape."
+            f"No effect of the library explains the runs as well as a free force in {d.unknown['axis']} that depends on {d.unknown['variable']}, "
+            f"best as {d.unknown['form']}.{taken} The pictures of the missing force below show its shape."
         )
     if not d.causes:
         return paragraph("None is named.")

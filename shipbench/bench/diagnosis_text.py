@@ -67,8 +67,8 @@ def headline(d: Diagnosis) -> str:
         return f"Found: {', '.join(_named(c) for c in d.causes)}. {gain_words(d.gain)}"
     if d.verdict == "unknown" and d.unknown:
         return (
-            f"Something is missing that is not in the library: a force in {d.unknown['axis']} that depends on {d.unknown['variable']} "
-            f"(score {d.unknown['score']:.0f}; no named effect explains as much)."
+            f"Something is missing that is not in the library: a force in {d.unknown['axis']} that depends on {d.unknown['variable']}, best "
+            f"as {d.unknown['form']} (score {d.unknown['score']:.0f}; no named effect explains as much)."
         )
     if d.warnings:
         return "Nothing is named, with the warnings below. See what would have been seen, and how the candidates rank."

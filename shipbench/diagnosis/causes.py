@@ -13,6 +13,7 @@ from ..effects.base import EFFECTS, Effect
 from .analysis import HULL_THRESHOLD, Analysis
 from .clocks import NAMES, LateVelocities
 from .gears import GearFinding
+from .generic import Dependence
 from .model import FREE, HULL_SPREAD
 from .outcome import Candidate, Cause, Estimate, Gain
 from .plant import HULL, NUM_HULL
@@ -310,11 +311,14 @@ def remaining(found: Analysis) -> dict[str, Any]:
     return {
         "force_variance_explained": {a: float(v) for a, v in zip(("surge", "sway", "yaw"), share, strict=True)},
         "force_sd": {a: float(v) for a, v in zip(("surge [m/s^2]", "sway [m/s^2]", "yaw [rad/s^2]"), force, strict=True)},
-        "best_dependence": None if best is None else {"axis": best.axis, "variable": best.variable, "score": best.score, "share": best.share},
+        "best_dependence": None if best is None else _described(best),
     }
 
 
 def unknown_part(found: Analysis) -> dict[str, Any] | None:
-    """Axis and variable of the dependence that no named cause covers."""
-    d = found.unknown
-    return None if d is None else {"axis": d.axis, "variable": d.variable, "score": d.score, "share": d.share}
+    """Axis, variable and form of the dependence that no named cause covers."""
+    return None if found.unknown is None else _described(found.unknown)
+
+
+def _described(d: Dependence) -> dict[str, Any]:
+    return {"axis": d.axis, "variable": d.variable, "form": d.form, "score": d.score, "share": d.share}

@@ -174,6 +174,12 @@ class Linearisation:
         own = tuple(self._of_term(i, term) for i, term in enumerate(self.point.terms))
         return self._chained(self.base_sources), own
 
+    def pushed(self, axis: int, on: np.ndarray, aside: np.ndarray) -> tuple[np.ndarray, Bend]:
+        """Columns (B, T, F) of accelerations (F, K, B) along one axis in the middle of every step, in units of the latent force's scales, and how
+        they bend the motion, where they are others beside it. After `columns`."""
+        along = self.scales.w * (np.arange(3) == axis)
+        return self._chained(self._ends(on[..., None] * along)), Bend((aside - on)[..., None] * along)
+
     def towards(self, target: Point) -> np.ndarray:
         """The trajectory that the linear model expects at another point, gaps closed: the guess for the next iteration. After `columns`."""
         here = self.point

@@ -241,6 +241,11 @@ class Plant:
         `Course.rates`."""
         return self.course.rates(middle, p, active, self._by_sample(path), often)
 
+    def midway(self, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Actuators (K, B, 4) and times since the runs began (K, B) in the middle of every sample."""
+        at = self.course.midway
+        return self._by_sample(path)[at], self.course.t[at]
+
     def pushes(self, w: np.ndarray) -> np.ndarray:
         """The latent acceleration w (B, K + 1, 3) at the stages of every integration step, (K, B, substeps, 3, 3)."""
         part = self.parts[..., None]

@@ -57,6 +57,12 @@ class Course:
     t: np.ndarray
     wind: np.ndarray | None
 
+    @property
+    def midway(self) -> tuple[slice, slice, int, int]:
+        """Where the middle of every sample is found in what is given at the stages of every integration step."""
+        S = self.t.shape[2]
+        return slice(None), slice(None), S // 2, S % 2
+
     def rolled(self, x0: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, push: np.ndarray) -> np.ndarray:
         """Motion (B, K + 1, 6) from x0 (B, 6), with p0..p10, effects, actuators act (K, B, S, 3, 4) and accelerations push (K, B, S, 3, 3)."""
         K, B, S = self.t.shape[:3]
@@ -84,9 +90,7 @@ class Course:
     def rates(self, middle: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, often: bool = True) -> np.ndarray:
         """Accelerations (D, K, B, 3) that forces give in the middle of every sample, from the states there (1, K, B, 6). often: whether these effects
         come up again and again, so that code of their own pays."""
-        S = self.t.shape[2]
-        at = (slice(None), slice(None), S // 2, S % 2)
-        code = self._code(active, steps=False) if often else None
+        at, code = self.midway, self._code(active, steps=False) if often else None
         if code is not None:
             return self._evaluated(code, 3, self._bundles(middle[..., None, :], p, active, act[at][:, :, None], self.t[at][:, :, None, None]))
         wind = None if self.wind is None else np.moveaxis(self.wind, -1, 0)

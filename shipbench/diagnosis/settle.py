@@ -76,7 +76,7 @@ def base_precision(model: Model) -> np.ndarray:
 @dataclass(frozen=True)
 class Fit:
     """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate: of [eta, w] per segment;
-    by_force: see `slopes`; early: what the fit promised at its second linearisation."""
+    early: what the fit promised at its second linearisation."""
 
     plant: Plant
     scales: Scales
@@ -94,7 +94,6 @@ class Fit:
     solution: Solution
     estimate: np.ndarray
     excess: float
-    by_force: np.ndarray
     early: float = np.nan
 
     @property
@@ -244,11 +243,11 @@ def settle(
     leap: float = np.inf, seen: Fit | None = None, far: bool = False,
 ) -> Fit:  # fmt: skip
     """Variances, whose logarithms move by `leap` at most, and posterior on one linearisation; seen: an earlier fit on it, whose products hold; far:
-    see `_sloped`."""
+    see `sloped`."""
     plant, scales, point = lin.plant, lin.scales, lin.point
     columns = lin.columns(candidates) if seen is None else seen.columns
     products = products_of(plant, scales, point, columns) if seen is None else seen.products
-    products, by_force = _sloped(lin, columns, products, hyper, far, known=seen is not None)
+    products = sloped(lin, columns, products, hyper, far, known=seen is not None)
     if leap > 0.0:
         hyper, log_tau2 = _variances(products.without(sum(t.size for t in candidates)), model, hyper, log_tau2, cycles, leap)
     gram = products.weigh(hyper)
@@ -259,14 +258,12 @@ def settle(
     excess = max(objective(lin, model, hyper, log_tau2, gram) - solution.squares, 0.0)
     return Fit(
         plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), lin.motion, products, gram, reduced, solution, estimate,
-        excess, by_force,
+        excess,
     )  # fmt: skip
 
 
-def _sloped(
-    lin: Linearisation, columns: Columns, products: Products, hyper: Hyper, far: bool, known: bool
-) -> tuple[Products, np.ndarray]:  # fmt: skip
-    """Products that know how the log determinants depend on what is shared, and how these depend on the force at the knots.
+def sloped(lin: Linearisation, columns: Columns, products: Products, hyper: Hyper, far: bool = False, known: bool = False) -> Products:
+    """Products that know how the log determinants depend on what is shared.
 
     What initial states take off is seen at the same variances in all fits of a diagnosis: it would else reward lower ones. Where the force does what
     the parameters should (`far`), the slopes mean nothing: followed from there, they made the yaw inertia of a navy ship negative. known: the
@@ -278,15 +275,13 @@ def _sloped(
         seen = lin.scales.background or hyper
         return -log_determinant(alone.weigh(seen).reduce(seen.log_force).inverse[:, :6, :6])
 
-    if far:
-        by_column, by_force = np.zeros((B, products.slope.shape[1] - 1)), np.zeros((B, products.knots, 3, 6))
-    else:
-        by_column, by_force = slopes(lin, columns, alone.weigh(hyper).reduce(hyper.log_force).inverse, hyper)
+    flat = np.zeros((B, products.slope.shape[1] - 1))
+    by_column = flat if far else slopes(lin, columns, alone.weigh(hyper).reduce(hyper.log_force).inverse, hyper)
     initial = products.initial if known and lin.scales.background else taken_off()
     own = [v[products.run] if t.per_run else np.broadcast_to(v, (B, t.size)) for t, v in zip(point.terms, point.values, strict=True)]
     candidates = np.zeros((B, sum(c.shape[-1] for c in columns.candidates)))
     at = np.concatenate([np.broadcast_to(point.base, (B, NUM_BASE)), *own, candidates], axis=1)
-    return products.sloped(by_column, at, initial), by_force
+    return products.sloped(by_column, at, initial)
 
 
 def evidence_with(found: Fit, colour: Colour) -> float:

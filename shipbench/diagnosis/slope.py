@@ -23,9 +23,8 @@ _MOVE = 1e-4
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyper) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of the log determinants of the segments, for trajectories that stay where they are: (B, G) by base, own terms and candidates, and
-    (B, knots, 3, 6) by what the force at each knot changes by when each part of the motion does (in units of the scales of the force).
+def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyper) -> np.ndarray:
+    """Derivatives (B, G) of the log determinants of the segments by base, own terms and candidates, for trajectories that stay where they are.
 
     With Phi the sensitivities to w, R the noise and A = Phi' R^-1 Phi + P: d log det A = 2 tr(A^-1 Phi' R^-1 d Phi). `inverse` (B, Z, Z) is that of
     [eta, w], which holds A^-1 once eta is known. Phi is a chain of single steps, so that the derivative by the Jacobian of each comes from an adjoint
@@ -40,9 +39,7 @@ def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyp
     by_rate = _by_rate(lin, phi, weight)
     turned = len(ASIDE) * np.take_along_axis(by_rate, lin.turn[..., None, None], axis=-1)[..., 0] / lin.away[..., None]
     found = [_of_sensors(lin, bend, phi, weight) if bend.rates is None else np.einsum("kbi,ckbi->bc", turned, bend.rates) for bend in columns.bends]
-    middle = 0.5 * (lin.plant.hat[:-1] + lin.plant.hat[1:])
-    by_force = lin.scales.w[:, None] * np.einsum("km,kbij->bmij", middle, by_rate)
-    return _finite(2.0 * np.concatenate(found, axis=1)), _finite(2.0 * by_force)
+    return _finite(2.0 * np.concatenate(found, axis=1))
 
 
 def _finite(values: np.ndarray) -> np.ndarray:

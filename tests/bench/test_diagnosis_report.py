@@ -33,7 +33,7 @@ CANDIDATES = (
 
 def make_diagnosis(verdict: str = "found", name: str = "trial") -> Diagnosis:
     found = verdict == "found"
-    unknown = {"axis": "yaw", "variable": "heading", "score": 44.0, "share": 0.5} if verdict == "unknown" else None
+    unknown = {"axis": "yaw", "variable": "heading", "form": "cos(3 psi + phase)", "score": 44.0, "share": 0.5} if verdict == "unknown" else None
     return Diagnosis(
         dataset=name, verdict=verdict, causes=(CAUSE,) if found else (), candidates=CANDIDATES,
         what_is_wrong=(Wrong("sway", 0.6, "heading", "worst at 90 to 135 deg"),), unexplained_after={"force_sd": {"surge": 0.001}},
@@ -130,7 +130,8 @@ def test_none_comes_with_the_sizes_that_would_have_been_seen():
 
 
 def test_unknown_names_axis_and_variable():
-    assert "a force in yaw that depends on heading" in " ".join("\n".join(summary_lines(make_diagnosis("unknown"))).split())
+    text = " ".join("\n".join(summary_lines(make_diagnosis("unknown"))).split())
+    assert "a force in yaw that depends on heading, best as cos(3 psi + phase)" in text
 
 
 def test_infinite_scores_do_not_reach_the_json(tmp_path):

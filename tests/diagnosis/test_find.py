@@ -16,6 +16,7 @@ from shipbench.diagnosis.analysis import THRESHOLD
 from shipbench.diagnosis.cases import ON_PUBLISHED, draw_case, singles
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.outside import canonical
 from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import changes, screen
@@ -148,13 +149,14 @@ def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
     assert not np.isfinite(cause.parameters["from_run"].ci95).any()  # none is known: no width of zero is claimed
 
 
-def test_a_force_that_follows_no_known_cause_is_called_unknown_with_its_variable():
-    case = draw_case("outside", 1, 3, "development")  # a slow force in time
+@pytest.mark.parametrize("index", [1, 3], ids=["slow force in time", "thrust lost with the rudder angle, not just lost"])
+def test_a_force_that_follows_no_known_cause_is_called_unknown_with_its_variable(index):
+    case = draw_case("outside", index, 3, "development")
     verdict = diagnose(case.dataset(), gain=False)
     assert verdict.verdict == "unknown"
     assert not verdict.causes
     assert verdict.unknown is not None
-    assert verdict.unknown["variable"] in case.variables
+    assert canonical(verdict.unknown["variable"]) & case.variables
 
 
 def test_a_ship_file_of_another_ship_names_nothing():

@@ -44,14 +44,13 @@ def _log_determinant(fitted: Fit, point: Point) -> float:
     return float(np.sum(settle(lin, Model(point.terms), fitted.hyper, {}, leap=0.0).reduced.logdet))
 
 
-def _by_column(fitted: Fit, candidates: list[Term]) -> tuple[np.ndarray, np.ndarray]:
+def _by_column(fitted: Fit, candidates: list[Term]) -> np.ndarray:
     lin = Linearisation(fitted.plant, fitted.scales, fitted.point, fitted.motion, coarse=False)
-    found, by_force = slopes(lin, lin.columns(candidates), fitted.reduced.inverse, fitted.hyper)
-    return found.sum(axis=0), by_force
+    return slopes(lin, lin.columns(candidates), fitted.reduced.inverse, fitted.hyper).sum(axis=0)
 
 
 def test_slopes_by_parameters_are_those_of_the_log_determinant(fitted):
-    found, _ = _by_column(fitted, [])
+    found = _by_column(fitted, [])
     numeric = np.zeros(NUM_BASE)
     for i in range(NUM_BASE):
         ends = [replace(fitted.point, base=fitted.point.base + step * np.eye(NUM_BASE)[i]) for step in (0.05, -0.05)]
@@ -66,7 +65,7 @@ CAUSES = ("mass_change", "rudder_gain", "added_resistance", "speed_scale", "ante
 @pytest.mark.parametrize("name", CAUSES)
 def test_slopes_by_causes_of_every_kind_are_those_of_the_log_determinant(fitted, name):
     term = Term(EFFECTS.get(name))
-    found = _by_column(fitted, [term])[0][NUM_BASE:]
+    found = _by_column(fitted, [term])[NUM_BASE:]
     for a in range(term.size):
         ends = [replace(fitted.point, terms=(term,), values=(step * np.eye(term.size)[a],)) for step in (0.1, -0.1)]
         numeric = (_log_determinant(fitted, ends[0]) - _log_determinant(fitted, ends[1])) / 0.2
@@ -80,7 +79,7 @@ def test_slopes_by_a_sensor_that_errs_already_are_those_of_the_log_determinant(f
     at = replace(fitted.point, terms=(term,), values=(np.full(term.size, 0.7),))
     lin = Linearisation(fitted.plant, fitted.scales, at, fitted.motion, coarse=False)
     now = settle(lin, Model((term,)), fitted.hyper, {}, leap=0.0)
-    found = slopes(lin, now.columns, now.reduced.inverse, fitted.hyper)[0].sum(axis=0)[NUM_BASE:]
+    found = slopes(lin, now.columns, now.reduced.inverse, fitted.hyper).sum(axis=0)[NUM_BASE:]
     for a in range(term.size):
         ends = [_log_determinant(fitted, replace(at, values=(at.values[0] + step * np.eye(term.size)[a],))) for step in (0.1, -0.1)]
         assert found[a] == pytest.approx((ends[0] - ends[1]) / 0.2, rel=0.15, abs=0.5)
@@ -89,7 +88,7 @@ def test_slopes_by_a_sensor_that_errs_already_are_those_of_the_log_determinant(f
 @pytest.mark.parametrize("term", [Term(EFFECTS.get("position_delay")), *(Term(EFFECTS.get("velocity_delay"), (axes,)) for axes in (0.0, 1.0))])
 def test_a_late_sensor_tells_as_much_of_the_force(fitted, term):
     """Shifted in time, nothing is lost but where a piece begins, and that is the cutting's doing."""
-    assert np.all(_by_column(fitted, [term])[0][NUM_BASE:] == 0.0)
+    assert np.all(_by_column(fitted, [term])[NUM_BASE:] == 0.0)
 
 
 def test_where_pieces_begin_is_no_evidence_for_a_late_sensor():
@@ -100,15 +99,17 @@ def test_where_pieces_begin_is_no_evidence_for_a_late_sensor():
     assert abs(score.estimate[0]) < 2.5 * score.sd[0]
 
 
-def test_slopes_by_a_force_at_the_knots_agree_with_those_by_a_parameter(fitted):
-    """A moment that goes with the yaw rate, as the motion's and as the force's."""
-    found, by_force = _by_column(fitted, [])
+def test_slopes_by_a_pushed_moment_agree_with_those_by_a_parameter(fitted):
+    """A moment that goes with the yaw rate, as the hull's and as a form of the second library."""
     lin = Linearisation(fitted.plant, fitted.scales, fitted.point, fitted.motion, coarse=False)
-    lin.columns()
-    at_r = lin.turn == 5
-    damping = np.mean((lin.bends[0].rates[N_R, ..., 2] / lin.away)[at_r])
-    share = np.sum(by_force[:, :, 2, 5]) * damping / fitted.scales.w[2]
-    assert share == pytest.approx(found[N_R], rel=0.25)
+    columns = lin.columns()
+    rates, aside = (states[..., 5] / fitted.scales.eta[5] for states in (lin.middle, lin.aside))
+    pushed, bend = lin.pushed(2, rates, aside)
+    with_push = replace(columns, candidates=(pushed,), bends=(*columns.bends, bend))
+    found = slopes(lin, with_push, fitted.reduced.inverse, fitted.hyper).sum(axis=0)
+    damping = np.mean((columns.bends[0].rates[N_R, ..., 2] / lin.away)[lin.turn == 5])
+    unit = fitted.scales.w[2] / fitted.scales.eta[5]
+    assert found[-1] * damping / unit == pytest.approx(found[N_R], rel=0.25)
 
 
 def test_estimates_are_nearer_to_the_truth_where_the_log_determinant_counts(monkeypatch):
@@ -132,7 +133,7 @@ def test_estimates_are_nearer_to_the_truth_where_the_log_determinant_counts(monk
         return float(error @ np.linalg.solve(found.solution.cov[:NUM_BASE, :NUM_BASE], error))
 
     counts = fitted()
-    monkeypatch.setattr(settling, "slopes", lambda *given: tuple(0.0 * x for x in slopes(*given)))
+    monkeypatch.setattr(settling, "slopes", lambda *given: 0.0 * slopes(*given))
     squares = fitted()
     assert counts.evidence > squares.evidence + 0.5
     assert off(counts) < 0.9 * off(squares)

@@ -1,0 +1,58 @@
+"""The forms of an unexplained force, evaluated at every step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipbench.diagnosis.fit import start
+from shipbench.diagnosis.forms import Feature, features
+from shipbench.diagnosis.model import Linearisation, Scales
+from shipbench.diagnosis.plant import Plant
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.simulate.trials import Trials, sea_trials
+
+
+def _features(plant: Plant) -> tuple[dict[str, list[Feature]], Linearisation]:
+    lin = Linearisation(plant, Scales(plant), start(plant)[0], plant.seg.states[..., :6].copy())
+    lin.columns()
+    return features(lin), lin
+
+
+@pytest.fixture(scope="module")
+def plant() -> Plant:
+    return Plant.of(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=6, samples=80)))
+
+
+def test_every_feature_is_of_order_one_over_the_samples_that_are_there(plant):
+    found, _ = _features(plant)
+    real = plant.seg.mask[:, 1:].T
+    for variable, forms in found.items():
+        for form in forms:
+            assert np.sqrt(np.mean(form.on[:, real] ** 2, axis=1)) == pytest.approx(np.ones(form.size)), (variable, form.form)
+    for form in (*found["heading"], *found["run"]):
+        assert np.abs(form.on[:, real].mean(axis=1)).max() < 1e-9
+
+
+def test_features_are_what_their_names_say_between_the_knots_too(plant):
+    found, lin = _features(plant)
+    (form,) = (f for f in found["revolutions and rudder"] if f.form == "n|n| |delta|")
+    act, _ = plant.midway(plant.path)
+    n, delta = act[..., 0], act[..., 1]
+    expected = n * np.abs(n) * np.abs(delta)
+    assert np.corrcoef(form.on[0].ravel(), expected.ravel())[0, 1] == pytest.approx(1.0)
+    assert np.array_equal(form.on, form.aside)  # rudder and revolutions are the same beside the trajectory
+    (speed,) = (f for f in found["speed"] if f.form == "u")
+    moved = lin.turn == 3
+    assert (speed.aside - speed.on)[0][moved] == pytest.approx(lin.away[moved] * np.median(speed.on[0] / lin.middle[0, ..., 3]))
+
+
+def test_periods_are_told_in_seconds_of_this_ship(plant):
+    found, _ = _features(plant)
+    shortest = next(f.form for f in found["time"] if f.form.startswith("cos"))
+    assert shortest == f"cos(2 pi t / {20.0 * plant.froude:.3g} s + phase)"
+
+
+def test_thrusters_that_are_not_used_are_not_looked_at(plant):
+    assert "thrusters" not in _features(plant)[0]
+    assert "thrusters" in _features(Plant.of(sea_trials(load_mmg_ship("container130"), 5, (), Trials(runs=4, samples=40))))[0]
