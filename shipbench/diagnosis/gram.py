@@ -199,19 +199,22 @@ class Solution:
     per_run: np.ndarray
 
 
+def shared_alone(reduced: Reduced, prior: Prior) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """S (N, P + 1, P + 1) of [prior.shared, e] and logdet (N,) with the values of single runs integrated out, and for going back to these: covs
+    (N, R, R) given the shared coefficients, and covs times their products with [shared, e]."""
+    keep, random = np.append(prior.shared, reduced.S.shape[1] - 1), prior.random
+    S = reduced.S[:, keep][:, :, keep]
+    if not len(random):
+        return S, reduced.logdet, np.zeros((len(S), 0, 0)), np.zeros((len(S), 0, len(keep)))
+    A = reduced.S[:, random][:, :, random] + np.diag(np.exp(-prior.log_tau2))
+    covs, right = np.linalg.inv(A), reduced.S[:, random][:, :, keep]
+    back = covs @ right
+    return S - np.swapaxes(right, 1, 2) @ back, reduced.logdet + log_determinant(A) + np.sum(prior.log_tau2), covs, back
+
+
 def solve(reduced: Reduced, prior: Prior) -> Solution:
     """Integrate the random effects and the shared coefficients out."""
-    last = reduced.S.shape[1] - 1
-    keep = np.append(prior.shared, last)
-    S, logdet = reduced.S[:, keep][:, :, keep], reduced.logdet
-    back = None
-    if len(prior.random):
-        A = reduced.S[:, prior.random][:, :, prior.random] + np.diag(np.exp(-prior.log_tau2))
-        covs = np.linalg.inv(A)
-        right = reduced.S[:, prior.random][:, :, keep]
-        back = covs @ right
-        S = S - np.swapaxes(right, 1, 2) @ back
-        logdet = logdet + log_determinant(A) + np.sum(prior.log_tau2)
+    S, logdet, covs, back = shared_alone(reduced, prior)
     total = S.sum(axis=0)
     A = total[:-1, :-1] + np.diag(prior.precision)
     cov = np.linalg.inv(A)
@@ -220,8 +223,6 @@ def solve(reduced: Reduced, prior: Prior) -> Solution:
     log_evidence = -0.5 * (quad + np.sum(logdet) + log_determinant(A) - np.sum(np.log(prior.precision)))
     fitted = np.append(-mean, 1.0)
     per_run = -0.5 * (np.einsum("nij,i,j->n", S, fitted, fitted) + logdet)
-    if back is None:
-        return Solution(float(log_evidence), float(quad), mean, cov, np.zeros((len(S), 0)), np.zeros((len(S), 0, 0)), per_run)
     means = back @ fitted
     spread = back[:, :, :-1] @ cov @ np.swapaxes(back[:, :, :-1], 1, 2)
     return Solution(float(log_evidence), float(quad), mean, cov, means, covs + spread, per_run)

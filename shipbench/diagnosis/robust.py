@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .gram import shared_alone
 from .settle import Fit
 
 NEGLIGIBLE = 0.05
@@ -18,10 +19,10 @@ _DOUBT, _DOUBT_LATE = 0.05, 1e-5
 
 
 def inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
-    """Variance of the shared coefficients `at` (P,) by the sandwich clustered by run, over the model's."""
-    S, mean = fit.reduced.S, fit.solution.mean
-    keep = fit.prior.shared
-    scores = S[:, keep, -1] - np.einsum("nij,j->ni", S[:, keep][:, :, keep], mean)
+    """Variance of the shared coefficients `at` (P,) by the sandwich clustered by run, over the model's; what single runs have of their own is
+    integrated out, else each run's current would pass for its disagreement with the others."""
+    S, *_ = shared_alone(fit.reduced, fit.prior)
+    scores = S[:, :-1, -1] - S[:, :-1, :-1] @ fit.solution.mean
     bread = fit.solution.cov
     num = len(S)
     sandwich = bread @ (scores.T @ scores * num / max(num - 1, 1)) @ bread

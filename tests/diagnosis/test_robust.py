@@ -7,12 +7,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from shipbench.diagnosis.gram import Prior, Reduced, solve
 from shipbench.diagnosis.robust import covariance, inflation, is_sure, least_size, matters
 from shipbench.diagnosis.select import passes_for_form
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
 
 RUNS = 20
+_NONE = np.zeros(0, dtype=int), np.zeros(0)
+
+
+def _reduced(S: np.ndarray) -> Reduced:
+    return Reduced(S, np.zeros(len(S)), np.zeros(0), np.zeros(0))
 
 
 def fit_of(estimates: np.ndarray, per_run: bool = False, since: int | None = None) -> SimpleNamespace:
@@ -23,7 +29,7 @@ def fit_of(estimates: np.ndarray, per_run: bool = False, since: int | None = Non
     cov = np.array([[1.0 / (1.0 + num * information)]])
     mean = cov[0] * information * estimates.sum()
     return SimpleNamespace(
-        reduced=SimpleNamespace(S=S), solution=SimpleNamespace(mean=mean, cov=cov), prior=SimpleNamespace(shared=np.array([0])), values=(mean,),
+        reduced=_reduced(S), solution=SimpleNamespace(mean=mean, cov=cov), prior=Prior(np.array([0]), np.ones(1), *_NONE), values=(mean,),
         columns_of=lambda index: np.array([0]), plant=SimpleNamespace(seg=SimpleNamespace(runs=num)),
         model=SimpleNamespace(terms=(SimpleNamespace(per_run=per_run, since=since),)),
     )  # fmt: skip
@@ -47,6 +53,24 @@ def test_a_beginning_needs_runs_that_agree_much_better(scatter: float, sure: boo
     estimates = 0.5 + scatter * np.resize([1.0, -1.0], RUNS)
     assert is_sure(fit_of(estimates), 0)
     assert is_sure(fit_of(estimates, since=4), 0) is sure
+
+
+def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
+    """A rudder offset beside a current of each run: the currents act on the motion much as the offset does."""
+    rng = np.random.default_rng(8)
+    Z = rng.standard_normal((RUNS, 200, 3))
+    Z[..., 1] += 0.5 * Z[..., 0]  # shared, own, e
+    Z[..., 2] += 0.5 * Z[..., 0] + 5.0 * rng.standard_normal((RUNS, 1)) * Z[..., 1]
+    reduced = _reduced(np.swapaxes(Z, 1, 2) @ Z)
+    prior = Prior(np.array([0]), np.ones(1), np.array([1]), np.log([25.0]))
+    solution = solve(reduced, prior)
+    fit = SimpleNamespace(
+        reduced=reduced, prior=prior, solution=solution, values=(solution.mean,), columns_of=lambda index: np.array([0]),
+        plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS)), model=SimpleNamespace(terms=(SimpleNamespace(per_run=False, since=None),)),
+    )  # fmt: skip
+    assert solution.mean[0] == pytest.approx(0.5, abs=0.05)
+    assert inflation(fit, np.array([0]))[0] < 3.0
+    assert is_sure(fit, 0)
 
 
 def test_values_of_single_runs_have_no_common_size_to_doubt():
