@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .gram import Gram, Prior, Reduced, accelerated, background, solve, update_force
+from .gram import Gram, Prior, Reduced, accelerated, background, shared_alone, solve, update_force
 from .inverse import log_determinant
 from .settle import Fit
 from .term import Term
@@ -79,6 +79,13 @@ def _columns(fit: Fit) -> list[np.ndarray]:
     return columns
 
 
+def _of_all_runs(fit: Fit) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """S (N, P + 1, P + 1) with the values of single runs integrated out, and where the shared columns and those of the candidates stand in it."""
+    kept = np.setdiff1d(np.arange(fit.reduced.S.shape[1] - 1), fit.prior.random)
+    S, *_ = shared_alone(fit.reduced, replace(fit.prior, shared=kept))
+    return S, np.searchsorted(kept, fit.prior.shared), [np.searchsorted(kept, at) for at in _columns(fit)]
+
+
 def glance(fit: Fit) -> list[Score]:
     """Scores of the candidates that `fit` was given, in their order, under the variances of `fit`."""
     null = solve(fit.reduced, fit.prior)
@@ -133,12 +140,10 @@ def overlap(fit: Fit, term: Term, value: np.ndarray) -> dict[str, float]:
 
     gap is the expected log likelihood ratio left between the two (diagnosis methods, A6); base parameters are projected out of both.
     """
-    columns = dict(zip(fit.candidates, _columns(fit), strict=True))
-    S = fit.reduced.S.sum(axis=0)
-    base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
-    P = np.concatenate([fit.prior.precision, np.exp(-fit.prior.log_tau2)])
+    by_run, base, places = _of_all_runs(fit)
+    columns, S = dict(zip(fit.candidates, places, strict=True)), by_run.sum(axis=0)
     rest = np.arange(len(S) - 1)
-    V = S[rest][:, rest] - S[rest][:, base] @ np.linalg.solve(S[np.ix_(base, base)] + np.diag(P), S[base][:, rest])
+    V = S[rest][:, rest] - S[rest][:, base] @ np.linalg.solve(S[np.ix_(base, base)] + np.diag(fit.prior.precision), S[base][:, rest])
     own = columns[term]
     total = float(value @ V[np.ix_(own, own)] @ value)
     shares: dict[str, float] = {}
@@ -159,15 +164,13 @@ def changes(fit: Fit) -> list[Score]:
     model lacks in one of them, and none is looked for. What the run that speaks most for it carries nearly alone is no change: a hull or
     propeller that is not of the fitted form does that.
     """
-    S, barred = fit.reduced.S, other_kinds_from(fit.plant.seg.kinds)
+    (S, base, columns), barred = _of_all_runs(fit), other_kinds_from(fit.plant.seg.kinds)
     begins = np.array([k for k in places(len(S)) if k not in barred], dtype=int)
     if not len(begins) or len(S) < _RUNS_FOR_A_CHANGE:
         return []
     total, from_run = S.sum(axis=0), np.cumsum(S[::-1], axis=0)[::-1]
-    base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
-    prior = np.concatenate([fit.prior.precision, np.exp(-fit.prior.log_tau2)])
-    cost, found = 2.0 * float(np.log(len(S))), []
-    for term, cols in zip(fit.candidates, _columns(fit), strict=True):
+    prior, cost, found = fit.prior.precision, 2.0 * float(np.log(len(S))), []
+    for term, cols in zip(fit.candidates, columns, strict=True):
         if term.per_run or term.effect.enters == "gear":
             continue
         scores, means = _changes(total, from_run[begins], base, prior, cols, cost)
