@@ -11,7 +11,7 @@ from html import escape
 from pathlib import Path
 
 from ..diagnosis.outcome import Cause, Diagnosis
-from .diagnosis_text import detectable, figure, gain_words, headline, interval, next_command, strength, summary_lines
+from .diagnosis_text import detectable, figure, gain_words, headline, interval, next_command, strength, summary_lines, what_it_is
 
 _STYLE = """
 :root { color-scheme: light dark; --ink: #1c2733; --paper: #fff; --soft: #f1f4f6; --line: #d5dde3; --accent: #00707f; --warn: #9a5200;
@@ -123,11 +123,10 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[
 def _causes(d: Diagnosis) -> str:
     if d.verdict == "unknown" and d.unknown:
         share = d.unknown.get("share")
-        taken = f" It takes {100 * share:.0f} % of the variance of that force." if isinstance(share, float) and math.isfinite(share) else ""
-        return paragraph(
-            f"No effect of the library explains the runs as well as a free force in {d.unknown['axis']} that depends on {d.unknown['variable']}, "
-            f"best as {d.unknown['form']}.{taken} The pictures of the missing force below show its shape."
-        )
+        taken = ""
+        if isinstance(share, float) and math.isfinite(share):
+            taken = f" It takes {100 * share:.0f} % of the variance of the missing force, whose pictures are below."
+        return paragraph(f"No effect of the library explains the runs as well as {what_it_is(d.unknown)}.{taken}")
     if not d.causes:
         return paragraph("None is named.")
     return "".join(_cause(c) for c in d.causes) + paragraph(

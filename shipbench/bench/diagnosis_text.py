@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import shlex
 import textwrap
+from collections.abc import Mapping
+from typing import Any
 
 from ..diagnosis.outcome import Candidate, Cause, Diagnosis, Estimate, Gain
 from .tables import display_unit
@@ -61,14 +63,22 @@ def gain_words(g: Gain | None) -> str:
     )
 
 
+def what_it_is(unknown: Mapping[str, Any]) -> str:
+    """An unknown force, or error of a sensor, with what it depends on."""
+    kind = "error of the" if unknown["axis"].startswith("recorded") else "force in"
+    if unknown["variable"] == "nothing":
+        return f"a constant {kind} {unknown['axis']}"
+    return f"{'an' if kind[0] == 'e' else 'a'} {kind} {unknown['axis']} that depends on {unknown['variable']}, best as {unknown['form']}"
+
+
 def headline(d: Diagnosis) -> str:
     """The verdict in one or two sentences."""
     if d.verdict == "found":
         return f"Found: {', '.join(_named(c) for c in d.causes)}. {gain_words(d.gain)}"
     if d.verdict == "unknown" and d.unknown:
         return (
-            f"Something is missing that is not in the library: a force in {d.unknown['axis']} that depends on {d.unknown['variable']}, best "
-            f"as {d.unknown['form']} (score {d.unknown['score']:.0f}; no named effect explains as much)."
+            f"Something is missing that is not in the library: {what_it_is(d.unknown)} (score {d.unknown['score']:.0f}; no named effect explains as "
+            f"much)."
         )
     if d.warnings:
         return "Nothing is named, with the warnings below. See what would have been seen, and how the candidates rank."

@@ -10,7 +10,7 @@ import numpy as np
 from ..physics.actuators import Gear
 from .gain import Extension
 from .gears import GearFinding, find_in_gears
-from .generic import Dependence, dependences
+from .generic import NO_FORM, Dependence, dependences
 from .model import Scales
 from .plain import null_fit
 from .plant import Plant
@@ -21,14 +21,15 @@ THRESHOLD = 10.0
 """Least gain of a named cause, 2 log Bayes factor. From nulls on the development ships, whose structure differs from the model's; the bootstrap of
 each diagnosis may raise it."""
 HULL_THRESHOLD = 30.0
-GENERIC_THRESHOLD, _OFF_FORM, _NO_FORM_THRESHOLD, _NO_FORM = 20.0, (4.0, 12.0), 16.0, ("heading", "time", "run")
-"""Least score of an unknown force. No ship's form depends on heading, time or number of the run; what follows anything else must be worth so many
-times `Selection.off_form` besides, where it is noticeable and where it is not. (550 sets without such a force, on development ships and ships of the
-literature under 18 conditions: 17 below that at the nearest; 13 of heading, time and run.)"""
+GENERIC_THRESHOLD, _OFF_FORM, _NO_FORM_THRESHOLD = 20.0, (4.0, 12.0), 16.0
+"""Least score of an unknown force. What follows something that a ship's form depends on (`NO_FORM` is what it does not) must be worth so many times
+`Selection.off_form` besides, where what it takes is noticeable and where it is not. (550 sets without such a force, on development ships and ships of
+the literature under 18 conditions: 17 below that at the nearest.) Nor does an error of a sensor depend on the form: the record contradicts itself."""
 GENERIC_MARGIN = 10.0
 """Least that it must be worth beyond all named causes together: it is what the runs show in their place."""
-_LEAST_FORCE = 0.07
-"""Least size of an unknown force in units of the latent force: 0.35 mm/s^2; in yaw 7e-6 rad/s^2 at 130 m."""
+_LEAST_FORCE, _LEAST_ERROR = 0.07, 0.3
+"""Least size of an unknown force in units of the latent force: 0.35 mm/s^2; in yaw 7e-6 rad/s^2 at 130 m; and of an error in units of ordinary noise:
+0.07 deg, 0.012 m/s, 0.012 deg/s."""
 NOTICEABLE = 0.14
 """Size from which a force is noticeable, and may doubt the ship file, in units of the latent force: 0.7 mm/s^2, a third of what a wind of 7 m/s
 gives; in yaw 1.4e-5 rad/s^2 at 130 m. Exact sensors or many samples show with certainty that ships differ in form from eq. (2)."""
@@ -116,10 +117,11 @@ def _unknown(selection: Selection, gears: Sequence[GearFinding], after: Sequence
     worth = max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) + GENERIC_MARGIN if named else 0.0
 
     def asked(d: Dependence) -> float:
-        of_form = _OFF_FORM[d.size < NOTICEABLE] * selection.off_form
-        return max(worth, _NO_FORM_THRESHOLD if d.variable in _NO_FORM else GENERIC_THRESHOLD + of_form)
+        if d.of_sensor or d.variable in NO_FORM:
+            return _NO_FORM_THRESHOLD if d.size > (_LEAST_ERROR if d.of_sensor else _LEAST_FORCE) else np.inf
+        return GENERIC_THRESHOLD + _OFF_FORM[d.taken < NOTICEABLE] * selection.off_form if d.taken > _LEAST_FORCE else np.inf
 
-    return next((d for d in found if d.size > _LEAST_FORCE and d.score > asked(d)), None)
+    return next((d for d in found if d.score > max(worth, asked(d))), None)
 
 
 def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""Forms of an unexplained force: what a force or moment may follow, by the variable that it then depends on. They are free of any named cause."""
+"""Forms of what no named cause explains: what a force, or an error of a sensor, may follow, by the variable that it then depends on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -11,16 +11,19 @@ from .model import Linearisation
 from .plant import Plant
 
 Features = tuple[np.ndarray, ...]
-_PERIODS = 20.0 * 10.0 ** (np.arange(11) / 10.0)
-"""Seconds (Froude-scaled, 130 m): over two minutes one of them is near enough to any from 20 to 200 s."""
-_CENTRED = ("heading", "run")
+_SHORTEST, _LONGEST, _MOST_PERIODS = 8.0, 200.0, 60
+"""Periods that are tried, in seconds (Froude-scaled, 130 m), and how many at most: even in frequency, from one to the next the longest run sees half
+a cycle more, so that one of them is near enough to any."""
+_CENTRED = ("heading", "position", "run")
 """Of these only differences count: a force that is always there is none that follows them."""
 
 
 class State(NamedTuple):
-    """What a force may follow, in units of the root mean square of the record: motion u, v, r over ground, actuators n, delta, F_b, F_s; psi [rad];
-    t: time since the run began [s]; run: from 0 for the first to 1 for the last."""
+    """What a force or an error may follow, in units of the root mean square of the record: motion u, v, r over ground, actuators n, delta, F_b, F_s;
+    psi [rad]; x, y: place, from the middle of all; t: time since the run began [s]; run: from 0 for the first to 1 for the last."""
 
+    x: np.ndarray
+    y: np.ndarray
     psi: np.ndarray
     u: np.ndarray
     v: np.ndarray
@@ -35,14 +38,17 @@ class State(NamedTuple):
 
 Form = Callable[[State], Features]
 """One coefficient for each feature."""
+Forms = Mapping[str, Mapping[str, Form]]
 
 
 class Feature(NamedTuple):
-    """The features (F, K, B) of one form in the middle of every step, and beside the trajectory (`Linearisation.aside`); of order one."""
+    """The features (F, K, B) of one form in the middle of every step, and beside the trajectory (`Linearisation.aside`); or (F, K + 1, B) at the
+    samples. Of order one. odd: whether it changes its sign with the ship's mirror image."""
 
     form: str
     on: np.ndarray
     aside: np.ndarray
+    odd: bool
 
     @property
     def size(self) -> int:
@@ -58,8 +64,10 @@ def _period(seconds: float) -> Form:
     return lambda s: (np.cos(2.0 * np.pi * s.t / seconds), np.sin(2.0 * np.pi * s.t / seconds))
 
 
-_FORMS: dict[str, dict[str, Form]] = {
+_OF_FORCES: Forms = {
+    "nothing": {"constant": lambda s: (np.ones_like(s.u),)},
     "heading": {f"cos({k} psi + phase)": _harmonic(k) for k in (1, 2, 3)},
+    "position": {"a x + b y": lambda s: (s.x, s.y), "a x + b y + c x^2 + d x y + e y^2": lambda s: (s.x, s.y, s.x**2, s.x * s.y, s.y**2)},
     "speed": {"u": lambda s: (s.u,), "u|u|": lambda s: (s.u * abs(s.u),)},
     "sway velocity": {"v": lambda s: (s.v,), "v|v|": lambda s: (s.v * abs(s.v),), "|v|": lambda s: (abs(s.v),), "v^2": lambda s: (s.v**2,)},
     "yaw rate": {"r": lambda s: (s.r,), "r|r|": lambda s: (s.r * abs(s.r),), "|r|": lambda s: (abs(s.r),), "r^2": lambda s: (s.r**2,)},
@@ -89,38 +97,77 @@ _FORMS: dict[str, dict[str, Form]] = {
         "F_b": lambda s: (s.F_b,), "F_s": lambda s: (s.F_s,), "F_b u": lambda s: (s.F_b * s.u,), "F_s u": lambda s: (s.F_s * s.u,),
     },
 }  # fmt: skip
+_OF_SENSORS: Forms = {
+    "nothing": {"constant": lambda s: (np.ones_like(s.u),)},
+    "heading": {f"cos({k} psi + phase)": _harmonic(k) for k in (1, 2)},
+    "speed": {"u": lambda s: (s.u,), "u|u|": lambda s: (s.u * abs(s.u),)},
+    "sway velocity": {"v": lambda s: (s.v,), "v|v|": lambda s: (s.v * abs(s.v),)},
+    "yaw rate": {"r": lambda s: (s.r,), "r|r|": lambda s: (s.r * abs(s.r),), "|r|": lambda s: (abs(s.r),)},
+    "rudder": {"delta": lambda s: (s.delta,), "|delta|": lambda s: (abs(s.delta),)},
+    "revolutions": {"n": lambda s: (s.n,), "n|n|": lambda s: (s.n * abs(s.n),)},
+    "run": {"number of the run": lambda s: (s.run,)},
+}
 
 
-def _of_time(froude: float, ends: float) -> dict[str, Form]:
-    grown: dict[str, Form] = {"t": lambda s: (s.t / ends,), "t^2": lambda s: ((s.t / ends) ** 2,)}
-    return grown | {f"cos(2 pi t / {seconds:.3g} s + phase)": _period(float(seconds)) for seconds in _PERIODS * froude}
-
-
-def features(lin: Linearisation) -> dict[str, list[Feature]]:
-    """The features of all forms about a trajectory, by variable; of thrusters only where they are used. After `lin.columns`."""
-    plant, seg, real = lin.plant, lin.plant.seg, lin.plant.seg.mask[:, 1:].T
+def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
+    """The features of all forms of a force about a trajectory, by variable; of thrusters only where they are used. After `lin.columns`."""
+    plant, seg = lin.plant, lin.plant.seg
     assert lin.aside is not None
-    on, aside = (_state(plant, middle[0], lin.path) for middle in (lin.middle, lin.aside))
-    ends = float(np.max(seg.start + seg.dt * (seg.mask.sum(axis=1) - 1)))
+    act, t = plant.midway(lin.path)
+    on, aside = (_state(plant, middle[0], act, t) for middle in (lin.middle, lin.aside))
+    ends = _ends(plant)
+    low, high = 1.0 / (_LONGEST * plant.froude), 1.0 / max(_SHORTEST * plant.froude, 4.0 * seg.dt)
+    tried = np.linspace(low, high, min(1 + int(np.ceil(2.0 * max(high - low, 0.0) * ends)), _MOST_PERIODS))
+    periods = {f"cos(2 pi t / {1.0 / f:.3g} s + phase)": _period(1.0 / float(f)) for f in tried}
+    forms = {**_OF_FORCES, "time": _grown(ends) | periods}
+    if not np.any(seg.states[..., 8:]):
+        del forms["thrusters"]
+    return _features(forms, on, aside, seg.mask[:, 1:].T)
+
+
+def of_sensors(lin: Linearisation) -> dict[str, list[Feature]]:
+    """The features of all forms of a sensor's error, likewise, at the samples."""
+    plant, seg = lin.plant, lin.plant.seg
+    t = (seg.start[:, None] + seg.dt * np.arange(plant.steps + 1)).T
+    at = _state(plant, np.swapaxes(lin.motion, 0, 1), np.swapaxes(seg.states[..., 6:], 0, 1), t)
+    return _features({**_OF_SENSORS, "time": _grown(_ends(plant))}, at, at, seg.mask.T)
+
+
+def _grown(ends: float) -> dict[str, Form]:
+    return {"t": lambda s: (s.t / ends,), "t^2": lambda s: ((s.t / ends) ** 2,)}
+
+
+def _ends(plant: Plant) -> float:
+    """How long the longest run lasts [s]."""
+    seg = plant.seg
+    return float(np.max(seg.start + seg.dt * (seg.mask.sum(axis=1) - 1)))
+
+
+def _features(of: Forms, on: State, aside: State, real: np.ndarray) -> dict[str, list[Feature]]:
     found: dict[str, list[Feature]] = {}
-    for variable, forms in (_FORMS | {"time": _of_time(plant.froude, ends)}).items():
-        if variable == "thrusters" and not np.any(seg.states[..., 8:]):
-            continue
+    mirrored = on._replace(v=-on.v, r=-on.r, delta=-on.delta)
+    for variable, forms in of.items():
         found[variable] = []
         for name, form in forms.items():
             x, y = np.stack(form(on)), np.stack(form(aside))
             centre = x[:, real].mean(axis=1) if variable in _CENTRED else np.zeros(len(x))
             unit = _rms(x[:, real] - centre[:, None])
-            found[variable].append(Feature(name, *((z - centre[:, None, None]) / unit[:, None, None] for z in (x, y))))
+            odd = np.array_equal(np.stack(form(mirrored)), -x)
+            x, y = ((z - centre[:, None, None]) / unit[:, None, None] for z in (x, y))
+            found[variable].append(Feature(name, x, y, odd))
     return found
 
 
-def _state(plant: Plant, motion: np.ndarray, path: np.ndarray) -> State:
-    seg, (act, t) = plant.seg, plant.midway(path)
-    units = _rms(seg.states[seg.mask][:, 3:].T)[:, None, None]
+def _state(plant: Plant, motion: np.ndarray, act: np.ndarray, t: np.ndarray) -> State:
+    """From motion (..., 6), actuators (..., 4) and times, each with axes (K, B) before."""
+    seg = plant.seg
+    record = seg.states[seg.mask]
+    units = _rms(record[:, 3:].T)[:, None, None]
+    places = record[:, :2] - record[:, :2].mean(axis=0)
+    x, y = np.moveaxis((motion[..., :2] - record[:, :2].mean(axis=0)) / _rms(places.reshape(1, -1)), -1, 0)
     u, v, r = np.moveaxis(motion[..., 3:], -1, 0) / units[:3]
     n, delta, F_b, F_s = np.moveaxis(act, -1, 0) / units[3:]
-    return State(motion[..., 2], u, v, r, n, delta, F_b, F_s, t, np.broadcast_to(seg.run / max(seg.runs - 1, 1), t.shape))
+    return State(x, y, motion[..., 2], u, v, r, n, delta, F_b, F_s, t, np.broadcast_to(seg.run / max(seg.runs - 1, 1), t.shape))
 
 
 def _rms(x: np.ndarray) -> np.ndarray:

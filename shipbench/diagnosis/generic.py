@@ -1,29 +1,40 @@
-"""The second library: what an unexplained force depends on, where no named cause fits. It needs no simulation."""
+"""The second library: what an unexplained force, or an error of a sensor, depends on, where no named cause fits. It needs no simulation."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
 from .columns import Bend, Columns
-from .forms import Feature, features
-from .gram import Gram, Prior, solve
+from .forms import Feature, of_forces, of_sensors
+from .gram import Gram, Prior, beside_products, ornstein_uhlenbeck, solve
 from .model import Linearisation
 from .screen import evidence
-from .settle import Fit, products_of, sloped
+from .settle import Fit, whitened
+from .slope import coefficients_at, slopes
 
 AXES = ("surge", "sway", "yaw")
-_PRIOR_SD = 0.5
-"""Of a form's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m)."""
+SENSORS = {"recorded heading": 2, "recorded surge": 3, "recorded sway": 4, "recorded yaw rate": 5}
+"""What a sensor's error is an error of, and its channel."""
+_PRIOR_SD, _SENSOR_SD = 0.5, 3.0
+"""Of a form's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m), or of ordinary noise of the
+channel (0.23 deg, 0.04 m/s, 0.04 m/s, 0.04 deg/s)."""
+NO_FORM = ("nothing", "heading", "position", "time", "run")
+"""What no ship's form depends on."""
 _WORTH_MORE = 2.0
+_OFTEN_ENOUGH = 4.0
+"""Seconds (Froude-scaled, 130 m) between samples up to which errors of sensors are looked for: what a rudder does between rarer ones is not known,
+and turns that begin late by that pass for a slow compass."""
 
 
 @dataclass(frozen=True)
 class Dependence:
-    """A missing force of one axis follows one variable, best in this form. score: 2 log Bayes factor, less that of the choice of the form; share: of
-    the variance of that axis's latent force that it takes; size: root mean square of what it takes, in units of the scales of the latent force."""
+    """A missing force on one axis or more, or the error of a recorded channel, follows one variable, best in this form. score: 2 log Bayes factor,
+    less that of the choice of the form; share: of the variance of that axis's latent force that it takes; size, taken: root mean square of what it
+    is, and of what it takes of the latent force, in units of the latent force, or of ordinary noise."""
 
     variable: str
     axis: str
@@ -31,55 +42,147 @@ class Dependence:
     score: float
     share: float
     size: float
+    taken: float
+
+    @property
+    def of_sensor(self) -> bool:
+        """Whether it is an error of a sensor."""
+        return self.axis in SENSORS
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """One form on one axis, with its columns; ways: number of forms of its variable."""
+
+    axis: str
+    variable: str
+    form: str
+    ways: int
+    columns: np.ndarray
+    bend: Bend
+
+    @property
+    def size(self) -> int:
+        return int(self.columns.shape[-1])
+
+    @property
+    def cost(self) -> float:
+        """Log evidence that the choice of the form costs."""
+        return float(np.log(self.ways))
 
 
 def dependences(fit: Fit, beside: Collection[str] = ()) -> list[Dependence]:
-    """Every variable on every axis, best first; judged beside the model of `fit`, and beside forces that follow the variables `beside`.
+    """Every variable on every axis and channel, best first; judged beside the model of `fit`, and beside forces that follow the variables `beside`,
+    as on a ship that is the same to port and to starboard.
 
     The forces are there at every step of the trajectory: between the knots of the latent force, rudder and propeller change.
     """
     lin = Linearisation(fit.plant, fit.scales, fit.point, fit.motion)
-    columns, forms = lin.columns(), features(lin)
-    side = [f for v in beside for f in forms.pop(v)]
-    sides = [_pushed(lin, axis, side) for axis in range(len(AXES)) if side]
-    looked = [(v, f) for v, of in forms.items() for f in of]
-    base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
-    first = len(base) + sum(c.shape[-1] for c, _ in sides)
-    places = np.split(first + np.arange(sum(f.size for _, f in looked)), np.cumsum([f.size for _, f in looked])[:-1])
-    prior = _with(fit.prior, np.arange(len(base), first))
-    plain = replace(prior, shared=np.arange(len(prior.shared)), random=len(prior.shared) + np.arange(len(prior.random)))
-    inside = np.concatenate([prior.shared, prior.random]).astype(int)
-    found, before, usual = [], -np.inf, fit.hyper.log_force
-    for axis, name in enumerate(AXES):
-        gram = _gram(fit, lin, columns, [*sides, _pushed(lin, axis, [f for _, f in looked])])
-        reduced = gram.reduce(fit.hyper.log_force)
-        null = solve(reduced, prior).log_evidence
-        if not axis:
-            before, usual, _ = evidence(gram.only(inside), plain, fit.hyper.log_force)
-        for variable, of in forms.items():
-            tried = [(solve(reduced, _with(prior, at)).log_evidence, f.form, at) for (v, f), at in zip(looked, places, strict=True) if v == variable]
-            after, form, at = max(tried, key=lambda t: t[0])
-            gain, log_force, cost = after - null, usual, float(np.log(len(of)))
-            if gain - cost > _WORTH_MORE:
-                after, log_force, _ = evidence(gram.only(np.append(inside, at)), _with(plain, len(inside) + np.arange(len(at))), usual)
-                gain = after - before
-            share = 1.0 - float(np.exp(log_force[axis] - usual[axis]))
-            size = float(np.sqrt(max(share, 0.0) * np.exp(usual[axis])))
-            found.append(Dependence(variable, name, form, 2.0 * (gain - cost), share, size))
-    return sorted(found, key=lambda d: -d.score)
+    columns, forces, errors = lin.columns(), of_forces(lin), of_sensors(lin)
+    sides = [t for axis in range(len(AXES)) if beside for t in _pushed(lin, axis, {v: [f for f in forces[v] if f.odd == (axis > 0)] for v in beside})]
+    look = _Look(fit, lin, columns, sides)
+    of_axes = [pair for axis in range(len(AXES)) for pair in look.at(_pushed(lin, axis, {v: of for v, of in forces.items() if v not in beside}))]
+    often = fit.plant.seg.dt < _OFTEN_ENOUGH * fit.plant.froude
+    channels = [(name, channel) for name, channel in SENSORS.items() if often and fit.plant.seg.seen[channel]]
+    of_channels = look.at([t for name, channel in channels for t in _added(lin, name, channel, errors)])
+    joined = [look.together([pair for pair in of_axes if pair[0].variable == v]) for v in NO_FORM]
+    return sorted([*(d for d, _ in of_axes + of_channels), *(d for d in joined if d is not None)], key=lambda d: -d.score)
 
 
-def _pushed(lin: Linearisation, axis: int, of: Sequence[Feature]) -> tuple[np.ndarray, Bend]:
-    """Columns of the forms on one axis, and how they bend the motion's sensitivities."""
-    on, aside = (_PRIOR_SD * np.concatenate(x) for x in ([f.on for f in of], [f.aside for f in of]))
-    return lin.pushed(axis, on, aside)
+class _Look:
+    """What forms add to a fit, beside forms that are there already."""
+
+    def __init__(self, fit: Fit, lin: Linearisation, columns: Columns, sides: Sequence[_Tried]) -> None:
+        self.fit, self.lin, self.columns, self.sides = fit, lin, columns, sides
+        base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
+        self.first = len(base) + sum(t.size for t in sides)
+        self.prior = _with(fit.prior, np.arange(len(base), self.first))
+        shared, random = len(self.prior.shared), len(self.prior.random)
+        self.plain = replace(self.prior, shared=np.arange(shared), random=shared + np.arange(random))
+        self.inside = np.concatenate([self.prior.shared, self.prior.random]).astype(int)
+        self.usual = fit.hyper.log_force
+        self.before = evidence(self._gram([]).only(self.inside), self.plain, self.usual)[0]
+
+    def at(self, tried: Sequence[_Tried]) -> list[tuple[Dependence, _Tried]]:
+        """The best form of every variable and axis."""
+        if not tried:
+            return []
+        gram = self._gram(tried)
+        reduced = gram.reduce(self.usual)
+        null = solve(reduced, self.prior).log_evidence
+        places = np.split(self.first + np.arange(sum(t.size for t in tried)), np.cumsum([t.size for t in tried])[:-1])
+        found = []
+        for _, group in groupby(zip(tried, places, strict=True), key=lambda pair: (pair[0].axis, pair[0].variable)):
+            solution, best, at = max(((solve(reduced, _with(self.prior, at)), t, at) for t, at in group), key=lambda way: way[0].log_evidence)
+            gain, log_force = solution.log_evidence - null, self.usual
+            if gain - best.cost > _WORTH_MORE:
+                after, log_force = self._evidence(gram, at)
+                gain = after - self.before
+            size, share, taken = float(np.linalg.norm(solution.mean[-best.size :])), np.nan, 0.0
+            if best.axis in AXES:
+                before, after = np.exp([self.usual, log_force])[:, AXES.index(best.axis)]
+                share, taken = float(1.0 - after / before), float(np.sqrt(max(before - after, 0.0)))
+            unit = _SENSOR_SD if best.axis in SENSORS else _PRIOR_SD
+            found.append((Dependence(best.variable, best.axis, best.form, 2.0 * (gain - best.cost), share, unit * size, taken), best))
+        return found
+
+    def together(self, of: Sequence[tuple[Dependence, _Tried]]) -> Dependence | None:
+        """The best forms of a variable on all axes where they are worth something, the strongest first; None where that is one axis alone."""
+        parts = sorted((pair for pair in of if pair[0].score > 2.0 * _WORTH_MORE), key=lambda pair: -pair[0].score)
+        if len(parts) < 2:
+            return None
+        gram, size = self._gram([t for _, t in parts]), sum(t.size for _, t in parts)
+        after, _ = self._evidence(gram, self.first + np.arange(size))
+        score = 2.0 * (after - self.before - sum(t.cost for _, t in parts))
+        return replace(parts[0][0], axis=" and ".join(t.axis for _, t in parts), score=score)
+
+    def _evidence(self, gram: Gram, at: np.ndarray) -> tuple[float, np.ndarray]:
+        """Log evidence with the columns `at` as well, and the variances of the force, re-estimated."""
+        prior = _with(self.plain, len(self.inside) + np.arange(len(at)))
+        return evidence(gram.only(np.append(self.inside, at)), prior, self.usual)[:2]
+
+    def _gram(self, tried: Sequence[_Tried]) -> Gram:
+        """The Gram of the fit with more columns, under its noise (products of single channels would take six times the memory)."""
+        fit, seg = self.fit, self.fit.plant.seg
+        more = [*self.sides, *tried]
+        columns = replace(self.columns, candidates=tuple(t.columns for t in more), bends=(*self.columns.bends, *(t.bend for t in more)))
+        Z = whitened(fit.plant, fit.scales, fit.point, columns)
+        G, part = np.zeros((2, Z.shape[1], Z.shape[3], Z.shape[3]))
+        for z, log_noise in zip(Z, fit.hyper.log_noise, strict=True):
+            z *= np.exp(-0.5 * log_noise)
+            G += np.matmul(np.swapaxes(z, 1, 2), z, out=part)
+        nothing = np.zeros((len(G), G.shape[-1] - 6 - 3 * fit.plant.knots))
+        correlation = ornstein_uhlenbeck(fit.plant.knots, fit.plant.knot_time, fit.hyper.tau)
+        gram = Gram(G, fit.plant.knots, *correlation, nothing[:, -1], nothing, seg.run, seg.runs)
+        inverse = gram.only(np.arange(0)).reduce(fit.hyper.log_force).inverse
+        return replace(gram, slope=beside_products(slopes(self.lin, columns, inverse, fit.hyper), coefficients_at(self.lin, columns)))
+
+
+def _pushed(lin: Linearisation, axis: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
+    """Forces on one axis."""
+    forms = [(v, f, len(group)) for v, group in of.items() for f in group]
+    if not forms:
+        return []
+    on, aside = (_PRIOR_SD * np.concatenate(x) for x in ([f.on for _, f, _ in forms], [f.aside for _, f, _ in forms]))
+    columns, bend = lin.pushed(axis, on, aside)
+    found, at = [], 0
+    for v, f, ways in forms:
+        part = np.s_[at : at + f.size]
+        found.append(_Tried(AXES[axis], v, f.form, ways, columns[..., part], Bend(None if bend.rates is None else bend.rates[part])))
+        at += f.size
+    return found
+
+
+def _added(lin: Linearisation, name: str, channel: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
+    """Errors in one channel of the record."""
+    found = []
+    for v, group in of.items():
+        for f in group:
+            error = np.zeros((*lin.motion.shape, f.size))
+            error[..., channel, :] = _SENSOR_SD * lin.scales.noise[channel] * np.moveaxis(f.on, 0, -1).swapaxes(0, 1)
+            found.append(_Tried(name, v, f.form, len(group), error.reshape(len(error), -1, f.size), Bend(None, (None,) * f.size)))
+    return found
 
 
 def _with(prior: Prior, at: np.ndarray) -> Prior:
     return replace(prior, shared=np.append(prior.shared, at), precision=np.append(prior.precision, np.ones(len(at))))
-
-
-def _gram(fit: Fit, lin: Linearisation, columns: Columns, more: Sequence[tuple[np.ndarray, Bend]]) -> Gram:
-    """The Gram of a fit with more columns."""
-    columns = replace(columns, candidates=tuple(c for c, _ in more), bends=(*columns.bends, *(b for _, b in more)))
-    return sloped(lin, columns, products_of(fit.plant, fit.scales, fit.point, columns), fit.hyper).weigh(fit.hyper)

@@ -93,7 +93,7 @@ class Products:
         on the parameters by more than the data (Francke, Koopman & de Vos, J. Time Ser. Anal. 31 (2010) 407). Without that part they are fixed but
         unknown (Durbin & Koopman, Time Series Analysis by State Space Methods, 2nd ed., 2012, 7.2.4).
         """
-        return replace(self, initial=initial, slope=np.concatenate([-0.5 * slopes, -np.sum(slopes * at, axis=1, keepdims=True)], axis=1))
+        return replace(self, initial=initial, slope=beside_products(slopes, at))
 
     def weigh(self, hyper: Hyper) -> Gram:
         """The Gram under given noise."""
@@ -101,6 +101,11 @@ class Products:
         K_inv, K_logdet = ornstein_uhlenbeck(self.knots, self.spacing, hyper.tau)
         log_noise = self.samples * float(np.sum(hyper.log_noise)) + self.colour - self.initial
         return Gram(G, self.knots, K_inv, K_logdet, log_noise, self.slope, self.run, self.runs)
+
+
+def beside_products(slopes: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """What slopes (B, G) of the log determinants, at coefficients `at` (B, G), add to the products of [shared, e] with e, (B, G + 1)."""
+    return np.concatenate([-0.5 * slopes, -np.sum(slopes * at, axis=1, keepdims=True)], axis=1)
 
 
 def ornstein_uhlenbeck(knots: int, spacing: float, tau: float) -> tuple[np.ndarray, float]:

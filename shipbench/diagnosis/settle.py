@@ -30,7 +30,7 @@ from .gram import (
 from .inverse import log_determinant
 from .model import FREE, NUM_BASE, Linearisation, Point, Scales
 from .plant import NUM_HULL, Plant
-from .slope import slopes
+from .slope import coefficients_at, slopes
 from .term import Term
 
 _EM_CYCLES, _NARROW = 3, 0.1
@@ -142,8 +142,14 @@ class Fit:
 
 
 def products_of(plant: Plant, scales: Scales, point: Point, columns: Columns, channels: Sequence[int] = range(6)) -> Products:
-    """Products of [eta, w, base, own, candidates, e], of some channels; e is the residual with everything linear added back, so that all of it
-    competes anew."""
+    """Products of `whitened` columns, of some channels."""
+    Z, seg = whitened(plant, scales, point, columns, channels), plant.seg
+    return Products.of(Z, seg.mask, plant.knots, plant.knot_time, seg.run, seg.runs, scales.colour.log_determinant(seg.mask.sum(axis=1)))
+
+
+def whitened(plant: Plant, scales: Scales, point: Point, columns: Columns, channels: Sequence[int] = range(6)) -> np.ndarray:
+    """[eta, w, base, own, candidates, e] (channels, B, K + 1, ...) in units of the scales, as if the noise were white; e is the residual with
+    everything linear added back, so that all of it competes anew."""
     seg, B = plant.seg, len(point.eta)
     e = (seg.states[..., :6] - columns.predicted).reshape(B, -1)
     e = e + _times(columns.eta, point.eta) + _times(columns.w, np.moveaxis(point.w, -1, 1).reshape(B, -1)) + columns.base @ point.base
@@ -163,7 +169,7 @@ def products_of(plant: Plant, scales: Scales, point: Point, columns: Columns, ch
     scales.colour.whiten(Z, channels)
     Z[:, ~seg.mask] = 0.0
     Z[~seg.seen[list(channels)]] = 0.0
-    return Products.of(Z, seg.mask, plant.knots, plant.knot_time, seg.run, seg.runs, scales.colour.log_determinant(seg.mask.sum(axis=1)))
+    return Z
 
 
 def _times(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -269,19 +275,16 @@ def sloped(lin: Linearisation, columns: Columns, products: Products, hyper: Hype
     the parameters should (`far`), the slopes mean nothing: followed from there, they made the yaw inertia of a navy ship negative. known: the
     products are of an earlier fit on this linearisation.
     """
-    point, B, alone = lin.point, len(products.run), products.without(products.shared)
+    alone = products.without(products.shared)
 
     def taken_off() -> np.ndarray:
         seen = lin.scales.background or hyper
         return -log_determinant(alone.weigh(seen).reduce(seen.log_force).inverse[:, :6, :6])
 
-    flat = np.zeros((B, products.slope.shape[1] - 1))
+    flat = np.zeros((len(products.run), products.slope.shape[1] - 1))
     by_column = flat if far else slopes(lin, columns, alone.weigh(hyper).reduce(hyper.log_force).inverse, hyper)
     initial = products.initial if known and lin.scales.background else taken_off()
-    own = [v[products.run] if t.per_run else np.broadcast_to(v, (B, t.size)) for t, v in zip(point.terms, point.values, strict=True)]
-    candidates = np.zeros((B, sum(c.shape[-1] for c in columns.candidates)))
-    at = np.concatenate([np.broadcast_to(point.base, (B, NUM_BASE)), *own, candidates], axis=1)
-    return products.sloped(by_column, at, initial)
+    return products.sloped(by_column, coefficients_at(lin, columns), initial)
 
 
 def evidence_with(found: Fit, colour: Colour) -> float:

@@ -42,6 +42,14 @@ def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyp
     return _finite(2.0 * np.concatenate(found, axis=1))
 
 
+def coefficients_at(lin: Linearisation, columns: Columns) -> np.ndarray:
+    """Coefficients (B, G) of base, own terms and candidates at the point of a linearisation."""
+    point, run = lin.point, lin.plant.seg.run
+    own = [v[run] if t.per_run else np.tile(v, (len(run), 1)) for t, v in zip(point.terms, point.values, strict=True)]
+    candidates = np.zeros((len(run), sum(c.shape[-1] for c in columns.candidates)))
+    return np.concatenate([np.tile(point.base, (len(run), 1)), *own, candidates], axis=1)
+
+
 def _finite(values: np.ndarray) -> np.ndarray:
     return np.nan_to_num(values, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
 

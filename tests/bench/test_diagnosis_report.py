@@ -129,6 +129,20 @@ def test_none_comes_with_the_sizes_that_would_have_been_seen():
     assert "physics+" not in text
 
 
+@pytest.mark.parametrize(
+    ("axis", "variable", "form", "told"),
+    [
+        ("sway and yaw", "nothing", "constant", "a constant force in sway and yaw"),
+        ("recorded surge", "nothing", "constant", "a constant error of the recorded surge"),
+        ("recorded heading", "time", "t", "an error of the recorded heading that depends on time, best as t"),
+    ],
+)
+def test_unknown_tells_a_force_from_an_error_of_a_sensor(axis, variable, form, told):
+    d = replace(in_words(make_diagnosis("unknown")), unknown={"axis": axis, "variable": variable, "form": form, "score": 44.0, "share": None})
+    assert told in headline(d)
+    assert told in page(d)
+
+
 def test_unknown_names_axis_and_variable():
     text = " ".join("\n".join(summary_lines(make_diagnosis("unknown"))).split())
     assert "a force in yaw that depends on heading, best as cos(3 psi + phase)" in text

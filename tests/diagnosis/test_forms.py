@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.fit import start
-from shipbench.diagnosis.forms import Feature, features
+from shipbench.diagnosis.forms import Feature, of_forces, of_sensors
 from shipbench.diagnosis.model import Linearisation, Scales
 from shipbench.diagnosis.plant import Plant
 from shipbench.physics.mmg import load_mmg_ship
@@ -16,7 +16,7 @@ from shipbench.simulate.trials import Trials, sea_trials
 def _features(plant: Plant) -> tuple[dict[str, list[Feature]], Linearisation]:
     lin = Linearisation(plant, Scales(plant), start(plant)[0], plant.seg.states[..., :6].copy())
     lin.columns()
-    return features(lin), lin
+    return of_forces(lin), lin
 
 
 @pytest.fixture(scope="module")
@@ -24,14 +24,28 @@ def plant() -> Plant:
     return Plant.of(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=6, samples=80)))
 
 
-def test_every_feature_is_of_order_one_over_the_samples_that_are_there(plant):
-    found, _ = _features(plant)
-    real = plant.seg.mask[:, 1:].T
+@pytest.mark.parametrize("of", [of_forces, of_sensors])
+def test_every_feature_is_of_order_one_over_the_samples_that_are_there(plant, of):
+    found = of(_features(plant)[1])
     for variable, forms in found.items():
         for form in forms:
+            real = plant.seg.mask[:, -form.on.shape[1] :].T
             assert np.sqrt(np.mean(form.on[:, real] ** 2, axis=1)) == pytest.approx(np.ones(form.size)), (variable, form.form)
-    for form in (*found["heading"], *found["run"]):
-        assert np.abs(form.on[:, real].mean(axis=1)).max() < 1e-9
+            if variable in ("heading", "position", "run"):
+                assert np.abs(form.on[:, real].mean(axis=1)).max() < 1e-9
+
+
+def test_errors_of_sensors_follow_the_samples(plant):
+    found = of_sensors(_features(plant)[1])
+    (turn,) = (f for f in found["yaw rate"] if f.form == "r")
+    assert turn.on.shape == (1, plant.steps + 1, len(plant.seg.run))
+    assert np.corrcoef(turn.on[0].T[plant.seg.mask], plant.seg.states[plant.seg.mask][:, 5])[0, 1] > 0.99
+
+
+def test_what_changes_its_sign_with_the_mirror_image_is_odd(plant):
+    found, _ = _features(plant)
+    odd = {f.form for v in ("speed", "sway velocity", "yaw rate", "rudder", "revolutions", "revolutions and rudder") for f in found[v] if f.odd}
+    assert odd == {"v", "v|v|", "r", "r|r|", "delta", "delta|delta|", "n delta", "n|n| delta"}
 
 
 def test_features_are_what_their_names_say_between_the_knots_too(plant):
@@ -47,10 +61,13 @@ def test_features_are_what_their_names_say_between_the_knots_too(plant):
     assert (speed.aside - speed.on)[0][moved] == pytest.approx(lin.away[moved] * np.median(speed.on[0] / lin.middle[0, ..., 3]))
 
 
-def test_periods_are_told_in_seconds_of_this_ship(plant):
+def test_periods_are_told_in_seconds_of_this_ship_and_one_is_near_to_any(plant):
     found, _ = _features(plant)
-    shortest = next(f.form for f in found["time"] if f.form.startswith("cos"))
-    assert shortest == f"cos(2 pi t / {20.0 * plant.froude:.3g} s + phase)"
+    periods = [float(f.form.split()[4]) for f in found["time"] if f.form.startswith("cos")]
+    assert periods[0] == pytest.approx(200.0 * plant.froude, rel=0.01)
+    assert periods[-1] == pytest.approx(8.0 * plant.froude, rel=0.01)
+    longest = plant.seg.dt * plant.steps
+    assert np.max(np.diff(longest / np.array(periods))) < 0.55  # cycles in the longest run: half of one and rounding
 
 
 def test_thrusters_that_are_not_used_are_not_looked_at(plant):

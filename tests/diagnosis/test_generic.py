@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.generic import dependences
+from shipbench.diagnosis.generic import SENSORS, dependences
 from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.outside import Outside, get
 from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.settle import Fit
+from shipbench.ops import Array
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.physics.modifiers import Flow, Modifiers
+from shipbench.ship import Particulars
+from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
+from shipbench.simulate.trials import Trials, sea_trials
 
 HULL = ("speed", "sway velocity", "yaw rate")
 
@@ -26,7 +35,7 @@ def test_beside_the_hull_nothing_is_left_of_what_the_hull_explains(s175):
     alone, beside = dependences(s175), dependences(s175, HULL)
     assert (alone[0].axis, alone[0].variable in HULL) == ("yaw", True)
     assert alone[0].score > 20.0
-    assert not {d.variable for d in beside} & set(HULL)
+    assert not {d.variable for d in beside if not d.of_sensor} & set(HULL)
     assert beside[0].score < 10.0
 
 
@@ -35,3 +44,36 @@ def test_a_variable_is_worth_the_same_beside_one_that_nothing_follows(s175):
     others = {(d.axis, d.variable): d.score for d in dependences(s175, ("run",))}
     assert max(abs(others[key] - scores[key]) for key in others) < 3.0
     assert np.isfinite(list(others.values())).all()
+
+
+@pytest.fixture(scope="module")
+def kcs() -> Callable[..., Fit]:
+    def fitted(*hidden: Hidden) -> Fit:
+        plant = Plant.of(sea_trials(load_mmg_ship("kcs"), 11, hidden, Trials(runs=12)))
+        return null_fit(plant, Scales(plant))
+
+    return fitted
+
+
+def test_a_pull_on_two_axes_is_judged_on_both_and_not_taken_for_the_hull(kcs):
+    def tug(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.push(0.0, q[0] * ship.mass, 0.3 * ship.L * q[0] * ship.mass)
+
+    fit = kcs(Hidden(Outside("a tug that pulls at the bow", ("nothing",), tug), (4e-3,)))
+    alone, beside = dependences(fit), dependences(fit, HULL)
+    for found in (alone, beside):
+        first = found[0]
+        assert (first.variable, first.form, set(first.axis.split(" and "))) == ("nothing", "constant", {"sway", "yaw"})
+        single = max(d.score for d in found if d.variable == "nothing" and d.axis in ("sway", "yaw"))
+        assert first.score > single + 10.0
+
+
+def test_errors_of_sensors_are_told_from_forces(kcs):
+    calm = [d for d in dependences(kcs()) if d.of_sensor]
+    assert {d.axis for d in calm} == set(SENSORS)
+    assert max(d.score for d in calm) < 16.0
+    for name, axis in (("compass deviation that goes with the heading", "recorded heading"), ("scale of the yaw rate", "recorded yaw rate")):
+        cause = get(name)
+        first = dependences(kcs(Hidden(cause, (1.0, 0.3))))[0]
+        assert (first.axis, {first.variable}) == (axis, cause.variables)
+        assert first.size > 0.3
