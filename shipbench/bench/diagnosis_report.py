@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
 
-from ..diagnosis.outcome import Cause, Diagnosis
-from .diagnosis_text import detectable, figure, gain_words, headline, interval, next_command, strength, summary_lines, what_it_is
+from ..diagnosis.outcome import Cause, Diagnosis, what_it_is
+from .diagnosis_text import detectable, figure, gain_words, headline, interval, next_command, strength, summary_lines
 
 _STYLE = """
 :root { color-scheme: light dark; --ink: #1c2733; --paper: #fff; --soft: #f1f4f6; --line: #d5dde3; --accent: #00707f; --warn: #9a5200;

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 import shlex
 import textwrap
-from collections.abc import Mapping
-from typing import Any
 
-from ..diagnosis.outcome import Candidate, Cause, Diagnosis, Estimate, Gain
+from ..diagnosis.outcome import Candidate, Cause, Diagnosis, Estimate, Gain, what_it_is
 from .tables import display_unit
 
 _SHOWN = 10
@@ -61,14 +59,6 @@ def gain_words(g: Gain | None) -> str:
         f"Held-out {g.metric} {figure(g.before)} -> {figure(g.after)} m: {_change(g.relative)} (95 %: {_change(low)} to {_change(high)}), "
         f"{g.runs_better} runs better{doubt}."
     )
-
-
-def what_it_is(unknown: Mapping[str, Any]) -> str:
-    """An unknown force, or error of a sensor, with what it depends on."""
-    kind = "error of the" if unknown["axis"].startswith("recorded") else "force in"
-    if unknown["variable"] == "nothing":
-        return f"a constant {kind} {unknown['axis']}"
-    return f"{'an' if kind[0] == 'e' else 'a'} {kind} {unknown['axis']} that depends on {unknown['variable']}, best as {unknown['form']}"
 
 
 def headline(d: Diagnosis) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from ..physics.actuators import Gear
 from .gain import Extension
 from .gears import GearFinding, find_in_gears
-from .generic import NO_FORM, Dependence, dependences
+from .generic import NO_FORM, Dependence, Search, dependences
 from .model import Scales
 from .plain import null_fit
 from .plant import Plant
@@ -26,7 +26,9 @@ GENERIC_THRESHOLD, _OFF_FORM, _NO_FORM_THRESHOLD = 20.0, (4.0, 12.0), 16.0
 `Selection.off_form` besides, where what it takes is noticeable and where it is not. (550 sets without such a force, on development ships and ships of
 the literature under 18 conditions: 17 below that at the nearest.) Nor does an error of a sensor depend on the form: the record contradicts itself."""
 GENERIC_MARGIN = 10.0
-"""Least that it must be worth beyond all named causes together: it is what the runs show in their place."""
+"""Least that it must be worth beyond all named causes together, as what the runs show in their place; within so much it is told beside them."""
+_CONTENDS, _CONTENDERS = 0.5, 3
+"""Share of what named causes are worth from which, and number of dependences that are looked at more closely in their place."""
 _LEAST_FORCE, _LEAST_ERROR = 0.07, 0.3
 """Least size of an unknown force in units of the latent force: 0.35 mm/s^2; in yaw 7e-6 rad/s^2 at 130 m; and of an error in units of ordinary noise:
 0.07 deg, 0.012 m/s, 0.012 deg/s."""
@@ -43,7 +45,8 @@ estimate."""
 @dataclass(frozen=True)
 class Analysis:
     """What was found in one set of runs. threshold: that was used; hull: 2 log evidence that the hull is off the regressions, or 0; unknown: the
-    dependence that no named cause covers; gears: named findings; plain_gears: the ordinary gears that fit best."""
+    dependence that no named cause covers; rival: one that covers about as much as the named causes; gears: named findings; plain_gears: the ordinary
+    gears that fit best."""
 
     selection: Selection
     threshold: float
@@ -54,6 +57,7 @@ class Analysis:
     plain_gears: dict[str, Gear]
     generic: tuple[Dependence, ...]
     unknown: Dependence | None
+    rival: Dependence | None
 
     @property
     def final(self) -> Fit:
@@ -101,27 +105,35 @@ def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, c
     gears = [] if cautious else _named_gears(findings, threshold, only)
     hull = 0.0 if only is not None and "hull_derivatives" not in only else hull_evidence(selection.final)
     generic = tuple(dependences(selection.final))
-    unknown = None
+    unknown = rival = None
     if only is None and not cautious:
         estimated = any(plant.ship.lacks(part) for part in ("rudder", "propeller"))
         ordinary = (*(_HULL_ALONE if hull > HULL_THRESHOLD else ()), *(_ESTIMATED if estimated else ()))
-        unknown = _unknown(selection, gears, generic, ordinary)
-    return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown)
+        unknown, rival = _unknown(selection, gears, generic, ordinary)
+    return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown, rival)
 
 
-def _unknown(selection: Selection, gears: Sequence[GearFinding], after: Sequence[Dependence], ordinary: Sequence[str]) -> Dependence | None:
-    """The dependence that beats all named causes together, if one does; after: those beside the causes; ordinary: variables that a force may follow
-    on this ship, beside which all are judged."""
+def _unknown(
+    selection: Selection, gears: Sequence[GearFinding], after: Sequence[Dependence], ordinary: Sequence[str]
+) -> tuple[Dependence | None, Dependence | None]:
+    """The dependence that beats all named causes together, if one does, or comes about as near; after: those beside the causes; ordinary: variables
+    that a force may follow on this ship, beside which all are judged."""
     named = bool(selection.final.model.terms) or bool(gears)
-    found = dependences(selection.null, ordinary) if named or ordinary else after
-    worth = max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) + GENERIC_MARGIN if named else 0.0
+    search = Search(selection.null, ordinary) if named or ordinary else None
+    worth = max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) if named else 0.0
 
     def asked(d: Dependence) -> float:
         if d.of_sensor or d.variable in NO_FORM:
             return _NO_FORM_THRESHOLD if d.size > (_LEAST_ERROR if d.of_sensor else _LEAST_FORCE) else np.inf
         return GENERIC_THRESHOLD + _OFF_FORM[d.taken < NOTICEABLE] * selection.off_form if d.taken > _LEAST_FORCE else np.inf
 
-    return next((d for d in found if d.score > max(worth, asked(d))), None)
+    found = [d for d in (search.found if search else after) if d.score > max(asked(d), _CONTENDS * worth)]
+    if not named or search is None:
+        return (found[0] if found else None), None
+    best = max((search.settled(d) for d in found[:_CONTENDERS]), key=lambda d: d.score, default=None)
+    if best is not None and best.score > worth + GENERIC_MARGIN:
+        return best, None
+    return None, best if best is not None and best.of_sensor and best.score > worth - GENERIC_MARGIN else None
 
 
 def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:

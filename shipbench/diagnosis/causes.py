@@ -15,7 +15,7 @@ from .clocks import NAMES, LateVelocities
 from .gears import GearFinding
 from .generic import Dependence
 from .model import FREE, HULL_SPREAD
-from .outcome import Candidate, Cause, Estimate, Gain
+from .outcome import Candidate, Cause, Estimate, Gain, what_it_is
 from .plant import HULL, NUM_HULL
 from .robust import covariance, inflation, least_size
 from .screen import Score, other_kinds_from, places
@@ -45,6 +45,9 @@ def describe_causes(
         named.append(_term_cause(found, index, term, gain, runs))
     named += [_gear_cause(found, g, gain) for g in found.gears]
     named.sort(key=lambda c: -c.score)
+    if named and found.rival is not None:
+        told = f"; {what_it_is(_described(found.rival))} would explain the runs about as well ({found.rival.score:.0f})"
+        named[0] = replace(named[0], evidence=named[0].evidence + told)
     if doubt:
         named = [c for c in named if _whatever_the_ship(c.effect, found)]
     if hull and found.hull > HULL_THRESHOLD:

@@ -13,12 +13,14 @@ from .forms import Feature, of_forces, of_sensors
 from .gram import Gram, Prior, beside_products, ornstein_uhlenbeck, solve
 from .model import Linearisation
 from .screen import evidence
-from .settle import Fit, whitened
+from .settle import Fit, products_of, settled_evidence, sloped, whitened
 from .slope import coefficients_at, slopes
 
 AXES = ("surge", "sway", "yaw")
 SENSORS = {"recorded heading": 2, "recorded surge": 3, "recorded sway": 4, "recorded yaw rate": 5}
 """What a sensor's error is an error of, and its channel."""
+_NAMED = ("recorded heading", "recorded yaw rate")
+"""Whose constant errors have a name."""
 _PRIOR_SD, _SENSOR_SD = 0.5, 3.0
 """Of a form's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m), or of ordinary noise of the
 channel (0.23 deg, 0.04 m/s, 0.04 m/s, 0.04 deg/s)."""
@@ -72,38 +74,53 @@ class _Tried:
 
 
 def dependences(fit: Fit, beside: Collection[str] = ()) -> list[Dependence]:
-    """Every variable on every axis and channel, best first; judged beside the model of `fit`, and beside forces that follow the variables `beside`,
-    as on a ship that is the same to port and to starboard.
+    """What `Search` finds."""
+    return Search(fit, beside).found
+
+
+class Search:
+    """Every variable on every axis and channel, best first (`found`); judged beside the model of a fit, and beside forces that follow the variables
+    `beside`, as on a ship that is the same to port and to starboard.
 
     The forces are there at every step of the trajectory: between the knots of the latent force, rudder and propeller change.
     """
-    lin = Linearisation(fit.plant, fit.scales, fit.point, fit.motion)
-    columns, forces, errors = lin.columns(), of_forces(lin), of_sensors(lin)
-    sides = [t for axis in range(len(AXES)) if beside for t in _pushed(lin, axis, {v: [f for f in forces[v] if f.odd == (axis > 0)] for v in beside})]
-    look = _Look(fit, lin, columns, sides)
-    of_axes = [pair for axis in range(len(AXES)) for pair in look.at(_pushed(lin, axis, {v: of for v, of in forces.items() if v not in beside}))]
-    often = fit.plant.seg.dt < _OFTEN_ENOUGH * fit.plant.froude
-    channels = [(name, channel) for name, channel in SENSORS.items() if often and fit.plant.seg.seen[channel]]
-    of_channels = look.at([t for name, channel in channels for t in _added(lin, name, channel, errors)])
-    joined = [look.together([pair for pair in of_axes if pair[0].variable == v]) for v in NO_FORM]
-    return sorted([*(d for d, _ in of_axes + of_channels), *(d for d in joined if d is not None)], key=lambda d: -d.score)
 
-
-class _Look:
-    """What forms add to a fit, beside forms that are there already."""
-
-    def __init__(self, fit: Fit, lin: Linearisation, columns: Columns, sides: Sequence[_Tried]) -> None:
-        self.fit, self.lin, self.columns, self.sides = fit, lin, columns, sides
+    def __init__(self, fit: Fit, beside: Collection[str] = ()) -> None:
+        lin = Linearisation(fit.plant, fit.scales, fit.point, fit.motion)
+        self.fit, self.lin, self.columns = fit, lin, lin.columns()
+        forces, errors = of_forces(lin), of_sensors(lin)
+        sides = [_pushed(lin, axis, {v: [f for f in forces[v] if f.odd == (axis > 0)] for v in beside}) for axis in range(len(AXES))]
+        self.sides = [t for of_axis in sides for t in of_axis]
         base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
-        self.first = len(base) + sum(t.size for t in sides)
+        self.first = len(base) + sum(t.size for t in self.sides)
         self.prior = _with(fit.prior, np.arange(len(base), self.first))
         shared, random = len(self.prior.shared), len(self.prior.random)
         self.plain = replace(self.prior, shared=np.arange(shared), random=shared + np.arange(random))
         self.inside = np.concatenate([self.prior.shared, self.prior.random]).astype(int)
         self.usual = fit.hyper.log_force
         self.before = evidence(self._gram([]).only(self.inside), self.plain, self.usual)[0]
+        free = {v: of for v, of in forces.items() if v not in beside}
+        alone = [pair for axis in range(len(AXES)) for pair in self._best(_pushed(lin, axis, free))]
+        joined = [self._together([pair for pair in alone if pair[0].variable == v]) for v in NO_FORM]
+        often = fit.plant.seg.dt < _OFTEN_ENOUGH * fit.plant.froude
+        channels = [(name, channel) for name, channel in SENSORS.items() if often and fit.plant.seg.seen[channel]]
+        alone += self._best([t for name, channel in channels for t in _added(lin, name, channel, errors)])
+        self._parts = {d: parts for d, *parts in [*alone, *(pair for pair in joined if pair is not None)]}
+        self.found = sorted(self._parts, key=lambda d: -d.score)
 
-    def at(self, tried: Sequence[_Tried]) -> list[tuple[Dependence, _Tried]]:
+    def settled(self, d: Dependence) -> Dependence:
+        """The same, with the variances of the noise re-estimated, too, as those of a named cause are once it is fitted: they hold what a large error
+        of a sensor does before it is known."""
+        parts, usual = self._parts[d], self._settled([])
+        score = 2.0 * (self._settled(parts) - usual - sum(t.cost for t in parts))
+        return replace(d, score=max(score, d.score))
+
+    def _settled(self, tried: Sequence[_Tried]) -> float:
+        more, columns = [*self.sides, *tried], self._columns_with(tried)
+        products = products_of(self.fit.plant, self.fit.scales, self.fit.point, columns)
+        return settled_evidence(self.fit, sloped(self.lin, columns, products, self.fit.hyper), sum(t.size for t in more))
+
+    def _best(self, tried: Sequence[_Tried]) -> list[tuple[Dependence, _Tried]]:
         """The best form of every variable and axis."""
         if not tried:
             return []
@@ -126,7 +143,7 @@ class _Look:
             found.append((Dependence(best.variable, best.axis, best.form, 2.0 * (gain - best.cost), share, unit * size, taken), best))
         return found
 
-    def together(self, of: Sequence[tuple[Dependence, _Tried]]) -> Dependence | None:
+    def _together(self, of: Sequence[tuple[Dependence, _Tried]]) -> tuple[Dependence, *tuple[_Tried, ...]] | None:
         """The best forms of a variable on all axes where they are worth something, the strongest first; None where that is one axis alone."""
         parts = sorted((pair for pair in of if pair[0].score > 2.0 * _WORTH_MORE), key=lambda pair: -pair[0].score)
         if len(parts) < 2:
@@ -134,7 +151,7 @@ class _Look:
         gram, size = self._gram([t for _, t in parts]), sum(t.size for _, t in parts)
         after, _ = self._evidence(gram, self.first + np.arange(size))
         score = 2.0 * (after - self.before - sum(t.cost for _, t in parts))
-        return replace(parts[0][0], axis=" and ".join(t.axis for _, t in parts), score=score)
+        return replace(parts[0][0], axis=" and ".join(t.axis for _, t in parts), score=score), *(t for _, t in parts)
 
     def _evidence(self, gram: Gram, at: np.ndarray) -> tuple[float, np.ndarray]:
         """Log evidence with the columns `at` as well, and the variances of the force, re-estimated."""
@@ -143,9 +160,7 @@ class _Look:
 
     def _gram(self, tried: Sequence[_Tried]) -> Gram:
         """The Gram of the fit with more columns, under its noise (products of single channels would take six times the memory)."""
-        fit, seg = self.fit, self.fit.plant.seg
-        more = [*self.sides, *tried]
-        columns = replace(self.columns, candidates=tuple(t.columns for t in more), bends=(*self.columns.bends, *(t.bend for t in more)))
+        fit, seg, columns = self.fit, self.fit.plant.seg, self._columns_with(tried)
         Z = whitened(fit.plant, fit.scales, fit.point, columns)
         G, part = np.zeros((2, Z.shape[1], Z.shape[3], Z.shape[3]))
         for z, log_noise in zip(Z, fit.hyper.log_noise, strict=True):
@@ -156,6 +171,10 @@ class _Look:
         gram = Gram(G, fit.plant.knots, *correlation, nothing[:, -1], nothing, seg.run, seg.runs)
         inverse = gram.only(np.arange(0)).reduce(fit.hyper.log_force).inverse
         return replace(gram, slope=beside_products(slopes(self.lin, columns, inverse, fit.hyper), coefficients_at(self.lin, columns)))
+
+    def _columns_with(self, tried: Sequence[_Tried]) -> Columns:
+        more = [*self.sides, *tried]
+        return replace(self.columns, candidates=tuple(t.columns for t in more), bends=(*self.columns.bends, *(t.bend for t in more)))
 
 
 def _pushed(lin: Linearisation, axis: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
@@ -177,6 +196,8 @@ def _added(lin: Linearisation, name: str, channel: int, of: Mapping[str, Sequenc
     """Errors in one channel of the record."""
     found = []
     for v, group in of.items():
+        if v == "nothing" and name in _NAMED:
+            continue
         for f in group:
             error = np.zeros((*lin.motion.shape, f.size))
             error[..., channel, :] = _SENSOR_SD * lin.scales.noise[channel] * np.moveaxis(f.on, 0, -1).swapaxes(0, 1)

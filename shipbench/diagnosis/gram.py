@@ -188,6 +188,11 @@ class Prior:
     random: np.ndarray
     log_tau2: np.ndarray
 
+    def and_shared(self, more: int) -> Prior:
+        """With so many columns behind its own, each with a prior of unit spread."""
+        at = len(self.shared) + len(self.random) + np.arange(more)
+        return replace(self, shared=np.append(self.shared, at), precision=np.append(self.precision, np.ones(more)))
+
 
 @dataclass(frozen=True)
 class Solution:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -99,6 +100,14 @@ class Trace:
     force_after: np.ndarray
     white: np.ndarray
     held_out: bool = True
+
+
+def what_it_is(unknown: Mapping[str, Any]) -> str:
+    """An unknown force, or error of a sensor, with what it depends on."""
+    kind = "error of the" if unknown["axis"].startswith("recorded") else "force in"
+    if unknown["variable"] == "nothing":
+        return f"a constant {kind} {unknown['axis']}"
+    return f"{'an' if kind[0] == 'e' else 'a'} {kind} {unknown['axis']} that depends on {unknown['variable']}, best as {unknown['form']}"
 
 
 @dataclass(frozen=True)

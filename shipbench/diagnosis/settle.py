@@ -310,15 +310,21 @@ def hull_evidence(found: Fit) -> float:
     return 2.0 * (with_hull(1.0) - with_hull(_NARROW))
 
 
+def settled_evidence(found: Fit, products: Products, more: int) -> float:
+    """Log evidence of products that hold `more` shared columns behind those of the model of `found`, with all variances fitted anew."""
+    hyper, log_tau2 = _variances(products, found.model, found.hyper, found.log_tau2, _EM_CYCLES, more=more)
+    return solve(products.weigh(hyper).reduce(hyper.log_force), found.model.prior(log_tau2).and_shared(more)).log_evidence
+
+
 def _variances(
-    products: Products, model: Model, hyper: Hyper, log_tau2: dict[int, float], cycles: int, leap: float = np.inf
+    products: Products, model: Model, hyper: Hyper, log_tau2: dict[int, float], cycles: int, leap: float = np.inf, more: int = 0
 ) -> tuple[Hyper, dict[int, float]]:
-    """Variances of force, noise and random effects on one linearisation."""
+    """Variances of force, noise and random effects on one linearisation; more: shared columns behind those of the model."""
     random = [i for i, term in enumerate(model.terms) if term.per_run]
 
     def step(theta: np.ndarray) -> tuple[float, np.ndarray]:
         now, tau2 = Hyper(theta[:3], theta[3:9], hyper.tau), dict(zip(random, theta[9:], strict=True))
-        gram, prior = products.weigh(now), model.prior(tau2)
+        gram, prior = products.weigh(now), model.prior(tau2).and_shared(more)
         reduced = gram.reduce(now.log_force)
         solution = solve(reduced, prior)
         estimate = background(gram, reduced, prior, solution)

@@ -150,7 +150,9 @@ def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
 
 
 @pytest.mark.parametrize(
-    "index", [1, 3, 6, 8], ids=["slow force in time", "thrust lost with the rudder angle, not just lost", "force that goes with the place", "turned log"]
+    "index",
+    [1, 3, 6, 8],
+    ids=["slow force in time", "thrust lost with the rudder angle, not just lost", "force that goes with the place", "turned log"],
 )
 def test_a_force_or_a_fault_of_a_sensor_that_follows_no_known_cause_is_called_unknown_with_its_variable(index):
     case = draw_case("outside", index, 3, "development")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.generic import SENSORS, dependences
+from shipbench.diagnosis.generic import SENSORS, Search, dependences
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.outside import Outside, get
 from shipbench.diagnosis.plain import null_fit
@@ -77,3 +77,10 @@ def test_errors_of_sensors_are_told_from_forces(kcs):
         first = dependences(kcs(Hidden(cause, (1.0, 0.3))))[0]
         assert (first.axis, {first.variable}) == (axis, cause.variables)
         assert first.size > 0.3
+
+
+def test_an_error_that_the_noise_had_held_is_worth_more_once_the_noise_is_fitted_anew(kcs):
+    search = Search(kcs(Hidden(get("speed log mounted at an angle"), (2.0, 0.0))))
+    first = search.found[0]
+    assert (first.axis, first.variable) == ("recorded sway", "speed")
+    assert search.settled(first).score > first.score + 10.0

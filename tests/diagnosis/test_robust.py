@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.gram import Prior, Reduced, solve
-from shipbench.diagnosis.robust import covariance, inflation, is_sure, least_size, matters
+from shipbench.diagnosis.robust import covariance, inflation, is_sure, least_size, matters, without_a_run
 from shipbench.diagnosis.select import passes_for_form
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
@@ -53,6 +53,18 @@ def test_a_beginning_needs_runs_that_agree_much_better(scatter: float, sure: boo
     estimates = 0.5 + scatter * np.resize([1.0, -1.0], RUNS)
     assert is_sure(fit_of(estimates), 0)
     assert is_sure(fit_of(estimates, since=4), 0) is sure
+
+
+@pytest.mark.parametrize(("informed", "sure"), [(9.0, False), (0.0, True)], ids=["the others say no", "the others cannot say"])
+def test_what_one_run_alone_bears_is_sure_only_if_the_others_do_not_speak_against_it(informed: float, sure: bool):
+    """A cause that is strong in the first run, as a bank near which it went; what its run says alone agrees with itself."""
+    S, weights = np.zeros((RUNS, 2, 2)), np.append(400.0, np.full(RUNS - 1, informed))
+    S[:, 0, 0], S[0, 0, 1], S[0, 1, 0] = weights, 400.0, 400.0
+    reduced, prior = _reduced(S), Prior(np.array([0]), np.ones(1), *_NONE)
+    fit = SimpleNamespace(reduced=reduced, prior=prior, columns_of=lambda index: np.array([0]))
+    assert (without_a_run(fit, 0) > -2.0) is sure
+    whole, nothing = solve(reduced, prior).log_evidence, solve(reduced, Prior(prior.shared[:0], prior.precision[:0], *_NONE)).log_evidence
+    assert 2.0 * (whole - nothing) > 100.0
 
 
 def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
