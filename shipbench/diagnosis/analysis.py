@@ -44,9 +44,9 @@ estimate."""
 
 @dataclass(frozen=True)
 class Analysis:
-    """What was found in one set of runs. threshold: that was used; hull: 2 log evidence that the hull is off the regressions, or 0; unknown: the
-    dependence that no named cause covers; rival: one that covers about as much as the named causes; gears: named findings; plain_gears: the ordinary
-    gears that fit best."""
+    """What was found in one set of runs. threshold: that was used; hull: 2 log evidence that the hull is off the regressions, or 0; gears: named
+    findings; plain_gears: the ordinary gears that fit best; unknown: the dependence that no named cause covers; rival: one that covers about as much
+    as the named causes; left: one that is there beside them."""
 
     selection: Selection
     threshold: float
@@ -56,8 +56,9 @@ class Analysis:
     all_gears: tuple[GearFinding, ...]
     plain_gears: dict[str, Gear]
     generic: tuple[Dependence, ...]
-    unknown: Dependence | None
-    rival: Dependence | None
+    unknown: Dependence | None = None
+    rival: Dependence | None = None
+    left: Dependence | None = None
 
     @property
     def final(self) -> Fit:
@@ -104,31 +105,31 @@ def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, c
     findings, plain = find_in_gears(null.plant)
     gears = [] if cautious else _named_gears(findings, threshold, only)
     hull = 0.0 if only is not None and "hull_derivatives" not in only else hull_evidence(selection.final)
-    generic = tuple(dependences(selection.final))
-    unknown = rival = None
-    if only is None and not cautious:
-        estimated = any(plant.ship.lacks(part) for part in ("rudder", "propeller"))
-        ordinary = (*(_HULL_ALONE if hull > HULL_THRESHOLD else ()), *(_ESTIMATED if estimated else ()))
-        unknown, rival = _unknown(selection, gears, generic, ordinary)
-    return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown, rival)
+    if only is not None or cautious:
+        return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, tuple(dependences(selection.final)))
+    estimated = any(plant.ship.lacks(part) for part in ("rudder", "propeller"))
+    search = Search(selection.null, (*(_HULL_ALONE if hull > HULL_THRESHOLD else ()), *(_ESTIMATED if estimated else ())))
+    unknown, rival = _unknown(selection, gears, search)
+    generic, left = tuple(search.found), None
+    if selection.final.model.terms:
+        generic = tuple(dependences(selection.final))
+        left = next((d for d in generic if d.score > asked(d, selection.off_form) and (d.of_sensor or d.variable in NO_FORM)), None)
+    return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown, rival, None if unknown else left)
 
 
-def _unknown(
-    selection: Selection, gears: Sequence[GearFinding], after: Sequence[Dependence], ordinary: Sequence[str]
-) -> tuple[Dependence | None, Dependence | None]:
-    """The dependence that beats all named causes together, if one does, or comes about as near; after: those beside the causes; ordinary: variables
-    that a force may follow on this ship, beside which all are judged."""
+def asked(d: Dependence, off_form: float) -> float:
+    """Least score of an unknown force or error."""
+    if d.of_sensor or d.variable in NO_FORM:
+        return _NO_FORM_THRESHOLD if d.size > (_LEAST_ERROR if d.of_sensor else _LEAST_FORCE) else np.inf
+    return GENERIC_THRESHOLD + _OFF_FORM[d.taken < NOTICEABLE] * off_form if d.taken > _LEAST_FORCE else np.inf
+
+
+def _unknown(selection: Selection, gears: Sequence[GearFinding], search: Search) -> tuple[Dependence | None, Dependence | None]:
+    """The dependence that beats all named causes together, if one does; or a sensor's error that comes about as near."""
     named = bool(selection.final.model.terms) or bool(gears)
-    search = Search(selection.null, ordinary) if named or ordinary else None
     worth = max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) if named else 0.0
-
-    def asked(d: Dependence) -> float:
-        if d.of_sensor or d.variable in NO_FORM:
-            return _NO_FORM_THRESHOLD if d.size > (_LEAST_ERROR if d.of_sensor else _LEAST_FORCE) else np.inf
-        return GENERIC_THRESHOLD + _OFF_FORM[d.taken < NOTICEABLE] * selection.off_form if d.taken > _LEAST_FORCE else np.inf
-
-    found = [d for d in (search.found if search else after) if d.score > max(asked(d), _CONTENDS * worth)]
-    if not named or search is None:
+    found = [d for d in search.found if d.score > max(asked(d, selection.off_form), _CONTENDS * worth)]
+    if not named:
         return (found[0] if found else None), None
     best = max((search.settled(d) for d in found[:_CONTENDERS]), key=lambda d: d.score, default=None)
     if best is not None and best.score > worth + GENERIC_MARGIN:

@@ -318,6 +318,14 @@ def remaining(found: Analysis) -> dict[str, Any]:
     }
 
 
+def what_is_left(found: Analysis) -> list[str]:
+    """A warning of what is there beside the named causes."""
+    if found.left is None:
+        return []
+    told = f"{what_it_is(_described(found.left))} (score {found.left.score:.0f})"
+    return [f"beside the causes named there is {told}: no effect of the library covers it, and their sizes may be off by what it does."]
+
+
 def unknown_part(found: Analysis) -> dict[str, Any] | None:
     """Axis, variable and form of the dependence that no named cause covers."""
     return None if found.unknown is None else _described(found.unknown)

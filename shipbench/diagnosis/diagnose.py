@@ -18,7 +18,7 @@ from ..checking.units import check_units, corrected
 from ..errors import InputError
 from ..records import Dataset
 from .analysis import HULL_THRESHOLD, NOTICEABLE, THRESHOLD, Analysis, analyse, causes_of
-from .causes import describe_candidates, describe_causes, remaining, unknown_part
+from .causes import describe_candidates, describe_causes, remaining, unknown_part, what_is_left
 from .clocks import NAMES, check_clocks
 from .derived import faults, has_speeds, marked, said
 from .felt_wind import with_true_wind
@@ -103,6 +103,7 @@ def diagnose(
     warnings += said(dataset) + drift + wind + doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
+    warnings += what_is_left(found) if causes and not doubts else []
     trace = trace_of(dataset, found, worth.hull)
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
     verdict = "unknown" if unknown else "found" if causes else "none"

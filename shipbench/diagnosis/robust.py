@@ -19,7 +19,7 @@ _DOUBT, _DOUBT_LATE = 0.05, 1e-5
 
 _AGAINST = -2.0
 """2 log evidence of a cause, any one run taken away, below which the other runs speak against it. (A bank on ships of the literature that had none:
--5 to -6, 7 to 28 with the run that lay nearest to it; true causes, development cases: 10 and more.)"""
+-5 to -6, but 7 to 28 with the run that lay nearest to it; true causes, development cases: 10 and more.)"""
 
 
 def inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
@@ -40,18 +40,20 @@ def covariance(fit: Fit, index: int) -> np.ndarray:
     return fit.solution.cov[np.ix_(at, at)] * np.outer(wider, wider)
 
 
-def without_a_run(fit: Fit, index: int) -> float:
-    """Least 2 log evidence of a cause that is left when any one run is taken away; of a cause that one run alone bears, what the others say of it."""
+def is_borne_by_one(fit: Fit, index: int) -> bool:
+    """Whether one run alone bears a cause, against what the others say: there is evidence for it, and, that run taken away, against it."""
     S, *_ = shared_alone(fit.reduced, fit.prior)
-    inside = np.isin(fit.prior.shared, fit.columns_of(index))
+    inside, whole = np.isin(fit.prior.shared, fit.columns_of(index)), S.sum(axis=0)
 
     def evidence(keep: np.ndarray) -> np.ndarray:
-        total, precision = (S.sum(axis=0) - S)[:, np.append(keep, True)][:, :, np.append(keep, True)], fit.prior.precision[keep]
+        at, precision = np.append(keep, True), fit.prior.precision[keep]
+        total = np.concatenate([whole[None], whole - S])[:, at][:, :, at]
         A, b = total[:, :-1, :-1] + np.diag(precision), total[:, :-1, -1]
-        fitted = np.einsum("ni,ni->n", b, np.linalg.solve(A, b[..., None])[..., 0])
+        fitted = np.sum(b * np.linalg.solve(A, b[..., None])[..., 0], axis=1)
         return np.asarray(fitted - np.linalg.slogdet(A)[1] + np.sum(np.log(precision)))
 
-    return float(np.min(evidence(inside | True) - evidence(~inside)))
+    with_all, *left = evidence(np.ones_like(inside)) - evidence(~inside)
+    return bool(with_all > 0.0 and len(left) > 1 and min(left) < _AGAINST)
 
 
 def is_sure(fit: Fit, index: int) -> bool:
@@ -66,7 +68,7 @@ def is_sure(fit: Fit, index: int) -> bool:
     size, free = len(value), max(num - len(value), 1)
     squares = float(value @ np.linalg.solve(covariance(fit, index), value))
     doubt = float(f.sf(squares * free / (size * max(num - 1, 1)), size, free))
-    return doubt < (_DOUBT if term.since is None else _DOUBT_LATE) and (num == 1 or without_a_run(fit, index) > _AGAINST)
+    return doubt < (_DOUBT if term.since is None else _DOUBT_LATE) and not is_borne_by_one(fit, index)
 
 
 def least_size(effect: str) -> float:

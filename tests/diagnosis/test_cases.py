@@ -14,6 +14,7 @@ from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.hull import polynomial, unified
 from shipbench.physics.mmg import load_mmg_ship
+from shipbench.signals import PSI
 from shipbench.simulate.fitted_ship import fitted_trials, is_sane
 from shipbench.simulate.manoeuvres import turning_circle
 from shipbench.simulate.simulator import Simulator
@@ -96,12 +97,17 @@ def test_a_unit_error_touches_its_channels_alone():
 
 
 @pytest.mark.parametrize("cause", OUTSIDE, ids=lambda c: c.name)
-def test_causes_outside_the_library_move_the_ship_and_are_not_registered(cause):
+def test_causes_outside_the_library_move_the_ship_or_what_is_recorded_and_are_not_registered(cause):
     case = draw_case("outside", OUTSIDE.index(cause), 6, plan=TINY)
     assert case.variables == cause.variables
     assert cause.name not in EFFECTS.names()
     moved = states(case.dataset()) - states(sea_trials(case.ship, case.data_seed, (), TINY))
-    assert np.max(np.abs(moved[..., :2])) > 0.5
+    if cause.enters == "sensor":
+        changed = np.flatnonzero(np.max(np.abs(moved), axis=(0, 1)))
+        assert len(changed) == 1  # of one channel, which is not the place
+        assert changed[0] >= PSI
+    else:
+        assert np.max(np.abs(moved[..., :2])) > 0.5
     assert pickle.loads(pickle.dumps(cause)) is cause
 
 

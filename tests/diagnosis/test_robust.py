@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.gram import Prior, Reduced, solve
-from shipbench.diagnosis.robust import covariance, inflation, is_sure, least_size, matters, without_a_run
+from shipbench.diagnosis.robust import covariance, inflation, is_borne_by_one, is_sure, least_size, matters
 from shipbench.diagnosis.select import passes_for_form
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
@@ -62,7 +62,7 @@ def test_what_one_run_alone_bears_is_sure_only_if_the_others_do_not_speak_agains
     S[:, 0, 0], S[0, 0, 1], S[0, 1, 0] = weights, 400.0, 400.0
     reduced, prior = _reduced(S), Prior(np.array([0]), np.ones(1), *_NONE)
     fit = SimpleNamespace(reduced=reduced, prior=prior, columns_of=lambda index: np.array([0]))
-    assert (without_a_run(fit, 0) > -2.0) is sure
+    assert is_borne_by_one(fit, 0) is not sure
     whole, nothing = solve(reduced, prior).log_evidence, solve(reduced, Prior(prior.shared[:0], prior.precision[:0], *_NONE)).log_evidence
     assert 2.0 * (whole - nothing) > 100.0
 
