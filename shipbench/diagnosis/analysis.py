@@ -114,6 +114,7 @@ def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, c
     if selection.final.model.terms:
         generic = tuple(dependences(selection.final))
         left = next((d for d in generic if d.score > asked(d, selection.off_form) and (d.of_sensor or d.variable in NO_FORM)), None)
+        left = None if left is None or left.has_name else left
     return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown, rival, None if unknown else left)
 
 
@@ -129,12 +130,13 @@ def _unknown(selection: Selection, gears: Sequence[GearFinding], search: Search)
     named = bool(selection.final.model.terms) or bool(gears)
     worth = max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) if named else 0.0
     found = [d for d in search.found if d.score > max(asked(d, selection.off_form), _CONTENDS * worth)]
-    if not named:
-        return (found[0] if found else None), None
-    best = max((search.settled(d) for d in found[:_CONTENDERS]), key=lambda d: d.score, default=None)
-    if best is not None and best.score > worth + GENERIC_MARGIN:
+    contenders = [search.settled(d) for d in found[:_CONTENDERS]] if named else found[:1]
+    best = max(contenders, key=lambda d: d.score, default=None)
+    if best is None or best.has_name:
+        return None, None
+    if not named or best.score > worth + GENERIC_MARGIN:
         return best, None
-    return None, best if best is not None and best.of_sensor and best.score > worth - GENERIC_MARGIN else None
+    return None, best if best.of_sensor and best.score > worth - GENERIC_MARGIN else None
 
 
 def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:

@@ -20,7 +20,7 @@ AXES = ("surge", "sway", "yaw")
 SENSORS = {"recorded heading": 2, "recorded surge": 3, "recorded sway": 4, "recorded yaw rate": 5}
 """What a sensor's error is an error of, and its channel."""
 _NAMED = ("recorded heading", "recorded yaw rate")
-"""Whose constant errors have a name."""
+"""Whose constant errors are causes of the library."""
 _PRIOR_SD, _SENSOR_SD = 0.5, 3.0
 """Of a form's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m), or of ordinary noise of the
 channel (0.23 deg, 0.04 m/s, 0.04 m/s, 0.04 deg/s)."""
@@ -50,6 +50,11 @@ class Dependence:
     def of_sensor(self) -> bool:
         """Whether it is an error of a sensor."""
         return self.axis in SENSORS
+
+    @property
+    def has_name(self) -> bool:
+        """Whether it is a cause of the library: too small to be named, perhaps, but not unknown."""
+        return self.variable == "nothing" and self.axis in _NAMED
 
 
 @dataclass(frozen=True)
@@ -196,8 +201,6 @@ def _added(lin: Linearisation, name: str, channel: int, of: Mapping[str, Sequenc
     """Errors in one channel of the record."""
     found = []
     for v, group in of.items():
-        if v == "nothing" and name in _NAMED:
-            continue
         for f in group:
             error = np.zeros((*lin.motion.shape, f.size))
             error[..., channel, :] = _SENSOR_SD * lin.scales.noise[channel] * np.moveaxis(f.on, 0, -1).swapaxes(0, 1)
