@@ -107,7 +107,7 @@ def _unit(c: Candidate, name: str) -> str:
 
 def strength(c: Cause) -> str:
     """Score and p."""
-    return f"score {c.score:.0f}, p {c.p_value:.2g}" if math.isfinite(c.score) else "by kinematics"
+    return f"score {c.score:.0f}, p {c.p_value:.2g}" if math.isfinite(c.score) else "in the record itself"
 
 
 def cause_lines(c: Cause) -> list[str]:

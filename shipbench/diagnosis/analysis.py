@@ -74,7 +74,7 @@ class Analysis:
 
 def causes_of(plant: Plant, threshold: float, only: Sequence[str] | None = None, settled: Sequence[str] = ()) -> tuple[Extension, dict[str, Gear]]:
     """What one training part alone leads to, by the same selection, with the threshold of the whole; and the best ordinary gears."""
-    selection = select(null_fit(plant, Scales(plant), candidates_for(plant, only, settled)), threshold)
+    selection = select(plain_model(plant, only, settled), threshold)
     findings, plain = find_in_gears(selection.final.plant)
     gears = {g.actuator: g.gear for g in _named_gears(findings, threshold, only)}
     return Extension(selection.final.model.terms, selection.final.values, False, gears or None), plain
@@ -89,16 +89,23 @@ def _named_gears(findings: Sequence[GearFinding], threshold: float, only: Sequen
     return list(named.values())
 
 
-def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, cautious: bool = False, settled: Sequence[str] = ()) -> Analysis:
-    """Fit the plain model, look for causes in the motion and in the gears, and for dependences that no cause explains.
+def plain_model(plant: Plant, only: Sequence[str] | None = None, settled: Sequence[str] = ()) -> Fit:
+    """The plain model, fitted, with the candidates that it is to be extended by.
 
     Args:
         only: restrict the candidates to these effects (for an oracle that knows the truth).
-        cautious: name nothing (too little data), but rank everything.
         settled: effects of which the data are free already.
     """
-    scales = Scales(plant)
-    null = null_fit(plant, scales, candidates_for(plant, only, settled))
+    return null_fit(plant, Scales(plant), candidates_for(plant, only, settled))
+
+
+def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, cautious: bool = False) -> Analysis:
+    """Look for causes in the motion and in the gears beside the plain model, and for dependences that no cause explains.
+
+    Args:
+        only: name none but these effects.
+        cautious: name nothing (too little data), but rank everything.
+    """
     draws = null_maxima(null, seed)
     threshold = max(THRESHOLD, float(np.quantile(draws, 0.95))) if only is None else 0.0
     selection = select(null, np.inf if cautious else threshold)
@@ -107,7 +114,7 @@ def analyse(plant: Plant, *, only: Sequence[str] | None = None, seed: int = 0, c
     hull = 0.0 if only is not None and "hull_derivatives" not in only else hull_evidence(selection.final)
     if only is not None or cautious:
         return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, tuple(dependences(selection.final)))
-    estimated = any(plant.ship.lacks(part) for part in ("rudder", "propeller"))
+    estimated = any(null.plant.ship.lacks(part) for part in ("rudder", "propeller"))
     search = Search(selection.null, (*(_HULL_ALONE if hull > HULL_THRESHOLD else ()), *(_ESTIMATED if estimated else ())))
     unknown, rival = _unknown(selection, gears, search)
     generic, left = tuple(search.found), None

@@ -56,7 +56,7 @@ _LIMITED = 0.65
 UNITS: tuple[tuple[str, tuple[int, ...], float], ...] = (
     ("speeds in knots", (U, V), 1.0 / 0.514444), ("sway velocity to port", (V,), -1.0), ("yaw rate to port", (R,), -1.0),
     ("yaw rate in deg/s", (R,), 180.0 / np.pi), ("rudder to port", (DELTA,), -1.0), ("revolutions in rev/s", (N,), 1.0 / 60.0),
-    ("heading anticlockwise", (PSI,), -1.0),
+    ("heading anticlockwise", (PSI,), -1.0), ("revolutions astern", (N,), -1.0),
 )  # fmt: skip
 """Errors of unit or sign: name, channels of the state (commands of the same actuator follow), factor."""
 

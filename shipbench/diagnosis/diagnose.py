@@ -14,10 +14,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..checking.standing import standing
-from ..checking.units import check_units, corrected
+from ..checking.units import check_units, corrected, merged
 from ..errors import InputError
 from ..records import Dataset
-from .analysis import HULL_THRESHOLD, NOTICEABLE, THRESHOLD, Analysis, analyse, causes_of
+from .analysis import HULL_THRESHOLD, NOTICEABLE, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .causes import describe_candidates, describe_causes, remaining, unknown_part, what_is_left
 from .clocks import NAMES, check_clocks
 from .derived import faults, has_speeds, marked, said
@@ -33,6 +33,7 @@ from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant
 from .strange import left_out
 from .structure import STRUCTURE
 from .trace import trace_of
+from .turned import turned_actuators
 from .wrong import what_is_wrong
 
 FOLDS = 5
@@ -95,7 +96,12 @@ def diagnose(
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) if wanted and workers > 1 else nullcontext() as pool:
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
-        found = analyse(plant, only=only, seed=seed, cautious=cautious, settled=settled)
+        null = plain_model(plant, only, settled)
+        if only is None and (turned := turned_actuators(dataset, null)):
+            units, dataset = merged([*units, *turned]), corrected(dataset, turned)
+            null = plain_model(Plant.of(dataset, THOROUGH_STEPS if thorough else MOST_STEPS), settled=settled)
+            ahead, work = None, partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
+        found = analyse(null, only=only, seed=seed, cautious=cautious)
         doubts = _doubts(found) if only is None else []
         measured = wanted and not doubts
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if measured else Worth()

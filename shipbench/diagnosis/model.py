@@ -22,8 +22,8 @@ from .term import Term
 
 FREE = (1, 2, 5, 7, 8, 10)
 """Of p0..p10 what a symmetric ship has: resistance, lift and drag of the rudder. A side force at zero rudder is an effect with a name."""
-_CENTRE = np.array([0.2, 1.0, 1.0, -0.8, 0.3, 1.0])
-_SPREAD = np.array([3.0, 1.5, 0.5, 0.8, 1.0, 1.0])
+CENTRE = np.array([0.2, 1.0, 1.0, -0.8, 0.3, 1.0])
+SPREAD = np.array([3.0, 1.5, 0.5, 0.8, 1.0, 1.0])
 """Mean and standard deviation of the free parameters before any data, in units of `parameter_scale`; drag of the rudder at zero angle is that of
 friction, 2.5 C_F (physics reference 2.6): with more of it, thrust would seem to be missing on every ship. Resistance that grows with speed
 itself is small on ships and large in the models of control engineers (12 of these units in the supply vessel of
@@ -75,6 +75,12 @@ class Scales:
         new.background = background
         return new
 
+    def alike(self, other: Scales) -> Scales:
+        """The same with the noise and the background of a fit that is compared."""
+        new = self.coloured(other.colour)
+        new.background = other.background
+        return new
+
     def amplitudes(self, term: Term, L: float) -> np.ndarray:
         """Typical sizes of a term's amplitudes."""
         return np.array([abs(p.typical) for p in term.effect.sized(L) if not p.shape])
@@ -85,7 +91,7 @@ def parameters(scales: Scales, base: np.ndarray) -> tuple[list[np.ndarray | floa
     segments."""
     p: list[np.ndarray | float] = [0.0] * 11
     for i, index in enumerate(FREE):
-        p[index] = (_CENTRE[i] + _SPREAD[i] * base[..., i]) * scales.p[index]
+        p[index] = (CENTRE[i] + SPREAD[i] * base[..., i]) * scales.p[index]
     at = len(FREE) + NUM_HULL
     hull = tuple(HULL_SPREAD * base[..., len(FREE) + i] for i in range(NUM_HULL))
     structure = tuple(spread * base[..., at + i] for i, spread in enumerate(scales.structure))

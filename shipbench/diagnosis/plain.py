@@ -46,6 +46,11 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
     return widened(found)
 
 
+def first_evidence(plant: Plant, null: Fit) -> float:
+    """Log evidence of the plain model for another reading, or some pieces, of what `null` was fitted to: from the beginning, with the same noise."""
+    return _first(plant, Scales(plant).alike(null.scales), iterations=REFIT_ITERATIONS).evidence
+
+
 def _begun(plant: Plant, scales: Scales) -> Fit:
     """The first fit, of which the others take the background.
 

@@ -69,7 +69,15 @@ class Segments:
             return self
         first = np.flatnonzero(np.diff(self.run, prepend=-1))
         spread = np.linspace(0, len(self.run) - 1, max(most - len(first), 1)).round().astype(int)
-        rows = np.unique(np.concatenate([first, spread]))
+        return self._of(np.unique(np.concatenate([first, spread])))
+
+    def where(self, wanted: np.ndarray) -> Segments:
+        """The `wanted` segments, with the runs that have any."""
+        found = self._of(np.flatnonzero(wanted))
+        runs, run = np.unique(found.run, return_inverse=True)
+        return replace(found, run=run, runs=len(runs), kinds=tuple(self.kinds[i] for i in runs))
+
+    def _of(self, rows: np.ndarray) -> Segments:
         wind = None if self.wind is None else self.wind[rows]
         return replace(
             self, states=self.states[rows], commands=self.commands[rows], earlier=self.earlier[rows], wind=wind, mask=self.mask[rows],
@@ -81,6 +89,12 @@ class Segments:
         mask = self.mask.copy()
         mask[pieces] = False
         return replace(self, mask=mask)
+
+    def turned(self, actuators: Sequence[int]) -> Segments:
+        """The same with some actuators (of n, delta, F_b, F_s) read to the other side."""
+        sign = np.where(np.isin(np.arange(4), actuators), -1.0, 1.0)
+        states = np.concatenate([self.states[..., :6], self.states[..., 6:] * sign], axis=-1)
+        return replace(self, states=states, commands=self.commands * sign, earlier=self.earlier * sign)
 
 
 def cut(dataset: Dataset, steps: int) -> Segments:
@@ -163,9 +177,17 @@ class Plant:
         """At most `most` of its segments, evenly spread; every run keeps at least one."""
         return self if len(self.seg.run) <= most else Plant(self.ship, self.seg.thinned(most), self.long, self.ordinary)
 
+    def where(self, wanted: np.ndarray) -> Plant:
+        """The `wanted` segments, with the runs that have any."""
+        return Plant(self.ship, self.seg.where(wanted), self.long, self.ordinary, self.froude)
+
     def resized(self, factor: float) -> Plant:
         """The same runs of a similar ship; pieces, latent force and units stay, so that evidence can be compared."""
         return Plant(self.ship.resized(factor), self.seg, self.long, froude=self.froude)
+
+    def turned(self, actuators: Sequence[int]) -> Plant:
+        """The same runs with some actuators (of n, delta, F_b, F_s) read to the other side."""
+        return Plant(self.ship, self.seg.turned(actuators), self.long.turned(actuators), self.ordinary, self.froude)
 
     @classmethod
     def of(cls, dataset: Dataset, most_steps: int = MOST_STEPS) -> Plant:

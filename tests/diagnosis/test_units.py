@@ -36,6 +36,7 @@ FAULTS = {
     "rudder in degrees": ({DELTA: DEG}, {"delta": "degrees", "delta_c": "degrees"}),
     "rudder to port": ({DELTA: -1.0}, {"delta": "sign", "delta_c": "sign"}),
     "rudder to port in degrees": ({DELTA: -DEG}, {"delta": "degrees, sign", "delta_c": "degrees, sign"}),
+    "revolutions astern": ({N: -1.0}, {"n": "sign", "n_c": "sign"}),
     "revolutions in rev/s": ({N: 1.0 / 60.0}, {"n": "rev/s", "n_c": "rev/s"}),
     "revolutions in rad/s": ({N: 2.0 * np.pi / 60.0}, {"n": "rad/s", "n_c": "rad/s"}),
 }

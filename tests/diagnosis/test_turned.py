@@ -1,0 +1,72 @@
+"""Rudder and thrusters recorded to the other side, told by the fit of the plain model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipbench.checking.units import check_units, corrected, merged
+from shipbench.diagnosis.analysis import plain_model
+from shipbench.diagnosis.cases import UNITS, draw_case, misread
+from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.turned import turned_actuators
+from shipbench.effects.base import EFFECTS
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.records import Dataset
+from shipbench.signals import DELTA, F_B, F_S, STATES
+from shipbench.simulate.hidden import Hidden
+from shipbench.simulate.published import PUBLISHED, published_trials
+from shipbench.simulate.trials import Trials, sea_trials
+
+PLAN = Trials(runs=12)
+
+
+def found(data: Dataset) -> dict[str, float]:
+    return {f.channel: f.factor for f in turned_actuators(data, plain_model(Plant.of(data)))}
+
+
+def port_trials(seed: int, *hidden: Hidden) -> Dataset:
+    return sea_trials(load_mmg_ship("container130"), seed, hidden, PLAN)
+
+
+def test_a_rudder_to_port_is_told_where_turns_are_too_few_for_kinematics():
+    error = next(i for i, item in enumerate(UNITS) if item[0] == "rudder to port")
+    data = draw_case("unit", error, 0).dataset()
+    assert check_units(data) == []
+    result = diagnose(data, gain=False)
+    assert result.verdict == "found"
+    assert [(c.effect, list(c.parameters)) for c in result.causes] == [
+        ("unit_or_sign_error", ["delta_factor"]), ("unit_or_sign_error", ["delta_c_factor"]),
+    ]  # fmt: skip
+    assert "lift of the rudder falls with its angle" in result.causes[0].evidence
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_so_it_is_on_ships_in_other_equations_and_read_rightly_there_is_nothing(name: str):
+    data = published_trials(PUBLISHED[name], 2, (), PLAN)
+    assert found(data) == {}
+    assert found(misread(data, (DELTA,), -1.0)) == {"delta": -1.0, "delta_c": -1.0}
+
+
+@pytest.mark.parametrize("channels", [(F_B,), (F_S,), (F_B, F_S)], ids=["bow", "stern", "both"])
+def test_thrusters_to_port_are_told(channels: tuple[int, ...]):
+    wanted = {STATES[c] + end: -1.0 for c in channels for end in ("", "_c")}
+    assert found(misread(port_trials(4), channels, -1.0)) == wanted
+
+
+@pytest.mark.parametrize("size", [-0.6, 0.6])
+def test_weak_or_strong_thrusters_are_not_to_port(size: float):
+    assert found(port_trials(4, Hidden(EFFECTS.get("thruster_gain"), (size,)))) == {}
+
+
+def test_an_order_that_was_blamed_for_its_actuator_is_cleared():
+    data = port_trials(4)
+    alone = data.with_runs(replace(run, states=np.where(np.arange(10) == F_B, -run.states, run.states)) for run in data.runs)
+    blamed = check_units(alone)
+    assert [(f.channel, f.factor) for f in blamed] == [("F_b_c", -1.0)]
+    data = corrected(alone, blamed)
+    both = merged([*blamed, *turned_actuators(data, plain_model(Plant.of(data)))])
+    assert [(f.channel, f.factor) for f in both] == [("F_b", -1.0)]
