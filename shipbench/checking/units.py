@@ -35,7 +35,7 @@ _MOST_WINDOWS, _FEWEST_WINDOWS = 1500, 12
 _POOR = 0.15
 _KEEPING, _KEPT, _FEWEST_KEPT, _MORE_KEPT = 30.0, 0.99, 5, 3
 """Seconds (Froude-scaled, 130 m) over which a ship keeps her speed, share of it that she keeps, and number of such stretches, at least, and for each
-with the revolutions. (A ship that stops loses 4 % at the least: a laden tanker, from full ahead to full astern.)"""
+with the revolutions. (A ship that stops by her engine does not keep it, unless a current carries her.)"""
 _SWAPPED = "exchanged with y"
 
 

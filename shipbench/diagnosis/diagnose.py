@@ -97,7 +97,7 @@ def diagnose(
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
         null = plain_model(plant, only, settled)
-        if only is None and (turned := turned_actuators(dataset, null)):
+        if only is None and not cautious and (turned := turned_actuators(dataset, null)):
             units, dataset = merged([*units, *turned]), corrected(dataset, turned)
             null = plain_model(Plant.of(dataset, THOROUGH_STEPS if thorough else MOST_STEPS), settled=settled)
             ahead, work = None, partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
