@@ -9,6 +9,7 @@ from itertools import groupby
 import numpy as np
 
 from .columns import Bend, Columns
+from .fit import fit
 from .forms import Feature, of_forces, of_sensors
 from .gram import Gram, Prior, beside_products, ornstein_uhlenbeck, solve
 from .model import Linearisation
@@ -114,11 +115,21 @@ class Search:
         self.found = sorted(self._parts, key=lambda d: -d.score)
 
     def settled(self, d: Dependence) -> Dependence:
-        """The same, with the variances of the noise re-estimated, too, as those of a named cause are once it is fitted: they hold what a large error
-        of a sensor does before it is known."""
+        """The same, judged as named causes are, which are fitted: with the variances of the noise re-estimated, and an error of a sensor taken out of
+        the record. Before it is known the noise holds a large one, and the fit is dragged along."""
         parts, usual = self._parts[d], self._settled([])
         score = 2.0 * (self._settled(parts) - usual - sum(t.cost for t in parts))
-        return replace(d, score=max(score, d.score))
+        return replace(d, score=max(score, d.score, *(self._refitted(t) for t in parts if d.of_sensor)))
+
+    def _refitted(self, tried: _Tried) -> float:
+        """Score of an error without which the plain model is fitted again, where its coefficients keep prior and precision. At least so much: of an
+        error of several degrees the linear estimate leaves some."""
+        now, at = self.fit, self.first + np.arange(tried.size)
+        solution = solve(self._gram([tried]).reduce(self.usual), _with(self.prior, at))
+        mean, cov = solution.mean[-tried.size :], solution.cov[-tried.size :, -tried.size :]
+        error = (tried.columns @ mean).reshape(now.plant.seg.states[..., :6].shape)
+        found = fit(now.plant.less(error), now.scales, now.model, now.point, now.hyper, now.log_tau2, guess=now.motion)
+        return float(2.0 * (found.evidence - now.evidence - tried.cost) - mean @ mean + np.linalg.slogdet(cov)[1])
 
     def _settled(self, tried: Sequence[_Tried]) -> float:
         more, columns = [*self.sides, *tried], self._columns_with(tried)

@@ -173,6 +173,13 @@ class Plant:
         plant.seg = self.seg.without(pieces)
         return plant
 
+    def less(self, error: np.ndarray) -> Plant:
+        """The same runs with an error (B, K + 1, 6) taken out of the recorded motion."""
+        plant, states = copy(self), self.seg.states.copy()
+        states[..., :6] -= error
+        plant.seg = replace(self.seg, states=states)
+        return plant
+
     def thinned(self, most: int) -> Plant:
         """At most `most` of its segments, evenly spread; every run keeps at least one."""
         return self if len(self.seg.run) <= most else Plant(self.ship, self.seg.thinned(most), self.long, self.ordinary)

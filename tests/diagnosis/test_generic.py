@@ -7,12 +7,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
+from shipbench.diagnosis.fit import fit
 from shipbench.diagnosis.generic import SENSORS, Search, dependences
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.outside import Outside, get
 from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.settle import Fit
+from shipbench.diagnosis.settle import Fit, Model
+from shipbench.diagnosis.term import Term
+from shipbench.effects.base import EFFECTS
 from shipbench.ops import Array
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.physics.modifiers import Flow, Modifiers
@@ -84,3 +87,14 @@ def test_an_error_that_the_noise_had_held_is_worth_more_once_the_noise_is_fitted
     first = search.found[0]
     assert (first.axis, first.variable) == ("recorded sway", "speed")
     assert search.settled(first).score > first.score + 10.0
+
+
+def test_an_error_that_is_a_cause_of_the_library_is_worth_what_that_cause_is_worth_once_it_is_fitted(kcs):
+    """Both are the same model, one taken out of the record, the other in the fit."""
+    null = kcs(Hidden(EFFECTS.get("heading_bias"), (0.035,)))
+    search = Search(null)
+    constant = next(d for d in search.found if (d.axis, d.variable) == ("recorded heading", "nothing"))
+    named = fit(null.plant, null.scales, Model(terms=(Term(EFFECTS.get("heading_bias"), ()),)), null.point, null.hyper, guess=null.motion)
+    worth = 2.0 * (named.evidence - null.evidence)
+    assert search.settled(constant).score == pytest.approx(worth, abs=10.0)
+    assert constant.score < search.settled(constant).score
