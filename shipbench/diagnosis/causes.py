@@ -34,11 +34,12 @@ def describe_causes(
     found: Analysis, units: Sequence[UnitFinding], late: LateVelocities | None, gain: Gain | None, hull: bool, doubt: bool, runs: Sequence[str]
 ) -> list[Cause]:
     """Named causes: what was taken out before the fit first (units, late velocities), then by score; the hull last, because it is off the
-    regressions on most ships. In doubt about the ship file only those that show whatever the ship is. `runs` are their names."""
+    regressions on most ships. None in whose place something unknown is told; but in doubt about the ship file a force may be unknown for that, and
+    those are named that show whatever the ship is. `runs` are their names."""
     causes = [_unit_cause(i + 1, u) for i, u in enumerate(units)]
     if late is not None:
         causes.append(_late_cause(len(causes) + 1, found, late))
-    if found.unknown is not None and not doubt:
+    if found.unknown is not None and (found.unknown.of_sensor or not doubt):
         return causes
     named: list[Cause] = []
     for index, term in enumerate(found.final.model.terms):

@@ -86,7 +86,7 @@ def diagnose(
     if late is not None:
         dataset = late.mended
     settled = (*(NAMES if late is not None else ()), *faults(dataset))
-    plant = Plant.of(dataset, THOROUGH_STEPS if thorough else MOST_STEPS)
+    steps = THOROUGH_STEPS if thorough else MOST_STEPS
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     apart = len({run.group for run in dataset.runs}) > 1
     if not apart and len(dataset) > 1:
@@ -96,10 +96,10 @@ def diagnose(
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) if wanted and workers > 1 else nullcontext() as pool:
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
-        null = plain_model(plant, only, settled)
+        null = plain_model(Plant.of(dataset, steps), only, settled)
         if only is None and not cautious and (turned := turned_actuators(dataset, null)):
             units, dataset = merged([*units, *turned]), corrected(dataset, turned)
-            null = plain_model(Plant.of(dataset, THOROUGH_STEPS if thorough else MOST_STEPS), settled=settled)
+            null = plain_model(Plant.of(dataset, steps), settled=settled)
             ahead, work = None, partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
         found = analyse(null, only=only, seed=seed, cautious=cautious)
         doubts = _doubts(found) if only is None else []
@@ -162,15 +162,16 @@ def _check(dataset: Dataset) -> list[str]:
 
 def _doubts(found: Analysis) -> list[str]:
     """Signs that the model does not belong to the data: the fit leaves what is ordinary, hull or propeller would be another ship's, or a ship of
-    another size explains the runs better."""
-    z = needed(found.final, NOTICEABLE)
+    another size explains the runs better. Causes in whose place something unknown is told raise none."""
+    fit = found.final if found.unknown is None else found.selection.null
+    z = needed(fit, NOTICEABLE)
     signs = []
     if np.max(np.abs(z)) > STRANGE or np.sum(z**2) > STRANGE_SUM:
         largest, together = (f"more than {_MOST:.0f}" if x > _MOST else f"{x:.1f}" for x in (np.max(np.abs(z)), np.sum(z**2) ** 0.5))
         signs.append(f"the fit moves a parameter by {largest} times its ordinary spread (all together {together} times)")
     if abs(z[_LOG_THRUST]) > STRANGE_THRUST:
-        signs.append(f"the propeller would have to give {_thrust_factor(found.final):.2g} times the thrust that the ship file makes likely")
-    for term, value in zip(found.final.model.terms, found.final.values, strict=True):
+        signs.append(f"the propeller would have to give {_thrust_factor(fit):.2g} times the thrust that the ship file makes likely")
+    for term, value in zip(fit.model.terms, fit.values, strict=True):
         if term.effect.family in ("hull", "propulsion") and np.max(np.abs(value)) > STRANGE_SIZE:
             signs.append(f"{term.label} would have to be {np.max(np.abs(value)):.1f} times its typical size")
     if not signs and np.sum(z**2) > ORDINARY_SUM:

@@ -155,12 +155,20 @@ def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
     ids=["slow force in time", "thrust lost with the rudder angle, not just lost", "force that goes with the place", "turned log"],
 )
 def test_a_force_or_a_fault_of_a_sensor_that_follows_no_known_cause_is_called_unknown_with_its_variable(index):
-    case = draw_case("outside", index, 3, "development")
+    case = draw_case("outside", index, 3, "development", Trials(runs=16, samples=100))
     verdict = diagnose(case.dataset(), gain=False)
     assert verdict.verdict == "unknown"
     assert not verdict.causes
     assert verdict.unknown is not None
     assert canonical(verdict.unknown["variable"]) & case.variables
+
+
+def test_what_an_unknown_fault_replaces_raises_no_doubt_of_the_ship_file():
+    """A log mounted at an angle: a list of 3.8 times its size had been the doubt, and a compass error was told beside it."""
+    verdict = diagnose(draw_case("outside", 58, 7, "test", Trials(runs=12, samples=90)).dataset(), gain=False)
+    assert (verdict.verdict, verdict.causes, verdict.warnings) == ("unknown", (), ())
+    assert verdict.unknown is not None
+    assert (verdict.unknown["axis"], verdict.unknown["variable"]) == ("recorded sway", "speed")
 
 
 def test_a_ship_file_of_another_ship_names_nothing():
