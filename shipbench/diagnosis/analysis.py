@@ -11,6 +11,7 @@ from ..physics.actuators import Gear
 from .gain import Extension
 from .gears import GearFinding, find_in_gears
 from .generic import NO_FORM, Dependence, Search, dependences
+from .misread import RecordError, judged
 from .model import Scales
 from .plain import null_fit
 from .plant import Plant
@@ -46,7 +47,7 @@ estimate."""
 class Analysis:
     """What was found in one set of runs. threshold: that was used; hull: 2 log evidence that the hull is off the regressions, or 0; gears: named
     findings; plain_gears: the ordinary gears that fit best; unknown: the dependence that no named cause covers; rival: one that covers about as much
-    as the named causes; left: one that is there beside them."""
+    as the named causes; left: one that is there beside them; misread: what the records of actuators err by."""
 
     selection: Selection
     threshold: float
@@ -59,6 +60,7 @@ class Analysis:
     unknown: Dependence | None = None
     rival: Dependence | None = None
     left: Dependence | None = None
+    misread: tuple[RecordError, ...] = ()
 
     @property
     def final(self) -> Fit:
@@ -75,7 +77,7 @@ class Analysis:
 def causes_of(plant: Plant, threshold: float, only: Sequence[str] | None = None, settled: Sequence[str] = ()) -> tuple[Extension, dict[str, Gear]]:
     """What one training part alone leads to, by the same selection, with the threshold of the whole; and the best ordinary gears."""
     selection = select(plain_model(plant, only, settled), threshold)
-    findings, plain = find_in_gears(selection.final.plant)
+    findings, plain, _ = find_in_gears(selection.final.plant)
     gears = {g.actuator: g.gear for g in _named_gears(findings, threshold, only)}
     return Extension(selection.final.model.terms, selection.final.values, False, gears or None), plain
 
@@ -99,17 +101,18 @@ def plain_model(plant: Plant, only: Sequence[str] | None = None, settled: Sequen
     return null_fit(plant, Scales(plant), candidates_for(plant, only, settled))
 
 
-def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, cautious: bool = False) -> Analysis:
+def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, cautious: bool = False, misread: Sequence[RecordError] = ()) -> Analysis:
     """Look for causes in the motion and in the gears beside the plain model, and for dependences that no cause explains.
 
     Args:
         only: name none but these effects.
         cautious: name nothing (too little data), but rank everything.
+        misread: errors of actuators' records that were taken out before.
     """
     draws = null_maxima(null, seed)
     threshold = max(THRESHOLD, float(np.quantile(draws, 0.95))) if only is None else 0.0
     selection = select(null, np.inf if cautious else threshold)
-    findings, plain = find_in_gears(null.plant)
+    findings, plain, errors = find_in_gears(null.plant)
     gears = [] if cautious else _named_gears(findings, threshold, only)
     hull = 0.0 if only is not None and "hull_derivatives" not in only else hull_evidence(selection.final)
     if only is not None or cautious:
@@ -122,7 +125,12 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
         generic = tuple(dependences(selection.final))
         left = next((d for d in generic if d.score > asked(d, selection.off_form) and (d.of_sensor or d.variable in NO_FORM)), None)
         left = None if left is None or left.has_name else left
-    return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown, rival, None if unknown else left)
+    errors = [*misread, *judged(null, errors)]
+    if unknown is None and errors and not selection.final.model.terms and not gears:
+        most = max(errors, key=lambda e: e.score)
+        unknown = Dependence(most.variable, most.axis, most.form, most.score, np.nan, most.size, 0.0)
+    left = None if unknown else left
+    return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown, rival, left, tuple(errors))
 
 
 def asked(d: Dependence, off_form: float) -> float:

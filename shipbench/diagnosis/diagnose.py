@@ -17,6 +17,7 @@ from ..checking.standing import standing
 from ..checking.units import check_units, corrected, merged
 from ..errors import InputError
 from ..records import Dataset
+from . import misread
 from .analysis import HULL_THRESHOLD, NOTICEABLE, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .causes import describe_candidates, describe_causes, remaining, unknown_part, what_is_left
 from .clocks import NAMES, check_clocks
@@ -102,11 +103,16 @@ def diagnose(
             null = plain_model(Plant.of(dataset, steps), settled=settled)
             ahead, work = None, partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
         found = analyse(null, only=only, seed=seed, cautious=cautious)
+        if wrong := [e for e in found.misread if e.contradicted]:
+            dataset = misread.read_rightly(dataset, wrong)
+            found = analyse(plain_model(Plant.of(dataset, steps), settled=settled), seed=seed, misread=wrong)
+            ahead, work = None, partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
         doubts = _doubts(found) if only is None else []
         measured = wanted and not doubts
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if measured else Worth()
     warnings += [text for text, _ in standing(dataset).values()]
     warnings += said(dataset) + drift + wind + doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
+    warnings += misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     warnings += what_is_left(found) if causes and not doubts else []

@@ -11,17 +11,21 @@ import numpy as np
 
 from ..ops import where
 from ..physics.actuators import Gear, gear_path, gear_step
+from .misread import CHANNELS, FORMS, RecordError, readings
 from .plant import Plant, Segments, ordinary_gears
 
 if TYPE_CHECKING:
     from ..compiled import Lanes
 
-_ACTUATORS = {"n": (0,), "delta": (1,), "F": (2, 3)}
 _RATE_POWER = {"n": 2, "delta": 1, "F": 0}
 _SCAN = (4, 12, 24)
 _ROUNDS, _FINE, _WORTH_A_MOVE, _MOST, _STEP = 150, 1e-3, 3e-5, 200, 0.02
 _DELAY = 10.0
 """Longest delay [s] at 130 m that is looked for."""
+_SECOND, _PARTS = 0.5, 4
+"""Greatest time constant of an ordinary second stage, as a share of the first's; parts of a sample in which it is followed."""
+_LEAST_SCORE, _LEAST_ERROR, _CORRECTIONS = 10.0, 0.03, 3
+"""Least score of an error of the record, least size that is told, relative, and how often record and gear are corrected in turn."""
 _OWN_SPREAD, _RECORD, _CLOCK = 0.25, 0.01, 0.02
 """Standard deviations: of an ordinary gear's time constant, relative (a lag is reported beyond it); of the scale of a record, relative; of a time, in
 samples."""
@@ -41,8 +45,8 @@ ORDINARY = {"n": Ordinary(12.0, 2.0), "delta": Ordinary(2.0, np.deg2rad(1.9)), "
 
 @dataclass(frozen=True)
 class GearFinding:
-    """An effect of a gear. score: 2 log likelihood ratio against the best ordinary gear, samples discounted for their correlation, less log(10 N) for
-    the added value; value: of the effect's parameter, ci95; per_run (N,)."""
+    """An effect of a gear. score: 2 log likelihood ratio against the best ordinary gear, of one stage or two, samples discounted for their
+    correlation, less log(10 N) for the added value; value: of the effect's parameter, ci95; per_run (N,)."""
 
     effect: str
     score: float
@@ -93,21 +97,23 @@ def _kinds(actuator: str, scale: float, span: float, ordinary: Gear) -> list[_Ki
     ]
 
 
-def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear]]:
-    """Findings of every actuator that moves, best first, and the best ordinary gears; nothing where only commands are recorded (those that the motion
-    was fitted with)."""
+def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear], list[RecordError]]:
+    """Findings of every actuator that moves, best first, the best ordinary gears, and what the records err by; nothing where only commands are
+    recorded (those that the motion was fitted with)."""
     if plant.seg.commanded:
-        return [], plant.ordinary
+        return [], plant.ordinary, []
     seg, gears = plant.long, ordinary_gears(plant.c.L)
     found: list[GearFinding] = []
-    for name, channels in _ACTUATORS.items():
+    errors: list[RecordError] = []
+    for name, channels in CHANNELS.items():
         rows = range(len(seg.run))
         picked = [(b, c) for c in channels for b in rows if np.ptp(seg.commands[b, seg.mask[b], c]) > 0]
         if len({seg.run[b] for b, _ in picked}) > 1:
             record = _Record.of(seg, plant.c.L, name, np.array(picked))
-            findings, gears[name] = record.findings(ordinary_gears(plant.c.L)[name])
+            findings, gears[name], error = record.findings(ordinary_gears(plant.c.L)[name])
             found += findings
-    return sorted(found, key=lambda f: -f.score), gears
+            errors += [] if error is None else [error]
+    return sorted(found, key=lambda f: -f.score), gears, errors
 
 
 @dataclass(frozen=True)
@@ -139,8 +145,9 @@ class _Record:
         gear = Gear(tiled[0], tiled[1])
         if kind is not None:
             gear = replace(gear, **{kind.field: tiled[kind.at]})
-        path = gear_path(np.tile(self.measured[:, 0], len(z)), np.tile(self.command, (len(z), 1)), self.dt, gear)
-        return path[:, 1:].reshape(len(z), *self.command.shape)
+        parts = _PARTS if kind is not None and kind.field == "T2" else 1
+        path = gear_path(np.tile(self.measured[:, 0], len(z)), np.tile(self.command, (len(z), 1)), self.dt, gear, parts)
+        return path[:, parts::parts].reshape(len(z), *self.command.shape)
 
     def errors(self, z: np.ndarray, kind: _Kind | None) -> np.ndarray:
         """Record less path (M, P, K), zero where it is not judged."""
@@ -173,31 +180,72 @@ class _Record:
             out[rows] = found
         return out
 
-    def findings(self, usual: Gear) -> tuple[list[GearFinding], Gear]:
-        """Every effect beside the best ordinary gear, and that gear."""
+    def findings(self, usual: Gear) -> tuple[list[GearFinding], Gear, RecordError | None]:
+        """Every effect beside the best ordinary gear, that gear, and what the record errs by.
+
+        Of an actuator whose record reads too little it seems that it stays short of its commands, as with a deadband: where an error of the record
+        explains more than every effect, they are judged without it.
+        """
+        found, ordinary, error = self._judged(usual)
+        if error is None:
+            return found, ordinary, None
+        found, ordinary, _ = replace(self, measured=error.taken_out(self.measured))._judged(usual)
+        return found, ordinary, error if error.size > _LEAST_ERROR else None
+
+    def _judged(self, usual: Gear) -> tuple[list[GearFinding], Gear, RecordError | None]:
+        """The same of the record as it is, with an error that explains more than every effect.
+
+        Two stages look like a delay; they are fitted only where something is to be explained, since that takes as long as all the others.
+        """
+        kinds = _kinds(self.name, self.scale, float(np.percentile(np.abs(self.command), 98)), usual)
+        ordinary, fits = self._fitted(None), [self._fitted(kind) for kind in kinds]
+        gear, plain = Gear(*(float(v) for v in np.exp(ordinary))), self.errors(ordinary[None], None)[0]
+        found = [self._finding(kind, z, plain) for kind, z in zip(kinds, fits, strict=True)]
+        if max(self._misread(ordinary, None, plain).score, *(f.score for f in found)) < _LEAST_SCORE:
+            return found, gear, None
+        second = _Kind("", "T2", 0.02 * self.scale, _SECOND * ORDINARY[self.name].T * self.scale)
+        z = self._fitted(second)
+        plain = min(plain, self.errors(z[None], second)[0], key=lambda e: float(np.sum(e**2)))
+        found = [self._finding(kind, fit, plain) for kind, fit in zip(kinds, fits, strict=True)]
+        error = self._misread(z, second, plain)
+        for _ in range(_CORRECTIONS):
+            z = replace(self, measured=error.taken_out(self.measured))._fitted(second)
+            error = self._misread(z, second, plain)
+        return found, gear, error if error.score > max(_LEAST_SCORE, *(f.score for f in found)) else None
+
+    def _misread(self, z: np.ndarray, kind: _Kind | None, plain: np.ndarray) -> RecordError:
+        """What the record reads beside the positions of a gear; score: against the errors `plain`."""
+        at = self.paths(z[None], kind)[0]
+        off, forms = np.where(self.judged, self.measured[:, 1:] - at, 0.0), np.where(self.judged, readings(at), 0.0)
+        factors = np.linalg.lstsq(forms.reshape(len(forms), -1).T, off.ravel(), rcond=None)[0]
+        score = self._worth(float(np.sum(plain**2)), off - np.tensordot(factors, forms, 1), len(factors))
+        told = (factors[:, None] * forms[:, self.judged])[1:]
+        best = FORMS[1 + int(np.argmax(np.linalg.norm(told, axis=1)))].format(self.name)
+        size = np.sqrt(np.mean(told.sum(axis=0) ** 2) / max(np.mean(self.measured[:, 1:][self.judged] ** 2), 1e-300))
+        return RecordError(self.name, best, score, float(size), factors)
+
+    def _worth(self, before: float, rest: np.ndarray, values: int) -> float:
+        """Score of `values` more values that leave `rest` (P, K) of errors whose squares were `before` together."""
+        samples, after = float(self.judged.sum()), max(float(np.sum(rest**2)), 1e-300)
+        return float(samples * _discount(rest) * np.log(max(before, 1e-300) / after) - values * np.log(10.0 * len(np.unique(self.run))))
+
+    def _fitted(self, kind: _Kind | None) -> np.ndarray:
+        """Logarithms of the time constant, the rate[, the value of `kind`] of the best gear."""
         span = float(np.percentile(np.abs(self.command), 98))
         rate = max(least_rate(self.name, self.scale), 0.01 * span / self.scale)
         most = max(10.0 * span / self.dt, 2.0 * rate)
         low, high = np.log([0.02 * self.scale, rate]), np.log([ORDINARY[self.name].T * self.scale, most])
-        ordinary = self._least(None, low, high)
-        plain = self.errors(ordinary[None], None)[0]
-        found = []
-        for kind in _kinds(self.name, self.scale, span, usual):
-            lows, highs = np.resize(low, max(2, kind.at + 1)), np.resize(high, max(2, kind.at + 1))
-            lows[kind.at], highs[kind.at] = np.log(kind.low), np.log(kind.high)
-            found.append(self._finding(kind, self._least(kind, lows, highs), plain))
-        return found, Gear(*(float(v) for v in np.exp(ordinary)))
+        if kind is not None:
+            low, high = np.resize(low, max(2, kind.at + 1)), np.resize(high, max(2, kind.at + 1))
+            low[kind.at], high[kind.at] = np.log(kind.low), np.log(kind.high)
+        return self._least(kind, low, high)
 
     def _finding(self, kind: _Kind, z: np.ndarray, plain: np.ndarray) -> GearFinding:
         rest = self.errors(z[None], kind)[0]
-        samples = float(self.judged.sum())
-        variance = max(float(np.sum(rest**2)) / samples, 1e-300)
-        rho = min(max(float(np.sum(rest[:, 1:] * rest[:, :-1]) / np.sum(rest**2)), 0.0), 0.98) if np.any(rest) else 0.0
-        discount = (1.0 - rho) / (1.0 + rho)
-        per_run = np.zeros(self.runs)
+        variance = max(float(np.sum(rest**2)) / float(self.judged.sum()), 1e-300)
+        discount, per_run = _discount(rest), np.zeros(self.runs)
         np.add.at(per_run, self.run, discount * np.sum(plain**2 - rest**2, axis=1) / (2.0 * variance))
-        gain = np.log(max(float(np.sum(plain**2)), 1e-300) / (variance * samples))
-        score = float(samples * discount * gain - np.log(10.0 * len(np.unique(self.run))))
+        score = self._worth(float(np.sum(plain**2)), rest, 1)
         steps = _STEP * np.eye(len(z))
         slopes = ((self.errors(z + steps, kind) - self.errors(z - steps, kind)) / (2.0 * _STEP)).reshape(len(z), -1)
         relative = np.linalg.inv(discount / variance * slopes @ slopes.T + np.eye(len(z)))[kind.at, kind.at] ** 0.5
@@ -232,6 +280,12 @@ class _Record:
         return center
 
 
+def _discount(rest: np.ndarray) -> float:
+    """What a sample counts for, of errors (P, K) that are correlated from one to the next."""
+    rho = min(max(float(np.sum(rest[:, 1:] * rest[:, :-1]) / np.sum(rest**2)), 0.0), 0.98) if np.any(rest) else 0.0
+    return (1.0 - rho) / (1.0 + rho)
+
+
 @cache
 def _follower(field: str | None) -> Lanes | None:
     """Machine code of a sample of `gear_step`: motor, position, cost; time constant, rate[, value of `field`, of a delay the part of a sample]; dt;
@@ -248,6 +302,7 @@ def _follower(field: str | None) -> Lanes | None:
     if beside == "delay":
         wanted = [(before, value[0] * dt), (now, (1.0 - value[0]) * dt)]
     elif beside is not None:
+        wanted = [(now, dt / _PARTS)] * _PARTS if beside == "T2" else wanted
         gear = replace(gear, **{beside: value[0]})
     motor, position = gear_step(motor, position, wanted, gear)
     after = ca.vertcat(motor, position, cost + where(judged, (measured - position) ** 2, 0.0))

@@ -49,8 +49,8 @@ class Dependence:
 
     @property
     def of_sensor(self) -> bool:
-        """Whether it is an error of a sensor."""
-        return self.axis in SENSORS
+        """Whether it is an error of a sensor, or of an order."""
+        return self.axis.startswith(("recorded ", "ordered "))
 
     @property
     def has_name(self) -> bool:

@@ -104,7 +104,7 @@ class Trace:
 
 def what_it_is(unknown: Mapping[str, Any]) -> str:
     """An unknown force, or error of a sensor, with what it depends on."""
-    kind = "error of the" if unknown["axis"].startswith("recorded") else "force in"
+    kind = "error of the" if unknown["axis"].startswith(("recorded", "ordered")) else "force in"
     if unknown["variable"] == "nothing":
         return f"a constant {kind} {unknown['axis']}"
     return f"{'an' if kind[0] == 'e' else 'a'} {kind} {unknown['axis']} that depends on {unknown['variable']}, best as {unknown['form']}"

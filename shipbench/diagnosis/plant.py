@@ -196,6 +196,11 @@ class Plant:
         """The same runs with some actuators (of n, delta, F_b, F_s) read to the other side."""
         return Plant(self.ship, self.seg.turned(actuators), self.long.turned(actuators), self.ordinary, self.froude)
 
+    def with_actuators(self, actuators: np.ndarray) -> Plant:
+        """The same runs with other records (B, K + 1, 4) of the actuators."""
+        seg = replace(self.seg, states=np.concatenate([self.seg.states[..., MOTION], actuators], axis=-1))
+        return Plant(self.ship, seg, self.long, self.ordinary, self.froude)
+
     @classmethod
     def of(cls, dataset: Dataset, most_steps: int = MOST_STEPS) -> Plant:
         """The plant of a data set, cut into segments of about 60 s at 130 m (Froude-scaled): over longer ones the motion is far from linear in its

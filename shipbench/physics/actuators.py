@@ -29,13 +29,15 @@ def lag_with_rate_limit(value: Array, command: Array, dt: Array, T: Array, rate:
 @dataclass(frozen=True)
 class Gear:
     """What lies between a command and its actuator: transport delay [s], time constant T [s], rate limit, deadband of the controller and play
-    (backlash) of the transmission, the last three in the actuator's units (and per second)."""
+    (backlash) of the transmission, these three in the actuator's units (and per second); T2: time constant [s] of what follows the motor, such as
+    the filter of a sensor, in place of play."""
 
     T: Array
     rate: Array
     delay: Array = 0.0
     deadband: Array = 0.0
     backlash: Array = 0.0
+    T2: Array = 0.0
 
 
 def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, substeps: int = 1) -> np.ndarray:
@@ -55,7 +57,7 @@ def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, sub
     part = shift - whole
     held, rows = np.repeat(command, substeps, axis=1), np.arange(runs)
     last = samples * substeps - 1
-    follows = replace(gear, **{name: 0.0 for name in ("deadband", "backlash") if not np.any(getattr(gear, name))})
+    follows = replace(gear, **{name: 0.0 for name in ("deadband", "backlash", "T2") if not np.any(getattr(gear, name))})
     for j in range(last + 1):
         now, before = held[rows, np.clip(j - whole, 0, last)], held[rows, np.clip(j - whole - 1, 0, last)]
         wanted = [(value, time) for value, time in ((before, part * h), (now, (1.0 - part) * h)) if not np.all(time <= 0.0)]
@@ -67,9 +69,20 @@ def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, sub
 def gear_step(motor: Array, position: Array, wanted: Sequence[tuple[Array, Array]], gear: Gear) -> tuple[Array, Array]:
     """Motor and actuator after commands that reach the controller one after the other, each with the seconds that it stands there."""
     for command, time in wanted:
+        before = motor
         moved = lag_with_rate_limit(motor, command, time, gear.T, gear.rate)
         motor = moved if is_neutral(gear.deadband, 0.0) else _stopped_short(motor, moved, command, gear.deadband)
+        if not is_neutral(gear.T2, 0.0):
+            position = _second_lag(position, before, motor, time, gear.T2)
+    if not is_neutral(gear.T2, 0.0):
+        return motor, position
     return motor, motor if is_neutral(gear.backlash, 0.0) else clip(position, motor - 0.5 * gear.backlash, motor + 0.5 * gear.backlash)
+
+
+def _second_lag(value: Array, before: Array, after: Array, dt: Array, T: Array) -> Array:
+    """What follows with time constant T a motor that moves evenly from `before` to `after` within `dt` seconds."""
+    behind = (after - before) * T / dt
+    return after - behind + (value - before + behind) * exp(-dt / T)
 
 
 def _stopped_short(before: Array, after: Array, wanted: Array, deadband: Array) -> Array:

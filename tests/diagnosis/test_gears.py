@@ -48,9 +48,9 @@ def test_machine_code_follows_as_numpy_does(compiler, which, monkeypatch):
 @pytest.mark.parametrize(("name", "value"), [("rudder_delay", 2.5), ("rudder_deadband", 0.04)])
 def test_findings_do_not_depend_on_the_compiler(compiler, name, value, monkeypatch):
     plant = trials(name, value)
-    found, ordinary = find_in_gears(plant)
+    found, ordinary, _ = find_in_gears(plant)
     monkeypatch.setattr(gears, "_follower", lambda field: None)
-    expected, as_before = find_in_gears(plant)
+    expected, as_before, _ = find_in_gears(plant)
     assert [f.effect for f in found] == [f.effect for f in expected]
     assert found[0].effect == name
     np.testing.assert_allclose([f.value for f in found], [f.value for f in expected], rtol=1e-3)
@@ -71,7 +71,7 @@ def test_an_ordinary_gear_is_found_at_any_sampling(dt):
             path = gear_path(inputs[:1, channel], inputs[None, :-1, channel], dt, gear)[0]
             states[:, 6 + channel] = path + noise * rng.standard_normal(len(path))
         runs.append(replace(run, t=dt * np.arange(len(inputs)), states=states, inputs=inputs))
-    found, ordinary = find_in_gears(Plant.of(replace(data, runs=tuple(runs), dt=dt)))
+    found, ordinary, _ = find_in_gears(Plant.of(replace(data, runs=tuple(runs), dt=dt)))
     assert max(f.score for f in found if f.actuator != "F") < 0.0
     assert ordinary["n"].rate == pytest.approx(3.0, rel=0.02)
     assert ordinary["delta"].rate == pytest.approx(np.deg2rad(2.5), rel=0.02)
