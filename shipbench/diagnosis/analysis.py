@@ -125,7 +125,7 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
         generic = tuple(dependences(selection.final))
         left = next((d for d in generic if d.score > asked(d, selection.off_form) and (d.of_sensor or d.variable in NO_FORM)), None)
         left = None if left is None or left.has_name else left
-    errors = [*misread, *judged(null, errors)]
+    errors = [*misread, *judged(null, [e for e in errors if e.actuator not in {m.actuator for m in misread}])]
     if unknown is None and errors and not selection.final.model.terms and not gears:
         most = max(errors, key=lambda e: e.score)
         unknown = Dependence(most.variable, most.axis, most.form, most.score, np.nan, most.size, 0.0)

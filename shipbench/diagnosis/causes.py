@@ -44,7 +44,10 @@ def describe_causes(
     named: list[Cause] = []
     for index, term in enumerate(found.final.model.terms):
         named.append(_term_cause(found, index, term, gain, runs))
-    named += [_gear_cause(found, g, gain) for g in found.gears]
+    gears = [_gear_cause(found, g, gain) for g in found.gears]
+    named = [c for c in named if c.effect not in {g.effect for g in gears}] + [
+        _with_motion(g, [c for c in named if c.effect == g.effect]) for g in gears
+    ]
     named.sort(key=lambda c: -c.score)
     if named and found.rival is not None:
         told = f"; {what_it_is(_described(found.rival))} would explain the runs about as well ({found.rival.score:.0f})"
@@ -150,6 +153,15 @@ def _gear_cause(found: Analysis, g: GearFinding, gain: Gain | None) -> Cause:
         "", gain,
         f"seen between command and record of the actuator, without the ship's motion; {runs} of {len(g.per_run)} runs support it",
     )  # fmt: skip
+
+
+def _with_motion(gear: Cause, motion: Sequence[Cause]) -> Cause:
+    """A cause of a gear's record with what the motion says of the same: a record that is late by as much as the motion is early is late alone."""
+    for c in motion:
+        sizes = ", ".join(f"{n} {e.value:.2g} {e.unit} ({e.ci95[0]:.2g} to {e.ci95[1]:.2g})" for n, e in c.parameters.items())
+        late = " (negative: the record is late)" if any(e.value < 0.0 for e in c.parameters.values()) else ""
+        gear = replace(gear, evidence=f"{gear.evidence}; between record and motion {sizes}{late}, which {c.evidence}")
+    return gear
 
 
 def _hull_cause(found: Analysis, gain: Gain | None) -> Cause:

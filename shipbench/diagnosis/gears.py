@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
@@ -195,23 +196,43 @@ class _Record:
     def _judged(self, usual: Gear) -> tuple[list[GearFinding], Gear, RecordError | None]:
         """The same of the record as it is, with an error that explains more than every effect.
 
-        Two stages look like a delay; they are fitted only where something is to be explained, since that takes as long as all the others.
+        Two stages look like a delay, end stops like an error: they are fitted only where something is to be explained, since that takes as long as
+        all the others.
         """
         kinds = _kinds(self.name, self.scale, float(np.percentile(np.abs(self.command), 98)), usual)
         ordinary, fits = self._fitted(None), [self._fitted(kind) for kind in kinds]
         gear, plain = Gear(*(float(v) for v in np.exp(ordinary))), self.errors(ordinary[None], None)[0]
         found = [self._finding(kind, z, plain) for kind, z in zip(kinds, fits, strict=True)]
-        if max(self._misread(ordinary, None, plain).score, *(f.score for f in found)) < _LEAST_SCORE:
+        stops, _ = self._ended(ordinary, None, float(np.sum(plain**2)))
+        if max(stops, self._misread(ordinary, None, plain).score, *(f.score for f in found)) < _LEAST_SCORE:
             return found, gear, None
         second = _Kind("", "T2", 0.02 * self.scale, _SECOND * ORDINARY[self.name].T * self.scale)
-        z = self._fitted(second)
+        z = self._fitted(second, [ordinary, *fits])
         plain = min(plain, self.errors(z[None], second)[0], key=lambda e: float(np.sum(e**2)))
         found = [self._finding(kind, fit, plain) for kind, fit in zip(kinds, fits, strict=True)]
         error = self._misread(z, second, plain)
         for _ in range(_CORRECTIONS):
-            z = replace(self, measured=error.taken_out(self.measured))._fitted(second)
+            z = replace(self, measured=error.taken_out(self.measured))._fitted(second, [ordinary, *fits])
             error = self._misread(z, second, plain)
-        return found, gear, error if error.score > max(_LEAST_SCORE, *(f.score for f in found)) else None
+        least, before = max(_LEAST_SCORE, *(f.score for f in found)), float(np.sum(plain**2))
+        worth, record = max((self._ended(fit, kind, before) for fit, kind in zip((ordinary, *fits), (None, *kinds), strict=True)), key=lambda x: x[0])
+        if worth > max(least, error.score):
+            return record._judged(usual)
+        return found, gear, error if error.score > least else None
+
+    def _ended(self, z: np.ndarray, kind: _Kind | None, before: float) -> tuple[float, _Record]:
+        """The same with orders ended where the record of a gear says that its stops are, and the score of these (and of `kind`)."""
+        from scipy.optimize import minimize_scalar
+
+        def ended(limit: float) -> _Record:
+            return replace(self, command=np.clip(self.command, -limit, limit))
+
+        most, record = float(np.max(np.abs(self.command))), self
+        for _ in range(2):
+            best = minimize_scalar(lambda limit, z=z: ended(limit).costs(z[None], kind)[0], bounds=(0.2 * most, most), method="bounded")
+            record = ended(float(best.x))
+            z = record._fitted(kind)
+        return self._worth(before, record.errors(z[None], kind)[0], 1 + (kind is not None)), record
 
     def _misread(self, z: np.ndarray, kind: _Kind | None, plain: np.ndarray) -> RecordError:
         """What the record reads beside the positions of a gear; score: against the errors `plain`."""
@@ -229,8 +250,8 @@ class _Record:
         samples, after = float(self.judged.sum()), max(float(np.sum(rest**2)), 1e-300)
         return float(samples * _discount(rest) * np.log(max(before, 1e-300) / after) - values * np.log(10.0 * len(np.unique(self.run))))
 
-    def _fitted(self, kind: _Kind | None) -> np.ndarray:
-        """Logarithms of the time constant, the rate[, the value of `kind`] of the best gear."""
+    def _fitted(self, kind: _Kind | None, near: Sequence[np.ndarray] = ()) -> np.ndarray:
+        """Logarithms of the time constant, the rate[, the value of `kind`] of the best gear, which may have the first two of one that is `near`."""
         span = float(np.percentile(np.abs(self.command), 98))
         rate = max(least_rate(self.name, self.scale), 0.01 * span / self.scale)
         most = max(10.0 * span / self.dt, 2.0 * rate)
@@ -238,7 +259,7 @@ class _Record:
         if kind is not None:
             low, high = np.resize(low, max(2, kind.at + 1)), np.resize(high, max(2, kind.at + 1))
             low[kind.at], high[kind.at] = np.log(kind.low), np.log(kind.high)
-        return self._least(kind, low, high)
+        return self._least(kind, low, high, near)
 
     def _finding(self, kind: _Kind, z: np.ndarray, plain: np.ndarray) -> GearFinding:
         rest = self.errors(z[None], kind)[0]
@@ -256,14 +277,15 @@ class _Record:
         gear = replace(Gear(*(float(v) for v in np.exp(z[:2]))), **{kind.field: size})
         return GearFinding(kind.effect, score, value, (value - spread, value + spread), per_run, self.name, gear)
 
-    def _least(self, kind: _Kind | None, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    def _least(self, kind: _Kind | None, low: np.ndarray, high: np.ndarray, near: Sequence[np.ndarray]) -> np.ndarray:
         """Minimum of the squared error inside a box: a grid, and a pattern of neighbours of its best point that shrinks when none is much better
         (else it creeps along a valley where the time constant hardly matters).
 
         Deadband and play leave the cost without a usable slope. The valley is narrow in the rate and in what is
         looked for: these are scanned closely.
         """
-        points = np.array(list(product(*(np.linspace(a, b, n) for a, b, n in zip(low, high, _SCAN, strict=False)))))
+        grid = [np.linspace(a, b, n) for a, b, n in zip(low, high, _SCAN, strict=False)]
+        points = np.clip([*product(*grid), *((*z[:2], *rest) for z in near for rest in product(*grid[2:]))], low, high)
         half = (high - low) / np.array(_SCAN[: len(low)])
         pattern = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(low))))
         best, center = np.inf, points[0]

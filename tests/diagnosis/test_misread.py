@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -73,20 +74,47 @@ def test_what_is_wrong_with_a_gear_is_no_error_of_its_record_and_is_seen_beside_
     assert named(recorded(data, DELTA, ERRORS["5 % low"]))[0][0] == name
 
 
+def driven(gear: Callable[[np.ndarray, float, float], np.ndarray], noise: float = 0.2) -> Dataset:
+    """Trials whose rudder is at positions (samples,) that a gear gives for commands (samples * 50,), steps of time and a scale of times."""
+    data, rng, runs = trials(), np.random.default_rng(0), []
+    for run in data.runs:
+        position = gear(np.repeat(run.inputs[:-1, 1], 50), data.dt / 50, (data.ship.L / 130.0) ** 0.5)[::50]
+        states = run.states.copy()
+        states[:, DELTA] = position + np.deg2rad(noise) * rng.standard_normal(len(run))
+        runs.append(replace(run, states=states))
+    return data.with_runs(runs)
+
+
+def followed(command: np.ndarray, dt: float, scale: float, **more: float) -> np.ndarray:
+    return gear_path(np.zeros(1), command[None], dt, Gear(scale, 0.044 / scale, **{k: np.full(1, v) for k, v in more.items()}))[0]
+
+
 @pytest.mark.parametrize("noise", [0.2, 0.005], ids=["noise", "almost exact"])
 def test_a_gear_of_two_stages_is_an_ordinary_one(noise):
-    data, rng, runs = trials(), np.random.default_rng(0), []
-    scale, parts = (data.ship.L / 130.0) ** 0.5, 50
-    for run in data.runs:
-        motor = gear_path(run.states[:1, DELTA], np.repeat(run.inputs[None, :-1, 1], parts, axis=1), data.dt / parts, Gear(scale, 0.044 / scale))[0]
-        position = motor.copy()
-        for i in range(1, len(motor)):  # the trapezoidal rule, as nobody else here follows a second stage
-            h = 0.5 * data.dt / parts / scale
+    def two_stages(command, dt, scale):
+        motor = followed(command, dt, scale)
+        position, h = motor.copy(), 0.5 * dt / scale
+        for i in range(1, len(motor)):  # the trapezoidal rule: not the formula of `Gear.T2`
             position[i] = (position[i - 1] * (1.0 - h) + h * (motor[i] + motor[i - 1])) / (1.0 + h)
-        states = run.states.copy()
-        states[:, DELTA] = position[::parts] + np.deg2rad(noise) * rng.standard_normal(len(run))
-        runs.append(replace(run, states=states))
-    assert named(data.with_runs(runs)) == ([], [])
+        return position
+
+    assert named(driven(two_stages, noise)) == ([], [])
+
+
+@pytest.mark.parametrize(("more", "names"), [({}, []), ({"deadband": 0.026}, ["rudder_deadband"]), ({"delay": 2.0}, ["rudder_delay"])])
+def test_orders_beyond_the_end_stops_are_ordinary(more, names):
+    """Stops at 20 degrees, orders up to 35."""
+    effects, errors = named(driven(lambda command, dt, scale: followed(np.clip(command, -0.35, 0.35), dt, scale, **more)))
+    assert (effects[:1], errors) == (names, [])
+
+
+def test_a_late_record_is_named_once_and_told_from_a_late_rudder():
+    """The gear seems late, and the rudder acts before its record: the same effect twice, which no spec takes."""
+    data = sea_trials(load_mmg_ship("kcs"), 4, (), Trials(runs=12))
+    result = diagnose(recorded(data, DELTA, lambda d: np.r_[d[[0, 0]], d[:-2]]), gain=False)
+    assert ([c.effect for c in result.causes], result.extended_model) == (["rudder_delay"], "physics+rudder_delay")
+    assert result.causes[0].parameters["delay"].value == pytest.approx(2.0, abs=0.1)
+    assert "the record is late" in result.causes[0].evidence
 
 
 def test_the_motion_tells_whether_record_or_order_is_wrong():
