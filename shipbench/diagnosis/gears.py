@@ -25,8 +25,9 @@ _DELAY = 10.0
 """Longest delay [s] at 130 m that is looked for."""
 _SECOND, _PARTS = 0.5, 4
 """Greatest time constant of an ordinary second stage, as a share of the first's; parts of a sample in which it is followed."""
-_LEAST_SCORE, _LEAST_ERROR, _CORRECTIONS = 10.0, 0.03, 3
-"""Least score of an error of the record, least size that is told, relative, and how often record and gear are corrected in turn."""
+_LEAST_SCORE, _LEAST_ERROR, _CORRECTIONS, _PROMISING = 10.0, 0.03, 3, 0.1
+"""Least score of an error of the record, least size that is told, relative, how often record and gear are corrected in turn, and the share of what
+the best effect explains from which they are: that may make ten times as much of it."""
 _OWN_SPREAD, _RECORD, _CLOCK = 0.25, 0.01, 0.02
 """Standard deviations: of an ordinary gear's time constant, relative (a lag is reported beyond it); of the scale of a record, relative; of a time, in
 samples."""
@@ -211,10 +212,10 @@ class _Record:
         plain = min(plain, self.errors(z[None], second)[0], key=lambda e: float(np.sum(e**2)))
         found = [self._finding(kind, fit, plain) for kind, fit in zip(kinds, fits, strict=True)]
         error = self._misread(z, second, plain)
-        for _ in range(_CORRECTIONS):
+        least, before = max(_LEAST_SCORE, *(f.score for f in found)), float(np.sum(plain**2))
+        for _ in range(_CORRECTIONS if error.score > _PROMISING * least else 0):
             z = replace(self, measured=error.taken_out(self.measured))._fitted(second, [ordinary, *fits])
             error = self._misread(z, second, plain)
-        least, before = max(_LEAST_SCORE, *(f.score for f in found)), float(np.sum(plain**2))
         worth, record = max((self._ended(fit, kind, before) for fit, kind in zip((ordinary, *fits), (None, *kinds), strict=True)), key=lambda x: x[0])
         if worth > max(least, error.score):
             return record._judged(usual)
@@ -231,6 +232,8 @@ class _Record:
         for _ in range(2):
             best = minimize_scalar(lambda limit, z=z: ended(limit).costs(z[None], kind)[0], bounds=(0.2 * most, most), method="bounded")
             record = ended(float(best.x))
+            if self._worth(float(self.costs(z[None], kind)[0]), record.errors(z[None], kind)[0], 1) < 0.0:
+                return -np.inf, self
             z = record._fitted(kind)
         return self._worth(before, record.errors(z[None], kind)[0], 1 + (kind is not None)), record
 
@@ -251,7 +254,7 @@ class _Record:
         return float(samples * _discount(rest) * np.log(max(before, 1e-300) / after) - values * np.log(10.0 * len(np.unique(self.run))))
 
     def _fitted(self, kind: _Kind | None, near: Sequence[np.ndarray] = ()) -> np.ndarray:
-        """Logarithms of the time constant, the rate[, the value of `kind`] of the best gear, which may have the first two of one that is `near`."""
+        """Logarithms of the time constant, the rate[, the value of `kind`] of the best gear; near: gears like whose first two it may be."""
         span = float(np.percentile(np.abs(self.command), 98))
         rate = max(least_rate(self.name, self.scale), 0.01 * span / self.scale)
         most = max(10.0 * span / self.dt, 2.0 * rate)
@@ -285,7 +288,7 @@ class _Record:
         looked for: these are scanned closely.
         """
         grid = [np.linspace(a, b, n) for a, b, n in zip(low, high, _SCAN, strict=False)]
-        points = np.clip([*product(*grid), *((*z[:2], *rest) for z in near for rest in product(*grid[2:]))], low, high)
+        points = np.clip([(*z[:2], *rest) for z in near for rest in product(*grid[2:])] or [*product(*grid)], low, high)
         half = (high - low) / np.array(_SCAN[: len(low)])
         pattern = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(low))))
         best, center = np.inf, points[0]
