@@ -11,10 +11,11 @@ from ..physics.actuators import Gear
 from .gain import Extension
 from .gears import GearFinding, find_in_gears
 from .generic import NO_FORM, Dependence, Search, dependences
-from .misread import RecordError, judged
+from .misread import judged
 from .model import Scales
 from .plain import null_fit
 from .plant import Plant
+from .record_error import RecordError
 from .select import Selection, candidates_for, select
 from .settle import Fit, hull_evidence
 

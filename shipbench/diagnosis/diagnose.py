@@ -76,7 +76,7 @@ def diagnose(
     """
     if workers < 1:
         raise InputError(f"workers: {workers}; accepted: whole numbers from 1.")
-    began = time.perf_counter()
+    began, fingerprint = time.perf_counter(), dataset.fingerprint
     warnings = _check(dataset)
     units = check_units(dataset) if only is None else []
     dataset = corrected(dataset, units)
@@ -124,7 +124,7 @@ def diagnose(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes),
         candidates=tuple(describe_candidates(found, [c.effect for c in causes], measured)),
         what_is_wrong=what_is_wrong(trace), unexplained_after=remaining(found), extended_model="+".join(["physics", *names]),
-        fingerprint=dataset.fingerprint, seconds=time.perf_counter() - began, warnings=tuple(warnings), gain=worth.gain if causes else None,
+        fingerprint=fingerprint, seconds=time.perf_counter() - began, warnings=tuple(warnings), gain=worth.gain if causes else None,
         unknown=unknown_part(found), gain_per_run=worth.per_run if causes else (), trace=trace,
     )  # fmt: skip
 

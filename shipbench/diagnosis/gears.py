@@ -12,8 +12,8 @@ import numpy as np
 
 from ..ops import where
 from ..physics.actuators import Gear, gear_path, gear_step
-from .misread import CHANNELS, FORMS, RecordError, readings
 from .plant import Plant, Segments, ordinary_gears
+from .record_error import CHANNELS, FORMS, RecordError, readings
 
 if TYPE_CHECKING:
     from ..compiled import Lanes

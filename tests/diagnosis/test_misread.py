@@ -10,8 +10,8 @@ import pytest
 
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.gears import find_in_gears
-from shipbench.diagnosis.misread import RecordError
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.record_error import RecordError, readings
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.actuators import Gear, gear_path
 from shipbench.physics.mmg import load_mmg_ship
@@ -57,6 +57,12 @@ def test_an_error_of_the_record_is_no_deadband(ship, error):
     (found,) = errors
     angles = np.linspace(-0.5, 0.5, 11)
     np.testing.assert_allclose(found.taken_out(error(angles)), angles, atol=0.004)
+
+
+@pytest.mark.parametrize("factors", [(0.02, 0.6, 0.0, 0.0), (0.0, -0.4, 0.0, 0.0), (0.0, -0.1, 0.4, -0.1)])
+def test_taking_an_error_out_is_exact(factors):
+    error, true = RecordError("delta", "", 0.0, 0.0, np.array(factors)), np.linspace(-0.6, 0.6, 25)
+    np.testing.assert_allclose(error.taken_out(true + np.tensordot(error.factors, readings(true), 1)), true, atol=1e-9)
 
 
 def test_a_zero_error_is_none_of_them():
@@ -120,13 +126,15 @@ def test_a_late_record_is_named_once_and_told_from_a_late_rudder():
 def test_the_motion_tells_whether_record_or_order_is_wrong():
     """Low revolutions passed for a propeller of too much thrust."""
     data = sea_trials(load_mmg_ship("kcs"), 7, (), Trials(runs=12))
-    low = diagnose(recorded(data, N, lambda n: 0.9 * n), gain=False)
+    read_low = recorded(data, N, lambda n: 0.9 * n)
+    low = diagnose(read_low, gain=False)
     ordered = diagnose(data.with_runs([replace(r, inputs=r.inputs * np.r_[1.1, np.ones(r.inputs.shape[1] - 1)]) for r in data.runs]), gain=False)
     for result, axis, taken in ((low, "recorded revolutions", "ordered"), (ordered, "ordered revolutions", "recorded")):
         assert (result.verdict, result.causes) == ("unknown", ())
         assert (result.unknown["axis"], result.unknown["variable"]) == (axis, "revolutions")
         (text,) = (w for w in result.warnings if f"error of the {axis}" in w)
         assert f"it is taken as {taken}" in text
+    assert low.fingerprint == read_low.fingerprint  # of the data as they were given, though they are read otherwise
 
 
 def test_beside_a_named_cause_it_is_a_warning():

@@ -1,0 +1,62 @@
+"""What the record of an actuator errs by beside its commands, as a function of the position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+CHANNELS = {"n": (0,), "delta": (1,), "F": (2, 3)}
+"""Of the actuators that share a gear."""
+FORMS = ("constant", "{}", "{0}|{0}|", "|{}|")
+"""What the error of a record may follow."""
+_VARIABLES = {"n": "revolutions", "delta": "rudder", "F": "thrusters"}
+_BETTER = 10.0
+"""Least log evidence of the motion for another reading of a record, as for one of another sign."""
+_INVERSIONS, _LEAST_SLOPE = 8, 0.1
+
+
+def readings(at: np.ndarray) -> np.ndarray:
+    """The `FORMS` (4, ...) of positions (...)."""
+    return np.stack([np.ones_like(at), at, at * abs(at), abs(at)])
+
+
+@dataclass(frozen=True)
+class RecordError:
+    """What the record of an actuator reads beside where its commands bring the gear, and follows the position, best in this form: a scale that is
+    off, a sensor that is not linear.
+
+    score: 2 log likelihood ratio, as of a gear's effects; size: root mean square without the zero error, relative to that of the record; factors
+    (4,): of `readings`; worth: log evidence of the motion for the record without it (where negative, the gear does not go where it is sent).
+    """
+
+    actuator: str
+    form: str
+    score: float
+    size: float
+    factors: np.ndarray
+    worth: float = 0.0
+
+    @property
+    def variable(self) -> str:
+        """What it depends on."""
+        return _VARIABLES[self.actuator]
+
+    @property
+    def axis(self) -> str:
+        """What of the two is wrong: the order, where the motion speaks for the record."""
+        return f"{'ordered' if self.worth < -_BETTER else 'recorded'} {self.variable}"
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the motion speaks against the record beyond doubt."""
+        return self.worth > _BETTER
+
+    def taken_out(self, recorded: np.ndarray) -> np.ndarray:
+        """Positions that are recorded so (Newton's method; the record rises with the position)."""
+        _, straight, bent, split = self.factors
+        true = recorded
+        for _ in range(_INVERSIONS):
+            slope = np.maximum(1.0 + straight + 2.0 * bent * abs(true) + split * np.sign(true), _LEAST_SLOPE)
+            true = true - (true + np.tensordot(self.factors, readings(true), 1) - recorded) / slope
+        return true
