@@ -41,13 +41,9 @@ def describe_causes(
         causes.append(_late_cause(len(causes) + 1, found, late))
     if found.unknown is not None and (found.unknown.of_sensor or not doubt):
         return causes
-    named: list[Cause] = []
-    for index, term in enumerate(found.final.model.terms):
-        named.append(_term_cause(found, index, term, gain, runs))
-    gears = [_gear_cause(found, g, gain) for g in found.gears]
-    named = [c for c in named if c.effect not in {g.effect for g in gears}] + [
-        _with_motion(g, [c for c in named if c.effect == g.effect]) for g in gears
-    ]
+    seen = [_gear_cause(found, g, gain) for g in found.gears]
+    felt = [_term_cause(found, index, term, gain, runs) for index, term in enumerate(found.final.model.terms)]
+    named = [c for c in felt if c.effect not in {s.effect for s in seen}] + [_with_motion(s, [c for c in felt if c.effect == s.effect]) for s in seen]
     named.sort(key=lambda c: -c.score)
     if named and found.rival is not None:
         told = f"; {what_it_is(_described(found.rival))} would explain the runs about as well ({found.rival.score:.0f})"

@@ -108,8 +108,7 @@ def diagnose(
             found = analyse(plain_model(Plant.of(dataset, steps), settled=settled), seed=seed, misread=wrong)
             ahead, work = None, partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
         doubts = _doubts(found) if only is None else []
-        measured = wanted and not doubts
-        worth = _cross_validated(dataset, found, seed, work, pool, ahead) if measured else Worth()
+        worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts else Worth()
     warnings += [text for text, _ in standing(dataset).values()]
     warnings += said(dataset) + drift + wind + doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
     warnings += misread.said(found.misread)
@@ -122,7 +121,7 @@ def diagnose(
     names = [c.effect for c in causes if c.effect not in NOT_A_MODEL]
     return Diagnosis(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes),
-        candidates=tuple(describe_candidates(found, [c.effect for c in causes], measured)),
+        candidates=tuple(describe_candidates(found, [c.effect for c in causes], worth.gain is not None)),
         what_is_wrong=what_is_wrong(trace), unexplained_after=remaining(found), extended_model="+".join(["physics", *names]),
         fingerprint=fingerprint, seconds=time.perf_counter() - began, warnings=tuple(warnings), gain=worth.gain if causes else None,
         unknown=unknown_part(found), gain_per_run=worth.per_run if causes else (), trace=trace,

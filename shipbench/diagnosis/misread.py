@@ -34,11 +34,11 @@ def said(errors: Sequence[RecordError]) -> list[str]:
     told = []
     for e in errors:
         what = what_it_is({"axis": e.axis, "variable": e.variable, "form": e.form})
-        worth = f"{'better' if e.worth > 0.0 else 'worse'} by {abs(e.worth):.0f} of log evidence"
+        motion = "does not tell which of the two is right" if e.undecided else f"believes the {'order' if e.contradicted else 'record'}"
         told.append(
-            f"the runs show {what}: record and order differ by {e.size:.0%} (root mean square), however long the order stands. As ordered the plain "
-            f"model explains the motion {worth}: it is taken as {'ordered' if e.contradicted else 'recorded'}. Check the calibration of both; delay, "
-            "lag, deadband and play are judged without it."
+            f"the runs show {what}: they differ by {e.size:.0%} (root mean square), however long the order stands. The motion {motion} (log evidence "
+            f"of the plain model {e.worth:+.1f} as ordered): it is taken as {'ordered' if e.contradicted else 'recorded'}. Check the calibration of "
+            "both; delay, lag, deadband and play are judged without it."
         )
     return told
 

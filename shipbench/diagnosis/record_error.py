@@ -43,13 +43,19 @@ class RecordError:
         return _VARIABLES[self.actuator]
 
     @property
+    def undecided(self) -> bool:
+        """Whether the motion does not tell which of the two is wrong."""
+        return abs(self.worth) <= _BETTER
+
+    @property
     def axis(self) -> str:
-        """What of the two is wrong: the order, where the motion speaks for the record."""
-        return f"{'ordered' if self.worth < -_BETTER else 'recorded'} {self.variable}"
+        """What is wrong, as far as the motion tells."""
+        which = "recorded or ordered" if self.undecided else "recorded" if self.contradicted else "ordered"
+        return f"{which} {self.variable}"
 
     @property
     def contradicted(self) -> bool:
-        """Whether the motion speaks against the record beyond doubt."""
+        """Whether the motion speaks against the record."""
         return self.worth > _BETTER
 
     def taken_out(self, recorded: np.ndarray) -> np.ndarray:

@@ -137,10 +137,10 @@ def test_the_motion_tells_whether_record_or_order_is_wrong():
     assert low.fingerprint == read_low.fingerprint  # of the data as they were given, though they are read otherwise
 
 
-def test_beside_a_named_cause_it_is_a_warning():
+def test_beside_a_named_cause_it_is_a_warning_and_of_a_rudder_the_motion_does_not_tell():
     result = diagnose(
         recorded(sea_trials(load_mmg_ship("kcs"), 7, (Hidden(EFFECTS.get("current"), (0.3, 0.2)),), Trials(runs=12)), DELTA, ERRORS["10 % high"]),
         gain=False,
     )
     assert [c.effect for c in result.causes] == ["current"]
-    assert any("error of the recorded rudder" in w for w in result.warnings)
+    assert any("error of the recorded or ordered rudder" in w and "does not tell" in w for w in result.warnings)
