@@ -205,7 +205,7 @@ def test_validate_prints_every_row_and_fails_when_one_is_outside(cli, monkeypatc
         (["leaderboard"], "no results below runs/"),
         (["leaderboard", "toyset"], "toyset holds no results"),
         (["predict", "hold", "toyset"], "'hold' is not a saved model"),
-        (["data", "check", "nothing"], "unknown data set 'nothing'"),
+        (["data", "check", "nothing"], "unknown folder or data set 'nothing'"),
         (["data", "make", "harbour9"], "Did you mean 'harbour90'?"),
     ],
 )
@@ -245,5 +245,5 @@ def test_the_installed_command_says_bad_input_without_a_traceback(tmp_path):
     done = subprocess.run([command, "run", "-m", "hold", "-d", "nothing"], capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stdout == ""
-    assert done.stderr.startswith("error: unknown data set 'nothing'")
+    assert done.stderr.startswith("error: unknown folder or data set 'nothing'")
     assert done.stderr.count("\n") == 1

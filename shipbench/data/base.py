@@ -73,8 +73,7 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
         raise InputError(f"folder {folder} holds no dataset.toml; a data set has {files}.")
     parsed = parse_spec(spec)
     if parsed.name not in DATASETS:
-        more = " (nor is it a folder)" if os.sep in spec else ""
-        raise unknown_name(f"data set{more}", parsed.name, DATASETS.names())
+        raise unknown_name("folder or data set", parsed.name, DATASETS.names())
     if parsed.effects or parsed.path is not None:
         raise InputError(f"data set '{spec}': accepted: name, name[key=value,...] or a folder; effects (+name) belong to models.")
     part: DatasetPart = DATASETS.get(parsed.name)

@@ -96,7 +96,7 @@ def test_a_cache_that_fails_in_the_middle_costs_no_result_and_leaves_nothing(mad
         ("made[sede=1]", "'sede'. Did you mean 'seed'"),
         ("made[seed=abc]", "seed=abc"),
         ("made+current", "effects"),
-        ("file.py:made", "effects|unknown data set"),
+        ("file.py:made", "effects|unknown folder or data set"),
         ("made[seed]", "has no value"),
         ("mad", "Did you mean 'made'"),
     ],
