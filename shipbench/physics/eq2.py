@@ -105,7 +105,8 @@ def propulsion(u: Array, n: Array, c: Coefficients, e: Modifiers | None = None) 
     e = e or Modifiers()
     V_A = u - (c.w_P0 + e.wake) * maximum(u, 0.0)  # no wake going astern: the propeller then leads
     thrust = propeller.thrust_quadratic(n / 60.0, V_A, c.D_P, c.kt, c.rho) * e.thrust
-    race = propeller.race_speed(V_A, maximum(thrust, 0.0), c.D_P, c.rho)
+    behind = propeller.race_speed if is_neutral(e.reversal, 0.0) else propeller.race_through
+    race = behind(V_A, maximum(thrust, 0.0), c.D_P, c.rho)
     return (1.0 - c.t_P) * thrust, V_A, race if is_neutral(e.race, 1.0) else V_A + e.race * (race - V_A)
 
 
@@ -118,13 +119,14 @@ def rudder(
     straightening). Angle of attack a = delta + atan2(w_R, u_R). Lift acts across the inflow, to port for a > 0; drag along it.
     """
     e = e or Modifiers()
-    u2 = c.eta * race * race + (1.0 - c.eta) * V_A * V_A
+    u2, angle = c.eta * race * race + (1.0 - c.eta) * V_A * V_A, delta + e.delta
+    if not is_neutral(e.reversal, 0.0):
+        through = c.eta * race * absolute(race) + (1.0 - c.eta) * V_A * absolute(V_A)
+        u2 = sqrt(through * through + 1e-8)
+        angle = angle * (1.0 - 2.0 * e.reversal * smoothstep(-through, 0.0, 4e-4 * 9.81 * c.L))
     u_R = sqrt(u2 + 1e-6)
     w_R = e.sideways(0.364 * v + 0.66 * c.x_R * r * e.straightening_r)
     beta = arctan2(w_R, u_R)
-    angle = delta + e.delta
-    if not is_neutral(e.reversal, 0.0):
-        angle = angle * (1.0 - 2.0 * e.reversal * smoothstep(-V_A, 0.0, 0.02 * (9.81 * c.L) ** 0.5))
     a = clip(angle + beta, -ALPHA_MAX, ALPHA_MAX)
     q = 0.5 * c.rho * c.A_R * (u2 + w_R * w_R)
     lift = q * (p[4] + a * (p[5] + a * (p[6] + a * p[7]))) * e.lift_factor(a)

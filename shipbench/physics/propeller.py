@@ -98,3 +98,9 @@ def side_force_astern(n: Array, u: Array, D: float, L: float, T: float, rho: flo
 def race_speed(V_A: Array, thrust: Array, D: float, rho: float) -> Array:
     """Axial speed far behind the propeller, sqrt(V_A^2 + 8 T / (rho pi D^2)) (momentum theory); 0 where the thrust would stop the flow."""
     return sqrt(maximum(V_A * V_A + 8.0 * thrust / (rho * math.pi * D**2), 1e-8))
+
+
+def race_through(V_A: Array, thrust: Array, D: float, rho: float) -> Array:
+    """The same of a propeller that drives ahead in a flow which may come from astern: negative where that is the stronger of the two."""
+    s = V_A * absolute(V_A) + 8.0 * thrust / (rho * math.pi * D**2)
+    return s / sqrt(sqrt(s * s + 1e-8))
