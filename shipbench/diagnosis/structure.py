@@ -36,9 +36,9 @@ class Structure(Effect):
     and her rudder, which then works from its trailing edge; thrust of a propeller that the ship file leaves open (log of the factor): K_T goes with
     the pitch, 0.6 to 1.1 of the diameter, and thrust with the fourth power of the diameter, for which 0.6 T is 20 % too much or too little (KVLCC2,
     KCS). Quadrants that K_T does not know: drag of a propeller that stands still (V_A^2, in rho D^2: B4-70 has 0.31, K_T alone 0.14), from none to
-    twice that; flow at the rudder behind it, slower or faster by 20 %, and what a propeller that
-    turns astern sucks from there (of n D); the terms with n V_A, in k_1, of a propeller that turns astern, and of
-    one that turns ahead on a ship which goes astern (B4-70 against eq. 2: 0.8 to -0.2 and -0.3 to -1.5; Roddy, Hess & Faller 2006).
+    twice that; flow at the rudder behind it, slower or faster by 20 %, and what a propeller that turns astern sucks from there (of n D); the terms
+    with n V_A, in k_1, of a propeller that turns astern, and of one that turns ahead on a ship which goes astern (B4-70 against eq. 2: 0.8 to -0.2
+    and -0.3 to -1.5; Roddy, Hess & Faller 2006).
     """
 
     family = "hull"

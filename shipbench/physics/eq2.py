@@ -105,8 +105,10 @@ def propulsion(u: Array, n: Array, c: Coefficients, e: Modifiers | None = None) 
     e = e or Modifiers()
     V_A = u - (c.w_P0 + e.wake) * maximum(u, 0.0)  # no wake going astern: the propeller then leads
     thrust = propeller.thrust_quadratic(n / 60.0, V_A, c.D_P, c.kt, c.rho) * e.thrust
-    behind = propeller.race_speed if is_neutral(e.reversal, 0.0) else propeller.race_through
-    race = behind(V_A, maximum(thrust, 0.0), c.D_P, c.rho)
+    if is_neutral(e.reversal, 0.0):
+        race = propeller.race_speed(V_A, maximum(thrust, 0.0), c.D_P, c.rho)
+    else:  # the drag of a propeller that goes astern, but does not drive, is no race
+        race = propeller.race_through(V_A, maximum(thrust, 0.0) * smoothstep(n, 0.0, 1.0), c.D_P, c.rho)
     return (1.0 - c.t_P) * thrust, V_A, race if is_neutral(e.race, 1.0) else V_A + e.race * (race - V_A)
 
 

@@ -57,6 +57,7 @@ PARTS = [
     Part("propeller.four_quadrant", lambda n, a: (propeller.thrust_four_quadrant(n, a, 3.8, 1025.0),), (N_, U_)),
     Part("propeller.wake", lambda u, v, r: (propeller.wake_fraction(u, v, r, 0.33, -59.0, 2.0, 1.4, 1.4),), (U_, V_, R_), (1, 2), ()),
     Part("propeller.side_force", lambda n, u: propeller.side_force_astern(n, u, 3.8, 130.0, 6.1, 1025.0), (N_, U_)),
+    Part("propeller.race_through", lambda a, t: (propeller.race_through(a, t, 3.8, 1025.0),), (U_, (0.0, 5e5))),
     Part("propeller.race", lambda a, t: (propeller.race_speed(a, t, 3.8, 1025.0),), (U_, (0.0, 5e5))),
     Part("rudder.inflow", lambda u, n, t: (_inflow(u, n, t),), (U_, N_, (-3e5, 5e5))),
     Part("rudder.mmg", lambda u, v, r, d, w: rudder.mmg_rudder(u, v, r, d, w, BLADE, 130.0, 1025.0), (U_, V_, R_, D_, U_), (1, 2, 3), (1, 2)),
@@ -301,14 +302,27 @@ def test_a_reversed_propeller_takes_the_rudders_flow_in_eq2():
 @pytest.mark.parametrize(("share", "turned"), [(0.5, 0.0), (1.0, -1.0)])
 def test_a_rudder_in_flow_from_astern_works_from_its_trailing_edge(share, turned):
     def turn(u, mods):
-        sides = [eq2.accelerations(u, 0.0, 0.0, 0.0, s * 0.3, 0.0, 0.0, None, C, P_SYMMETRIC, mods)[2] for s in (1.0, -1.0)]
-        return sides[0] - sides[1]
+        return _turned(u, -80.0 if u < 0 else 0.0, mods)  # reversed, it drives no race
 
     plain, changed = Modifiers(), Modifiers(reversal=share)
     assert turn(2.0, changed) == pytest.approx(turn(2.0, plain))
     assert turn(-2.0, plain) > 0.0
-    # the propeller that stands still holds the flow back, which the plain formula takes for a race
-    assert turn(-2.0, changed) == pytest.approx(0.75 * turned * turn(-2.0, plain), abs=(0.25 * abs(turned) + 1e-7) * turn(-2.0, plain))
+    assert turn(-2.0, changed) == pytest.approx(turned * turn(-2.0, plain), abs=1e-7 * turn(-2.0, plain))
+
+
+def test_a_propeller_that_drives_ahead_against_sternway_turns_the_flow_at_the_rudder():
+    """A propeller that stands still does not, though its drag pushes the ship ahead."""
+    changed = Modifiers(reversal=1.0)
+    assert _turned(-1.0, 120.0, changed) > 0.0
+    assert _turned(-1.0, 0.0, changed) == pytest.approx(_turned(-1.0, -60.0, changed))
+    assert _turned(-1.0, 0.0, changed) < 0.0
+    assert _turned(1.0, 120.0, changed) == pytest.approx(_turned(1.0, 120.0, Modifiers()), rel=1e-6)
+
+
+def _turned(u, n, mods):
+    """What the rudder does to the yaw acceleration."""
+    sides = [eq2.accelerations(u, 0.0, 0.0, n, s * 0.3, 0.0, 0.0, None, C, P_SYMMETRIC, mods)[2] for s in (1.0, -1.0)]
+    return sides[0] - sides[1]
 
 
 def test_added_mass_between_sway_and_yaw_couples_both_ways():
