@@ -218,7 +218,7 @@ def complete(ship: Ship) -> Particulars:
         notes.append(f"rudder not given: area {rudder.area:.4g} m^2 from L T / 55")
     thrusters = ship.thrusters or Thrusters(x_bow=0.4 * ship.L, x_stern=-0.4 * ship.L)
     if ship.thrusters is None:
-        notes.append(f"thrusters not given: {thrusters.x_bow:.4g} m ahead and astern of midship from 0.4 L")
+        notes.append(f"thrusters not given: any there are {thrusters.x_bow:.4g} m ahead and astern of midship, from 0.4 L")
     wind = ship.wind or Wind(frontal_area=0.6 * ship.B**2, lateral_area=ship.L * 0.08 * ship.L)
     if ship.wind is None:
         notes.append(f"wind areas not given: frontal {wind.frontal_area:.4g} m^2 from 0.6 B^2, lateral {wind.lateral_area:.4g} m^2 from 0.08 L^2")

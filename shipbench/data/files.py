@@ -168,8 +168,8 @@ def complete_columns(table: pd.DataFrame, notes: list[str]) -> tuple[str, ...]:
     """Add what may be missing (with a note), and return the names of the inputs."""
     for actuator, command in zip(_ACTUATORS, COMMANDS, strict=True):
         if actuator not in table and command not in table:
-            table[actuator] = 0.0
-            notes.append(f"{actuator} is not recorded: taken as zero")
+            table[actuator] = table[command] = 0.0
+            notes.append(f"{actuator} and {command} are not recorded: taken as zero")
         if actuator not in table:
             table[actuator] = table.groupby("trajectory")[command].shift(1).fillna(table[command])
             notes.append(f"{actuator} is not recorded: taken as the command of the sample before")
