@@ -35,10 +35,11 @@ class Structure(Effect):
     which eq. (2) takes for those ahead (from there, as in cubic polynomials, to the change of sign of theory: Yoshimura, Nakao & Ishibashi 2009),
     and her rudder, which then works from its trailing edge; thrust of a propeller that the ship file leaves open (log of the factor): K_T goes with
     the pitch, 0.6 to 1.1 of the diameter, and thrust with the fourth power of the diameter, for which 0.6 T is 20 % too much or too little (KVLCC2,
-    KCS). Quadrants that K_T does not know: drag of a propeller that stands still (V_A^2, in rho D^2: B4-70 has 0.31, K_T alone 0.14), from none to
-    twice that; flow at the rudder behind it, slower or faster by 20 %, and what a propeller that turns astern sucks from there (of n D); the terms
-    with n V_A, in k_1, of a propeller that turns astern, and of one that turns ahead on a ship which goes astern (B4-70 against eq. 2: 0.8 to -0.2
-    and -0.3 to -1.5; Roddy, Hess & Faller 2006).
+    KCS). Quadrants that K_T does not know: drag of a propeller that stands still, beside K_T's own (V_A^2, in rho D^2: 0.14, B4-70 has 0.31); flow
+    at the rudder behind it, slower or faster by 20 %, and what a propeller that turns astern sucks from there (of n D); the terms with n V_A, in
+    k_1, of a propeller that turns astern, and of one that turns ahead on a ship which goes astern (B4-70 against eq. 2: 0.8 to -0.2, and -0.3 to
+    -1.5; Roddy, Hess & Faller 2006). The first and the last but one are narrow: in a stop they pass for mass or thrust, and where a ship needs more
+    she gets a wider spread (`ordinary.widened`).
     """
 
     family = "hull"
@@ -74,13 +75,13 @@ class Structure(Effect):
         Parameter("Y_r_astern", "1", 0.4, -1.0, 2.0),
         Parameter("reversal", "1", 0.3, -0.6, 0.6),
         Parameter("log_thrust", "1", 1.0, -3.0, 3.0),
-        Parameter("windmilling", "1", 0.1, -0.3, 1.0),
+        Parameter("windmilling", "1", 0.05, -0.3, 1.0),
         Parameter("stopped", "1", 0.2, -0.8, 0.8),
-        Parameter("thrust_backing", "1", 0.4, -1.5, 3.0),
-        Parameter("thrust_braking", "1", 0.4, -3.0, 1.5),
+        Parameter("thrust_backing", "1", 0.2, -1.5, 3.0),
+        Parameter("braking", "1", 0.4, -3.0, 1.5),
         Parameter("suction", "1", 0.25, -0.8, 0.8),
     )
-    backing, m_x, astern, windmilling, thrust_backing, thrust_braking = 0.5, -0.4, 0.7, 0.15, 0.3, -0.7
+    backing, m_x, astern, braking = 0.5, -0.4, 0.7, -0.7
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
 
     def spreads(self, ship: Particulars, measured_wind: bool) -> np.ndarray:
@@ -96,7 +97,7 @@ class Structure(Effect):
         names = [p.name for p in self.parameters]
         for name in ("N_v_astern", "Y_r_astern", "reversal"):
             centres[names.index(name)] = self.astern
-        for name in ("backing", "m_x", "windmilling", "thrust_backing", "thrust_braking"):
+        for name in ("backing", "m_x", "braking"):
             centres[names.index(name)] = getattr(self, name)
         return np.array([-c / p.typical for c, p in zip(centres, self.parameters, strict=True)])
 
@@ -125,8 +126,8 @@ class Structure(Effect):
         n, D, u = s.n / 60.0, ship.D_P, s.u - e.u_c
         ahead, V_A = maximum(n, 0.0), u - ship.w_P0 * maximum(u, 0.0)
         stands = (V_A * V_A / (V_A * V_A + (0.7 * math.pi * n * D) ** 2 + 1e-4)) ** 2
-        drag = (self.windmilling + q[1]) * maximum(V_A, 0.0) ** 2 * stands
-        turned = (self.thrust_backing + q[3]) * (ahead - n) * V_A + (self.thrust_braking + q[4]) * ahead * minimum(V_A, 0.0)
+        drag = q[1] * maximum(V_A, 0.0) ** 2 * stands
+        turned = q[3] * (ahead - n) * V_A + (self.braking + q[4]) * ahead * minimum(V_A, 0.0)
         e.push((1.0 - ship.t_P) * ship.rho * D**2 * exp(q[0]) * (ship.kt[1] * D * turned - drag), 0.0, 0.0)
         e.wake = e.wake + q[2] * (1.0 - ship.w_P0) * stands
         e.backing = e.backing + headway * q[5] * (ahead - n) * D / sqrt(V_A * V_A + 4e-4 * 9.81 * ship.L)
