@@ -119,7 +119,7 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
     if only is not None or cautious:
         return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, tuple(dependences(selection.final)))
     estimated = any(null.plant.ship.lacks(part) for part in ("rudder", "propeller"))
-    search = Search(selection.null, (*(_HULL_ALONE if hull > HULL_THRESHOLD else ()), *(_ESTIMATED if estimated else ())))
+    search = Search(selection.small or selection.null, (*(_HULL_ALONE if hull > HULL_THRESHOLD else ()), *(_ESTIMATED if estimated else ())))
     unknown, rival = _unknown(selection, gears, search)
     generic, left = tuple(search.found), None
     if selection.final.model.terms:
@@ -135,10 +135,14 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
 
 
 def asked(d: Dependence, off_form: float) -> float:
-    """Least score of an unknown force or error."""
-    if d.of_sensor or d.variable in NO_FORM:
+    """Least score of an unknown force or error. What goes with time, but leaves the latent force as large as it was, is motion with the waves."""
+    if not d.of_sensor and d.variable == "time" and d.taken < _LEAST_FORCE:
+        return np.inf
+    ahead = (d.axis, d.variable) == ("surge", "nothing")  # a resistance or a propeller of another form comes near a constant
+    if d.of_sensor or (d.variable in NO_FORM and not ahead):
         return _NO_FORM_THRESHOLD if d.size > (_LEAST_ERROR if d.of_sensor else _LEAST_FORCE) else np.inf
-    return GENERIC_THRESHOLD + _OFF_FORM[d.taken < NOTICEABLE] * off_form if d.taken > _LEAST_FORCE else np.inf
+    times = max(_OFF_FORM[d.taken < NOTICEABLE], 0.5 * off_form)  # so far off the regressions the form is a ship's own
+    return GENERIC_THRESHOLD + times * off_form if d.taken > _LEAST_FORCE else np.inf
 
 
 def _unknown(selection: Selection, gears: Sequence[GearFinding], search: Search) -> tuple[Dependence | None, Dependence | None]:

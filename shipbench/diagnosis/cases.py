@@ -187,7 +187,9 @@ def draw_hidden(rng: np.random.Generator, effect: Effect, ship: MMGShip | Publis
         return _bank(rng, effect, ship, size, case)
     q = []
     for p in parameters:
-        if p.shape:
+        if p.other:
+            q.append(0.0)
+        elif p.shape:
             q.append(float(np.clip(p.typical * rng.uniform(0.7, 1.4), p.low, p.high)))
         else:
             q.append(_sign(rng, effect, p) * size * abs(p.typical))

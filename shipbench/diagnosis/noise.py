@@ -21,13 +21,14 @@ _PERIODS, _DAMPING = (1.7, 2.0, 2.3), (0.1, 0.25)
 """Periods tried, in lags of the lowest correlation, and damping ratios."""
 
 
-def colour_of(found: Fit, share: float = 1.0) -> Colour:
-    """Correlation of the noise of each channel that suits the residuals by far better than none; found: of this share of the pieces."""
+def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colour:
+    """Correlation of the noise of each channel that suits the residuals by far better than none; found: of this share of the pieces. waves_alone:
+    look for motion with the waves, and for nothing that lasts."""
     worth = _WORTH * share
     colour = Colour.white(found.plant.steps + 1)
     best = evidence_with(found, colour)
     for channel in np.flatnonzero(found.plant.seg.seen).tolist():
-        ways = _lasting(found, colour, channel, best + worth) + _swinging(found, colour, channel)
+        ways = _swinging(found, colour, channel) + ([] if waves_alone else _lasting(found, colour, channel, best + worth))
         tried = [evidence_with(found, way) for way in ways]
         if tried and max(tried) > best + worth:
             best, colour = max(tried), ways[int(np.argmax(tried))]

@@ -33,12 +33,16 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
     """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion; where sensors err
     for longer than a sample, with such noise; without the few pieces that no ship's motion explains."""
     few = plant.thinned(FEW_PIECES)
-    found = _begun(few, scales)
+    found, share = _begun(few, scales), len(few.seg.run) / len(plant.seg.run)
     if plant.seg.commanded:
+        waves = colour_of(found, share, waves_alone=True)
+        if waves.share.any():  # a force that follows them says nothing of a gear
+            scales = scales.coloured(waves)
+            found = _begun(few, scales)
         for i, name, field in ((0, "n", "T"), (1, "delta", "rate"), (1, "delta", "T")):
             if np.ptp(plant.seg.commands[..., i]) > 0.0:
                 found = _with_gear(found, name, field)
-    colour = colour_of(found, len(few.seg.run) / len(plant.seg.run))
+    colour = colour_of(found, share)
     if few is not plant:
         found = _begun(plant.driven(found.plant.ordinary), scales)
     scales = found.scales.coloured(colour)
@@ -54,20 +58,24 @@ def first_evidence(plant: Plant, null: Fit) -> float:
 def _begun(plant: Plant, scales: Scales) -> Fit:
     """The first fit, of which the others take the background.
 
-    A push may drag it so far that nothing looks strange where it ends: a fit that creeps is made again without what is strange where it began, and
-    kept if it rests then.
+    On a ship far from the regressions the force that tracks her is so large that it may go on doing what the parameters should; and a push may drag
+    a fit so far that nothing looks strange where it ends. One that creeps is made again, from a force of ordinary size, then without what is strange
+    where it began, and kept if it rests then.
     """
     found = _without_strange(_first(plant, scales))
-    if found.excess > _CREEPS and len(pieces := strange_pieces(_first(plant, scales, iterations=1))):
-        calm = _without_strange(_first(plant.without(pieces), scales))
+    if found.excess > _CREEPS:
+        calm = _without_strange(_first(plant, scales, weak=True))
+        if calm.excess > _CREEPS and len(pieces := strange_pieces(_first(plant, scales, iterations=1))):
+            calm = _without_strange(_first(plant.without(pieces), scales))
         if calm.excess < _CREEPS:
             found = calm
     return replace(found, scales=scales.with_background(found.hyper))
 
 
-def _first(plant: Plant, scales: Scales, iterations: int = _FIRST_ITERATIONS) -> Fit:
+def _first(plant: Plant, scales: Scales, iterations: int = _FIRST_ITERATIONS, weak: bool = False) -> Fit:
     origin = Origin.of(plant, scales)
-    return fit(plant, scales, Model(), origin.point, origin.hyper, iterations=iterations, guess=origin.motion, far=True)
+    hyper = replace(origin.hyper, log_force=np.minimum(origin.hyper.log_force, 0.0)) if weak else origin.hyper
+    return fit(plant, scales, Model(), origin.point, hyper, iterations=iterations, guess=origin.motion, far=True)
 
 
 def _without_strange(found: Fit) -> Fit:

@@ -10,9 +10,10 @@ from .settle import Fit
 
 NEGLIGIBLE = 0.05
 """In typical sizes. With enough samples the form of a hull makes tiny causes certain: speeds 0.1 % off, a bank of a 65th of the usual suction."""
-_OWN = {"rudder_delay": 0.5}
-"""Likewise, seen in the motion: how soon a ship answers her rudder depends on heel and on the flow's memory, which eq. (2) does not know (S175 with
-heel, nothing hidden: 0.5 to 0.7 s early, 0.3 to 0.42 of the typical size)."""
+_OWN = {"rudder_delay": 0.5, "rudder_asymmetry": 0.25}
+"""Likewise. How soon a ship answers her rudder depends on heel and on the flow's memory, which eq. (2) does not know (S175 with heel, nothing hidden:
+0.5 to 0.7 s early, 0.3 to 0.42 of the typical size); the race of a single screw turns, and meets the rudder more on one side (5 % more race to one
+side, 4 % less to the other: 0.15 to 0.22 of the typical size)."""
 _DOUBT, _DOUBT_LATE = 0.05, 1e-5
 """Probability that a size is zero from which it is not sure; of a cause that begins with a run, which is chosen among hundreds of effects and runs.
 (Ten standard manoeuvres with nothing hidden: 0.01 to 1e-4; changes hidden in 24 runs: 1e-6 and less.)"""

@@ -77,7 +77,8 @@ class Step:
 class Selection:
     """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final one; off_form:
     what a cause that `passes_for_form` must be worth besides the threshold; unsure: effects taken out again, since over the runs their size may be
-    zero; tiny: effects that gain more than the threshold, but are too small to matter."""
+    zero; tiny: effects that gain more than the threshold, but are too small to matter; small: the plain model with those of them that it is better
+    with, where nothing else was found."""
 
     null: Fit
     final: Fit
@@ -87,6 +88,7 @@ class Selection:
     off_form: float = 0.0
     unsure: tuple[str, ...] = ()
     tiny: tuple[str, ...] = ()
+    small: Fit | None = None
 
 
 def passes_for_form(term: Term) -> bool:
@@ -193,9 +195,11 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     now, scores, steps, tiny, origin = null, first, [], set[str](), Origin.of(null.plant, null.scales)
 
     def gain(tried: Fit) -> float:
-        if careful and not matters(tried, -1):
+        term = tried.model.terms[-1]
+        ordinary = term.effect.breaks_symmetry or term.per_run  # every ship is a little unequal, every run has a breath of wind: beside it
+        if careful and not (ordinary or matters(tried, -1)):  # others are judged
             return -np.inf
-        return 2.0 * (tried.evidence - now.evidence) - off_form * passes_for_form(tried.model.terms[-1])
+        return 2.0 * (tried.evidence - now.evidence) - off_form * passes_for_form(term)
 
     for round_ in range(most):
         tried = refits(now, worth_a_refit(scores, now, threshold), origin, threshold)
@@ -214,11 +218,13 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         scores = screen(now)
     pruned = _backward(now, threshold, spare_last=False)
     pruned, unsure = _without(pruned, is_sure) if careful else (pruned, ())
+    all_of_them = pruned
     pruned, small = _without(pruned, matters) if careful else (pruned, ())
     if pruned is not now:
         now = looking_at(pruned, candidates)
         scores = screen(now)
-    return Selection(null, now, first, scores, steps, off_form, unsure, (*tiny, *small))
+    alone = looking_at(all_of_them, ()) if small and not now.model.terms else None
+    return Selection(null, now, first, scores, steps, off_form, unsure, (*tiny, *small), alone)
 
 
 def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:

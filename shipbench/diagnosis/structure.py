@@ -18,6 +18,7 @@ from ..effects.wake_variation import EFFECT as WAKE
 from ..effects.wind_coefficients import EFFECT as WIND
 from ..ops import Array, absolute, arctan2, clip, exp, maximum, minimum, smoothstep, sqrt, tanh
 from ..physics.modifiers import Flow, Modifiers
+from ..physics.thruster import fading
 from ..ship import Particulars
 
 
@@ -80,6 +81,9 @@ class Structure(Effect):
         Parameter("thrust_backing", "1", 0.2, -1.5, 3.0),
         Parameter("braking", "1", 0.4, -3.0, 1.5),
         Parameter("suction", "1", 0.25, -0.8, 0.8),
+        Parameter("bow_fading", "1", 0.25, -0.5, 1.2),
+        Parameter("stern_fading", "1", 0.25, -0.5, 1.2),
+        Parameter("walk_share", "1", 0.03, -0.5, 0.5),
     )
     backing, m_x, astern, braking = 0.5, -0.4, 0.7, -0.7
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
@@ -103,7 +107,7 @@ class Structure(Effect):
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         for (effect, centre), value in zip(self.parts, q[:6], strict=True):
-            effect.force(e, s, (centre + value,), ship)
+            effect.force(e, s, (centre + value, *(0.0,) * (len(effect.parameters) - 1)), ship)
         e.straightening, e.straightening_asymmetry, e.straightening_r = 1.0 + q[6], q[7], 1.0 + q[17]
         e.coupling = q[16] * ship.mass * ship.L
         e.m_x = 1.0 + self.m_x + q[24]
@@ -112,7 +116,10 @@ class Structure(Effect):
         GOING_ASTERN.force(e, s, (self.astern + q[25], self.astern + q[26], 0.0, ahead * (self.backing + q[19])), ship)
         e.reversal = self.astern + q[27]
         e.thrust = e.thrust * exp(q[28]) * (1.0 + q[18] * smoothstep(-s.n, 0.0, 1.0))
-        self._off_design(e, s, q[28:], ahead, ship)
+        self._off_design(e, s, q[28:34], ahead, ship)
+        ASTERN.force(e, s, (0.0, q[36]), ship)
+        lost = fading(s.u - e.u_c, ship.L)
+        e.bow, e.stern = e.bow * (1.0 - q[34] * lost), e.stern * (1.0 - q[35] * lost)
         unit = 0.5 * ship.rho * ship.L * ship.T
         u, v, r = s.u - e.u_c, s.v - e.v_c, s.r * ship.L
         drift = clip(v / sqrt(u * u + v * v + 1e-3 * ship.L), -0.5, 0.5)

@@ -32,7 +32,8 @@ class Parameter:
     """One value of an effect.
 
     typical, low, high are for a ship of 130 m; `scaling` says how they go with the length (Froude's law): a key of `_FROUDE`.
-    A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes are zero.
+    A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes are zero. An `other` one is
+    the amplitude of another form of the same cause, which a ship may have in its place: fitted, but not drawn for the suite.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Parameter:
     high: float
     scaling: str = "1"
     shape: bool = False
+    other: bool = False
 
     def for_length(self, L: float) -> Parameter:
         """The same parameter of a ship of length L [m]."""

@@ -1,4 +1,5 @@
-"""The thrusters lose force at forward speed: moment times 1 - loss q exp(1 - q), force with 0.6 of the loss, q = (u/2.1 m/s)^2.
+"""The thrusters lose force at forward speed: moment times 1 - loss q exp(1 - q), force with 0.6 of the loss, q = (u/2.1 m/s)^2, and both times
+1 - fading (1 - exp(-|u| / (0.1 sqrt(g L)))), which does not come back at higher speed.
 
 The worst speed is that of the ship's own tunnels (`physics.thruster`)."""
 
@@ -8,6 +9,7 @@ from collections.abc import Sequence
 
 from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
+from ..physics.thruster import fading
 from ..ship import Particulars
 from .base import Effect, Parameter
 
@@ -15,12 +17,13 @@ from .base import Effect, Parameter
 class ThrusterSpeedLoss(Effect):
     family = "thruster"
     summary = "loss of thruster force at speed"
-    source = "shape after Int. Shipbuild. Progress 1967 (physics reference, section 5, T41)"
-    parameters = (Parameter("loss", "1", 0.5, -0.5, 1.2),)
+    source = "shapes after Int. Shipbuild. Progress 1967 and k = exp(-|u|/u_0) (physics reference, 2.7 and section 5, T41)"
+    parameters = (Parameter("loss", "1", 0.5, -0.5, 1.2), Parameter("fading", "1", 0.5, -0.2, 1.2, other=True))
     separate = "thruster pushes at 0, 1 and 2 m/s"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        e.loss = e.loss + q[0]
+        left = 1.0 - q[1] * fading(s.u - e.u_c, ship.L)
+        e.loss, e.bow, e.stern = e.loss + q[0], e.bow * left, e.stern * left
 
 
 EFFECT = ThrusterSpeedLoss()

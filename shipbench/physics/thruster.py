@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..ops import Array, exp
+from ..ops import Array, absolute, exp
 
 
 @dataclass(frozen=True)
@@ -34,3 +34,11 @@ def tunnel_thrusters(u: Array, F_b: Array, F_s: Array, c: Tunnels, loss: Array =
         (1.0 - (c.loss_force + 0.6 * loss) * bump) * (F_b + F_s),
         (1.0 - (c.loss_moment + loss) * bump) * ((c.x_bow + lever) * F_b + c.x_stern * F_s),
     )
+
+
+def fading(u: Array, L: float) -> Array:
+    """Share of its force that a thruster may lose for good as the ship gathers way: 1 - exp(-|u| / (0.1 sqrt(g L))).
+
+    Source: shapes without a return at speed, k = exp(-|u| / u_0) and k = 1 + a Fn with a < 0 (physics reference 2.7). Limits: none at rest.
+    """
+    return 1.0 - exp(-absolute(u) / (0.1 * (9.81 * L) ** 0.5))

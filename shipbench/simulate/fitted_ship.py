@@ -39,8 +39,10 @@ def draw_hull(rng: np.random.Generator) -> list[Hidden]:
     """Differences of an ordinary ship from the regressions: hull derivatives, race at the rudder, wake in turns, thrusters at speed."""
     hull = EFFECTS.get("hull_derivatives")
     factors = np.clip(HULL_SPREAD * rng.standard_normal(len(hull.parameters)), -0.5, 0.5)
-    ordinary = (("race_gain", -0.45, 0.1), ("wake_variation", 0.35, 0.12), ("thruster_speed_loss", 0.25, 0.12))
-    own = [Hidden(EFFECTS.get(name), (float(centre + spread * rng.standard_normal()),)) for name, centre, spread in ordinary]
+    own = []
+    for name, centre, spread in (("race_gain", -0.45, 0.1), ("wake_variation", 0.35, 0.12), ("thruster_speed_loss", 0.25, 0.12)):
+        effect = EFFECTS.get(name)
+        own.append(Hidden(effect, (float(centre + spread * rng.standard_normal()), *(0.0 for _ in effect.parameters[1:]))))
     return [Hidden(hull, tuple(float(f) for f in factors)), *own]
 
 

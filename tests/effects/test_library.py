@@ -30,7 +30,7 @@ NAMES = [name for name in EFFECTS.names() if name != "change_point"]  # it has n
 MIRROR: dict[str, tuple[int, ...]] = {
     "current": (1,), "current_per_run": (1,), "wind": (1,), "wind_per_run": (1,), "wave_drift": (1,),  # the east component, at psi -> -psi
     "bank_suction": (1,),  # the bearing
-    "rudder_offset": (0,), "rudder_asymmetry": (0,), "propeller_walk": (0,), "propeller_walk_astern": (0,), "list": (0,),
+    "rudder_offset": (0,), "rudder_asymmetry": (0,), "propeller_walk": (0,), "propeller_walk_astern": (0, 1), "list": (0,),
     "heading_bias": (0,), "yaw_rate_bias": (0,), "antenna_offset": (1,),
 }  # fmt: skip
 """Indices of the values that change sign in a mirror that exchanges port and starboard; none for the others."""
