@@ -40,7 +40,8 @@ class Structure(Effect):
     at the rudder behind it, slower or faster by 20 %, and what a propeller that turns astern sucks from there (of n D); the terms with n V_A, in
     k_1, of a propeller that turns astern, and of one that turns ahead on a ship which goes astern (B4-70 against eq. 2: 0.8 to -0.2, and -0.3 to
     -1.5; Roddy, Hess & Faller 2006). The first and the last but one are narrow: in a stop they pass for mass or thrust, and where a ship needs more
-    she gets a wider spread (`ordinary.widened`).
+    she gets a wider spread (`ordinary.widened`). Last, other forms of what is above: force that thrusters lose for good as the ship gathers way, bow
+    and stern (reference 2.7), and side force of a propeller going astern as a share of its thrust at rest, of a few per cent.
     """
 
     family = "hull"

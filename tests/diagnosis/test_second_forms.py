@@ -1,0 +1,56 @@
+"""Causes that act in another form than the simulator's, and small inequalities that every ship has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipbench.diagnosis.analysis import asked
+from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.generic import Dependence
+from shipbench.effects.base import EFFECTS
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.physics.thruster import fading
+from shipbench.simulate.hidden import Hidden
+from shipbench.simulate.trials import Trials, sea_trials
+
+
+def named(effect: str, *values: float, ship: str = "container130") -> list[str]:
+    data = sea_trials(load_mmg_ship(ship), 5, (Hidden(EFFECTS.get(effect), values),), Trials())
+    return [cause.effect for cause in diagnose(data, gain=False).causes]
+
+
+def test_thrusters_that_lose_their_force_for_good_are_named():
+    assert named("thruster_speed_loss", 0.0, 1.0) == ["thruster_speed_loss"]
+
+
+def test_a_little_of_it_is_ordinary():
+    assert named("thruster_speed_loss", 0.0, 0.25) == []
+
+
+def test_a_side_force_that_is_a_share_of_the_thrust_astern_is_named():
+    assert named("propeller_walk_astern", 0.0, 0.3) == ["propeller_walk_astern"]
+
+
+def test_a_race_that_meets_the_rudder_a_little_more_on_one_side_is_ordinary_and_nothing_is_named_in_its_place():
+    assert named("rudder_asymmetry", 0.04, ship="kvlcc2_l7") == []
+
+
+def test_thrusters_fade_alike_ahead_and_astern_and_not_at_rest():
+    speeds = np.array([0.0, 3.57, -3.57, 100.0])
+    np.testing.assert_allclose(fading(speeds, 130.0), [0.0, 1.0 - np.exp(-1.0), 1.0 - np.exp(-1.0), 1.0], rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("variable", "axis", "taken", "told"),
+    [
+        ("time", "yaw", 0.03, False),  # motion with the waves: the latent force is as large without it
+        ("time", "yaw", 0.3, True),
+        ("heading", "yaw", 0.03, True),
+        ("nothing", "surge", 0.3, False),  # a resistance of another form
+        ("nothing", "sway", 0.3, True),
+    ],
+)
+def test_what_is_asked_of_an_unknown_force(variable, axis, taken, told):
+    force = Dependence(variable, axis, "form", 24.0, 0.3, 0.6, taken)
+    assert (force.score > asked(force, off_form=5.0)) == told
