@@ -77,10 +77,11 @@ def _columns(windows: Dataset) -> tuple[np.ndarray, list[str], dict[str, str]]:
     data = Data(model.c, batch, model.actuator_path(batch.s0, batch.U), model._wind(batch.U), windows.dt, model.substeps)
     effects = [EFFECTS.get(name) for name in _EFFECTS]
     sized = [effect.sized(windows.ship.L) for effect in effects]
-    forces = tuple((e, tuple(p.typical if p.shape else None for p in parameters)) for e, parameters in zip(effects, sized, strict=True))
+    held = [tuple(p.typical if p.shape else 0.0 if p.other else None for p in parameters) for parameters in sized]
+    forces = tuple(zip(effects, held, strict=True))
     runs = len(data.path)
     function = rollout_function(model.c, windows.dt / model.substeps, data.wind is not None, True, forces, model.particulars)
-    free = [(e, p) for e, parameters in zip(effects, sized, strict=True) for p in parameters if not p.shape]
+    free = [(e, p) for e, parameters in zip(effects, sized, strict=True) for p in parameters if not (p.shape or p.other)]
     p = np.concatenate([model.p, np.zeros(len(free))])
     _, S = data.linearised(function, batch.s0, data.inputs(data.path, with_time=True), p)
     root = np.sqrt(runs * data.truth.shape[1] * 6.0)
