@@ -196,8 +196,8 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
 
     def gain(tried: Fit) -> float:
         term = tried.model.terms[-1]
-        ordinary = term.effect.breaks_symmetry or term.per_run  # every ship is a little unequal, every run has a breath of wind: beside it
-        if careful and not (ordinary or matters(tried, -1)):  # others are judged
+        # every ship is a little unequal, every run has a breath of wind: what is too small of that stays, and others are judged beside it
+        if careful and not (term.effect.breaks_symmetry or term.per_run or matters(tried, -1)):
             return -np.inf
         return 2.0 * (tried.evidence - now.evidence) - off_form * passes_for_form(term)
 
@@ -218,13 +218,12 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         scores = screen(now)
     pruned = _backward(now, threshold, spare_last=False)
     pruned, unsure = _without(pruned, is_sure) if careful else (pruned, ())
-    all_of_them = pruned
+    whole = pruned
     pruned, small = _without(pruned, matters) if careful else (pruned, ())
     if pruned is not now:
         now = looking_at(pruned, candidates)
         scores = screen(now)
-    alone = looking_at(all_of_them, ()) if small and not now.model.terms else None
-    return Selection(null, now, first, scores, steps, off_form, unsure, (*tiny, *small), alone)
+    return Selection(null, now, first, scores, steps, off_form, unsure, (*tiny, *small), whole if small and not now.model.terms else None)
 
 
 def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:

@@ -42,7 +42,7 @@ def draw_hull(rng: np.random.Generator) -> list[Hidden]:
     own = []
     for name, centre, spread in (("race_gain", -0.45, 0.1), ("wake_variation", 0.35, 0.12), ("thruster_speed_loss", 0.25, 0.12)):
         effect = EFFECTS.get(name)
-        own.append(Hidden(effect, (float(centre + spread * rng.standard_normal()), *(0.0 for _ in effect.parameters[1:]))))
+        own.append(Hidden(effect, effect.internal({effect.parameters[0].name: centre + spread * rng.standard_normal()})))
     return [Hidden(hull, tuple(float(f) for f in factors)), *own]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,29 +61,37 @@ def turning_circle(sim: Simulator, speed: float, rpm: float, delta_deg: float, d
     )
 
 
-def zigzag_overshoots(sim: Simulator, speed: float, rpm: float, amplitude_deg: float, dt: float, duration: float) -> tuple[float, float]:
-    """First and second overshoot angles [deg] of a zig-zag that starts with the rudder at `amplitude_deg` (negative: to port first)."""
-    amplitude, sign = np.deg2rad(abs(amplitude_deg)), np.sign(amplitude_deg)
-    state, command = straight_state(speed, rpm), np.zeros((1, 4))
-    command[0, 0] = rpm
-    switches: list[int] = []
-    heading = [0.0]
+def zigzag_overshoots(sim: Simulator, speed: float, rpm: float, amplitudes_deg: Sequence[float], dt: float, duration: float) -> np.ndarray:
+    """First and second overshoot angles [deg], (Z, 2), of zig-zags that start with the rudder at each of `amplitudes_deg` (negative: to port first).
+
+    Raises:
+        WorkError: one of them has not reversed its rudder three times within `duration` [s].
+    """
+    sign, amplitude = np.sign(amplitudes_deg), np.abs(amplitudes_deg)
+    num, at = len(sign), np.deg2rad(amplitude)
+    state, command = straight_state(speed, rpm, num), np.zeros((num, 4))
+    command[:, 0] = rpm
+    switches: list[list[int]] = [[] for _ in range(num)]
+    headings = [state[:, PSI]]
     for k in range(round(duration / dt)):
-        side = sign * (-1) ** len(switches)  # heading side on which the rudder is reversed next
-        if side * state[0, PSI] >= amplitude:
-            switches.append(k)
-            side = -side
-        command[0, 1] = side * amplitude
-        state = sim.step(state, command, dt)
-        heading.append(float(state[0, PSI]))
-        if len(switches) == 3:
+        reversals = np.array([len(s) for s in switches])
+        if np.all(reversals == 3):
             break
-    if len(switches) < 3:
-        raise WorkError(f"zig-zag: only {len(switches)} rudder reversals within {duration:g} s; 3 are needed: sail longer.")
-    psi = np.rad2deg(np.asarray(heading))
-    first = float(np.max(sign * psi[switches[0] : switches[1] + 1])) - abs(amplitude_deg)
-    second = float(np.max(-sign * psi[switches[1] : switches[2] + 1])) - abs(amplitude_deg)
-    return first, second
+        side = sign * (-1.0) ** reversals  # heading side on which the rudder is reversed next
+        turns = (side * state[:, PSI] >= at) & (reversals < 3)
+        for i in np.flatnonzero(turns):
+            switches[i].append(k)
+        command[:, 1] = np.where(turns, -side, side) * at
+        state = sim.step(state, command, dt)
+        headings.append(state[:, PSI])
+    psi, least = np.rad2deg(headings), min(len(s) for s in switches)
+    if least < 3:
+        raise WorkError(f"zig-zag: only {least} rudder reversals within {duration:g} s; 3 are needed: sail longer.")
+    over = [
+        [np.max(side * psi[first : last + 1, i]) for side, first, last in zip((sign[i], -sign[i]), s, s[1:], strict=False)]
+        for i, s in enumerate(switches)
+    ]
+    return np.asarray(over) - amplitude[:, None]
 
 
 def self_propulsion_rpm(sim: Simulator, speed: float) -> float:

@@ -16,9 +16,9 @@ KCS_SPEED, KCS_RPM = 12.3467, 115.5
 
 # Overshoots (first, second) [deg] of the reference's own runs; source: physics reference, section 2.11.
 _ZIGZAG = {
-    ("kvlcc2_l7", 10): (5.6, 16.6), ("kvlcc2_l7", -10): (8.2, 10.6), ("kvlcc2_l7", 20): (12.3, 18.5), ("kvlcc2_l7", -20): (16.2, 13.7),
-    ("kcs", 10): (6.2, 12.2), ("kcs", -10): (7.8, 9.4), ("kcs", 20): (13.8, 16.2), ("kcs", -20): (16.1, 14.0),
-}  # fmt: skip
+    "kvlcc2_l7": {10: (5.6, 16.6), -10: (8.2, 10.6), 20: (12.3, 18.5), -20: (16.2, 13.7)},
+    "kcs": {10: (6.2, 12.2), -10: (7.8, 9.4), 20: (13.8, 16.2), -20: (16.1, 14.0)},
+}
 
 # Wageningen polynomial (Oosterveld & van Oossanen 1975), Z = 4, A_E/A_0 = 0.70, P/D = 0.8; physics reference, section 2.5.
 _KT_POLYNOMIAL = {0.0: 0.354, 0.2: 0.291, 0.4: 0.212, 0.6: 0.123, 0.8: 0.028}
@@ -80,12 +80,13 @@ def table() -> list[dict[str, Any]]:
             _row("kcs", f"advance, {35 * sign:+d} deg", turn.advance, advance, "L", None, True, "reference's own run"),
             _row("kcs", f"tactical diameter, {35 * sign:+d} deg", turn.tactical_diameter, diameter, "L", None, True, "reference's own run"),
         ]
-    for (name, angle), published in _ZIGZAG.items():
-        sim, speed, rpm, dt, duration = (
-            (model, KVLCC2_SPEED, KVLCC2_RPM, 0.1, 200.0) if name == "kvlcc2_l7" else (kcs, KCS_SPEED, KCS_RPM, 0.5, 900.0)
-        )
-        for label, computed, value in zip(("1st", "2nd"), zigzag_overshoots(sim, speed, rpm, angle, dt, duration), published, strict=True):
-            rows.append(_row(name, f"zig-zag {angle:+d}/{angle:+d}, {label} overshoot", computed, value, "deg", None, True, "reference's own run"))
+    for name, sim, speed, rpm, dt, duration in (
+        ("kvlcc2_l7", model, KVLCC2_SPEED, KVLCC2_RPM, 0.1, 200.0), ("kcs", kcs, KCS_SPEED, KCS_RPM, 0.5, 900.0)
+    ):  # fmt: skip
+        angles = _ZIGZAG[name]
+        for (angle, published), computed in zip(angles.items(), zigzag_overshoots(sim, speed, rpm, [*angles], dt, duration), strict=True):
+            for label, ours, theirs in zip(("1st", "2nd"), computed.tolist(), published, strict=True):
+                rows.append(_row(name, f"zig-zag {angle:+d}/{angle:+d}, {label} overshoot", ours, theirs, "deg", None, True, "reference's own run"))
     for J, value in _KT_POLYNOMIAL.items():
         computed = float(thrust_coefficient_four_quadrant(np.float64(J)))
         rows.append(_row("B4-70, P/D 0.8", f"K_T at J = {J:g}, 4 quadrants", computed, value, "1", 0.01, False, "Wageningen polynomial"))
