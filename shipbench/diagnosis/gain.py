@@ -67,8 +67,8 @@ def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
     lin = _lin(plant, scales, Rollout(plain_base(), terms, start))
     weights = _weights(lin)
     for _ in range(_STEPS):
-        base, own = lin.parameter_columns()
-        J = np.concatenate([base[..., free], *own], axis=-1) * weights[None, :, None]
+        base, own = lin.parameter_columns(free)
+        J = np.concatenate([base, *own], axis=-1) * weights[None, :, None]
         J = J * np.repeat(plant.seg.mask, 6, axis=1)[..., None]
         e = _errors(lin) * weights
         ok = np.isfinite(J).all(axis=(1, 2)) & np.isfinite(e).all(axis=1)

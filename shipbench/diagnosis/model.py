@@ -171,9 +171,9 @@ class Linearisation:
         return Columns(self.predicted, eta, latent, base, own, tuple(self._of_candidates(candidates)), tuple(self.bends))
 
     @_quiet
-    def parameter_columns(self) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-        """Those of the base parameters and of the terms in the model alone."""
-        p, ship = parameters(self.scales, self.point.base + _STEP * np.eye(NUM_BASE)[:, None, None, :])
+    def parameter_columns(self, free: Sequence[int] = range(NUM_BASE)) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+        """Those of the `free` base parameters and of the terms in the model alone."""
+        p, ship = parameters(self.scales, self.point.base + _STEP * np.eye(NUM_BASE)[list(free), None, None, :])
         changed, bent = self._changed(_STEP, p=p, ship=ship)
         self.base_sources, self.bends = self._ends(changed), [Bend(bent)]
         self.own_sources: list[np.ndarray | None] = []

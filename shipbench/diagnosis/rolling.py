@@ -1,12 +1,13 @@
 """Steps of eq. (2) with effects over many lanes at once: the formula, and machine code of it for every set of effects that is met.
 
 Lanes are (D, K, B): changed directions, samples, segments. What the ship and the effects' values are, the code takes as numbers: one compilation
-serves all ships and all fits with the same effects. Without a compiler numpy goes through the formula.
+serves all ships and all fits with the same effects, in whichever way these are fitted. Without a compiler numpy goes through the formula.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -37,6 +38,18 @@ class Active:
 
     effect: Effect
     q: tuple[Array, ...]
+
+    @property
+    def own(self) -> tuple[float, ...]:
+        """The effect's own numbers, which differ between the ways in which it is fitted (`Effect.fitted`)."""
+        numbers = numbers_of(tuple(vars(self.effect).values()))
+        return tuple(numbers) if all(isinstance(number, float) for number in numbers) else ()
+
+    def with_own(self, numbers: Iterator[Array]) -> Effect:
+        """The effect with others in their place."""
+        effect, attributes = copy(self.effect), vars(self.effect)
+        vars(effect).update(zip(attributes, with_numbers(tuple(attributes.values()), numbers), strict=True))
+        return effect
 
 
 @dataclass(frozen=True)
@@ -114,7 +127,7 @@ class Course:
 
     def _bundles(self, x: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, t: np.ndarray, *push: np.ndarray) -> list[Any]:
         """What the machine code takes, each spread over (D, K, B, S, its numbers)."""
-        values = np.stack(np.broadcast_arrays(*p, *(v for a in active for v in a.q)), axis=-1)[..., None, :]
+        values = np.stack(np.broadcast_arrays(*p, *(v for a in active for v in (*a.q, *a.own))), axis=-1)[..., None, :]
         stages = [a.reshape(*self.t.shape[:2], a.shape[2], -1) for a in (act, t, *push)]
         return [x, values, self._numbers, *stages, *([] if self.wind is None else [self.wind[:, :, None]])]
 
@@ -128,7 +141,7 @@ class Course:
     def _code(self, active: Sequence[Active], steps: bool) -> Lanes | None:
         """Machine code of the step, or of the accelerations; None where there is none."""
         kind = (self.wind is not None, steps)
-        key = (tuple((a.effect, len(a.q)) for a in active), *kind)
+        key = (tuple((type(a.effect) if a.own else a.effect, len(a.q), len(a.own)) for a in active), *kind)
         if key not in _built:
             if len(_built) >= _MOST_BUILT:
                 _built.clear()
@@ -204,7 +217,13 @@ def _traced(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool, a
     import casadi as ca
 
     stages, ship = 3 if steps else 1, numbers_of(_fields(vessel))
-    sizes = {"x": 6, "values": eq2.NUM_PARAMETERS + sum(len(a.q) for a in active), "numbers": 1 + len(ship), "act": 4 * stages, "t": stages}
+    sizes = {
+        "x": 6,
+        "values": eq2.NUM_PARAMETERS + sum(len(a.q) + len(a.own) for a in active),
+        "numbers": 1 + len(ship),
+        "act": 4 * stages,
+        "t": stages,
+    }
     sizes |= ({"push": 9} if steps else {}) | ({"wind": 2} if wind else {})
     whole = {name: ca.SX.sym(name, num) for name, num in sizes.items()}
     x, values, (h, *symbols), act, t, *_ = (ca.vertsplit(v) for v in whole.values())
@@ -212,7 +231,10 @@ def _traced(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool, a
     c, *fields = with_numbers(_fields(vessel), iter(symbols if any_ship else ship))
     named = Vessel(vessel.ship.model_copy(update=dict(zip(_names(vessel), fields, strict=True))), c)
     rest = iter(values)
-    p, effects = [next(rest) for _ in range(eq2.NUM_PARAMETERS)], [Active(a.effect, tuple(next(rest) for _ in a.q)) for a in active]
+    p, effects = [next(rest) for _ in range(eq2.NUM_PARAMETERS)], []
+    for a in active:
+        q = tuple(next(rest) for _ in a.q)
+        effects.append(Active(a.with_own(rest) if a.own else a.effect, q))
     if steps:
         push = ca.vertsplit(whole["push"])
         ends = step(tuple(x), [(act[4 * i : 4 * i + 4], push[3 * i : 3 * i + 3], t[i]) for i in range(3)], air, p, effects, named, h)

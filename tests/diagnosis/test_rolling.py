@@ -123,6 +123,20 @@ def test_one_compilation_serves_all_ships(compiler):
     assert len(rolling._built) == 2
 
 
+def test_and_all_ways_in_which_an_effect_is_fitted(compiler, monkeypatch):
+    found = []
+    for ship in ("kcs", "container130"):
+        plant = Plant.of(sea_trials(load_mmg_ship(ship), 5, (), Trials(runs=2, samples=30)))
+        for way in EFFECTS.get("wind").fitted(plant.c.L):
+            at = replace(point(plant, "wind"), terms=(Term(way, (), False),))
+            found.append((plant, at, Linearisation(plant, Scales(plant), at).motion))
+    assert len(rolling._built) == 2
+    monkeypatch.setattr(rolling.Course, "_code", lambda *_, **__: None)
+    for plant, at, motion in found:
+        assert_agree(motion, Linearisation(plant, Scales(plant), at).motion)
+    assert len({motion.tobytes() for _, _, motion in found}) == len(found) > 2
+
+
 class Stubborn(Effect):
     """Looks at its value, as no effect should: symbols have none."""
 
