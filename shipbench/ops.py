@@ -15,6 +15,10 @@ Array = Any
 """A float, numpy array, torch tensor or casadi SX/MX; all operands of one formula come from one back end (or are floats)."""
 
 
+_NUMPY = frozenset({np.ndarray, np.float64, float, int})
+"""Types that need no closer look: the loops of a simulation come here a million times."""
+
+
 def _backend(*args: Array) -> str:
     torch, casadi = sys.modules.get("torch"), sys.modules.get("casadi")
     for a in args:
@@ -33,13 +37,17 @@ def _tensors(*args: Array) -> list[Any]:
 
 
 def _unary(numpy_name: str, torch_name: str, casadi_name: str):
+    plain = getattr(np, numpy_name)
+
     def apply(x: Array) -> Array:
+        if type(x) in _NUMPY:
+            return plain(x)
         backend = _backend(x)
         if backend == "torch":
             return getattr(sys.modules["torch"], torch_name)(x)
         if backend == "casadi":
             return getattr(sys.modules["casadi"], casadi_name)(x)
-        return getattr(np, numpy_name)(x)
+        return plain(x)
 
     apply.__name__ = numpy_name
     apply.__doc__ = f"Elementwise `{numpy_name}`."
@@ -47,13 +55,17 @@ def _unary(numpy_name: str, torch_name: str, casadi_name: str):
 
 
 def _binary(numpy_name: str, torch_name: str, casadi_name: str):
+    plain = getattr(np, numpy_name)
+
     def apply(x: Array, y: Array) -> Array:
+        if type(x) in _NUMPY and type(y) in _NUMPY:
+            return plain(x, y)
         backend = _backend(x, y)
         if backend == "torch":
             return getattr(sys.modules["torch"], torch_name)(*_tensors(x, y))
         if backend == "casadi":
             return getattr(sys.modules["casadi"], casadi_name)(x, y)
-        return getattr(np, numpy_name)(x, y)
+        return plain(x, y)
 
     apply.__name__ = numpy_name
     apply.__doc__ = f"Elementwise `{numpy_name}`."
@@ -77,6 +89,8 @@ def where(condition: Array, yes: Array, no: Array) -> Array:
 
     With a torch condition at least one side must be a tensor: two plain numbers have no dtype, and torch would round them to float32.
     """
+    if type(condition) in _NUMPY and type(yes) in _NUMPY and type(no) in _NUMPY:
+        return np.where(condition, yes, no)
     backend = _backend(condition, yes, no)
     if backend == "torch":
         torch = sys.modules["torch"]

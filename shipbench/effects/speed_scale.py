@@ -1,8 +1,10 @@
-"""The recorded speeds, surge and sway, are too large by a constant share: u and v times 1 + scale."""
+"""The recorded speeds, surge and sway, are too large by a constant share: u and v times 1 + scale; or, of a log with one axis, u alone."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from typing import Self
 
 import numpy as np
 
@@ -17,11 +19,18 @@ class SpeedScale(Effect):
     source = "physics reference, section 5, S62"
     parameters = (Parameter("scale", "1", 0.05, -0.5, 0.5),)
     separate = "straight runs on reciprocal courses"
+    sway = 1.0
+
+    def fitted(self, L: float) -> tuple[Self, ...]:
+        """Both ways: a log has one axis or two, and the sway beside one axis comes from elsewhere."""
+        alone = copy(self)
+        alone.sway = 0.0
+        return self, alone
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
         out = S.copy()
         out[..., U] *= 1.0 + per_run(q[0])
-        out[..., V] *= 1.0 + per_run(q[0])
+        out[..., V] *= 1.0 + self.sway * per_run(q[0])
         return out
 
 

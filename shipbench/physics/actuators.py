@@ -55,13 +55,12 @@ def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, sub
     shift = gear.delay / h
     whole = np.floor(shift).astype(int)
     part = shift - whole
-    held, rows = np.repeat(command, substeps, axis=1), np.arange(runs)
-    last = samples * substeps - 1
+    held, steps, last = np.repeat(command, substeps, axis=1), np.arange(samples * substeps)[:, None], samples * substeps - 1
+    seen = [(held[np.arange(runs), np.clip(steps - whole - late, 0, last)], time) for late, time in ((1, part * h), (0, (1.0 - part) * h))]
+    seen = [(values, time) for values, time in seen if not np.all(time <= 0.0)]
     follows = replace(gear, **{name: 0.0 for name in ("deadband", "backlash", "T2") if not np.any(getattr(gear, name))})
     for j in range(last + 1):
-        now, before = held[rows, np.clip(j - whole, 0, last)], held[rows, np.clip(j - whole - 1, 0, last)]
-        wanted = [(value, time) for value, time in ((before, part * h), (now, (1.0 - part) * h)) if not np.all(time <= 0.0)]
-        motor, position = gear_step(motor, position, wanted, follows)
+        motor, position = gear_step(motor, position, [(values[j], time) for values, time in seen], follows)
         out[:, j + 1] = position
     return out
 
