@@ -41,7 +41,9 @@ class Structure(Effect):
     k_1, of a propeller that turns astern, and of one that turns ahead on a ship which goes astern (B4-70 against eq. 2: 0.8 to -0.2, and -0.3 to
     -1.5; Roddy, Hess & Faller 2006). The first and the last but one are narrow: in a stop they pass for mass or thrust, and where a ship needs more
     she gets a wider spread (`ordinary.widened`). Last, other forms of what is above: force that thrusters lose for good as the ship gathers way, bow
-    and stern (reference 2.7), and side force of a propeller going astern as a share of its thrust at rest, of a few per cent.
+    and stern (reference 2.7), side force of a propeller going astern as a share of its thrust at rest, of a few per cent, and a wake that falls with
+    the square of the angle at the propeller, as w_P0 exp(-4 beta_P^2) (reference 2.5: 0.2 to 0.5 of 1 - w_P0 for w_P0 of 0.18 to 0.33), or of S175
+    without end (Son & Nomoto 1982): thrust that she loses in long hard turns passed for mass.
     """
 
     family = "hull"
@@ -85,6 +87,7 @@ class Structure(Effect):
         Parameter("bow_fading", "1", 0.25, -0.5, 1.2),
         Parameter("stern_fading", "1", 0.25, -0.5, 1.2),
         Parameter("walk_share", "1", 0.03, -0.5, 0.5),
+        Parameter("wake_square", "1", 0.3, -1.0, 2.0),
     )
     backing, m_x, astern, braking = 0.5, -0.4, 0.7, -0.7
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
@@ -127,7 +130,8 @@ class Structure(Effect):
         X, Y = q[8] * v * v + q[9] * r * r, absolute(r) * (q[11] * v + q[12] * r)
         e.push(unit * X, unit * Y, unit * ship.L * r * (q[13] * absolute(r) + drift * (q[14] * v + q[15] * r)))
         beta_P = arctan2(-(v + ship.x_P * s.r), maximum(u, 0.0) + 0.1)
-        e.wake = e.wake - q[10] * (1.0 - ship.w_P0) * (1.0 - exp(-2.0 * absolute(beta_P))) * tanh(beta_P / 0.05)
+        in_turns = q[10] * (1.0 - exp(-2.0 * absolute(beta_P))) * tanh(beta_P / 0.05) + q[37] * (1.0 - exp(-4.0 * beta_P * beta_P))
+        e.wake = e.wake - (1.0 - ship.w_P0) * in_turns
 
     def _off_design(self, e: Modifiers, s: Flow, q: Sequence[Array], headway: Array, ship: Particulars) -> None:
         """Quadrants that K_T does not know: a propeller that does not drive or is turned against the flow."""

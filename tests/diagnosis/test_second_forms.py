@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.physics.thruster import fading
 from shipbench.records import Dataset
+from shipbench.signals import U
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
 
@@ -36,6 +39,15 @@ def test_a_little_of_it_is_ordinary():
 
 def test_a_side_force_that_is_a_share_of_the_thrust_astern_is_named():
     assert named(trials("propeller_walk_astern", 0.0, 0.3)) == ["propeller_walk_astern"]
+
+
+def test_the_scale_of_a_log_with_one_axis_is_named():
+    """Sway comes from elsewhere. It had been an `unknown` error of surge that goes with the speed."""
+    plain = sea_trials(load_mmg_ship("container130"), 5, (), Trials(runs=12))
+    factor = np.where(np.arange(10) == U, 0.95, 1.0)
+    found = diagnose(plain.with_runs([replace(run, states=run.states * factor) for run in plain.runs]), gain=False)
+    assert [cause.effect for cause in found.causes] == ["speed_scale"]
+    assert found.causes[0].parameters["scale"].value == pytest.approx(-0.05, abs=0.01)
 
 
 def test_a_race_that_meets_the_rudder_a_little_more_on_one_side_is_ordinary_and_nothing_is_named_in_its_place():
