@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -121,15 +120,11 @@ class Course:
             x = step(x, stages, air, p, active, self.vessel, self.h)
         return x
 
-    @cached_property
-    def _numbers(self) -> np.ndarray:
-        return np.array([self.h, *numbers_of(_fields(self.vessel))])
-
     def _bundles(self, x: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, t: np.ndarray, *push: np.ndarray) -> list[Any]:
         """What the machine code takes, each spread over (D, K, B, S, its numbers)."""
-        values = np.stack(np.broadcast_arrays(*p, *(v for a in active for v in (*a.q, *a.own))), axis=-1)[..., None, :]
+        values = np.stack(np.broadcast_arrays(*p, *(v for a in active for v in a.q)), axis=-1)[..., None, :]
         stages = [a.reshape(*self.t.shape[:2], a.shape[2], -1) for a in (act, t, *push)]
-        return [x, values, self._numbers, *stages, *([] if self.wind is None else [self.wind[:, :, None]])]
+        return [x, values, np.array([self.h, *_numbers(active, self.vessel)]), *stages, *([] if self.wind is None else [self.wind[:, :, None]])]
 
     def _evaluated(self, code: Lanes, num: int, bundles: Sequence[np.ndarray]) -> np.ndarray:
         """(D, K, B, num); D is that of the states or of the values."""
@@ -148,7 +143,7 @@ class Course:
             _built[key] = _compiled(active, self.vessel, *kind, any_ship=True)
         if _built[key] is not None:
             return _built[key]
-        own = (*key, *self._numbers)  # a formula that asks for the ship's proportions is traced for every ship
+        own = (*key, self.h, *_numbers(active, self.vessel))  # a formula that asks for the ship's proportions is traced for every ship
         if own not in _built:
             _built[own] = _compiled(active, self.vessel, *kind, any_ship=False)
         return _built[own]
@@ -194,6 +189,11 @@ def _fields(vessel: Vessel) -> tuple[Any, ...]:
     return (vessel.c, *(getattr(vessel.ship, name) for name in _names(vessel)))
 
 
+def _numbers(active: Sequence[Active], vessel: Vessel) -> list[float]:
+    """What the code takes as numbers besides the step: the ship's, and the effects' own."""
+    return [*numbers_of(_fields(vessel)), *(number for a in active for number in a.own)]
+
+
 def _names(vessel: Vessel) -> list[str]:
     return [name for name in type(vessel.ship).model_fields if name != "notes"]
 
@@ -209,32 +209,24 @@ def _compiled(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool,
 
 
 def _traced(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool, any_ship: bool) -> casadi.Function:
-    """The step, or the accelerations, of symbols: state, values of p and effects, h and the ship's numbers, actuators, times[, pushes][, wind].
+    """The step, or the accelerations, of symbols: state, values of p and effects, h and `_numbers`, actuators, times[, pushes][, wind].
 
     Raises:
         RuntimeError, TypeError, ValueError: an effect takes no symbols.
     """
     import casadi as ca
 
-    stages, ship = 3 if steps else 1, numbers_of(_fields(vessel))
-    sizes = {
-        "x": 6,
-        "values": eq2.NUM_PARAMETERS + sum(len(a.q) + len(a.own) for a in active),
-        "numbers": 1 + len(ship),
-        "act": 4 * stages,
-        "t": stages,
-    }
+    stages, numbers = 3 if steps else 1, _numbers(active, vessel)
+    sizes = {"x": 6, "values": eq2.NUM_PARAMETERS + sum(len(a.q) for a in active), "numbers": 1 + len(numbers), "act": 4 * stages, "t": stages}
     sizes |= ({"push": 9} if steps else {}) | ({"wind": 2} if wind else {})
     whole = {name: ca.SX.sym(name, num) for name, num in sizes.items()}
     x, values, (h, *symbols), act, t, *_ = (ca.vertsplit(v) for v in whole.values())
     air = ca.vertsplit(whole["wind"]) if wind else None
-    c, *fields = with_numbers(_fields(vessel), iter(symbols if any_ship else ship))
+    known, rest = iter(symbols if any_ship else numbers), iter(values)
+    c, *fields = with_numbers(_fields(vessel), known)
     named = Vessel(vessel.ship.model_copy(update=dict(zip(_names(vessel), fields, strict=True))), c)
-    rest = iter(values)
-    p, effects = [next(rest) for _ in range(eq2.NUM_PARAMETERS)], []
-    for a in active:
-        q = tuple(next(rest) for _ in a.q)
-        effects.append(Active(a.with_own(rest) if a.own else a.effect, q))
+    p = [next(rest) for _ in range(eq2.NUM_PARAMETERS)]
+    effects = [Active(a.with_own(known) if a.own else a.effect, tuple(next(rest) for _ in a.q)) for a in active]
     if steps:
         push = ca.vertsplit(whole["push"])
         ends = step(tuple(x), [(act[4 * i : 4 * i + 4], push[3 * i : 3 * i + 3], t[i]) for i in range(3)], air, p, effects, named, h)

@@ -147,6 +147,26 @@ class Stubborn(Effect):
             e.push(q[0] * ship.mass)
 
 
+class Shallow(Effect):
+    """Looks at its own number and at the ship's."""
+
+    name, family, parameters = "shallow", "hull", (Parameter("amplitude", "1", 1.0, -5.0, 5.0),)
+
+    def __init__(self, depth: float) -> None:
+        self.depth = depth
+
+    def force(self, e, s, q, ship):
+        if self.depth < 2.0 * ship.T:
+            e.push(q[0] * ship.mass)
+
+
+def test_one_that_asks_for_proportions_is_compiled_for_each_ship_and_number(compiler, plant):
+    x0, still = plant.seg.states[:, 0, :6], np.zeros((len(plant.seg.run), plant.steps + 1, 3))
+    ends = [plant.roll(x0, [0.0] * 11, [rolling.Active(Shallow(depth), (1e-2,))], still)[0, 1, 3] for depth in (1000.0, 5.0)]
+    assert ends[1] > ends[0]
+    assert sum(code is not None for code in rolling._built.values()) == 2
+
+
 def test_an_effect_that_takes_no_symbols_goes_through_numpy(plant):
     course = plant.course
     active = [rolling.Active(Stubborn(), (1e-3,))]

@@ -21,8 +21,8 @@ from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
 
 
-def trials(effect: str, *values: float, ship: str = "container130") -> Dataset:
-    return sea_trials(load_mmg_ship(ship), 5, (Hidden(EFFECTS.get(effect), values),), Trials())
+def trials(effect: str, *values: float, ship: str = "container130", runs: int = 24) -> Dataset:
+    return sea_trials(load_mmg_ship(ship), 5, (Hidden(EFFECTS.get(effect), values),), Trials(runs=runs))
 
 
 def named(data: Dataset) -> list[str]:
@@ -38,7 +38,7 @@ def test_a_little_of_it_is_ordinary():
 
 
 def test_a_side_force_that_is_a_share_of_the_thrust_astern_is_named():
-    assert named(trials("propeller_walk_astern", 0.0, 0.3)) == ["propeller_walk_astern"]
+    assert named(trials("propeller_walk_astern", 0.0, 0.3, runs=12)) == ["propeller_walk_astern"]
 
 
 def test_the_scale_of_a_log_with_one_axis_is_named():
