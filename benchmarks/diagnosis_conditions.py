@@ -119,6 +119,7 @@ CHANGES: dict[str, tuple[Trials, Callable[[Dataset], Dataset] | None]] = {
     "standard manoeuvres": (Trials(runs=10, samples=600, standard=True), None),
     "low-pass filtered": (Trials(), low_passed),
     "5 standard manoeuvres": (Trials(runs=5, samples=600, standard=True), None),
+    "8 standard manoeuvres of 400 s": (Trials(runs=8, samples=400, standard=True), None),
 }
 CONDITIONS = [*PLANS, *CHANGES]
 
