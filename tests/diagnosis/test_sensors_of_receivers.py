@@ -118,7 +118,7 @@ def _low_passed(data: Dataset) -> Dataset:
 def test_a_record_that_was_filtered_shows_its_cause_and_nothing_else():
     """Its smooth errors had been an `unknown` force."""
     hidden = Hidden(EFFECTS.get("rudder_offset"), (0.03,))
-    found = diagnose(_low_passed(published_trials(PUBLISHED["mariner"], 5015, (hidden,), Trials(runs=12))), gain=False)
+    found = diagnose(_low_passed(published_trials(PUBLISHED["mariner"], 5015, (hidden,))), gain=False)
     assert ([c.effect for c in found.causes], found.unknown) == (["rudder_offset"], None)
     assert found.causes[0].parameters["offset"].value == pytest.approx(0.03, rel=0.35), "the filter takes of the motion, too"
 
