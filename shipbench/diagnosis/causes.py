@@ -79,6 +79,8 @@ def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs
         score, supporters, beside = added.score, added.supporters, "where it was added"
     rivals = rivals_of(found, term)
     evidence = f"adds {0.5 * score:.0f} to the log evidence {beside}; {supporters} of {fit.plant.seg.runs} runs support it"
+    if effect.way:
+        evidence += f"; {effect.way}"
     if term.since is not None:
         evidence += f"; {effect.name} begins with run {runs[term.since]} (number {term.since}, the first is 0)"
     name = effect.name if term.since is None else "change_point"

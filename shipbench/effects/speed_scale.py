@@ -24,7 +24,7 @@ class SpeedScale(Effect):
     def fitted(self, L: float) -> tuple[Self, ...]:
         """Both ways: a log has one axis or two, and the sway beside one axis comes from elsewhere."""
         alone = copy(self)
-        alone.sway = 0.0
+        alone.sway, alone.way = 0.0, "surge alone is off, sway is not"
         return self, alone
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:

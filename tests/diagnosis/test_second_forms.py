@@ -48,6 +48,7 @@ def test_the_scale_of_a_log_with_one_axis_is_named():
     found = diagnose(plain.with_runs([replace(run, states=run.states * factor) for run in plain.runs]), gain=False)
     assert [cause.effect for cause in found.causes] == ["speed_scale"]
     assert found.causes[0].parameters["scale"].value == pytest.approx(-0.05, abs=0.01)
+    assert "surge alone" in found.causes[0].evidence
 
 
 def test_a_race_that_meets_the_rudder_a_little_more_on_one_side_is_ordinary_and_nothing_is_named_in_its_place():
