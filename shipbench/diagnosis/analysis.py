@@ -25,8 +25,9 @@ each diagnosis may raise it."""
 HULL_THRESHOLD = 30.0
 GENERIC_THRESHOLD, _OFF_FORM, _NO_FORM_THRESHOLD = 20.0, (4.0, 12.0), 16.0
 """Least score of an unknown force. What follows something that a ship's form depends on (`NO_FORM` is what it does not) must be worth so many times
-`Selection.off_form` besides, where what it takes is noticeable and where it is not. (550 sets without such a force, on development ships and ships of
-the literature under 18 conditions: 17 below that at the nearest.) Nor does an error of a sensor depend on the form: the record contradicts itself."""
+`Selection.off_form` besides: the first where what it takes is twice what is noticeable, the second where it is not noticeable, and between in
+proportion. (550 sets without such a force, on development ships and ships of the literature under 18 conditions: 17 below that at the nearest.) Nor
+does an error of a sensor depend on the form: the record contradicts itself."""
 _FAR_OFF = 0.5
 """The first factor grows with `off_form` from 8 on: so far off the regressions the form is a ship's own. (It rests on one ship, a boat of 17 m with
 `off_form` 16 and nothing hidden: 111 to 127 for u^2 delta in yaw, where four times would ask 85.)"""
@@ -144,7 +145,9 @@ def asked(d: Dependence, off_form: float) -> float:
     ahead = (d.axis, d.variable) == ("surge", "nothing")  # a resistance or a propeller of another form comes near a constant
     if d.of_sensor or (d.variable in NO_FORM and not ahead):
         return _NO_FORM_THRESHOLD if d.size > (_LEAST_ERROR if d.of_sensor else _LEAST_FORCE) else np.inf
-    times = max(_OFF_FORM[d.taken < NOTICEABLE], _FAR_OFF * off_form)
+    seen, hardly = _OFF_FORM
+    ordinary = seen + (hardly - seen) * min(max(2.0 - d.taken / NOTICEABLE, 0.0), 1.0)
+    times = max(ordinary, _FAR_OFF * off_form)
     return GENERIC_THRESHOLD + times * off_form if d.taken > _LEAST_FORCE else np.inf
 
 

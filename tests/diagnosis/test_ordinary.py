@@ -20,6 +20,7 @@ from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.eq2 import coefficients
 from shipbench.physics.mmg import load_mmg_ship
+from shipbench.physics.modifiers import Flow, Modifiers
 from shipbench.predictors._physics_fit import parameter_scale
 from shipbench.ship import Propeller, complete
 from shipbench.simulate.hidden import Hidden
@@ -49,6 +50,26 @@ def test_with_it_less_is_left_for_a_cause_of_the_same_kind(mariner):
     lin = Linearisation(mariner.plant, mariner.scales, mariner.point, mariner.motion)
     narrow = settle(lin, replace(mariner.model, widths=()), mariner.hyper, {}, mariner.candidates, leap=0.0)
     assert screen(mariner)[0].score < screen(narrow)[0].score
+
+
+def test_behind_a_propeller_that_drives_the_flow_is_that_of_one_that_drives():
+    """With exact sensors a leak of what holds for one that stands was enough to doubt the navy ship's file (21 spreads)."""
+    ship, zero = complete(load_mmg_ship("kcs").particulars), np.zeros(3)
+    u, names = 5.0, [p.name for p in STRUCTURE.parameters]
+    V_A = u * (1.0 - ship.w_P0)
+    n = np.array([60.0 * V_A / (0.95 * ship.D_P), 60.0 * V_A / (1.5 * ship.D_P), 0.0])  # J = 0.95, 1.5 and without end
+    flow = Flow(zero, zero, zero, zero, u + zero, zero, zero, n, zero, zero, zero)
+
+    def wake(stopped: float) -> np.ndarray:
+        e, q = Modifiers(), np.zeros(len(names))
+        q[names.index("stopped")] = stopped
+        STRUCTURE.force(e, flow, q, ship)
+        return np.asarray(e.wake)
+
+    changed = wake(0.2) - wake(0.0)
+    assert changed[0] == 0.0
+    np.testing.assert_array_less(0.0, np.diff(changed))
+    assert changed[2] == pytest.approx(0.2 * (1.0 - ship.w_P0), rel=1e-3)
 
 
 def test_an_ordinary_ship_keeps_its_spreads():
