@@ -12,7 +12,7 @@ from ..checking.units import UnitFinding
 from ..effects.base import EFFECTS, Effect
 from .analysis import HULL_THRESHOLD, Analysis
 from .clocks import NAMES, LateVelocities
-from .gears import GearFinding
+from .gears import GearFinding, slow_on_any_ship
 from .generic import Dependence
 from .model import FREE, HULL_SPREAD
 from .outcome import Candidate, Cause, Estimate, Gain, what_it_is
@@ -25,8 +25,6 @@ from .term import Term
 
 _TIE = 10.0
 """Candidates within this of the winner's score (2 log Bayes factor) are called confused with it."""
-_SLOW = ("rudder_lag", "rudder_rate_limit", "shaft_lag", "shaft_rate_limit", "thruster_lag")
-"""Slow against the ordinary gears of a ship of the file's length."""
 _DOUBT = "in the model, but not named while the ship file is in doubt"
 
 
@@ -58,10 +56,10 @@ def describe_causes(
 def _whatever_the_ship(name: str, found: Analysis) -> bool:
     """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, delay or play of a gear seen in its own record, a
     force that breaks a symmetry which every ship has. (46 trials, with nothing, wind, a rudder offset or a current hidden, each diagnosed with
-    another ship's file: no sensor and no such force was named but those that were there, while thrust, mass and others were.) How slow a gear may
-    be goes with the length of the ship: with the file of a shorter one an ordinary rudder or shaft is slow."""
+    another ship's file: no sensor and no such force was named but those that were there, while thrust, mass and others were.) With the file of a
+    shorter ship an ordinary rudder or shaft is slow: it must be slow for the longest ship."""
     effect = EFFECTS.get(name)
-    in_record = any(g.effect == name for g in found.gears) and name not in _SLOW
+    in_record = any(g.effect == name and slow_on_any_ship(g) for g in found.gears)
     return effect.family == "sensor" or effect.breaks_symmetry or in_record
 
 
@@ -246,7 +244,8 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
         late = any(t.label == label and t.since is not None for t in found.final.model.terms)
         return "named as a change_point" if late and "change_point" in named else _DOUBT
     if label in found.selection.unsure:
-        return "the runs do not agree that its size is not zero"
+        unsteady = "another value in every piece of a run explains more than one for the run"
+        return unsteady if s.term.per_run else "the runs do not agree that its size is not zero"
     if label in found.selection.tiny:
         return f"score {score:.0f}, but less than {least_size(label):.0%} of its typical size: too small to matter"
     if not s.term.per_run and float(np.trace(s.information)) < 1.0:

@@ -186,8 +186,9 @@ def _doubts(found: Analysis) -> list[str]:
     text = "; ".join(signs)
     return [
         f"{text}. Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)? Until that is sure, nothing is named but "
-        "what shows whatever the ship is (faults of sensors, delay and play of gears seen in their own record, and forces that know port from "
-        "starboard or a direction of the earth, with their sizes on the ship of the file); the candidates below are ranked as if it were."
+        "what shows whatever the ship is (faults of sensors, delay and play of gears seen in their own record, those slow for any ship, and forces "
+        "that know port from starboard or a direction of the earth, with their sizes on the ship of the file); the candidates below are ranked as "
+        "if it were."
     ]
 
 

@@ -28,6 +28,8 @@ _SECOND, _PARTS = 0.5, 4
 _LEAST_SCORE, _LEAST_ERROR, _CORRECTIONS, _PROMISING = 10.0, 0.03, 3, 0.1
 """Least score of an error of the record, least size that is told, relative, how often record and gear are corrected in turn, and the share of what
 the best effect explains from which they are: that may make ten times as much of it."""
+_LONGEST = 400.0
+"""Length [m] of the longest ships."""
 _OWN_SPREAD, _RECORD, _CLOCK = 0.25, 0.01, 0.02
 """Standard deviations: of an ordinary gear's time constant, relative (a lag is reported beyond it); of the scale of a record, relative; of a time, in
 samples."""
@@ -80,6 +82,14 @@ def least_rate(actuator: str, scale: float) -> float:
     if actuator == "delta" and scale > 0.4:
         scale = max(scale, 1.0)
     return ORDINARY[actuator].rate / scale ** _RATE_POWER[actuator]
+
+
+def slow_on_any_ship(found: GearFinding) -> bool:
+    """Whether a gear that is slower than those of its ship would be so on the longest ship, too; whatever does not go with the length is."""
+    scale = (_LONGEST / 130.0) ** 0.5
+    if found.effect.endswith("_lag"):
+        return ORDINARY[found.actuator].T * scale < found.gear.T
+    return not found.effect.endswith("_rate_limit") or found.gear.rate < least_rate(found.actuator, scale)
 
 
 def _kinds(actuator: str, scale: float, span: float, ordinary: Gear) -> list[_Kind]:

@@ -3,9 +3,11 @@ whether it matters."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from .gram import shared_alone
+from .gram import by_run, shared_alone
 from .settle import Fit
 
 NEGLIGIBLE = 0.05
@@ -21,6 +23,9 @@ _DOUBT, _DOUBT_LATE = 0.05, 1e-5
 _AGAINST = -2.0
 """2 log evidence of a cause, any one run taken away, below which the other runs speak against it. (A bank on ships of the literature that had none:
 -5 to -6, but 7 to 28 with the run that lay nearest to it; true causes, development cases: 10 and more.)"""
+
+
+_TAUS = np.log(np.array([0.03, 0.06, 0.1, 0.2, 0.3, 0.6, 1.0, 2.0, 3.0]) ** 2)
 
 
 def inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
@@ -57,14 +62,31 @@ def is_borne_by_one(fit: Fit, index: int) -> bool:
     return bool(with_all > 0.0 and len(left) > 1 and min(left) < _AGAINST)
 
 
+def is_steady(fit: Fit, index: int) -> bool:
+    """Whether one value in each run explains the runs better than one in each piece of it, everything else held where it is: a wind or a current
+    stays for a run, what the model lacks of the ship changes with the manoeuvre."""
+    columns, num = fit.columns_of(index), len(fit.gram.run)
+    pieces = replace(fit.gram, run=np.arange(num), runs=num).reduce(fit.hyper.log_force).S[:, columns]
+    others = ~np.isin(fit.prior.random, columns)
+    at, held = np.append(fit.prior.shared, fit.prior.random[others]), np.empty((num, len(fit.prior.shared) + int(np.sum(others))))
+    held[:, : len(fit.prior.shared)], held[:, len(fit.prior.shared) :] = fit.solution.mean, fit.solution.means[fit.gram.run][:, others]
+    information, left = pieces[:, :, columns], pieces[:, :, -1] - np.einsum("bcs,bs->bc", pieces[:, :, at], held)
+
+    def worth(A: np.ndarray, b: np.ndarray) -> float:
+        ways = [(A + np.exp(-t) * np.eye(len(columns)), t) for t in _TAUS]
+        return max(float(np.sum(b * np.linalg.solve(W, b[..., None])[..., 0]) - np.sum(np.linalg.slogdet(W)[1] + t * len(columns))) for W, t in ways)
+
+    return worth(by_run(information, fit.gram.run), by_run(left, fit.gram.run)) > worth(information, left)
+
+
 def is_sure(fit: Fit, index: int) -> bool:
     """Whether the values of a cause differ from zero (Hotelling's test over the runs), and the other runs do not speak against it where one bears it;
-    always where each run has its own."""
+    where each run has its own, whether they last for the run."""
     from scipy.stats import f
 
     term = fit.model.terms[index]
     if term.per_run:
-        return True
+        return is_steady(fit, index)
     value, num = fit.values[index], fit.plant.seg.runs
     size, free = len(value), max(num - len(value), 1)
     squares = float(value @ np.linalg.solve(covariance(fit, index), value))

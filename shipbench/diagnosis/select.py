@@ -77,8 +77,8 @@ class Step:
 class Selection:
     """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final one; off_form:
     what a cause that `passes_for_form` must be worth besides the threshold; unsure: effects taken out again, since over the runs their size may be
-    zero; tiny: effects that gain more than the threshold, but are too small to matter; small: the plain model with those of them that it is better
-    with, where nothing else was found."""
+    zero, or does not last for a run; tiny: effects that gain more than the threshold, but are too small to matter; small: the plain model with those
+    of them that it is better with, where nothing else was found."""
 
     null: Fit
     final: Fit
@@ -222,6 +222,9 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     pruned, small = _without(pruned, matters) if careful else (pruned, ())
     if pruned is not now:
         now = looking_at(pruned, candidates)
+        sure, more = _without(now, is_sure) if small else (now, ())  # without what is too small, too
+        if more:
+            now, unsure = looking_at(sure, candidates), unsure + more
         scores = screen(now)
     return Selection(null, now, first, scores, steps, off_form, unsure, (*tiny, *small), whole if small and not now.model.terms else None)
 

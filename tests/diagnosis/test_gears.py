@@ -85,3 +85,18 @@ def test_a_record_that_is_late_by_less_than_a_stage_has_a_slope_to_be_found_by()
     moved = [plant.path_of([Active(effect, (late,))]) - still for late in (-0.01, -0.02)]
     small, twice = (np.abs(m[..., 1]).max() for m in moved)
     assert 0.0 < small < twice < 2.5 * small
+
+
+@pytest.mark.parametrize(
+    ("effect", "actuator", "gear", "slow"),
+    [
+        ("shaft_lag", "n", Gear(25.0, 10.0), True),  # a Diesel of 12 s on a ship of 130 m needs 21 s on one of 400 m
+        ("shaft_lag", "n", Gear(15.0, 10.0), False),
+        ("rudder_rate_limit", "delta", Gear(1.0, np.deg2rad(0.6)), True),
+        ("rudder_rate_limit", "delta", Gear(1.0, np.deg2rad(1.6)), False),
+        ("rudder_delay", "delta", Gear(1.0, 0.1, delay=1.0), True),
+    ],
+)
+def test_what_is_slow_for_the_longest_ship_is_slow_for_any(effect, actuator, gear, slow):
+    found = gears.GearFinding(effect, 100.0, 1.0, (0.9, 1.1), np.zeros(4), actuator, gear)
+    assert gears.slow_on_any_ship(found) is slow

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.gram import Prior, Reduced, solve
+from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
 from shipbench.diagnosis.robust import covariance, inflation, is_borne_by_one, is_sure, least_size, matters
 from shipbench.diagnosis.select import passes_for_form
 from shipbench.diagnosis.term import Term
@@ -21,7 +21,7 @@ def _reduced(S: np.ndarray) -> Reduced:
     return Reduced(S, np.zeros(len(S)), np.zeros(0), np.zeros(0))
 
 
-def fit_of(estimates: np.ndarray, per_run: bool = False, since: int | None = None) -> SimpleNamespace:
+def fit_of(estimates: np.ndarray, since: int | None = None) -> SimpleNamespace:
     """Runs (N,) with information 9 each, whose own least squares estimates are given; prior N(0, 1)."""
     information, num = 9.0, len(estimates)
     S = np.empty((num, 2, 2))
@@ -31,7 +31,7 @@ def fit_of(estimates: np.ndarray, per_run: bool = False, since: int | None = Non
     return SimpleNamespace(
         reduced=_reduced(S), solution=SimpleNamespace(mean=mean, cov=cov), prior=Prior(np.array([0]), np.ones(1), *_NONE), values=(mean,),
         columns_of=lambda index: np.array([0]), plant=SimpleNamespace(seg=SimpleNamespace(runs=num)),
-        model=SimpleNamespace(terms=(SimpleNamespace(per_run=per_run, since=since),)),
+        model=SimpleNamespace(terms=(SimpleNamespace(per_run=False, since=since),)),
     )  # fmt: skip
 
 
@@ -85,8 +85,21 @@ def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
     assert is_sure(fit, 0)
 
 
-def test_values_of_single_runs_have_no_common_size_to_doubt():
-    assert is_sure(fit_of(np.resize([3.0, -3.0], RUNS), per_run=True), 0)
+@pytest.mark.parametrize("steady", [True, False])
+def test_a_value_for_each_run_is_sure_only_if_it_lasts_for_the_run(steady: bool):
+    """Four pieces to a run; what differs from piece to piece of it is no wind, however large."""
+    rng, pieces = np.random.default_rng(9), 4
+    run = np.repeat(np.arange(RUNS), pieces)
+    value = rng.standard_normal((RUNS if steady else len(run), 1))
+    Z = rng.standard_normal((len(run), 50, 11))  # eta, w of one knot for each axis, own, e
+    Z[..., -1] += 2.0 * (value[run] if steady else value) * Z[..., -2]
+    gram = Gram(np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 2)), run, RUNS)
+    prior = Prior(*_NONE, np.array([0]), np.log([4.0]))
+    fit = SimpleNamespace(
+        gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, solution=solve(gram.reduce(np.zeros(3)), prior),
+        columns_of=lambda index: np.array([0]), model=SimpleNamespace(terms=(SimpleNamespace(per_run=True, since=None),)),
+    )  # fmt: skip
+    assert is_sure(fit, 0) is steady
 
 
 @pytest.mark.parametrize("per_run", [False, True])

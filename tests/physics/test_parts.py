@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from shipbench.physics import actuators, eq2, hull, mmg, propeller, rudder, shallow_water, thruster, wind
+from shipbench.physics import actuators, eq2, hull, mmg, propeller, regressions, rudder, shallow_water, thruster, wind
 from shipbench.physics.modifiers import Modifiers
 from shipbench.ship import complete
 
@@ -375,3 +375,12 @@ def test_a_ship_drifting_with_the_current_feels_no_water():
     assert np.allclose(
         mmg.accelerations(SHIP, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, replace(env, wind_speed=0.5, wind_from=0.7 + np.pi)), 0.0, atol=1e-9
     )
+
+
+def test_a_beamy_ship_turns_with_added_inertia_about_her_middle():
+    """A tug of 30 m: the regression as printed gives J_z < 0, and Y of an added mass that stands 0.4 L before midship."""
+    of = regressions.clarke_1983(30.0, 10.0, 4.0, 0.55)
+    assert 0.03 < of.N_rd / of.Y_vd < 1.0 / 12.0
+    assert abs(of.N_vd / of.Y_vd) < 0.15
+    ordinary = regressions.clarke_1983(230.0, 32.2, 10.8, 0.651)
+    assert ordinary.N_rd / ordinary.Y_vd == pytest.approx(0.058, abs=1e-3)
