@@ -89,7 +89,7 @@ def slow_on_any_ship(found: GearFinding) -> bool:
     scale = (_LONGEST / 130.0) ** 0.5
     if found.effect.endswith("_lag"):
         return ORDINARY[found.actuator].T * scale < found.gear.T
-    return not found.effect.endswith("_rate_limit") or found.gear.rate < least_rate(found.actuator, scale)
+    return not found.effect.endswith("_rate_limit") or bool(found.gear.rate < least_rate(found.actuator, scale))
 
 
 def _kinds(actuator: str, scale: float, span: float, ordinary: Gear) -> list[_Kind]:

@@ -137,7 +137,8 @@ class Structure(Effect):
         """Quadrants that K_T does not know: a propeller that does not drive or is turned against the flow."""
         n, D, u = s.n / 60.0, ship.D_P, s.u - e.u_c
         ahead, V_A = maximum(n, 0.0), u - ship.w_P0 * maximum(u, 0.0)
-        stands = smoothstep(V_A * V_A / (V_A * V_A + (0.7 * math.pi * n * D) ** 2 + 1e-4), 0.17, 1.0)  # from J = 1 on
+        share = V_A * V_A / (V_A * V_A + (0.7 * math.pi * n * D) ** 2 + 1e-4)
+        stands = share * share * smoothstep(share, 0.15, 0.3)  # nothing up to J = 0.9, where it drives
         drag = q[1] * maximum(V_A, 0.0) ** 2 * stands
         turned = q[3] * (ahead - n) * V_A + (self.braking + q[4]) * ahead * minimum(V_A, 0.0)
         e.push((1.0 - ship.t_P) * ship.rho * D**2 * exp(q[0]) * (ship.kt[1] * D * turned - drag), 0.0, 0.0)

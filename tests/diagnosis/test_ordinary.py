@@ -57,7 +57,7 @@ def test_behind_a_propeller_that_drives_the_flow_is_that_of_one_that_drives():
     ship, zero = complete(load_mmg_ship("kcs").particulars), np.zeros(3)
     u, names = 5.0, [p.name for p in STRUCTURE.parameters]
     V_A = u * (1.0 - ship.w_P0)
-    n = np.array([60.0 * V_A / (0.95 * ship.D_P), 60.0 * V_A / (1.5 * ship.D_P), 0.0])  # J = 0.95, 1.5 and without end
+    n = np.array([60.0 * V_A / (0.9 * ship.D_P), 60.0 * V_A / (1.5 * ship.D_P), 0.0])  # J = 0.9, 1.5 and without end
     flow = Flow(zero, zero, zero, zero, u + zero, zero, zero, n, zero, zero, zero)
 
     def wake(stopped: float) -> np.ndarray:
