@@ -63,8 +63,8 @@ def is_borne_by_one(fit: Fit, index: int) -> bool:
 
 
 def is_steady(fit: Fit, index: int) -> bool:
-    """Whether one value in each run explains the runs better than one in each piece of it, everything else held where it is: a wind or a current
-    stays for a run, what the model lacks of the ship changes with the manoeuvre."""
+    """Whether one value in each run explains the runs no worse than one in each piece of it, everything else held where it is: a wind or a current
+    stays for a run, what the model lacks of the ship changes with the manoeuvre. Runs of one piece cannot tell."""
     columns, num = fit.columns_of(index), len(fit.gram.run)
     pieces = replace(fit.gram, run=np.arange(num), runs=num).reduce(fit.hyper.log_force).S[:, columns]
     others = ~np.isin(fit.prior.random, columns)
@@ -76,7 +76,7 @@ def is_steady(fit: Fit, index: int) -> bool:
         ways = [(A + np.exp(-t) * np.eye(len(columns)), t) for t in _TAUS]
         return max(float(np.sum(b * np.linalg.solve(W, b[..., None])[..., 0]) - np.sum(np.linalg.slogdet(W)[1] + t * len(columns))) for W, t in ways)
 
-    return worth(by_run(information, fit.gram.run), by_run(left, fit.gram.run)) > worth(information, left)
+    return worth(by_run(information, fit.gram.run), by_run(left, fit.gram.run)) >= worth(information, left)
 
 
 def is_sure(fit: Fit, index: int) -> bool:

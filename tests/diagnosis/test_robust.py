@@ -85,10 +85,10 @@ def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
     assert is_sure(fit, 0)
 
 
-@pytest.mark.parametrize("steady", [True, False])
-def test_a_value_for_each_run_is_sure_only_if_it_lasts_for_the_run(steady: bool):
-    """Four pieces to a run; what differs from piece to piece of it is no wind, however large."""
-    rng, pieces = np.random.default_rng(9), 4
+@pytest.mark.parametrize(("pieces", "steady", "sure"), [(4, True, True), (4, False, False), (1, True, True)])
+def test_a_value_for_each_run_is_sure_only_if_it_lasts_for_the_run(pieces: int, steady: bool, sure: bool):
+    """What differs from piece to piece of a run is no wind, however large; runs of one piece cannot tell."""
+    rng = np.random.default_rng(9)
     run = np.repeat(np.arange(RUNS), pieces)
     value = rng.standard_normal((RUNS if steady else len(run), 1))
     Z = rng.standard_normal((len(run), 50, 11))  # eta, w of one knot for each axis, own, e
@@ -99,7 +99,7 @@ def test_a_value_for_each_run_is_sure_only_if_it_lasts_for_the_run(steady: bool)
         gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, solution=solve(gram.reduce(np.zeros(3)), prior),
         columns_of=lambda index: np.array([0]), model=SimpleNamespace(terms=(SimpleNamespace(per_run=True, since=None),)),
     )  # fmt: skip
-    assert is_sure(fit, 0) is steady
+    assert is_sure(fit, 0) is sure
 
 
 @pytest.mark.parametrize("per_run", [False, True])
