@@ -26,6 +26,7 @@ _AGAINST = -2.0
 
 
 _TAUS = np.log(np.array([0.03, 0.06, 0.1, 0.2, 0.3, 0.6, 1.0, 2.0, 3.0]) ** 2)
+"""Variances of the values of single runs, or pieces, of which the likeliest is taken, in typical sizes."""
 
 
 def inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
@@ -67,10 +68,10 @@ def is_steady(fit: Fit, index: int) -> bool:
     stays for a run, what the model lacks of the ship changes with the manoeuvre. Runs of one piece cannot tell."""
     columns, num = fit.columns_of(index), len(fit.gram.run)
     pieces = replace(fit.gram, run=np.arange(num), runs=num).reduce(fit.hyper.log_force).S[:, columns]
-    others = ~np.isin(fit.prior.random, columns)
-    at, held = np.append(fit.prior.shared, fit.prior.random[others]), np.empty((num, len(fit.prior.shared) + int(np.sum(others))))
-    held[:, : len(fit.prior.shared)], held[:, len(fit.prior.shared) :] = fit.solution.mean, fit.solution.means[fit.gram.run][:, others]
-    information, left = pieces[:, :, columns], pieces[:, :, -1] - np.einsum("bcs,bs->bc", pieces[:, :, at], held)
+    held = np.zeros((num, pieces.shape[-1]))
+    held[:, fit.prior.shared], held[:, fit.prior.random] = fit.solution.mean, fit.solution.means[fit.gram.run]
+    held[:, columns], held[:, -1] = 0.0, -1.0
+    information, left = pieces[:, :, columns], -(pieces @ held[..., None])[..., 0]
 
     def worth(A: np.ndarray, b: np.ndarray) -> float:
         ways = [(A + np.exp(-t) * np.eye(len(columns)), t) for t in _TAUS]

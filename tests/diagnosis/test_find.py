@@ -8,12 +8,14 @@ from __future__ import annotations
 import os
 import secrets
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from shipbench.diagnosis.analysis import THRESHOLD
 from shipbench.diagnosis.cases import ON_PUBLISHED, draw_case, singles
+from shipbench.diagnosis.causes import _whatever_the_ship
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.outside import canonical
@@ -197,6 +199,14 @@ def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship
     if name == "speed_scale":  # beside which the file's thrust would be another
         assert any(r == "in the model, but not named while the ship file is in doubt" for r in reasons.values())
     assert next(iter(verdict.causes[0].parameters.values())).value == pytest.approx(np.linalg.norm(values), rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("wind_per_run", False), ("current_per_run", True), ("wind", True), ("heading_bias", True), ("mass_change", False)]
+)
+def test_under_doubt_a_wind_of_each_run_is_not_told(name, told):
+    """What the coefficients of another ship lack in a run's manoeuvre passes for it."""
+    assert _whatever_the_ship(name, SimpleNamespace(gears=())) is told
 
 
 def test_the_file_of_a_ship_of_another_size_is_doubted():

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
+from shipbench.diagnosis import other_size
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.other_size import better_size
 from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
-from shipbench.ship import complete
+from shipbench.ship import Ship, complete
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials
 
@@ -41,3 +44,14 @@ def test_a_file_of_a_smaller_or_larger_similar_ship_is_doubted(plant, factor, be
     wrong = plant.resized(factor)
     (line,) = better_size(null_fit(wrong, Scales(wrong)))
     assert line.startswith(f"a similar ship of {better} times the size explains the runs better (by ")
+
+
+@pytest.mark.parametrize(("bare", "gain", "doubted"), [(False, 127.0, True), (True, 127.0, False), (True, 200.0, True)])
+def test_a_size_that_suits_an_estimated_propeller_needs_more_evidence(plant, monkeypatch, bare, gain, doubted):
+    """Mariner, known by her main dimensions alone, gains 127 as a ship of 2.5 times her size."""
+    evidence = {True: 0.0, False: gain}
+    monkeypatch.setattr(other_size, "first_evidence", lambda *_: gain)
+    monkeypatch.setattr(other_size, "null_fit", lambda at, _: SimpleNamespace(plant=at, evidence=evidence[at is few]))
+    monkeypatch.setattr(plant, "ship", complete(Ship(name="bare", L=175.0, B=25.4, T=8.5, displacement=21222.0)) if bare else plant.ship)
+    few = plant.thinned(99)
+    assert bool(better_size(SimpleNamespace(plant=plant, evidence=0.0))) is doubted
