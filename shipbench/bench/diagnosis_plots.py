@@ -91,7 +91,7 @@ def tracks(trace: Trace, changed: bool) -> list[Panel]:
     for b in telling(trace, changed):
 
         def draw(ax: Axes, b: int = b) -> None:
-            ax.plot(trace.measured[b, :, 1], trace.measured[b, :, 0], color=_INK, lw=2.2, alpha=0.55)
+            ax.plot(trace.measured[b, :, 1], trace.measured[b, :, 0], color=_INK, lw=2.2)
             for values, colour, style in ((trace.before, _BEFORE, (0, (4, 1.5))), (trace.after, _AFTER, "-"))[: 2 if changed else 1]:
                 path = _near(values[b, :, :2], trace.measured[b, :, :2])
                 ax.plot(path[:, 1], path[:, 0], color=colour, lw=1.3, ls=style)
