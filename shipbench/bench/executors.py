@@ -8,6 +8,7 @@ import logging
 import pickle
 import platform
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -70,7 +71,7 @@ class Execution:
                 raise InputError(f"{option} {value:g}; accepted: more than 0.")
 
 
-class Workers:
+class Workers(ABC):
     """Takes jobs. `room`: how many at once at most (None: all, the cluster queues them); `about`: who they are, for the progress.
 
     `sends_files`: the workers may not see this machine's files, so that a job must bring those of the model.
@@ -79,9 +80,9 @@ class Workers:
     def __init__(self, executor: Executor, room: int | None, about: str = "") -> None:
         self.executor, self.room, self.about, self.sends_files = executor, room, about, False
 
+    @abstractmethod
     def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
         """Start the job (or put it in the queue)."""
-        raise NotImplementedError
 
 
 class _Here(Executor):
