@@ -13,6 +13,7 @@ from .gears import GearFinding, find_in_gears
 from .generic import NO_FORM, Dependence, Search, dependences
 from .misread import judged
 from .model import Scales
+from .ordinary import NOTICEABLE
 from .plain import null_fit
 from .plant import Plant
 from .record_error import RecordError
@@ -38,9 +39,6 @@ _CONTENDS, _CONTENDERS = 0.5, 3
 _LEAST_FORCE, _LEAST_ERROR = 0.07, 0.3
 """Least size of an unknown force in units of the latent force: 0.35 mm/s^2; in yaw 7e-6 rad/s^2 at 130 m; and of an error in units of ordinary noise:
 0.07 deg, 0.012 m/s, 0.012 deg/s."""
-NOTICEABLE = 0.14
-"""Size from which a force is noticeable, and may doubt the ship file, in units of the latent force: 0.7 mm/s^2, a third of what a wind of 7 m/s
-gives; in yaw 1.4e-5 rad/s^2 at 130 m. Exact sensors or many samples show with certainty that ships differ in form from eq. (2)."""
 _HULL_ALONE = ("speed", "sway velocity", "yaw rate")
 _ESTIMATED = ("rudder", "revolutions", "revolutions and rudder", "speed and rudder")
 """A force that follows nothing but the hull's own motion is the hull's: where its derivatives are off, it is no unknown cause, and others are judged

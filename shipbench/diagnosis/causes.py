@@ -17,9 +17,9 @@ from .generic import Dependence
 from .model import FREE, HULL_SPREAD
 from .outcome import Candidate, Cause, Estimate, Gain, what_it_is
 from .plant import HULL, NUM_HULL
-from .robust import covariance, inflation, least_size
+from .robust import WITHOUT_WIND, covariance, inflation, least_size
 from .screen import Score, other_kinds_from, places
-from .select import AS_RECORDED, WITHOUT_WIND, passes_for_form
+from .select import AS_RECORDED, passes_for_form
 from .settle import Fit
 from .term import Term
 

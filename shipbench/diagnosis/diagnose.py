@@ -18,28 +18,27 @@ from ..checking.units import check_units, corrected, merged
 from ..errors import InputError
 from ..records import Dataset
 from . import misread
-from .analysis import HULL_THRESHOLD, NOTICEABLE, THRESHOLD, Analysis, analyse, causes_of, plain_model
+from .analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .causes import describe_candidates, describe_causes, remaining, unknown_part, what_is_left
 from .clocks import NAMES, check_clocks
 from .derived import faults, has_speeds, marked, said
 from .felt_wind import with_true_wind
 from .fit import Fit
 from .gain import FoldGain, fold_gain, summarise
-from .model import NUM_BASE
-from .ordinary import needed
+from .model import NUM_BASE, PLACES
+from .ordinary import STRANGE, needed
 from .other_size import better_size
 from .outcome import Diagnosis, Gain
 from .over_ground import over_ground
 from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant
 from .strange import left_out
-from .structure import STRUCTURE
 from .trace import trace_of
 from .turned import turned_actuators
 from .wrong import what_is_wrong
 
 FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
-STRANGE, STRANGE_SUM, STRANGE_SIZE = 8.0, 160.0, 3.0
+STRANGE_SUM, STRANGE_SIZE = 160.0, 3.0
 """Of the fit's parameters in units of their ordinary spreads, beside the causes; their sum of squares; and the size of a cause in typical sizes.
 (Sums with right ship files: 15 to 63 on MMG ships, up to 148 on ships of the literature and on the Esso Osaka; with wrong ones from 18 on; what
 is not seen here may be seen by `better_size`.)"""
@@ -49,8 +48,6 @@ times the length: 22 and more.)"""
 _MOST = 100.0
 STRANGE_THRUST = 4.0
 """Of the thrust the fit asks for, in units of what the ship file leaves open of it (of kt a factor of 1.2, of the diameter 2.2 besides)."""
-_LOG_THRUST = NUM_BASE - len(STRUCTURE.parameters) + [p.name for p in STRUCTURE.parameters].index("log_thrust")
-"""Place of the thrust's factor among the fit's parameters."""
 ODD_THRUST = 1.3
 """Factor of the thrust of an estimated propeller from which it is spoken of."""
 NOT_A_MODEL = ("unit_or_sign_error", "change_point")
@@ -169,12 +166,12 @@ def _doubts(found: Analysis) -> list[str]:
     """Signs that the model does not belong to the data: the fit leaves what is ordinary, hull or propeller would be another ship's, or a ship of
     another size explains the runs better. Causes in whose place something unknown is told raise none."""
     fit = found.final if found.unknown is None else found.selection.null
-    z = needed(fit, NOTICEABLE)
+    z = needed(fit)
     signs = []
     if np.max(np.abs(z)) > STRANGE or np.sum(z**2) > STRANGE_SUM:
         largest, together = (f"more than {_MOST:.0f}" if x > _MOST else f"{x:.1f}" for x in (np.max(np.abs(z)), np.sum(z**2) ** 0.5))
         signs.append(f"the fit moves a parameter by {largest} times its ordinary spread (all together {together} times)")
-    if abs(z[_LOG_THRUST]) > STRANGE_THRUST:
+    if abs(z[PLACES["log_thrust"]]) > STRANGE_THRUST:
         signs.append(f"the propeller would have to give {_thrust_factor(fit):.2g} times the thrust that the ship file makes likely")
     for term, value in zip(fit.model.terms, fit.values, strict=True):
         if term.effect.family in ("hull", "propulsion") and np.max(np.abs(value)) > STRANGE_SIZE:
@@ -205,8 +202,8 @@ def _own_propeller(found: Analysis) -> list[str]:
 
 
 def _thrust_factor(fit: Fit) -> float:
-    scale = fit.scales.structure[_LOG_THRUST - NUM_BASE]
-    return float(np.exp(scale * fit.solution.mean[_LOG_THRUST]))
+    at = PLACES["log_thrust"]
+    return float(np.exp(fit.scales.structure[at - NUM_BASE] * fit.solution.mean[at]))
 
 
 def _in_time(dataset: Dataset) -> Dataset:

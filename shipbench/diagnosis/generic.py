@@ -27,6 +27,9 @@ _PRIOR_SD, _SENSOR_SD = 0.5, 3.0
 channel (0.23 deg, 0.04 m/s, 0.04 m/s, 0.04 deg/s)."""
 NO_FORM = ("nothing", "heading", "position", "time", "run")
 """What no ship's form depends on."""
+_BY_RUN = ("heading", "position")
+"""What every run has its own of. What a model lacks of a ship is another force in each manoeuvre, and passes for one that follows these: it does only
+if it explains more than a constant force of its own in each run."""
 _WORTH_MORE = 2.0
 _OFTEN_ENOUGH = 4.0
 """Seconds (Froude-scaled, 130 m) between samples up to which errors of sensors are looked for: what a rudder does between rarer ones is not known,
@@ -107,12 +110,17 @@ class Search:
         self.before = evidence(self._gram([]).only(self.inside), self.plain, self.usual)[0]
         free = {v: of for v, of in forces.items() if v not in beside}
         alone = [pair for axis in range(len(AXES)) for pair in self._best(_pushed(lin, axis, free))]
-        joined = [self._together([pair for pair in alone if pair[0].variable == v]) for v in NO_FORM]
+        apart = {v: [pair for pair in alone if pair[0].variable == v] for v in NO_FORM}
+        apart["nothing"] = [pair for pair in apart["nothing"] if pair[0].axis != "surge"]  # where another form of resistance comes near a constant
+        joined = [self._together(pairs) for pairs in apart.values()]
         often = fit.plant.seg.dt < _OFTEN_ENOUGH * fit.plant.froude
         channels = [(name, channel) for name, channel in SENSORS.items() if often and fit.plant.seg.seen[channel]]
         alone += self._best([t for name, channel in channels for t in _added(lin, name, channel, errors)])
         self._parts = {d: parts for d, *parts in [*alone, *(pair for pair in joined if pair is not None)]}
-        self.found = sorted(self._parts, key=lambda d: -d.score)
+        constant = {d.axis: t for d, t in alone if d.variable == "nothing" and d.axis in AXES}
+        doubtful = [d for d in self._parts if d.variable in _BY_RUN and not d.of_sensor and d.score > 0.0]
+        lost = [d for d in doubtful if self._of_runs([constant[axis] for axis in d.axis.split(" and ")]) > d.score]
+        self.found = sorted((d for d in self._parts if d not in lost), key=lambda d: -d.score)
 
     def settled(self, d: Dependence) -> Dependence:
         """The same, judged as named causes are, which are fitted: with the variances of the noise re-estimated, and an error of a sensor taken out of
@@ -120,6 +128,14 @@ class Search:
         parts, usual = self._parts[d], self._settled([])
         score = 2.0 * (self._settled(parts) - usual - sum(t.cost for t in parts))
         return replace(d, score=max(score, d.score, *(self._refitted(t) for t in parts if d.of_sensor)))
+
+    def _of_runs(self, constants: Sequence[_Tried]) -> float:
+        """2 log evidence of a constant force of its own in each run, on the axes of `constants`."""
+        num, prior = len(constants), self.plain
+        at = len(self.inside) + np.arange(num)
+        prior = replace(prior, random=np.append(prior.random, at), log_tau2=np.append(prior.log_tau2, np.zeros(num)))
+        gram = self._gram(constants).only(np.append(self.inside, self.first + np.arange(num)))
+        return 2.0 * (evidence(gram, prior, self.usual, num)[0] - self.before)
 
     def _refitted(self, tried: _Tried) -> float:
         """Score of an error without which the plain model is fitted again, where its coefficients keep prior and precision. At least so much: of an

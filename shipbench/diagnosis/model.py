@@ -31,6 +31,8 @@ Fossen, Sagatun & Sorensen, Control Eng. Practice 4 (1996) 369)."""
 HULL_SPREAD = 0.3
 """Standard deviation of the relative error of the regressions (10 to 50 % is what comparisons with tests find; physics reference, section 3.3)."""
 NUM_BASE = len(FREE) + NUM_HULL + len(STRUCTURE.parameters)
+PLACES = {p.name: len(FREE) + NUM_HULL + i for i, p in enumerate(STRUCTURE.parameters)}
+"""Of the parameters of the structure among all NUM_BASE."""
 
 
 @dataclass

@@ -9,9 +9,15 @@ import numpy as np
 
 from .fit import fit
 from .gram import Reduced, solve
-from .model import NUM_BASE
+from .model import NUM_BASE, PLACES
 from .settle import Fit
+from .structure import STRUCTURE
 
+NOTICEABLE = 0.14
+"""Size from which a force is noticeable, and may doubt the ship file, in units of the latent force: 0.7 mm/s^2, a third of what a wind of 7 m/s
+gives; in yaw 1.4e-5 rad/s^2 at 130 m. Exact sensors or many samples show with certainty that ships differ in form from eq. (2)."""
+STRANGE = 8.0
+"""In spreads: from here on a parameter is no ordinary ship's."""
 _FAR = 3.5
 """In spreads: up to here a parameter is ordinary, beyond its prior falls by Huber's linear tail instead of the square."""
 _SOLVES, _FITS, _SAME = 20, 3, 0.05
@@ -28,11 +34,14 @@ def widths_of(found: Fit, reduced: Reduced | None = None) -> np.ndarray:
     return widths
 
 
-def needed(found: Fit, least: float) -> np.ndarray:
-    """(NUM_BASE,) parameters in spreads, as they would be beside a latent force of at least the size `least`: what so small a force could stand for
-    need not be the ship's."""
+def needed(found: Fit, least: float = NOTICEABLE) -> np.ndarray:
+    """(NUM_BASE,) parameters in units of what ships differ by (`STRUCTURE.wider`), as they would be beside a latent force of at least the size
+    `least`: what so small a force could stand for need not be the ship's."""
     reduced = found.gram.reduce(np.maximum(found.hyper.log_force, 2.0 * np.log(least)))
-    return _base(found, reduced, widths_of(found, reduced))
+    z = _base(found, reduced, widths_of(found, reduced))
+    for name, factor in STRUCTURE.wider.items():
+        z[PLACES[name]] /= factor
+    return z
 
 
 def _base(found: Fit, reduced: Reduced, widths: np.ndarray) -> np.ndarray:

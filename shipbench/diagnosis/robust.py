@@ -8,8 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from .gram import by_run, shared_alone
+from .model import PLACES
+from .ordinary import STRANGE, needed
 from .settle import Fit
 
+WITHOUT_WIND = ("wind", "wind_per_run")
+"""Causes only where the wind is not measured."""
 NEGLIGIBLE = 0.05
 """In typical sizes. With enough samples the form of a hull makes tiny causes certain: speeds 0.1 % off, a bank of a 65th of the usual suction."""
 _OWN = {"rudder_delay": 0.5, "rudder_asymmetry": 0.25}
@@ -23,7 +27,6 @@ _DOUBT, _DOUBT_LATE = 0.05, 1e-5
 _AGAINST = -2.0
 """2 log evidence of a cause, any one run taken away, below which the other runs speak against it. (A bank on ships of the literature that had none:
 -5 to -6, but 7 to 28 with the run that lay nearest to it; true causes, development cases: 10 and more.)"""
-
 
 _TAUS = np.log(np.array([0.03, 0.06, 0.1, 0.2, 0.3, 0.6, 1.0, 2.0, 3.0]) ** 2)
 """Variances of the values of single runs, or pieces, of which the likeliest is taken, in typical sizes."""
@@ -80,12 +83,19 @@ def is_steady(fit: Fit, index: int) -> bool:
     return worth(by_run(information, fit.gram.run), by_run(left, fit.gram.run)) >= worth(information, left)
 
 
+def blows_on_a_ship(fit: Fit) -> bool:
+    """Whether a wind that is not measured needs no superstructure that no ship has: then something else is taken for it."""
+    return bool(np.max(np.abs(needed(fit)[[PLACES[f"wind_{axis}"] for axis in ("X", "Y", "N", "lever")]])) < STRANGE)
+
+
 def is_sure(fit: Fit, index: int) -> bool:
     """Whether the values of a cause differ from zero (Hotelling's test over the runs), and the other runs do not speak against it where one bears it;
-    where each run has its own, whether they last for the run."""
+    where each run has its own, whether they last for the run. Of a wind, whether it could blow on a ship."""
     from scipy.stats import f
 
     term = fit.model.terms[index]
+    if term.label in WITHOUT_WIND and not blows_on_a_ship(fit):
+        return False
     if term.per_run:
         return is_steady(fit, index)
     value, num = fit.values[index], fit.plant.seg.runs

@@ -14,7 +14,7 @@ from .model import Linearisation
 from .ordinary import widened
 from .plain import REFIT_ITERATIONS
 from .plant import Plant
-from .robust import is_sure, matters
+from .robust import WITHOUT_WIND, is_sure, matters
 from .screen import Score, changes, glance, overlap, screen
 from .settle import Fit, hull_evidence, settle
 from .term import Term
@@ -24,8 +24,6 @@ NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error", "going
 slope where it does not act: where only commands are recorded, the rates of the gears are fitted instead."""
 AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft_rate_limit", "shaft_lag", "thruster_lag", "rudder_lag")
 """Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
-WITHOUT_WIND = ("wind", "wind_per_run")
-"""Only where the wind is not measured."""
 MOST_EFFECTS = 6
 _REFITS = 3
 _WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -90,6 +91,8 @@ class Structure(Effect):
         Parameter("wake_square", "1", 0.3, -1.0, 2.0),
     )
     backing, m_x, astern, braking = 0.5, -0.4, 0.7, -0.7
+    wider: ClassVar = {"windmilling": 3.0, "thrust_backing": 2.5}
+    """How many times more ships differ in them than their spreads say, which are narrow for the sake of the fit (0.31 and 0.8 of B4-70, above)."""
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
 
     def spreads(self, ship: Particulars, measured_wind: bool) -> np.ndarray:

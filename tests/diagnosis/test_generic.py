@@ -71,6 +71,33 @@ def test_a_pull_on_two_axes_is_judged_on_both_and_not_taken_for_the_hull(kcs):
         assert first.score > single + 10.0
 
 
+@pytest.mark.parametrize("seed", [11, 13, 15])
+def test_a_force_of_its_own_in_each_run_is_not_taken_for_one_that_follows_place_or_heading(seed):
+    """Every run has its own of both: place scored 26 and 58, heading 31 and 47, where 16 are asked. What does follow the place still does."""
+
+    def push(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.push(q[0] * ship.mass, 0.0, 0.0)
+
+    def found(hidden: Hidden) -> set[tuple[str, str]]:
+        plant = Plant.of(sea_trials(load_mmg_ship("kcs"), seed, (hidden,), Trials(runs=12)))
+        return {(d.axis, d.variable) for d in dependences(null_fit(plant, Scales(plant))) if d.score > 16.0}
+
+    own = 0.01 * np.random.default_rng(seed).standard_normal(12)
+    assert not found(Hidden(Outside("a push of its own in each run", ("run",), push), (own,))) & {("surge", "position"), ("surge", "heading")}
+    assert ("sway", "position") in found(Hidden(get("side force that goes with the place"), (1.0, 0.3)))
+
+
+def test_a_constant_ahead_is_no_part_of_a_pull(kcs):
+    """Another form of resistance comes near one, and much is asked of it alone: with a trace of yaw beside it, it was `unknown` on a tug."""
+
+    def push(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.push(q[0] * ship.mass, 0.0, 0.03 * ship.L * q[0] * ship.mass)
+
+    constants = [d for d in dependences(kcs(Hidden(Outside("a push", ("nothing",), push), (8e-3,)))) if d.variable == "nothing" and not d.of_sensor]
+    assert {d.axis for d in constants} == {"surge", "sway", "yaw"}
+    assert min(d.score for d in constants if d.axis != "sway") > 4.0
+
+
 def test_errors_of_sensors_are_told_from_forces(kcs):
     calm = [d for d in dependences(kcs()) if d.of_sensor]
     assert {d.axis for d in calm} == set(SENSORS)

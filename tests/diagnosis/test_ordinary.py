@@ -7,15 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.analysis import NOTICEABLE
-from shipbench.diagnosis.diagnose import STRANGE, STRANGE_SUM, diagnose
-from shipbench.diagnosis.model import FREE, NUM_BASE, Linearisation, Scales
-from shipbench.diagnosis.ordinary import needed, widths_of
+from shipbench.diagnosis.diagnose import STRANGE_SUM, diagnose
+from shipbench.diagnosis.model import NUM_BASE, PLACES, Linearisation, Scales
+from shipbench.diagnosis.ordinary import NOTICEABLE, STRANGE, needed, widths_of
 from shipbench.diagnosis.plain import null_fit
-from shipbench.diagnosis.plant import NUM_HULL, Plant
+from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import screen
 from shipbench.diagnosis.select import candidates_for
-from shipbench.diagnosis.settle import settle
+from shipbench.diagnosis.settle import Fit, settle
 from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.eq2 import coefficients
@@ -27,7 +26,7 @@ from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
 
-RACE = len(FREE) + NUM_HULL + [p.name for p in STRUCTURE.parameters].index("race")
+RACE = PLACES["race"]
 
 
 @pytest.fixture(scope="module")
@@ -87,9 +86,30 @@ def test_a_ship_of_the_literature_with_an_odd_rudder_is_neither_doubted_nor_expl
 EXACT = Trials(noise=0.0, gusts=0.0)
 
 
-def test_what_a_small_force_could_stand_for_is_not_asked_of_the_ship():
+@pytest.mark.parametrize(("name", "value"), [("windmilling", 0.31), ("thrust_backing", 0.8)])
+def test_a_propeller_of_the_b_series_is_that_of_an_ordinary_ship(name, value):
+    """B4-70 lay 6 and 4 spreads off, ships of a third simulator up to 6 in both: two such made half a doubt of a right ship file."""
+    p = next(p for p in STRUCTURE.parameters if p.name == name)
+    assert value / (p.typical * STRUCTURE.wider[name]) < 2.5
+
+
+@pytest.fixture(scope="module")
+def exact_mariner() -> Fit:
     plant = Plant.of(published_trials(PUBLISHED["mariner"], 41, plan=EXACT))
-    found = null_fit(plant, Scales(plant))
+    return null_fit(plant, Scales(plant))
+
+
+def test_what_ships_differ_by_more_counts_for_less(exact_mariner, monkeypatch):
+    less = needed(exact_mariner)
+    monkeypatch.setattr(type(STRUCTURE), "wider", {})
+    before = needed(exact_mariner)
+    narrow = PLACES["thrust_backing"]
+    assert less[narrow] == pytest.approx(before[narrow] / 2.5)
+    np.testing.assert_array_equal(np.delete(less, [narrow, PLACES["windmilling"]]), np.delete(before, [narrow, PLACES["windmilling"]]))
+
+
+def test_what_a_small_force_could_stand_for_is_not_asked_of_the_ship(exact_mariner):
+    found = exact_mariner
     moved, less = found.solution.mean[:NUM_BASE], needed(found, NOTICEABLE)
     assert np.sum(less**2) < 0.9 * np.sum(moved**2)
     np.testing.assert_allclose(needed(found, 1e-6), moved, atol=0.2)  # where the force is as it was, so are the parameters

@@ -7,7 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from shipbench.diagnosis import robust
 from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
+from shipbench.diagnosis.model import NUM_BASE, PLACES
 from shipbench.diagnosis.robust import covariance, inflation, is_borne_by_one, is_sure, least_size, matters
 from shipbench.diagnosis.select import passes_for_form
 from shipbench.diagnosis.term import Term
@@ -31,7 +33,7 @@ def fit_of(estimates: np.ndarray, since: int | None = None) -> SimpleNamespace:
     return SimpleNamespace(
         reduced=_reduced(S), solution=SimpleNamespace(mean=mean, cov=cov), prior=Prior(np.array([0]), np.ones(1), *_NONE), values=(mean,),
         columns_of=lambda index: np.array([0]), plant=SimpleNamespace(seg=SimpleNamespace(runs=num)),
-        model=SimpleNamespace(terms=(SimpleNamespace(per_run=False, since=since),)),
+        model=SimpleNamespace(terms=(SimpleNamespace(label="current", per_run=False, since=since),)),
     )  # fmt: skip
 
 
@@ -78,7 +80,8 @@ def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
     solution = solve(reduced, prior)
     fit = SimpleNamespace(
         reduced=reduced, prior=prior, solution=solution, values=(solution.mean,), columns_of=lambda index: np.array([0]),
-        plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS)), model=SimpleNamespace(terms=(SimpleNamespace(per_run=False, since=None),)),
+        plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS)),
+        model=SimpleNamespace(terms=(SimpleNamespace(label="current", per_run=False, since=None),)),
     )  # fmt: skip
     assert solution.mean[0] == pytest.approx(0.5, abs=0.05)
     assert inflation(fit, np.array([0]))[0] < 3.0
@@ -97,7 +100,7 @@ def test_a_value_for_each_run_is_sure_only_if_it_lasts_for_the_run(pieces: int, 
     prior = Prior(*_NONE, np.array([0]), np.log([4.0]))
     fit = SimpleNamespace(
         gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, solution=solve(gram.reduce(np.zeros(3)), prior),
-        columns_of=lambda index: np.array([0]), model=SimpleNamespace(terms=(SimpleNamespace(per_run=True, since=None),)),
+        columns_of=lambda index: np.array([0]), model=SimpleNamespace(terms=(SimpleNamespace(label="current_per_run", per_run=True, since=None),)),
     )  # fmt: skip
     assert is_sure(fit, 0) is sure
 
@@ -117,3 +120,13 @@ def test_more_is_asked_of_what_the_form_of_a_hull_could_be():
     current, thrust = EFFECTS.get("current"), EFFECTS.get("thrust_gain")
     assert [passes_for_form(t) for t in (Term(current), Term(current, since=3), Term(thrust))] == [False, True, True]
     assert passes_for_form(Term(EFFECTS.get("wind_per_run"), per_run=True))
+
+
+@pytest.mark.parametrize(("effect", "lever", "sure"), [("wind_per_run", 2.0, True), ("wind_per_run", -9.3, False), ("current_per_run", -9.3, True)])
+def test_a_wind_that_needs_a_superstructure_of_no_ship_is_none(monkeypatch, effect: str, lever: float, sure: bool):
+    """Two ships of a third simulator without wind: what their model lacked passed for winds, with the centre of the area 0.35 lengths off."""
+    z = np.zeros(NUM_BASE)
+    z[PLACES["wind_lever"]] = lever
+    monkeypatch.setattr(robust, "needed", lambda fit: z)
+    monkeypatch.setattr(robust, "is_steady", lambda fit, index: True)
+    assert is_sure(SimpleNamespace(model=SimpleNamespace(terms=(Term(EFFECTS.get(effect), per_run=True),))), 0) is sure
