@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis import robust
+from shipbench.diagnosis import robust, select
 from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
 from shipbench.diagnosis.model import NUM_BASE, PLACES
 from shipbench.diagnosis.robust import covariance, inflation, is_borne_by_one, is_sure, least_size, matters
@@ -130,3 +130,24 @@ def test_a_wind_that_needs_a_superstructure_of_no_ship_is_none(monkeypatch, effe
     monkeypatch.setattr(robust, "needed", lambda fit: z)
     monkeypatch.setattr(robust, "is_steady", lambda fit, index: True)
     assert is_sure(SimpleNamespace(model=SimpleNamespace(terms=(Term(EFFECTS.get(effect), per_run=True),))), 0) is sure
+
+
+@pytest.mark.parametrize(("wind", "alone", "left"), [(3.0, True, "wind_per_run"), (1.0, True, "current_per_run"), (3.0, False, "current_per_run")])
+def test_of_two_with_values_for_each_run_the_better_stays_if_it_is_sure_alone(monkeypatch, wind: float, alone: bool, left: str):
+    """A wind is not sure beside a current, which is."""
+    evidence = {"wind_per_run": wind, "current_per_run": 2.0}
+
+    def of(*labels: str) -> SimpleNamespace:
+        terms = tuple(SimpleNamespace(label=label, per_run=label.endswith("run")) for label in labels)
+        return SimpleNamespace(model=SimpleNamespace(terms=terms), evidence=sum(evidence.get(label, 0.0) for label in labels))
+
+    def without(found: SimpleNamespace, index: int) -> SimpleNamespace:
+        return of(*(t.label for i, t in enumerate(found.model.terms) if i != index))
+
+    def sure(found: SimpleNamespace, index: int) -> bool:
+        return found.model.terms[index].label != "wind_per_run" or (alone and len(found.model.terms) == 2)
+
+    monkeypatch.setattr(select, "without", without)
+    found, dropped = select._without(of("rudder_lag", "wind_per_run", "current_per_run"), sure)
+    assert [t.label for t in found.model.terms] == ["rudder_lag", left]
+    assert {*dropped, left} == {"wind_per_run", "current_per_run"}
