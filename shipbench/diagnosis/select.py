@@ -303,18 +303,9 @@ def _backward(found: Fit, threshold: float, spare_last: bool = True) -> Fit:
 
 
 def _without(found: Fit, wanted: Callable[[Fit, int], bool]) -> tuple[Fit, tuple[str, ...]]:
-    """Without the terms that are not `wanted`, the last first, and their effects. Two with a value for each run take over from each other: where one
-    is not wanted beside the other, it stays in its place if it is wanted there, and explains the runs better. (Wind of the Esso Osaka, beside a
-    current of 0.01 m/s.)"""
+    """Without the terms that are not `wanted`, the last first, and their effects."""
     dropped: tuple[str, ...] = ()
     while others := [i for i in range(len(found.model.terms)) if not wanted(found, i)]:
-        terms, out = found.model.terms, others[-1]
-        left = without(found, out)
-        for rival in [i for i, t in enumerate(terms) if terms[out].per_run and t.per_run and i != out]:
-            instead = without(found, rival)
-            if instead.evidence > left.evidence and wanted(instead, out - (rival < out)):
-                left, out = instead, rival
-                break
-        dropped += (terms[out].label,)
-        found = left
+        dropped += (found.model.terms[others[-1]].label,)
+        found = without(found, others[-1])
     return found, dropped

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis import robust, select
+from shipbench.diagnosis import robust
 from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
 from shipbench.diagnosis.model import NUM_BASE, PLACES
 from shipbench.diagnosis.robust import covariance, inflation, is_borne_by_one, is_sure, least_size, matters
@@ -100,9 +100,29 @@ def test_a_value_for_each_run_is_sure_only_if_it_lasts_for_the_run(pieces: int, 
     prior = Prior(*_NONE, np.array([0]), np.log([4.0]))
     fit = SimpleNamespace(
         gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, solution=solve(gram.reduce(np.zeros(3)), prior),
-        columns_of=lambda index: np.array([0]), model=SimpleNamespace(terms=(SimpleNamespace(label="current_per_run", per_run=True, since=None),)),
+        model=SimpleNamespace(terms=(SimpleNamespace(label="current_per_run", per_run=True, since=None),)),
     )  # fmt: skip
     assert is_sure(fit, 0) is sure
+
+
+@pytest.mark.parametrize("steady", [True, False])
+def test_a_wind_with_gusts_is_sure_beside_a_current_that_lasts(steady: bool):
+    """They take over from each other: alone, its gusts would speak against the wind."""
+    rng = np.random.default_rng(10)
+    run = np.repeat(np.arange(RUNS), 4)
+    Z = rng.standard_normal((len(run), 50, 12))  # eta, w of one knot for each axis, wind, current, e
+    wind = 0.2 * rng.standard_normal((RUNS, 1))[run] + 0.3 * rng.standard_normal((len(run), 1))
+    current = 2.0 * (rng.standard_normal((RUNS, 1))[run] if steady else rng.standard_normal((len(run), 1)))
+    Z[..., -1] += wind * Z[..., 9] + current * Z[..., 10]
+    gram = Gram(np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 3)), run, RUNS)
+    terms = tuple(SimpleNamespace(label="current_per_run", per_run=True) for _ in range(2))
+    for random, sure in ((np.array([0]), False), (np.array([0, 1]), steady)):
+        prior = Prior(*_NONE, random, np.log([0.1, 4.0])[random])
+        fit = SimpleNamespace(
+            gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, solution=solve(gram.reduce(np.zeros(3)), prior),
+            model=SimpleNamespace(terms=terms[: len(random)]),
+        )  # fmt: skip
+        assert is_sure(fit, 0) is sure
 
 
 @pytest.mark.parametrize("per_run", [False, True])
@@ -128,26 +148,5 @@ def test_a_wind_that_needs_a_superstructure_of_no_ship_is_none(monkeypatch, effe
     z = np.zeros(NUM_BASE)
     z[PLACES["wind_lever"]] = lever
     monkeypatch.setattr(robust, "needed", lambda fit: z)
-    monkeypatch.setattr(robust, "is_steady", lambda fit, index: True)
+    monkeypatch.setattr(robust, "lasts", lambda fit: True)
     assert is_sure(SimpleNamespace(model=SimpleNamespace(terms=(Term(EFFECTS.get(effect), per_run=True),))), 0) is sure
-
-
-@pytest.mark.parametrize(("wind", "alone", "left"), [(3.0, True, "wind_per_run"), (1.0, True, "current_per_run"), (3.0, False, "current_per_run")])
-def test_of_two_with_values_for_each_run_the_better_stays_if_it_is_sure_alone(monkeypatch, wind: float, alone: bool, left: str):
-    """A wind is not sure beside a current, which is."""
-    evidence = {"wind_per_run": wind, "current_per_run": 2.0}
-
-    def of(*labels: str) -> SimpleNamespace:
-        terms = tuple(SimpleNamespace(label=label, per_run=label.endswith("run")) for label in labels)
-        return SimpleNamespace(model=SimpleNamespace(terms=terms), evidence=sum(evidence.get(label, 0.0) for label in labels))
-
-    def without(found: SimpleNamespace, index: int) -> SimpleNamespace:
-        return of(*(t.label for i, t in enumerate(found.model.terms) if i != index))
-
-    def sure(found: SimpleNamespace, index: int) -> bool:
-        return found.model.terms[index].label != "wind_per_run" or (alone and len(found.model.terms) == 2)
-
-    monkeypatch.setattr(select, "without", without)
-    found, dropped = select._without(of("rudder_lag", "wind_per_run", "current_per_run"), sure)
-    assert [t.label for t in found.model.terms] == ["rudder_lag", left]
-    assert {*dropped, left} == {"wind_per_run", "current_per_run"}
