@@ -39,7 +39,7 @@ from .wrong import what_is_wrong
 FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
 STRANGE_SUM, STRANGE_SIZE = 160.0, 3.0
-"""Of the fit's parameters in units of their ordinary spreads, beside the causes; their sum of squares; and the size of a cause in typical sizes.
+"""Sum of squares of the fit's parameters, in units of what ships differ by, beside the causes; and the size of a cause in typical sizes.
 (Sums with right ship files: 15 to 63 on MMG ships, up to 148 on ships of the literature and on the Esso Osaka; with wrong ones from 18 on; what
 is not seen here may be seen by `better_size`.)"""
 ORDINARY_SUM = 20.0
