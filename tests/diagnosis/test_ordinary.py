@@ -88,7 +88,7 @@ EXACT = Trials(noise=0.0, gusts=0.0)
 
 @pytest.mark.parametrize(("name", "value"), [("windmilling", 0.31), ("thrust_backing", 0.8)])
 def test_a_propeller_of_the_b_series_is_that_of_an_ordinary_ship(name, value):
-    """B4-70 lay 6 and 4 spreads off, ships of a third simulator up to 6 in both: two such made half a doubt of a right ship file."""
+    """B4-70 lay 6 and 4 spreads off, ships of a third simulator up to 6 in both: half of the sum that doubts a ship file."""
     p = next(p for p in STRUCTURE.parameters if p.name == name)
     assert value / (p.typical * STRUCTURE.wider[name]) < 2.5
 
