@@ -69,6 +69,18 @@ class Analysis:
     def final(self) -> Fit:
         return self.selection.final
 
+    def score(self, index: int) -> tuple[float, int, str]:
+        """Twice the log evidence that the index-th cause adds, number of runs that support it, and where: beside the others or where it was added.
+
+        The linear model, asked for the fit without it, does not hold so far from its point: what a refit gained is an upper bound, or all there is.
+        """
+        score, term = self.final.worth(index), self.final.model.terms[index]
+        added = max((s for s in self.selection.steps if s.term == term), key=lambda s: s.score, default=None)
+        if added is not None and (score < self.threshold or score > added.score):
+            return added.score, added.supporters, "where it was added"
+        supporters = int(np.sum(self.final.solution.per_run > self.final.solution_without(index).per_run))
+        return score, supporters, "beside the other causes"
+
     def extension(self, name_hull: bool) -> Extension:
         """What the diagnosis adds to the plain model."""
         if self.unknown is not None:

@@ -12,7 +12,7 @@ from ..checking.units import UnitFinding
 from ..effects.base import EFFECTS, Effect
 from .analysis import HULL_THRESHOLD, Analysis
 from .clocks import NAMES, LateVelocities
-from .gears import GearFinding, slow_on_any_ship
+from .gears import GearFinding
 from .generic import Dependence
 from .model import FREE, HULL_SPREAD
 from .outcome import Candidate, Cause, Estimate, Gain, what_it_is
@@ -21,6 +21,7 @@ from .robust import WITHOUT_WIND, covariance, inflation, least_size
 from .screen import Score, other_kinds_from, places
 from .select import AS_RECORDED, passes_for_form
 from .settle import Fit
+from .ship_file import whatever_the_ship
 from .term import Term
 
 _TIE = 10.0
@@ -47,22 +48,10 @@ def describe_causes(
         told = f"; {what_it_is(_described(found.rival))} would explain the runs about as well ({found.rival.score:.0f})"
         named[0] = replace(named[0], evidence=named[0].evidence + told)
     if doubt:
-        named = [c for c in named if _whatever_the_ship(c.effect, found)]
+        named = [c for c in named if whatever_the_ship(c.effect, found)]
     if hull and found.hull > HULL_THRESHOLD:
         named.append(_hull_cause(found, gain))
     return causes + [replace(c, rank=len(causes) + i + 1) for i, c in enumerate(named)]
-
-
-def _whatever_the_ship(name: str, found: Analysis) -> bool:
-    """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, delay or play of a gear seen in its own record, a
-    force that breaks a symmetry which every ship has. (46 trials, with nothing, wind, a rudder offset or a current hidden, each diagnosed with
-    another ship's file: no sensor and no such force was named but those that were there, while thrust, mass and others were.) With the file of a
-    shorter ship an ordinary rudder or shaft is slow: it must be slow for the longest ship. A wind of each run acts through coefficients alone, and
-    what these lack in a run's manoeuvre passes for it (a current shows in track and speeds besides)."""
-    effect = EFFECTS.get(name)
-    forces = effect.breaks_symmetry and name != "wind_per_run"
-    in_record = any(g.effect == name and slow_on_any_ship(g) for g in found.gears)
-    return effect.family == "sensor" or forces or in_record
 
 
 def _p(found: Analysis, score: float) -> float:
@@ -71,12 +60,7 @@ def _p(found: Analysis, score: float) -> float:
 
 def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs: Sequence[str]) -> Cause:
     fit, effect = found.final, term.effect
-    # the linear model, asked for the fit without it, does not hold so far from its point: what a refit has gained is an upper bound, or all there is
-    score, beside = fit.worth(index), "beside the other causes"
-    supporters = int(np.sum(fit.solution.per_run > fit.solution_without(index).per_run))
-    added = max((s for s in found.selection.steps if s.term == term), key=lambda s: s.score, default=None)
-    if added is not None and (score < found.threshold or score > added.score):
-        score, supporters, beside = added.score, added.supporters, "where it was added"
+    score, supporters, beside = found.score(index)
     rivals = rivals_of(found, term)
     evidence = f"adds {0.5 * score:.0f} to the log evidence {beside}; {supporters} of {fit.plant.seg.runs} runs support it"
     if effect.way:

@@ -23,14 +23,11 @@ from .causes import describe_candidates, describe_causes, remaining, unknown_par
 from .clocks import NAMES, check_clocks
 from .derived import faults, has_speeds, marked, said
 from .felt_wind import with_true_wind
-from .fit import Fit
 from .gain import FoldGain, fold_gain, summarise
-from .model import NUM_BASE, PLACES
-from .ordinary import STRANGE, needed
-from .other_size import better_size
 from .outcome import Diagnosis, Gain
 from .over_ground import over_ground
 from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant
+from .ship_file import doubts_of, odd_for, own_propeller
 from .strange import left_out
 from .trace import trace_of
 from .turned import turned_actuators
@@ -38,18 +35,6 @@ from .wrong import what_is_wrong
 
 FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
-STRANGE_SUM, STRANGE_SIZE = 160.0, 3.0
-"""Sum of squares of the fit's parameters, in units of what ships differ by, beside the causes; and the size of a cause in typical sizes.
-(Sums with right ship files: 15 to 63 on MMG ships, up to 148 on ships of the literature and on the Esso Osaka; with wrong ones from 18 on; what
-is not seen here may be seen by `better_size`.)"""
-ORDINARY_SUM = 20.0
-"""Sum of squares below which no other size is tried, which takes as long as the first fit. (With the files of ships of less than 0.6 or more than 1.7
-times the length: 22 and more.)"""
-_MOST = 100.0
-STRANGE_THRUST = 4.0
-"""Of the thrust the fit asks for, in units of what the ship file leaves open of it (of kt a factor of 1.2, of the diameter 2.2 besides)."""
-ODD_THRUST = 1.3
-"""Factor of the thrust of an estimated propeller from which it is spoken of."""
 NOT_A_MODEL = ("unit_or_sign_error", "change_point")
 """They describe the data, not the ship: correct the data, or fit the runs before and after the change apart."""
 
@@ -95,23 +80,29 @@ def diagnose(
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
         null = plain_model(Plant.of(dataset, steps), only, settled)
-        if only is None and not cautious and (turned := turned_actuators(dataset, null)):
-            units, dataset = merged([*units, *turned]), corrected(dataset, turned)
+        turned = turned_actuators(dataset, null) if only is None and not cautious else []
+        if turned:
+            as_recorded, dataset = (dataset, null), corrected(dataset, turned)
             null = plain_model(Plant.of(dataset, steps), settled=settled)
-            ahead, work = None, partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
         found = analyse(null, only=only, seed=seed, cautious=cautious)
+        if turned and doubts_of(found):  # of another ship's thrusters or rudder the model cannot tell the side
+            (dataset, null), turned = as_recorded, []
+            found = analyse(null, seed=seed)
+        if turned:
+            units, ahead, work = merged([*units, *turned]), None, partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
         if wrong := [e for e in found.misread if e.contradicted]:
             dataset = misread.read_rightly(dataset, wrong)
             found = analyse(plain_model(Plant.of(dataset, steps), settled=settled), seed=seed, misread=wrong)
             ahead, work = None, partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
-        doubts = _doubts(found) if only is None else []
+        doubts = doubts_of(found) if only is None else []
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts else Worth()
     warnings += [text for text, _ in standing(dataset).values()]
-    warnings += said(dataset) + drift + wind + doubts + _own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
+    warnings += said(dataset) + drift + wind + doubts + own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
     warnings += misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     warnings += what_is_left(found) if causes and not doubts else []
+    warnings += odd_for(found, [c.effect for c in causes]) if only is None and not doubts else []
     trace = trace_of(dataset, found, worth.hull)
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
     verdict = "unknown" if unknown else "found" if causes else "none"
@@ -160,50 +151,6 @@ def _check(dataset: Dataset) -> list[str]:
     if np.std(states[:, 7]) < 1e-3 and np.std(states[:, 5]) < 1e-5:
         warnings.append("the rudder is never used and the ship never turns: nothing can be said about rudder and hull.")
     return warnings
-
-
-def _doubts(found: Analysis) -> list[str]:
-    """Signs that the model does not belong to the data: the fit leaves what is ordinary, hull or propeller would be another ship's, or a ship of
-    another size explains the runs better. Causes in whose place something unknown is told raise none."""
-    fit = found.final if found.unknown is None else found.selection.null
-    z = needed(fit)
-    signs = []
-    if np.max(np.abs(z)) > STRANGE or np.sum(z**2) > STRANGE_SUM:
-        largest, together = (f"more than {_MOST:.0f}" if x > _MOST else f"{x:.1f}" for x in (np.max(np.abs(z)), np.sum(z**2) ** 0.5))
-        signs.append(f"the fit moves a parameter by {largest} times its ordinary spread (all together {together} times)")
-    if abs(z[PLACES["log_thrust"]]) > STRANGE_THRUST:
-        signs.append(f"the propeller would have to give {_thrust_factor(fit):.2g} times the thrust that the ship file makes likely")
-    for term, value in zip(fit.model.terms, fit.values, strict=True):
-        if term.effect.family in ("hull", "propulsion") and np.max(np.abs(value)) > STRANGE_SIZE:
-            signs.append(f"{term.label} would have to be {np.max(np.abs(value)):.1f} times its typical size")
-    if not signs and np.sum(z**2) > ORDINARY_SUM:
-        signs = better_size(found.selection.null)
-    if not signs:
-        return []
-    text = "; ".join(signs)
-    return [
-        f"{text}. Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)? Until that is sure, nothing is named but "
-        "what shows whatever the ship is (faults of sensors, delay and play of gears seen in their own record, those slow for any ship, and forces "
-        "that know port from starboard or a direction of the earth, with their sizes on the ship of the file); the candidates below are ranked as "
-        "if it were."
-    ]
-
-
-def _own_propeller(found: Analysis) -> list[str]:
-    """What the runs say of a propeller that the ship file leaves open."""
-    factor, ship = _thrust_factor(found.final), found.final.plant.ship
-    if max(factor, 1.0 / factor) < ODD_THRUST:
-        return []
-    what = "diameter, kt" if ship.lacks("propeller") else "kt"
-    return [
-        f"the ship file does not give the propeller's {what}: the runs suggest {factor:.2g} times the thrust of the estimate, by which the model "
-        f"`physics` goes; give [propeller] {what}. Causes are judged with the thrust that suits the runs."
-    ]
-
-
-def _thrust_factor(fit: Fit) -> float:
-    at = PLACES["log_thrust"]
-    return float(np.exp(fit.scales.structure[at - NUM_BASE] * fit.solution.mean[at]))
 
 
 def _in_time(dataset: Dataset) -> Dataset:

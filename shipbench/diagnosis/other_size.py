@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from .model import Scales
 from .plain import first_evidence, null_fit
 from .settle import Fit
 
-_FACTORS = (0.4, 2.5)
+_FACTORS, _NEAR = (0.4, 2.5), (0.7, 0.85, 1.2, 1.4)
 _PIECES = 99
 """Of a long record, spread over all runs: so few that none of them is left out of a fit as strange."""
 _LEAST = 60.0
@@ -22,14 +24,34 @@ end, where nothing else speaks against the file, has 17 and more.)"""
 
 def better_size(null: Fit) -> list[str]:
     """A line if a smaller or a larger ship, with masses, inertia and forces of her size, is far better beside no cause; none if not."""
+    best, gain = _best(null, _FACTORS)
+    return [f"{_similar(best)} (by {gain:.0f} of log evidence)"] if gain > _LEAST * _times(null) else []
+
+
+def rather_another_size(null: Fit, causes: str, worth: float) -> list[str]:
+    """A line if a ship of nearly the same size is better than that of the file with `causes`, which add `worth` to the log evidence."""
+    worth *= min(1.0, _PIECES / len(null.plant.seg.run))
+    best, gain = _best(null, _NEAR)
+    return [f"{_similar(best)} than {causes} (by {gain:.0f} of log evidence, against {worth:.0f})"] if gain > worth * _times(null) else []
+
+
+def _best(null: Fit, factors: Sequence[float]) -> tuple[float, float]:
+    """The best factor of the size, and the log evidence that it gains; 0 where none gains any."""
     few = null.plant.thinned(_PIECES)
     own = null if few is null.plant else null_fit(few, Scales(few))
-    estimated = any(null.plant.ship.lacks(part) for part in ("propeller", "rudder"))
-    best, most = 1.0, _LEAST * (_ESTIMATED if estimated else 1.0)
-    for plant, factor in ((few.resized(factor), factor) for factor in _FACTORS):
+    best, most = 1.0, 0.0
+    for plant, factor in ((few.resized(factor), factor) for factor in factors):
         if first_evidence(plant, own) - own.evidence < _WORTH_A_FIT:
             continue
         gain = null_fit(plant, Scales(plant)).evidence - own.evidence
         if gain > most:
             best, most = factor, gain
-    return [] if best == 1.0 else [f"a similar ship of {best:g} times the size explains the runs better (by {most:.0f} of log evidence)"]
+    return best, most
+
+
+def _times(null: Fit) -> float:
+    return _ESTIMATED if any(null.plant.ship.lacks(part) for part in ("propeller", "rudder")) else 1.0
+
+
+def _similar(factor: float) -> str:
+    return f"a similar ship of {factor:g} times the size explains the runs better"

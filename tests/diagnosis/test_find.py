@@ -15,7 +15,6 @@ import pytest
 
 from shipbench.diagnosis.analysis import THRESHOLD
 from shipbench.diagnosis.cases import ON_PUBLISHED, draw_case, singles
-from shipbench.diagnosis.causes import _whatever_the_ship
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.outside import canonical
@@ -23,6 +22,7 @@ from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import changes, screen
 from shipbench.diagnosis.select import candidates_for, select
+from shipbench.diagnosis.ship_file import whatever_the_ship
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship
@@ -187,7 +187,7 @@ def test_a_ship_file_of_another_ship_names_nothing():
         ("speed_scale", (0.05,), "tanker", "s175"), ("current", (0.3, -0.2), "tanker", "s175"), ("rudder_offset", (0.035,), "navy", "tanker"),
     ],
 )  # fmt: skip
-def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship, file):
+def test_what_showswhatever_the_ship_is_is_named_under_doubt(name, values, ship, file):
     trials = published_trials(PUBLISHED[ship], 7, (Hidden(EFFECTS.get(name), values),), Trials(runs=16, samples=100))
     verdict = diagnose(replace(trials, ship=PUBLISHED[file].particulars), gain=False)
     assert "Is the ship file that of this ship" in verdict.warnings[0]
@@ -206,7 +206,7 @@ def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship
 )
 def test_under_doubt_a_wind_of_each_run_is_not_told(name, told):
     """What the coefficients of another ship lack in a run's manoeuvre passes for it."""
-    assert _whatever_the_ship(name, SimpleNamespace(gears=())) is told
+    assert whatever_the_ship(name, SimpleNamespace(gears=())) is told
 
 
 def test_the_file_of_a_ship_of_another_size_is_doubted():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.diagnose import STRANGE_SUM, diagnose
+from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.model import NUM_BASE, PLACES, Linearisation, Scales
 from shipbench.diagnosis.ordinary import NOTICEABLE, STRANGE, needed, widths_of
 from shipbench.diagnosis.plain import null_fit
@@ -15,6 +15,7 @@ from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import screen
 from shipbench.diagnosis.select import candidates_for
 from shipbench.diagnosis.settle import Fit, settle
+from shipbench.diagnosis.ship_file import STRANGE_SUM
 from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.eq2 import coefficients

@@ -1,0 +1,105 @@
+"""Whether the ship file is that of the ship that sailed, and what can be said while that is in doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..effects.base import EFFECTS
+from .analysis import Analysis
+from .gears import slow_on_any_ship
+from .model import NUM_BASE, PLACES
+from .ordinary import STRANGE, needed
+from .other_size import better_size, rather_another_size
+from .settle import Fit
+
+STRANGE_SUM, STRANGE_SIZE = 160.0, 3.0
+"""Sum of squares of the fit's parameters, in units of what ships differ by, beside the causes; and the size of a cause in typical sizes.
+(Sums with right ship files: 15 to 63 on MMG ships, up to 148 on ships of the literature and on the Esso Osaka; with wrong ones from 18 on; what
+is not seen here may be seen by `better_size`.)"""
+ORDINARY_SUM = 20.0
+"""Sum of squares below which no other size is tried, which takes as long as the first fit. (With the files of ships of less than 0.6 or more than 1.7
+times the length: 22 and more.)"""
+ODD, ODD_SUM = 5.0, 75.0
+"""Of one parameter and of all, from which a cause that goes by the ship file is told with a warning. (Of 76 sets with right files 7 and 10 reach
+them, all of ships of the literature; of 42 with wrong ones 36 and 30.)"""
+_MOST = 100.0
+STRANGE_THRUST = 4.0
+"""Of the thrust the fit asks for, in units of what the ship file leaves open of it (of kt a factor of 1.2, of the diameter 2.2 besides)."""
+ODD_THRUST = 1.3
+"""Factor of the thrust of an estimated propeller from which it is spoken of."""
+_QUESTION = "Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)?"
+
+
+def doubts_of(found: Analysis) -> list[str]:
+    """Signs that the model does not belong to the data, in one warning: the fit leaves what is ordinary, hull or propeller would be another ship's,
+    or a ship of another size explains the runs better than this one or than her causes. What is told as unknown in place of causes raises none."""
+    fit = found.final if found.unknown is None else found.selection.null
+    z = needed(fit)
+    signs = []
+    if np.max(np.abs(z)) > STRANGE or np.sum(z**2) > STRANGE_SUM:
+        signs.append(_moved(z))
+    if abs(z[PLACES["log_thrust"]]) > STRANGE_THRUST:
+        signs.append(f"the propeller would have to give {_thrust_factor(fit):.2g} times the thrust that the ship file makes likely")
+    for term, value in zip(fit.model.terms, fit.values, strict=True):
+        if term.effect.family in ("hull", "propulsion") and np.max(np.abs(value)) > STRANGE_SIZE:
+            signs.append(f"{term.label} would have to be {np.max(np.abs(value)):.1f} times its typical size")
+    if not signs and np.sum(z**2) > ORDINARY_SUM:
+        signs = better_size(found.selection.null)
+    if not signs:
+        by_file = {term.label: 0.5 * found.score(i)[0] for i, term in enumerate(fit.model.terms) if not whatever_the_ship(term.effect.name, found)}
+        signs = rather_another_size(found.selection.null, " and ".join(by_file), sum(by_file.values())) if by_file else []
+    if not signs:
+        return []
+    return [
+        f"{'; '.join(signs)}. {_QUESTION} Until that is sure, nothing is named but what shows whatever the ship is (faults of sensors, delay and "
+        "play of gears seen in their own record, those slow for any ship, and forces that know port from starboard or a direction of the earth, with "
+        "their sizes on the ship of the file); the candidates below are ranked as if it were."
+    ]
+
+
+def odd_for(found: Analysis, named: Sequence[str]) -> list[str]:
+    """A warning where the fit is odd, though not beyond all ships, and a cause is named that the file of another ship may make."""
+    by_file = [name for name in named if not whatever_the_ship(name, found)]
+    z = needed(found.final)
+    if not by_file or (np.max(np.abs(z)) < ODD and np.sum(z**2) < ODD_SUM):
+        return []
+    return [
+        f"{_moved(z)}, which few ships need. {_QUESTION} The file of another ship, too, may make {' and '.join(by_file)}: believe "
+        f"{'it' if len(by_file) == 1 else 'them'} only when that is sure."
+    ]
+
+
+def whatever_the_ship(name: str, found: Analysis) -> bool:
+    """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, delay or play of a gear seen in its own record, a
+    force that breaks a symmetry which every ship has. (46 trials, with nothing, wind, a rudder offset or a current hidden, each diagnosed with
+    another ship's file: no sensor and no such force was named but those that were there, while thrust, mass and others were.) With the file of a
+    shorter ship an ordinary rudder or shaft is slow: it must be slow for the longest ship. A wind of each run acts through coefficients alone, and
+    what these lack in a run's manoeuvre passes for it (a current shows in track and speeds besides)."""
+    effect = EFFECTS.get(name)
+    forces = effect.breaks_symmetry and name != "wind_per_run"
+    in_record = any(g.effect == name and slow_on_any_ship(g) for g in found.gears)
+    return effect.family == "sensor" or forces or in_record
+
+
+def own_propeller(found: Analysis) -> list[str]:
+    """What the runs say of a propeller that the ship file leaves open."""
+    factor, ship = _thrust_factor(found.final), found.final.plant.ship
+    if max(factor, 1.0 / factor) < ODD_THRUST:
+        return []
+    what = "diameter, kt" if ship.lacks("propeller") else "kt"
+    return [
+        f"the ship file does not give the propeller's {what}: the runs suggest {factor:.2g} times the thrust of the estimate, by which the model "
+        f"`physics` goes; give [propeller] {what}. Causes are judged with the thrust that suits the runs."
+    ]
+
+
+def _moved(z: np.ndarray) -> str:
+    largest, together = (f"more than {_MOST:.0f}" if x > _MOST else f"{x:.1f}" for x in (np.max(np.abs(z)), np.sum(z**2) ** 0.5))
+    return f"the fit moves a parameter by {largest} times its ordinary spread (all together {together} times)"
+
+
+def _thrust_factor(fit: Fit) -> float:
+    at = PLACES["log_thrust"]
+    return float(np.exp(fit.scales.structure[at - NUM_BASE] * fit.solution.mean[at]))
