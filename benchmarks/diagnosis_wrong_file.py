@@ -9,6 +9,7 @@ diagnosed with the file of each of the six others.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -19,28 +20,37 @@ from seven_ships import SHIPS, particulars, trials
 from shipbench.diagnosis.diagnose import diagnose
 
 
-def outcome(job: tuple[int, int, int]) -> tuple[bool, list[str]]:
-    """Whether the ship file is doubted, and what is named, for (ship, file, draw)."""
+def outcome(job: tuple[int, int, int]) -> tuple[str, list[str]]:
+    """What the verdict says of the ship file, and what it names, for (ship, file, draw)."""
     sails, file, draw = job
     found = diagnose(replace(trials(sails, draw, draw), ship=particulars(file, draw)), gain=False)
-    return any("Is the ship file" in w for w in found.warnings), [c.effect for c in found.causes if c.effect != "hull_derivatives"]
+    asks = [w for w in found.warnings if "Is the ship file" in w]
+    said = "no word" if not asks else "doubted" if "nothing is named but" in asks[0] else "a warning"
+    return said, [c.effect for c in found.causes if c.effect != "hull_derivatives"]
+
+
+def summary(found: Sequence[tuple[str, list[str]]]) -> str:
+    """The counts in words."""
+    of = Counter(said for said, _ in found)
+    unsaid = sum(said == "no word" and bool(names) for said, names in found)
+    silent = sum(not names for _, names in found)
+    return f"of {len(found)} files doubted {of['doubted']}, warned of {of['a warning']}; nothing named {silent}, named without a word {unsaid}"
 
 
 def main() -> None:
     """One line a ship, and the sum."""
     given = measure.options(__doc__, runs=1, cases=SHIPS)
     measure.header(given)
-    total: Counter[str] = Counter()
+    total: list[tuple[str, list[str]]] = []
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         for ship in given.only or (SHIPS[:1] if given.quick else SHIPS):
             jobs = [(SHIPS.index(ship), file, draw) for draw in range(given.runs) for file in range(len(SHIPS)) if SHIPS[file] != ship]
-            found = dict(zip(jobs, pool.map(outcome, jobs), strict=True))
-            doubted, silent = sum(d for d, _ in found.values()), sum(not names for _, names in found.values())
-            said = [f"file of {SHIPS[j[1]]}{', doubted' if doubt else ''}: {', '.join(names)}" for j, (doubt, names) in found.items() if names]
-            measure.record(given, {"ship": ship, "doubted": doubted, "silent": silent, "of": len(jobs), "named": said})
-            total.update(doubted=doubted, silent=silent, of=len(jobs))
-            print(f"{ship}: of {len(jobs)} doubted {doubted}, nothing named {silent}", *said, sep="; ", flush=True)
-    print(f"all: of {total['of']} doubted {total['doubted']}, nothing named {total['silent']}")
+            found = list(pool.map(outcome, jobs))
+            named = [f"file of {SHIPS[job[1]]}, {said}: {', '.join(names)}" for job, (said, names) in zip(jobs, found, strict=True) if names]
+            measure.record(given, {"ship": ship, "summary": summary(found), "named": named})
+            total += found
+            print(f"{ship}: {summary(found)}", *named, sep="; ", flush=True)
+    print(f"all: {summary(total)}")
 
 
 if __name__ == "__main__":

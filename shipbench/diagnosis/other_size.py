@@ -20,19 +20,25 @@ known by her main dimensions, 127. Six other ships had less than 60; what it cos
 _WORTH_A_FIT = 0.0
 """The same after a first fit, with the noise of the ship of the file, in a fifth of the time. (126 files of other ships: what reaches `_LEAST` in the
 end, where nothing else speaks against the file, has 17 and more.)"""
+_ABOUT = 5.0
+"""Log evidence by which a cause must beat a ship of nearly the same size, or she is spoken of (causes that come so near are called confused)."""
 
 
 def better_size(null: Fit) -> list[str]:
     """A line if a smaller or a larger ship, with masses, inertia and forces of her size, is far better beside no cause; none if not."""
-    best, gain = _best(null, _FACTORS)
-    return [f"{_similar(best)} (by {gain:.0f} of log evidence)"] if gain > _LEAST * _times(null) else []
+    factor, gain = _best(null, _FACTORS)
+    if factor == 1.0 or gain < _LEAST * _times(null):
+        return []
+    return [f"a similar ship of {factor:g} times the size explains the runs better (by {gain:.0f} of log evidence)"]
 
 
-def rather_another_size(null: Fit, causes: str, worth: float) -> list[str]:
-    """A line if a ship of nearly the same size is better than that of the file with `causes`, which add `worth` to the log evidence."""
+def size_instead_of(causes: str, worth: float, null: Fit) -> list[str]:
+    """A line if a ship of nearly the same size does about what `causes` do for that of the file, which add `worth` to the log evidence."""
     worth *= min(1.0, _PIECES / len(null.plant.seg.run))
-    best, gain = _best(null, _NEAR)
-    return [f"{_similar(best)} than {causes} (by {gain:.0f} of log evidence, against {worth:.0f})"] if gain > worth * _times(null) else []
+    factor, gain = _best(null, _NEAR)
+    if factor == 1.0 or gain < (worth - _ABOUT) * _times(null):
+        return []
+    return [f"a similar ship of {factor:g} times the size explains the runs about as well as {causes} (log evidence {gain:.0f}, against {worth:.0f})"]
 
 
 def _best(null: Fit, factors: Sequence[float]) -> tuple[float, float]:
@@ -51,7 +57,3 @@ def _best(null: Fit, factors: Sequence[float]) -> tuple[float, float]:
 
 def _times(null: Fit) -> float:
     return _ESTIMATED if any(null.plant.ship.lacks(part) for part in ("propeller", "rudder")) else 1.0
-
-
-def _similar(factor: float) -> str:
-    return f"a similar ship of {factor:g} times the size explains the runs better"

@@ -1,0 +1,58 @@
+"""The file of another ship: what is named goes by the ship of the file, and is told with a warning or not at all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipbench.checking.units import UnitFinding
+from shipbench.diagnosis import diagnose as whole
+from shipbench.diagnosis.case_ships import draw_ship
+from shipbench.diagnosis.cases import draw_case, singles
+from shipbench.diagnosis.diagnose import diagnose
+from shipbench.simulate.published import PUBLISHED, published_trials
+from shipbench.simulate.trials import Trials, sea_trials
+
+QUESTION = "Is the ship file that of this ship"
+
+
+@pytest.fixture(scope="module")
+def tankers():
+    """Variants of KVLCC2 of 66 and 110 m."""
+    rng = np.random.default_rng(0)
+    return [draw_ship(rng, "test", False) for _ in range(2)]
+
+
+def test_a_thrust_that_a_ship_of_nearly_the_same_size_explains_too_is_told_with_a_warning(tankers):
+    """With the file of the smaller one the larger one had too much thrust, and nothing else was out of the ordinary."""
+    verdict = diagnose(replace(sea_trials(tankers[1], 0), ship=tankers[0].particulars), gain=False)
+    assert [c.effect for c in verdict.causes] == ["thrust_gain"]
+    (warning,) = [w for w in verdict.warnings if QUESTION in w]
+    assert warning.startswith("a similar ship of 1.4 times the size explains the runs about as well as thrust_gain (log evidence ")
+
+
+def test_a_stalled_rudder_that_no_other_size_explains_is_told_without():
+    case = draw_case("single", singles().index("rudder_stall"), 0)
+    verdict = diagnose(case.dataset(), gain=False)
+    assert [c.effect for c in verdict.causes] == ["rudder_stall"]
+    assert not any(QUESTION in w for w in verdict.warnings)
+
+
+def test_a_slow_gear_of_an_odd_ship_is_told_with_a_warning():
+    trials = replace(published_trials(PUBLISHED["tanker"], 0, (), Trials()), ship=PUBLISHED["navy"].particulars)
+    verdict = diagnose(trials, gain=False)
+    named = [c.effect for c in verdict.causes]
+    assert named == ["rudder_lag", "shaft_lag"]
+    (warning,) = [w for w in verdict.warnings if QUESTION in w]
+    assert warning.endswith("The file of another ship, too, may make rudder_lag and shaft_lag: believe them only when that is sure.")
+
+
+def test_of_a_ship_in_doubt_no_actuator_is_read_to_the_other_side(monkeypatch):
+    """Thrusters of a research ship, beside the file of a ship of 300 m, were all four named as of the wrong sign, with certainty."""
+    monkeypatch.setattr(whole, "turned_actuators", lambda *_: [UnitFinding("delta", "sign", -1.0, "as if it were")])
+    trials = published_trials(PUBLISHED["navy"], 3, (), Trials(runs=8, samples=100))
+    verdict = diagnose(replace(trials, ship=PUBLISHED["s175"].particulars), gain=False)
+    assert any(QUESTION in w for w in verdict.warnings)
+    assert [c.effect for c in verdict.causes] == []
