@@ -17,6 +17,9 @@ from .errors import InputError
 
 _LEAST_FULLNESS = 0.1
 """Block coefficient over the whole breadth below which a unit is wrong."""
+_WITHIN, _DIAMETER, _RUDDER, _GYRATION = 0.6, 2.0, 0.15, (0.1, 0.5)
+"""Beyond every ship, so that a unit or an axis is wrong: place over L, propeller over T, rudder over L T (0.1 on yachts and tugs), radius of gyration
+over L (0.2 to 0.3)."""
 
 
 class _Part(BaseModel):
@@ -71,7 +74,7 @@ class Ship(_Part):
     Cb: float | None = Field(None, gt=0, le=1)
     xG: float | None = None
     Izz: float | None = Field(None, gt=0)
-    rho: float = Field(1025.0, gt=0)
+    rho: float = Field(1025.0, ge=900, le=1200)
     propeller: Propeller | None = None
     rudder: Rudder | None = None
     thrusters: Thrusters | None = None
@@ -174,7 +177,8 @@ def complete(ship: Ship) -> Particulars:
     """Fill in what `ship` does not give from published regressions and rules of thumb, each named in `notes`.
 
     Raises:
-        InputError: mass, displacement and Cb contradict one another by more than 10 %, or no hull is so full or so slender.
+        InputError: mass, displacement and Cb contradict one another by more than 10 %, no hull is so full or so slender, or something is too large
+            for the ship or outside of her.
     """
     notes: list[str] = []
 
@@ -198,6 +202,7 @@ def complete(ship: Ship) -> Particulars:
             f"ship '{ship.name}': mass {mass:.4g} kg, rho {ship.rho:g} kg/m^3 and L B T = {box:.4g} m^3 give a block coefficient of "
             f"{mass / (ship.rho * box):.3f}, the file says {Cb:.3f}; they must agree within 10 %. Check units (kg, m, m^3)."
         )
+    _check_proportions(ship, mass)
     xG = take(ship.xG, 0.0, "xG", "the centre of gravity at midship")
     Izz = take(ship.Izz, mass * (0.25 * ship.L) ** 2, "Izz", "a radius of gyration of 0.25 L")
     prop = ship.propeller or Propeller(diameter=0.6 * ship.T)
@@ -230,3 +235,28 @@ def complete(ship: Ship) -> Particulars:
         x_bow=thrusters.x_bow, x_stern=thrusters.x_stern, F_max=thrusters.max_force,
         A_F=wind.frontal_area, A_L=wind.lateral_area, notes=tuple(notes),
     )  # fmt: skip
+
+
+def _check_proportions(ship: Ship, mass: float) -> None:
+    """Raise InputError for what no ship has, all faults in one message."""
+    faults = []
+    if not ship.L >= ship.B >= ship.T:
+        faults.append(f"L, B, T are {ship.L:g}, {ship.B:g}, {ship.T:g} m; accepted: L >= B >= T")
+    propeller, rudder, thrusters = ship.propeller, ship.rudder, ship.thrusters
+    places = {
+        "xG": ship.xG, "propeller.x": propeller.x if propeller else None, "rudder.x": rudder.x if rudder else None,
+        "thrusters.x_bow": thrusters.x_bow if thrusters else None, "thrusters.x_stern": thrusters.x_stern if thrusters else None,
+    }  # fmt: skip
+    for name, x in places.items():
+        most = 0.0 if name == "rudder.x" else _WITHIN * ship.L
+        if x is not None and not -_WITHIN * ship.L <= x <= most:
+            faults.append(f"{name} is {x:g} m; accepted: {-_WITHIN * ship.L:.4g} to {most:.4g} (from midship, forward positive)")
+    if propeller and propeller.diameter > _DIAMETER * ship.T:
+        faults.append(f"propeller.diameter is {propeller.diameter:g} m; accepted: up to {_DIAMETER:g} T = {_DIAMETER * ship.T:.4g}")
+    if rudder and rudder.area > _RUDDER * ship.L * ship.T:
+        faults.append(f"rudder.area is {rudder.area:g} m^2; accepted: up to {_RUDDER:g} L T = {_RUDDER * ship.L * ship.T:.4g}")
+    low, high = (mass * (k * ship.L) ** 2 for k in _GYRATION)
+    if ship.Izz is not None and not low <= ship.Izz <= high:
+        faults.append(f"Izz is {ship.Izz:.4g} kg m^2; accepted: {low:.3g} to {high:.3g}, radii of gyration of {_GYRATION[0]:g} to {_GYRATION[1]:g} L")
+    if faults:
+        raise InputError(f"ship '{ship.name}': {'; '.join(faults)}. Check units and axes (m, m^2, kg m^2; lengths from midship).")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from shipbench.errors import InputError
 from shipbench.integrate import rk4_step
 from shipbench.records import Dataset, Run
 from shipbench.registry import Registry
-from shipbench.ship import Ship, complete
+from shipbench.ship import Propeller, Rudder, Ship, Thrusters, complete
 from shipbench.signals import COMMANDS, STATES, UNITS, wrap_angle
 from shipbench.specs import EffectSpec, parse_spec
 
@@ -122,6 +124,25 @@ def test_a_ship_that_contradicts_itself_is_refused():
 def test_a_ship_in_other_units_is_refused_with_the_figures(wrong):
     """Length in cm, mass in t, displacement in kg."""
     with pytest.raises(InputError, match=r"give a block coefficient of [0-9.e+-]+; hulls have"):
+        complete(SHIP.model_copy(update=wrong))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"propeller": Propeller(diameter=4600.0)}, "propeller.diameter is 4600 m; accepted: up to 2 T = 12"),
+        ({"rudder": Rudder(area=215.0)}, "rudder.area is 215 m^2; accepted: up to 0.15 L T = 90"),
+        ({"rudder": Rudder(area=10.0, x=50.0)}, "rudder.x is 50 m; accepted: -60 to 0 (from midship, forward positive)"),
+        ({"B": 6.0, "T": 16.0}, "L, B, T are 100, 6, 16 m; accepted: L >= B >= T"),
+        ({"thrusters": Thrusters(x_bow=110.0, x_stern=10.0)}, "thrusters.x_bow is 110 m; accepted: -60 to 60"),
+        ({"Izz": 6e6}, "Izz is 6e+06 kg m^2; accepted: 6.15e+08 to 1.54e+10"),
+        ({"xG": float("nan"), "Izz": 1.0}, "xG is nan m; accepted: -60 to 60 (from midship, forward positive); Izz is 1 kg m^2"),
+    ],
+    ids=["diameter in mm", "area in square feet", "from the stern", "exchanged", "thrusters from the stern", "in t m^2", "two faults"],
+)
+def test_what_no_ship_has_is_refused_with_what_is_accepted(wrong, told):
+    """A propeller in mm once ended in an OverflowError of the diagnosis, a rudder at the bow in `none`."""
+    with pytest.raises(InputError, match=re.escape(told)):
         complete(SHIP.model_copy(update=wrong))
 
 
