@@ -14,7 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..checking.standing import standing
-from ..checking.units import check_units, corrected, merged
+from ..checking.units import UnitFinding, check_units, corrected, merged
 from ..errors import InputError
 from ..records import Dataset
 from . import misread
@@ -23,6 +23,7 @@ from .causes import describe_candidates, describe_causes, remaining, unknown_par
 from .clocks import NAMES, check_clocks
 from .derived import faults, has_speeds, marked, said
 from .felt_wind import with_true_wind
+from .fit import Fit
 from .gain import FoldGain, fold_gain, summarise
 from .outcome import Diagnosis, Gain
 from .over_ground import over_ground
@@ -80,20 +81,14 @@ def diagnose(
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
         null = plain_model(Plant.of(dataset, steps), only, settled)
-        turned = turned_actuators(dataset, null) if only is None and not cautious else []
-        if turned:
-            as_recorded, dataset = (dataset, null), corrected(dataset, turned)
-            null = plain_model(Plant.of(dataset, steps), settled=settled)
-        found = analyse(null, only=only, seed=seed, cautious=cautious)
-        if turned and doubts_of(found):  # of another ship's thrusters or rudder the model cannot tell the side
-            (dataset, null), turned = as_recorded, []
-            found = analyse(null, seed=seed)
-        if turned:
-            units, ahead, work = merged([*units, *turned]), None, partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
-        if wrong := [e for e in found.misread if e.contradicted]:
-            dataset = misread.read_rightly(dataset, wrong)
-            found = analyse(plain_model(Plant.of(dataset, steps), settled=settled), seed=seed, misread=wrong)
-            ahead, work = None, partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
+        if only is not None or cautious:
+            found = analyse(null, only=only, seed=seed, cautious=cautious)
+        else:
+            as_recorded = dataset
+            found, dataset, turned = _as_it_must_be_read(dataset, null, steps, settled, seed)
+            units = merged([*units, *turned])
+            if dataset is not as_recorded:
+                ahead, work = None, partial(work, dataset=dataset)
         doubts = doubts_of(found) if only is None else []
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts else Worth()
     warnings += [text for text, _ in standing(dataset).values()]
@@ -151,6 +146,24 @@ def _check(dataset: Dataset) -> list[str]:
     if np.std(states[:, 7]) < 1e-3 and np.std(states[:, 5]) < 1e-5:
         warnings.append("the rudder is never used and the ship never turns: nothing can be said about rudder and hull.")
     return warnings
+
+
+def _as_it_must_be_read(dataset: Dataset, null: Fit, steps: int, settled: Sequence[str], seed: int) -> tuple[Analysis, Dataset, list[UnitFinding]]:
+    """What is found in runs of which `null` is the plain model, the runs as actuators must be read in them, and those that are read to the other side
+    (which the model cannot tell of another ship than that of the file)."""
+
+    def plain(read: Dataset) -> Fit:
+        return plain_model(Plant.of(read, steps), settled=settled)
+
+    turned = turned_actuators(dataset, null)
+    read = corrected(dataset, turned)
+    found = analyse(plain(read) if turned else null, seed=seed)
+    if turned and doubts_of(found):
+        turned, read, found = [], dataset, analyse(null, seed=seed)
+    if wrong := [e for e in found.misread if e.contradicted]:
+        read = misread.read_rightly(read, wrong)
+        found = analyse(plain(read), seed=seed, misread=wrong)
+    return found, read, turned
 
 
 def _in_time(dataset: Dataset) -> Dataset:
