@@ -34,7 +34,8 @@ _QUESTION = "Is the ship file that of this ship (L, B, T, displacement, propelle
 
 def doubts_of(found: Analysis) -> list[str]:
     """Signs that the model does not belong to the data, in one warning: the fit leaves what is ordinary, hull or propeller would be another ship's,
-    or a ship of quite another size explains the runs better. Causes in whose place something unknown is told raise none."""
+    a ship of quite another size explains the runs better, or one of nearly the same size does as well as the causes where the fit is odd. Causes in
+    whose place something unknown is told raise none."""
     fit = found.final if found.unknown is None else found.selection.null
     z = needed(fit)
     signs = []
@@ -47,6 +48,8 @@ def doubts_of(found: Analysis) -> list[str]:
             signs.append(f"{term.label} would have to be {np.max(np.abs(value)):.1f} times its typical size")
     if not signs and np.sum(z**2) > ORDINARY_SUM:
         signs = better_size(found.selection.null)
+    if not signs and _is_odd(z) and (size := _size_instead(found, [term.label for term in fit.model.terms])):
+        signs = [_moved(z), *size]
     if not signs:
         return []
     return [
@@ -63,16 +66,24 @@ def odd_for(found: Analysis, named: Sequence[str]) -> list[str]:
     if not by_file:
         return []
     z = needed(found.final)
-    odd = np.max(np.abs(z)) > ODD or np.sum(z**2) > ODD_SUM
-    signs = [f"{_moved(z)}, which few ships need"] if odd else []
-    forces = {term.label: 0.5 * found.score(i)[0] for i, term in enumerate(found.final.model.terms) if term.label in by_file}
-    signs += size_instead_of(" and ".join(forces), sum(forces.values()), found.selection.null) if forces else []
+    signs = [f"{_moved(z)}, which few ships need"] if _is_odd(z) else _size_instead(found, by_file)
     if not signs:
         return []
     return [
         f"{'; '.join(signs)}. {_QUESTION} The file of another ship, too, may make {' and '.join(by_file)}: believe "
         f"{'it' if len(by_file) == 1 else 'them'} only when that is sure."
     ]
+
+
+def _is_odd(z: np.ndarray) -> bool:
+    return bool(np.max(np.abs(z)) > ODD or np.sum(z**2) > ODD_SUM)
+
+
+def _size_instead(found: Analysis, among: Sequence[str]) -> list[str]:
+    """What is said if a ship of nearly the same size does as well as those of the causes `among` that go by the ship file and act as forces."""
+    terms = {t.label: i for i, t in enumerate(found.final.model.terms) if t.label in among and not whatever_the_ship(t.label, found)}
+    worth = sum(0.5 * found.score(i)[0] for i in terms.values())
+    return size_instead_of(" and ".join(terms), worth, found.selection.null) if terms else []
 
 
 def whatever_the_ship(name: str, found: Analysis) -> bool:
