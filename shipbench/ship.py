@@ -91,10 +91,14 @@ class Ship(_Part):
         """Validate `data`; `where` names the source in messages.
 
         Raises:
-            InputError: a required key is missing, a key is unknown or a value is out of range.
+            InputError: a required key is missing, a key is unknown, a value is out of range, or together they are of no ship (see `complete`).
         """
         try:
-            return cls.model_validate(data)
+            ship = cls.model_validate(data)
+            complete(ship)
+            return ship
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
         except ValidationError as error:
             first = error.errors()[0]
             key = ".".join(str(k) for k in first["loc"]) or "ship"

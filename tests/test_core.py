@@ -141,9 +141,12 @@ def test_a_ship_in_other_units_is_refused_with_the_figures(wrong):
     ids=["diameter in mm", "area in square feet", "from the stern", "exchanged", "thrusters from the stern", "in t m^2", "two faults"],
 )
 def test_what_no_ship_has_is_refused_with_what_is_accepted(wrong, told):
-    """A propeller in mm once ended in an OverflowError of the diagnosis, a rudder at the bow in `none`."""
+    """A propeller in mm once ended in an OverflowError of the diagnosis, a rudder at the bow in `none`. It is refused where the file is read."""
+    ship = SHIP.model_copy(update=wrong)
     with pytest.raises(InputError, match=re.escape(told)):
-        complete(SHIP.model_copy(update=wrong))
+        complete(ship)
+    with pytest.raises(InputError, match=re.escape(f"her.toml: ship 's': {told}")):
+        Ship.from_dict(ship.model_dump(), "her.toml")
 
 
 def test_rk4_is_of_fourth_order_on_an_oscillator():

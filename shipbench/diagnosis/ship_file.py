@@ -91,8 +91,8 @@ def whatever_the_ship(name: str, found: Analysis) -> bool:
     force that breaks a symmetry which every ship has. (46 trials, with nothing, wind, a rudder offset or a current hidden, each diagnosed with
     another ship's file: no sensor and no such force was named but those that were there, while thrust, mass and others were.) With the file of a
     shorter ship an ordinary rudder or shaft is slow: it must be slow for the longest ship. A wind of each run acts through coefficients alone, and
-    what these lack in a run's manoeuvre passes for it (a current shows in track and speeds besides)."""
-    effect = EFFECTS.get(name)
+    what these lack in a run's manoeuvre passes for it (a current shows in track and speeds besides). Of a change, what has changed decides."""
+    effect = EFFECTS.get(next((t.label for t in found.final.model.terms if t.since is not None), name) if name == "change_point" else name)
     forces = effect.breaks_symmetry and name != "wind_per_run"
     in_record = any(g.effect == name and slow_on_any_ship(g) for g in found.gears)
     return effect.family == "sensor" or forces or in_record

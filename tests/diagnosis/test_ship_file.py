@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,9 @@ from shipbench.diagnosis import diagnose as whole
 from shipbench.diagnosis.case_ships import draw_ship
 from shipbench.diagnosis.cases import draw_case, singles
 from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.ship_file import whatever_the_ship
+from shipbench.diagnosis.term import Term
+from shipbench.effects.base import EFFECTS
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
 
@@ -47,6 +51,13 @@ def test_a_slow_gear_of_an_odd_ship_is_told_with_a_warning():
     assert named == ["rudder_lag", "shaft_lag"]
     (warning,) = [w for w in verdict.warnings if QUESTION in w]
     assert warning.endswith("The file of another ship, too, may make rudder_lag and shaft_lag: believe them only when that is sure.")
+
+
+@pytest.mark.parametrize(("changed", "shows"), [("heading_bias", True), ("rudder_offset", True), ("thrust_gain", False)])
+def test_of_a_change_what_has_changed_decides_whether_it_shows_whatever_the_ship(changed, shows):
+    terms = (Term(EFFECTS.get("current")), Term(EFFECTS.get(changed), since=9))
+    found = SimpleNamespace(final=SimpleNamespace(model=SimpleNamespace(terms=terms)), gears=())
+    assert whatever_the_ship("change_point", found) is shows
 
 
 def test_of_a_ship_in_doubt_no_actuator_is_read_to_the_other_side(monkeypatch):

@@ -354,6 +354,13 @@ def test_a_missing_log_or_ship_is_named(trial_import, tmp_path):
     assert "ship.toml" in result.stderr
 
 
+def test_a_ship_file_of_no_ship_is_refused_before_anything_is_written(trial_import, tmp_path):
+    result = trial_import(TEXT, ship=SHIP + "[propeller]\ndiameter = 2400.0\n")
+    assert result.exit_code == 2
+    assert "ship.toml: ship 'trial': propeller.diameter is 2400 m; accepted: up to 2 T = 6" in " ".join(result.stderr.split())
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_latitude_out_of_range_names_unit_and_format(trial_import):
     plan = mapping(body=channels("x", "y", lat='{ column = "north", unit = "deg" }', lon='{ column = "east", unit = "deg" }'))
     result = trial_import(TEXT, plan)
