@@ -172,10 +172,10 @@ def _ranking(d: Diagnosis) -> str:
 
 
 def _smallest(d: Diagnosis) -> str:
-    rows = [[c.effect, c.family, detectable(c)] for c in sorted(d.candidates, key=lambda c: (c.family, c.effect)) if detectable(c) != "-"]
+    rows = [[c.effect, c.family, detectable(c)] for c in sorted(d.candidates, key=lambda c: (c.family, c.effect)) if c.detectable]
     note = (
         "At this size the expected score reaches the threshold, beside the plain model of these runs. A larger one would probably have been named; "
-        "of a smaller one nothing can be said. Effects that are not listed could not have been named, or are looked for in another way."
+        "of a smaller one nothing can be said. -: not at any size that is possible. Effects that are not listed are looked for in another way."
     )
     body = table(["effect", "family", "smallest size"], rows) + paragraph(note, small=True)
     return body if d.verdict == "none" else f"<details><summary>Table of {len(rows)} effects</summary>{body}</details>" if rows else ""

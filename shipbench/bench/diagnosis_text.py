@@ -89,7 +89,7 @@ def next_command(d: Diagnosis) -> str:
 
 
 def detectable(c: Candidate) -> str:
-    """Smallest size that would have been named, per amplitude; the unit once where it is the same."""
+    """Smallest size that would have been named, per amplitude, the unit once where it is the same; "-" where no possible size would."""
     known = [(name, v, _unit(c, name)) for name, v in c.detectable.items() if v is not None and math.isfinite(v)]
     parts = []
     for i, (name, v, unit) in enumerate(known):
@@ -140,11 +140,11 @@ def _detectable_lines(d: Diagnosis) -> list[str]:
     kept = (
         sorted(d.candidates, key=lambda c: c.effect) if d.verdict == "none" else [c for c in d.candidates[:_SHOWN] if c.rejected_because != "named"]
     )
-    kept = [c for c in kept if detectable(c) != "-"]
+    kept = [c for c in kept if c.detectable]
     if not kept:
         return []
     wide = max(len(c.effect) for c in kept)
-    lines = ["Smallest size of each effect that would have been named:"]
+    lines = ["Smallest size of each effect that would have been named (-: none that is possible):"]
     for c in kept:
         lines += textwrap.wrap(f"{c.effect:<{wide}s}  {detectable(c)}", WIDTH, initial_indent="  ", subsequent_indent=" " * (wide + 4))
     return [*lines, ""]

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..physics.actuators import Gear
 from .gain import Extension
-from .gears import GearFinding, find_in_gears
+from .gear_kinds import GearFinding
+from .gears import find_in_gears
 from .generic import NO_FORM, Dependence, Search, dependences
 from .misread import judged
 from .model import Scales

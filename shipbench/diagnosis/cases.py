@@ -26,7 +26,7 @@ from ..simulate.published import PUBLISHED, Published, published_trials
 from ..simulate.simulator import Simulator
 from ..simulate.trials import CRUISE, Trials, sea_trials
 from .case_ships import WHICH, draw_ship
-from .gears import least_rate
+from .gear_kinds import least_rate
 from .outside import OUTSIDE, Outside
 
 KINDS = ("single", "pair", "none-same", "none-other", "outside", "change", "unit", "published", "none-published")

@@ -12,7 +12,7 @@ from ..checking.units import UnitFinding
 from ..effects.base import EFFECTS, Effect
 from .analysis import HULL_THRESHOLD, Analysis
 from .clocks import NAMES, LateVelocities
-from .gears import GearFinding
+from .gear_kinds import GearFinding
 from .generic import Dependence
 from .model import FREE, HULL_SPREAD
 from .outcome import Candidate, Cause, Estimate, Gain, what_it_is
@@ -201,20 +201,26 @@ def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -
             s.term.effect.units(), s.term.effect.family,
         )  # fmt: skip
     for g in found.all_gears:
-        effect = EFFECTS.get(g.effect)
-        if g.effect not in lines or g.score > lines[g.effect].score:
-            reason = "named" if g.effect in named else f"score {g.score:.0f} below the threshold {found.threshold:.0f}"
-            if g.effect not in named and g.score > found.threshold:
-                best = next(x for x in found.all_gears if x.actuator == g.actuator)
-                reason = f"{best.effect} explains the same actuator better ({best.score:.0f} against {g.score:.0f})" if best is not g else _DOUBT
-            name = effect.parameters[0].name
-            lines[g.effect] = Candidate(
-                g.effect, g.score, _p(found, g.score), reason, {name: g.value}, {}, {name: effect.parameters[0].unit}, effect.family
-            )
+        lines[g.effect] = _gear_candidate(found, g, named, lines.get(g.effect))
     for name in EFFECTS.names():
         if name not in lines:
             lines[name] = _not_screened(found, name, named, measured)
     return sorted(lines.values(), key=lambda c: -c.score if np.isfinite(c.score) else np.inf)
+
+
+def _gear_candidate(found: Analysis, g: GearFinding, named: Sequence[str], motion: Candidate | None) -> Candidate:
+    """The same of an effect of a gear; motion: what the ship's motion says of it."""
+    name, unit = EFFECTS.get(g.effect).parameters[0].name, EFFECTS.get(g.effect).parameters[0].unit
+    sizes = [g.detectable, motion.detectable[name]] if motion else [g.detectable]
+    detectable = {name: float(np.fmin.reduce(sizes))}
+    if motion and motion.score >= g.score:
+        return replace(motion, detectable=detectable)
+    reason = "named" if g.effect in named else f"score {g.score:.0f} below the threshold {found.threshold:.0f}"
+    if g.effect not in named and g.score > found.threshold:
+        best = next(x for x in found.all_gears if x.actuator == g.actuator)
+        reason = f"{best.effect} explains the same actuator better ({best.score:.0f} against {g.score:.0f})" if best is not g else _DOUBT
+    family = EFFECTS.get(g.effect).family
+    return Candidate(g.effect, g.score, _p(found, g.score), reason, {name: g.value}, detectable, {name: unit}, family)
 
 
 def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str]) -> str:
@@ -256,17 +262,29 @@ def _shown(s: Score, fit: Fit) -> dict[str, float]:
 
 
 def _detectable(found: Analysis, s: Score) -> dict[str, float]:
-    """Size whose expected score is the threshold, along each amplitude: x^2 V - log(1 + V) - cost = T; none below `least_size`."""
-    unit = found.selection.null.scales.amplitudes(s.term, found.selection.null.plant.c.L)
-    if s.term.per_run:
-        return {}
-    names = [p.name for p in s.term.effect.parameters if not p.shape]
-    values, needed = {}, found.threshold + s.term.cost(found.selection.null.plant.seg.runs)
-    for i, name in enumerate(names):
-        V = float(s.information[i, i])
-        size = float(unit[i] * max(np.sqrt((needed + np.log1p(max(V, 0.0))) / V), least_size(s.term.label))) if V > 1e-6 else float("nan")
-        values[name] = s.term.effect.public((size, 0.0))[s.term.effect.vector[0]] if s.term.effect.vector else size
+    """Size from which a cause is expected to be named, along each amplitude, where x^2 V - log(1 + V) is what is asked of it, or, of values of single
+    runs, their root mean square x, where the sum of tr(x^2 V) - log det(1 + x^2 V) over runs is; none below `least_size`, NaN beyond the bounds."""
+    null, term = found.selection.null, s.term
+    unit, effect = null.scales.amplitudes(term, null.plant.c.L), term.effect
+    asked = found.threshold + term.cost(null.plant.seg.runs) + found.selection.off_form * passes_for_form(term)
+    if term.per_run:
+        least = np.full(term.size, max(_root_mean_square(s.information, asked), least_size(term.label)))
+    else:
+        V = np.maximum(np.diag(s.information), 1e-12)
+        least = np.maximum(np.sqrt((asked + np.log1p(V)) / V), least_size(term.label))
+    values = {}
+    for size, p in zip(unit * least, [p for p in effect.sized(null.plant.c.L) if not p.shape], strict=True):
+        seen = effect.public((size, 0.0))[effect.vector[0]] if effect.vector else float(size)
+        values[f"{p.name}_rms" if term.per_run else p.name] = seen if size <= max(abs(p.low), abs(p.high)) else float("nan")
     return values
+
+
+def _root_mean_square(information: np.ndarray, asked: float) -> float:
+    """Of the values of single runs, whose `information` (N, size, size) is known, where they are expected to score `asked`."""
+    from scipy.optimize import brentq
+
+    seen = np.maximum(np.linalg.eigvalsh(information), 0.0) + 1e-12
+    return float(np.exp(brentq(lambda x: np.sum(np.exp(2.0 * x) * seen - np.log1p(np.exp(2.0 * x) * seen)) - asked, -20.0, 20.0)))
 
 
 def _not_screened(found: Analysis, name: str, named: Sequence[str], measured: bool) -> Candidate:

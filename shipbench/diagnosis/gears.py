@@ -12,101 +12,23 @@ import numpy as np
 
 from ..ops import where
 from ..physics.actuators import Gear, gear_path, gear_step
+from .gear_kinds import DELAY, ORDINARY, GearFinding, Kind, kinds_of, least_rate
 from .plant import Plant, Segments, ordinary_gears
 from .record_error import CHANNELS, FORMS, RecordError, readings
 
 if TYPE_CHECKING:
     from ..compiled import Lanes
 
-_RATE_POWER = {"n": 2, "delta": 1, "F": 0}
-_SCAN = (4, 12, 24)
+_SCAN, _HALVINGS = (4, 12, 24), 8
 _ROUNDS, _FINE, _WORTH_A_MOVE, _MOST, _STEP = 150, 1e-3, 3e-5, 200, 0.02
-_DELAY = 10.0
-"""Longest delay [s] at 130 m that is looked for."""
 _SECOND, _PARTS = 0.5, 4
 """Greatest time constant of an ordinary second stage, as a share of the first's; parts of a sample in which it is followed."""
 _LEAST_SCORE, _LEAST_ERROR, _CORRECTIONS, _PROMISING = 10.0, 0.03, 3, 0.1
 """Least score of an error of the record, least size that is told, relative, how often record and gear are corrected in turn, and the share of what
 the best effect explains from which they are: that may make ten times as much of it."""
-_LONGEST = 400.0
-"""Length [m] of the longest ships."""
 _OWN_SPREAD, _RECORD, _CLOCK = 0.25, 0.01, 0.02
 """Standard deviations: of an ordinary gear's time constant, relative (a lag is reported beyond it); of the scale of a record, relative; of a time, in
 samples."""
-
-
-@dataclass(frozen=True)
-class Ordinary:
-    """What an ordinary gear may be, at 130 m: greatest time constant [s] and smallest rate [actuator's unit per s]."""
-
-    T: float
-    rate: float
-
-
-ORDINARY = {"n": Ordinary(12.0, 2.0), "delta": Ordinary(2.0, np.deg2rad(1.9)), "F": Ordinary(4.5, 0.0)}
-"""Shaft as for slow Diesels; rudder as SOLAS II-1 reg. 29 asks (65 deg in 28 s, 2.3 deg/s) less a margin; thrusters as for electric tunnels."""
-
-
-@dataclass(frozen=True)
-class GearFinding:
-    """An effect of a gear. score: 2 log likelihood ratio against the best ordinary gear, of one stage or two, samples discounted for their
-    correlation, less log(10 N) for the added value; value: of the effect's parameter, ci95; per_run (N,)."""
-
-    effect: str
-    score: float
-    value: float
-    ci95: tuple[float, float]
-    per_run: np.ndarray
-    actuator: str
-    gear: Gear
-
-
-@dataclass(frozen=True)
-class _Kind:
-    """An effect of one actuator: bounds of its value in the gear, and how a gear takes it; `beyond` is subtracted when it is reported."""
-
-    effect: str
-    field: str
-    low: float
-    high: float
-    beyond: float = 0.0
-
-    @property
-    def at(self) -> int:
-        """Where its value stands beside time constant and rate, or in place of one of them."""
-        return {"T": 0, "rate": 1}.get(self.field, 2)
-
-
-def least_rate(actuator: str, scale: float) -> float:
-    """Least rate of an ordinary gear, by Froude's law; a full-scale rudder under 130 m need be no faster (SOLAS)."""
-    if actuator == "delta" and scale > 0.4:
-        scale = max(scale, 1.0)
-    return ORDINARY[actuator].rate / scale ** _RATE_POWER[actuator]
-
-
-def slow_on_any_ship(found: GearFinding) -> bool:
-    """Whether a gear that is slower than those of its ship would be so on the longest ship, too; whatever does not go with the length is."""
-    scale = (_LONGEST / 130.0) ** 0.5
-    if found.effect.endswith("_lag"):
-        return ORDINARY[found.actuator].T * scale < found.gear.T
-    return not found.effect.endswith("_rate_limit") or bool(found.gear.rate < least_rate(found.actuator, scale))
-
-
-def _kinds(actuator: str, scale: float, span: float, ordinary: Gear) -> list[_Kind]:
-    """What may be wrong with an actuator; `span` is the range of its commands."""
-    T, rate = ORDINARY[actuator].T * scale, least_rate(actuator, scale)
-    lag = _Kind({"n": "shaft_lag", "delta": "rudder_lag", "F": "thruster_lag"}[actuator], "T", T, 60.0 * scale, ordinary.T)
-    if actuator == "n":
-        return [lag, _Kind("shaft_rate_limit", "rate", 0.02 * rate, rate)]
-    if actuator == "F":
-        return [lag]
-    return [
-        lag,
-        _Kind("rudder_rate_limit", "rate", 0.02 * rate, rate),
-        _Kind("rudder_delay", "delay", 0.15 * scale, _DELAY * scale),
-        _Kind("rudder_deadband", "deadband", 0.004 * span, 0.3 * span),
-        _Kind("rudder_backlash", "backlash", 0.004 * span, 0.3 * span),
-    ]
 
 
 def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear], list[RecordError]]:
@@ -145,10 +67,10 @@ class _Record:
     @classmethod
     def of(cls, seg: Segments, L: float, name: str, picked: np.ndarray) -> _Record:
         scale, (b, c) = (L / 130.0) ** 0.5, picked.T
-        late = np.arange(seg.states.shape[1] - 1) * seg.dt >= min(_DELAY * scale, 0.25 * seg.states.shape[1] * seg.dt)
+        late = np.arange(seg.states.shape[1] - 1) * seg.dt >= min(DELAY * scale, 0.25 * seg.states.shape[1] * seg.dt)
         return cls(name, scale, seg.dt, seg.commands[b, :-1, c], seg.states[b, :, 6 + c], seg.mask[b, 1:] & late, seg.run[b], seg.runs)
 
-    def paths(self, z: np.ndarray, kind: _Kind | None) -> np.ndarray:
+    def paths(self, z: np.ndarray, kind: Kind | None) -> np.ndarray:
         """Positions (M, P, K) that M gears would give; z (M, values): logarithms of time constant, rate[, the value of `kind`]."""
         code = _follower(kind and kind.field)
         if code is not None:
@@ -161,18 +83,18 @@ class _Record:
         path = gear_path(np.tile(self.measured[:, 0], len(z)), np.tile(self.command, (len(z), 1)), self.dt, gear, parts)
         return path[:, parts::parts].reshape(len(z), *self.command.shape)
 
-    def errors(self, z: np.ndarray, kind: _Kind | None) -> np.ndarray:
+    def errors(self, z: np.ndarray, kind: Kind | None) -> np.ndarray:
         """Record less path (M, P, K), zero where it is not judged."""
         return np.where(self.judged, self.measured[:, 1:] - self.paths(z, kind), 0.0)
 
-    def costs(self, z: np.ndarray, kind: _Kind | None) -> np.ndarray:
+    def costs(self, z: np.ndarray, kind: Kind | None) -> np.ndarray:
         """Sums of the squared errors (M,)."""
         code = _follower(kind and kind.field)
         if code is not None:
             return self._followed(code, z, kind, 1)[:, 0, :, 2].sum(axis=1)
         return np.concatenate([np.sum(self.errors(part, kind) ** 2, axis=(1, 2)) for part in np.array_split(z, len(z) // _MOST + 1)])
 
-    def _followed(self, code: Lanes, z: np.ndarray, kind: _Kind | None, kept: int) -> np.ndarray:
+    def _followed(self, code: Lanes, z: np.ndarray, kind: Kind | None, kept: int) -> np.ndarray:
         """Motor, position and sum of squared errors so far, (M, kept, P, 3): at every sample or, if 1 is kept, at the end."""
         (P, K), values = self.command.shape, np.exp(z)
         whole = np.zeros(len(z), dtype=int)
@@ -210,17 +132,17 @@ class _Record:
         Two stages look like a delay, end stops like an error: they are fitted only where something is to be explained, since that takes as long as
         all the others.
         """
-        kinds = _kinds(self.name, self.scale, float(np.percentile(np.abs(self.command), 98)), usual)
+        kinds = kinds_of(self.name, self.scale, float(np.percentile(np.abs(self.command), 98)), usual)
         ordinary, fits = self._fitted(None), [self._fitted(kind) for kind in kinds]
         gear, plain = Gear(*(float(v) for v in np.exp(ordinary))), self.errors(ordinary[None], None)[0]
-        found = [self._finding(kind, z, plain) for kind, z in zip(kinds, fits, strict=True)]
+        found = [self._finding(kind, z, ordinary, plain) for kind, z in zip(kinds, fits, strict=True)]
         stops, _ = self._ended(ordinary, None, float(np.sum(plain**2)))
         if max(stops, self._misread(ordinary, None, plain).score, *(f.score for f in found)) < _LEAST_SCORE:
             return found, gear, None
-        second = _Kind("", "T2", 0.02 * self.scale, _SECOND * ORDINARY[self.name].T * self.scale)
+        second = Kind("", "T2", 0.02 * self.scale, _SECOND * ORDINARY[self.name].T * self.scale)
         z = self._fitted(second, [ordinary, *fits])
         plain = min(plain, self.errors(z[None], second)[0], key=lambda e: float(np.sum(e**2)))
-        found = [self._finding(kind, fit, plain) for kind, fit in zip(kinds, fits, strict=True)]
+        found = [self._finding(kind, fit, ordinary, plain) for kind, fit in zip(kinds, fits, strict=True)]
         error = self._misread(z, second, plain)
         least, before = max(_LEAST_SCORE, *(f.score for f in found)), float(np.sum(plain**2))
         for _ in range(_CORRECTIONS if error.score > _PROMISING * least else 0):
@@ -231,7 +153,7 @@ class _Record:
             return record._judged(usual)
         return found, gear, error if error.score > least else None
 
-    def _ended(self, z: np.ndarray, kind: _Kind | None, before: float) -> tuple[float, _Record]:
+    def _ended(self, z: np.ndarray, kind: Kind | None, before: float) -> tuple[float, _Record]:
         """The same with orders ended where the record of a gear says that its stops are, and the score of these (and of `kind`)."""
         from scipy.optimize import minimize_scalar
 
@@ -247,7 +169,7 @@ class _Record:
             z = record._fitted(kind)
         return self._worth(before, record.errors(z[None], kind)[0], 1 + (kind is not None)), record
 
-    def _misread(self, z: np.ndarray, kind: _Kind | None, plain: np.ndarray) -> RecordError:
+    def _misread(self, z: np.ndarray, kind: Kind | None, plain: np.ndarray) -> RecordError:
         """What the record reads beside the positions of a gear; score: against the errors `plain`."""
         at = self.paths(z[None], kind)[0]
         off, forms = np.where(self.judged, self.measured[:, 1:] - at, 0.0), np.where(self.judged, readings(at), 0.0)
@@ -263,7 +185,7 @@ class _Record:
         samples, after = float(self.judged.sum()), max(float(np.sum(rest**2)), 1e-300)
         return float(samples * _discount(rest) * np.log(max(before, 1e-300) / after) - values * np.log(10.0 * len(np.unique(self.run))))
 
-    def _fitted(self, kind: _Kind | None, near: Sequence[np.ndarray] = ()) -> np.ndarray:
+    def _fitted(self, kind: Kind | None, near: Sequence[np.ndarray] = ()) -> np.ndarray:
         """Logarithms of the time constant, the rate[, the value of `kind`] of the best gear; near: gears like whose first two it may be."""
         span = float(np.percentile(np.abs(self.command), 98))
         rate = max(least_rate(self.name, self.scale), 0.01 * span / self.scale)
@@ -274,7 +196,7 @@ class _Record:
             low[kind.at], high[kind.at] = np.log(kind.low), np.log(kind.high)
         return self._least(kind, low, high, near)
 
-    def _finding(self, kind: _Kind, z: np.ndarray, plain: np.ndarray) -> GearFinding:
+    def _finding(self, kind: Kind, z: np.ndarray, ordinary: np.ndarray, plain: np.ndarray) -> GearFinding:
         rest = self.errors(z[None], kind)[0]
         variance = max(float(np.sum(rest**2)) / float(self.judged.sum()), 1e-300)
         discount, per_run = _discount(rest), np.zeros(self.runs)
@@ -288,9 +210,31 @@ class _Record:
         spread = 1.96 * float(np.sqrt((size * np.hypot(relative, _RECORD)) ** 2 + (_OWN_SPREAD * kind.beyond) ** 2 + clock**2))
         value = size - kind.beyond
         gear = replace(Gear(*(float(v) for v in np.exp(z[:2]))), **{kind.field: size})
-        return GearFinding(kind.effect, score, value, (value - spread, value + spread), per_run, self.name, gear)
+        least = self._detectable(kind, ordinary, plain) - kind.beyond
+        return GearFinding(kind.effect, score, value, (value - spread, value + spread), per_run, self.name, gear, least)
 
-    def _least(self, kind: _Kind | None, low: np.ndarray, high: np.ndarray, near: Sequence[np.ndarray]) -> np.ndarray:
+    def _detectable(self, kind: Kind, ordinary: np.ndarray, plain: np.ndarray) -> float:
+        """Size from which `kind` is expected to be found on a gear that is like the `ordinary` one otherwise, whose errors are `plain`: what its time
+        constant and rate cannot take up as well is seen. NaN beyond the bounds."""
+        least, most = (kind.high, kind.low) if kind.field == "rate" else (kind.low, kind.high)
+        begins = ordinary if kind.at == 2 else kind.like(ordinary, least)
+        free = _STEP * np.eye(2)[[at for at in (0, 1) if at != kind.at]]
+        slopes = (self.errors(begins + free, None) - self.errors(begins - free, None)).reshape(len(free), -1).T
+        at_first, squares = self.errors(begins[None], None).ravel(), max(float(np.sum(plain**2)), 1e-300)
+
+        def is_seen(size: float) -> bool:
+            off = self.errors(kind.like(ordinary, size)[None], kind).ravel() - at_first
+            off -= slopes @ np.linalg.lstsq(slopes, off, rcond=None)[0]
+            return self._worth(squares + float(off @ off), plain, 1) > _LEAST_SCORE
+
+        if not is_seen(most):
+            return np.nan
+        for _ in range(_HALVINGS):
+            middle = float(np.sqrt(least * most))
+            least, most = (least, middle) if is_seen(middle) else (middle, most)
+        return most
+
+    def _least(self, kind: Kind | None, low: np.ndarray, high: np.ndarray, near: Sequence[np.ndarray]) -> np.ndarray:
         """Minimum of the squared error inside a box: a grid, and a pattern of neighbours of its best point that shrinks when none is much better
         (else it creeps along a valley where the time constant hardly matters).
 

@@ -31,7 +31,8 @@ class Score:
 
     score: twice the gain in log evidence (2 log Bayes factor with a prior of typical size), less the term's cost; estimate, sd (size,) in units of
     the typical size (for a random effect: root mean square over runs, and NaN); information (size, size): precision of the estimate that the data
-    give, nuisances integrated out; per_run (N,): gain in log likelihood by run; log_tau2: of a random effect.
+    give, nuisances integrated out (for a random effect (N, size, size): of each run, what it has of its own integrated out); per_run (N,): gain in
+    log likelihood by run; log_tau2: of a random effect.
     """
 
     term: Term
@@ -127,7 +128,7 @@ def _score(fit: Fit, term: Term, at: np.ndarray, null: float, null_runs: np.ndar
         values = best.means[:, -term.size :]
         rms = np.sqrt(np.mean(values**2, axis=0))
         score = 2.0 * (best.log_evidence - null) - term.cost(fit.plant.seg.runs)
-        return Score(term, score, rms, np.full(term.size, np.nan), np.zeros((term.size, term.size)), best.per_run - null_runs, tau)
+        return Score(term, score, rms, np.full(term.size, np.nan), reduced.S[:, at][:, :, at], best.per_run - null_runs, tau)
     found = solve(reduced, with_columns(fit.prior, at, term, 0.0))
     cov = found.cov[-term.size :, -term.size :]
     information = np.linalg.inv(cov) - np.eye(term.size)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..effects.base import EFFECTS
 from .analysis import Analysis
-from .gears import slow_on_any_ship
+from .gear_kinds import slow_on_any_ship
 from .model import NUM_BASE, PLACES
 from .ordinary import STRANGE, needed
 from .other_size import better_size, size_instead_of

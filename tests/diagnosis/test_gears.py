@@ -9,7 +9,8 @@ import pytest
 
 from shipbench import compiled
 from shipbench.diagnosis import gears
-from shipbench.diagnosis.gears import _kinds, _Record, find_in_gears
+from shipbench.diagnosis.gear_kinds import GearFinding, kinds_of, slow_on_any_ship
+from shipbench.diagnosis.gears import _Record, find_in_gears
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.rolling import Active
 from shipbench.effects.base import EFFECTS
@@ -33,7 +34,7 @@ def trials(name: str, *values: float) -> Plant:
 def test_machine_code_follows_as_numpy_does(compiler, which, monkeypatch):
     plant, rng = trials("rudder_backlash", 0.03), np.random.default_rng(which)
     record = _Record.of(plant.long, plant.c.L, "delta", np.array([(b, 1) for b in range(len(plant.long.run))]))
-    kind = (None, *_kinds("delta", record.scale, 0.6, Gear(1.0, 0.1)))[which]
+    kind = (None, *kinds_of("delta", record.scale, 0.6, Gear(1.0, 0.1)))[which]
     low, high = np.log([0.1, 0.02]), np.log([3.0, 0.2])
     z = rng.uniform(low, high, (9, 2))
     if kind is not None:
@@ -98,5 +99,5 @@ def test_a_record_that_is_late_by_less_than_a_stage_has_a_slope_to_be_found_by()
     ],
 )
 def test_what_is_slow_for_the_longest_ship_is_slow_for_any(effect, actuator, gear, slow):
-    found = gears.GearFinding(effect, 100.0, 1.0, (0.9, 1.1), np.zeros(4), actuator, gear)
-    assert gears.slow_on_any_ship(found) is slow
+    found = GearFinding(effect, 100.0, 1.0, (0.9, 1.1), np.zeros(4), actuator, gear)
+    assert slow_on_any_ship(found) is slow
