@@ -8,12 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from .model import Linearisation
-from .plant import Plant
+from .plant import Plant, Segments
 
 Features = tuple[np.ndarray, ...]
 _SHORTEST, _LONGEST, _MOST_PERIODS = 8.0, 200.0, 60
 """Periods that are tried, in seconds (Froude-scaled, 130 m), and how many at most: even in frequency, from one to the next the longest run sees half
 a cycle more, so that one of them is near enough to any."""
+_SHORTEST_WAVE, _MOST_WAVES, _MOST_KNOTS = 4.0, 25, 5000
+"""Shortest wave over the places visited that is tried, in ship lengths, most of them in twice the extent of the places, and most knots of the force
+at which they are compared."""
 _CENTRED = ("heading", "position", "run")
 """Of these only differences count: a force that is always there is none that follows them."""
 
@@ -43,12 +46,13 @@ Forms = Mapping[str, Mapping[str, Form]]
 
 class Feature(NamedTuple):
     """The features (F, K, B) of one form in the middle of every step, and beside the trajectory (`Linearisation.aside`); or (F, K + 1, B) at the
-    samples. Of order one. odd: whether it changes its sign with the ship's mirror image."""
+    samples. Of order one. odd: whether it changes its sign with the ship's mirror image; ways: number of forms of which it was chosen."""
 
     form: str
     on: np.ndarray
     aside: np.ndarray
     odd: bool
+    ways: int
 
     @property
     def size(self) -> int:
@@ -119,10 +123,11 @@ def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
     low, high = 1.0 / (_LONGEST * plant.froude), 1.0 / max(_SHORTEST * plant.froude, 4.0 * seg.dt)
     tried = np.linspace(low, high, min(1 + int(np.ceil(2.0 * max(high - low, 0.0) * ends)), _MOST_PERIODS))
     periods = {f"cos(2 pi t / {1.0 / f:.3g} s + phase)": _period(1.0 / float(f)) for f in tried}
-    forms = {**_OF_FORCES, "time": _grown(ends) | periods}
+    waves, compared = _waves(lin)
+    forms = {**_OF_FORCES, "time": _grown(ends) | periods, "position": {**_OF_FORCES["position"], **waves}}
     if not np.any(seg.states[..., 8:]):
         del forms["thrusters"]
-    return _features(forms, on, aside, seg.mask[:, 1:].T)
+    return _features(forms, on, aside, seg.mask[:, 1:].T, dict.fromkeys(waves, compared))
 
 
 def of_sensors(lin: Linearisation) -> dict[str, list[Feature]]:
@@ -130,7 +135,36 @@ def of_sensors(lin: Linearisation) -> dict[str, list[Feature]]:
     plant, seg = lin.plant, lin.plant.seg
     t = (seg.start[:, None] + seg.dt * np.arange(plant.steps + 1)).T
     at = _state(plant, np.swapaxes(lin.motion, 0, 1), np.swapaxes(seg.states[..., 6:], 0, 1), t)
-    return _features({**_OF_SENSORS, "time": _grown(_ends(plant))}, at, at, seg.mask.T)
+    return _features({**_OF_SENSORS, "time": _grown(_ends(plant))}, at, at, seg.mask.T, {})
+
+
+def _waves(lin: Linearisation) -> tuple[dict[str, Form], int]:
+    """The waves over the places visited, in whatever direction, that the latent force follows best, one for each axis, and of how many: a current, a
+    depth or a shore that differs from place to place. They are compared at the knots of the force, by the share of it that they take."""
+    plant, seg = lin.plant, lin.plant.seg
+    at = np.minimum(np.round(np.arange(plant.knots) * plant.knot_time / seg.dt).astype(int), plant.steps)
+    known, (centre, unit) = seg.mask[:, at], _places(seg)
+    every = 1 + int(known.sum()) // _MOST_KNOTS
+    places, force = ((lin.motion[:, at, :2][known] - centre) / unit)[::every], lin.point.w[known][::every]
+    step = np.pi / max(float(np.max(np.ptp(places, axis=0))), 1e-9)
+    most = min(int(2.0 * np.pi * unit / (_SHORTEST_WAVE * plant.c.L) / step), _MOST_WAVES)
+    i, j = np.meshgrid(np.arange(-most, most + 1), np.arange(most + 1), indexing="ij")
+    numbers = step * np.stack([i, j], axis=-1)[((j > 0) | (i > 0)) & (np.hypot(i, j) <= most)]
+    if not len(numbers):
+        return {}, 0
+    a, b = (x - x.mean(axis=0) for x in (np.cos(places @ numbers.T), np.sin(places @ numbers.T)))
+    aa, bb, ab = np.sum(a * a, axis=0), np.sum(b * b, axis=0), np.sum(a * b, axis=0)
+    fa, fb = ((force - force.mean(axis=0)).T @ x for x in (a, b))
+    taken = (bb * fa**2 - 2.0 * ab * fa * fb + aa * fb**2) / np.maximum(aa * bb - ab**2, 1e-9 * len(places) ** 2)
+    found = {}
+    for k, m in numbers[np.unique(np.argmax(taken, axis=1))]:
+        towards = np.degrees(np.arctan2(m, k))
+        found[f"wave of {2.0 * np.pi * unit / np.hypot(k, m):.0f} m over the places, towards {towards:.0f} deg"] = _wave(float(k), float(m))
+    return found, len(numbers)
+
+
+def _wave(k: float, m: float) -> Form:
+    return lambda s: (np.cos(k * s.x + m * s.y), np.sin(k * s.x + m * s.y))
 
 
 def _grown(ends: float) -> dict[str, Form]:
@@ -143,7 +177,8 @@ def _ends(plant: Plant) -> float:
     return float(np.max(seg.start + seg.dt * (seg.mask.sum(axis=1) - 1)))
 
 
-def _features(of: Forms, on: State, aside: State, real: np.ndarray) -> dict[str, list[Feature]]:
+def _features(of: Forms, on: State, aside: State, real: np.ndarray, ways: Mapping[str, int]) -> dict[str, list[Feature]]:
+    """By variable. ways: of forms that were chosen from more than stand here."""
     found: dict[str, list[Feature]] = {}
     mirrored = on._replace(v=-on.v, r=-on.r, delta=-on.delta)
     for variable, forms in of.items():
@@ -154,7 +189,7 @@ def _features(of: Forms, on: State, aside: State, real: np.ndarray) -> dict[str,
             unit = _rms(x[:, real] - centre[:, None])
             odd = np.array_equal(np.stack(form(mirrored)), -x)
             x, y = ((z - centre[:, None, None]) / unit[:, None, None] for z in (x, y))
-            found[variable].append(Feature(name, x, y, odd))
+            found[variable].append(Feature(name, x, y, odd, ways.get(name, len(forms.keys() - ways.keys()))))
     return found
 
 
@@ -163,11 +198,18 @@ def _state(plant: Plant, motion: np.ndarray, act: np.ndarray, t: np.ndarray) -> 
     seg = plant.seg
     record = seg.states[seg.mask]
     units = _rms(record[:, 3:].T)[:, None, None]
-    places = record[:, :2] - record[:, :2].mean(axis=0)
-    x, y = np.moveaxis((motion[..., :2] - record[:, :2].mean(axis=0)) / _rms(places.reshape(1, -1)), -1, 0)
+    centre, unit = _places(seg)
+    x, y = np.moveaxis((motion[..., :2] - centre) / unit, -1, 0)
     u, v, r = np.moveaxis(motion[..., 3:], -1, 0) / units[:3]
     n, delta, F_b, F_s = np.moveaxis(act, -1, 0) / units[3:]
     return State(x, y, motion[..., 2], u, v, r, n, delta, F_b, F_s, t, np.broadcast_to(seg.run / max(seg.runs - 1, 1), t.shape))
+
+
+def _places(seg: Segments) -> tuple[np.ndarray, float]:
+    """Middle (2,) and root mean square [m] of the places visited."""
+    places = seg.states[seg.mask][:, :2]
+    centre = places.mean(axis=0)
+    return centre, float(_rms((places - centre).reshape(1, -1))[0])
 
 
 def _rms(x: np.ndarray) -> np.ndarray:

@@ -63,7 +63,7 @@ class Dependence:
 
 @dataclass(frozen=True)
 class _Tried:
-    """One form on one axis, with its columns; ways: number of forms of its variable."""
+    """One form on one axis, with its columns; ways: number of forms of which it was chosen."""
 
     axis: str
     variable: str
@@ -211,15 +211,15 @@ class Search:
 
 def _pushed(lin: Linearisation, axis: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
     """Forces on one axis."""
-    forms = [(v, f, len(group)) for v, group in of.items() for f in group]
+    forms = [(v, f) for v, group in of.items() for f in group]
     if not forms:
         return []
-    on, aside = (_PRIOR_SD * np.concatenate(x) for x in ([f.on for _, f, _ in forms], [f.aside for _, f, _ in forms]))
+    on, aside = (_PRIOR_SD * np.concatenate(x) for x in ([f.on for _, f in forms], [f.aside for _, f in forms]))
     columns, bend = lin.pushed(axis, on, aside)
     found, at = [], 0
-    for v, f, ways in forms:
+    for v, f in forms:
         part = np.s_[at : at + f.size]
-        found.append(_Tried(AXES[axis], v, f.form, ways, columns[..., part], Bend(None if bend.rates is None else bend.rates[part])))
+        found.append(_Tried(AXES[axis], v, f.form, f.ways, columns[..., part], Bend(None if bend.rates is None else bend.rates[part])))
         at += f.size
     return found
 
@@ -231,7 +231,7 @@ def _added(lin: Linearisation, name: str, channel: int, of: Mapping[str, Sequenc
         for f in group:
             error = np.zeros((*lin.motion.shape, f.size))
             error[..., channel, :] = _SENSOR_SD * lin.scales.noise[channel] * np.moveaxis(f.on, 0, -1).swapaxes(0, 1)
-            found.append(_Tried(name, v, f.form, len(group), error.reshape(len(error), -1, f.size), Bend(None, (None,) * f.size)))
+            found.append(_Tried(name, v, f.form, f.ways, error.reshape(len(error), -1, f.size), Bend(None, (None,) * f.size)))
     return found
 
 

@@ -21,8 +21,8 @@ _BORNE_BY_OTHERS = 0.25
 """Share of a change's score that must be left when any one run is taken away. On ships of other equations changes that were none kept 0.13 at most;
 hidden ones (development cases) a third at least."""
 _RUNS_FOR_A_CHANGE = 8
-_ALIKE = 0.5
-"""Share of the runs before and after a change that are of the same kinds, at least."""
+_ALIKE, _BY_CHANCE, _ORDERS = (0.35, 0.5), 0.05, 500
+"""Share of the runs before and after a change that are of the same kinds, at least: between the two what all but one of twenty random orders have."""
 
 
 @dataclass(frozen=True)
@@ -192,15 +192,22 @@ def places(runs: int) -> range:
 
 
 def other_kinds_from(kinds: Sequence[str]) -> list[int]:
-    """Of `places` those from which on mostly other kinds of manoeuvre are sailed than before; none where the kind of a run is not known."""
+    """Of `places` those from which on mostly other kinds of manoeuvre are sailed than before, and more so than where kinds come in random order; none
+    where the kind of a run is not known."""
     if not all(kinds):
         return []
-    of = np.array([[kind == one for one in sorted(set(kinds))] for kind in kinds])
+    of = np.array([[kind == one for one in sorted(set(kinds))] for kind in kinds], dtype=float)
+    at, shuffle = np.array(places(len(kinds)), dtype=int), np.random.default_rng(0)
+    by_chance = [_alike(shuffle.permutation(of), at) for _ in range(_ORDERS)]
+    least = np.clip(np.quantile(by_chance, _BY_CHANCE, axis=0), *_ALIKE)
+    return [int(k) for k in at[_alike(of, at) < least]]
 
-    def alike(k: int) -> float:
-        return float(np.minimum(of[:k].mean(axis=0), of[k:].mean(axis=0)).sum())
 
-    return [k for k in places(len(kinds)) if alike(k) < _ALIKE]
+def _alike(of: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Share of runs of the same kinds before and after places, of the kinds (runs, kinds) of the runs."""
+    before = np.cumsum(of, axis=0)[at - 1]
+    shares = before / at[:, None], (of.sum(axis=0) - before) / (len(of) - at)[:, None]
+    return np.asarray(np.minimum(*shares).sum(axis=1))
 
 
 def _changes(

@@ -37,9 +37,11 @@ class BankSuction(Effect):
         e.push(0.0, unit * u * u, -0.2 * ship.L * unit * u * absolute(u))
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
-        """Banks on four sides, each two breadths beyond the outermost place visited."""
-        bearings = [0.5 * math.pi * k for k in range(4)]
+        """Banks on four sides, along and across the direction in which the places visited lie, each two breadths beyond the outermost of them."""
         flat = positions.reshape(-1, 2)
+        flat = flat[np.isfinite(flat).all(axis=1)]
+        along = np.linalg.eigh(np.cov(flat, rowvar=False))[1][:, 1]
+        bearings = [(math.atan2(along[1], along[0]) + 0.5 * math.pi * k) % (2.0 * math.pi) for k in range(4)]
         return [(b, float(np.max(flat[:, 0] * math.cos(b) + flat[:, 1] * math.sin(b))) + 2.0 * ship.B) for b in bearings]
 
 

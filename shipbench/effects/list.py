@@ -1,6 +1,7 @@
 """A list: the heeled hull is unsymmetrical and turns away from its low side.
 
-N = -0.008 phi rho/2 L^2 T u|u|, Y = -0.5 N/L; heel phi positive to starboard. At rest there is no force."""
+N = -0.008 phi rho/2 L^2 T u|u|, Y = -0.5 N/L + s rho/2 L T u|u|; heel phi positive to starboard. At rest there is no force. s is what the side force
+of another hull differs by: of it little is known."""
 
 from __future__ import annotations
 
@@ -17,14 +18,14 @@ class List(Effect):
     family = "hull"
     summary = "heel angle"
     source = "N'_phi of physics reference, section 5, H51"
-    parameters = (Parameter("heel", "rad", math.radians(4.0), -0.35, 0.35),)
+    parameters = (Parameter("heel", "rad", math.radians(4.0), -0.35, 0.35), Parameter("side_force", "1", 6e-4, -0.01, 0.01, other=True))
     breaks_symmetry = True
     separate = "vary the revolutions at one speed: a list acts with the ship's speed alone"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         u = s.u - e.u_c
-        N = -0.008 * 0.5 * ship.rho * ship.L**2 * ship.T * u * absolute(u) * q[0]
-        e.push(0.0, -0.5 * N / ship.L, N)
+        unit = 0.5 * ship.rho * ship.L * ship.T * u * absolute(u)
+        e.push(0.0, unit * (0.004 * q[0] + q[1]), -0.008 * ship.L * unit * q[0])
 
 
 EFFECT = List()

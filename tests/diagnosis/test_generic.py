@@ -87,6 +87,19 @@ def test_a_force_of_its_own_in_each_run_is_not_taken_for_one_that_follows_place_
     assert ("sway", "position") in found(Hidden(get("side force that goes with the place"), (1.0, 0.3)))
 
 
+def test_a_force_that_comes_and_goes_from_place_to_place_follows_the_place(kcs):
+    """It is as often to one side as to the other, so that no trend of the place shows it."""
+
+    def eddies(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.push(0.0, q[0] * ship.mass * np.sin(2.0 * np.pi * (s.x * np.cos(0.7) + s.y * np.sin(0.7)) / 1500.0), 0.0)
+
+    best = dependences(kcs(Hidden(Outside("eddies", ("position",), eddies), (4e-3,))))[0]
+    assert (best.axis, best.variable) == ("sway", "position")
+    _, _, wavelength, _, _, _, _, _, towards, _ = best.form.split()
+    assert float(wavelength) == pytest.approx(1500.0, rel=0.2)  # a step of the waves that are tried
+    assert float(towards) % 180.0 == pytest.approx(np.rad2deg(0.7), abs=10.0)
+
+
 def test_a_constant_ahead_is_no_part_of_a_pull(kcs):
     """Another form of resistance comes near one, and much is asked of it alone: with a trace of yaw beside it, it was `unknown` on a tug."""
 

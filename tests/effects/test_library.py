@@ -30,7 +30,7 @@ NAMES = [name for name in EFFECTS.names() if name != "change_point"]  # it has n
 MIRROR: dict[str, tuple[int, ...]] = {
     "current": (1,), "current_per_run": (1,), "wind": (1,), "wind_per_run": (1,), "wave_drift": (1,),  # the east component, at psi -> -psi
     "bank_suction": (1,),  # the bearing
-    "rudder_offset": (0,), "rudder_asymmetry": (0,), "propeller_walk": (0,), "propeller_walk_astern": (0, 1), "list": (0,),
+    "rudder_offset": (0,), "rudder_asymmetry": (0,), "propeller_walk": (0,), "propeller_walk_astern": (0, 1), "list": (0, 1),
     "heading_bias": (0,), "yaw_rate_bias": (0,), "antenna_offset": (1,),
 }  # fmt: skip
 """Indices of the values that change sign in a mirror that exchanges port and starboard; none for the others."""
@@ -427,3 +427,13 @@ def test_going_astern_turns_the_moment_of_drift_over():
     np.testing.assert_allclose(N_turned[[0, 2]], N[[0, 2]], rtol=0.02)
     np.testing.assert_allclose(N_turned[[1, 3]], -N[[1, 3]], rtol=0.02)
     np.testing.assert_allclose(Y_turned, Y, rtol=1e-9)
+
+
+def test_banks_lie_along_the_way_that_was_sailed():
+    """Runs up and down a channel to the north-east: two of four banks lie beside them."""
+    along, across = np.linspace(-2000.0, 2000.0, 50), np.tile([-40.0, 40.0], 25)
+    towards = np.array([[np.cos(0.75), np.sin(0.75)], [-np.sin(0.75), np.cos(0.75)]])
+    settings = get("bank_suction").settings(np.column_stack([along, across]) @ towards, PARTICULARS)
+    beside = [(bearing, line) for bearing, line in settings if abs(np.cos(bearing - 0.75)) < 0.01]
+    assert len(settings) == 4
+    assert [line for _, line in beside] == pytest.approx([40.0 + 2.0 * PARTICULARS.B] * 2, abs=25.0)
