@@ -3,8 +3,8 @@
     python benchmarks/diagnosis_smallest.py [--runs DRAWS] [--only SHIP ...] [--quick] [--json FILE]
 
 A ship sails with nothing hidden, and the diagnosis says what it would have seen. Then she sails the same trials, with the same noise, with one effect
-after another at 0.7 and 1.4 times that size (one amplitude of it; of a wave or a current to the north; normal where each run has its own; of a bank,
-whose place would have to be drawn, none).
+after another at half and at one and a half times that size (one amplitude of it; of a wind or a current to the north; normal where each run has its
+own; of a bank, whose place would have to be drawn, none).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.simulate.hidden import Hidden
 
-FACTORS = (0.7, 1.4)
+FACTORS = (0.5, 1.5)
 LEFT_OUT = ("bank_suction",)
 
 

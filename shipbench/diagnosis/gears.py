@@ -139,7 +139,7 @@ class _Record:
         stops, _ = self._ended(ordinary, None, float(np.sum(plain**2)))
         if max(stops, self._misread(ordinary, None, plain).score, *(f.score for f in found)) < _LEAST_SCORE:
             return found, gear, None
-        second = Kind("", "T2", 0.02 * self.scale, _SECOND * ORDINARY[self.name].T * self.scale)
+        second = self._second
         z = self._fitted(second, [ordinary, *fits])
         plain = min(plain, self.errors(z[None], second)[0], key=lambda e: float(np.sum(e**2)))
         found = [self._finding(kind, fit, ordinary, plain) for kind, fit in zip(kinds, fits, strict=True)]
@@ -210,17 +210,24 @@ class _Record:
         spread = 1.96 * float(np.sqrt((size * np.hypot(relative, _RECORD)) ** 2 + (_OWN_SPREAD * kind.beyond) ** 2 + clock**2))
         value = size - kind.beyond
         gear = replace(Gear(*(float(v) for v in np.exp(z[:2]))), **{kind.field: size})
-        least = self._detectable(kind, ordinary, plain) - kind.beyond
+        least = self._detectable(kind, ordinary, plain) - (float(np.exp(ordinary[0])) if kind.field == "T" else 0.0)
         return GearFinding(kind.effect, score, value, (value - spread, value + spread), per_run, self.name, gear, least)
+
+    @property
+    def _second(self) -> Kind:
+        """An ordinary second stage."""
+        return Kind("", "T2", 0.02 * self.scale, _SECOND * ORDINARY[self.name].T * self.scale)
 
     def _detectable(self, kind: Kind, ordinary: np.ndarray, plain: np.ndarray) -> float:
         """Size from which `kind` is expected to be found on a gear that is like the `ordinary` one otherwise, whose errors are `plain`: what its time
-        constant and rate cannot take up as well is seen. NaN beyond the bounds."""
+        constant, rate and a second stage cannot take up as well is seen. NaN beyond the bounds."""
         least, most = (kind.high, kind.low) if kind.field == "rate" else (kind.low, kind.high)
         begins = ordinary if kind.at == 2 else kind.like(ordinary, least)
         free = _STEP * np.eye(2)[[at for at in (0, 1) if at != kind.at]]
-        slopes = (self.errors(begins + free, None) - self.errors(begins - free, None)).reshape(len(free), -1).T
         at_first, squares = self.errors(begins[None], None).ravel(), max(float(np.sum(plain**2)), 1e-300)
+        stages = self.errors(np.stack([self._second.like(begins, part * self._second.low) for part in (1.0, 5.0)]), self._second)
+        slopes = np.concatenate([self.errors(begins + free, None) - self.errors(begins - free, None), np.diff(stages, axis=0)])
+        slopes = slopes.reshape(len(slopes), -1).T
 
         def is_seen(size: float) -> bool:
             off = self.errors(kind.like(ordinary, size)[None], kind).ravel() - at_first

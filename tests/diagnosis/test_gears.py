@@ -59,6 +59,20 @@ def test_findings_do_not_depend_on_the_compiler(compiler, name, value, monkeypat
     assert ordinary.keys() == as_before.keys()
 
 
+@pytest.mark.parametrize("name", ["rudder_delay", "rudder_backlash", "rudder_lag", "rudder_rate_limit", "shaft_lag"])
+def test_from_the_smallest_size_that_is_told_on_an_effect_is_found(name):
+    """The same trials and noise with nothing hidden, with more than the size that they would have shown, and with less."""
+    ship, effect = load_mmg_ship("kcs"), EFFECTS.get(name)
+
+    def score(*hidden: Hidden) -> GearFinding:
+        found, _, _ = find_in_gears(Plant.of(sea_trials(ship, 4, hidden, Trials(runs=8, samples=120))))
+        return next(g for g in found if g.effect == name)
+
+    least = score().detectable
+    more, less = (least / f if name == "rudder_rate_limit" else least * f for f in (1.2, 0.5))
+    assert score(Hidden(effect, (more,))).score > 10.0 > score(Hidden(effect, (less,))).score
+
+
 @pytest.mark.parametrize("dt", [0.1, 1.0])
 def test_an_ordinary_gear_is_found_at_any_sampling(dt):
     """Ten samples a second are no reason for quicker gears: the least rate that is looked for was one of the samples, and every gear seemed slow."""
