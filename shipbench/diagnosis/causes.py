@@ -262,16 +262,16 @@ def _shown(s: Score, fit: Fit) -> dict[str, float]:
 
 
 def _detectable(found: Analysis, s: Score) -> dict[str, float]:
-    """Size from which a cause is expected to be named, along each amplitude, where x^2 V - log(1 + V) is what is asked of it, or, of values of single
-    runs, their root mean square x, where the sum of tr(x^2 V) - log det(1 + x^2 V) over runs is; none below `least_size`, NaN beyond the bounds."""
+    """Size from which a cause is expected to be named, along each amplitude i, where x^2 V_ii - log det(1 + V) is what is asked of it; of values of
+    single runs the root mean square x, where the sum of x^2 tr(V) - log det(1 + x^2 V) is. None below `least_size`, NaN beyond the bounds."""
     null, term = found.selection.null, s.term
     unit, effect = null.scales.amplitudes(term, null.plant.c.L), term.effect
     asked = found.threshold + term.cost(null.plant.seg.runs) + found.selection.off_form * passes_for_form(term)
     if term.per_run:
         least = np.full(term.size, max(_root_mean_square(s.information, asked), least_size(term.label)))
     else:
-        V = np.maximum(np.diag(s.information), 1e-12)
-        least = np.maximum(np.sqrt((asked + np.log1p(V)) / V), least_size(term.label))
+        V, volume = np.maximum(np.diag(s.information), 1e-12), np.linalg.slogdet(np.eye(term.size) + s.information)[1]
+        least = np.maximum(np.sqrt((asked + volume) / V), least_size(term.label))
     values = {}
     for size, p in zip(unit * least, [p for p in effect.sized(null.plant.c.L) if not p.shape], strict=True):
         seen = effect.public((size, 0.0))[effect.vector[0]] if effect.vector else float(size)
