@@ -44,9 +44,8 @@ class Structure(Effect):
     she gets a wider spread (`ordinary.widened`). Last, other forms of what is above: force that thrusters lose for good as the ship gathers way, bow
     and stern (reference 2.7), side force of a propeller going astern as a share of its thrust at rest, of a few per cent, and a wake that falls with
     the square of the angle at the propeller, as w_P0 exp(-4 beta_P^2) (reference 2.5: 0.2 to 0.5 of 1 - w_P0 for w_P0 of 0.18 to 0.33), or of S175
-    without end (Son & Nomoto 1982): thrust that she loses in long hard turns passed for mass. N_vv: the cross-flow drag acts up to 5 % of the length
-    from midship (fuller ends, a skeg). Of two tunnels with the same record each gives its own force, by where it stands in the hull (0.8 to 1.0 of
-    its thrust): what one has more than the other passed for its lever.
+    without end (Son & Nomoto 1982): thrust that she loses in long hard turns passed for mass. Of two tunnels with the same record each gives its own
+    force, by where it stands in the hull (0.8 to 1.0 of its thrust): what one has more than the other passed for its lever.
     """
 
     family = "hull"
@@ -91,7 +90,6 @@ class Structure(Effect):
         Parameter("stern_fading", "1", 0.25, -0.5, 1.2),
         Parameter("walk_share", "1", 0.03, -0.5, 0.5),
         Parameter("wake_square", "1", 0.3, -1.0, 2.0),
-        Parameter("N_vv", "1", 0.03, -0.5, 0.5),
         Parameter("bow_over_stern", "1", 0.1, -0.5, 0.5),
     )
     backing, m_x, astern, braking = 0.5, -0.4, 0.7, -0.7
@@ -130,13 +128,12 @@ class Structure(Effect):
         self._off_design(e, s, q[28:34], ahead, ship)
         ASTERN.force(e, s, (0.0, q[36]), ship)
         lost = fading(s.u - e.u_c, ship.L)
-        e.bow, e.stern = e.bow * (1.0 + q[39]) * (1.0 - q[34] * lost), e.stern * (1.0 - q[39]) * (1.0 - q[35] * lost)
+        e.bow, e.stern = e.bow * (1.0 + q[38]) * (1.0 - q[34] * lost), e.stern * (1.0 - q[38]) * (1.0 - q[35] * lost)
         unit = 0.5 * ship.rho * ship.L * ship.T
         u, v, r = s.u - e.u_c, s.v - e.v_c, s.r * ship.L
         drift = clip(v / sqrt(u * u + v * v + 1e-3 * ship.L), -0.5, 0.5)
         X, Y = q[8] * v * v + q[9] * r * r, absolute(r) * (q[11] * v + q[12] * r)
-        N = q[38] * v * absolute(v) + r * (q[13] * absolute(r) + drift * (q[14] * v + q[15] * r))
-        e.push(unit * X, unit * Y, unit * ship.L * N)
+        e.push(unit * X, unit * Y, unit * ship.L * r * (q[13] * absolute(r) + drift * (q[14] * v + q[15] * r)))
         beta_P = arctan2(-(v + ship.x_P * s.r), maximum(u, 0.0) + 0.1)
         in_turns = q[10] * (1.0 - exp(-2.0 * absolute(beta_P))) * tanh(beta_P / 0.05) + q[37] * (1.0 - exp(-4.0 * beta_P * beta_P))
         e.wake = e.wake - (1.0 - ship.w_P0) * in_turns
