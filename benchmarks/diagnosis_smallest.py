@@ -1,4 +1,4 @@
-"""Whether "the smallest size that would have been named" is true: effects hidden at a share of that size and at more than it. About 15 minutes.
+"""Whether "the smallest size that would have been named" is true: effects hidden at a share of that size and at more than it. About 10 minutes.
 
     python benchmarks/diagnosis_smallest.py [--runs DRAWS] [--only SHIP ...] [--quick] [--json FILE]
 
