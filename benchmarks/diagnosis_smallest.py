@@ -23,6 +23,7 @@ from shipbench.diagnosis.diagnose import diagnose
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.simulate.hidden import Hidden
+from shipbench.simulate.trials import Trials
 
 FACTORS = (0.5, 1.5)
 LEFT_OUT = ("bank_suction",)
@@ -41,7 +42,7 @@ def hidden(name: str, size: float, ship: int, draw: int) -> Hidden:
     first, *others = effect.sized(particulars(ship, draw).L)
     if effect.per_run:
         rng = np.random.default_rng(draw)
-        return Hidden(effect, tuple(size * rng.standard_normal(24) for _ in effect.parameters))
+        return Hidden(effect, tuple(size * rng.standard_normal(Trials().runs) for _ in effect.parameters))
     return Hidden(effect, (float(np.copysign(size, first.typical)), *(p.typical if p.shape else 0.0 for p in others)))
 
 

@@ -41,6 +41,15 @@ def test_a_side_force_that_is_a_share_of_the_thrust_astern_is_named():
     assert named(trials("propeller_walk_astern", 0.0, 0.3, runs=12)) == ["propeller_walk_astern"]
 
 
+def test_a_list_with_another_side_force_is_named():
+    """To the other side of what the formula has with this moment, and much larger: it had been an `unknown` yaw moment that goes with the speed."""
+    data = sea_trials(load_mmg_ship("kcs"), 2, (Hidden(EFFECTS.get("list"), (0.149, -0.0031)),), Trials(runs=12))
+    (cause,) = diagnose(data, gain=False).causes
+    assert cause.effect == "list"
+    low, high = cause.parameters["side_force"].ci95
+    assert low < high < 0.0
+
+
 def test_the_scale_of_a_log_with_one_axis_is_named():
     """Sway comes from elsewhere. It had been an `unknown` error of surge that goes with the speed."""
     plain = sea_trials(load_mmg_ship("container130"), 5, (), Trials(runs=12))
