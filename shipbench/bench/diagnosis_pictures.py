@@ -23,6 +23,9 @@ def sections(d: Diagnosis) -> list[tuple[str, str]]:
         return [("What is wrong", _words(d))] if d.what_is_wrong else []
     tables, changed = error_tables(trace), plots.changed(d)
     fitted = "Runs that were not fitted." if trace.held_out else "Here the models are fitted to all runs; the gain per run is held out."
+    lacks = plots.forces(trace, tables, changed)
+    if d.unknown and d.unknown["variable"] == "position":
+        lacks += plots.over_places(trace, d.unknown["axis"].split(" and "))
     which = "The runs where the plain model is worst" + (", and the one that gains least." if changed else ".")
     return [
         ("Tracks before and after" if changed else "Tracks", key(changed, measured=True) + _grid(plots.tracks(trace, changed))
@@ -32,7 +35,7 @@ def sections(d: Diagnosis) -> list[tuple[str, str]]:
         ("What is wrong", _words(d) + _channels(trace, tables, changed) + "<h3>Where the error is</h3>" + key(changed)
          + _grid(plots.error_slices(trace, tables, changed)) + _worst_runs(tables) + paragraph(
              "Root mean square of the error of all channels, each over its scale in the table above.", small=True)),
-        ("The force that the plain model lacks", _grid(plots.forces(trace, tables, changed)) + paragraph(
+        ("The force that the plain model lacks", _grid(lacks) + paragraph(
             "The acceleration that the plain model needs to follow the measurement. Shares are net of what chance takes; whether they could be "
             "chance is tested by giving the runs each other's force, turned round in time, over all variables at once.", small=True)),
         ("Are the residuals white?", _whiteness(trace, tables)),
@@ -50,7 +53,7 @@ def _grid(panels: Iterable[plots.Panel]) -> str:
 
 
 def _words(d: Diagnosis) -> str:
-    rows = [[w.channel, f"{100 * w.share_of_error:.0f} %", w.depends_on or "no single variable", w.when] for w in d.what_is_wrong]
+    rows = [[w.channel, f"{100 * w.share_of_error:.0f} %", w.depends_on or "no single one of those below", w.when] for w in d.what_is_wrong]
     return table(["channel", "share of error", "missing force follows", "when"], rows, numbers=(1,), long=(3,)) if rows else ""
 
 

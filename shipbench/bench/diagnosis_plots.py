@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..diagnosis.follows import AXES, UNITS, at_knots, curve
+from ..diagnosis.follows import AXES, UNITS, at_knots, curve, samples_of
 from ..diagnosis.outcome import Diagnosis, Trace
 from ..diagnosis.wrong import FORCE_UNITS, INPUTS, LAGS, RESIDUALS, ErrorTables, Slice, correlogram, slices
 
@@ -243,22 +243,51 @@ def forces(trace: Trace, tables: ErrorTables, changed: bool) -> list[Panel]:
     return found
 
 
+def over_places(trace: Trace, axes: Sequence[str]) -> list[Panel]:
+    """One panel for each of some axes: the force that the plain model lacks, where the ship was."""
+    places = trace.measured[:, samples_of(trace)]
+    found = []
+    for j in map(AXES.index, axes):
+        unit, factor = FORCE_UNITS[j]
+
+        def draw(ax: Axes, j: int = j, factor: float = factor) -> None:
+            force = factor * trace.force[..., j]
+            ax.scatter(places[..., 1], places[..., 0], s=6, color=_INK, alpha=0.08, lw=0)
+            dots = ax.scatter(places[..., 1], places[..., 0], s=6, c=force, lw=0, **_colours(force))
+            _scale(ax, dots)
+            ax.set_aspect("equal", adjustable="datalim")
+            ax.set_xlabel("east [m]")
+            ax.set_ylabel("north [m]")
+
+        found.append(panel(draw, f"Missing {AXES[j]} force over the places [{unit.replace('^2', '²')}]"))
+    return found
+
+
 def _force_map(trace: Trace, j: int, caption: str, factor: float) -> Panel:
     def draw(ax: Axes) -> None:
         force = factor * trace.force[..., j]
-        known = np.abs(force[np.isfinite(force)])
-        reach = max(float(np.quantile(known, 0.98)), 1e-9) if len(known) else 1.0
         step = trace.knots[1] - trace.knots[0] if len(trace.knots) > 1 else 1.0
         extent = (trace.knots[0] - 0.5 * step, trace.knots[-1] + 0.5 * step, len(force) - 0.5, -0.5)
-        image = ax.imshow(force, aspect="auto", cmap=_two_colours(), vmin=-reach, vmax=reach, extent=extent, interpolation="nearest")
-        bar = ax.figure.colorbar(image, ax=ax, pad=0.04, fraction=0.06)
-        bar.outline.set_visible(False)
-        bar.solids.set_rasterized(True)  # type: ignore[union-attr]  # its 256 stripes would show their seams
-        bar.ax.locator_params(nbins=5)
+        _scale(ax, ax.imshow(force, aspect="auto", extent=extent, interpolation="nearest", **_colours(force)))
         ax.set_xlabel("time [s]")
         ax.set_ylabel("run" if len(force) == len(trace.names) else "piece of a run")
 
     return panel(draw, caption)
+
+
+def _colours(force: np.ndarray) -> dict[str, Any]:
+    """Of a force, the same to either side, for a picture of it."""
+    known = np.abs(force[np.isfinite(force)])
+    reach = max(float(np.quantile(known, 0.98)), 1e-9) if len(known) else 1.0
+    return {"cmap": _two_colours(), "vmin": -reach, "vmax": reach}
+
+
+def _scale(ax: Axes, image: Any) -> None:
+    """The bar beside a picture in colours."""
+    bar = ax.figure.colorbar(image, ax=ax, pad=0.04, fraction=0.06)
+    bar.outline.set_visible(False)
+    bar.solids.set_rasterized(True)  # type: ignore[union-attr]  # its 256 stripes would show their seams
+    bar.ax.locator_params(nbins=5)
 
 
 def _two_colours() -> Colormap:

@@ -165,7 +165,7 @@ def summary_lines(d: Diagnosis) -> list[str]:
     if d.what_is_wrong:
         lines.append("What the plain physics model gets wrong:")
         for w in d.what_is_wrong:
-            when = w.when if w.depends_on else f"{w.when}; its missing force follows no single variable".removeprefix("; ")
+            when = w.when if w.depends_on else f"{w.when}; its missing force follows nothing in motion, actuators or time alone".removeprefix("; ")
             lines += textwrap.wrap(f"{w.channel}, {100 * w.share_of_error:.0f} % of the error: {when}", WIDTH, initial_indent="  ",
                                    subsequent_indent="      ")  # fmt: skip
         lines.append("")

@@ -50,8 +50,13 @@ def variables(trace: Trace) -> dict[str, np.ndarray]:
 
 def at_knots(trace: Trace) -> dict[str, np.ndarray]:
     """The variables at the knots of the force, (B, J)."""
-    at = np.clip(np.searchsorted(trace.t, trace.knots - 1e-6), 0, len(trace.t) - 1)
+    at = samples_of(trace)
     return {k: x[:, at] for k, x in variables(trace).items()}
+
+
+def samples_of(trace: Trace) -> np.ndarray:
+    """(J,): where among the samples the knots of the force are."""
+    return np.clip(np.searchsorted(trace.t, trace.knots - 1e-6), 0, len(trace.t) - 1)
 
 
 def basis(name: str, x: np.ndarray, reference: np.ndarray | None = None) -> np.ndarray:

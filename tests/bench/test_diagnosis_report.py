@@ -143,6 +143,21 @@ def test_unknown_tells_a_force_from_an_error_of_a_sensor(axis, variable, form, t
     assert told in page(d)
 
 
+def test_what_follows_the_place_is_drawn_over_the_places():
+    """Its axes alone: what else is missing follows something else."""
+    unknown = {"axis": "yaw and sway", "variable": "position", "form": "a x + b y", "score": 44.0, "share": None}
+    drawn, other = (page(replace(make_diagnosis("unknown"), unknown=u)) for u in (unknown, unknown | {"variable": "heading"}))
+    assert [f"Missing {axis} force over the places" in drawn for axis in ("surge", "sway", "yaw")] == [False, True, True]
+    assert "over the places" not in other
+
+
+def test_an_effect_that_no_possible_size_shows_has_a_line_without_one():
+    seen, never = (Candidate(e, 1.0, 0.9, "below", {}, {"gain": v}, {"gain": "1"}, "rudder") for e, v in (("one", 0.3), ("other", np.nan)))
+    lines = summary_lines(replace(make_diagnosis("none"), candidates=(seen, never, Candidate("third", 1.0, 0.9, "below"))))
+    at = next(i for i, line in enumerate(lines) if line.startswith("Smallest size"))
+    assert [line.split() for line in lines[at + 1 : at + 4]] == [["one", "gain", "0.300"], ["other", "-"], []]
+
+
 def test_unknown_names_axis_and_variable():
     text = " ".join("\n".join(summary_lines(make_diagnosis("unknown"))).split())
     assert "a force in yaw that depends on heading, best as cos(3 psi + phase)" in text
