@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import shlex
+import signal
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -178,5 +179,6 @@ def predict(
 
 
 def main() -> None:
-    """Entry point of the `shipbench` command."""
+    """Entry point of the `shipbench` command. SIGTERM ends it as Ctrl-C does: what is finished is kept, nothing goes on behind it."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     app()

@@ -59,7 +59,8 @@ class Lines:
         print(f"{f'[{self.count}/{self.total}]':>8s} {label}: {outcome}{after}", file=self.stream, flush=True)
 
     def finish(self) -> None:
-        print(f"        finished in {duration(time.monotonic() - self.began)}", file=self.stream, flush=True)
+        how = "finished in" if self.count == self.total else "stopped after"
+        print(f"        {how} {duration(time.monotonic() - self.began)}", file=self.stream, flush=True)
 
 
 class Bar:

@@ -28,7 +28,7 @@ from .cost import count_parameters
 from .provenance import machine
 
 _RAISED = (Exception, SystemExit)
-"""What a user's own model may raise, and only its own rows say so."""
+"""What a user's own model may raise, and only its own rows say so (after `_let_stop_through`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,17 @@ def work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
         with _at_hand(job) as spec:
             return _work(replace(job, spec=spec), folds)
     except _RAISED as error:
+        _let_stop_through(error)
         return [Answer("failed", one_line(error)) for _ in folds]
+
+
+def _let_stop_through(error: BaseException) -> None:
+    """Raise KeyboardInterrupt where that is behind the exception: Lightning makes a SystemExit of it, which would count as a failed model."""
+    behind: BaseException | None = error
+    while behind is not None:
+        if isinstance(behind, KeyboardInterrupt):
+            raise KeyboardInterrupt from error
+        behind = behind.__context__
 
 
 def one_line(error: BaseException) -> str:
@@ -152,7 +162,8 @@ def _fit(job: Job, folds: Sequence[FoldData]) -> list[_Fit]:
             group(models, [fold.train for fold in folds], [fold.valid for fold in folds], [seed] * len(folds))
             seconds = (time.perf_counter() - began) / len(folds)
             return [_Fit(model, seconds, len(folds)) for model in models]
-        except _RAISED:  # one fold is enough to fail them all: each gets its chance alone
+        except _RAISED as error:  # one fold is enough to fail them all: each gets its chance alone
+            _let_stop_through(error)
             models = [make_predictor(spec, job.device) for _ in folds]
     fits = []
     for model, fold in zip(models, folds, strict=True):
@@ -160,6 +171,7 @@ def _fit(job: Job, folds: Sequence[FoldData]) -> list[_Fit]:
         try:
             model.fit(fold.train, fold.valid, seed=seed)
         except _RAISED as error:
+            _let_stop_through(error)
             reason = f"fit: {one_line(error)}"
         fits.append(_Fit(model, time.perf_counter() - began, error=reason))
     return fits
@@ -174,6 +186,7 @@ def _predicted(fit: _Fit, fold: FoldData) -> Answer:
         predict_s = (time.perf_counter() - began) / len(S)
         params = json.loads(json.dumps(asdict(fit.model), default=str)) if is_dataclass(fit.model) and not isinstance(fit.model, type) else None
     except _RAISED as error:
+        _let_stop_through(error)
         return Answer("failed", f"predict: {one_line(error)}", fit_s=fit.seconds, shared_by=fit.shared_by)
     files, notes = _kept(fit.model)
     return Answer("", "", S, fit.seconds, fit.shared_by, predict_s, params, count_parameters(fit.model), files, notes)

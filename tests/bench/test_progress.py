@@ -25,6 +25,19 @@ def test_lines_count_and_tell_the_remaining_time(monkeypatch):
     assert stream.getvalue().splitlines() == ["   [1/3] a: ok; about 20 s left", "   [2/3] b: failed, 1 of 2 runs: no; about 10 s left"]
 
 
+@pytest.mark.parametrize(("cells", "said"), [(1, "stopped after 5 s"), (2, "finished in 5 s")])
+def test_lines_tell_a_study_that_was_stopped_from_one_that_came_to_its_end(monkeypatch, cells, said):
+    clock = iter([0.0, 0.0, *[1.0] * cells, 5.0])
+    monkeypatch.setattr("shipbench.bench.progress.time.monotonic", lambda: next(clock))
+    stream = io.StringIO()
+    lines = Lines(stream)
+    lines.start(2)
+    for _ in range(cells):
+        lines.done("a", "ok")
+    lines.finish()
+    assert stream.getvalue().splitlines()[-1].strip() == said
+
+
 def test_quiet_means_silent_and_a_pipe_gets_lines():
     assert isinstance(make_progress(quiet=True), Silent)
     assert isinstance(make_progress(), Lines)

@@ -39,6 +39,28 @@ class Together(Drawn):
             m.bias = s + 1.0 / len(models)
 '''
 
+TRAINED = '''
+"""As a network that Lightning trains: it makes a SystemExit of Ctrl-C, and puts SIGTERM off until a batch has ended."""
+import time
+import lightning
+import torch
+
+class Net(lightning.LightningModule):
+    automatic_optimization = False
+    def training_step(self, batch, index):
+        open("training", "a").write("x")
+        time.sleep(20)
+    def configure_optimizers(self):
+        return torch.optim.SGD([torch.nn.Parameter(torch.zeros(1))], lr=1.0)
+
+class Trained:
+    def fit(self, train, valid=None, *, seed=0):
+        lightning.Trainer(accelerator="cpu", max_epochs=1, barebones=True).fit(Net(), [0, 1])
+        return self
+    def predict(self, s0, U, history=None):
+        raise NotImplementedError
+'''
+
 KILLED_AT_EVERY_STEP = '''
 """Forks a study that kills itself at its n-th step on the file system, then one that resumes, for every n in the steps given."""
 import os, signal, sys
@@ -167,3 +189,26 @@ def test_no_process_outlives_a_study_that_is_stopped(folder, sent):
         process.kill()
     study.wait()
     assert outlived == []
+
+
+@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGINT])
+def test_a_study_is_stopped_while_lightning_trains_and_counts_no_failure(folder, sent):
+    (folder / "trained.py").write_text(TRAINED)
+    command = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # as above
+    command += "from shipbench.cli import main; main()"
+    options = ["run", "-m", "trained.py:Trained", "-d", "toyset", "--horizon", "20", "--folds", "2", "-o", "out", "--executor", "local"]
+    study = subprocess.Popen([sys.executable, "-c", command, *options], cwd=folder, env=environment(), stderr=subprocess.PIPE, text=True)
+    end = time.monotonic() + 120
+    while not (folder / "training").exists():
+        assert time.monotonic() < end
+        assert study.poll() is None
+        time.sleep(0.02)
+    study.send_signal(sent)
+    try:
+        _, said = study.communicate(timeout=10)
+    finally:
+        study.kill()
+    assert study.returncode == 130
+    assert "stopped after" in said
+    assert "failed" not in said
+    assert (folder / "training").read_text() == "x"  # no other fold was begun
