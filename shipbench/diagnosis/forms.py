@@ -14,6 +14,8 @@ Features = tuple[np.ndarray, ...]
 _SHORTEST, _LONGEST, _MOST_PERIODS = 8.0, 200.0, 60
 """Periods that are tried, in seconds (Froude-scaled, 130 m), and how many at most: even in frequency, from one to the next the longest run sees half
 a cycle more, so that one of them is near enough to any."""
+_LONGEST_SWELL = 1.8
+"""Longest period of waves that rock a ship [s], for the root of her length [m]: of a wave of five ship lengths (T^2 = 2 pi lambda / g)."""
 _SHORTEST_WAVE, _MOST_WAVES, _MOST_KNOTS = 4.0, 25, 5000
 """Shortest wave over the places visited that is tried, in ship lengths, most of them in twice the extent of the places, and most knots of the force
 at which they are compared."""
@@ -114,7 +116,8 @@ _OF_SENSORS: Forms = {
 
 
 def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
-    """The features of all forms of a force about a trajectory, by variable; of thrusters only where they are used. After `lin.columns`."""
+    """The features of all forms of a force about a trajectory, by variable; of thrusters only where they are used; "waves": of time, with the periods
+    of waves. After `lin.columns`."""
     plant, seg = lin.plant, lin.plant.seg
     assert lin.aside is not None
     act, t = plant.midway(lin.path)
@@ -122,9 +125,10 @@ def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
     ends = _ends(plant)
     low, high = 1.0 / (_LONGEST * plant.froude), 1.0 / max(_SHORTEST * plant.froude, 4.0 * seg.dt)
     tried = np.linspace(low, high, min(1 + int(np.ceil(2.0 * max(high - low, 0.0) * ends)), _MOST_PERIODS))
-    periods = {f"cos(2 pi t / {1.0 / f:.3g} s + phase)": _period(1.0 / float(f)) for f in tried}
+    rocking = tried > 1.0 / (_LONGEST_SWELL * plant.c.L**0.5)
+    rhythms, periods = ({f"cos(2 pi t / {T:.3g} s + phase)": _period(float(T)) for T in 1.0 / part} for part in (tried[rocking], tried[~rocking]))
     waves, compared = _waves(lin)
-    forms = {**_OF_FORCES, "time": _grown(ends) | periods, "position": {**_OF_FORCES["position"], **waves}}
+    forms = {**_OF_FORCES, "time": _grown(ends) | periods, "waves": rhythms, "position": {**_OF_FORCES["position"], **waves}}
     if not np.any(seg.states[..., 8:]):
         del forms["thrusters"]
     return _features(forms, on, aside, seg.mask[:, 1:].T, dict.fromkeys(waves, compared))

@@ -25,11 +25,12 @@ _NAMED = ("recorded heading", "recorded yaw rate")
 _PRIOR_SD, _SENSOR_SD = 0.5, 3.0
 """Of a form's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m), or of ordinary noise of the
 channel (0.23 deg, 0.04 m/s, 0.04 m/s, 0.04 deg/s)."""
-NO_FORM = ("nothing", "heading", "position", "time", "run")
+NO_FORM = ("nothing", "heading", "position", "time", "waves", "run")
 """What no ship's form depends on."""
-_BY_RUN = ("heading", "position")
+_BY_RUN = ("heading", "position", "waves")
 """What every run has its own of. What a model lacks of a ship is another force in each manoeuvre, and passes for one that follows these: it does only
-if it explains more than a constant force of its own in each run."""
+if it explains more than a constant force of its own in each run; and one with the period of waves, more than one of its own phase in each run, since
+waves rock a ship, and the latent force, which has no periods, makes too much of those that are in step by chance."""
 _WORTH_MORE = 2.0
 _OFTEN_ENOUGH = 4.0
 """Seconds (Froude-scaled, 130 m) between samples up to which errors of sensors are looked for: what a rudder does between rarer ones is not known,
@@ -119,8 +120,11 @@ class Search:
         self._parts = {d: parts for d, *parts in [*alone, *(pair for pair in joined if pair is not None)]}
         constant = {d.axis: t for d, t in alone if d.variable == "nothing" and d.axis in AXES}
         doubtful = [d for d in self._parts if d.variable in _BY_RUN and not d.of_sensor and d.score > 0.0]
-        lost = [d for d in doubtful if self._of_runs([constant[axis] for axis in d.axis.split(" and ")]) > d.score]
-        self.found = sorted((d for d in self._parts if d not in lost), key=lambda d: -d.score)
+        own = {d: self._parts[d] if d.variable == "waves" else [constant[axis] for axis in d.axis.split(" and ")] for d in doubtful}
+        lost = [d for d in doubtful if self._of_runs(own[d]) > d.score]
+        told = {d: replace(d, variable="time") if d.variable == "waves" else d for d in self._parts if d not in lost}
+        self._parts = {named: self._parts[d] for d, named in told.items()}
+        self.found = sorted(self._parts, key=lambda d: -d.score)
 
     def settled(self, d: Dependence) -> Dependence:
         """The same, judged as named causes are, which are fitted: with the variances of the noise re-estimated, and an error of a sensor taken out of
@@ -129,12 +133,12 @@ class Search:
         score = 2.0 * (self._settled(parts) - usual - sum(t.cost for t in parts))
         return replace(d, score=max(score, d.score, *(self._refitted(t) for t in parts if d.of_sensor)))
 
-    def _of_runs(self, constants: Sequence[_Tried]) -> float:
-        """2 log evidence of a constant force of its own in each run, on the axes of `constants`."""
-        num, prior = len(constants), self.plain
+    def _of_runs(self, tried: Sequence[_Tried]) -> float:
+        """2 log evidence of the forces `tried` with coefficients of its own in each run."""
+        num, prior = sum(t.size for t in tried), self.plain
         at = len(self.inside) + np.arange(num)
         prior = replace(prior, random=np.append(prior.random, at), log_tau2=np.append(prior.log_tau2, np.zeros(num)))
-        gram = self._gram(constants).only(np.append(self.inside, self.first + np.arange(num)))
+        gram = self._gram(tried).only(np.append(self.inside, self.first + np.arange(num)))
         return 2.0 * (evidence(gram, prior, self.usual, num)[0] - self.before)
 
     def _refitted(self, tried: _Tried) -> float:

@@ -45,7 +45,8 @@ class Structure(Effect):
     and stern (reference 2.7), side force of a propeller going astern as a share of its thrust at rest, of a few per cent, and a wake that falls with
     the square of the angle at the propeller, as w_P0 exp(-4 beta_P^2) (reference 2.5: 0.2 to 0.5 of 1 - w_P0 for w_P0 of 0.18 to 0.33), or of S175
     without end (Son & Nomoto 1982): thrust that she loses in long hard turns passed for mass. Of two tunnels with the same record each gives its own
-    force, by where it stands in the hull (0.8 to 1.0 of its thrust): what one has more than the other passed for its lever.
+    force, by where it stands in the hull (0.8 to 1.0 of its thrust): what one has more than the other passed for its lever. late_stall: share of the
+    lift that the rudder loses from 26 to 37 deg, since every rudder stalls at 30 to 40 deg (physics reference, R18), sharper than a cubic lift does.
     """
 
     family = "hull"
@@ -91,6 +92,7 @@ class Structure(Effect):
         Parameter("walk_share", "1", 0.03, -0.5, 0.5),
         Parameter("wake_square", "1", 0.3, -1.0, 2.0),
         Parameter("bow_over_stern", "1", 0.1, -0.5, 0.5),
+        Parameter("late_stall", "1", 0.3, -0.5, 0.95),
     )
     backing, m_x, astern, braking = 0.5, -0.4, 0.7, -0.7
     wider: ClassVar = {"windmilling": 3.0, "thrust_backing": 2.5}
@@ -127,6 +129,7 @@ class Structure(Effect):
         e.thrust = e.thrust * exp(q[28]) * (1.0 + q[18] * smoothstep(-s.n, 0.0, 1.0))
         self._off_design(e, s, q[28:34], ahead, ship)
         ASTERN.force(e, s, (0.0, q[36]), ship)
+        e.late_stall = q[39]
         lost = fading(s.u - e.u_c, ship.L)
         e.bow, e.stern = e.bow * (1.0 + q[38]) * (1.0 - q[34] * lost), e.stern * (1.0 - q[38]) * (1.0 - q[35] * lost)
         unit = 0.5 * ship.rho * ship.L * ship.T

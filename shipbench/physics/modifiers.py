@@ -36,14 +36,14 @@ class Modifiers:
     u_c, v_c: velocity of the water in body axes [m/s]; drift: share of the wind's velocity that the water has besides. air_u, air_v: velocity of the
     air beyond the measured wind, body axes [m/s]; wind_X, wind_Y, wind_N: factors of the wind's forces and moment; wind_lever: of its side force, to
     add [m]. delta: rudder angle to add [rad]; rudder: factor of the rudder's lift; rudder_asymmetry a: factor 1 + a to starboard and 1 - a to port;
-    stall: share of the lift lost beyond `stall_angle` [rad]. race, thrust: factors of the race's excess speed and of the thrust; straightening:
-    factor of the sideways flow at the rudder, 1 + its asymmetry where it comes from port (positive) and 1 - where from starboard; straightening_r:
-    factor of its part by yaw alone; backing: share of the flow at the rudder that a reversed propeller stops; reversal: a rudder angle counts
-    1 - 2 reversal where the flow comes from astern (1/2: nothing, 1: the other way); wake: added to the wake fraction. bow,
-    stern: factors of the thrusters; lever: shift of the bow thruster [m]; loss: share of side force and moment lost at speed. mass, m_x, m_y, J_z:
-    factors of the ship's mass (with its inertia), of added mass in surge and sway and of added inertia in yaw; coupling: added mass between sway and
-    yaw, to add [kg m]; x_G: shift of the centre of gravity [m]. hull: factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship
-    [N m] to add.
+    stall: share of the lift lost beyond `stall_angle` [rad]; late_stall: the same from 26 to 37 deg, as any rudder may. race, thrust: factors of the
+    race's excess speed and of the thrust; straightening: factor of the sideways flow at the rudder, 1 + its asymmetry where it comes from port
+    (positive) and 1 - where from starboard; straightening_r: factor of its part by yaw alone; backing: share of the flow at the rudder that a
+    reversed propeller stops; reversal: a rudder angle counts 1 - 2 reversal where the flow comes from astern (1/2: nothing, 1: the other way); wake:
+    added to the wake fraction. bow, stern: factors of the thrusters; lever: shift of the bow thruster [m]; loss: share of side force and moment lost
+    at speed. mass, m_x, m_y, J_z: factors of the ship's mass (with its inertia), of added mass in surge and sway and of added inertia in yaw;
+    coupling: added mass between sway and yaw, to add [kg m]; x_G: shift of the centre of gravity [m]. hull: factors of the hull's derivatives. X, Y,
+    N: forces [N] and moment about midship [N m] to add.
     """
 
     u_c: Array = 0.0
@@ -60,6 +60,7 @@ class Modifiers:
     rudder_asymmetry: Array = 0.0
     stall: Array = 0.0
     stall_angle: Array = 0.4
+    late_stall: Array = 0.0
     race: Array = 1.0
     straightening: Array = 1.0
     straightening_asymmetry: Array = 0.0
@@ -114,6 +115,8 @@ class Modifiers:
             factor = factor * (1.0 + self.rudder_asymmetry * tanh(alpha / 0.05))
         if not is_neutral(self.stall, 0.0):
             factor = factor * (1.0 - self.stall * smoothstep(absolute(alpha) - self.stall_angle, 0.0, 0.35))
+        if not is_neutral(self.late_stall, 0.0):
+            factor = factor * (1.0 - self.late_stall * smoothstep(absolute(alpha), 0.45, 0.65))
         return factor
 
 

@@ -100,6 +100,20 @@ def test_a_force_that_comes_and_goes_from_place_to_place_follows_the_place(kcs):
     assert float(towards) % 180.0 == pytest.approx(np.rad2deg(0.7), abs=10.0)
 
 
+@pytest.mark.parametrize("in_step", [False, True])
+def test_waves_that_rock_the_ship_are_no_force_that_follows_the_time_but_one_in_step_with_the_runs_is(in_step):
+    """Of 14 s on 232 m. Phases of their own in each run scored 26, where 16 are asked."""
+
+    def rock(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.push(0.0, 0.0, q[0] * ship.mass * ship.L**2 * np.sin(2.0 * np.pi * s.t / 14.0 + q[1]))
+
+    phases = np.zeros(12) if in_step else np.random.default_rng(13).uniform(0.0, 2.0 * np.pi, 12)
+    hidden = Hidden(Outside("waves", ("time",), rock), (2e-5, phases))
+    plant = Plant.of(sea_trials(load_mmg_ship("kcs"), 13, (hidden,), Trials(runs=12)))
+    found = {(d.axis, d.variable) for d in dependences(null_fit(plant, Scales(plant))) if d.score > 16.0}
+    assert (("yaw", "time") in found) == in_step
+
+
 def test_a_constant_ahead_is_no_part_of_a_pull(kcs):
     """Another form of resistance comes near one, and much is asked of it alone: with a trace of yaw beside it, it was `unknown` on a tug."""
 

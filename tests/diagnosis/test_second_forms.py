@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +11,16 @@ import pytest
 from shipbench.diagnosis.analysis import THRESHOLD, asked, plain_model
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.generic import Dependence
+from shipbench.diagnosis.outside import Outside
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.select import select
 from shipbench.effects.base import EFFECTS
+from shipbench.ops import Array
 from shipbench.physics.mmg import load_mmg_ship
+from shipbench.physics.modifiers import Flow, Modifiers
 from shipbench.physics.thruster import fading
 from shipbench.records import Dataset
+from shipbench.ship import Particulars
 from shipbench.signals import U
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
@@ -66,6 +71,17 @@ def test_a_race_that_meets_the_rudder_a_little_more_on_one_side_is_ordinary_and_
     assert found.small is not None
     assert [t.label for t in found.small.model.terms] == ["rudder_asymmetry"]  # what is unknown is judged beside it
     assert named(data) == []
+
+
+def test_a_rudder_that_stalls_beyond_30_deg_is_ordinary_but_one_that_stalls_before_is_named():
+    """With half of the lift lost from 26 to 37 deg it was `rudder_stall` (score 78), as on ships with Whicker & Fehlner's curves."""
+
+    def late(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.late_stall = q[0]
+
+    kvlcc2 = load_mmg_ship("kvlcc2_l7")
+    assert named(sea_trials(kvlcc2, 5, (Hidden(Outside("late stall", ("rudder",), late), (0.5,)),), Trials())) == []
+    assert named(trials("rudder_stall", 0.6, 0.25, ship="kvlcc2_l7")) == ["rudder_stall"]
 
 
 def test_thrusters_fade_alike_ahead_and_astern_and_not_at_rest():

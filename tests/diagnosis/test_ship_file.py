@@ -38,7 +38,7 @@ def test_a_thrust_that_a_ship_of_nearly_the_same_size_explains_too_is_told_with_
 
 
 def test_a_stalled_rudder_that_no_other_size_explains_is_told_without():
-    case = draw_case("single", singles().index("rudder_stall"), 0)
+    case = draw_case("single", singles().index("rudder_stall"), 4)
     verdict = diagnose(case.dataset(), gain=False)
     assert [c.effect for c in verdict.causes] == ["rudder_stall"]
     assert not any(QUESTION in w for w in verdict.warnings)
