@@ -232,7 +232,8 @@ class Plant:
         return path
 
     def _stages(self, i: int, gear: Gear) -> np.ndarray:
-        """One actuator behind a gear, (B, steps * substeps, 3). A negative delay means that the record is late."""
+        """One actuator behind a gear, (B, steps * substeps, 3). A negative delay means that the record is late. Recorded actuators are read at the
+        time that a delay points to: a gear that follows them at once moves from stage to stage, and would leave a delay without a slope."""
         seg, n, before = self.seg, 2 * self.substeps, self.seg.earlier.shape[1]
         fine = np.arange(-before * n, self.steps * n + 1) / n
         if seg.commanded:
@@ -241,12 +242,13 @@ class Plant:
             orders = np.concatenate([seg.earlier[..., i], seg.commands[..., i]], axis=1)
             at = [np.clip(np.floor(fine + (whole + k) / n + 1e-9).astype(int), -before, self.steps - 1) for k in (0, 1)]
             values = orders[:, before + at[0]] * (1.0 - part) + orders[:, before + at[1]] * part
+            follow = replace(gear, delay=max(gear.delay, 0.0))
         else:
-            at = np.clip(fine - min(gear.delay, 0.0) / seg.dt, 0, self.steps)
+            at = np.clip(fine - gear.delay / seg.dt, 0, self.steps)
             low = np.minimum(at.astype(int), self.steps - 1)
             values = seg.states[:, low, 6 + i] * (1.0 - (at - low)) + seg.states[:, low + 1, 6 + i] * (at - low)
-        if gear != NO_GEAR and not (gear.delay < 0 and replace(gear, delay=0.0) == NO_GEAR):
-            follow = replace(gear, delay=max(gear.delay, 0.0))
+            follow = replace(gear, delay=0.0)
+        if follow != NO_GEAR:
             # recorded actuators: the value at the end of the step is what the gear follows; commands are held from its beginning
             wanted = values[:, :-1] if seg.commanded else values[:, 1:]
             begins = values[:, 0] if before or not seg.commanded else seg.states[:, 0, 6 + i]

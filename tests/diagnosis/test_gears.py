@@ -9,6 +9,7 @@ import pytest
 
 from shipbench import compiled
 from shipbench.diagnosis import gears
+from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.gear_kinds import GearFinding, kinds_of, slow_on_any_ship
 from shipbench.diagnosis.gears import _Record, find_in_gears
 from shipbench.diagnosis.plant import Plant
@@ -16,6 +17,7 @@ from shipbench.diagnosis.rolling import Active
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.actuators import Gear, gear_path
 from shipbench.physics.mmg import load_mmg_ship
+from shipbench.signals import DELTA
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
 
@@ -100,6 +102,26 @@ def test_a_record_that_is_late_by_less_than_a_stage_has_a_slope_to_be_found_by()
     moved = [plant.path_of([Active(effect, (late,))]) - still for late in (-0.01, -0.02)]
     small, twice = (np.abs(m[..., 1]).max() for m in moved)
     assert 0.0 < small < twice < 2.5 * small
+
+
+def test_a_rudder_that_is_later_than_its_record_by_part_of_a_sample_has_a_slope_to_be_found_by():
+    """It moved by whole stages only, and delays of recorded rudders were never found."""
+    plant, effect = trials("rudder_delay", 0.0), EFFECTS.get("rudder_delay")
+    at, on = (plant.path_of([Active(effect, (late,))])[..., 1] for late in (1.3, 1.31))
+    further = plant.path_of([Active(effect, (1.32,))])[..., 1]
+    assert 0.0 < np.abs(on - at).max() < np.abs(further - at).max() < 2.5 * np.abs(on - at).max()
+
+
+def test_a_rudder_that_is_later_than_its_record_is_named():
+    """The motion alone shows it: between order and record nothing is late."""
+    data = sea_trials(load_mmg_ship("container130"), 5, (), Trials(runs=12))
+    seconds = data.dt * np.arange(len(data.runs[0].states))
+    early = [replace(run, states=run.states.copy()) for run in data.runs]
+    for run in early:
+        run.states[:, DELTA] = np.interp(seconds + 1.3, seconds, run.states[:, DELTA])
+    (cause,) = diagnose(data.with_runs(early), gain=False).causes
+    assert cause.effect == "rudder_delay"
+    assert cause.parameters["delay"].value == pytest.approx(1.3, abs=0.3)
 
 
 @pytest.mark.parametrize(
