@@ -19,7 +19,7 @@ from .outcome import Candidate, Cause, Estimate, Gain, what_it_is
 from .plant import HULL, NUM_HULL
 from .robust import WITHOUT_WIND, covariance, inflation, least_size
 from .screen import Score, other_kinds_from, places
-from .select import AS_RECORDED, passes_for_form
+from .select import passes_for_form, shows_in_record
 from .settle import Fit
 from .ship_file import whatever_the_ship
 from .term import Term
@@ -307,9 +307,9 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str], measured: bo
         reason = "no sign of it"
     elif effect.family == "thruster":
         reason = "the thrusters are not used in these runs"
-    elif not plant.seg.commanded and name in AS_RECORDED:
+    elif not plant.seg.commanded and shows_in_record(effect):
         reason = "this actuator is not commanded in these runs"
-    elif name in AS_RECORDED:
+    elif shows_in_record(effect):
         reason = "only commands are recorded: how fast the gears are is fitted"
     elif name == "going_astern":
         reason = f"not looked for; fit it with physics+{name}"

@@ -25,7 +25,7 @@ from .derived import faults, has_speeds, marked, said
 from .felt_wind import with_true_wind
 from .fit import Fit
 from .gain import FoldGain, fold_gain, summarise
-from .outcome import Diagnosis, Gain
+from .outcome import Cause, Diagnosis, Gain
 from .over_ground import over_ground
 from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant
 from .ship_file import doubts_of, odd_for, own_propeller
@@ -96,12 +96,14 @@ def diagnose(
     warnings += misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
+    behind = _behind_its_record(found, causes)
+    warnings += [f"{name}: {text}" for name, text in behind.items()]
     warnings += what_is_left(found) if causes and not doubts else []
     warnings += odd_for(found, [c.effect for c in causes]) if only is None and not doubts else []
     trace = trace_of(dataset, found, worth.hull)
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
     verdict = "unknown" if unknown else "found" if causes else "none"
-    names = [c.effect for c in causes if c.effect not in NOT_A_MODEL]
+    names = [c.effect for c in causes if c.effect not in (*NOT_A_MODEL, *behind)]
     return Diagnosis(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes),
         candidates=tuple(describe_candidates(found, [c.effect for c in causes], worth.gain is not None)),
@@ -195,6 +197,19 @@ def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
     size = np.array([len(g) for g in groups])
     part = np.repeat(np.arange(FOLDS), [len(p) for p in np.array_split(np.arange(len(dataset)), FOLDS)])[np.cumsum(size) - 1 - size // 2]
     return [np.sort(np.concatenate([g for g, k in zip(groups, part, strict=True) if k == fold])) for fold in np.unique(part)]
+
+
+def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, str]:
+    """What to do about a rudder that acts later (or sooner) than its record says, by the name of the cause: the gears of the predictors end at the
+    record, so that the record has to be put right."""
+    if found.final.plant.seg.commanded or any(g.effect == "rudder_delay" for g in found.gears):
+        return {}
+    late = {c.effect: c.parameters["delay"].value for c in causes if c.effect == "rudder_delay"}
+    return {
+        name: f"the motion shows the rudder {abs(s):.2g} s {'later' if s > 0.0 else 'sooner'} than its record. The gears of the predictors are fitted to "
+        f"the record: put that right first, by [delay] delta = {-s:.2g} in dataset.toml."
+        for name, s in late.items()
+    }
 
 
 def _cross_validated(

@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from ..effects.base import EFFECTS
+from ..effects.base import EFFECTS, Effect
 from .fit import Origin, fit, looking_at
 from .model import Linearisation
 from .ordinary import widened
@@ -22,8 +22,6 @@ from .term import Term
 NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error", "going_astern", "rudder_rate_limit", "shaft_rate_limit")
 """Found by their own tests (prior width of the hull, gated columns, kinematics, the record of the gears), or what every ship does. A limit has no
 slope where it does not act: where only commands are recorded, the rates of the gears are fitted instead."""
-AS_RECORDED = ("rudder_rate_limit", "rudder_deadband", "rudder_backlash", "shaft_rate_limit", "shaft_lag", "thruster_lag", "rudder_lag")
-"""Between command and actuator: where the actuator is recorded they cannot act on the motion, and are looked for in the record."""
 MOST_EFFECTS = 6
 _REFITS = 3
 _WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
@@ -89,6 +87,11 @@ class Selection:
     small: Fit | None = None
 
 
+def shows_in_record(effect: Effect) -> bool:
+    """Whether it acts between command and actuator alone: where the actuator is recorded, it is looked for in the record, not in the motion."""
+    return effect.enters == "gear" and not effect.unrecorded
+
+
 def passes_for_form(term: Term) -> bool:
     """Whether what the form of a hull lacks could pass for it."""
     return term.per_run or term.since is not None or term.label in AS_SHIPS_DIFFER
@@ -98,9 +101,9 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Se
     """Every effect that could act on these data, less those that are `settled`, once per shape setting."""
     found = []
     for name in names if names is not None else EFFECTS.names():
-        if name in NOT_SCREENED or name in settled or (not plant.seg.commanded and name in AS_RECORDED):
-            continue
         effect = EFFECTS.get(name)
+        if name in NOT_SCREENED or name in settled or (not plant.seg.commanded and shows_in_record(effect)):
+            continue
         if plant.seg.wind is None and effect.channels:
             continue
         if plant.seg.wind is not None and name in WITHOUT_WIND:

@@ -54,12 +54,12 @@ class Parameter:
 class Effect:
     """Base of all effects; see the module's docstring.
 
-    Class attributes: `family` (environment, rudder, propulsion, thruster, hull, sensor, time), `summary`, `source`, `parameters`, `per_run`
-    (every run has its own values), `vector` (names of size and direction that two earth-fixed components are reported as), `separate` (the
-    manoeuvre that tells it from its look-alikes), `channels` (measured inputs without which it means nothing), `breaks_symmetry` (a force that knows
-    port from starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that are wrong), `late` (tells
-    of another time, and as much of the motion as a sensor in time, but where a record begins or ends). `way`: how one of those that `fitted` gives
-    acts, where the user should be told.
+    Class attributes: `family` (environment, rudder, propulsion, thruster, hull, sensor, time), `summary`, `source`, `parameters`, `per_run` (every
+    run has its own values), `vector` (names of size and direction that two earth-fixed components are reported as), `separate` (the manoeuvre that
+    tells it from its look-alikes), `channels` (measured inputs without which it means nothing), `breaks_symmetry` (a force that knows port from
+    starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that are wrong), `late` (tells of another
+    time, and as much of the motion as a sensor in time, but where a record begins or ends), `unrecorded` (of a gear's: it may also act behind the
+    record of the actuator, where the motion alone shows it). `way`: how one of those that `fitted` gives acts, where the user should be told.
     """
 
     name: str = ""
@@ -73,6 +73,7 @@ class Effect:
     channels: ClassVar[tuple[str, ...]] = ()
     breaks_symmetry: ClassVar[bool] = False
     late: ClassVar[bool] = False
+    unrecorded: ClassVar[bool] = False
     way: str = ""
 
     def __init_subclass__(cls) -> None:

@@ -15,6 +15,7 @@ class RudderDelay(Effect):
     summary = "transport delay of the steering gear or of its record"
     source = "physics reference, section 5, A26"
     parameters = (Parameter("delay", "s", 1.5, -10.0, 10.0, scaling="time"),)
+    unrecorded = True
     separate = "quick rudder reversals, sampled faster"
 
     def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:

@@ -119,9 +119,13 @@ def test_a_rudder_that_is_later_than_its_record_is_named():
     early = [replace(run, states=run.states.copy()) for run in data.runs]
     for run in early:
         run.states[:, DELTA] = np.interp(seconds + 1.3, seconds, run.states[:, DELTA])
-    (cause,) = diagnose(data.with_runs(early), gain=False).causes
+    found = diagnose(data.with_runs(early), gain=False)
+    (cause,) = found.causes
     assert cause.effect == "rudder_delay"
     assert cause.parameters["delay"].value == pytest.approx(1.3, abs=0.3)
+    (warning,) = [w for w in found.warnings if w.startswith("rudder_delay: the motion shows the rudder 1.")]
+    assert "by [delay] delta = -1." in warning
+    assert found.extended_model == "physics"  # whose gears end at the record
 
 
 @pytest.mark.parametrize(
