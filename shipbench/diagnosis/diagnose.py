@@ -206,8 +206,8 @@ def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, st
         return {}
     late = {c.effect: c.parameters["delay"].value for c in causes if c.effect == "rudder_delay"}
     return {
-        name: f"the motion shows the rudder {abs(s):.2g} s {'later' if s > 0.0 else 'sooner'} than its record. The gears of the predictors are fitted to "
-        f"the record: put that right first, by [delay] delta = {-s:.2g} in dataset.toml."
+        name: f"the motion shows the rudder {abs(s):.2g} s {'later' if s > 0.0 else 'sooner'} than its record, to which predictors fit their "
+        f"gears. Put the record right first, by [delay] delta = {-s:.2g} in dataset.toml."
         for name, s in late.items()
     }
 
