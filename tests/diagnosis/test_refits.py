@@ -30,6 +30,17 @@ def null() -> Fit:
     return null_fit(plant, Scales(plant), candidates_for(plant, NAMES))
 
 
+@pytest.mark.parametrize("actuators", ["measured", "commanded"])
+def test_every_candidate_has_a_slope_at_whatever_size(actuators):
+    """Else its fit rests where it begins: the delay of a recorded rudder had one at zero alone, and was never found."""
+    plant = Plant.of(replace(sea_trials(load_mmg_ship("container130"), 4, (), Trials(runs=8, samples=70)), actuators=actuators))
+    found = null_fit(plant, Scales(plant))
+    for term in candidates_for(plant):
+        value = np.full((plant.seg.runs, term.size) if term.per_run else term.size, 0.31)
+        at = Linearisation(plant, found.scales, replace(found.point, terms=(term,), values=(value,)), found.motion)
+        assert np.all(np.abs(at.columns().own[0]).sum(axis=(0, 1)) > 1e-3), term
+
+
 def test_a_refit_from_the_shared_linearisation_is_the_one_from_its_own(null):
     origin, scores = Origin.of(null.plant, null.scales), {s.term.label: s for s in reversed(screen(null))}
     together = Beginning.of(null, origin, [s.term for s in scores.values()])
