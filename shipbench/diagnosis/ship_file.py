@@ -90,10 +90,11 @@ def whatever_the_ship(name: str, found: Analysis) -> bool:
     """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, delay or play of a gear seen in its own record, a
     force that breaks a symmetry which every ship has. (46 trials, with nothing, wind, a rudder offset or a current hidden, each diagnosed with
     another ship's file: no sensor and no such force was named but those that were there, while thrust, mass and others were.) With the file of a
-    shorter ship an ordinary rudder or shaft is slow: it must be slow for the longest ship. A wind of each run acts through coefficients alone, and
-    what these lack in a run's manoeuvre passes for it (a current shows in track and speeds besides). Of a change, what has changed decides."""
+    shorter ship an ordinary rudder or shaft is slow: it must be slow for the longest ship. A wind of each run and a bank act through coefficients
+    alone, and what these lack in a run's manoeuvre, or in those of one place, passes for them (a current shows in track and speeds besides; a ship
+    that towed a barge on an elastic line had a bank). Of a change, what has changed decides."""
     effect = EFFECTS.get(next((t.label for t in found.final.model.terms if t.since is not None), name) if name == "change_point" else name)
-    forces = effect.breaks_symmetry and name != "wind_per_run"
+    forces = effect.breaks_symmetry and name not in ("wind_per_run", "bank_suction")
     in_record = any(g.effect == name and slow_on_any_ship(g) for g in found.gears)
     return effect.family == "sensor" or forces or in_record
 

@@ -187,7 +187,7 @@ def test_a_ship_file_of_another_ship_names_nothing():
         ("speed_scale", (0.05,), "tanker", "s175"), ("current", (0.3, -0.2), "tanker", "s175"), ("rudder_offset", (0.035,), "navy", "tanker"),
     ],
 )  # fmt: skip
-def test_what_showswhatever_the_ship_is_is_named_under_doubt(name, values, ship, file):
+def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship, file):
     trials = published_trials(PUBLISHED[ship], 7, (Hidden(EFFECTS.get(name), values),), Trials(runs=16, samples=100))
     verdict = diagnose(replace(trials, ship=PUBLISHED[file].particulars), gain=False)
     assert "Is the ship file that of this ship" in verdict.warnings[0]
@@ -202,10 +202,13 @@ def test_what_showswhatever_the_ship_is_is_named_under_doubt(name, values, ship,
 
 
 @pytest.mark.parametrize(
-    ("name", "told"), [("wind_per_run", False), ("current_per_run", True), ("wind", True), ("heading_bias", True), ("mass_change", False)]
-)
-def test_under_doubt_a_wind_of_each_run_is_not_told(name, told):
-    """What the coefficients of another ship lack in a run's manoeuvre passes for it."""
+    ("name", "told"),
+    [
+        ("wind_per_run", False), ("bank_suction", False), ("current_per_run", True), ("wind", True), ("heading_bias", True), ("mass_change", False),
+    ],
+)  # fmt: skip
+def test_under_doubt_a_wind_of_each_run_and_a_bank_are_not_told(name, told):
+    """What the coefficients of another ship lack in a run's manoeuvre, or in those of one place, passes for them."""
     assert whatever_the_ship(name, SimpleNamespace(gears=())) is told
 
 
