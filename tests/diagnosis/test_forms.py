@@ -63,7 +63,9 @@ def test_features_are_what_their_names_say_between_the_knots_too(plant):
 
 def test_periods_are_told_in_seconds_of_this_ship_and_one_is_near_to_any(plant):
     found, _ = _features(plant)
-    periods = [float(f.form.split()[4]) for f in found["time"] if f.form.startswith("cos")]
+    slow, of_waves = ([float(f.form.split()[4]) for f in found[variable] if f.form.startswith("cos")] for variable in ("time", "waves"))
+    assert min(slow) > 1.8 * plant.c.L**0.5 > max(of_waves)
+    periods = slow + of_waves
     assert periods[0] == pytest.approx(200.0 * plant.froude, rel=0.01)
     assert periods[-1] == pytest.approx(8.0 * plant.froude, rel=0.01)
     longest = plant.seg.dt * plant.steps
