@@ -202,13 +202,12 @@ def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
 def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, str]:
     """What to do about a rudder that acts later (or sooner) than its record says, by the name of the cause: the gears of the predictors end at the
     record, so that the record has to be put right."""
-    if found.final.plant.seg.commanded or any(g.effect == "rudder_delay" for g in found.gears):
+    late = next((c.parameters["delay"].value for c in causes if c.effect == "rudder_delay"), 0.0)
+    if not late or found.final.plant.seg.commanded or any(g.effect == "rudder_delay" for g in found.gears):
         return {}
-    late = {c.effect: c.parameters["delay"].value for c in causes if c.effect == "rudder_delay"}
     return {
-        name: f"the motion shows the rudder {abs(s):.2g} s {'later' if s > 0.0 else 'sooner'} than its record, to which predictors fit their "
-        f"gears. Put the record right first, by [delay] delta = {-s:.2g} in dataset.toml."
-        for name, s in late.items()
+        "rudder_delay": f"the motion shows the rudder {abs(late):.2g} s {'later' if late > 0.0 else 'sooner'} than its record, to which predictors "
+        f"fit their gears. Put the record right first, by [delay] delta = {-late:.2g} in dataset.toml."
     }
 
 
