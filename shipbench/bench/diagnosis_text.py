@@ -169,6 +169,10 @@ def summary_lines(d: Diagnosis) -> list[str]:
             lines += textwrap.wrap(f"{w.channel}, {100 * w.share_of_error:.0f} % of the error: {when}", WIDTH, initial_indent="  ",
                                    subsequent_indent="      ")  # fmt: skip
         lines.append("")
+    if noise := d.unexplained_after.get("taken_as_noise"):
+        lines.append("Taken as noise, no cause:")
+        lines += [f"  {channel}: {words}" for channel, words in noise.items()]
+        lines.append("")
     lines += _candidate_lines(d) + _detectable_lines(d)
     if command := next_command(d):
         lines += [f"Extended model: {d.extended_model}", f"  {command}"]

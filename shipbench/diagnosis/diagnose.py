@@ -25,6 +25,7 @@ from .derived import faults, has_speeds, marked, said
 from .felt_wind import with_true_wind
 from .fit import Fit
 from .gain import FoldGain, fold_gain, summarise
+from .noise import noise_in_words
 from .outcome import Cause, Diagnosis, Gain
 from .over_ground import over_ground
 from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant
@@ -107,9 +108,10 @@ def diagnose(
     return Diagnosis(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes),
         candidates=tuple(describe_candidates(found, [c.effect for c in causes], worth.gain is not None)),
-        what_is_wrong=what_is_wrong(trace), unexplained_after=remaining(found), extended_model="+".join(["physics", *names]),
-        fingerprint=fingerprint, seconds=time.perf_counter() - began, warnings=tuple(warnings), gain=worth.gain if causes else None,
-        unknown=unknown_part(found), gain_per_run=worth.per_run if causes else (), trace=trace,
+        what_is_wrong=what_is_wrong(trace), unexplained_after=remaining(found) | {"taken_as_noise": noise_in_words(found.final)},
+        extended_model="+".join(["physics", *names]), fingerprint=fingerprint, seconds=time.perf_counter() - began,
+        warnings=tuple(warnings), gain=worth.gain if causes else None, unknown=unknown_part(found),
+        gain_per_run=worth.per_run if causes else (), trace=trace,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Which correlation of the sensors' noise suits a fit."""
+"""Which correlation of the sensors' noise suits a fit, and what a reader is told of it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from .colour import Colour
 from .settle import Fit, evidence_with
+from .wrong import CHANNEL_UNITS, RESIDUALS
 
 _SHARES, _TIMES = (1.0, 4.0, 16.0, 64.0), (2.0, 6.0, 20.0)
 _SMOOTH_SHARES, _SMOOTH_TIMES = (16.0, 64.0), (0.5, 1.0, 2.0, 4.0)
@@ -54,3 +55,22 @@ def _swinging(found: Fit, colour: Colour, channel: int) -> list[Colour]:
     half = 1 + int(np.argmin(correlation))
     ways = [(share, factor * half, damping) for share, factor, damping in product(_SHARES, _PERIODS, _DAMPING)]
     return [colour.with_channel(channel, share, period / (2.0 * np.pi * damping), period) for share, period, damping in ways]
+
+
+def noise_in_words(found: Fit) -> dict[str, str]:
+    """What the fit takes as noise of each channel that is not white: motion with the waves, or errors of the sensor that last. It is no cause, but a
+    reader has to know of it."""
+    colour, dt = found.scales.colour, found.plant.seg.dt
+    size = np.exp(0.5 * found.hyper.log_noise) * found.scales.noise * np.sqrt(colour.share)
+    told = {}
+    for channel in np.flatnonzero(colour.share).tolist():
+        name = RESIDUALS[channel]
+        unit, factor = CHANNEL_UNITS["position" if name in ("x", "y") else name]
+        period, time = dt * colour.period[channel], dt * colour.time[channel]
+        kind = (
+            f"swings with a period of about {period:.2g} s, as in waves" if np.isfinite(period)
+            else f"errors that are smooth for about {time:.2g} s, as of a filter" if colour.smooth[channel]
+            else f"errors that last for about {time:.2g} s"
+        )  # fmt: skip
+        told[name] = f"{kind} (standard deviation {factor * size[channel]:.2g} {unit})"
+    return told

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfiltfilt
 
+from shipbench.bench.diagnosis_text import summary_lines
 from shipbench.diagnosis import clocks
 from shipbench.diagnosis.clocks import check_clocks
 from shipbench.diagnosis.colour import Colour
@@ -121,6 +123,7 @@ def test_a_record_that_was_filtered_shows_its_cause_and_nothing_else():
     found = diagnose(_low_passed(published_trials(PUBLISHED["mariner"], 5015, (hidden,))), gain=False)
     assert ([c.effect for c in found.causes], found.unknown) == (["rudder_offset"], None)
     assert found.causes[0].parameters["offset"].value == pytest.approx(0.03, rel=0.35), "the filter takes of the motion, too"
+    assert "smooth" in found.unexplained_after["taken_as_noise"]["heading"]
 
 
 def test_noise_that_swings_has_nothing_at_frequency_zero():
@@ -169,6 +172,10 @@ def test_a_cause_is_seen_through_the_motion_with_the_waves():
     (cause,) = found.causes
     assert cause.effect == "rudder_offset"
     assert cause.score > 30.0
+    told = found.unexplained_after["taken_as_noise"]
+    period = re.search(r"swings with a period of about ([\d.]+) s", told["yaw rate"])
+    assert float(period[1]) == pytest.approx(WAVE_PERIOD, rel=0.25)
+    assert f"  yaw rate: {told['yaw rate']}" in summary_lines(found)
 
 
 def test_velocities_filtered_in_the_earths_axes_are_seen_and_put_back(trials, filtered):
