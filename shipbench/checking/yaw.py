@@ -5,6 +5,8 @@ Over windows of 30 s (at 130 m, Froude-scaled) the change of the heading is comp
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..signals import PSI, R
@@ -39,11 +41,21 @@ def _explain(run: np.ndarray, rows: np.ndarray, span: float) -> Chosen:
     return select(rows[:, 0] - rows[:, 1], groups, np.zeros((len(run), 1)), run, 1, whole)
 
 
-def check(recording: Recording) -> list[Finding]:
-    """Findings of the yaw rate; none where the ship hardly turns."""
+class _Settled(NamedTuple):
+    """Windows as `_windows` makes them with the lag taken out, what was chosen in the record as it is and then, the lag and its standard error."""
+
+    made: tuple[np.ndarray, np.ndarray, float]
+    first: Chosen
+    chosen: Chosen
+    lag: float
+    lag_sd: float
+
+
+def _settled(recording: Recording) -> _Settled | None:
+    """None where the ship hardly turns."""
     lag, made = 0.0, _windows(recording, 0.0)
     if made is None or np.sqrt(np.mean(made[1][:, 0] ** 2)) < 0.01:
-        return []
+        return None
     first = chosen = _explain(*made)
     lag_sd = float(first.sd["lag"][0]) if "lag" in first.names else 0.0
     for _ in range(5):
@@ -55,6 +67,25 @@ def check(recording: Recording) -> list[Finding]:
             break
         lag, made = lag + move, again
         chosen = _explain(*made)
+    return _Settled(made, first, chosen, lag, lag_sd)
+
+
+def late_yaw_rate(recording: Recording) -> tuple[float, float] | None:
+    """Seconds by which the yaw rate is late against the heading, with their standard error; None if it is not."""
+    found = _settled(recording)
+    return None if found is None or found.lag < _least_lag(recording) else (found.lag, found.lag_sd)
+
+
+def _least_lag(recording: Recording) -> float:
+    return max(0.25 * recording.dt, LEAST_LAG * recording.froude)
+
+
+def check(recording: Recording) -> list[Finding]:
+    """Findings of the yaw rate; none where the ship hardly turns."""
+    found = _settled(recording)
+    if found is None:
+        return []
+    made, first, chosen, lag, lag_sd = found
     return _lag(recording, made, first, chosen, lag, lag_sd) + _scale(made, first, chosen) + _biases(recording, made, first, chosen)
 
 
@@ -79,7 +110,7 @@ def _shares(first: Chosen, chosen: Chosen) -> str:
 
 
 def _lag(recording: Recording, made: tuple, first: Chosen, chosen: Chosen, lag: float, sd: float) -> list[Finding]:
-    if abs(lag) < max(0.25 * recording.dt, LEAST_LAG * recording.froude):
+    if abs(lag) < _least_lag(recording):
         return []
     late, other = ("r", "the heading") if lag > 0.0 else ("psi", "the yaw rate")  # sensors are late, not early
     text = f"{late} lags {other} by {abs(lag):.2g} s (standard error {sd:.1g} s): {_shares(first, chosen)}."

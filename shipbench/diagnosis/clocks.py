@@ -13,6 +13,7 @@ import pandas as pd
 
 from ..checking.recording import Recording
 from ..checking.track import late_velocities
+from ..checking.yaw import late_yaw_rate
 from ..data.corrections import undelayed
 from ..records import Dataset, Run
 from ..signals import PSI, STATES, U, V
@@ -59,6 +60,20 @@ def check_clocks(dataset: Dataset) -> LateVelocities | None:
     if np.sum(over) < 0.0 or -np.sum(over_position) > _SURE * len(over) ** 0.5 * np.std(over_position):
         return None
     return LateVelocities(delay, sd, best == "filtered", 2.0 * float(np.sum(over)), 2.0 * float(np.sum(over_position)), ways[best])
+
+
+def with_prompt_yaw_rate(dataset: Dataset) -> tuple[Dataset, list[str]]:
+    """The data set with a yaw rate that was late against the heading put back, and a line for the reader. A heading cannot be early: of the two it is
+    the yaw rate, and beside it a rudder, or whatever else turns the ship, would seem to be late."""
+    found = None if "r" in dataset.derived else late_yaw_rate(Recording(dataset))
+    if found is None:
+        return dataset, []
+    delay, sd = found
+    line = (
+        f"the yaw rate follows the heading {delay:.2g} s late (standard error {sd:.1g} s; seen by kinematics). It is put back before anything else "
+        f"is looked for; in dataset.toml: [delay] r = {delay:.3g}."
+    )
+    return put_back(dataset, {"r": delay}, 0.0), [line]
 
 
 def put_back(dataset: Dataset, delay: dict[str, float], ends: float) -> Dataset:

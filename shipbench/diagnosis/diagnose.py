@@ -20,7 +20,7 @@ from ..records import Dataset
 from . import misread
 from .analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .causes import describe_candidates, describe_causes, remaining, unknown_part, what_is_left
-from .clocks import NAMES, check_clocks
+from .clocks import NAMES, check_clocks, with_prompt_yaw_rate
 from .derived import faults, has_speeds, marked, said
 from .felt_wind import with_true_wind
 from .fit import Fit
@@ -65,6 +65,7 @@ def diagnose(
     units = check_units(dataset) if only is None else []
     dataset = corrected(dataset, units)
     dataset, drift = over_ground(marked(dataset)) if only is None else (dataset, [])
+    dataset, slow = with_prompt_yaw_rate(dataset) if only is None else (dataset, [])
     dataset, wind = with_true_wind(dataset) if only is None else (dataset, [])
     dataset = _in_time(dataset)
     late = check_clocks(dataset) if only is None and has_speeds(dataset) else None
@@ -93,7 +94,7 @@ def diagnose(
         doubts = doubts_of(found) if only is None else []
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts else Worth()
     warnings += [text for text, _ in standing(dataset).values()]
-    warnings += said(dataset) + drift + wind + doubts + own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
+    warnings += said(dataset) + drift + slow + wind + doubts + own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
     warnings += misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]

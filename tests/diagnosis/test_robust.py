@@ -88,6 +88,15 @@ def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
     assert is_sure(fit, 0)
 
 
+def _of_runs(gram: Gram, prior: Prior) -> SimpleNamespace:
+    """A fit of causes with values of single runs."""
+    reduced = gram.reduce(np.zeros(3))
+    return SimpleNamespace(
+        gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, reduced=reduced, solution=solve(reduced, prior),
+        model=SimpleNamespace(terms=tuple(SimpleNamespace(label="current_per_run", per_run=True, since=None) for _ in prior.random)),
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize(("pieces", "steady", "sure"), [(4, True, True), (4, False, False), (1, True, True)])
 def test_a_value_for_each_run_is_sure_only_if_it_lasts_for_the_run(pieces: int, steady: bool, sure: bool):
     """What differs from piece to piece of a run is no wind, however large; runs of one piece cannot tell."""
@@ -98,11 +107,7 @@ def test_a_value_for_each_run_is_sure_only_if_it_lasts_for_the_run(pieces: int, 
     Z[..., -1] += 2.0 * (value[run] if steady else value) * Z[..., -2]
     gram = Gram(np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 2)), run, RUNS)
     prior = Prior(*_NONE, np.array([0]), np.log([4.0]))
-    fit = SimpleNamespace(
-        gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, solution=solve(gram.reduce(np.zeros(3)), prior),
-        model=SimpleNamespace(terms=(SimpleNamespace(label="current_per_run", per_run=True, since=None),)),
-    )  # fmt: skip
-    assert is_sure(fit, 0) is sure
+    assert is_sure(_of_runs(gram, prior), 0) is sure
 
 
 @pytest.mark.parametrize("steady", [True, False])
@@ -115,14 +120,21 @@ def test_a_wind_with_gusts_is_sure_beside_a_current_that_lasts(steady: bool):
     current = 2.0 * (rng.standard_normal((RUNS, 1))[run] if steady else rng.standard_normal((len(run), 1)))
     Z[..., -1] += wind * Z[..., 9] + current * Z[..., 10]
     gram = Gram(np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 3)), run, RUNS)
-    terms = tuple(SimpleNamespace(label="current_per_run", per_run=True) for _ in range(2))
     for random, sure in ((np.array([0]), False), (np.array([0, 1]), steady)):
         prior = Prior(*_NONE, random, np.log([0.1, 4.0])[random])
-        fit = SimpleNamespace(
-            gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, solution=solve(gram.reduce(np.zeros(3)), prior),
-            model=SimpleNamespace(terms=terms[: len(random)]),
-        )  # fmt: skip
-        assert is_sure(fit, 0) is sure
+        assert is_sure(_of_runs(gram, prior), 0) is sure
+
+
+@pytest.mark.parametrize(("own", "sure"), [(0.3, True), (3.0, False)])
+def test_a_value_for_each_run_is_sure_only_if_little_else_differs_between_runs(own: float, sure: bool):
+    """A force in the axes of the ship that is another in each run is no current."""
+    rng = np.random.default_rng(12)
+    run = np.repeat(np.arange(RUNS), 4)
+    Z = rng.standard_normal((len(run), 50, 11))  # eta, w of one knot for each axis, own, e
+    Z[..., -1] += rng.standard_normal((RUNS, 1))[run] * Z[..., -2]
+    Z[..., -1] += np.einsum("bkj,bj->bk", Z[..., 6:9], own * rng.standard_normal((RUNS, 3))[run])
+    gram = Gram(np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 2)), run, RUNS)
+    assert is_sure(_of_runs(gram, Prior(*_NONE, np.array([0]), np.zeros(1))), 0) is sure
 
 
 @pytest.mark.parametrize("per_run", [False, True])
@@ -149,4 +161,5 @@ def test_a_wind_that_needs_a_superstructure_of_no_ship_is_none(monkeypatch, effe
     z[PLACES["wind_lever"]] = lever
     monkeypatch.setattr(robust, "needed", lambda fit: z)
     monkeypatch.setattr(robust, "lasts", lambda fit: True)
+    monkeypatch.setattr(robust, "tells_runs_apart", lambda fit: True)
     assert is_sure(SimpleNamespace(model=SimpleNamespace(terms=(Term(EFFECTS.get(effect), per_run=True),))), 0) is sure

@@ -22,7 +22,7 @@ from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.settle import Model
 from shipbench.diagnosis.strange import left_out
-from shipbench.effects.base import EFFECTS
+from shipbench.effects.base import EFFECTS, delayed
 from shipbench.physics.actuators import gear_path
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
@@ -236,6 +236,18 @@ def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):
     assert len(verdict.causes) == 1
     position = next(c for c in verdict.candidates if c.effect == "position_delay")
     assert "put right before the fit" in position.rejected_because
+
+
+@pytest.mark.parametrize(("channels", "named"), [((U, V, R), ["velocity_delay"]), ((R,), [])])
+def test_a_late_yaw_rate_is_put_back_and_no_late_rudder(trials, channels: tuple[int, ...], named: list[str]):
+    def change(S: np.ndarray) -> None:
+        S[:] = delayed(S[None], channels, LATE, trials.dt)[0]
+
+    found = diagnose(_changed(trials, change), gain=False)
+    assert ([c.effect for c in found.causes], found.unknown) == (named, None)
+    (told,) = [w for w in found.warnings if w.startswith("the yaw rate follows the heading")]
+    assert float(re.search(r"\[delay\] r = ([\d.]+)\.", told)[1]) == pytest.approx(LATE, rel=0.1)
+    assert not any("yaw rate" in w for w in diagnose(trials, gain=False).warnings)
 
 
 @pytest.mark.parametrize("seed", [3, 7])
