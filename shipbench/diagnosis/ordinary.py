@@ -49,11 +49,15 @@ def _base(found: Fit, reduced: Reduced, widths: np.ndarray) -> np.ndarray:
 
 
 def widened(found: Fit) -> Fit:
-    """The same model, fitted with as wide a spread for each parameter as it needs."""
+    """The same model, fitted with as wide a spread for each parameter as it needs; as it is, where such a fit ends in a worse place (winds of single
+    runs whose size and coefficients make up for each other)."""
     for _ in range(_FITS):
         widths = widths_of(found)
         if np.max(np.abs(widths / np.asarray(found.model.widths or 1.0) - 1.0)) < _SAME:
             break
         model = replace(found.model, widths=tuple(widths))
-        found = fit(found.plant, found.scales, model, found.point, found.hyper, found.log_tau2, candidates=found.candidates, guess=found.motion)
+        wider = fit(found.plant, found.scales, model, found.point, found.hyper, found.log_tau2, candidates=found.candidates, guess=found.motion)
+        if wider.evidence < found.evidence:
+            break
+        found = wider
     return found
