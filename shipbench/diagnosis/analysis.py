@@ -27,10 +27,10 @@ each diagnosis may raise it."""
 HULL_THRESHOLD = 30.0
 GENERIC_THRESHOLD, _OFF_FORM, _NO_FORM_THRESHOLD = 20.0, (4.0, 12.0), 16.0
 """Least score of an unknown force. What follows something that a ship's form depends on (`NO_FORM` is what it does not) must be worth so many times
-`Selection.off_form` besides, the first where what it takes is twice what is noticeable, the second where it is hardly noticeable, and between in
-proportion; what is not noticeable is none. (550 sets without such a force, on development ships and ships of the literature under 18 conditions: 17
-below that at the nearest. A tanker of 305 m in 30 runs of 180 s with nothing hidden: 101 for n|n| delta in yaw, 0.7 of what is noticeable; forces
-of that kind that were hidden: 1.05 times and more.) Nor does an error of a sensor depend on the form: the record contradicts itself."""
+`Selection.off_form` besides: the first where what it takes is twice what is noticeable, the second where it is what is noticeable, between and
+below in proportion. (550 sets without such a force, on development ships and ships of the literature under 18 conditions: 17 below that at the
+nearest. Below what is noticeable, a tanker of 305 m in 30 runs of 180 s with nothing hidden: 101 for n|n| delta in yaw, where twelve times would ask
+96 and this asks 109.) Nor does an error of a sensor depend on the form: the record contradicts itself."""
 _FAR_OFF = 0.75
 """The first factor grows with `off_form` from 5 on: so far off the regressions the form is a ship's own. (It rests on two boats with nothing hidden,
 of 17 and 23 m, with `off_form` 16: 111 to 127 and 179 for u^2 delta, where four times would ask 85.)"""
@@ -160,7 +160,7 @@ def asked(d: Dependence, off_form: float) -> float:
     seen, hardly = _OFF_FORM
     ordinary = seen + (hardly - seen) * max(2.0 - d.taken / NOTICEABLE, 0.0)
     times = max(ordinary, _FAR_OFF * off_form)
-    return GENERIC_THRESHOLD + times * off_form if d.taken > NOTICEABLE else np.inf
+    return GENERIC_THRESHOLD + times * off_form if d.taken > _LEAST_FORCE else np.inf
 
 
 def _unknown(selection: Selection, gears: Sequence[GearFinding], search: Search) -> tuple[Dependence | None, Dependence | None]:
