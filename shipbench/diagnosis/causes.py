@@ -236,7 +236,7 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
         late = any(t.label == label and t.since is not None for t in found.final.model.terms)
         return "named as a change_point" if late and "change_point" in named else _DOUBT
     if label in found.selection.unsure:
-        unsteady = "another value in every piece of a run explains more than one for the run"
+        unsteady = "one value for each run does not explain how runs differ"
         return unsteady if s.term.per_run else "the runs do not agree that its size is not zero"
     if label in found.selection.tiny:
         return f"score {score:.0f}, but less than {least_size(label):.0%} of its typical size: too small to matter"

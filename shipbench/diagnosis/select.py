@@ -73,8 +73,8 @@ class Step:
 class Selection:
     """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final one; off_form:
     what a cause that `passes_for_form` must be worth besides the threshold; unsure: effects taken out again, since over the runs their size may be
-    zero, or does not last for a run; tiny: effects that gain more than the threshold, but are too small to matter; small: the plain model with those
-    of them that it is better with, where nothing else was found."""
+    zero, or does not explain how runs differ; tiny: effects that gain more than the threshold, but are too small to matter; small: the plain model
+    with those of them that it is better with, where nothing else was found."""
 
     null: Fit
     final: Fit
