@@ -64,9 +64,7 @@ def diagnose(
     warnings = _check(dataset)
     units = check_units(dataset) if only is None else []
     dataset = corrected(dataset, units)
-    dataset, drift = over_ground(marked(dataset)) if only is None else (dataset, [])
-    dataset, slow = with_prompt_yaw_rate(dataset) if only is None else (dataset, [])
-    dataset, wind = with_true_wind(dataset) if only is None else (dataset, [])
+    dataset, mended = _mended(dataset) if only is None else (dataset, [])
     dataset = _in_time(dataset)
     late = check_clocks(dataset) if only is None and has_speeds(dataset) else None
     if late is not None:
@@ -94,7 +92,7 @@ def diagnose(
         doubts = doubts_of(found) if only is None else []
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts else Worth()
     warnings += [text for text, _ in standing(dataset).values()]
-    warnings += said(dataset) + drift + slow + wind + doubts + own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
+    warnings += said(dataset) + mended + doubts + own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
     warnings += misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
@@ -151,6 +149,15 @@ def _check(dataset: Dataset) -> list[str]:
     if np.std(states[:, 7]) < 1e-3 and np.std(states[:, 5]) < 1e-5:
         warnings.append("the rudder is never used and the ship never turns: nothing can be said about rudder and hull.")
     return warnings
+
+
+def _mended(dataset: Dataset) -> tuple[Dataset, list[str]]:
+    """The data set with what its own record shows to be wrong put right, and lines for the reader."""
+    dataset, lines = marked(dataset), []
+    for put_right in (over_ground, with_prompt_yaw_rate, with_true_wind):
+        dataset, told = put_right(dataset)
+        lines += told
+    return dataset, lines
 
 
 def _as_it_must_be_read(dataset: Dataset, null: Fit, steps: int, settled: Sequence[str], seed: int) -> tuple[Analysis, Dataset, list[UnitFinding]]:
