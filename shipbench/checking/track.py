@@ -136,7 +136,7 @@ def late_velocities(recording: Recording) -> tuple[float, float] | None:
     if found is None or "lag of position" not in found.first.sd:
         return None
     lag = -found.late.get(X, 0.0)
-    return (lag, float(found.first.sd["lag of position"][0])) if lag >= _least_lag(recording) else None
+    return (lag, float(found.first.sd["lag of position"][0])) if lag >= least_lag(recording) else None
 
 
 def through_water(recording: Recording) -> tuple[float, float] | None:
@@ -149,7 +149,8 @@ def through_water(recording: Recording) -> tuple[float, float] | None:
     return (float(north), float(east)) if np.hypot(north, east) > sure else None
 
 
-def _least_lag(recording: Recording) -> float:
+def least_lag(recording: Recording) -> float:
+    """Seconds below which a lag of a channel is not told."""
     return max(0.25 * recording.dt, LEAST_LAG * recording.froude)
 
 
@@ -175,7 +176,7 @@ def _lag_findings(recording: Recording, w: Windows, chosen: Chosen, first: Chose
     found = []
     for name, channels in _LAGS.items():
         lag = late.get(channels[0], 0.0)
-        if abs(lag) < _least_lag(recording) or name not in first.sd:
+        if abs(lag) < least_lag(recording) or name not in first.sd:
             continue
         names, others, keys = words[name, lag > 0.0]
         lag, sd = abs(lag), float(first.sd[name][0])

@@ -14,7 +14,7 @@ from .finding import Curve, Finding, Picture, Severity, toml_line
 from .recording import Recording
 from .selection import Chosen, select
 from .statistics import some, spread
-from .track import LEAST_LAG, WINDOW, shifted
+from .track import WINDOW, least_lag, shifted
 
 _LEAST_SCALE, _LEAST_BIAS = 0.02, 0.01
 """Shares: of the rate, and of the typical yaw rate (root mean square)."""
@@ -73,11 +73,7 @@ def _settled(recording: Recording) -> _Settled | None:
 def late_yaw_rate(recording: Recording) -> tuple[float, float] | None:
     """Seconds by which the yaw rate is late against the heading, with their standard error; None if it is not."""
     found = _settled(recording)
-    return None if found is None or found.lag < _least_lag(recording) else (found.lag, found.lag_sd)
-
-
-def _least_lag(recording: Recording) -> float:
-    return max(0.25 * recording.dt, LEAST_LAG * recording.froude)
+    return None if found is None or found.lag < least_lag(recording) else (found.lag, found.lag_sd)
 
 
 def check(recording: Recording) -> list[Finding]:
@@ -110,7 +106,7 @@ def _shares(first: Chosen, chosen: Chosen) -> str:
 
 
 def _lag(recording: Recording, made: tuple, first: Chosen, chosen: Chosen, lag: float, sd: float) -> list[Finding]:
-    if abs(lag) < _least_lag(recording):
+    if abs(lag) < least_lag(recording):
         return []
     late, other = ("r", "the heading") if lag > 0.0 else ("psi", "the yaw rate")  # sensors are late, not early
     text = f"{late} lags {other} by {abs(lag):.2g} s (standard error {sd:.1g} s): {_shares(first, chosen)}."

@@ -32,8 +32,9 @@ _AGAINST = -2.0
 
 _OWN_LEFT, _OWN_SHARE = 30.0, 0.1
 """2 log evidence of forces of single runs that may be left beside causes with values for single runs: so much, and this share of what those are
-worth. (On 21 sets with such a cause at most 0.06 of it is left, on the Esso Osaka's runs 13 of 92; on a boat whose lift builds up slowly, where a
-current or wind of 0.5 to 1.7 typical sizes was named for it, 103 to 250, a fifth to all of it.)"""
+worth. (On 21 sets with such a cause at most 0.06 of it is left, on the Esso Osaka's runs 11 to 13; on a boat whose lift builds up slowly, where a
+current or wind of 0.5 to 1.7 typical sizes was named for it, 103 to 250, a fifth to all of it. Beside two such causes together 59 were left there,
+which is too little to be seen.)"""
 _OWN_FORCE = float(np.log(0.5**2))
 """Variance of a run's own force from which its search begins, in units of the latent force."""
 _FACTORS = np.log(np.array([0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0]) ** 2)
