@@ -197,7 +197,7 @@ def _flat(tree: dict, prefix: str = "") -> list[list[str]]:
         if isinstance(value, dict):
             rows += _flat(value, f"{label}: ")
         else:
-            rows.append([label, "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)])
+            rows.append([label, "-" if value is None else _number(value, ".3g") if isinstance(value, float) else str(value)])
     return rows
 
 
