@@ -243,7 +243,7 @@ def _bank(rng: np.random.Generator, effect: Effect, ship: MMGShip, size: float, 
     places = np.concatenate([run.states[:, :2] for run in calm.runs])
     bearing = rng.uniform(0.0, 2.0 * np.pi)
     line = float(np.max(places @ np.array([np.cos(bearing), np.sin(bearing)]))) + rng.uniform(1.0, 3.0) * complete(ship.particulars).B
-    return Hidden(effect, (size * effect.sized(ship.L)[0].typical, float(bearing), line))
+    return Hidden(effect, (size * effect.sized(ship.L)[0].typical, 0.0, float(bearing), line, 0.0))
 
 
 def _outside(case: Case, rng: np.random.Generator) -> Case:

@@ -19,7 +19,7 @@ from .outcome import Candidate, Cause, Estimate, Gain, what_it_is
 from .plant import HULL, NUM_HULL
 from .robust import WITHOUT_WIND, covariance, inflation, least_size
 from .screen import Score, other_kinds_from, places
-from .select import passes_for_form, shows_in_record
+from .select import asked_besides, shows_in_record
 from .settle import Fit
 from .ship_file import whatever_the_ship
 from .term import Term
@@ -226,7 +226,7 @@ def _gear_candidate(found: Analysis, g: GearFinding, named: Sequence[str], motio
 def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str]) -> str:
     """Why a candidate that was screened is not named; last: its score beside the causes found."""
     label, steps, inside = s.term.label, found.selection.steps, [t.label for t in found.final.model.terms]
-    odd = found.selection.off_form if passes_for_form(s.term) else 0.0
+    odd = asked_besides(s.term, found.selection.off_form)
     asked, score = found.threshold + odd, max([s.score, *(x.score for x in steps if x.term.label == label)])
     if label in named:
         return "named"
@@ -245,7 +245,7 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
     if score <= found.threshold:
         return f"score {score:.1f} below the threshold {found.threshold:.0f}"
     if score <= asked:
-        return f"score {score:.1f} below {asked:.1f}: {odd:.1f} more is asked of what ships differ in, since this hull is far off the regressions"
+        return f"score {score:.1f} below {asked:.1f}: {odd:.1f} more is asked of what ships differ in anyhow, more still far off the regressions"
     if inside and (last is None or last.score <= asked):
         left = f", {last.score:.0f} beside it" if last is not None else ""
         return f"explained by {next((n for n in named if n in inside), inside[0])} ({score:.0f} alone{left})"
@@ -266,7 +266,7 @@ def _detectable(found: Analysis, s: Score) -> dict[str, float]:
     single runs the root mean square x, where the sum of x^2 tr(V) - log det(1 + x^2 V) is. None below `least_size`, NaN beyond the bounds."""
     null, term = found.selection.null, s.term
     unit, effect = null.scales.amplitudes(term, null.plant.c.L), term.effect
-    asked = found.threshold + term.cost(null.plant.seg.runs) + found.selection.off_form * passes_for_form(term)
+    asked = found.threshold + term.cost(null.plant.seg.runs) + asked_besides(term, found.selection.off_form)
     if term.per_run:
         least = np.full(term.size, max(_root_mean_square(s.information, asked), least_size(term.label)))
     else:

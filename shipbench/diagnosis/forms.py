@@ -101,6 +101,7 @@ _OF_FORCES: Forms = {
     "run": {"number of the run": lambda s: (s.run,), "its square": lambda s: (s.run**2,)},
     "thrusters": {
         "F_b": lambda s: (s.F_b,), "F_s": lambda s: (s.F_s,), "F_b u": lambda s: (s.F_b * s.u,), "F_s u": lambda s: (s.F_s * s.u,),
+        "|F_b|": lambda s: (abs(s.F_b),), "|F_s|": lambda s: (abs(s.F_s),),
     },
 }  # fmt: skip
 _OF_SENSORS: Forms = {

@@ -35,7 +35,7 @@ _NEAR = 1.0
 """A refit that ends so little below the threshold is fitted on: at rest the variances may still creep, by up to half of this."""
 _IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
 """What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
-_OFF_FORM = 0.02
+_OFF_FORM, _MISTAKEN, _OF_RUNS = 0.02, 10.0, 50.0
 AS_SHIPS_DIFFER = (
     "added_resistance", "bank_suction", "center_of_gravity_shift", "cross_flow_drag", "mass_change", "race_gain", "rudder_delay", "rudder_gain",
     "rudder_stall", "shallow_water", "thrust_gain", "thruster_gain", "thruster_lever", "thruster_speed_loss", "wake_variation",
@@ -44,6 +44,9 @@ AS_SHIPS_DIFFER = (
 they must be worth this share of the evidence for such a hull besides. (Mariner, nothing hidden: 600 to 1200 for the hull, 13 to 18 for a wrong name;
 thrust or mass off by their typical size on development ships: 80 to 290, and 28 to 31.) So must a cause with a value for each run, one that
 begins with a run, and a bank: where each run is another manoeuvre elsewhere, what the form lacks differs from run to run."""
+OFTEN_MISTAKEN = ("mass_change", "rudder_stall", "thrust_gain", "thruster_lever")
+"""What such forms passed for most: these, and values of single runs, must be worth more again. (Ships of five simulators with other equations: eight
+wrong names were worth 13 to 28, right ones 20 and from 50 on; of values of single runs, wrong ones 15 to 87 and from 147 on, right ones from 125.)"""
 _CHANGES, _CHANGE_MARGIN, _OWN_MARGIN = 2, 14.0, 4.0
 """A beginning is chosen among all effects: it must beat the best cause without one by this; the second where that is the same effect."""
 _INSEPARABLE = ({"wind", "wind_per_run", "wave_drift"},)
@@ -72,9 +75,9 @@ class Step:
 @dataclass(frozen=True)
 class Selection:
     """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final one; off_form:
-    what a cause that `passes_for_form` must be worth besides the threshold; unsure: effects taken out again, since over the runs their size may be
-    zero, or does not explain how runs differ; tiny: effects that gain more than the threshold, but are too small to matter; small: the plain model
-    with those of them that it is better with, where nothing else was found."""
+    what a cause for which the form of a hull could pass must be worth besides (`asked_besides`); unsure: effects taken out again, since over the runs
+    their size may be zero, or does not explain how runs differ; tiny: effects that gain more than the threshold, but are too small to matter; small:
+    the plain model with those of them that it is better with, where nothing else was found."""
 
     null: Fit
     final: Fit
@@ -92,9 +95,10 @@ def shows_in_record(effect: Effect) -> bool:
     return effect.enters == "gear" and not effect.unrecorded
 
 
-def passes_for_form(term: Term) -> bool:
-    """Whether what the form of a hull lacks could pass for it."""
-    return term.per_run or term.since is not None or term.label in AS_SHIPS_DIFFER
+def asked_besides(term: Term, off_form: float) -> float:
+    """What a term must be worth besides the threshold, since what the form of a hull lacks could pass for it."""
+    besides = _OF_RUNS if term.per_run else _MISTAKEN if term.label in OFTEN_MISTAKEN else 0.0
+    return besides + off_form * (term.per_run or term.since is not None or term.label in AS_SHIPS_DIFFER)
 
 
 def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Sequence[str] = ()) -> list[Term]:
@@ -200,7 +204,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         # every ship is a little unequal, every run has a breath of wind: what is too small of that stays, and others are judged beside it
         if careful and not (term.effect.breaks_symmetry or term.per_run or matters(tried, -1)):
             return -np.inf
-        return 2.0 * (tried.evidence - now.evidence) - off_form * passes_for_form(term)
+        return 2.0 * (tried.evidence - now.evidence) - (asked_besides(term, off_form) if careful else 0.0)
 
     for round_ in range(most):
         tried = refits(now, worth_a_refit(scores, now, threshold), origin, threshold)

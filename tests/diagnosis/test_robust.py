@@ -11,7 +11,7 @@ from shipbench.diagnosis import robust
 from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
 from shipbench.diagnosis.model import NUM_BASE, PLACES
 from shipbench.diagnosis.robust import covariance, inflation, is_borne_by_one, is_sure, least_size, matters
-from shipbench.diagnosis.select import passes_for_form
+from shipbench.diagnosis.select import asked_besides
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
 
@@ -149,9 +149,10 @@ def test_a_size_matters_from_its_least_on(effect: str, per_run: bool):
 
 def test_more_is_asked_of_what_the_form_of_a_hull_could_be():
     """Where each run is another manoeuvre, what a polynomial lacks differs from run to run and passes for winds of single runs."""
-    current, thrust = EFFECTS.get("current"), EFFECTS.get("thrust_gain")
-    assert [passes_for_form(t) for t in (Term(current), Term(current, since=3), Term(thrust))] == [False, True, True]
-    assert passes_for_form(Term(EFFECTS.get("wind_per_run"), per_run=True))
+    current, mass, bank = (EFFECTS.get(name) for name in ("current", "mass_change", "bank_suction"))
+    plain, late, mistaken, near = (asked_besides(t, 3.0) for t in (Term(current), Term(current, since=3), Term(mass), Term(bank)))
+    assert (plain, late, near) == (0.0, 3.0, 3.0)
+    assert 3.0 < mistaken < asked_besides(Term(EFFECTS.get("wind_per_run"), per_run=True), 3.0)
 
 
 @pytest.mark.parametrize(("effect", "lever", "sure"), [("wind_per_run", 2.0, True), ("wind_per_run", -9.3, False), ("current_per_run", -9.3, True)])

@@ -29,7 +29,7 @@ NAMES = [name for name in EFFECTS.names() if name != "change_point"]  # it has n
 
 MIRROR: dict[str, tuple[int, ...]] = {
     "current": (1,), "current_per_run": (1,), "wind": (1,), "wind_per_run": (1,), "wave_drift": (1,),  # the east component, at psi -> -psi
-    "bank_suction": (1,),  # the bearing
+    "bank_suction": (2,),  # the bearing
     "rudder_offset": (0,), "rudder_asymmetry": (0,), "propeller_walk": (0,), "propeller_walk_astern": (0, 1), "list": (0, 1),
     "heading_bias": (0,), "yaw_rate_bias": (0,), "antenna_offset": (1,),
 }  # fmt: skip
@@ -430,10 +430,26 @@ def test_going_astern_turns_the_moment_of_drift_over():
 
 
 def test_banks_lie_along_the_way_that_was_sailed():
-    """Runs up and down a channel to the north-east: two of four banks lie beside them."""
+    """Runs up and down a channel to the north-east: two of four banks lie beside them, and may both be there."""
     along, across = np.linspace(-2000.0, 2000.0, 50), np.tile([-40.0, 40.0], 25)
     towards = np.array([[np.cos(0.75), np.sin(0.75)], [-np.sin(0.75), np.cos(0.75)]])
     settings = get("bank_suction").settings(np.column_stack([along, across]) @ towards, PARTICULARS)
-    beside = [(bearing, line) for bearing, line in settings if abs(np.cos(bearing - 0.75)) < 0.01]
-    assert len(settings) == 4
-    assert [line for _, line in beside] == pytest.approx([40.0 + 2.0 * PARTICULARS.B] * 2, abs=25.0)
+    beside = [(line, channel) for bearing, line, channel in settings if abs(np.cos(bearing - 0.75)) < 0.01]
+    breadth = PARTICULARS.B
+    away = 40.0 + 2.0 * breadth
+    channels = [(away - i * breadth, 2.0 * away - (i + j) * breadth) for i, j in ((0, 0), (1, 0), (0, 1), (1, 1))]
+    assert len(settings) == 8
+    assert np.ravel(beside) == pytest.approx(np.ravel([(away, 0.0), (away, 0.0), *channels]), abs=0.5 * breadth)
+
+
+def test_in_the_middle_of_a_channel_banks_are_not_felt_and_far_banks_leave_the_near_one():
+    def force(y: float, channel: float) -> list[float]:
+        e, zero = Modifiers(), np.zeros(1)
+        state = Flow(zero, zero + y, zero, zero, zero + 3.0, *[zero] * 6)
+        get("bank_suction").force(e, state, (0.3, 0.0, 0.5 * np.pi, 100.0, channel), PARTICULARS)
+        return [float(np.squeeze(x)) for x in (e.Y, e.N)]
+
+    np.testing.assert_allclose(force(0.0, 200.0), 0.0, atol=1e-6)
+    np.testing.assert_allclose(force(60.0, 200.0), np.negative(force(-60.0, 200.0)), rtol=1e-9)
+    assert force(60.0, 200.0)[0] > 0.0
+    np.testing.assert_allclose(force(60.0, 1e6), force(60.0, 0.0), rtol=1e-3)

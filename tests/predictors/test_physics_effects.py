@@ -139,11 +139,11 @@ def test_given_values_are_held_and_the_others_are_fitted():
     assert held.extension is not None
     assert held.extension.values[1] == (0.1,)
     assert np.isnan(held.extension.ci95).all()
-    shape = values(fitted("physics+bank_suction[bearing=1.57,line=900]", data))
-    assert shape[1:] == (1.57, 900.0)
+    shape = values(fitted("physics+bank_suction[bearing=1.57,line=900,channel=0]", data))
+    assert shape[2:] == (1.57, 900.0, 0.0)
     assert shape[0] != 0.0
     chosen = values(fitted("physics+bank_suction", data))
-    assert chosen[1:] in EFFECTS.get("bank_suction").settings(data.batch().truth[:, :, :2], complete(data.ship))
+    assert chosen[2:] in EFFECTS.get("bank_suction").settings(data.batch().truth[:, :, :2], complete(data.ship))
 
 
 def test_a_change_within_the_run_acts_from_its_time_on():
