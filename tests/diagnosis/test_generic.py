@@ -100,6 +100,16 @@ def test_a_force_that_comes_and_goes_from_place_to_place_follows_the_place(kcs):
     assert float(towards) % 180.0 == pytest.approx(np.rad2deg(0.7), abs=10.0)
 
 
+def test_a_drag_of_thrusters_that_work_either_way_follows_their_size():
+    def drag(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.push(-q[0] * ship.mass * (np.abs(s.F_b) > 2e4), 0.0, 0.0)
+
+    hidden = Hidden(Outside("drag of a bow thruster", ("thrusters",), drag), (8e-3,))
+    plant = Plant.of(sea_trials(load_mmg_ship("container130"), 5, (hidden,), Trials(runs=12)))
+    best = dependences(null_fit(plant, Scales(plant)), HULL)[0]
+    assert (best.axis, best.variable, best.form) == ("surge", "thrusters", "|F_b|")
+
+
 @pytest.mark.parametrize("in_step", [False, True])
 def test_waves_that_rock_the_ship_are_no_force_that_follows_the_time_but_one_in_step_with_the_runs_is(in_step):
     """Of 14 s on 232 m. Phases of their own in each run scored 26, where 16 are asked."""

@@ -138,7 +138,7 @@ def test_a_value_for_each_run_is_sure_only_if_little_else_differs_between_runs(o
 
 
 @pytest.mark.parametrize("per_run", [False, True])
-@pytest.mark.parametrize("effect", ["current", "rudder_delay"])
+@pytest.mark.parametrize("effect", ["current", "rudder_delay", "thruster_lag"])
 def test_a_size_matters_from_its_least_on(effect: str, per_run: bool):
     for factor, wanted in ((0.9, False), (1.1, True)):
         size = factor * least_size(effect) * np.array([0.6, -0.8])

@@ -20,7 +20,7 @@ from shipbench.physics.mmg import load_mmg_ship
 from shipbench.physics.modifiers import Flow, Modifiers
 from shipbench.physics.thruster import fading
 from shipbench.records import Dataset
-from shipbench.ship import Particulars
+from shipbench.ship import Particulars, complete
 from shipbench.signals import U
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
@@ -82,6 +82,23 @@ def test_a_rudder_that_stalls_beyond_30_deg_is_ordinary_but_one_that_stalls_befo
     kvlcc2 = load_mmg_ship("kvlcc2_l7")
     assert named(sea_trials(kvlcc2, 5, (Hidden(Outside("late stall", ("rudder",), late), (0.5,)),), Trials())) == []
     assert named(trials("rudder_stall", 0.6, 0.25, ship="kvlcc2_l7")) == ["rudder_stall"]
+
+
+def test_waves_that_push_ahead_as_those_of_the_ship_s_length_are_no_wind():
+    """Five times the drift force ahead of short waves: wind, whose force ahead is fitted, was named in four simulators that had it so."""
+    long = EFFECTS.get("wave_drift").fitted(130.0)[2]
+    data = sea_trials(load_mmg_ship("container130"), 5, (Hidden(long, (0.08, -0.06)),), Trials(runs=12))
+    assert named(data) == ["wave_drift"]
+
+
+def test_the_banks_of_a_channel_are_named_with_its_breadth():
+    """One bank alone scored 39 on a ship that kept to a channel of 150 m, with a 30th of its typical strength."""
+    ship, bank = load_mmg_ship("container130"), EFFECTS.get("bank_suction")
+    places = np.concatenate([run.states[:, :2] for run in sea_trials(ship, 5, (), Trials(runs=12)).runs])
+    bearing, line, channel = bank.settings(places, complete(ship.particulars))[4]
+    (cause,) = diagnose(sea_trials(ship, 5, (Hidden(bank, (0.3, 0.0, bearing, line, channel)),), Trials(runs=12)), gain=False).causes
+    assert cause.effect == "bank_suction"
+    assert cause.parameters["channel"].value == pytest.approx(channel, rel=0.1)
 
 
 def test_thrusters_fade_alike_ahead_and_astern_and_not_at_rest():
