@@ -27,6 +27,8 @@ _REFITS = 3
 _WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
 """Least linear score of what is refitted: of the threshold, and of the best."""
 _RIVAL, _RIVALS = 0.25, 4
+_TIE = 0.1
+"""Scores of two ways of an effect that differ by less are equal: a moment that goes with the square of a size has no slope at zero, either way."""
 _HOPE, _HOPE_MARGIN = 0.6, 30.0
 """A refit is given up where it promises less than this share of what the best so far has gained, less the margin. (198 refits on development ships:
 promises at the second linearisation fell short of the end by at most 27 % and 60, and none was lower whose end came within 6 of the best. With the
@@ -253,7 +255,7 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
 
 
 def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[Score]:
-    """The best, the best of each family, and whatever could stand in for the best: one line each per effect."""
+    """The best, the best of each family, and whatever could stand in for the best: one way of each effect, or those that tie."""
     present, best = _beside(now), dict[str, Score]()
     for s in scores:
         if s.term.label not in present:
@@ -273,7 +275,8 @@ def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[S
     if best_of_all.vector or best_of_all.per_run:  # their sensitivities depend on the size too much for the linear overlap
         rivals |= {s.term.label: 1.0 for s in ranked if s.term.effect.vector or s.term.effect.per_run}
     near = sorted((s for s in ranked if rivals.get(s.term.label, 0.0) > _RIVAL and s not in chosen), key=lambda s: -rivals[s.term.label])
-    return chosen + near[:_RIVALS]
+    chosen += near[:_RIVALS]
+    return [s for s in scores if any(s is c or (s.term.label == c.term.label and s.score > c.score - _TIE) for c in chosen)]
 
 
 def _beside(now: Fit) -> set[str]:
