@@ -14,7 +14,7 @@ from .analysis import HULL_THRESHOLD, Analysis
 from .clocks import NAMES, LateVelocities
 from .gear_kinds import GearFinding
 from .generic import Dependence
-from .model import FREE, HULL_SPREAD
+from .model import FREE, hull_changes
 from .outcome import Candidate, Cause, Estimate, Gain, what_it_is
 from .plant import HULL, NUM_HULL
 from .robust import WITHOUT_WIND, covariance, inflation, least_size
@@ -153,10 +153,9 @@ def _hull_cause(found: Analysis, gain: Gain | None) -> Cause:
     at = np.arange(len(FREE), len(FREE) + NUM_HULL)
     half = float(t.ppf(0.975, max(fit.plant.seg.runs - 1, 1)))
     wider = np.maximum(1.0, inflation(fit, at)) ** 0.5
-    values, sd = HULL_SPREAD * fit.solution.mean[at], HULL_SPREAD * np.sqrt(np.diag(fit.solution.cov)[at]) * wider
-    parameters = {
-        p.name: Estimate(float(v), p.unit, (float(v - half * s), float(v + half * s))) for p, v, s in zip(HULL.parameters, values, sd, strict=True)
-    }
+    mean, reach = fit.solution.mean[at], half * np.sqrt(np.diag(fit.solution.cov)[at]) * wider
+    values = zip(HULL.parameters, *(hull_changes(z).tolist() for z in (mean, mean - reach, mean + reach)), strict=True)
+    parameters = {p.name: Estimate(value, p.unit, (low, high)) for p, value, low, high in values}
     evidence = "a hull within 30 % of the regressions explains the runs better than one within 3 %; values are relative changes of the derivatives"
     return Cause("hull_derivatives", 0, found.hull, _p(found, found.hull), parameters, (), "", gain, evidence)
 

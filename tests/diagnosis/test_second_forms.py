@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.analysis import THRESHOLD, asked, plain_model
+from shipbench.diagnosis.cases import draw_case
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.generic import Dependence
+from shipbench.diagnosis.model import hull_changes
 from shipbench.diagnosis.outside import Outside
-from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.plant import HULL, NUM_HULL, Plant
 from shipbench.diagnosis.select import select
 from shipbench.effects.base import EFFECTS
 from shipbench.ops import Array
@@ -99,6 +101,21 @@ def test_the_banks_of_a_channel_are_named_with_its_breadth():
     (cause,) = diagnose(sea_trials(ship, 5, (Hidden(bank, (0.3, 0.0, bearing, line, channel)),), Trials(runs=12)), gain=False).causes
     assert cause.effect == "bank_suction"
     assert cause.parameters["channel"].value == pytest.approx(channel, rel=0.1)
+
+
+def test_no_hull_is_damped_the_wrong_way():
+    many = np.linspace(-9.0, 9.0, 7)
+    changes = dict(zip((p.name for p in HULL.parameters), hull_changes(np.repeat(many[:, None], NUM_HULL, axis=1)).T, strict=True))
+    for name, change in changes.items():
+        assert np.all(np.diff(change) > 0.0)
+        assert (np.min(change) > -1.0) == (name in ("Y_v", "N_v", "N_r", "m_y"))
+    np.testing.assert_allclose(hull_changes(np.full(NUM_HULL, -1.5)), -0.45)
+
+
+def test_currents_of_single_runs_are_named_on_a_large_tanker():
+    """A hull without damping explained them as well."""
+    found = select(plain_model(Plant.of(draw_case("published", 57, 0).dataset())), THRESHOLD)
+    assert [t.label for t in found.final.model.terms] == ["current_per_run"]
 
 
 def test_thrusters_fade_alike_ahead_and_astern_and_not_at_rest():
