@@ -28,7 +28,7 @@ SPREAD = np.array([3.0, 1.5, 0.5, 0.8, 1.0, 1.0])
 friction, 2.5 C_F (physics reference 2.6): with more of it, thrust would seem to be missing on every ship. Resistance that grows with speed
 itself is small on ships and large in the models of control engineers (12 of these units in the supply vessel of
 Fossen, Sagatun & Sorensen, Control Eng. Practice 4 (1996) 369)."""
-_HULL_SPREAD, _PLAIN, _ONE_SIGN = 0.3, 0.5, np.array([p.name in ("Y_v", "N_v", "N_r", "m_y") for p in HULL.parameters])
+_HULL_SPREAD, _PLAIN, _ONE_SIGN = 0.3, 0.5, np.array([p.name in ("Y_v", "N_v", "N_r") for p in HULL.parameters])
 """Standard deviation of the relative error of the regressions (10 to 50 % in comparisons; physics reference, section 3.3). What has one sign
 on every hull nears zero from so far down on: else a large tanker that did not feel the water explained her runs as well as 24 currents did."""
 NUM_BASE = len(FREE) + NUM_HULL + len(STRUCTURE.parameters)
