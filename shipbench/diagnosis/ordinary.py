@@ -16,8 +16,8 @@ from .structure import STRUCTURE
 NOTICEABLE = 0.14
 """Size from which a force is noticeable, and may doubt the ship file, in units of the latent force: 0.7 mm/s^2, a third of what a wind of 7 m/s
 gives; in yaw 1.4e-5 rad/s^2 at 130 m. Exact sensors or many samples show with certainty that ships differ in form from eq. (2)."""
-STRANGE = 8.0
-"""In spreads: from here on a parameter is no ordinary ship's."""
+STRANGE, STRANGE_SIZE = 8.0, 3.0
+"""In spreads: from here on a parameter is no ordinary ship's; and in typical sizes: a mass or a thrust."""
 _FAR = 3.5
 """In spreads: up to here a parameter is ordinary, beyond its prior falls by Huber's linear tail instead of the square."""
 _SOLVES, _FITS, _SAME = 20, 3, 0.05

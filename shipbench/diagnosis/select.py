@@ -11,7 +11,7 @@ import numpy as np
 from ..effects.base import EFFECTS, Effect
 from .fit import Origin, fit, looking_at
 from .model import Linearisation
-from .ordinary import widened
+from .ordinary import STRANGE_SIZE, widened
 from .plain import REFIT_ITERATIONS
 from .plant import Plant
 from .robust import WITHOUT_WIND, is_sure, matters
@@ -97,9 +97,10 @@ def shows_in_record(effect: Effect) -> bool:
     return effect.enters == "gear" and not effect.unrecorded
 
 
-def asked_besides(term: Term, off_form: float) -> float:
-    """What a term must be worth besides the threshold, since what the form of a hull lacks could pass for it."""
-    besides = _OF_RUNS if term.per_run else _MISTAKEN if term.label in OFTEN_MISTAKEN else 0.0
+def asked_besides(term: Term, off_form: float, size: float = 0.0) -> float:
+    """What a term must be worth besides the threshold, since what the form of a hull lacks could pass for it. Not so much of one whose `size`, in
+    typical ones, doubts the ship file: that is no name."""
+    besides = _OF_RUNS if term.per_run else _MISTAKEN if term.label in OFTEN_MISTAKEN and size < STRANGE_SIZE else 0.0
     return besides + off_form * (term.per_run or term.since is not None or term.label in AS_SHIPS_DIFFER)
 
 
@@ -206,7 +207,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         # every ship is a little unequal, every run has a breath of wind: what is too small of that stays, and others are judged beside it
         if careful and not (term.effect.breaks_symmetry or term.per_run or matters(tried, -1)):
             return -np.inf
-        return 2.0 * (tried.evidence - now.evidence) - (asked_besides(term, off_form) if careful else 0.0)
+        return 2.0 * (tried.evidence - now.evidence) - (asked_besides(term, off_form, np.max(np.abs(tried.values[-1]))) if careful else 0.0)
 
     for round_ in range(most):
         tried = refits(now, worth_a_refit(scores, now, threshold), origin, threshold)

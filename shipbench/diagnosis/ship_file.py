@@ -10,12 +10,12 @@ from ..effects.base import EFFECTS
 from .analysis import Analysis
 from .gear_kinds import slow_on_any_ship
 from .model import NUM_BASE, PLACES
-from .ordinary import STRANGE, needed
+from .ordinary import STRANGE, STRANGE_SIZE, needed
 from .other_size import better_size, size_instead_of
 from .settle import Fit
 
-STRANGE_SUM, STRANGE_SIZE = 160.0, 3.0
-"""Sum of squares of the fit's parameters, in units of what ships differ by, beside the causes; and the size of a cause in typical sizes.
+STRANGE_SUM = 160.0
+"""Sum of squares of the fit's parameters, in units of what ships differ by, beside the causes.
 (Sums with right ship files: 15 to 63 on MMG ships, up to 148 on ships of the literature and on the Esso Osaka; with wrong ones from 18 on; what
 is not seen here may be seen by `better_size`.)"""
 ORDINARY_SUM = 20.0

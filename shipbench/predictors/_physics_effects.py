@@ -118,13 +118,15 @@ class Extension:
         return held
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[Extension]:
-        """One copy per choice of the shape parameters that the spec leaves open, given the places (.., 2) that the ship visited."""
+        """One copy per choice of the shape parameters that the spec leaves open, given the places (.., 2) that the ship visited. Beside a given one,
+        what is absent as a rule (the other bank of a channel) stays so: it was placed for another value."""
         choices: list[list[tuple[float, ...]]] = []
         for t, now in zip(self.terms, self.values, strict=True):
             shapes = [j for j, p in enumerate(t.effect.parameters) if p.shape]
+            absent = [j for j in shapes if t.effect.parameters[j].typical == 0.0 and any(t.given[i] is not None for i in shapes)]
             found: list[tuple[float, ...]] = []
             for setting in t.effect.settings(positions, ship):
-                chosen = {j: v for j, v in zip(shapes, setting, strict=True) if t.given[j] is None}
+                chosen = {j: v for j, v in zip(shapes, setting, strict=True) if t.given[j] is None and j not in absent}
                 values = tuple(chosen.get(j, v) for j, v in enumerate(now))
                 found += [values] if values not in found else []
             choices.append(found)

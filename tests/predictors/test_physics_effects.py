@@ -139,7 +139,7 @@ def test_given_values_are_held_and_the_others_are_fitted():
     assert held.extension is not None
     assert held.extension.values[1] == (0.1,)
     assert np.isnan(held.extension.ci95).all()
-    shape = values(fitted("physics+bank_suction[bearing=1.57,line=900,channel=0]", data))
+    shape = values(fitted("physics+bank_suction[bearing=1.57,line=900]", data))
     assert shape[2:] == (1.57, 900.0, 0.0)
     assert shape[0] != 0.0
     chosen = values(fitted("physics+bank_suction", data))
