@@ -16,7 +16,7 @@ class Current(Effect):
     family = "environment"
     summary = "uniform current, the same in all runs"
     source = "Fossen (2021), section 10.3; added masses act on the velocity through the water"
-    parameters = (Parameter("north", "m/s", 0.3, -2.0, 2.0, scaling="speed"), Parameter("east", "m/s", 0.3, -2.0, 2.0, scaling="speed"))
+    parameters = (Parameter("north", "m/s", 0.3, -6.0, 6.0, scaling="speed"), Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"))
     breaks_symmetry = True
     vector = ("speed", "to")
     separate = "straight runs on reciprocal courses at two speeds, or a full turn"

@@ -14,7 +14,7 @@ class CurrentPerRun(Effect):
     family = "environment"
     summary = "uniform current, another one in each run"
     source = "Fossen (2021), section 10.3"
-    parameters = (Parameter("north", "m/s", 0.3, -2.0, 2.0, scaling="speed"), Parameter("east", "m/s", 0.3, -2.0, 2.0, scaling="speed"))
+    parameters = (Parameter("north", "m/s", 0.3, -6.0, 6.0, scaling="speed"), Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"))
     breaks_symmetry = True
     per_run = True
     vector = ("speed", "to")

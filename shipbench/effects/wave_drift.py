@@ -19,7 +19,7 @@ class WaveDrift(Effect):
     family = "environment"
     summary = "mean drift force of waves"
     source = "short-wave limit after Faltinsen et al. (1980), as simplified in physics reference, section 5, E05"
-    parameters = (Parameter("north", "m^2", 0.12, -2.0, 2.0, scaling="area"), Parameter("east", "m^2", 0.12, -2.0, 2.0, scaling="area"))
+    parameters = (Parameter("north", "m^2", 0.12, -8.0, 8.0, scaling="area"), Parameter("east", "m^2", 0.12, -8.0, 8.0, scaling="area"))
     breaks_symmetry = True
     vector = ("amplitude_squared", "to")
     separate = "an anemometer or a wave buoy: wind and waves from one side push alike"

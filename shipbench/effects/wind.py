@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import replace
 from typing import Self
 
 from ..ops import Array, sqrt
@@ -16,7 +17,7 @@ class Wind(Effect):
     family = "environment"
     summary = "mean wind, the same in all runs"
     source = "Blendermann (1994) in the simulator, lowest harmonics in the fitted model (physics reference, section 5, E03)"
-    parameters = (Parameter("north", "m/s", 7.0, -30.0, 30.0, scaling="speed"), Parameter("east", "m/s", 7.0, -30.0, 30.0, scaling="speed"))
+    parameters = (Parameter("north", "m/s", 7.0, -60.0, 60.0, scaling="speed"), Parameter("east", "m/s", 7.0, -60.0, 60.0, scaling="speed"))
     breaks_symmetry = True
     vector = ("speed", "from")
     separate = "the same manoeuvre at two speeds and on reciprocal courses: wind forces do not grow with the ship's speed"
@@ -33,6 +34,14 @@ class Wind(Effect):
             effect.stretch, effect.moment = (self.sized(L)[0].typical, 0.1 * (9.81 * L) ** 0.5), moment
             found.append(effect)
         return tuple(found)
+
+    def sized(self, L: float) -> tuple[Parameter, ...]:
+        """Of the fitted components where it is fitted, with the bounds of a wind along one of them."""
+        if self.stretch is None:
+            return super().sized(L)
+        typical, speed = self.stretch
+        most = [p.high * (p.high + speed) / (typical + speed) for p in super().sized(L)]
+        return tuple(replace(p, low=-high, high=high) for p, high in zip(super().sized(L), most, strict=True))
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         air_u, air_v = body_axes(*self._wind(q), s.psi)

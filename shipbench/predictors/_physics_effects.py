@@ -94,6 +94,19 @@ class Extension:
             if t.effect.enters in enters and t.given[j] is None and not parameter.shape
         ]
 
+    def check(self, L: float) -> None:
+        """That the values which the spec gives are ones a ship of length L [m] may have.
+
+        Raises:
+            InputError: a value lies outside the bounds of its parameter.
+        """
+        for t in self.terms:
+            for parameter, value in zip(t.effect.sized(L), t.given, strict=True):
+                if value is not None and not parameter.low <= value <= parameter.high:
+                    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+                    accepted = f"{parameter.low:.4g} to {parameter.high:.4g}{unit} on a ship of {L:.4g} m"
+                    raise InputError(f"effect '{t.name}': {parameter.name} = {value:.4g}{unit}; accepted: {accepted}.")
+
     def with_values(self, slots: Sequence[Slot], q: Sequence[float]) -> Extension:
         """The same effects with `q` in the slots."""
         values = [list(v) for v in self.values]

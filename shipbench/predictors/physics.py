@@ -91,12 +91,15 @@ class Physics(PredictorBase):
         """Fit actuator dynamics, then p0..p10, over full rollouts of all runs of `train` and `valid` (nothing is tuned on `valid`).
 
         Raises:
+            InputError: the spec gives an effect a value that no such ship has.
             WorkError: the fit found no finite rollouts.
         """
         from ._physics_fit import fit_parameters  # casadi is loaded only for fitting
 
         data = train.merged(valid)
         self._set_ship(data.ship, data.inputs, data.dt, data.actuators == "commanded")
+        if self.extension is not None:
+            self.extension.check(self.particulars.L)
         batch = self._pieces(data).batch()
         asked, self.extension = self.extension, None
         if not self.commanded:

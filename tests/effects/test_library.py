@@ -372,6 +372,16 @@ def test_stretched_wind_says_the_wind_that_it_pushes_with(name: str):
         assert (fitted.name, fitted.enters, fitted.per_run) == (plain.name, plain.enters, plain.per_run)
 
 
+@pytest.mark.parametrize("L", [25.0, 130.0])
+def test_a_fitted_wind_has_the_bounds_of_the_wind_that_it_means(L: float):
+    plain = get("wind")
+    for fitted in plain.fitted(L):
+        for own, meant in zip(fitted.sized(L), plain.sized(L), strict=True):
+            assert fitted.public((own.high, 0.0))["speed"] == pytest.approx(meant.high, rel=1e-6)
+            assert (own.low, own.typical) == pytest.approx((-own.high, meant.typical))
+            assert meant.high > 25.0  # a storm, which blows on boats too
+
+
 def test_wind_coefficients_scale_the_wind_alone():
     effect = get("wind_coefficients")
     still, moved = Modifiers(), Modifiers()

@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from shipbench.data.files import write_dataset
+from shipbench.diagnosis.case_ships import scaled
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship
@@ -212,6 +213,23 @@ def test_the_start_behind_a_sensor_is_the_one_that_it_shows(name):
 def test_a_faulty_spec_is_one_clear_message(spec, message):
     with pytest.raises(InputError, match=message):
         make_predictor(parse_spec(spec))
+
+
+@pytest.mark.parametrize(("spec", "message"), [
+    ("physics+rudder_lag[lag=-1]", r"'rudder_lag': lag = -1 s; accepted: 0 to 30 s on a ship of 130 m"),
+    ("neural_ode+mass_change[share=-3]", r"share = -3; accepted: -0.5 to 1 on"),
+    ("physics+current[speed=50,to=0]", r"north = 50 m/s; accepted: -6 to 6 m/s"),
+])  # fmt: skip
+def test_a_given_value_that_no_ship_has_is_refused_before_anything_is_fitted(spec, message):
+    with pytest.raises(InputError, match=message):
+        fitted(spec, trials(3, runs=6, samples=40))
+
+
+def test_a_river_s_current_on_a_boat_is_within_what_may_be_found():
+    """Currents and winds do not follow Froude's law: 1.8 m/s are a third of what a ship of 130 m may have, on a boat of 25 m much of it."""
+    boat, hidden = scaled(SHIP, 25.0), (1.3, -1.2)
+    data = sea_trials(boat, 5, [Hidden(EFFECTS.get("current"), hidden)], Trials(runs=8, samples=60))
+    np.testing.assert_allclose(values(fitted("physics+current", data)), hidden, rtol=0.15)
 
 
 def test_it_runs_beside_the_plain_physics_on_the_command_line(tmp_path):
