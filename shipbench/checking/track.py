@@ -16,6 +16,7 @@ from ..signals import PSI, U, V, X, Y
 from .finding import Curve, Finding, Picture, Severity, toml_line
 from .recording import Recording
 from .selection import Chosen, select
+from .statistics import clustered_fit, clusters
 
 WINDOW = 30.0
 """Seconds at 130 m."""
@@ -23,8 +24,8 @@ LEAST_ARM = 0.02
 """Share of the ship's length."""
 LEAST_SCALE, LEAST_SWAY_SCALE, LEAST_HEADING, LEAST_CURRENT, LEAST_LAG = 0.02, 0.15, np.deg2rad(1.0), 0.03, 0.8
 """What matters at all: shares, rad, share of the speed, s at 130 m (and a quarter of a sample)."""
-_SURE = 6.0
-"""Standard errors from which a drift is taken out unasked."""
+_SURE, _SMALL = 6.0, 3.0
+"""Standard errors from which a drift is taken out unasked, and below which a lag may be none."""
 _LAGS = {"lag of u, v": (U, V), "lag of position": (X, Y), "lag of heading": (PSI,)}
 _SCALES = frozenset({"scale of u and v", "scale of u", "scale of v"})
 _LATE = frozenset({"lag of u, v", "lag of position"})
@@ -137,6 +138,16 @@ def late_velocities(recording: Recording) -> tuple[float, float] | None:
         return None
     lag = -found.late.get(X, 0.0)
     return (lag, float(found.first.sd["lag of position"][0])) if lag >= least_lag(recording) else None
+
+
+def keeps_time(recording: Recording) -> bool:
+    """Whether the track shows that neither the velocities nor the position are late against the other: by standard errors over the runs."""
+    w = windows(recording, {})
+    if w is None:
+        return False
+    off, cluster = _real(w.moved - w.surge - w.sway)[:, 0], np.tile(clusters(w.run), 2)
+    lags = [clustered_fit(off, _real(column), cluster) for column in (w.velocity_change, -w.way_change)]
+    return all(abs(f.value[0]) < _SMALL * f.sd[0] and abs(f.value[0]) + 2.0 * f.sd[0] < LEAST_LAG * recording.froude for f in lags)
 
 
 def through_water(recording: Recording) -> tuple[float, float] | None:

@@ -293,8 +293,9 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str], measured: bo
     elif name == "hull_derivatives":
         unpaid = "not shown to pay on held-out runs" if measured else "named only where it pays on held-out runs, which was not measured"
         reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}" if found.hull <= HULL_THRESHOLD else unpaid
-    elif name in NAMES and "velocity_delay" in named:
-        reason = "the clocks of position and velocities were put right before the fit"
+    elif name in NAMES:
+        put_right = "the clocks of position and velocities were put right before the fit"
+        reason = put_right if "velocity_delay" in named else "by the track, position and velocities are recorded at the same time"
     elif name in WITHOUT_WIND and plant.seg.wind is not None:
         reason = "the wind is measured and in the model already"
     elif effect.channels and plant.seg.wind is None:

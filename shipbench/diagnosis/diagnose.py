@@ -13,7 +13,9 @@ from multiprocessing import get_context
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from ..checking.recording import Recording
 from ..checking.standing import standing
+from ..checking.track import keeps_time
 from ..checking.units import UnitFinding, check_units, corrected, merged
 from ..errors import InputError
 from ..records import Dataset
@@ -69,7 +71,8 @@ def diagnose(
     late = check_clocks(dataset) if only is None and has_speeds(dataset) else None
     if late is not None:
         dataset = late.mended
-    settled = (*(NAMES if late is not None else ()), *faults(dataset))
+    in_time = late is not None or (only is None and has_speeds(dataset) and keeps_time(Recording(dataset)))
+    settled = (*(NAMES if in_time else ()), *faults(dataset))
     steps = THOROUGH_STEPS if thorough else MOST_STEPS
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     apart = len({run.group for run in dataset.runs}) > 1

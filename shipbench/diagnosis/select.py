@@ -27,8 +27,9 @@ _REFITS = 3
 _WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
 """Least linear score of what is refitted: of the threshold, and of the best."""
 _RIVAL, _RIVALS = 0.25, 4
-_TIE = 0.1
-"""Scores of two ways of an effect that differ by less are equal: a moment that goes with the square of a size has no slope at zero, either way."""
+_TIE, _TIE_OF_VECTORS = 0.1, 0.5
+"""Scores of two ways of an effect that differ by less are equal: a moment that goes with the square of a size has no slope at zero, either way. Of
+winds and waves, whose forces grow with the square, by this share: those of waves four times as strong as typical ones end in another order."""
 _HOPE, _HOPE_MARGIN = 0.6, 30.0
 """A refit is given up where it promises less than this share of what the best so far has gained, less the margin. (198 refits on development ships:
 promises at the second linearisation fell short of the end by at most 27 % and 60, and none was lower whose end came within 6 of the best. With the
@@ -277,7 +278,12 @@ def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[S
         rivals |= {s.term.label: 1.0 for s in ranked if s.term.effect.vector or s.term.effect.per_run}
     near = sorted((s for s in ranked if rivals.get(s.term.label, 0.0) > _RIVAL and s not in chosen), key=lambda s: -rivals[s.term.label])
     chosen += near[:_RIVALS]
-    return [s for s in scores if any(s is c or (s.term.label == c.term.label and s.score > c.score - _TIE) for c in chosen)]
+    return [s for s in scores if any(s is c or (s.term.label == c.term.label and s.score > c.score - _tie(c)) for c in chosen)]
+
+
+def _tie(best: Score) -> float:
+    """What another way of an effect may score less to be refitted, too."""
+    return max(_TIE, _TIE_OF_VECTORS * best.score) if best.term.effect.vector and not best.term.per_run else _TIE
 
 
 def _beside(now: Fit) -> set[str]:

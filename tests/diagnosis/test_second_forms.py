@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.analysis import THRESHOLD, asked, plain_model
+from shipbench.diagnosis.case_ships import scaled
 from shipbench.diagnosis.cases import draw_case
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.generic import Dependence
@@ -90,6 +91,12 @@ def test_waves_that_push_ahead_as_those_of_the_ship_s_length_are_no_wind():
     """Five times the drift force ahead of short waves: wind, whose force ahead is fitted, was named in four simulators that had it so."""
     long = EFFECTS.get("wave_drift").fitted(130.0)[2]
     data = sea_trials(load_mmg_ship("container130"), 5, (Hidden(long, (0.08, -0.06)),), Trials(runs=12))
+    assert named(data) == ["wave_drift"]
+
+
+def test_waves_four_times_as_strong_as_typical_ones_are_no_wind():
+    """Their force grows with the square: at none of it, another way of waves seems best, and fitted that does worse than a wind."""
+    data = sea_trials(scaled(load_mmg_ship("kcs"), 160.0), 3, (Hidden(EFFECTS.get("wave_drift"), (0.54, -0.54)),), Trials(runs=12))
     assert named(data) == ["wave_drift"]
 
 

@@ -10,6 +10,8 @@ import pytest
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from shipbench.bench.diagnosis_text import summary_lines
+from shipbench.checking.recording import Recording
+from shipbench.checking.track import keeps_time
 from shipbench.diagnosis import clocks
 from shipbench.diagnosis.clocks import check_clocks
 from shipbench.diagnosis.colour import Colour
@@ -44,6 +46,14 @@ def _changed(data: Dataset, change) -> Dataset:
     for S in states:
         change(S)
     return data.with_runs([replace(run, states=S) for run, S in zip(data.runs, states, strict=True)])
+
+
+@pytest.mark.parametrize(("effect", "delay"), [("position_delay", 0.0), ("position_delay", 1.0), ("velocity_delay", 1.0)])
+def test_no_delay_is_looked_for_where_the_track_shows_none(effect: str, delay: float):
+    """What a hull's form lacks passed for velocities that are early by a second."""
+    cause = EFFECTS.get(effect)
+    hidden = Hidden(cause, (delay, 0.0)[: len(cause.parameters)])
+    assert keeps_time(Recording(sea_trials(load_mmg_ship("kcs"), 3, (hidden,), Trials(runs=24)))) is (delay == 0.0)
 
 
 def _filter_in_earth_axes(data: Dataset, T: float) -> Dataset:
