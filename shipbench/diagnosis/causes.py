@@ -19,7 +19,7 @@ from .outcome import Candidate, Cause, Estimate, Gain, what_it_is
 from .plant import HULL, NUM_HULL
 from .robust import WITHOUT_WIND, covariance, inflation, least_size
 from .screen import Score, other_kinds_from, places
-from .select import asked_besides, shows_in_record
+from .select import ALIKE, asked_besides, shows_in_record
 from .settle import Fit
 from .ship_file import whatever_the_ship
 from .term import Term
@@ -79,6 +79,7 @@ def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
     steps = found.selection.steps
     own = max((s for s in steps if s.term.label == term.label), key=lambda s: (s.round, s.score), default=None)
     near = [s.term.label for s in steps if own is not None and s.round == own.round and s.score > own.score - _TIE]
+    near += [other for group in ALIKE if term.label in group for other in sorted(group - {term.label})]
     present = {t.label for t in found.final.model.terms}
     return tuple(dict.fromkeys(n for n in near if n not in present))
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .fit import Origin, fit
+from .gram import Hyper
 from .model import Scales
 from .noise import colour_of
 from .ordinary import widened
@@ -51,8 +52,14 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
 
 
 def first_evidence(plant: Plant, null: Fit) -> float:
-    """Log evidence of the plain model for another reading, or some pieces, of what `null` was fitted to: from the beginning, with the same noise."""
-    return _first(plant, Scales(plant).alike(null.scales), iterations=REFIT_ITERATIONS).evidence
+    """Log evidence of `first_fit`."""
+    return first_fit(plant, null).evidence
+
+
+def first_fit(plant: Plant, null: Fit, like: Fit | None = None) -> Fit:
+    """The plain model of another reading, or some pieces, of what `null` was fitted to: from the beginning, with the same units; with the forces and
+    the noise of the fit `like`."""
+    return _first(plant, Scales(plant).alike(null.scales), iterations=REFIT_ITERATIONS, hyper=like.hyper if like else None)
 
 
 def _begun(plant: Plant, scales: Scales) -> Fit:
@@ -72,9 +79,9 @@ def _begun(plant: Plant, scales: Scales) -> Fit:
     return replace(found, scales=scales.with_background(found.hyper))
 
 
-def _first(plant: Plant, scales: Scales, iterations: int = _FIRST_ITERATIONS, weak: bool = False) -> Fit:
+def _first(plant: Plant, scales: Scales, iterations: int = _FIRST_ITERATIONS, weak: bool = False, hyper: Hyper | None = None) -> Fit:
     origin = Origin.of(plant, scales)
-    hyper = replace(origin.hyper, log_force=np.minimum(origin.hyper.log_force, 0.0)) if weak else origin.hyper
+    hyper = hyper or (replace(origin.hyper, log_force=np.minimum(origin.hyper.log_force, 0.0)) if weak else origin.hyper)
     return fit(plant, scales, Model(), origin.point, hyper, iterations=iterations, guess=origin.motion, far=True)
 
 

@@ -18,3 +18,10 @@ def test_only_what_came_near_in_the_round_in_which_a_cause_was_added_is_its_riva
     assert rivals_of(found, named[0]) == ("wave_drift",)
     named.append(SimpleNamespace(label="wave_drift"))
     assert rivals_of(found, named[0]) == ()
+
+
+def test_mass_and_thrust_are_always_told_as_confused():
+    """The one that was there was behind the other by up to 24 on ships of five simulators."""
+    steps, mass = [step(0, "mass_change", 40.0), step(0, "thrust_gain", 18.0), step(0, "wind", 17.0)], SimpleNamespace(label="mass_change")
+    found = SimpleNamespace(selection=SimpleNamespace(steps=steps), final=SimpleNamespace(model=SimpleNamespace(terms=[mass])))
+    assert rivals_of(found, mass) == ("thrust_gain",)

@@ -155,6 +155,13 @@ def test_thrusters_known_by_their_orders_may_be_as_slow_as_ordinary_ones():
     assert least_size("thruster_lag") * EFFECTS.get("thruster_lag").parameters[0].typical > lag > 1.0
 
 
+def test_lift_that_grows_more_slowly_than_the_sine_is_no_stall():
+    """A rudder with a flap, of aspect ratio 0.65, whose lift goes as tanh up to 1.35, at 35 deg: named 0.19 with nothing hidden."""
+    sine = 1.5 * 6.13 * 0.65 / (0.65 + 2.25) * np.sin(np.deg2rad(35.0)) / 1.35
+    lost = 1.0 - np.tanh(sine) / sine
+    assert least_size("rudder_stall") * EFFECTS.get("rudder_stall").parameters[0].typical > lost > 0.15
+
+
 def test_more_is_asked_of_what_the_form_of_a_hull_could_be():
     """Where each run is another manoeuvre, what a polynomial lacks differs from run to run and passes for winds of single runs."""
     current, mass, bank = (EFFECTS.get(name) for name in ("current", "mass_change", "bank_suction"))

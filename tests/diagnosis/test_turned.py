@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from shipbench.checking.units import check_units, corrected, merged
+from shipbench.diagnosis import turned
 from shipbench.diagnosis.analysis import plain_model
 from shipbench.diagnosis.cases import UNITS, draw_case, misread
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.settle import Fit
 from shipbench.diagnosis.turned import turned_actuators
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
@@ -55,6 +58,21 @@ def test_so_it_is_on_ships_in_other_equations_and_read_rightly_there_is_nothing(
 def test_thrusters_to_port_are_told(channels: tuple[int, ...]):
     wanted = {STATES[c] + end: -1.0 for c in channels for end in ("", "_c")}
     assert found(misread(port_trials(4), channels, -1.0)) == wanted
+
+
+@pytest.mark.parametrize("as_recorded", [0.0, 54.0])
+def test_thrusters_are_not_turned_for_another_rest_of_the_fit(monkeypatch, as_recorded: float):
+    """Of four runs a fit took swell for noise of the sway velocity; read to the other side, for forces, 54 better; as recorded with those, too."""
+    data = port_trials(4)
+    null = plain_model(Plant.of(data))
+    pushed = float(np.sum(null.plant.seg.states[..., [F_B, F_S]] * [1.0, 0.3]))
+
+    def first(plant: Plant, null: Fit, like: Fit | None = None) -> SimpleNamespace:
+        as_they_are = np.isclose(np.sum(plant.seg.states[..., [F_B, F_S]] * [1.0, 0.3]), pushed)
+        return SimpleNamespace(evidence=54.0 if not as_they_are else as_recorded if like is not None else 0.0)
+
+    monkeypatch.setattr(turned, "first_fit", first)
+    assert bool(turned_actuators(data, null)) is (as_recorded == 0.0)
 
 
 @pytest.mark.parametrize("size", [-0.6, 0.6])
