@@ -25,6 +25,8 @@ _AT_REST, _AT_REST_EVIDENCE = 0.5, 0.1
 _STALE = 3
 """Later steps with neither a better point nor the promise of one, each half of the one before, after which a fit rests, too: two linearisations may
 lead to and fro for ever."""
+_LOST = 100.0
+"""Excess of the cost where free steps have led astray (a current and positions of 1.5 m noise: 11000, at the regressions still)."""
 _FOLLOWING, _HALVINGS = 6, 5
 """Steps of initial states and latent force alone at the end, and trials of each."""
 
@@ -32,24 +34,24 @@ _FOLLOWING, _HALVINGS = 6, 5
 def fit(
     plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 20,
     candidates: Sequence[Term] = (), guess: np.ndarray | None = None, hope: float = -np.inf, far: bool = False,
-    begun: tuple[Linearisation, Fit] | None = None,
+    begun: tuple[Linearisation, Fit] | None = None, free_steps: int = _FREE_STEPS,
 ) -> Fit:  # fmt: skip
     """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), until it rests or promises
     less log evidence than `hope`, when it is not worth its time.
 
     A step is at first halved only where the cost explodes: the cost of a step that is right for the parameters rises until the latent force has
     followed, and the path would else end where parameters compensate each other. The best point of the path is kept, by its evidence once the force
-    has followed; there it does. `candidates` get columns there. far: `point` is that of an `Origin`; begun: its linearisation, and a fit there
-    whose products hold.
+    has followed; there it does. If that led astray, each step must lower the cost from the first on. `candidates` get columns there. far: `point` is
+    that of an `Origin`; begun: its linearisation, and a fit there whose products hold.
     """
-    log_tau2 = dict(log_tau2 or {})
+    log_tau2, began = dict(log_tau2 or {}), (hyper, dict(log_tau2 or {}))
     if len(point.terms) < len(model.terms):
         new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
         point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
     lin, seen = begun or (Linearisation(plant, scales, point, guess), None)
     best, before, promised, stale, early = None, -np.inf, -np.inf, 0, np.nan
     for number in range(iterations):
-        free = number < _FREE_STEPS
+        free = number < free_steps
         found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP, seen=seen, far=far and not number)
         if number < 2:
             early = found.promise
@@ -67,12 +69,19 @@ def fit(
         if stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
             break
         before = found.evidence
-        after, seen = _step(lin, found, number + 1 < _FREE_STEPS, 0.5**stale) if number < iterations - 1 else (None, None)
+        after, seen = _step(lin, found, number + 1 < free_steps, 0.5**stale) if number < iterations - 1 else (None, None)
         if after is None:
             break
         lin = after
     assert best is not None
     found, lin = _followed(*best[1:])
+    if free_steps and found.excess > _LOST:
+        again = fit(
+            plant, scales, model, point, *began, iterations=iterations, candidates=candidates, guess=guess, hope=hope, far=far, begun=begun,
+            free_steps=0,
+        )  # fmt: skip
+        if again.evidence > found.evidence:
+            return again
     return replace(settle(lin, model, found.hyper, found.log_tau2, candidates, leap=0.0) if candidates else found, early=early)
 
 

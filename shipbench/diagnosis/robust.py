@@ -17,13 +17,15 @@ WITHOUT_WIND = ("wind", "wind_per_run")
 """Causes only where the wind is not measured."""
 NEGLIGIBLE = 0.05
 """In typical sizes. With enough samples the form of a hull makes tiny causes certain: speeds 0.1 % off, a bank of a 65th of the usual suction."""
-_OWN = {"rudder_delay": 0.5, "rudder_asymmetry": 0.25, "current_per_run": 0.15, "wind_per_run": 0.15, "rudder_stall": 0.5, "thruster_lag": 0.42}
+_OWN = {"rudder_delay": 0.6, "rudder_asymmetry": 0.25, "current_per_run": 0.15, "wind_per_run": 0.15, "rudder_stall": 0.5, "thruster_lag": 0.42}
 """Likewise. How soon a ship answers her rudder depends on heel and on the flow's memory, which eq. (2) does not know (S175 with heel, nothing hidden:
-0.5 to 0.7 s early, 0.3 to 0.42 of the typical size); the race of a single screw turns, and meets the rudder more on one side (5 % more race to one
-side, 4 % less to the other: 0.15 to 0.22 of the typical size); gusts and swell do not average out in a run (gusts of 1.5 m/s that last 20 s have
-means over 120 s of 0.11 of the typical wind), and push a ship about as a current of her own in each run does; lift grows more slowly than the sine
-of the angle on many a rudder (one with a flap, whose lift goes as tanh: 0.19 lost, 0.4 of the typical size); thrusters whose record is their order
-lag by 2 s, but ordinary ones by up to 4.5 s (`gear_kinds.ORDINARY`)."""
+0.5 to 0.7 s early, 0.3 to 0.42 of the typical size; a ship whose lift builds up over half a length: 0.51 late); the race of a single screw turns, and
+meets the rudder more on one side (5 % more race to one side, 4 % less to the other: 0.15 to 0.22 of the typical size); gusts and swell do not average
+out in a run (gusts of 1.5 m/s that last 20 s have means over 120 s of 0.11 of the typical wind), and push a ship about as currents of single runs do;
+lift grows more slowly than the sine of the angle on many a rudder (one with a flap, whose lift goes as tanh: 0.19 lost, 0.4 of the typical
+size); thrusters whose record is their order lag by 2 s, but ordinary ones by up to 4.5 s (`gear_kinds.ORDINARY`)."""
+_REACH = 0.75
+"""Lengths from midship within which a thruster acts, whatever the hull makes of its jet. (A lever of 1.0 was named for what a hull lacked.)"""
 _DOUBT, _DOUBT_LATE = 0.05, 1e-5
 """Probability that a size is zero from which it is not sure; of a cause that begins with a run, which is chosen among hundreds of effects and runs.
 (Ten standard manoeuvres with nothing hidden: 0.01 to 1e-4; changes hidden in 24 runs: 1e-6 and less.)"""
@@ -124,13 +126,22 @@ def blows_on_a_ship(fit: Fit) -> bool:
     return bool(np.max(np.abs(needed(fit)[[PLACES[f"wind_{axis}"] for axis in ("X", "Y", "N", "lever")]])) < STRANGE)
 
 
+def acts_on_board(fit: Fit, index: int) -> bool:
+    """Whether the bow thruster with its shifted lever is on the ship, or near her."""
+    c = fit.plant.c
+    (shift,) = fit.values[index] * fit.scales.amplitudes(fit.model.terms[index], c.L)
+    return bool(abs(c.tunnels.x_bow + shift) < _REACH * c.L)
+
+
 def is_sure(fit: Fit, index: int) -> bool:
     """Whether the values of a cause differ from zero (Hotelling's test over the runs), and the other runs do not speak against it where one bears it;
-    where each run has its own, whether they last for the run. Of a wind, whether it could blow on a ship."""
+    where each run has its own, whether they last for the run. Of a wind, whether it could blow on a ship; of a thruster, whether it is on one."""
     from scipy.stats import f
 
     term = fit.model.terms[index]
     if term.label in WITHOUT_WIND and not blows_on_a_ship(fit):
+        return False
+    if term.label == "thruster_lever" and not acts_on_board(fit, index):
         return False
     if term.per_run:
         return lasts(fit) and tells_runs_apart(fit)
@@ -147,6 +158,10 @@ def least_size(effect: str) -> float:
 
 
 def matters(fit: Fit, index: int) -> bool:
-    """Whether a cause reaches its least size; of one with a value for each run, their root mean square counts."""
-    squares = np.sum(np.square(fit.values[index]), axis=-1)
-    return bool(np.mean(squares) >= least_size(fit.model.terms[index].label) ** 2)
+    """Whether a cause reaches its least size; of one with a value for each run, their root mean square counts. Of a gear's time half a sample, too,
+    for which an order may have stood before it was recorded."""
+    term, squares = fit.model.terms[index], np.sum(np.square(fit.values[index]), axis=-1)
+    least = least_size(term.label)
+    if term.effect.enters == "gear" and term.effect.parameters[0].unit == "s":
+        least = max(least, 0.5 * fit.plant.seg.dt / float(fit.scales.amplitudes(term, fit.plant.c.L)[0]))
+    return bool(np.mean(squares) >= least**2)

@@ -12,7 +12,7 @@ from shipbench.diagnosis.gear_kinds import ORDINARY
 from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
 from shipbench.diagnosis.model import NUM_BASE, PLACES
 from shipbench.diagnosis.plant import ordinary_gears
-from shipbench.diagnosis.robust import covariance, inflation, is_borne_by_one, is_sure, least_size, matters
+from shipbench.diagnosis.robust import acts_on_board, covariance, inflation, is_borne_by_one, is_sure, least_size, matters
 from shipbench.diagnosis.select import asked_besides
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
@@ -144,9 +144,26 @@ def test_a_value_for_each_run_is_sure_only_if_little_else_differs_between_runs(o
 def test_a_size_matters_from_its_least_on(effect: str, per_run: bool):
     for factor, wanted in ((0.9, False), (1.1, True)):
         size = factor * least_size(effect) * np.array([0.6, -0.8])
-        values = (np.outer([1.0, -1.0, 1.0], size) if per_run else size,)
-        fit = SimpleNamespace(values=values, model=SimpleNamespace(terms=(SimpleNamespace(label=effect),)))
-        assert matters(fit, 0) is wanted
+        assert matters(_sized(effect, np.outer([1.0, -1.0, 1.0], size) if per_run else size, dt=0.5), 0) is wanted
+
+
+def _sized(effect: str, values: np.ndarray, dt: float = 1.0, L: float = 130.0) -> SimpleNamespace:
+    term = Term(EFFECTS.get(effect))
+    plant = SimpleNamespace(seg=SimpleNamespace(dt=dt), c=SimpleNamespace(L=L, tunnels=SimpleNamespace(x_bow=0.38 * L)))
+    typical = np.array([abs(p.typical) for p in term.effect.sized(L)])
+    return SimpleNamespace(values=(values,), model=SimpleNamespace(terms=(term,)), plant=plant, scales=SimpleNamespace(amplitudes=lambda *_: typical))
+
+
+@pytest.mark.parametrize(("dt", "wanted"), [(1.0, True), (2.5, False)])
+def test_a_time_of_less_than_half_a_sample_does_not_matter(dt: float, wanted: bool):
+    assert matters(_sized("rudder_delay", np.array([0.7]), dt), 0) is wanted  # 1.05 s
+    assert matters(_sized("rudder_stall", np.array([0.7]), dt), 0)
+
+
+@pytest.mark.parametrize(("shift", "wanted"), [(-1.4, True), (1.4, True), (4.1, False)])
+def test_a_thruster_acts_on_board(shift: float, wanted: bool):
+    """On a ship of 56 m a lever of 57 m was named for what the hull's form lacked."""
+    assert acts_on_board(_sized("thruster_lever", np.array([shift]), L=56.0), 0) is wanted
 
 
 def test_thrusters_known_by_their_orders_may_be_as_slow_as_ordinary_ones():
