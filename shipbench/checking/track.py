@@ -26,6 +26,8 @@ LEAST_SCALE, LEAST_SWAY_SCALE, LEAST_HEADING, LEAST_CURRENT, LEAST_LAG = 0.02, 0
 """What matters at all: shares, rad, share of the speed, s at 130 m (and a quarter of a sample)."""
 _SURE, _SMALL = 6.0, 3.0
 """Standard errors from which a drift is taken out unasked, and below which a lag may be none."""
+_NO_LAG = 0.7
+"""Seconds at 130 m, which the track must rule out by two standard errors where no lag is to be looked for by other means."""
 _LAGS = {"lag of u, v": (U, V), "lag of position": (X, Y), "lag of heading": (PSI,)}
 _SCALES = frozenset({"scale of u and v", "scale of u", "scale of v"})
 _LATE = frozenset({"lag of u, v", "lag of position"})
@@ -141,13 +143,15 @@ def late_velocities(recording: Recording) -> tuple[float, float] | None:
 
 
 def keeps_time(recording: Recording) -> bool:
-    """Whether the track shows that neither the velocities nor the position are late against the other: by standard errors over the runs."""
+    """Whether the track shows that neither the velocities nor the position are late against the other, by standard errors over the runs, whatever the
+    speed's scale, the heading's reference and the antenna's place."""
     w = windows(recording, {})
     if w is None:
         return False
-    off, cluster = _real(w.moved - w.surge - w.sway)[:, 0], np.tile(clusters(w.run), 2)
-    lags = [clustered_fit(off, _real(column), cluster) for column in (w.velocity_change, -w.way_change)]
-    return all(abs(f.value[0]) < _SMALL * f.sd[0] and abs(f.value[0]) + 2.0 * f.sd[0] < LEAST_LAG * recording.froude for f in lags)
+    way, cluster = w.surge + w.sway, np.tile(clusters(w.run), 2)
+    off, others = _real(w.moved - way)[:, 0], (way, 1j * way, w.turned, 1j * w.turned)
+    lags = [clustered_fit(off, _real(column, *others), cluster) for column in (w.velocity_change, -w.way_change)]
+    return all(abs(f.value[0]) < _SMALL * f.sd[0] and abs(f.value[0]) + 2.0 * f.sd[0] < _NO_LAG * recording.froude for f in lags)
 
 
 def through_water(recording: Recording) -> tuple[float, float] | None:
