@@ -237,7 +237,7 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
         return "named as a change_point" if late and "change_point" in named else _DOUBT
     if label in found.selection.unsure:
         unsteady = "one value for each run does not explain how runs differ"
-        return unsteady if s.term.per_run else "the runs do not agree that its size is not zero"
+        return unsteady if s.term.per_run else "the runs do not agree that its size is not zero, or no ordinary ship would sail so with it"
     if label in found.selection.tiny:
         return f"score {score:.0f}, but less than {least_size(label):.0%} of its typical size: too small to matter"
     if not s.term.per_run and float(np.trace(s.information)) < 1.0:

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..effects.base import Effect
 from .gram import by_run, shared_alone, solve
 from .model import PLACES
-from .ordinary import STRANGE, needed
+from .ordinary import STRANGE, is_strange, needed
 from .screen import evidence
 from .settle import Fit
 
@@ -131,6 +132,18 @@ def acts_on_board(fit: Fit, index: int) -> bool:
     c = fit.plant.c
     (shift,) = fit.values[index] * fit.scales.amplitudes(fit.model.terms[index], c.L)
     return bool(abs(c.tunnels.x_bow + shift) < _REACH * c.L)
+
+
+def shows_on_any_ship(effect: Effect) -> bool:
+    """Whether it shows beside the coefficients of another ship, too: a fault of a sensor, or a force that breaks a symmetry which every ship has (not
+    a wind of each run, nor a bank, which act through coefficients alone)."""
+    return effect.family == "sensor" or (effect.breaks_symmetry and effect.name not in ("wind_per_run", "bank_suction"))
+
+
+def bends(fit: Fit, index: int, null: Fit) -> bool:
+    """Whether a cause that goes by the ship file is in a model that needs a stranger ship than the plain model `null` does: then it explains nothing,
+    but one error by another. (A late rudder for lift that builds up slowly: the thrusters 9 spreads off, without it 5.)"""
+    return not shows_on_any_ship(fit.model.terms[index].effect) and is_strange(fit) and not is_strange(null)
 
 
 def is_sure(fit: Fit, index: int) -> bool:

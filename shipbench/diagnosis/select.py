@@ -14,7 +14,7 @@ from .model import Linearisation
 from .ordinary import STRANGE_SIZE, widened
 from .plain import REFIT_ITERATIONS
 from .plant import Plant
-from .robust import WITHOUT_WIND, is_sure, matters
+from .robust import WITHOUT_WIND, bends, is_sure, matters
 from .screen import Score, changes, glance, overlap, screen
 from .settle import Fit, hull_evidence, settle
 from .term import Term
@@ -83,8 +83,8 @@ class Step:
 class Selection:
     """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final one; off_form:
     what a cause for which the form of a hull could pass must be worth besides (`asked_besides`); unsure: effects taken out again, since over the runs
-    their size may be zero, or does not explain how runs differ; tiny: effects that gain more than the threshold, but are too small to matter; small:
-    the plain model with those of them that it is better with, where nothing else was found."""
+    their size may be zero, does not explain how runs differ, or asks for a stranger ship; tiny: effects that gain more than the threshold, but are
+    too small to matter; small: the plain model with those of them that it is better with, where nothing else was found."""
 
     null: Fit
     final: Fit
@@ -233,7 +233,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         now = widened(looking_at(_backward(best, threshold, besides), candidates))
         scores = screen(now)
     pruned = _backward(now, threshold, besides, spare_last=False)
-    pruned, unsure = _without(pruned, is_sure) if careful else (pruned, ())
+    pruned, unsure = _without(pruned, lambda f, i: is_sure(f, i) and not bends(f, i, null)) if careful else (pruned, ())
     whole = pruned
     pruned, small = _without(pruned, matters) if careful else (pruned, ())
     if pruned is not now:

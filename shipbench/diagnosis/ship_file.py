@@ -10,14 +10,11 @@ from ..effects.base import EFFECTS
 from .analysis import Analysis
 from .gear_kinds import slow_on_any_ship
 from .model import NUM_BASE, PLACES
-from .ordinary import STRANGE, STRANGE_SIZE, needed
+from .ordinary import STRANGE_SIZE, is_strange, needed
 from .other_size import better_size, size_instead_of
+from .robust import shows_on_any_ship
 from .settle import Fit
 
-STRANGE_SUM = 160.0
-"""Sum of squares of the fit's parameters, in units of what ships differ by, beside the causes.
-(Sums with right ship files: 15 to 63 on MMG ships, up to 148 on ships of the literature and on the Esso Osaka; with wrong ones from 18 on; what
-is not seen here may be seen by `better_size`.)"""
 ORDINARY_SUM = 20.0
 """Sum of squares below which no other size is tried, which takes as long as the first fit. (With the files of ships of less than 0.6 or more than 1.7
 times the length: 22 and more.)"""
@@ -35,11 +32,11 @@ _QUESTION = "Is the ship file that of this ship (L, B, T, displacement, propelle
 def doubts_of(found: Analysis) -> list[str]:
     """Signs that the model does not belong to the data, in one warning: the fit leaves what is ordinary, hull or propeller would be another ship's,
     a ship of quite another size explains the runs better, or one of nearly the same size does as well as the causes where the fit is odd. Causes in
-    whose place something unknown is told raise none."""
+    whose place something unknown is told raise none, nor do parameters that are ordinary without causes."""
     fit = found.final if found.unknown is None else found.selection.null
     z = needed(fit)
     signs = []
-    if np.max(np.abs(z)) > STRANGE or np.sum(z**2) > STRANGE_SUM:
+    if is_strange(fit) and is_strange(found.selection.null):
         signs.append(_moved(z))
     if abs(z[PLACES["log_thrust"]]) > STRANGE_THRUST:
         signs.append(f"the propeller would have to give {_thrust_factor(fit):.2g} times the thrust that the ship file makes likely")
@@ -94,9 +91,7 @@ def whatever_the_ship(name: str, found: Analysis) -> bool:
     alone, and what these lack in a run's manoeuvre, or in those of one place, passes for them (a current shows in track and speeds besides; a ship
     that towed a barge on an elastic line had a bank). Of a change, what has changed decides."""
     effect = EFFECTS.get(next((t.label for t in found.final.model.terms if t.since is not None), name) if name == "change_point" else name)
-    forces = effect.breaks_symmetry and name not in ("wind_per_run", "bank_suction")
-    in_record = any(g.effect == name and slow_on_any_ship(g) for g in found.gears)
-    return effect.family == "sensor" or forces or in_record
+    return shows_on_any_ship(effect) or any(g.effect == name and slow_on_any_ship(g) for g in found.gears)
 
 
 def own_propeller(found: Analysis) -> list[str]:

@@ -11,13 +11,12 @@ import pytest
 from shipbench.diagnosis import ordinary
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.model import NUM_BASE, PLACES, Linearisation, Scales
-from shipbench.diagnosis.ordinary import NOTICEABLE, STRANGE, needed, widened, widths_of
+from shipbench.diagnosis.ordinary import NOTICEABLE, STRANGE, STRANGE_SUM, needed, widened, widths_of
 from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import screen
 from shipbench.diagnosis.select import candidates_for
 from shipbench.diagnosis.settle import Fit, settle
-from shipbench.diagnosis.ship_file import STRANGE_SUM
 from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.eq2 import coefficients

@@ -12,7 +12,7 @@ from shipbench.diagnosis.gear_kinds import ORDINARY
 from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
 from shipbench.diagnosis.model import NUM_BASE, PLACES
 from shipbench.diagnosis.plant import ordinary_gears
-from shipbench.diagnosis.robust import acts_on_board, covariance, inflation, is_borne_by_one, is_sure, least_size, matters
+from shipbench.diagnosis.robust import acts_on_board, bends, covariance, inflation, is_borne_by_one, is_sure, least_size, matters
 from shipbench.diagnosis.select import asked_besides
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
@@ -158,6 +158,17 @@ def _sized(effect: str, values: np.ndarray, dt: float = 1.0, L: float = 130.0) -
 def test_a_time_of_less_than_half_a_sample_does_not_matter(dt: float, wanted: bool):
     assert matters(_sized("rudder_delay", np.array([0.7]), dt), 0) is wanted  # 1.05 s
     assert matters(_sized("rudder_stall", np.array([0.7]), dt), 0)
+
+
+@pytest.mark.parametrize(
+    ("effect", "strange", "wanted"),
+    [("rudder_delay", ("with",), True), ("rudder_delay", ("with", "null"), False), ("rudder_delay", (), False), ("current", ("with",), False)],
+)
+def test_what_asks_for_a_stranger_ship_than_nothing_does_is_no_cause(monkeypatch, effect: str, strange: tuple[str, ...], wanted: bool):
+    """Else the ship file was doubted for it; a current shows whatever the ship is."""
+    fit = _sized(effect, np.array([1.0]))
+    monkeypatch.setattr(robust, "is_strange", lambda found: ("with" if found is fit else "null") in strange)
+    assert bends(fit, 0, SimpleNamespace()) is wanted
 
 
 @pytest.mark.parametrize(("shift", "wanted"), [(-1.4, True), (1.4, True), (4.1, False)])
