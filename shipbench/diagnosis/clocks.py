@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from ..checking.recording import Recording
-from ..checking.track import late_velocities
+from ..checking.track import keeps_time, late_velocities
 from ..checking.yaw import late_yaw_rate
 from ..data.corrections import undelayed
 from ..records import Dataset, Run
@@ -60,6 +60,11 @@ def check_clocks(dataset: Dataset) -> LateVelocities | None:
     if np.sum(over) < 0.0 or -np.sum(over_position) > _SURE * len(over) ** 0.5 * np.std(over_position):
         return None
     return LateVelocities(delay, sd, best == "filtered", 2.0 * float(np.sum(over)), 2.0 * float(np.sum(over_position)), ways[best])
+
+
+def ruled_out(dataset: Dataset) -> tuple[str, ...]:
+    """Delays that need not be asked of the model, since the track shows none."""
+    return NAMES if keeps_time(Recording(dataset)) else ()
 
 
 def with_prompt_yaw_rate(dataset: Dataset) -> tuple[Dataset, list[str]]:

@@ -13,16 +13,14 @@ from multiprocessing import get_context
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ..checking.recording import Recording
 from ..checking.standing import standing
-from ..checking.track import keeps_time
 from ..checking.units import UnitFinding, check_units, corrected, merged
 from ..errors import InputError
 from ..records import Dataset
 from . import misread
 from .analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .causes import describe_candidates, describe_causes, remaining, unknown_part, what_is_left
-from .clocks import NAMES, check_clocks, with_prompt_yaw_rate
+from .clocks import NAMES, check_clocks, ruled_out, with_prompt_yaw_rate
 from .derived import faults, has_speeds, marked, said
 from .felt_wind import with_true_wind
 from .fit import Fit
@@ -68,11 +66,12 @@ def diagnose(
     dataset = corrected(dataset, units)
     dataset, mended = _mended(dataset) if only is None else (dataset, [])
     dataset = _in_time(dataset)
-    late = check_clocks(dataset) if only is None and has_speeds(dataset) else None
+    told_by_track = only is None and has_speeds(dataset)
+    late = check_clocks(dataset) if told_by_track else None
+    clocks = NAMES if late is not None else ruled_out(dataset) if told_by_track else ()
     if late is not None:
         dataset = late.mended
-    in_time = late is not None or (only is None and has_speeds(dataset) and keeps_time(Recording(dataset)))
-    settled = (*(NAMES if in_time else ()), *faults(dataset))
+    settled = (*clocks, *faults(dataset))
     steps = THOROUGH_STEPS if thorough else MOST_STEPS
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     apart = len({run.group for run in dataset.runs}) > 1

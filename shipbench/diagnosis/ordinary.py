@@ -48,9 +48,8 @@ def needed(found: Fit, least: float = NOTICEABLE) -> np.ndarray:
     return z
 
 
-def is_strange(found: Fit) -> bool:
-    """Whether hull, propeller or rudder would be no ordinary ship's."""
-    z = needed(found)
+def is_strange(z: np.ndarray) -> bool:
+    """Whether hull, propeller or rudder would be no ordinary ship's, given the parameters (NUM_BASE,) that are `needed`."""
     return bool(np.max(np.abs(z)) > STRANGE or np.sum(z**2) > STRANGE_SUM)
 
 

@@ -143,7 +143,7 @@ def shows_on_any_ship(effect: Effect) -> bool:
 def bends(fit: Fit, index: int, null: Fit) -> bool:
     """Whether a cause that goes by the ship file is in a model that needs a stranger ship than the plain model `null` does: then it explains nothing,
     but one error by another. (A late rudder for lift that builds up slowly: the thrusters 9 spreads off, without it 5.)"""
-    return not shows_on_any_ship(fit.model.terms[index].effect) and is_strange(fit) and not is_strange(null)
+    return not shows_on_any_ship(fit.model.terms[index].effect) and is_strange(needed(fit)) and not is_strange(needed(null))
 
 
 def is_sure(fit: Fit, index: int) -> bool:

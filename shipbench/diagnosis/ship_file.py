@@ -36,7 +36,7 @@ def doubts_of(found: Analysis) -> list[str]:
     fit = found.final if found.unknown is None else found.selection.null
     z = needed(fit)
     signs = []
-    if is_strange(fit) and is_strange(found.selection.null):
+    if is_strange(z) and is_strange(needed(found.selection.null)):
         signs.append(_moved(z))
     if abs(z[PLACES["log_thrust"]]) > STRANGE_THRUST:
         signs.append(f"the propeller would have to give {_thrust_factor(fit):.2g} times the thrust that the ship file makes likely")

@@ -8,7 +8,7 @@ from ..checking.units import UnitFinding, check_commands
 from ..records import Dataset
 from ..signals import DELTA, F_B, F_S, STATES, N
 from .model import CENTRE, FREE, SPREAD
-from .plain import first_fit
+from .plain import first_evidence, first_fit
 from .settle import Fit
 
 _LIFT = FREE.index(5)
@@ -35,7 +35,7 @@ def _rudder(null: Fit) -> list[UnitFinding]:
     slope, sd = CENTRE[_LIFT] + SPREAD[_LIFT] * null.solution.mean[_LIFT], SPREAD[_LIFT] * np.sqrt(null.solution.cov[_LIFT, _LIFT])
     if slope > -_FALLS * sd:
         return []
-    gain = first_fit(null.plant.turned([DELTA - N]), null).evidence - null.evidence
+    gain = first_evidence(null.plant.turned([DELTA - N]), null) - null.evidence
     if gain < 0.0:
         return []
     text = f"The fitted lift of the rudder falls with its angle, to {slope:.2g} +- {sd:.1g} of the usual slope. {_better(gain)}"
@@ -52,7 +52,7 @@ def _thrusters(null: Fit) -> list[UnitFinding]:
     plant = null.plant.where(np.any(push != 0.0, axis=(1, 2)))
     readings = [[c] for c in used] + ([used] if len(used) > 1 else [])
     best, turned = max(((first_fit(plant.turned([c - N for c in reading]), null), reading) for reading in readings), key=lambda x: x[0].evidence)
-    gain = best.evidence - first_fit(plant, null).evidence
+    gain = best.evidence - first_evidence(plant, null)
     if gain > _BETTER:
         gain = min(gain, best.evidence - first_fit(plant, null, like=best).evidence)
     return [UnitFinding(STATES[c], "sign", -1.0, _better(gain)) for c in turned] if gain > _BETTER else []

@@ -37,11 +37,12 @@ class Wind(Effect):
 
     def sized(self, L: float) -> tuple[Parameter, ...]:
         """Of the fitted components where it is fitted, with the bounds of a wind along one of them."""
+        plain = super().sized(L)
         if self.stretch is None:
-            return super().sized(L)
+            return plain
         typical, speed = self.stretch
-        most = [p.high * (p.high + speed) / (typical + speed) for p in super().sized(L)]
-        return tuple(replace(p, low=-high, high=high) for p, high in zip(super().sized(L), most, strict=True))
+        factors = [(p.high + speed) / (typical + speed) for p in plain]
+        return tuple(replace(p, low=factor * p.low, high=factor * p.high) for p, factor in zip(plain, factors, strict=True))
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         air_u, air_v = body_axes(*self._wind(q), s.psi)

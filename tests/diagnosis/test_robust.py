@@ -167,7 +167,8 @@ def test_a_time_of_less_than_half_a_sample_does_not_matter(dt: float, wanted: bo
 def test_what_asks_for_a_stranger_ship_than_nothing_does_is_no_cause(monkeypatch, effect: str, strange: tuple[str, ...], wanted: bool):
     """Else the ship file was doubted for it; a current shows whatever the ship is."""
     fit = _sized(effect, np.array([1.0]))
-    monkeypatch.setattr(robust, "is_strange", lambda found: ("with" if found is fit else "null") in strange)
+    monkeypatch.setattr(robust, "needed", lambda found: "with" if found is fit else "null")
+    monkeypatch.setattr(robust, "is_strange", lambda z: z in strange)
     assert bends(fit, 0, SimpleNamespace()) is wanted
 
 
