@@ -17,6 +17,7 @@ from ..checking.yaw import late_yaw_rate
 from ..data.corrections import undelayed
 from ..records import Dataset, Run
 from ..signals import PSI, STATES, U, V
+from .derived import has_speeds
 from .fit import Origin, fit
 from .gram import by_run
 from .model import Scales
@@ -24,7 +25,7 @@ from .plant import Plant
 from .settle import Model
 
 NAMES = ("velocity_delay", "position_delay")
-"""What need not be asked of the model once the clocks are put right."""
+"""What kinematics may answer."""
 _SURE = 2.0
 """Standard errors over the runs."""
 
@@ -62,9 +63,9 @@ def check_clocks(dataset: Dataset) -> LateVelocities | None:
     return LateVelocities(delay, sd, best == "filtered", 2.0 * float(np.sum(over)), 2.0 * float(np.sum(over_position)), ways[best])
 
 
-def ruled_out(dataset: Dataset) -> tuple[str, ...]:
-    """Delays that need not be asked of the model, since the track shows none."""
-    return NAMES if keeps_time(Recording(dataset)) else ()
+def not_asked(dataset: Dataset, late: LateVelocities | None) -> tuple[str, ...]:
+    """Delays that are not asked of the model: all of them once the clocks are put right, or where measured speeds and the track show none."""
+    return NAMES if late is not None or (has_speeds(dataset) and keeps_time(Recording(dataset))) else ()
 
 
 def with_prompt_yaw_rate(dataset: Dataset) -> tuple[Dataset, list[str]]:

@@ -20,7 +20,7 @@ from ..records import Dataset
 from . import misread
 from .analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .causes import describe_candidates, describe_causes, remaining, unknown_part, what_is_left
-from .clocks import NAMES, check_clocks, ruled_out, with_prompt_yaw_rate
+from .clocks import check_clocks, not_asked, with_prompt_yaw_rate
 from .derived import faults, has_speeds, marked, said
 from .felt_wind import with_true_wind
 from .fit import Fit
@@ -66,12 +66,10 @@ def diagnose(
     dataset = corrected(dataset, units)
     dataset, mended = _mended(dataset) if only is None else (dataset, [])
     dataset = _in_time(dataset)
-    told_by_track = only is None and has_speeds(dataset)
-    late = check_clocks(dataset) if told_by_track else None
-    clocks = NAMES if late is not None else ruled_out(dataset) if told_by_track else ()
+    late = check_clocks(dataset) if only is None and has_speeds(dataset) else None
     if late is not None:
         dataset = late.mended
-    settled = (*clocks, *faults(dataset))
+    settled = (*(not_asked(dataset, late) if only is None else ()), *faults(dataset))
     steps = THOROUGH_STEPS if thorough else MOST_STEPS
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     apart = len({run.group for run in dataset.runs}) > 1
