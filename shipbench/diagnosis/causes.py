@@ -239,7 +239,7 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
         unsteady = "one value for each run does not explain how runs differ"
         return unsteady if s.term.per_run else "the runs do not agree that its size is not zero, or no ordinary ship would sail so with it"
     if label in found.selection.tiny:
-        return f"score {score:.0f}, but less than {least_size(label):.0%} of its typical size: too small to matter"
+        return f"score {score:.0f}, but less than {least_size(found.selection.null, s.term):.0%} of its typical size: too small to matter"
     if not s.term.per_run and float(np.trace(s.information)) < 1.0:
         return "cannot be told from the fitted coefficients with these data"
     if score <= found.threshold:
@@ -268,10 +268,10 @@ def _detectable(found: Analysis, s: Score) -> dict[str, float]:
     unit, effect = null.scales.amplitudes(term, null.plant.c.L), term.effect
     asked = found.threshold + term.cost(null.plant.seg.runs) + asked_besides(term, found.selection.off_form)
     if term.per_run:
-        least = np.full(term.size, max(_root_mean_square(s.information, asked), least_size(term.label)))
+        least = np.full(term.size, max(_root_mean_square(s.information, asked), least_size(null, term)))
     else:
         V, volume = np.maximum(np.diag(s.information), 1e-12), np.linalg.slogdet(np.eye(term.size) + s.information)[1]
-        least = np.maximum(np.sqrt((asked + volume) / V), least_size(term.label))
+        least = np.maximum(np.sqrt((asked + volume) / V), least_size(null, term))
     values = {}
     for size, p in zip(unit * least, [p for p in effect.sized(null.plant.c.L) if not p.shape], strict=True):
         seen = effect.public((size, 0.0))[effect.vector[0]] if effect.vector else float(size)

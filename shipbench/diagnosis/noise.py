@@ -18,8 +18,9 @@ _FIRST, _WORTH = ((1.0, 2.0), (4.0, 6.0)), 50.0
 residuals, too."""
 _SWINGS, _MOST_LAG = -0.1, 12
 """Correlation of residuals below which they swing (independent ones: above -0.08), and the lag [samples] up to which that is looked for."""
-_PERIODS, _DAMPING = (1.7, 2.0, 2.3), (0.1, 0.25)
-"""Periods tried, in lags of the lowest correlation, and damping ratios."""
+_PERIODS, _DAMPING, _FURTHER = (1.7, 2.0, 2.3), (0.1, 0.25), 1.15
+"""Periods tried, in lags of the lowest correlation, damping ratios, and the factor of further periods: where the latent force follows the waves, what
+is left swings faster than they."""
 
 
 def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colour:
@@ -32,8 +33,18 @@ def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colo
         ways = _swinging(found, colour, channel) + ([] if waves_alone else _lasting(found, colour, channel, best + worth))
         tried = [evidence_with(found, way) for way in ways]
         if tried and max(tried) > best + worth:
-            best, colour = max(tried), ways[int(np.argmax(tried))]
+            best, colour = _tuned(found, ways[int(np.argmax(tried))], channel, max(tried))
     return colour
+
+
+def _tuned(found: Fit, colour: Colour, channel: int, best: float) -> tuple[float, Colour]:
+    """Log evidence and noise of `colour`, which has the evidence `best`, with a longer or a shorter period in a channel, as far as that is better."""
+    share, time, period = (float(x[channel]) for x in (colour.share, colour.time, colour.period))
+    for factor in (_FURTHER, 1.0 / _FURTHER) if np.isfinite(period) else ():
+        stretch = factor
+        while (worth := evidence_with(found, way := colour.with_channel(channel, share, time * stretch, period * stretch))) > best:
+            best, colour, stretch = worth, way, stretch * factor
+    return best, colour
 
 
 def _lasting(found: Fit, colour: Colour, channel: int, least: float) -> list[Colour]:

@@ -44,6 +44,10 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
             if np.ptp(plant.seg.commands[..., i]) > 0.0:
                 found = _with_gear(found, name, field)
     colour = colour_of(found, share)
+    if np.isfinite(colour.period).any():  # a force that follows the waves hides what is slow, and how they swing
+        scales = scales.coloured(colour)
+        found = _begun(found.plant, scales)
+        colour = colour_of(found, share)
     if few is not plant:
         found = _begun(plant.driven(found.plant.ordinary), scales)
     scales = found.scales.coloured(colour)

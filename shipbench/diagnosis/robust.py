@@ -13,6 +13,7 @@ from .model import PLACES
 from .ordinary import STRANGE, is_strange, needed
 from .screen import evidence
 from .settle import Fit
+from .term import Term
 
 WITHOUT_WIND = ("wind", "wind_per_run")
 """Causes only where the wind is not measured."""
@@ -165,16 +166,16 @@ def is_sure(fit: Fit, index: int) -> bool:
     return doubt < (_DOUBT if term.since is None else _DOUBT_LATE) and not is_borne_by_one(fit, index)
 
 
-def least_size(effect: str) -> float:
-    """Below which a cause does not matter, in typical sizes."""
-    return _OWN.get(effect, NEGLIGIBLE)
+def least_size(fit: Fit, term: Term) -> float:
+    """Below which a cause does not matter, in typical sizes. Of a gear's time half a sample, too, for which an order may have stood before it was
+    recorded."""
+    least = _OWN.get(term.label, NEGLIGIBLE)
+    if term.effect.enters == "gear" and term.effect.parameters[0].unit == "s":
+        least = max(least, 0.5 * fit.plant.seg.dt / float(fit.scales.amplitudes(term, fit.plant.c.L)[0]))
+    return least
 
 
 def matters(fit: Fit, index: int) -> bool:
-    """Whether a cause reaches its least size; of one with a value for each run, their root mean square counts. Of a gear's time half a sample, too,
-    for which an order may have stood before it was recorded."""
+    """Whether a cause reaches its least size; of one with a value for each run, their root mean square counts."""
     term, squares = fit.model.terms[index], np.sum(np.square(fit.values[index]), axis=-1)
-    least = least_size(term.label)
-    if term.effect.enters == "gear" and term.effect.parameters[0].unit == "s":
-        least = max(least, 0.5 * fit.plant.seg.dt / float(fit.scales.amplitudes(term, fit.plant.c.L)[0]))
-    return bool(np.mean(squares) >= least**2)
+    return bool(np.mean(squares) >= least_size(fit, term) ** 2)
