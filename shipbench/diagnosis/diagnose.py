@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
@@ -15,6 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from ..checking.standing import standing
 from ..checking.units import UnitFinding, check_units, corrected, merged
+from ..effects.base import EFFECTS
 from ..errors import InputError
 from ..records import Dataset
 from . import misread
@@ -210,15 +212,27 @@ def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
 
 
 def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, str]:
-    """What to do about a rudder that acts later (or sooner) than its record says, by the name of the cause: the gears of the predictors end at the
-    record, so that the record has to be put right."""
-    late = next((c.parameters["delay"].value for c in causes if c.effect == "rudder_delay"), 0.0)
-    if not late or found.final.plant.seg.commanded or any(g.effect == "rudder_delay" for g in found.gears):
+    """What to do about an actuator that acts otherwise than its record says, by the name of the cause: the gears of the predictors end at the record,
+    so that the record has to be put right."""
+    if found.final.plant.seg.commanded:
         return {}
-    return {
-        "rudder_delay": f"the motion shows the rudder {abs(late):.2g} s {'later' if late > 0.0 else 'sooner'} than its record, to which predictors "
-        f"fit their gears. Put the record right first, by [delay] delta = {-late:.2g} in dataset.toml."
-    }
+    in_record, told = {g.effect for g in found.gears}, {}
+    for c in causes:
+        if c.effect in in_record or not (c.effect in EFFECTS.names() and EFFECTS.get(c.effect).unrecorded):
+            continue
+        ((name, size),) = c.parameters.items()
+        what, channel = ("rudder", "delta") if c.effect.startswith("rudder") else ("shaft", "n")
+        value, unit = (math.degrees(size.value), "deg") if size.unit == "rad" else (size.value, size.unit)
+        sooner = name == "delay" and value < 0.0
+        text = f"the motion shows the {what} {abs(value):.2g} {unit} {'sooner' if sooner else 'later'} than its record"
+        if name != "delay":
+            text = f"the motion shows a {name} of {value:.2g} {unit} between the record of the {what} and the {what} itself"
+        told[c.effect] = f"{text}, and predictors fit their gears to the record. "
+        told[c.effect] += (
+            "Measure at the rudder stock." if name == "play" else
+            f"Put the record right first, by [delay] {channel} = {-value:.2g} in dataset.toml{'' if name == 'delay' else ', which comes near'}."
+        )  # fmt: skip
+    return told
 
 
 def _cross_validated(

@@ -27,7 +27,7 @@ _PRIOR_SD, _SENSOR_SD = 0.5, 3.0
 channel (0.23 deg, 0.04 m/s, 0.04 m/s, 0.04 deg/s)."""
 NO_FORM = ("nothing", "heading", "position", "time", "waves", "run")
 """What no ship's form depends on."""
-_BY_RUN = ("heading", "position", "waves")
+_BY_RUN = ("heading", "position", "waves", "run")
 """What every run has its own of. What a model lacks of a ship is another force in each manoeuvre, and passes for one that follows these: it does only
 if it explains more than a constant force of its own in each run; and one with the period of waves, more than one of its own phase in each run, since
 waves rock a ship, and the latent force, which has no periods, makes too much of those that are in step by chance."""

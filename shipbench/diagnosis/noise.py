@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 
+from ..signals import R, U, V
 from .colour import Colour
 from .settle import Fit, evidence_with
 from .wrong import CHANNEL_UNITS, RESIDUALS
@@ -21,6 +22,9 @@ _SWINGS, _MOST_LAG = -0.1, 12
 _PERIODS, _DAMPING, _FURTHER = (1.7, 2.0, 2.3), (0.1, 0.25), 1.15
 """Periods tried, in lags of the lowest correlation, damping ratios, and the factor of further periods: where the latent force follows the waves, what
 is left swings faster than they."""
+_RISES, _LONGEST, _LIKELY = 0.2, 30, 4.0
+"""Rise of the correlation of the latent force from its lowest on, from which it swings (without waves: 0, in a swell: 0.33 to 0.48), the lag
+[samples] up to which that is looked for, and the share of such waves in a velocity."""
 
 
 def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colour:
@@ -66,6 +70,21 @@ def _swinging(found: Fit, colour: Colour, channel: int) -> list[Colour]:
     half = 1 + int(np.argmin(correlation))
     ways = [(share, factor * half, damping) for share, factor, damping in product(_SHARES, _PERIODS, _DAMPING)]
     return [colour.with_channel(channel, share, period / (2.0 * np.pi * damping), period) for share, period, damping in ways]
+
+
+def swinging_force(found: Fit, colour: Colour) -> Colour:
+    """`colour` with noise that swings in the velocities of the axes in which the latent force does: it follows waves that are long to its knots, and
+    no residual shows them."""
+    for axis, channel in enumerate((U, V, R)):
+        w = np.where(found.plant.seg.mask, found.point.w[..., axis] @ found.plant.hat.T, 0.0)
+        lags = range(1, min(_LONGEST, w.shape[1] - 1) + 1)
+        correlation = np.array([np.sum(w[:, lag:] * w[:, :-lag]) for lag in lags]) / max(np.sum(w**2), 1e-300)
+        lowest, later = np.minimum.accumulate(correlation), np.maximum.accumulate(correlation[::-1])[::-1]
+        half = int(np.argmax(later - lowest))
+        if np.isinf(colour.period[channel]) and later[half] - lowest[half] > _RISES:
+            period = 1.0 + half + float(np.argmax(correlation[half:]))
+            colour = colour.with_channel(channel, _LIKELY, period / (2.0 * np.pi * _DAMPING[0]), period)
+    return colour
 
 
 def noise_in_words(found: Fit) -> dict[str, str]:

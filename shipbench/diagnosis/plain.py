@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from .colour import Colour
 from .fit import Origin, fit
 from .gram import Hyper
 from .model import Scales
-from .noise import colour_of
+from .noise import colour_of, swinging_force
 from .ordinary import widened
 from .plant import FEW_PIECES, Plant
 from .settle import Fit, Model
@@ -36,18 +37,11 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
     few = plant.thinned(FEW_PIECES)
     found, share = _begun(few, scales), len(few.seg.run) / len(plant.seg.run)
     if plant.seg.commanded:
-        waves = colour_of(found, share, waves_alone=True)
-        if waves.share.any():  # a force that follows them says nothing of a gear
-            scales = scales.coloured(waves)
-            found = _begun(few, scales)
+        found, scales, _ = _beside_waves(found, scales, share, waves_alone=True)  # a force that follows them says nothing of a gear
         for i, name, field in ((0, "n", "T"), (1, "delta", "rate"), (1, "delta", "T")):
             if np.ptp(plant.seg.commands[..., i]) > 0.0:
                 found = _with_gear(found, name, field)
-    colour = colour_of(found, share)
-    if np.isfinite(colour.period).any():  # a force that follows the waves hides what is slow, and how they swing
-        scales = scales.coloured(colour)
-        found = _begun(found.plant, scales)
-        colour = colour_of(found, share)
+    found, scales, colour = _beside_waves(found, scales, share)
     if few is not plant:
         found = _begun(plant.driven(found.plant.ordinary), scales)
     scales = found.scales.coloured(colour)
@@ -81,6 +75,18 @@ def _begun(plant: Plant, scales: Scales) -> Fit:
         if calm.excess < _CREEPS:
             found = calm
     return replace(found, scales=scales.with_background(found.hyper))
+
+
+def _beside_waves(found: Fit, scales: Scales, share: float, waves_alone: bool = False) -> tuple[Fit, Scales, Colour]:
+    """A first fit, its units, and the noise that suits it (`colour_of`); made again beside the waves, where the ship moves with them: a force that
+    follows them is large, hides what is slow, and leaves residuals that swing too fast."""
+    colour = colour_of(found, share, waves_alone)
+    waves = swinging_force(found, colour)
+    if np.isfinite(waves.period).any():
+        scales = scales.coloured(waves)
+        found = _begun(found.plant, scales)
+        colour = colour_of(found, share, waves_alone)
+    return found, scales, colour
 
 
 def _first(plant: Plant, scales: Scales, iterations: int = _FIRST_ITERATIONS, weak: bool = False, hyper: Hyper | None = None) -> Fit:

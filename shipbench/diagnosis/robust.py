@@ -19,13 +19,17 @@ WITHOUT_WIND = ("wind", "wind_per_run")
 """Causes only where the wind is not measured."""
 NEGLIGIBLE = 0.05
 """In typical sizes. With enough samples the form of a hull makes tiny causes certain: speeds 0.1 % off, a bank of a 65th of the usual suction."""
-_OWN = {"rudder_delay": 0.6, "rudder_asymmetry": 0.25, "current_per_run": 0.15, "wind_per_run": 0.15, "rudder_stall": 0.5, "thruster_lag": 0.42}
-"""Likewise. How soon a ship answers her rudder depends on heel and on the flow's memory, which eq. (2) does not know (S175 with heel, nothing hidden:
-0.5 to 0.7 s early, 0.3 to 0.42 of the typical size; a ship whose lift builds up over half a length: 0.51 late); the race of a single screw turns, and
-meets the rudder more on one side (5 % more race to one side, 4 % less to the other: 0.15 to 0.22 of the typical size); gusts and swell do not average
-out in a run (gusts of 1.5 m/s that last 20 s have means over 120 s of 0.11 of the typical wind), and push a ship about as currents of single runs do;
-lift grows more slowly than the sine of the angle on many a rudder (one with a flap, whose lift goes as tanh: 0.19 lost, 0.4 of the typical
-size); thrusters whose record is their order lag by 2 s, but ordinary ones by up to 4.5 s (`gear_kinds.ORDINARY`)."""
+_OWN = {
+    "rudder_delay": 0.6, "rudder_lag": 0.3, "rudder_asymmetry": 0.25, "current_per_run": 0.15, "wind_per_run": 0.15, "rudder_stall": 0.5,
+    "thruster_lag": 0.42,
+}  # fmt: skip
+"""Likewise. How soon a ship answers her rudder depends on heel and on the flow's memory, which eq. (2) does not know (S175 with heel, nothing
+hidden: 0.5 to 0.7 s early, 0.3 to 0.42 of the typical size; a ship whose lift builds up over half a length: 0.51 late; a lag is about as late); the
+race of a single screw turns, and meets the rudder more on one side (5 % more race to one side, 4 % less to the other: 0.15 to 0.22 of the typical
+size); gusts and swell do not average out in a run (gusts of 1.5 m/s that last 20 s have means over 120 s of 0.11 of the typical wind), and push a
+ship about as currents of single runs do; lift grows more slowly than the sine of the angle on many a rudder (one with a flap, whose lift goes as
+tanh: 0.19 lost, 0.4 of the typical size); thrusters whose record is their order lag by 2 s, but ordinary ones by up to 4.5 s
+(`gear_kinds.ORDINARY`)."""
 _REACH = 0.75
 """Lengths from midship within which a thruster acts, whatever the hull makes of its jet. (A lever of 1.0 was named for what a hull lacked.)"""
 _DOUBT, _DOUBT_LATE = 0.05, 1e-5

@@ -40,8 +40,9 @@ _IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
 """What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
 _OFF_FORM, _MISTAKEN, _OF_RUNS = 0.02, 10.0, 50.0
 AS_SHIPS_DIFFER = (
-    "added_resistance", "bank_suction", "center_of_gravity_shift", "cross_flow_drag", "mass_change", "race_gain", "rudder_delay", "rudder_gain",
-    "rudder_stall", "shallow_water", "thrust_gain", "thruster_gain", "thruster_lever", "thruster_speed_loss", "wake_variation",
+    "added_resistance", "bank_suction", "center_of_gravity_shift", "cross_flow_drag", "mass_change", "race_gain", "rudder_backlash", "rudder_delay",
+    "rudder_gain", "rudder_lag", "rudder_stall", "shaft_lag", "shallow_water", "thrust_gain", "thruster_gain", "thruster_lever",
+    "thruster_speed_loss", "wake_variation",
 )  # fmt: skip
 """A hull that lies off the regressions is not of the fitted form either, and what its form lacks passes for these, in which ships differ anyhow:
 they must be worth this share of the evidence for such a hull besides. (Mariner, nothing hidden: 600 to 1200 for the hull, 13 to 18 for a wrong name;

@@ -16,6 +16,7 @@ class RudderBacklash(Effect):
     summary = "play of the steering gear"
     source = "physics reference, section 5, A24"
     parameters = (Parameter("play", "rad", math.radians(2.0), 0.0, 0.15),)
+    unrecorded = True
     separate = "slow rudder reversals: play leaves a constant difference, a lag none"
 
     def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:

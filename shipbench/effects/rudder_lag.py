@@ -15,6 +15,7 @@ class RudderLag(Effect):
     summary = "slow first-order steering gear"
     source = "physics reference, section 5, A22"
     parameters = (Parameter("lag", "s", 3.0, 0.0, 30.0, scaling="time"),)
+    unrecorded = True
     separate = "small and large rudder steps: a lag takes the same time for both"
 
     def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:

@@ -15,6 +15,7 @@ class ShaftLag(Effect):
     summary = "slow first-order shaft"
     source = "physics reference, section 5, P31"
     parameters = (Parameter("lag", "s", 10.0, 0.0, 120.0, scaling="time"),)
+    unrecorded = True
     separate = "small and large steps of the revolutions"
 
     def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,10 +15,11 @@ from shipbench.diagnosis.gear_kinds import GearFinding, kinds_of, slow_on_any_sh
 from shipbench.diagnosis.gears import _Record, find_in_gears
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.rolling import Active
-from shipbench.effects.base import EFFECTS
+from shipbench.effects.base import EFFECTS, Effect, Parameter
+from shipbench.ops import Array
 from shipbench.physics.actuators import Gear, gear_path
 from shipbench.physics.mmg import load_mmg_ship
-from shipbench.signals import DELTA
+from shipbench.signals import DELTA, N
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
 
@@ -126,6 +128,44 @@ def test_a_rudder_that_is_later_than_its_record_is_named():
     (warning,) = [w for w in found.warnings if w.startswith("rudder_delay: the motion shows the rudder 1.")]
     assert "by [delay] delta = -1." in warning
     assert found.extended_model == "physics"  # whose gears end at the record
+
+
+class Behind(Effect):
+    """What follows a gear with a time constant, or after some play."""
+
+    family = "rudder"
+    summary = source = ""
+    parameters = (Parameter("size", "1", 1.0, 0.0, 100.0),)
+
+    def __init__(self, actuator: str, field: str) -> None:
+        self.name, self.actuator, self.field = "behind", actuator, field
+
+    def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
+        gears[self.actuator] = replace(gears[self.actuator], **{self.field: q[0]})
+
+
+@pytest.mark.parametrize(
+    ("effect", "gear", "size", "channel", "told"),
+    [
+        ("rudder_lag", Behind("delta", "T2"), 3.0, DELTA, "by [delay] delta = -"),
+        ("rudder_backlash", Behind("delta", "backlash"), 0.05, DELTA, "Measure at the rudder stock."),
+        ("shaft_lag", Behind("n", "T2"), 8.0, N, "by [delay] n = -"),
+    ],
+)
+def test_a_gear_behind_its_record_is_named(effect: str, gear: Behind, size: float, channel: int, told: str):
+    """The record is that of the same orders on a ship without it."""
+    data, plain = (sea_trials(load_mmg_ship("container130"), 6, hidden, Trials(runs=16)) for hidden in ((Hidden(gear, (size,)),), ()))
+    runs = [replace(run, states=run.states.copy()) for run in data.runs]
+    for run, other in zip(runs, plain.runs, strict=True):
+        run.states[:, channel] = other.states[:, channel]
+    found = diagnose(data.with_runs(runs), gain=False)
+    (cause,) = found.causes
+    assert cause.effect == effect
+    (value,) = cause.parameters.values()
+    assert value.value == pytest.approx(size, rel=0.2)
+    (warning,) = [w for w in found.warnings if w.startswith(f"{effect}: the motion shows a ")]
+    assert told in warning
+    assert found.extended_model == "physics"
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfiltfilt
 
+import shipbench.simulate.trials
 from shipbench.bench.diagnosis_text import summary_lines
 from shipbench.checking.recording import Recording
 from shipbench.checking.track import keeps_time
@@ -186,6 +187,26 @@ def test_a_cause_is_seen_through_the_motion_with_the_waves():
     period = re.search(r"swings with a period of about ([\d.]+) s", told["yaw rate"])
     assert float(period[1]) == pytest.approx(WAVE_PERIOD, rel=0.25)
     assert f"  yaw rate: {told['yaw rate']}" in summary_lines(found)
+
+
+@pytest.mark.parametrize(("ship", "period"), [("container130", 16.0), ("kcs", 20.0)])
+def test_a_swell_is_told_from_the_ships_own_motion_though_the_latent_force_follows_it(ship, period, monkeypatch):
+    """The force in yaw was 24 and 12 times the ordinary one, and hid whatever turns a ship."""
+    monkeypatch.setattr(shipbench.simulate.trials, "WAVE_PERIOD", period)
+    data = sea_trials(load_mmg_ship(ship), 11, (), Trials(runs=12, waves=0.5))
+    plant = Plant.of(data)
+    found = null_fit(plant, Scales(plant))
+    assert np.exp(0.5 * found.hyper.log_force) == pytest.approx(0.1, abs=0.1)
+    assert found.scales.colour.period[[V, R]] == pytest.approx(period * (data.ship.L / 130.0) ** 0.5 / data.dt, rel=0.25)
+
+
+def test_a_cause_is_seen_through_a_swell(monkeypatch):
+    monkeypatch.setattr(shipbench.simulate.trials, "WAVE_PERIOD", 16.0)
+    hidden = [Hidden(EFFECTS.get("rudder_offset"), (0.03,))]
+    found = diagnose(sea_trials(load_mmg_ship("container130"), 11, hidden, Trials(runs=12, waves=0.5)), gain=False)
+    (cause,) = found.causes
+    assert cause.effect == "rudder_offset"
+    assert cause.parameters["offset"].value == pytest.approx(0.03, abs=0.005)
 
 
 def test_velocities_filtered_in_the_earths_axes_are_seen_and_put_back(trials, filtered):
