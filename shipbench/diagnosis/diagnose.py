@@ -218,20 +218,16 @@ def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, st
         return {}
     in_record, told = {g.effect for g in found.gears}, {}
     for c in causes:
-        if c.effect in in_record or not (c.effect in EFFECTS.names() and EFFECTS.get(c.effect).unrecorded):
+        if c.effect in in_record or c.effect not in EFFECTS.names() or not EFFECTS.get(c.effect).unrecorded:
             continue
-        ((name, size),) = c.parameters.items()
-        what, channel = ("rudder", "delta") if c.effect.startswith("rudder") else ("shaft", "n")
-        value, unit = (math.degrees(size.value), "deg") if size.unit == "rad" else (size.value, size.unit)
-        sooner = name == "delay" and value < 0.0
-        text = f"the motion shows the {what} {abs(value):.2g} {unit} {'sooner' if sooner else 'later'} than its record"
-        if name != "delay":
-            text = f"the motion shows a {name} of {value:.2g} {unit} between the record of the {what} and the {what} itself"
-        told[c.effect] = f"{text}, and predictors fit their gears to the record. "
-        told[c.effect] += (
-            "Measure at the rudder stock." if name == "play" else
-            f"Put the record right first, by [delay] {channel} = {-value:.2g} in dataset.toml{'' if name == 'delay' else ', which comes near'}."
-        )  # fmt: skip
+        (size,) = c.parameters.values()
+        what, channel = ("rudder", "delta") if EFFECTS.get(c.effect).family == "rudder" else ("shaft", "n")
+        how, mend = f"with a play of {math.degrees(size.value):.2g} deg behind", "Measure behind that play."
+        if size.unit == "s":
+            how = f"{abs(size.value):.2g} s {'later' if size.value > 0.0 else 'sooner'} than"
+            near = ", which comes near" if c.effect.endswith("_lag") else ""
+            mend = f"Put the record right first, by [delay] {channel} = {-size.value:.2g} in dataset.toml{near}."
+        told[c.effect] = f"the motion shows the {what} {how} its record, to which predictors fit their gears. {mend}"
     return told
 
 

@@ -148,7 +148,7 @@ class Behind(Effect):
     ("effect", "gear", "size", "channel", "told"),
     [
         ("rudder_lag", Behind("delta", "T2"), 3.0, DELTA, "by [delay] delta = -"),
-        ("rudder_backlash", Behind("delta", "backlash"), 0.05, DELTA, "Measure at the rudder stock."),
+        ("rudder_backlash", Behind("delta", "backlash"), 0.05, DELTA, "Measure behind that play."),
         ("shaft_lag", Behind("n", "T2"), 8.0, N, "by [delay] n = -"),
     ],
 )
@@ -163,7 +163,7 @@ def test_a_gear_behind_its_record_is_named(effect: str, gear: Behind, size: floa
     assert cause.effect == effect
     (value,) = cause.parameters.values()
     assert value.value == pytest.approx(size, rel=0.2)
-    (warning,) = [w for w in found.warnings if w.startswith(f"{effect}: the motion shows a ")]
+    (warning,) = [w for w in found.warnings if w.startswith(f"{effect}: the motion shows ")]
     assert told in warning
     assert found.extended_model == "physics"
 
