@@ -297,8 +297,8 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str], measured: bo
     elif name in NAMES:
         put_right = "the clocks of position and velocities were put right before the fit"
         reason = put_right if "velocity_delay" in named else "by the track, position and velocities are recorded at the same time"
-    elif name in WITHOUT_WIND and plant.seg.wind is not None:
-        reason = "the wind is measured and in the model already"
+    elif (name in WITHOUT_WIND and plant.seg.wind is not None) or (name == "shallow_water" and plant.water):
+        reason = f"the {'depth' if name == 'shallow_water' else 'wind'} is measured and in the model already"
     elif effect.channels and plant.seg.wind is None:
         reason = f"{' and '.join(effect.channels)} are not measured"
     elif name == "change_point" and (barred := other_kinds_from(plant.seg.kinds)):

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..effects.base import EFFECTS
 from ..effects.hull_derivatives import EFFECT as HULL
 from ..ops import Array
 from ..physics import eq2
@@ -29,6 +30,8 @@ _LONG = 5
 MOST_STEPS, FOLD_STEPS, THOROUGH_STEPS = 24_000, 12_000, 48_000
 """Of all segments together, per stage: more cost many minutes. What differs from run to run, such as the wind, may show only in all of a long record
 (3.5 h of a 3 m model: 48,000)."""
+DEEP = 10.0
+"""Draughts from which water is deep: it changes no derivative by more than 5 %."""
 FEW_PIECES = 200
 """Segments from which gears and the noise of sensors are told: 100 runs of 120 s at 130 m."""
 
@@ -47,7 +50,8 @@ class Segments:
 
     Shapes: states (B, K + 1, 10), commands (B, K + 1, 4), wind (B, K + 1, 2) or None, mask (B, K + 1) of real samples, run (B,) index of the run,
     start (B,) time since the run began [s]; earlier (B, P, 4): the commands before the piece (the first, before the run), without any where actuators
-    are recorded; kinds: of manoeuvre, by run, "" where not given; seen (6,): what of the motion was measured.
+    are recorded; kinds: of manoeuvre, by run, "" where not given; seen (6,): what of the motion was measured; depth (B,): mean of the recorded one
+    [m], None where none is, or deep water.
     """
 
     dt: float
@@ -62,6 +66,7 @@ class Segments:
     runs: int
     kinds: tuple[str, ...]
     seen: np.ndarray = field(default_factory=lambda: np.ones(6, dtype=bool))
+    depth: np.ndarray | None = None
 
     def thinned(self, most: int) -> Segments:
         """At most `most` segments, evenly spread; every run keeps at least one."""
@@ -78,10 +83,10 @@ class Segments:
         return replace(found, run=run, runs=len(runs), kinds=tuple(self.kinds[i] for i in runs))
 
     def _of(self, rows: np.ndarray) -> Segments:
-        wind = None if self.wind is None else self.wind[rows]
+        wind, depth = (None if v is None else v[rows] for v in (self.wind, self.depth))
         return replace(
             self, states=self.states[rows], commands=self.commands[rows], earlier=self.earlier[rows], wind=wind, mask=self.mask[rows],
-            run=self.run[rows], start=self.start[rows],
+            run=self.run[rows], start=self.start[rows], depth=depth,
         )  # fmt: skip
 
     def without(self, pieces: np.ndarray) -> Segments:
@@ -109,7 +114,8 @@ def cut(dataset: Dataset, steps: int) -> Segments:
     at = [np.minimum(np.arange(a, a + K + 1), b) for _, _, a, b in pieces]
     states = np.stack([run.states[i] for (_, run, _, _), i in zip(pieces, at, strict=True)])
     inputs = np.stack([run.inputs[i] for (_, run, _, _), i in zip(pieces, at, strict=True)])
-    commanded, scale = dataset.actuators == "commanded", (complete(dataset.ship).L / 130.0) ** 0.5
+    ship, commanded = complete(dataset.ship), dataset.actuators == "commanded"
+    scale, depth = (ship.L / 130.0) ** 0.5, inputs[..., dataset.inputs.index("depth")].mean(axis=1) if "depth" in dataset.inputs else None
     back = np.arange(-round(_EARLIER * scale / dataset.dt) if commanded else 0, 0)
     return Segments(
         dt=dataset.dt, commanded=commanded, states=states, commands=inputs[..., :4],
@@ -117,7 +123,7 @@ def cut(dataset: Dataset, steps: int) -> Segments:
         wind=None if wind_columns is None else inputs[..., wind_columns], mask=np.stack([np.arange(K + 1) <= b - a for _, _, a, b in pieces]),
         run=np.array([p[0] for p in pieces]), start=np.array([p[2] * dataset.dt for p in pieces]), runs=len(dataset),
         kinds=tuple(run.kind for run in dataset.runs),
-        seen=~np.isin(STATES[MOTION], dataset.derived),
+        seen=~np.isin(STATES[MOTION], dataset.derived), depth=None if depth is None or np.all(depth > DEEP * ship.T) else depth,
     )  # fmt: skip
 
 
@@ -153,6 +159,8 @@ class Plant:
         t = segments.start[:, None, None] + np.minimum(k + self.parts, k + 1.0 - 1e-9)[:, None] * segments.dt
         wind = None if segments.wind is None else np.swapaxes(segments.wind[:, :-1], 0, 1)
         self.course = Course(Vessel(dataset_ship, self.c), segments.dt / self.substeps, t, wind)
+        self.water = [] if segments.depth is None else [Active(EFFECTS.get("shallow_water"), (dataset_ship.T / segments.depth,))]
+        """What the recorded depth does."""
         self.ordinary: dict[str, Gear] = {}
         self.drive((ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR)) | (gears or {}))
 
@@ -259,7 +267,7 @@ class Plant:
 
     def roll(self, x0: np.ndarray, p: Sequence[Array], active: Sequence[Active], w: np.ndarray, path: np.ndarray | None = None) -> np.ndarray:
         """Motion (B, K + 1, 6) from x0 (B, 6), with parameters p0..p10, effects, and a latent acceleration w (B, K + 1, 3) at the samples."""
-        return self.course.rolled(x0, p, active, self._by_sample(path), self.pushes(w))
+        return self.course.rolled(x0, p, [*active, *self.water], self._by_sample(path), self.pushes(w))
 
     def steps_from(
         self, states: np.ndarray, p: Sequence[Array], active: Sequence[Active], push: np.ndarray, path: np.ndarray | None = None
@@ -268,14 +276,14 @@ class Plant:
 
         Along a known trajectory this replaces the loop over time: the sensitivities of the single steps are chained afterwards.
         """
-        return self.course.ends(states, p, active, self._by_sample(path), push)
+        return self.course.ends(states, p, [*active, *self.water], self._by_sample(path), push)
 
     def rates_from(
         self, middle: np.ndarray, p: Sequence[Array], active: Sequence[Active], path: np.ndarray | None = None, often: bool = True
     ) -> np.ndarray:
         """Accelerations (D, K, B, 3) that forces give in the middle of every step, from the states there (1, K, B, 6); `often` as in
         `Course.rates`."""
-        return self.course.rates(middle, p, active, self._by_sample(path), often)
+        return self.course.rates(middle, p, [*active, *self.water], self._by_sample(path), often)
 
     def midway(self, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Actuators (K, B, 4) and times since the runs began (K, B) in the middle of every sample."""

@@ -32,6 +32,9 @@ tanh: 0.19 lost, 0.4 of the typical size); thrusters whose record is their order
 (`gear_kinds.ORDINARY`)."""
 _REACH = 0.75
 """Lengths from midship within which a thruster acts, whatever the hull makes of its jet. (A lever of 1.0 was named for what a hull lacked.)"""
+_TRIMS = 0.06
+"""Lengths by which a shifted centre of gravity trims a ship by about as much (over a longitudinal metacentric height of one length), more than her
+draught. (A shift of 0.08 was named for what a hull's form lacked.)"""
 _DOUBT, _DOUBT_LATE = 0.05, 1e-5
 """Probability that a size is zero from which it is not sure; of a cause that begins with a run, which is chosen among hundreds of effects and runs.
 (Ten standard manoeuvres with nothing hidden: 0.01 to 1e-4; changes hidden in 24 runs: 1e-6 and less.)"""
@@ -132,11 +135,15 @@ def blows_on_a_ship(fit: Fit) -> bool:
     return bool(np.max(np.abs(needed(fit)[[PLACES[f"wind_{axis}"] for axis in ("X", "Y", "N", "lever")]])) < STRANGE)
 
 
-def acts_on_board(fit: Fit, index: int) -> bool:
-    """Whether the bow thruster with its shifted lever is on the ship, or near her."""
+def is_on_a_ship(fit: Fit, index: int) -> bool:
+    """Whether the bow thruster with its shifted lever is on the ship, or near her; whether she floats with her centre of gravity where it is shifted
+    to. True of other causes."""
+    term = fit.model.terms[index]
+    if term.label not in ("thruster_lever", "center_of_gravity_shift"):
+        return True
     c = fit.plant.c
-    (shift,) = fit.values[index] * fit.scales.amplitudes(fit.model.terms[index], c.L)
-    return bool(abs(c.tunnels.x_bow + shift) < _REACH * c.L)
+    (shift,) = fit.values[index] * fit.scales.amplitudes(term, c.L)
+    return bool(abs(c.tunnels.x_bow + shift) < _REACH * c.L if term.label == "thruster_lever" else abs(shift) < _TRIMS * c.L)
 
 
 def shows_on_any_ship(effect: Effect) -> bool:
@@ -153,13 +160,13 @@ def bends(fit: Fit, index: int, null: Fit) -> bool:
 
 def is_sure(fit: Fit, index: int) -> bool:
     """Whether the values of a cause differ from zero (Hotelling's test over the runs), and the other runs do not speak against it where one bears it;
-    where each run has its own, whether they last for the run. Of a wind, whether it could blow on a ship; of a thruster, whether it is on one."""
+    where each run has its own, whether they last for the run. Of a wind, whether it could blow on a ship; of a place, whether it is on one."""
     from scipy.stats import f
 
     term = fit.model.terms[index]
     if term.label in WITHOUT_WIND and not blows_on_a_ship(fit):
         return False
-    if term.label == "thruster_lever" and not acts_on_board(fit, index):
+    if not is_on_a_ship(fit, index):
         return False
     if term.per_run:
         return lasts(fit) and tells_runs_apart(fit)

@@ -119,7 +119,7 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Se
             continue
         if plant.seg.wind is None and effect.channels:
             continue
-        if plant.seg.wind is not None and name in WITHOUT_WIND:
+        if (plant.seg.wind is not None and name in WITHOUT_WIND) or (plant.water and name == "shallow_water"):
             continue
         if effect.family == "thruster" and not np.any(plant.seg.states[..., 8:]):
             continue

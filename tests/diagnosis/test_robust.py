@@ -12,7 +12,7 @@ from shipbench.diagnosis.gear_kinds import ORDINARY
 from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
 from shipbench.diagnosis.model import NUM_BASE, PLACES
 from shipbench.diagnosis.plant import ordinary_gears
-from shipbench.diagnosis.robust import acts_on_board, bends, covariance, inflation, is_borne_by_one, is_sure, least_size, matters
+from shipbench.diagnosis.robust import bends, covariance, inflation, is_borne_by_one, is_on_a_ship, is_sure, least_size, matters
 from shipbench.diagnosis.select import asked_besides
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
@@ -180,7 +180,13 @@ def test_what_asks_for_a_stranger_ship_than_nothing_does_is_no_cause(monkeypatch
 @pytest.mark.parametrize(("shift", "wanted"), [(-1.4, True), (1.4, True), (4.1, False)])
 def test_a_thruster_acts_on_board(shift: float, wanted: bool):
     """On a ship of 56 m a lever of 57 m was named for what the hull's form lacked."""
-    assert acts_on_board(_sized("thruster_lever", np.array([shift]), L=56.0), 0) is wanted
+    assert is_on_a_ship(_sized("thruster_lever", np.array([shift]), L=56.0), 0) is wanted
+
+
+@pytest.mark.parametrize(("shift", "wanted"), [(1.8, True), (-1.8, True), (2.1, False), (-2.6, False)])
+def test_a_ship_floats_with_her_centre_of_gravity_where_it_is(shift: float, wanted: bool):
+    """On a ferry of 132 m a shift of 10.5 m was named for what her form lacked in water of two to four draughts."""
+    assert is_on_a_ship(_sized("center_of_gravity_shift", np.array([shift]), L=132.0), 0) is wanted
 
 
 def test_thrusters_known_by_their_orders_may_be_as_slow_as_ordinary_ones():
