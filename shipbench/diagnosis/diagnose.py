@@ -94,9 +94,14 @@ def diagnose(
         doubts = doubts_of(found) if only is None else []
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts else Worth()
     warnings += [text for text, _ in standing(dataset).values()]
-    if (depth := found.selection.null.plant.seg.depth) is not None:
-        warnings.append(_of_depth(float(np.min(depth) / dataset.ship.T), float(np.max(depth) / dataset.ship.T)))
-    warnings += said(dataset) + mended + doubts + own_propeller(found) + left_out(found.selection.null.plant, dataset.runs)
+    warnings += (
+        _of_depth(found.selection.null.plant)
+        + said(dataset)
+        + mended
+        + doubts
+        + own_propeller(found)
+        + left_out(found.selection.null.plant, dataset.runs)
+    )
     warnings += misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
@@ -182,11 +187,14 @@ def _as_it_must_be_read(dataset: Dataset, null: Fit, steps: int, settled: Sequen
     return found, read, turned
 
 
-def _of_depth(least: float, most: float) -> str:
-    return (
-        f"the depth is recorded ({least:.2g} to {most:.2g} draughts): what it does to hull and added masses is in the fitted model, by the formulas "
-        "of `shallow_water`. The models of `shipbench run` do not know it."
-    )
+def _of_depth(plant: Plant) -> list[str]:
+    if plant.seg.depth is None:
+        return []
+    draughts = plant.seg.depth / plant.ship.T
+    return [
+        f"the depth is recorded ({np.min(draughts):.2g} to {np.max(draughts):.2g} draughts): what it does to hull and added masses is in the fitted "
+        "model, by the formulas of `shallow_water`. The models of `shipbench run` do not know it."
+    ]
 
 
 def _in_time(dataset: Dataset) -> Dataset:
