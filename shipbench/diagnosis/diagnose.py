@@ -30,7 +30,7 @@ from .gain import FoldGain, fold_gain, summarise
 from .noise import noise_in_words
 from .outcome import Cause, Diagnosis, Gain
 from .over_ground import over_ground
-from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant
+from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, least_depth
 from .ship_file import doubts_of, odd_for, own_propeller
 from .strange import left_out
 from .trace import trace_of
@@ -93,9 +93,8 @@ def diagnose(
                 ahead, work = None, partial(work, dataset=dataset)
         doubts = doubts_of(found) if only is None else []
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts else Worth()
-    warnings += [*(text for text, _ in standing(dataset).values()), *_of_depth(null.plant), *said(dataset), *mended, *doubts, *own_propeller(found)]
-    warnings += left_out(found.selection.null.plant, dataset.runs)
-    warnings += misread.said(found.misread)
+    warnings += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + said(dataset) + mended + doubts
+    warnings += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     behind = _behind_its_record(found, causes)
@@ -180,13 +179,20 @@ def _as_it_must_be_read(dataset: Dataset, null: Fit, steps: int, settled: Sequen
     return found, read, turned
 
 
-def _of_depth(plant: Plant) -> list[str]:
-    if plant.seg.depth is None:
+def _of_depth(dataset: Dataset, plant: Plant) -> list[str]:
+    """What a recorded depth is taken for."""
+    if plant.seg.depth is not None:
+        draughts = plant.seg.depth / plant.ship.T
+        return [
+            f"the depth is recorded ({np.min(draughts):.2g} to {np.max(draughts):.2g} draughts): what it does to hull and added masses is in the "
+            "fitted model, by the formulas of `shallow_water`. The models of `shipbench run` do not know it."
+        ]
+    least = least_depth(dataset)
+    if least > plant.ship.T:
         return []
-    draughts = plant.seg.depth / plant.ship.T
     return [
-        f"the depth is recorded ({np.min(draughts):.2g} to {np.max(draughts):.2g} draughts): what it does to hull and added masses is in the fitted "
-        "model, by the formulas of `shallow_water`. The models of `shipbench run` do not know it."
+        f"the recorded depth falls to {least:.3g} m, and the ship draws {plant.ship.T:.3g} m: it is not used. A depth counts from the surface; "
+        "to one below the keel add the draught."
     ]
 
 
@@ -228,10 +234,11 @@ def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, st
         return {}
     in_record, told = {g.effect for g in found.gears}, {}
     for c in causes:
-        if c.effect in in_record or c.effect not in EFFECTS.names() or not EFFECTS.get(c.effect).unrecorded:
+        effect = EFFECTS.get(c.effect)
+        if not effect.unrecorded or c.effect in in_record:
             continue
         (size,) = c.parameters.values()
-        what, channel = ("rudder", "delta") if EFFECTS.get(c.effect).family == "rudder" else ("shaft", "n")
+        what, channel = ("rudder", "delta") if effect.family == "rudder" else ("shaft", "n")
         how, mend = f"with a play of {math.degrees(size.value):.2g} deg behind", "Measure behind that play."
         if size.unit == "s":
             how = f"{abs(size.value):.2g} s {'later' if size.value > 0.0 else 'sooner'} than"

@@ -42,11 +42,16 @@ def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colo
 
 
 def _tuned(found: Fit, colour: Colour, channel: int, best: float) -> tuple[float, Colour]:
-    """Log evidence and noise of `colour`, which has the evidence `best`, with a longer or a shorter period in a channel, as far as that is better."""
+    """Log evidence and noise of `colour`, which has the evidence `best`, with a longer or a shorter period in a channel, as far as that is better
+    and a piece holds one, a sample no more than half of one."""
     share, time, period = (float(x[channel]) for x in (colour.share, colour.time, colour.period))
-    for factor in (_FURTHER, 1.0 / _FURTHER) if np.isfinite(period) else ():
+    for factor in (_FURTHER, 1.0 / _FURTHER):
         stretch = factor
-        while (worth := evidence_with(found, way := colour.with_channel(channel, share, time * stretch, period * stretch))) > best:
+        while 2.0 < period * stretch < found.plant.steps:
+            way = colour.with_channel(channel, share, time * stretch, period * stretch)
+            worth = evidence_with(found, way)
+            if worth <= best:
+                break
             best, colour, stretch = worth, way, stretch * factor
     return best, colour
 

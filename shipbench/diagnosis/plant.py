@@ -51,7 +51,7 @@ class Segments:
     Shapes: states (B, K + 1, 10), commands (B, K + 1, 4), wind (B, K + 1, 2) or None, mask (B, K + 1) of real samples, run (B,) index of the run,
     start (B,) time since the run began [s]; earlier (B, P, 4): the commands before the piece (the first, before the run), without any where actuators
     are recorded; kinds: of manoeuvre, by run, "" where not given; seen (6,): what of the motion was measured; depth (B,): mean of the recorded one
-    [m], None where none is, or deep water.
+    [m], None where none is, or deep water, or less than the draught.
     """
 
     dt: float
@@ -115,7 +115,8 @@ def cut(dataset: Dataset, steps: int) -> Segments:
     states = np.stack([run.states[i] for (_, run, _, _), i in zip(pieces, at, strict=True)])
     inputs = np.stack([run.inputs[i] for (_, run, _, _), i in zip(pieces, at, strict=True)])
     ship, commanded = complete(dataset.ship), dataset.actuators == "commanded"
-    scale, depth = (ship.L / 130.0) ** 0.5, inputs[..., dataset.inputs.index("depth")].mean(axis=1) if "depth" in dataset.inputs else None
+    scale = (ship.L / 130.0) ** 0.5
+    depth = inputs[..., dataset.inputs.index("depth")].mean(axis=1) if ship.T < least_depth(dataset) < DEEP * ship.T else None
     back = np.arange(-round(_EARLIER * scale / dataset.dt) if commanded else 0, 0)
     return Segments(
         dt=dataset.dt, commanded=commanded, states=states, commands=inputs[..., :4],
@@ -123,8 +124,15 @@ def cut(dataset: Dataset, steps: int) -> Segments:
         wind=None if wind_columns is None else inputs[..., wind_columns], mask=np.stack([np.arange(K + 1) <= b - a for _, _, a, b in pieces]),
         run=np.array([p[0] for p in pieces]), start=np.array([p[2] * dataset.dt for p in pieces]), runs=len(dataset),
         kinds=tuple(run.kind for run in dataset.runs),
-        seen=~np.isin(STATES[MOTION], dataset.derived), depth=None if depth is None or np.all(depth > DEEP * ship.T) else depth,
+        seen=~np.isin(STATES[MOTION], dataset.derived), depth=depth,
     )  # fmt: skip
+
+
+def least_depth(dataset: Dataset) -> float:
+    """The least that is recorded [m]; infinite where none is."""
+    if "depth" not in dataset.inputs:
+        return np.inf
+    return float(min(np.min(run.inputs[:, dataset.inputs.index("depth")]) for run in dataset.runs))
 
 
 def _substeps(dt: float, L: float) -> int:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.diagnose import _of_depth, diagnose
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import DEEP, Plant
@@ -55,3 +55,10 @@ def test_deep_water_changes_nothing(trials):
     deep = sounded(unsounded(trials), 1.1 * DEEP * trials.ship.T)
     assert Plant.of(deep).seg.depth is None
     assert Plant.of(trials).seg.depth.shape == Plant.of(trials).seg.run.shape
+
+
+def test_a_depth_below_the_keel_is_not_used_and_said(trials):
+    below = sounded(unsounded(trials.subset(range(6))), 0.6 * trials.ship.T)
+    assert Plant.of(below).seg.depth is None
+    (warning,) = _of_depth(below, Plant.of(below))
+    assert "to one below the keel add the draught" in warning

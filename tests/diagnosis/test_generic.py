@@ -124,6 +124,21 @@ def test_waves_that_rock_the_ship_are_no_force_that_follows_the_time_but_one_in_
     assert (("yaw", "time") in found) == in_step
 
 
+@pytest.mark.parametrize("in_order", [False, True])
+def test_what_goes_with_the_number_of_the_run_explains_more_than_a_force_of_each_run(in_order):
+    """A side force of its own in each run, by chance greater in the later ones, passed for one that follows the number."""
+
+    def push(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.push(0.0, q[0] * ship.mass * q[1], 0.0)
+
+    even = np.linspace(-1.0, 1.0, 12)
+    sizes = even if in_order else even + np.resize([0.35, -0.35], 12)
+    hidden = Hidden(Outside("pull", ("run",), push), (8e-3, sizes))
+    plant = Plant.of(sea_trials(load_mmg_ship("kcs"), 13, (hidden,), Trials(runs=12)))
+    found = {(d.axis, d.variable) for d in dependences(null_fit(plant, Scales(plant))) if d.score > 16.0}
+    assert (("sway", "run") in found) == in_order
+
+
 def test_a_constant_ahead_is_no_part_of_a_pull(kcs):
     """Another form of resistance comes near one, and much is asked of it alone: with a trace of yaw beside it, it was `unknown` on a tug."""
 
