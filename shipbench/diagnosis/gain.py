@@ -46,7 +46,7 @@ def rollout_plant(dataset: Dataset, gears: dict[str, Gear]) -> Plant:
     """Segments of `HORIZON` (Froude-scaled), fast records averaged; driven by the commands through `gears` from where the actuators begin."""
     ship, dataset = complete(dataset.ship), averaged(dataset)
     segments = cut(dataset, max(20, round(HORIZON * (ship.L / 130.0) ** 0.5 / dataset.dt)))
-    return Plant(ship, replace(segments, commanded=True), gears=gears)
+    return Plant(ship, replace(segments, commanded=True), gears=gears, recorded=not segments.commanded)
 
 
 def plain_base() -> np.ndarray:

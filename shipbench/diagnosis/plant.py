@@ -148,8 +148,10 @@ class Plant:
 
     def __init__(
         self, dataset_ship: Particulars, segments: Segments, long: Segments | None = None, gears: dict[str, Gear] | None = None,
-        froude: float | None = None,
+        froude: float | None = None, recorded: bool = False,
     ) -> None:  # fmt: skip
+        self.recorded = recorded
+        """Whether the actuators that `gears` bring about are recorded ones, though orders drive them here."""
         self.ship, self.seg, self.long = dataset_ship, segments, segments if long is None else long
         self.c = eq2.coefficients(dataset_ship)
         self.froude = (self.c.L / 130.0) ** 0.5 if froude is None else froude
@@ -239,6 +241,8 @@ class Plant:
         for a in active:
             if a.effect.enters == "gear":
                 a.effect.gear(gears, a.q)
+        if self.recorded:  # what the motion shows is behind the record, and so behind the motor that these are
+            gears = {k: replace(g, T=self.ordinary[k].T, T2=g.T2 + g.T - self.ordinary[k].T) for k, g in gears.items()}
         if gears == self.ordinary:
             return self.path
         path = self.path.copy()
