@@ -37,10 +37,11 @@ _RULES: tuple[tuple[str, str], ...] = (
     ("r", r"\b(rot|r|rate of turn|yaw rate|r angvelo|gyro z)\b"), ("psi", r"\b(psi|hdg|hdt|heading|yaw|psi hat|true heading)\b"),
     ("delta_c", r"\b(delta c|rudder (order|command|cmd|set\w*|demand)|(order\w*|command\w*|cmd) rudder( angle)?)\b"),
     ("n_c", r"\b(n c|rpm (order|command|cmd|set\w*|demand)|(order\w*|command\w*|cmd) (rpm|revs))\b"),
-    ("delta", r"\b(delta|rudder|rudder angle|delta rudder|rsa)\b"), ("n", r"\b(n|rpm|n prop|shaft (speed|rpm)|propeller (speed|rpm|revs)|revs)\b"),
+    ("delta", r"\b(delta|rudder|rudder angle|delta rudder|rsa)\b"),
+    ("n", r"\b(n|rpm|n prop|shaft (speed|rpm)|propeller (speed|rpm|revs)|revs)\b|^shaft$"),
     ("F_b_c", r"\b(f b c|bow thruster (order|command|cmd|set\w*))\b"), ("F_s_c", r"\b(f s c|stern thruster (order|command|cmd|set\w*))\b"),
     ("F_b", r"\b(f b|bow thruster( force)?)\b"), ("F_s", r"\b(f s|stern thruster( force)?)\b"),
-    ("depth", r"\b(depth|water depth|ukc)\b"), ("x", r"\b(x|north|northing|x position( mid)?|pos x)\b"),
+    ("depth", r"\b(depth|water depth)\b"), ("x", r"\b(x|north|northing|x position( mid)?|pos x)\b"),
     ("y", r"\b(y|east|easting|y position( mid)?|pos y)\b"), ("u", r"\b(u|u velo|surge( speed| velocity)?|u vel\w*)\b"),
     ("v", r"\b(v|vm|v velo|vm velo|sway( speed| velocity)?|v vel\w*)\b"),
 )  # fmt: skip
@@ -306,7 +307,8 @@ def _guess_unit(channel: str, column: _Column) -> tuple[str, str]:
     if channel in ("lat", "lon"):
         return "deg", f"unit as usual for {channel} ({what})"
     if ours == "rad":
-        return ("deg" if size > 6.5 else "rad"), f"unit from the values ({what})"
+        most = 1.6 if channel in ("delta", "delta_c") else 6.5  # no rudder turns by more than a right angle
+        return ("deg" if size > most else "rad"), f"unit from the values ({what})"
     if ours == "rad/s":
         return ("deg/min" if size > 20 else "deg/s" if size > 0.3 else "rad/s"), f"unit from the values ({what})"
     if channel == "sog":

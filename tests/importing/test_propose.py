@@ -179,3 +179,15 @@ def test_the_mapping_in_the_readme_imports_a_log(tmp_path, monkeypatch):
     assert [len(run) for run in data.runs] == [301, 301]
     np.testing.assert_allclose(data.runs[0].states[:, 3], 4e-5 * 111_270, rtol=1e-3)  # a degree of latitude at 52 north is 111.27 km
     np.testing.assert_allclose(data.runs[0].states[:, 7], -np.deg2rad(5.0), rtol=1e-9)
+
+
+def test_the_columns_of_the_readme_are_taken_and_clearance_is_no_depth(propose, tmp_path):
+    """A rudder of 5 without a unit is no angle in radians, and what is below the keel is less than the depth by the draught."""
+    table = pd.DataFrame(
+        {"t": np.arange(40.0), "HDG": 10.0, "shaft [rpm]": 80.0, "shaft power [kW]": 900.0, "rudder": 5.0 * np.sin(np.arange(40.0)), "UKC [m]": 4.0}
+    )
+    assert propose(write(tmp_path, "log.csv", table)).exit_code == 0
+    channels = tomllib.loads(Path("draft.toml").read_text())["channels"]
+    assert channels["n"] == {"column": "shaft [rpm]", "unit": "rpm"}
+    assert channels["delta"] == {"column": "rudder", "unit": "deg"}
+    assert "depth" not in channels
