@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -34,11 +35,27 @@ def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colo
     colour = Colour.white(found.plant.steps + 1)
     best = evidence_with(found, colour)
     for channel in np.flatnonzero(found.plant.seg.seen).tolist():
-        ways = _swinging(found, colour, channel) + ([] if waves_alone else _lasting(found, colour, channel, best + worth))
-        tried = [evidence_with(found, way) for way in ways]
-        if tried and max(tried) > best + worth:
-            best, colour = _tuned(found, ways[int(np.argmax(tried))], channel, max(tried))
+        grids = _swinging(found, colour, channel) + ([] if waves_alone else _lasting(found, colour, channel, best + worth))
+        reached, way = max((_climbed(found, grid) for grid in grids), key=lambda c: c[0], default=(best, colour))
+        if reached > best + worth:
+            best, colour = _tuned(found, way, channel, reached)
     return colour
+
+
+def _climbed(found: Fit, grid: np.ndarray) -> tuple[float, Colour]:
+    """Log evidence and noise of a grid's summit, from its second entry along the first two axes on, as far as a neighbour is better."""
+    at = (1, 1, *[0] * (grid.ndim - 2))
+    known = {at: evidence_with(found, grid[at])}
+    while True:
+        steps = [(axis, step) for axis in range(grid.ndim) for step in (-1, 1) if 0 <= at[axis] + step < grid.shape[axis]]
+        for axis, step in steps:
+            beside = (*at[:axis], at[axis] + step, *at[axis + 1 :])
+            if beside not in known:
+                known[beside] = evidence_with(found, grid[beside])
+        summit = max(known, key=lambda place: known[place])
+        if summit == at:
+            return known[at], grid[at]
+        at = summit
 
 
 def _tuned(found: Fit, colour: Colour, channel: int, best: float) -> tuple[float, Colour]:
@@ -56,16 +73,25 @@ def _tuned(found: Fit, colour: Colour, channel: int, best: float) -> tuple[float
     return best, colour
 
 
-def _lasting(found: Fit, colour: Colour, channel: int, least: float) -> list[Colour]:
-    """Errors that last for seconds, or were filtered, where such noise reaches the `least` evidence."""
+def _lasting(found: Fit, colour: Colour, channel: int, least: float) -> list[np.ndarray]:
+    """Errors that last for seconds, or were filtered, where such noise reaches the `least` evidence: grids of share and time."""
     if max(evidence_with(found, colour.with_channel(channel, share, time)) for share, time in _FIRST) < least:
         return []
-    lasting = [colour.with_channel(channel, share, time) for share, time in product(_SHARES, _TIMES)]
-    return lasting + [colour.with_channel(channel, share, time, smooth=True) for share, time in product(_SMOOTH_SHARES, _SMOOTH_TIMES)]
+    return [
+        _grid((_SHARES, _TIMES), lambda share, time: colour.with_channel(channel, share, time)),
+        _grid((_SMOOTH_SHARES, _SMOOTH_TIMES), lambda share, time: colour.with_channel(channel, share, time, smooth=True)),
+    ]
 
 
-def _swinging(found: Fit, colour: Colour, channel: int) -> list[Colour]:
-    """Motion with the waves, where the residuals swing."""
+def _grid(axes: tuple[tuple[float, ...], ...], way: Callable[..., Colour]) -> np.ndarray:
+    grid = np.empty([len(axis) for axis in axes], dtype=object)
+    for at, values in zip(np.ndindex(grid.shape), product(*axes), strict=True):
+        grid[at] = way(*values)
+    return grid
+
+
+def _swinging(found: Fit, colour: Colour, channel: int) -> list[np.ndarray]:
+    """Motion with the waves, where the residuals swing: a grid of share, period and damping."""
     seg = found.plant.seg
     e = np.where(seg.mask, seg.states[..., channel] - found.columns.predicted[..., channel], 0.0)
     lags = range(1, min(_MOST_LAG, e.shape[1] - 1) + 1)
@@ -73,8 +99,12 @@ def _swinging(found: Fit, colour: Colour, channel: int) -> list[Colour]:
     if min(correlation) > _SWINGS:
         return []
     half = 1 + int(np.argmin(correlation))
-    ways = [(share, factor * half, damping) for share, factor, damping in product(_SHARES, _PERIODS, _DAMPING)]
-    return [colour.with_channel(channel, share, period / (2.0 * np.pi * damping), period) for share, period, damping in ways]
+
+    def way(share: float, factor: float, damping: float) -> Colour:
+        period = factor * half
+        return colour.with_channel(channel, share, period / (2.0 * np.pi * damping), period)
+
+    return [_grid((_SHARES, _PERIODS, _DAMPING), way)]
 
 
 def swinging_force(found: Fit, colour: Colour) -> Colour:

@@ -24,13 +24,13 @@ FILTER = 0.93
 
 @pytest.fixture(scope="module")
 def recorded() -> Dataset:
-    """The first 300 s of every sixteenth run, wind columns withheld, commands taken for positions (the search for quicker gears has nothing to do
+    """The first 200 s of every sixteenth run, wind columns withheld, commands taken for positions (the search for quicker gears has nothing to do
     with sensors)."""
     try:
         data = load_dataset("esso_osaka[wind=false]")
     except InputError as error:
         pytest.skip(str(error))
-    begins = [replace(r, t=r.t[:601], states=r.states[:601], inputs=r.inputs[:601]) for r in data.runs[::16]]
+    begins = [replace(r, t=r.t[:401], states=r.states[:401], inputs=r.inputs[:401]) for r in data.runs[::16]]
     return replace(data.with_runs(begins), actuators="measured")
 
 

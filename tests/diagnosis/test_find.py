@@ -87,6 +87,7 @@ def test_causes_are_found_on_ships_of_the_literature_in_their_own_equations(ship
     assert named[:1] == [effect], f"seed {SEED}: {named} on {case.ship.name}"
 
 
+@pytest.mark.long
 def test_what_ships_differ_in_is_not_named_for_a_hull_of_another_form():
     """A container ship that heels, with nothing hidden: what her forces lack of the fit's form looks like a rudder that answers late."""
     verdict = diagnose(published_trials(PUBLISHED["s175"], 40), gain=False)
@@ -116,6 +117,7 @@ def test_a_current_shows_where_the_plain_model_rests_and_where_nothing_is_fitted
     assert found.final.evidence - found.null.evidence > 50.0
 
 
+@pytest.mark.long
 def test_a_strong_wind_in_every_run_is_found_on_a_ship_far_from_the_regressions():
     """Her fit is far from linear in it: the variance of its values vanished, and no run seemed to support it."""
     cause = diagnose(draw_case("published", 60, 0).dataset(), gain=False).causes[0]
@@ -188,9 +190,11 @@ def test_a_ship_file_of_another_ship_names_nothing():
 @pytest.mark.parametrize(
     ("name", "values", "ship", "file"),
     [
-        ("speed_scale", (0.05,), "tanker", "s175"), ("current", (0.3, -0.2), "tanker", "s175"), ("rudder_offset", (0.035,), "navy", "tanker"),
+        ("speed_scale", (0.05,), "tanker", "s175"),
+        ("current", (0.3, -0.2), "tanker", "s175"),
+        pytest.param("rudder_offset", (0.035,), "navy", "tanker", marks=pytest.mark.long),
     ],
-)  # fmt: skip
+)
 def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship, file):
     trials = published_trials(PUBLISHED[ship], 7, (Hidden(EFFECTS.get(name), values),), Trials(runs=16, samples=100))
     verdict = diagnose(replace(trials, ship=PUBLISHED[file].particulars), gain=False)
@@ -229,6 +233,7 @@ def test_the_file_of_a_ship_of_another_size_is_doubted():
     assert "rudder_lag" not in [c.effect for c in verdict.causes]
 
 
+@pytest.mark.long
 def test_where_every_fit_creeps_no_refit_is_given_up_for_its_first_promise():
     """With another ship's file the current's refit promises less than nothing at first; it ends far ahead."""
     trials = sea_trials(load_mmg_ship("container130"), 0, (Hidden(EFFECTS.get("current"), (0.3, 0.2)),), Trials(runs=12, samples=100))

@@ -40,7 +40,7 @@ def test_nothing_is_named_where_nothing_is_hidden(ship, known):
     assert (verdict.verdict, [c.effect for c in verdict.causes]) == ("none", [])
 
 
-@pytest.mark.parametrize("known", [with_main_dimensions_alone, with_commands_alone])
+@pytest.mark.parametrize("known", [with_main_dimensions_alone, pytest.param(with_commands_alone, marks=pytest.mark.long)])
 def test_a_current_is_found_with_its_size(known):
     verdict = diagnose(known(trials(CURRENT)), gain=False)
     assert [c.effect for c in verdict.causes] == ["current"]

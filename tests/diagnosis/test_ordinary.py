@@ -129,7 +129,7 @@ def test_what_a_small_force_could_stand_for_is_not_asked_of_the_ship(exact_marin
     assert np.sum(less**2) < STRANGE_SUM
 
 
-@pytest.mark.parametrize(("ship", "runs"), [("mariner", 24), ("tanker", 12)])
+@pytest.mark.parametrize(("ship", "runs"), [pytest.param("mariner", 24, marks=pytest.mark.long), ("tanker", 12)])
 def test_exact_sensors_in_a_calm_make_no_cause_of_the_form_of_a_hull(ship, runs):
     """Before a least force both were `unknown` and their ship files doubted: a parameter at 12.5 spreads, a mass changed by 3.3 typical sizes."""
     verdict = diagnose(published_trials(PUBLISHED[ship], 43, plan=replace(EXACT, runs=runs)), gain=False)
@@ -144,7 +144,7 @@ def test_exact_sensors_in_a_calm_still_show_a_small_cause():
     assert verdict.causes[0].parameters["offset"].value == pytest.approx(0.01, rel=0.25)
 
 
-@pytest.mark.parametrize(("runs", "samples"), [(10, 600), (8, 400)])
+@pytest.mark.parametrize(("runs", "samples"), [pytest.param(10, 600, marks=pytest.mark.long), (8, 400)])
 def test_standard_manoeuvres_make_no_cause_and_no_doubt_of_the_form_of_a_hull(runs, samples):
     """At the limits of the rudder, S175 with heel: once ten runs gave a `rudder_delay` and a doubt of her file, and eight a `mass_change`, for inflow
     that rises with the square of the angle."""

@@ -37,6 +37,7 @@ def named(data: Dataset) -> list[str]:
     return [cause.effect for cause in diagnose(data, gain=False).causes]
 
 
+@pytest.mark.long
 def test_thrusters_that_lose_their_force_for_good_are_named():
     assert named(trials("thruster_speed_loss", 0.0, 1.0)) == ["thruster_speed_loss"]
 
@@ -68,6 +69,7 @@ def test_the_scale_of_a_log_with_one_axis_is_named():
     assert "surge alone" in found.causes[0].evidence
 
 
+@pytest.mark.long
 def test_a_race_that_meets_the_rudder_a_little_more_on_one_side_is_ordinary_and_nothing_is_named_in_its_place():
     data = trials("rudder_asymmetry", 0.04, ship="kvlcc2_l7")
     found = select(plain_model(Plant.of(data)), THRESHOLD)
@@ -76,6 +78,7 @@ def test_a_race_that_meets_the_rudder_a_little_more_on_one_side_is_ordinary_and_
     assert named(data) == []
 
 
+@pytest.mark.long
 def test_a_rudder_that_stalls_beyond_30_deg_is_ordinary_but_one_that_stalls_before_is_named():
     """With half of the lift lost from 26 to 37 deg it was `rudder_stall` (score 78), as on ships with Whicker & Fehlner's curves."""
 
@@ -119,6 +122,7 @@ def test_no_hull_is_damped_the_wrong_way():
     np.testing.assert_allclose(hull_changes(np.full(NUM_HULL, -1.5)), -0.45)
 
 
+@pytest.mark.long
 def test_currents_of_single_runs_are_named_on_a_large_tanker():
     """A hull without damping explained them as well."""
     found = select(plain_model(Plant.of(draw_case("published", 57, 0).dataset())), THRESHOLD)

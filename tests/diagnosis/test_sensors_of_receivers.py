@@ -128,6 +128,7 @@ def _low_passed(data: Dataset) -> Dataset:
     return _changed(data, change)
 
 
+@pytest.mark.long
 def test_a_record_that_was_filtered_shows_its_cause_and_nothing_else():
     """Its smooth errors had been an `unknown` force."""
     hidden = Hidden(EFFECTS.get("rudder_offset"), (0.03,))

@@ -29,6 +29,7 @@ def tankers():
     return [draw_ship(rng, "test", False) for _ in range(2)]
 
 
+@pytest.mark.long
 def test_a_thrust_that_a_ship_of_nearly_the_same_size_explains_too_is_told_with_a_warning(tankers):
     """With the file of the smaller one the larger one had too much thrust, and nothing else was out of the ordinary."""
     verdict = diagnose(replace(sea_trials(tankers[1], 0), ship=tankers[0].particulars), gain=False)
@@ -44,6 +45,7 @@ def test_a_stalled_rudder_that_no_other_size_explains_is_told_without():
     assert not any(QUESTION in w for w in verdict.warnings)
 
 
+@pytest.mark.long
 def test_a_slow_gear_of_an_odd_ship_is_told_with_a_warning():
     trials = replace(published_trials(PUBLISHED["tanker"], 0, (), Trials()), ship=PUBLISHED["navy"].particulars)
     verdict = diagnose(trials, gain=False)
@@ -60,6 +62,7 @@ def test_of_a_change_what_has_changed_decides_whether_it_shows_whatever_the_ship
     assert whatever_the_ship("change_point", found) is shows
 
 
+@pytest.mark.long
 def test_of_a_ship_in_doubt_no_actuator_is_read_to_the_other_side(monkeypatch):
     """Thrusters of a research ship, beside the file of a ship of 300 m, were all four named as of the wrong sign, with certainty."""
     monkeypatch.setattr(whole, "turned_actuators", lambda *_: [UnitFinding("delta", "sign", -1.0, "as if it were")])
