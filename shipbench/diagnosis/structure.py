@@ -18,6 +18,7 @@ from ..effects.thruster_speed_loss import EFFECT as LOSS
 from ..effects.wake_variation import EFFECT as WAKE
 from ..effects.wind_coefficients import EFFECT as WIND
 from ..ops import Array, absolute, arctan2, clip, exp, maximum, minimum, smoothstep, sqrt, tanh
+from ..physics.hull import tilted_cross_flow
 from ..physics.modifiers import Flow, Modifiers
 from ..physics.thruster import fading
 from ..ship import Particulars
@@ -47,6 +48,9 @@ class Structure(Effect):
     without end (Son & Nomoto 1982): thrust that she loses in long hard turns passed for mass. Of two tunnels with the same record each gives its own
     force, by where it stands in the hull (0.8 to 1.0 of its thrust): what one has more than the other passed for its lever. late_stall: share of the
     lift that the rudder loses from 26 to 37 deg, since every rudder stalls at 30 to 40 deg (physics reference, R18), sharper than a cubic lift does.
+    wave_resistance: of X'_uu 0.015 at a Froude number of 0.25, growing with its fourth power (p1 and p2 end at the square of the speed; without it a
+    fast ship needed thrust, mass and a propeller of her own). drag_forward: cross-flow drag of sections, 2 q xi beside C_D, larger forward or aft (Hooft, Ocean Eng. 21
+    (1994) 329; without it a ship pushed sideways at rest had another lever of her bow thruster).
     """
 
     family = "hull"
@@ -93,6 +97,8 @@ class Structure(Effect):
         Parameter("wake_square", "1", 0.3, -1.0, 2.0),
         Parameter("bow_over_stern", "1", 0.1, -0.5, 0.5),
         Parameter("late_stall", "1", 0.3, -0.5, 0.95),
+        Parameter("wave_resistance", "1", 0.3, -0.5, 3.0),
+        Parameter("drag_forward", "1", 0.4, -2.0, 2.0),
     )
     backing, m_x, astern, braking = 0.5, -0.4, 0.7, -0.7
     wider: ClassVar = {"windmilling": 3.0, "thrust_backing": 2.5}
@@ -127,7 +133,7 @@ class Structure(Effect):
         GOING_ASTERN.force(e, s, (self.astern + q[25], self.astern + q[26], 0.0, ahead * (self.backing + q[19])), ship)
         e.reversal = self.astern + q[27]
         e.thrust = e.thrust * exp(q[28]) * (1.0 + q[18] * smoothstep(-s.n, 0.0, 1.0))
-        self._off_design(e, s, q[28:34], ahead, ship)
+        self._off_design(e, s, q[29:34], ahead, ship)
         ASTERN.force(e, s, (0.0, q[36]), ship)
         e.late_stall = q[39]
         lost = fading(s.u - e.u_c, ship.L)
@@ -135,8 +141,11 @@ class Structure(Effect):
         unit = 0.5 * ship.rho * ship.L * ship.T
         u, v, r = s.u - e.u_c, s.v - e.v_c, s.r * ship.L
         drift = clip(v / sqrt(u * u + v * v + 1e-3 * ship.L), -0.5, 0.5)
-        X, Y = q[8] * v * v + q[9] * r * r, absolute(r) * (q[11] * v + q[12] * r)
+        waves = 0.015 * q[40] * (u * u / (9.81 * ship.L * 0.25**2)) ** 2 * u * absolute(u)
+        X, Y = q[8] * v * v + q[9] * r * r - waves, absolute(r) * (q[11] * v + q[12] * r)
         e.push(unit * X, unit * Y, unit * ship.L * r * (q[13] * absolute(r) + drift * (q[14] * v + q[15] * r)))
+        I_Y, I_N = tilted_cross_flow(v, s.r, ship.L)
+        e.push(0.0, -unit * q[41] * I_Y, -unit * ship.L * q[41] * I_N)
         beta_P = arctan2(-(v + ship.x_P * s.r), maximum(u, 0.0) + 0.1)
         in_turns = q[10] * (1.0 - exp(-2.0 * absolute(beta_P))) * tanh(beta_P / 0.05) + q[37] * (1.0 - exp(-4.0 * beta_P * beta_P))
         e.wake = e.wake - (1.0 - ship.w_P0) * in_turns
@@ -147,11 +156,11 @@ class Structure(Effect):
         ahead, V_A = maximum(n, 0.0), u - ship.w_P0 * maximum(u, 0.0)
         share = V_A * V_A / (V_A * V_A + (0.7 * math.pi * n * D) ** 2 + 1e-4)
         stands = share * share * smoothstep(share, 0.15, 0.3)  # nothing up to J = 0.9, where it drives
-        drag = q[1] * maximum(V_A, 0.0) ** 2 * stands
-        turned = q[3] * (ahead - n) * V_A + (self.braking + q[4]) * ahead * minimum(V_A, 0.0)
-        e.push((1.0 - ship.t_P) * ship.rho * D**2 * exp(q[0]) * (ship.kt[1] * D * turned - drag), 0.0, 0.0)
-        e.wake = e.wake + q[2] * (1.0 - ship.w_P0) * stands
-        e.backing = e.backing + headway * q[5] * (ahead - n) * D / sqrt(V_A * V_A + 4e-4 * 9.81 * ship.L)
+        drag = q[0] * maximum(V_A, 0.0) ** 2 * stands
+        turned = q[2] * (ahead - n) * V_A + (self.braking + q[3]) * ahead * minimum(V_A, 0.0)
+        e.off_design = ship.rho * D**2 * (ship.kt[1] * D * turned - drag)
+        e.wake = e.wake + q[1] * (1.0 - ship.w_P0) * stands
+        e.backing = e.backing + headway * q[4] * (ahead - n) * D / sqrt(V_A * V_A + 4e-4 * 9.81 * ship.L)
 
 
 STRUCTURE = Structure()

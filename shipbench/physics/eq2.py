@@ -109,7 +109,8 @@ def propulsion(u: Array, n: Array, c: Coefficients, e: Modifiers | None = None) 
         race = propeller.race_speed(V_A, maximum(thrust, 0.0), c.D_P, c.rho)
     else:  # the drag of a propeller that goes astern, but does not drive, is no race
         race = propeller.race_through(V_A, maximum(thrust, 0.0) * smoothstep(n, 0.0, 1.0), c.D_P, c.rho)
-    return (1.0 - c.t_P) * thrust, V_A, race if is_neutral(e.race, 1.0) else V_A + e.race * (race - V_A)
+    X_n = (1.0 - c.t_P) * (thrust + e.off_design * e.thrust)
+    return X_n, V_A, race if is_neutral(e.race, 1.0) else V_A + e.race * (race - V_A)
 
 
 def rudder(

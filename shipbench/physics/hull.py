@@ -110,6 +110,17 @@ def cross_flow(v: Array, r: Array, L: float, C_rY: float, C_rN: float) -> tuple[
     return Y, N
 
 
+def tilted_cross_flow(v: Array, r: Array, L: float) -> tuple[Array, Array]:
+    """The same of a drag that grows along the length: integrals of 2 xi w|w| and 2 xi^2 w|w|, w = v + r L xi (distributions along the hull: J. P.
+    Hooft, Ocean Eng. 21 (1994) 329)."""
+    Y, N = 0.0, 0.0
+    for xi, weight in zip(_NODES.tolist(), _WEIGHTS.tolist(), strict=True):
+        w = v + L * xi * r
+        drag = 2.0 * weight * xi * w * absolute(w)
+        Y, N = Y + drag, N + xi * drag
+    return Y, N
+
+
 def unified(u: Array, v: Array, r: Array, c: UnifiedHull, L: float, T: float, rho: float, f: HullFactors = DEEP) -> tuple[Array, Array, Array]:
     """Hull force of the unified model for ocean and harbour: linear lift terms plus cross-flow drag; nothing is divided by the speed.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from shipbench.diagnosis import ordinary
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.model import NUM_BASE, PLACES, Linearisation, Scales
 from shipbench.diagnosis.ordinary import NOTICEABLE, STRANGE, STRANGE_SUM, needed, widened, widths_of
+from shipbench.diagnosis.outside import Outside
 from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.screen import screen
@@ -19,11 +21,12 @@ from shipbench.diagnosis.select import candidates_for
 from shipbench.diagnosis.settle import Fit, settle
 from shipbench.diagnosis.structure import STRUCTURE
 from shipbench.effects.base import EFFECTS
-from shipbench.physics.eq2 import coefficients
+from shipbench.ops import Array
+from shipbench.physics.eq2 import accelerations, coefficients
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.physics.modifiers import Flow, Modifiers
 from shipbench.predictors._physics_fit import parameter_scale
-from shipbench.ship import Propeller, complete
+from shipbench.ship import Particulars, Propeller, complete
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
@@ -163,6 +166,35 @@ def test_resistance_that_grows_with_the_speed_itself_is_no_sign_of_a_wrong_ship_
     found = diagnose(published_trials(replace(tanker, rates=rates), 1, plan=Trials(runs=10, samples=80)), gain=False)
     assert found.verdict == "none"
     assert not found.warnings
+
+
+def test_the_waves_of_a_fast_ship_are_no_added_resistance():
+    """A fourth power of the Froude number beside the square of the speed was named with a score of 27; the latent surge force was 16 times as large."""
+
+    def of_waves(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.push(-q[0] * 0.5 * ship.rho * ship.L * ship.T * 0.015 * (s.u * s.u / (9.81 * ship.L * 0.25**2)) ** 2 * s.u * np.abs(s.u))
+
+    hidden = Hidden(Outside("wave resistance", ("speed",), of_waves), (1.0,))
+    found = diagnose(published_trials(PUBLISHED["navy"], 5, (hidden,), Trials(runs=12)), gain=False)
+    assert (found.verdict, found.causes, found.warnings) == ("none", (), ())
+    assert found.unexplained_after["force_sd"]["surge [m/s^2]"] < 1.5e-3
+
+
+def test_a_propeller_whose_curve_is_not_given_is_not_named_for_what_it_does_beside_that_curve():
+    """More thrust in the estimate and less in `thrust_gain` was a way to twice the drag of a propeller that is turned against the flow."""
+    ship = complete(load_mmg_ship("kcs").particulars.model_copy(update={"propeller": Propeller(diameter=4.0)}))
+    c, p = coefficients(ship), np.zeros(11)
+    names = [q.name for q in STRUCTURE.parameters]
+
+    def surge(log_thrust: float, gain: float) -> np.ndarray:
+        e, q = Modifiers(), np.zeros(len(names))
+        q[names.index("log_thrust")], q[names.index("thrust_backing")], q[names.index("windmilling")] = log_thrust, 1.0, 0.3
+        n, still = np.array([-80.0, 0.0, 90.0]), np.zeros(3)
+        STRUCTURE.force(e, Flow(still, still, still, still, still + 4.0, still, still, n, still, still, still), q, ship)
+        EFFECTS.get("thrust_gain").force(e, Flow(still, still, still, still, still + 4.0, still, still, n, still, still, still), (gain,), ship)
+        return accelerations(still + 4.0, still, still, n, still, still, still, None, c, p, e)[0]
+
+    np.testing.assert_allclose(surge(np.log(1.8), 1.0 / 1.8 - 1.0), surge(0.0, 0.0))
 
 
 @pytest.mark.parametrize("diameter", [1.9, 2.26, 2.6])

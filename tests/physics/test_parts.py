@@ -53,6 +53,7 @@ PARTS = [
     Part("hull.polynomial", lambda u, v, r: hull.polynomial(u, v, r, POLY, 130.0, 6.1, 1025.0), (U_, V_, R_), (1, 2), (1, 2)),
     Part("hull.unified", lambda u, v, r: hull.unified(u, v, r, SHIP.hull, 130.0, 6.1, 1025.0), (U_, V_, R_), (1, 2), (1, 2)),
     Part("hull.cross_flow", lambda v, r: hull.cross_flow(v, r, 130.0, 2.2, 1.9), (V_, R_), (0, 1), (0, 1)),
+    Part("hull.tilted_cross_flow", lambda v, r: hull.tilted_cross_flow(v, r, 130.0), (V_, R_), (0, 1), (0, 1)),
     Part("propeller.quadratic", lambda n, a: (propeller.thrust_quadratic(n, a, 3.8, (0.356, -0.3055, -0.1338), 1025.0),), (N_, U_)),
     Part("propeller.four_quadrant", lambda n, a: (propeller.thrust_four_quadrant(n, a, 3.8, 1025.0),), (N_, U_)),
     Part("propeller.wake", lambda u, v, r: (propeller.wake_fraction(u, v, r, 0.33, -59.0, 2.0, 1.4, 1.4),), (U_, V_, R_), (1, 2), ()),
@@ -134,6 +135,13 @@ def test_hull_and_thrusters_give_nothing_at_rest():
     for f in (hull.polynomial, hull.unified):
         assert np.allclose(f(0.0, 0.0, 0.0, POLY if f is hull.polynomial else SHIP.hull, 130.0, 6.1, 1025.0), 0.0)
     assert thruster.tunnel_thrusters(0.0, 1e4, 0.0, SHIP.thrusters) == (1e4, pytest.approx(54.6e4))
+
+
+def test_a_drag_that_is_larger_forward_turns_a_ship_pushed_sideways_and_pushes_one_that_turns():
+    L, v, r = 130.0, 0.7, 0.01
+    Y, N = hull.tilted_cross_flow(np.array([v, 0.0]), np.array([0.0, r]), L)
+    np.testing.assert_allclose(Y, [0.0, (L * r) ** 2 / 16.0], atol=1e-12, rtol=2e-3)  # 2 int xi^3 sign(xi) over the length
+    np.testing.assert_allclose(N, [v**2 / 6.0, 0.0], atol=1e-12)
 
 
 def test_pure_sway_meets_the_cross_flow_drag_of_a_plate():
