@@ -48,9 +48,9 @@ class Structure(Effect):
     without end (Son & Nomoto 1982): thrust that she loses in long hard turns passed for mass. Of two tunnels with the same record each gives its own
     force, by where it stands in the hull (0.8 to 1.0 of its thrust): what one has more than the other passed for its lever. late_stall: share of the
     lift that the rudder loses from 26 to 37 deg, since every rudder stalls at 30 to 40 deg (physics reference, R18), sharper than a cubic lift does.
-    wave_resistance: of X'_uu 0.015 at a Froude number of 0.25, growing with its fourth power (p1 and p2 end at the square of the speed; without it a
-    fast ship needed thrust, mass and a propeller of her own). drag_forward: cross-flow drag of sections, 2 q xi beside C_D, larger forward or aft (Hooft, Ocean Eng. 21
-    (1994) 329; without it a ship pushed sideways at rest had another lever of her bow thruster).
+    wave_resistance: of X'_uu 0.015 at a Froude number of 0.25, growing with its fourth power (p1 and p2 end at the square of the speed; without it
+    a fast ship needed thrust, mass and a propeller of her own). drag_forward: cross-flow drag of sections, 2 q xi beside C_D, larger forward or aft
+    (Hooft, Ocean Eng. 21 (1994) 329; without it a ship pushed sideways at rest had another lever of her bow thruster).
     """
 
     family = "hull"

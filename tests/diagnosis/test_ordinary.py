@@ -169,7 +169,7 @@ def test_resistance_that_grows_with_the_speed_itself_is_no_sign_of_a_wrong_ship_
 
 
 def test_the_waves_of_a_fast_ship_are_no_added_resistance():
-    """A fourth power of the Froude number beside the square of the speed was named with a score of 27; the latent surge force was 16 times as large."""
+    """A fourth power of the Froude number beside the square of the speed was named with a score of 27, the latent force 16 times as large."""
 
     def of_waves(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.push(-q[0] * 0.5 * ship.rho * ship.L * ship.T * 0.015 * (s.u * s.u / (9.81 * ship.L * 0.25**2)) ** 2 * s.u * np.abs(s.u))
