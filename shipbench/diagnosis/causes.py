@@ -11,6 +11,7 @@ import numpy as np
 from ..checking.units import UnitFinding
 from ..effects.base import EFFECTS, Effect
 from .analysis import HULL_THRESHOLD, Analysis
+from .by_place import goes_with, of_runs
 from .clocks import NAMES, LateVelocities
 from .gear_kinds import GearFinding
 from .generic import Dependence
@@ -63,8 +64,8 @@ def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs
     score, supporters, beside = found.score(index)
     rivals = rivals_of(found, term)
     evidence = f"adds {0.5 * score:.0f} to the log evidence {beside}; {supporters} of {fit.plant.seg.runs} runs support it"
-    if effect.way:
-        evidence += f"; {effect.way}"
+    more = goes_with(fit, of_runs(fit, index)) if term.per_run else ""
+    evidence += "".join(f"; {words}" for words in (effect.way, more) if words)
     if term.since is not None:
         evidence += f"; {effect.name} begins with run {runs[term.since]} (number {term.since}, the first is 0)"
     name = effect.name if term.since is None else "change_point"
@@ -93,10 +94,7 @@ def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
     value = fit.values[index] * unit
     num = fit.plant.seg.runs
     if term.per_run:
-        if effect.vector is not None:
-            size, towards = np.array([tuple(effect.public(row).values()) for row in value]).T
-            value = np.stack([size * np.cos(towards), size * np.sin(towards)], axis=1)
-        rms = np.sqrt(np.mean(value**2, axis=0))
+        rms = np.sqrt(np.mean(of_runs(fit, index) ** 2, axis=0))
         low, high = np.sqrt(num / chi2.ppf(0.975, num)), np.sqrt(num / chi2.ppf(0.025, num))
         names = [p.name for p in effect.parameters if not p.shape]
         return {f"{n}_rms": Estimate(float(r), effect.parameters[0].unit, (float(r * low), float(r * high))) for n, r in zip(names, rms, strict=True)}
