@@ -23,7 +23,7 @@ def of_runs(fit: Fit, index: int) -> np.ndarray:
 def goes_with(fit: Fit, values: np.ndarray) -> str:
     """In words, with the share of the variance: what `values` (runs, components) go with, empty if nothing."""
     seg = fit.plant.seg
-    weight = np.bincount(seg.run, seg.mask.sum(axis=1), minlength=seg.runs)
+    weight = np.maximum(np.bincount(seg.run, seg.mask.sum(axis=1), minlength=seg.runs), 1.0)
     x, y = (np.bincount(seg.run, np.sum(seg.states[..., i] * seg.mask, axis=1), minlength=seg.runs) / weight for i in (0, 1))
     found = [(_chance(values, at), words) for at, words in ((np.stack([x, y], axis=1), "place"), (np.arange(seg.runs)[:, None], "number"))]
     (chance, share), words = min(found, key=lambda f: f[0][0])
