@@ -98,7 +98,7 @@ class Structure(Effect):
         Parameter("bow_over_stern", "1", 0.1, -0.5, 0.5),
         Parameter("late_stall", "1", 0.3, -0.5, 0.95),
         Parameter("wave_resistance", "1", 0.3, -0.5, 3.0),
-        Parameter("drag_forward", "1", 0.4, -2.0, 2.0),
+        Parameter("drag_forward", "1", 0.2, -2.0, 2.0),
     )
     backing, m_x, astern, braking = 0.5, -0.4, 0.7, -0.7
     wider: ClassVar = {"windmilling": 3.0, "thrust_backing": 2.5}
