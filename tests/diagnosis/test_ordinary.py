@@ -168,6 +168,21 @@ def test_resistance_that_grows_with_the_speed_itself_is_no_sign_of_a_wrong_ship_
     assert not found.warnings
 
 
+def test_a_ship_with_more_drag_forward_is_turned_where_she_is_pushed_sideways():
+    """Without it she had another lever of her bow thruster."""
+    ship, still, v = complete(load_mmg_ship("kcs").particulars), np.zeros(2), np.array([0.5, -0.5])
+    names = [p.name for p in STRUCTURE.parameters]
+
+    def moment(forward: float) -> np.ndarray:
+        e, q = Modifiers(), np.zeros(len(names))
+        q[names.index("drag_forward")] = forward
+        STRUCTURE.force(e, Flow(still, still, still, still, still, v, still, still, still, still, still), q, ship)
+        return np.asarray(e.N)
+
+    unit = 0.5 * ship.rho * ship.L**2 * ship.T
+    np.testing.assert_allclose(moment(0.3) - moment(0.0), -unit * 0.3 * v * np.abs(v) / 6.0)
+
+
 def test_the_waves_of_a_fast_ship_are_no_added_resistance():
     """A fourth power of the Froude number beside the square of the speed was named with a score of 27, the latent force 16 times as large."""
 
