@@ -13,7 +13,7 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from .errors import InputError
+from .errors import InputError, unknown_name
 
 _LEAST_FULLNESS = 0.1
 """Block coefficient over the whole breadth below which a unit is wrong."""
@@ -62,6 +62,9 @@ class Wind(_Part):
     lateral_area: float = Field(gt=0)
 
 
+_TABLES: dict[str, type[_Part]] = {"propeller": Propeller, "rudder": Rudder, "thrusters": Thrusters, "wind": Wind}
+
+
 class Ship(_Part):
     """Main dimensions [m], displacement [m^3] or mass [kg], and the optional rest of `ship.toml` (contract, section 3)."""
 
@@ -101,6 +104,10 @@ class Ship(_Part):
             raise InputError(f"{where}: {error}") from None
         except ValidationError as error:
             first = error.errors()[0]
+            if first["type"] == "extra_forbidden":
+                *table, name = (str(k) for k in first["loc"])
+                accepted = _TABLES[table[0]].model_fields if table else cls.model_fields
+                raise InputError(f"{where}: {f'[{table[0]}] ' if table else ''}{unknown_name('key', name, accepted)}") from None
             key = ".".join(str(k) for k in first["loc"]) or "ship"
             more = f" ({error.error_count() - 1} more faults)" if error.error_count() > 1 else ""
             value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:80]})"

@@ -149,6 +149,21 @@ def test_what_no_ship_has_is_refused_with_what_is_accepted(wrong, told):
         Ship.from_dict(ship.model_dump(), "her.toml")
 
 
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"displacment": 100.0}, "unknown key 'displacment'. Did you mean 'displacement'? Known: B,"),
+        (
+            {"propeller": {"diameter": 4.0, "pitch_ratoi": 0.8}},
+            "[propeller] unknown key 'pitch_ratoi'. Did you mean 'pitch_ratio'? Known: area_ratio,",
+        ),
+    ],
+)
+def test_a_key_that_a_ship_file_does_not_know_is_told_with_those_it_knows(wrong, told):
+    with pytest.raises(InputError, match=re.escape(f"her.toml: {told}")):
+        Ship.from_dict(SHIP.model_dump(exclude_none=True) | wrong, "her.toml")
+
+
 def test_rk4_is_of_fourth_order_on_an_oscillator():
     def error(h: float) -> float:
         state = (1.0, 0.0)
