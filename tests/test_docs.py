@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from shipbench.cache import cache_folder
+
 ROOT = Path(__file__).parent.parent
 PAGES = sorted((ROOT / "docs").glob("*.md"))
 _BLOCK = re.compile(r"(?:^`(?P<file>[\w./-]+)`:\n\n)?^```(?P<language>\w*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -74,8 +76,11 @@ class Session:
 
 @pytest.fixture(scope="session")
 def cache(tmp_path_factory):
-    """Simulated data are made once for all pages."""
-    return str(tmp_path_factory.mktemp("cache"))
+    """Simulated data are made once for all pages, and machine code is that of the other tests."""
+    folder, compiled = tmp_path_factory.mktemp("cache"), cache_folder() / "compiled"
+    compiled.mkdir(parents=True, exist_ok=True)
+    (folder / "compiled").symlink_to(compiled)
+    return str(folder)
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..physics.wind import apparent_wind
 from .model import Linearisation
 from .plant import Plant, Segments
 
@@ -19,13 +20,15 @@ _LONGEST_SWELL = 1.8
 _SHORTEST_WAVE, _MOST_WAVES, _MOST_KNOTS = 4.0, 25, 5000
 """Shortest wave over the places visited that is tried, in ship lengths, most of them in twice the extent of the places, and most knots of the force
 at which they are compared."""
+_MIRROR = np.array([1.0, -1.0])[:, None, None]
 _CENTRED = ("heading", "position", "run")
 """Of these only differences count: a force that is always there is none that follows them."""
 
 
 class State(NamedTuple):
     """What a force or an error may follow, in units of the root mean square of the record: motion u, v, r over ground, actuators n, delta, F_b, F_s;
-    psi [rad]; x, y: place, from the middle of all; t: time since the run began [s]; run: from 0 for the first to 1 for the last."""
+    psi [rad]; x, y: place, from the middle of all; t: time since the run began [s]; run: from 0 for the first to 1 for the last; air: velocity of the
+    ship relative to the measured air, forward and to starboard; calm: to air at rest."""
 
     x: np.ndarray
     y: np.ndarray
@@ -39,6 +42,8 @@ class State(NamedTuple):
     F_s: np.ndarray
     t: np.ndarray
     run: np.ndarray
+    air: np.ndarray
+    calm: np.ndarray
 
 
 Form = Callable[[State], Features]
@@ -64,6 +69,11 @@ class Feature(NamedTuple):
 
 def _harmonic(k: int) -> Form:
     return lambda s: (np.cos(k * s.psi), np.sin(k * s.psi))
+
+
+def _blown(form: Callable[[np.ndarray, np.ndarray], Features]) -> Form:
+    """A function of the relative velocity, less what it is in air at rest, which is a resistance."""
+    return lambda s: tuple(x - still for x, still in zip(form(*s.air), form(*s.calm), strict=True))
 
 
 def _period(seconds: float) -> Form:
@@ -103,6 +113,12 @@ _OF_FORCES: Forms = {
         "F_b": lambda s: (s.F_b,), "F_s": lambda s: (s.F_s,), "F_b u": lambda s: (s.F_b * s.u,), "F_s u": lambda s: (s.F_s * s.u,),
         "|F_b|": lambda s: (abs(s.F_b),), "|F_s|": lambda s: (abs(s.F_s),),
     },
+    "measured wind": {
+        "V^2": _blown(lambda a, b: (a**2 + b**2,)), "V^2 cos(gamma)": _blown(lambda a, b: (a * np.hypot(a, b),)),
+        "V^2 sin(gamma)": _blown(lambda a, b: (b * np.hypot(a, b),)), "V^2 sin(2 gamma)": _blown(lambda a, b: (a * b,)),
+        "V^2 cos(gamma + phase)": _blown(lambda a, b: (a * np.hypot(a, b), b * np.hypot(a, b))),
+        "V^2 cos(2 gamma + phase)": _blown(lambda a, b: (a**2 - b**2, a * b)),
+    },
 }  # fmt: skip
 _OF_SENSORS: Forms = {
     "nothing": {"constant": lambda s: (np.ones_like(s.u),)},
@@ -122,7 +138,8 @@ def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
     plant, seg = lin.plant, lin.plant.seg
     assert lin.aside is not None
     act, t = plant.midway(lin.path)
-    on, aside = (_state(plant, middle[0], act, t) for middle in (lin.middle, lin.aside))
+    wind = None if seg.wind is None else np.swapaxes(seg.wind[:, :-1], 0, 1)
+    on, aside = (_state(plant, middle[0], act, t, wind) for middle in (lin.middle, lin.aside))
     ends = _ends(plant)
     low, high = 1.0 / (_LONGEST * plant.froude), 1.0 / max(_SHORTEST * plant.froude, 4.0 * seg.dt)
     tried = np.linspace(low, high, min(1 + int(np.ceil(2.0 * max(high - low, 0.0) * ends)), _MOST_PERIODS))
@@ -132,6 +149,8 @@ def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
     forms = {**_OF_FORCES, "time": _grown(ends) | periods, "waves": rhythms, "position": {**_OF_FORCES["position"], **waves}}
     if not np.any(seg.states[..., 8:]):
         del forms["thrusters"]
+    if wind is None:
+        del forms["measured wind"]
     return _features(forms, on, aside, seg.mask[:, 1:].T, dict.fromkeys(waves, compared))
 
 
@@ -139,7 +158,7 @@ def of_sensors(lin: Linearisation) -> dict[str, list[Feature]]:
     """The features of all forms of a sensor's error, likewise, at the samples."""
     plant, seg = lin.plant, lin.plant.seg
     t = (seg.start[:, None] + seg.dt * np.arange(plant.steps + 1)).T
-    at = _state(plant, np.swapaxes(lin.motion, 0, 1), np.swapaxes(seg.states[..., 6:], 0, 1), t)
+    at = _state(plant, np.swapaxes(lin.motion, 0, 1), np.swapaxes(seg.states[..., 6:], 0, 1), t, None)
     return _features({**_OF_SENSORS, "time": _grown(_ends(plant))}, at, at, seg.mask.T, {})
 
 
@@ -185,7 +204,7 @@ def _ends(plant: Plant) -> float:
 def _features(of: Forms, on: State, aside: State, real: np.ndarray, ways: Mapping[str, int]) -> dict[str, list[Feature]]:
     """By variable. ways: of forms that were chosen from more than stand here."""
     found: dict[str, list[Feature]] = {}
-    mirrored = on._replace(v=-on.v, r=-on.r, delta=-on.delta)
+    mirrored = on._replace(v=-on.v, r=-on.r, delta=-on.delta, **{name: getattr(on, name) * _MIRROR for name in ("air", "calm")})
     for variable, forms in of.items():
         found[variable] = []
         for name, form in forms.items():
@@ -198,16 +217,19 @@ def _features(of: Forms, on: State, aside: State, real: np.ndarray, ways: Mappin
     return found
 
 
-def _state(plant: Plant, motion: np.ndarray, act: np.ndarray, t: np.ndarray) -> State:
-    """From motion (..., 6), actuators (..., 4) and times, each with axes (K, B) before."""
+def _state(plant: Plant, motion: np.ndarray, act: np.ndarray, t: np.ndarray, wind: np.ndarray | None) -> State:
+    """From motion (..., 6), actuators (..., 4), times and wind (..., 2: speed, from), each with axes (K, B) before."""
     seg = plant.seg
     record = seg.states[seg.mask]
     units = _rms(record[:, 3:].T)[:, None, None]
     centre, unit = _places(seg)
     x, y = np.moveaxis((motion[..., :2] - centre) / unit, -1, 0)
-    u, v, r = np.moveaxis(motion[..., 3:], -1, 0) / units[:3]
+    psi, u, v, r = np.moveaxis(motion[..., 2:], -1, 0)
+    calm = np.stack([u, v])
+    air = calm if wind is None else np.stack(apparent_wind(psi, u, v, wind[..., 0], wind[..., 1]))
+    u, v, r = (value / unit for value, unit in zip((u, v, r), units, strict=False))
     n, delta, F_b, F_s = np.moveaxis(act, -1, 0) / units[3:]
-    return State(x, y, motion[..., 2], u, v, r, n, delta, F_b, F_s, t, np.broadcast_to(seg.run / max(seg.runs - 1, 1), t.shape))
+    return State(x, y, psi, u, v, r, n, delta, F_b, F_s, t, np.broadcast_to(seg.run / max(seg.runs - 1, 1), t.shape), air, calm)
 
 
 def _places(seg: Segments) -> tuple[np.ndarray, float]:

@@ -25,7 +25,7 @@ _NAMED = ("recorded heading", "recorded yaw rate")
 _PRIOR_SD, _SENSOR_SD = 0.5, 3.0
 """Of a form's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m), or of ordinary noise of the
 channel (0.23 deg, 0.04 m/s, 0.04 m/s, 0.04 deg/s)."""
-NO_FORM = ("nothing", "heading", "position", "time", "waves", "run")
+NO_FORM = ("nothing", "heading", "position", "time", "waves", "run", "measured wind")
 """What no ship's form depends on."""
 _BY_RUN = ("heading", "position", "waves", "run")
 """What every run has its own of. What a model lacks of a ship is another force in each manoeuvre, and passes for one that follows these: it does only

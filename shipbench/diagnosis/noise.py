@@ -15,7 +15,7 @@ from .wrong import CHANNEL_UNITS, RESIDUALS
 _SHARES, _TIMES = (1.0, 4.0, 16.0, 64.0), (2.0, 6.0, 20.0)
 _SMOOTH_SHARES, _SMOOTH_TIMES = (16.0, 64.0), (0.5, 1.0, 2.0, 4.0)
 """Tried, of errors that last and of filtered noise; times in samples."""
-_FIRST, _WORTH = ((1.0, 2.0), (4.0, 6.0)), 50.0
+_FIRST, WORTH = ((1.0, 2.0), (4.0, 6.0)), 50.0
 """Share and time of noise that is tried first, and the log evidence that it must gain in all pieces together: a cause in the sensors leaves lasting
 residuals, too."""
 _SWINGS, _MOST_LAG = -0.1, 12
@@ -31,7 +31,7 @@ _RISES, _LONGEST, _LIKELY = 0.2, 30, 4.0
 def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colour:
     """Correlation of the noise of each channel that suits the residuals by far better than none; found: of this share of the pieces. waves_alone:
     look for motion with the waves, and for nothing that lasts."""
-    worth = _WORTH * share
+    worth = WORTH * share
     colour = Colour.white(found.plant.steps + 1)
     best = evidence_with(found, colour)
     for channel in np.flatnonzero(found.plant.seg.seen).tolist():

@@ -11,10 +11,10 @@ from .colour import Colour
 from .fit import Origin, fit
 from .gram import Hyper
 from .model import Scales
-from .noise import colour_of, swinging_force
+from .noise import WORTH, colour_of, swinging_force
 from .ordinary import widened
 from .plant import FEW_PIECES, Plant
-from .settle import Fit, Model
+from .settle import Fit, Model, evidence_with
 from .strange import strange_pieces
 from .term import Term
 
@@ -47,6 +47,15 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
     scales = found.scales.coloured(colour)
     found = _without_strange(fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion))
     return widened(found)
+
+
+def beside_noise_of(named: Fit, null: Fit) -> Fit | None:
+    """The plain model `null` fitted again beside the noise that suits the causes of `named`; None where its own does about as well. What a late or a
+    turned sensor errs by lasts, as noise may, and beside such noise it is worth less, or is taken for something else."""
+    colour = colour_of(named)
+    if evidence_with(named, colour) < evidence_with(named, named.scales.colour) + WORTH:
+        return None
+    return widened(fit(null.plant, null.scales.coloured(colour), Model(), null.point, null.hyper, candidates=null.candidates, guess=null.motion))
 
 
 def first_evidence(plant: Plant, null: Fit) -> float:

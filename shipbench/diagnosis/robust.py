@@ -179,8 +179,11 @@ def is_sure(fit: Fit, index: int) -> bool:
 
 def least_size(fit: Fit, term: Term) -> float:
     """Below which a cause does not matter, in typical sizes. Of a gear's time half a sample, too, for which an order may have stood before it was
-    recorded."""
+    recorded. Beside the delay of another sensor as of the rudder's: by what positions are later than velocities, the track tells; which of the two is
+    late, how soon the ship answers alone."""
     least = _OWN.get(term.label, NEGLIGIBLE)
+    if term.effect.late and any(t.effect.late for t in fit.model.terms if t.label != term.label):
+        least = max(least, _OWN["rudder_delay"])
     if term.effect.enters == "gear" and term.effect.parameters[0].unit == "s":
         least = max(least, 0.5 * fit.plant.seg.dt / float(fit.scales.amplitudes(term, fit.plant.c.L)[0]))
     return least

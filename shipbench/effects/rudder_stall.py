@@ -23,7 +23,7 @@ class RudderStall(Effect):
         e.stall, e.stall_angle = q[0], q[1]
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
-        return [(0.2,), (0.35,)]
+        return [(0.1,), (0.2,), (0.35,)]
 
 
 EFFECT = RudderStall()

@@ -62,5 +62,5 @@ def test_a_ship_that_coasts_or_is_held_in_a_turn_or_drifts_is_no_sign_of_a_dead_
 
 
 def test_the_diagnosis_says_so_too():
-    verdict = diagnose(dead(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=12, samples=120)), DELTA), gain=False)
+    verdict = diagnose(dead(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=12, samples=80)), DELTA), gain=False)
     assert any(w.startswith("The rudder is recorded at 0 degrees throughout") for w in verdict.warnings)

@@ -30,7 +30,7 @@ def sounded(data: Dataset, depth: float) -> Dataset:
 def trials() -> Dataset:
     """Runs in water of three depths."""
     ship, shallow = load_mmg_ship("container130"), EFFECTS.get("shallow_water")
-    parts = [sounded(sea_trials(ship, seed, [Hidden(shallow, (q,))], Trials(runs=8)), ship.T / q) for seed, q in enumerate(RATIOS)]
+    parts = [sounded(sea_trials(ship, seed, [Hidden(shallow, (q,))], Trials(runs=5)), ship.T / q) for seed, q in enumerate(RATIOS)]
     runs = [replace(run, id=f"{i}-{run.id}") for i, part in enumerate(parts) for run in part.runs]
     return replace(parts[0], runs=tuple(runs))
 

@@ -54,7 +54,7 @@ def test_a_perfect_log_of_the_speed_beside_a_poor_position_is_a_sensor():
     assert marked(noisy).derived == ()
 
 
-@pytest.mark.parametrize("name", ["", "current"])
+@pytest.mark.parametrize("name", ["", pytest.param("current", marks=pytest.mark.long)])
 def test_derived_speeds_are_no_evidence(name):
     """Counted as measured, they made Mariner's force unknown with a score of 160."""
     hidden = [Hidden(EFFECTS.get(name), (0.3, 0.2))] if name else []

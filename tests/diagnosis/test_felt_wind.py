@@ -17,7 +17,7 @@ from shipbench.simulate.trials import Trials, sea_trials
 
 @pytest.fixture(scope="module")
 def windy() -> Dataset:
-    return sea_trials(load_mmg_ship("container130"), 41, (), Trials(wind=(6.0, -5.0)), wind_recorded=True)
+    return sea_trials(load_mmg_ship("container130"), 41, (), Trials(runs=12, wind=(6.0, -5.0)), wind_recorded=True)
 
 
 def _vector(dataset: Dataset) -> np.ndarray:

@@ -18,6 +18,7 @@ from shipbench.diagnosis.cases import ON_PUBLISHED, draw_case, singles
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.fit import Origin
 from shipbench.diagnosis.model import Scales
+from shipbench.diagnosis.outcome import Diagnosis
 from shipbench.diagnosis.outside import canonical
 from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
@@ -60,13 +61,21 @@ def test_no_workers_are_refused_before_any_work():
         diagnose(_trials(runs=2, samples=20), workers=0)
 
 
-def test_two_processes_say_what_one_says():
+@pytest.fixture(scope="module")
+def drifting() -> tuple[Dataset, Diagnosis]:
+    """Runs in a current, and what one process says of them."""
+    data = _trials(Hidden(EFFECTS.get("current"), (0.25, -0.2)))
+    return data, diagnose(data, workers=1)
+
+
+@pytest.mark.parametrize("found", [True, pytest.param(False, marks=pytest.mark.long)])
+def test_two_processes_say_what_one_says(drifting, found):
     """The first part is fitted beside the whole there, before it is known whether anything is found and what the threshold is."""
-    for hidden in ((Hidden(EFFECTS.get("heading_bias"), (0.04,)),), ()):
-        data = _trials(*hidden, runs=8, samples=50)
-        one, two = (replace(diagnose(data, workers=w), seconds=0.0, trace=None).document() for w in (1, 2))
-        assert [c["effect"] for c in one["causes"]] == [h.effect.name for h in hidden]
-        assert two == one
+    plain = _trials(runs=8, samples=50)
+    data, one = drifting if found else (plain, diagnose(plain, workers=1))
+    assert one.verdict == ("found" if found else "none")
+    one, two = (replace(d, seconds=0.0, trace=None).document() for d in (one, diagnose(data, workers=2)))
+    assert two == one
 
 
 def test_nothing_is_named_on_most_fresh_ships_without_a_hidden_effect():
@@ -125,8 +134,8 @@ def test_a_strong_wind_in_every_run_is_found_on_a_ship_far_from_the_regressions(
     assert "24 of 24 runs support it" in cause.evidence
 
 
-def test_a_hidden_current_is_sized_and_pays_on_runs_that_were_not_fitted():
-    verdict = diagnose(_trials(Hidden(EFFECTS.get("current"), (0.25, -0.2))), workers=1)
+def test_a_hidden_current_is_sized_and_pays_on_runs_that_were_not_fitted(drifting):
+    _, verdict = drifting
     cause = verdict.causes[0]
     assert verdict.verdict == "found"
     assert cause.effect == "current"
@@ -191,7 +200,7 @@ def test_a_ship_file_of_another_ship_names_nothing():
     ("name", "values", "ship", "file"),
     [
         ("speed_scale", (0.05,), "tanker", "s175"),
-        ("current", (0.3, -0.2), "tanker", "s175"),
+        pytest.param("current", (0.3, -0.2), "tanker", "s175", marks=pytest.mark.long),
         pytest.param("rudder_offset", (0.035,), "navy", "tanker", marks=pytest.mark.long),
     ],
 )

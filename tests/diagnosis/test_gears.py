@@ -149,8 +149,8 @@ class Behind(Effect):
     ("effect", "gear", "size", "channel", "told"),
     [
         ("rudder_lag", Behind("delta", "T2"), 3.0, DELTA, "by [delay] delta = -"),
-        ("rudder_backlash", Behind("delta", "backlash"), 0.05, DELTA, "Measure behind that play."),
-        ("shaft_lag", Behind("n", "T2"), 8.0, N, "by [delay] n = -"),
+        pytest.param("rudder_backlash", Behind("delta", "backlash"), 0.05, DELTA, "Measure behind that play.", marks=pytest.mark.long),
+        pytest.param("shaft_lag", Behind("n", "T2"), 8.0, N, "by [delay] n = -", marks=pytest.mark.long),
     ],
 )
 def test_a_gear_behind_its_record_is_named(effect: str, gear: Behind, size: float, channel: int, told: str):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.fit import fit
-from shipbench.diagnosis.generic import SENSORS, Search, dependences
+from shipbench.diagnosis.generic import SENSORS, Dependence, Search, dependences
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.outside import Outside, get
 from shipbench.diagnosis.plain import null_fit
@@ -108,6 +108,26 @@ def test_a_drag_of_thrusters_that_work_either_way_follows_their_size():
     plant = Plant.of(sea_trials(load_mmg_ship("container130"), 5, (hidden,), Trials(runs=12)))
     best = dependences(null_fit(plant, Scales(plant)), HULL)[0]
     assert (best.axis, best.variable, best.form) == ("surge", "thrusters", "|F_b|")
+
+
+def test_a_sail_follows_the_measured_wind_and_nothing_does_without_one():
+    """A force across the wind that is felt on board. A current of each run, waves and a bank were named for two rotor sails."""
+
+    def sail(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        ahead, abeam = s.u + 6.0 * np.cos(s.psi) - 5.0 * np.sin(s.psi), s.v - 6.0 * np.sin(s.psi) - 5.0 * np.cos(s.psi)
+        lift = q[0] * np.hypot(ahead, abeam)
+        e.push(-lift * abeam, lift * ahead, 0.2 * ship.L * lift * ahead)
+
+    def found(*hidden: Hidden) -> Dependence:
+        data = sea_trials(load_mmg_ship("container130"), 41, hidden, Trials(runs=12, wind=(6.0, -5.0)), wind_recorded=True)
+        plant = Plant.of(data)
+        return dependences(null_fit(plant, Scales(plant)))[0]
+
+    assert found().score < 16.0
+    best = found(Hidden(Outside("sail", ("measured wind",), sail), (200.0,)))
+    assert (best.variable, best.form) == ("measured wind", "V^2 cos(gamma)")
+    assert set(best.axis.split(" and ")) >= {"sway", "yaw"}
+    assert best.score > 40.0
 
 
 @pytest.mark.parametrize("in_step", [False, True])

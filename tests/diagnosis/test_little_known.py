@@ -33,8 +33,13 @@ def with_commands_alone(data: Dataset) -> Dataset:
     return replace(data.with_runs(runs), actuators="commanded")
 
 
-@pytest.mark.parametrize("ship", ["kcs", "kvlcc2_l7"])
-@pytest.mark.parametrize("known", [with_main_dimensions_alone, with_commands_alone])
+@pytest.mark.parametrize(
+    ("ship", "known"),
+    [
+        ("kcs", with_main_dimensions_alone), ("kvlcc2_l7", with_main_dimensions_alone), ("kvlcc2_l7", with_commands_alone),
+        pytest.param("kcs", with_commands_alone, marks=pytest.mark.long),
+    ],
+)  # fmt: skip
 def test_nothing_is_named_where_nothing_is_hidden(ship, known):
     verdict = diagnose(known(trials(ship=ship)), gain=False)
     assert (verdict.verdict, [c.effect for c in verdict.causes]) == ("none", [])
@@ -54,6 +59,7 @@ def test_a_warning_says_how_far_off_an_estimated_propeller_is():
     assert warning.startswith("the ship file does not give the propeller's diameter, kt: the runs suggest ")
 
 
+@pytest.mark.long
 def test_a_ship_that_goes_astern_for_long_has_nothing_missing():
     """Six minutes astern in one run of six: the rudder works from its trailing edge, the hull the other way round."""
     data = sea_trials(draw_ship(np.random.default_rng(77), "test", False), 40, (), Trials(runs=6, samples=600))

@@ -93,6 +93,7 @@ def test_an_ordinary_ship_keeps_its_spreads():
     np.testing.assert_array_equal(widths_of(found), 1.0)
 
 
+@pytest.mark.long
 def test_a_ship_of_the_literature_with_an_odd_rudder_is_neither_doubted_nor_explained():
     verdict = diagnose(published_trials(PUBLISHED["mariner"], 42), gain=False)
     assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
@@ -147,7 +148,8 @@ def test_exact_sensors_in_a_calm_still_show_a_small_cause():
     assert verdict.causes[0].parameters["offset"].value == pytest.approx(0.01, rel=0.25)
 
 
-@pytest.mark.parametrize(("runs", "samples"), [pytest.param(10, 600, marks=pytest.mark.long), (8, 400)])
+@pytest.mark.long
+@pytest.mark.parametrize(("runs", "samples"), [(10, 600), (8, 400)])
 def test_standard_manoeuvres_make_no_cause_and_no_doubt_of_the_form_of_a_hull(runs, samples):
     """At the limits of the rudder, S175 with heel: once ten runs gave a `rudder_delay` and a doubt of her file, and eight a `mass_change`, for inflow
     that rises with the square of the angle."""

@@ -165,6 +165,14 @@ def test_a_time_of_less_than_half_a_sample_does_not_matter(dt: float, wanted: bo
     assert matters(_sized("rudder_stall", np.array([0.7]), dt), 0)
 
 
+@pytest.mark.parametrize(("others", "wanted"), [(("position_delay",), False), (("rudder_delay", "current"), True), ((), True)])
+def test_of_two_sensors_that_are_late_each_must_be_so_by_more(others: tuple[str, ...], wanted: bool):
+    """Velocities early by 0.14 s stood beside positions 0.3 s late on a model whose positions alone were late, by 0.5 s."""
+    fit = _sized("velocity_delay", np.array([-0.4]))
+    fit.model.terms += tuple(Term(EFFECTS.get(name)) for name in others)
+    assert matters(fit, 0) is wanted
+
+
 @pytest.mark.parametrize(
     ("effect", "strange", "wanted"),
     [("rudder_delay", ("with",), True), ("rudder_delay", ("with", "null"), False), ("rudder_delay", (), False), ("current", ("with",), False)],

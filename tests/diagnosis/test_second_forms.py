@@ -42,6 +42,7 @@ def test_thrusters_that_lose_their_force_for_good_are_named():
     assert named(trials("thruster_speed_loss", 0.0, 1.0)) == ["thruster_speed_loss"]
 
 
+@pytest.mark.long
 def test_a_little_of_it_is_ordinary():
     assert named(trials("thruster_speed_loss", 0.0, 0.25)) == []
 
@@ -90,6 +91,16 @@ def test_a_rudder_that_stalls_beyond_30_deg_is_ordinary_but_one_that_stalls_befo
     assert named(trials("rudder_stall", 0.6, 0.25, ship="kvlcc2_l7")) == ["rudder_stall"]
 
 
+@pytest.mark.long
+def test_a_rudder_that_stalls_early_is_named_with_its_angle():
+    """Beginning at 0.2 rad it scored 21, on a model that stalled at 15 deg the flow at the rudder was 15 spreads off, and the ship file in doubt."""
+    (cause,) = diagnose(trials("rudder_stall", 0.6, 0.1, ship="kcs", runs=12), gain=False).causes
+    assert cause.effect == "rudder_stall"
+    assert cause.parameters["angle"].value == 0.1
+    assert cause.parameters["lost_share"].value == pytest.approx(0.6, rel=0.15)
+
+
+@pytest.mark.long
 def test_waves_that_push_ahead_as_those_of_the_ship_s_length_are_no_wind():
     """Five times the drift force ahead of short waves: wind, whose force ahead is fitted, was named in four simulators that had it so."""
     long = EFFECTS.get("wave_drift").fitted(130.0)[2]
@@ -97,6 +108,7 @@ def test_waves_that_push_ahead_as_those_of_the_ship_s_length_are_no_wind():
     assert named(data) == ["wave_drift"]
 
 
+@pytest.mark.long
 def test_waves_four_times_as_strong_as_typical_ones_are_no_wind():
     """Their force grows with the square: at none of it, another way of waves seems best, and fitted that does worse than a wind."""
     data = sea_trials(scaled(load_mmg_ship("kcs"), 160.0), 3, (Hidden(EFFECTS.get("wave_drift"), (0.54, -0.54)),), Trials(runs=12))

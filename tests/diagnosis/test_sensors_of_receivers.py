@@ -14,6 +14,7 @@ from shipbench.bench.diagnosis_text import summary_lines
 from shipbench.checking.recording import Recording
 from shipbench.checking.track import keeps_time
 from shipbench.diagnosis import clocks
+from shipbench.diagnosis.analysis import THRESHOLD, plain_model
 from shipbench.diagnosis.clocks import check_clocks
 from shipbench.diagnosis.colour import Colour
 from shipbench.diagnosis.diagnose import diagnose
@@ -21,8 +22,9 @@ from shipbench.diagnosis.fit import Origin, fit
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.noise import colour_of
 from shipbench.diagnosis.over_ground import over_ground
-from shipbench.diagnosis.plain import null_fit
+from shipbench.diagnosis.plain import beside_noise_of, null_fit
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.select import select
 from shipbench.diagnosis.settle import Model
 from shipbench.diagnosis.strange import left_out
 from shipbench.effects.base import EFFECTS, delayed
@@ -128,6 +130,17 @@ def _low_passed(data: Dataset) -> Dataset:
     return _changed(data, change)
 
 
+def test_what_a_cause_does_to_a_sensor_is_no_noise_once_it_is_named():
+    """Beside the noise that a late position had been taken for, half of the delay was found in other sensors on a model."""
+    late = Hidden(EFFECTS.get("position_delay"), (3.0,))
+    null = plain_model(Plant.of(sea_trials(load_mmg_ship("kcs"), 4, (late,), Trials(runs=12, samples=80, noise=0.3))))
+    assert null.scales.colour.share[:2].any()
+    named = select(null, THRESHOLD)
+    again = beside_noise_of(named.final, null)
+    assert not again.scales.colour.share.any()
+    assert beside_noise_of(select(again, THRESHOLD).final, again) is None
+
+
 @pytest.mark.long
 def test_a_record_that_was_filtered_shows_its_cause_and_nothing_else():
     """Its smooth errors had been an `unknown` force."""
@@ -201,6 +214,7 @@ def test_a_swell_is_told_from_the_ships_own_motion_though_the_latent_force_follo
     assert found.scales.colour.period[[V, R]] == pytest.approx(period * (data.ship.L / 130.0) ** 0.5 / data.dt, rel=0.25)
 
 
+@pytest.mark.long
 def test_a_cause_is_seen_through_a_swell(monkeypatch):
     monkeypatch.setattr(shipbench.simulate.trials, "WAVE_PERIOD", 16.0)
     hidden = [Hidden(EFFECTS.get("rudder_offset"), (0.03,))]

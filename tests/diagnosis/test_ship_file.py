@@ -38,6 +38,7 @@ def test_a_thrust_that_a_ship_of_nearly_the_same_size_explains_too_is_told_with_
     assert warning.startswith("a similar ship of 1.4 times the size explains the runs about as well as thrust_gain (log evidence ")
 
 
+@pytest.mark.long
 def test_a_stalled_rudder_that_no_other_size_explains_is_told_without():
     case = draw_case("single", singles().index("rudder_stall"), 4)
     verdict = diagnose(case.dataset(), gain=False)
