@@ -15,7 +15,7 @@ from .generic import NO_FORM, Dependence, Search, dependences
 from .misread import judged
 from .model import Scales
 from .ordinary import NOTICEABLE
-from .plain import beside_noise_of, null_fit
+from .plain import null_fit
 from .plant import Plant
 from .record_error import RecordError
 from .select import Selection, candidates_for, select
@@ -36,9 +36,9 @@ _FAR_OFF = 0.75
 of 17 and 23 m, with `off_form` 16: 111 to 127 and 179 for u^2 delta, where four times would ask 85.)"""
 GENERIC_MARGIN = 10.0
 """Least that it must be worth beyond all named causes together, as what the runs show in their place; within so much it is told beside them."""
-_CONTENDS, _SENSOR_CONTENDS, _CONTENDERS = 0.5, 0.25, 3
-"""Share of what named causes are worth from which forces and errors of sensors, and number of dependences that are looked at more closely in their
-place. (A log mounted at an angle: worth 1525 before the noise is known, which holds it, and 3379 then.)"""
+_CONTENDS, _CONTENDERS = 0.4, 3
+"""Share of what named causes are worth from which, and number of dependences that are looked at more closely in their place. (A log
+mounted at an angle: worth 1525 before the noise is known, which holds it, and 3379 then; what was named in its place 3210.)"""
 _LEAST_FORCE, _LEAST_ERROR = 0.07, 0.3
 """Least size of an unknown force in units of the latent force: 0.35 mm/s^2; in yaw 7e-6 rad/s^2 at 130 m; and of an error in units of ordinary noise:
 0.07 deg, 0.012 m/s, 0.012 deg/s."""
@@ -94,20 +94,10 @@ class Analysis:
 
 def causes_of(plant: Plant, threshold: float, only: Sequence[str] | None = None, settled: Sequence[str] = ()) -> tuple[Extension, dict[str, Gear]]:
     """What one training part alone leads to, by the same selection, with the threshold of the whole; and the best ordinary gears."""
-    selection = _selected(plain_model(plant, only, settled), threshold)
+    selection = select(plain_model(plant, only, settled), threshold)
     findings, plain, _ = find_in_gears(selection.final.plant)
     gears = {g.actuator: g.gear for g in _named_gears(findings, threshold, only)}
     return Extension(selection.final.model.terms, selection.final.values, False, gears or None), plain
-
-
-def _selected(null: Fit, threshold: float) -> Selection:
-    """What `select` finds, beside the noise that suits it."""
-    found = select(null, threshold)
-    if not found.final.model.terms or not null.scales.colour.share.any():
-        return found
-    again = beside_noise_of(found.final, null)
-    other = found if again is None else select(again, threshold)
-    return max(found, other, key=lambda s: s.final.evidence)
 
 
 def _named_gears(findings: Sequence[GearFinding], threshold: float, only: Sequence[str] | None) -> list[GearFinding]:
@@ -139,7 +129,7 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
     """
     draws = null_maxima(null, seed)
     threshold = max(THRESHOLD, float(np.quantile(draws, 0.95))) if only is None else 0.0
-    selection = _selected(null, np.inf if cautious else threshold)
+    selection = select(null, np.inf if cautious else threshold)
     null = selection.null
     findings, plain, errors = find_in_gears(null.plant)
     gears = [] if cautious else _named_gears(findings, threshold, only)
@@ -179,8 +169,7 @@ def _unknown(selection: Selection, gears: Sequence[GearFinding], search: Search)
     """The dependence that beats all named causes together, if one does; or a sensor's error that comes about as near."""
     named = bool(selection.final.model.terms) or bool(gears)
     worth = max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) if named else 0.0
-    shares = {False: _CONTENDS, True: _SENSOR_CONTENDS}
-    found = [d for d in search.found if d.score > max(asked(d, selection.off_form), shares[d.of_sensor] * worth)]
+    found = [d for d in search.found if d.score > max(asked(d, selection.off_form), _CONTENDS * worth)]
     contenders = [search.settled(d) for d in found[:_CONTENDERS]] if named else found[:1]
     best = max(contenders, key=lambda d: d.score, default=None)
     if best is None or best.has_name:

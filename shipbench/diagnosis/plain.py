@@ -50,8 +50,10 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
 
 
 def beside_noise_of(named: Fit, null: Fit) -> Fit | None:
-    """The plain model `null` fitted again beside the noise that suits the causes of `named`; None where its own does about as well. What a late or a
-    turned sensor errs by lasts, as noise may, and beside such noise it is worth less, or is taken for something else."""
+    """The plain model `null` fitted again beside the noise that suits the causes of `named`; None where its own does about as well, or is white. What
+    a late or a turned sensor errs by lasts, as noise may, and beside such noise it is worth less, or is taken for something else."""
+    if not null.scales.colour.share.any():
+        return None
     colour = colour_of(named)
     if evidence_with(named, colour) < evidence_with(named, named.scales.colour) + WORTH:
         return None

@@ -12,7 +12,7 @@ from ..effects.base import EFFECTS, Effect
 from .fit import Origin, fit, looking_at
 from .model import Linearisation
 from .ordinary import STRANGE_SIZE, widened
-from .plain import REFIT_ITERATIONS
+from .plain import REFIT_ITERATIONS, beside_noise_of
 from .plant import Plant
 from .robust import WITHOUT_WIND, bends, is_sure, matters
 from .screen import Score, changes, glance, overlap, screen
@@ -232,6 +232,8 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         if best.model.terms[-1].since is not None:
             steps.append(Step.of(round_, best, now, 2.0 * (best.evidence - now.evidence)))
         now = widened(looking_at(_backward(best, threshold, besides), candidates))
+        if round_ == 0 and (again := beside_noise_of(now, null)) is not None:
+            return select(again, threshold, most=most)
         scores = screen(now)
     pruned = _backward(now, threshold, besides, spare_last=False)
     pruned, unsure = _without(pruned, lambda f, i: is_sure(f, i) and not bends(f, i, null)) if careful else (pruned, ())

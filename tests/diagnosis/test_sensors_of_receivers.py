@@ -135,10 +135,11 @@ def test_what_a_cause_does_to_a_sensor_is_no_noise_once_it_is_named():
     late = Hidden(EFFECTS.get("position_delay"), (3.0,))
     null = plain_model(Plant.of(sea_trials(load_mmg_ship("kcs"), 4, (late,), Trials(runs=12, samples=80, noise=0.3))))
     assert null.scales.colour.share[:2].any()
-    named = select(null, THRESHOLD)
-    again = beside_noise_of(named.final, null)
-    assert not again.scales.colour.share.any()
-    assert beside_noise_of(select(again, THRESHOLD).final, again) is None
+    found = select(null, THRESHOLD)
+    assert [t.label for t in found.final.model.terms] == ["position_delay"]
+    assert not found.null.scales.colour.share.any()
+    assert found.final.scales.colour is found.null.scales.colour
+    assert beside_noise_of(found.final, found.null) is None
 
 
 @pytest.mark.long
