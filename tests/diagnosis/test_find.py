@@ -181,6 +181,7 @@ def test_a_force_or_a_fault_of_a_sensor_that_follows_no_known_cause_is_called_un
     assert canonical(verdict.unknown["variable"]) & case.variables
 
 
+@pytest.mark.long
 def test_what_an_unknown_fault_replaces_raises_no_doubt_of_the_ship_file():
     """A log mounted at an angle: a list of 3.8 times its size had been the doubt, and a compass error was told beside it."""
     verdict = diagnose(draw_case("outside", 58, 7, "test", Trials(runs=12, samples=90)).dataset(), gain=False)
@@ -196,12 +197,13 @@ def test_a_ship_file_of_another_ship_names_nothing():
     assert verdict.verdict == "unknown"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "values", "ship", "file"),
     [
         ("speed_scale", (0.05,), "tanker", "s175"),
-        pytest.param("current", (0.3, -0.2), "tanker", "s175", marks=pytest.mark.long),
-        pytest.param("rudder_offset", (0.035,), "navy", "tanker", marks=pytest.mark.long),
+        ("current", (0.3, -0.2), "tanker", "s175"),
+        ("rudder_offset", (0.035,), "navy", "tanker"),
     ],
 )
 def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship, file):

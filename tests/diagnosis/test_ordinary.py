@@ -141,6 +141,7 @@ def test_exact_sensors_in_a_calm_make_no_cause_of_the_form_of_a_hull(ship, runs)
     assert not any("Is the ship file" in w for w in verdict.warnings)
 
 
+@pytest.mark.long
 def test_exact_sensors_in_a_calm_still_show_a_small_cause():
     hidden = Hidden(EFFECTS.get("rudder_offset"), (0.01,))
     verdict = diagnose(published_trials(PUBLISHED["mariner"], 43, (hidden,), replace(EXACT, runs=12)), gain=False)
