@@ -227,7 +227,7 @@ def _state(plant: Plant, motion: np.ndarray, act: np.ndarray, t: np.ndarray, win
     psi, u, v, r = np.moveaxis(motion[..., 2:], -1, 0)
     calm = np.stack([u, v])
     air = calm if wind is None else np.stack(apparent_wind(psi, u, v, wind[..., 0], wind[..., 1]))
-    u, v, r = (value / unit for value, unit in zip((u, v, r), units, strict=False))
+    u, v, r = np.stack([u, v, r]) / units[:3]
     n, delta, F_b, F_s = np.moveaxis(act, -1, 0) / units[3:]
     return State(x, y, psi, u, v, r, n, delta, F_b, F_s, t, np.broadcast_to(seg.run / max(seg.runs - 1, 1), t.shape), air, calm)
 

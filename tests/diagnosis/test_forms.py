@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,3 +77,19 @@ def test_periods_are_told_in_seconds_of_this_ship_and_one_is_near_to_any(plant):
 def test_thrusters_that_are_not_used_are_not_looked_at(plant):
     assert "thrusters" not in _features(plant)[0]
     assert "thrusters" in _features(Plant.of(sea_trials(load_mmg_ship("container130"), 5, (), Trials(runs=4, samples=40))))[0]
+
+
+@pytest.mark.parametrize("blows", [True, False])
+def test_a_measured_wind_pushes_only_where_it_blows_and_abeam_to_one_side(blows: bool):
+    """What air at rest does is a resistance: none of these forms follows it."""
+    data = sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=6, samples=80, wind=(6.0, -5.0)), wind_recorded=True)
+    if not blows:
+        data = data.with_runs([replace(run, inputs=run.inputs * (np.array(run.inputs_names) != "wind_speed")) for run in data.runs])
+    forms = _features(Plant.of(data))[0]["measured wind"]
+    assert [f.form for f in forms if np.any(f.on)] == ([f.form for f in forms] if blows else [])
+    if blows:
+        assert {f.form for f in forms if f.odd} == {"V^2 sin(gamma)", "V^2 sin(2 gamma)"}
+
+
+def test_without_a_measured_wind_no_force_follows_it(plant):
+    assert "measured wind" not in _features(plant)[0]
