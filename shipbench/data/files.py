@@ -176,6 +176,9 @@ def complete_columns(table: pd.DataFrame, notes: list[str]) -> tuple[str, ...]:
         if command not in table:
             table[command] = table[actuator]
             notes.append(f"{command} is not recorded: taken as {actuator}")
+    wind = [c for c in ("wind_speed", "wind_from") if c in table]
+    if len(wind) == 1:
+        notes.append(f"{wind[0]} is recorded alone: no wind is used without both wind_speed and wind_from")
     return (*COMMANDS, *(c for c in ENVIRONMENT if c in table))
 
 

@@ -13,7 +13,10 @@ _ADVICE = "`shipbench data check` has the lines for dataset.toml."
 
 def with_true_wind(dataset: Dataset) -> tuple[Dataset, list[str]]:
     """The data set with the true wind in its channels, and a line for the reader where it had another."""
-    if not set(CHANNELS) <= set(dataset.inputs):
+    recorded = [name for name in CHANNELS if name in dataset.inputs]
+    if len(recorded) == 1:
+        return dataset, [f"{recorded[0]} is recorded alone: without both {' and '.join(CHANNELS)} the wind counts as not measured."]
+    if not recorded:
         return dataset, []
     lines = []
     found = wind_reading(Recording(dataset))

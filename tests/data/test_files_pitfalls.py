@@ -88,6 +88,12 @@ def test_an_actuator_filled_from_its_command_is_in_our_units_too(tmp_path):
     assert any("n is not recorded" in note for note in read.notes)
 
 
+@pytest.mark.parametrize("kept", ["wind_speed", "wind_from"])
+def test_half_a_wind_is_said(tmp_path, kept):
+    read = read_dataset(folder_with(tmp_path, lambda t: t.assign(**{kept: 1.0})))
+    assert [note for note in read.notes if note.startswith(f"{kept} is recorded alone")]
+
+
 def test_a_wrapped_heading_becomes_continuous_inside_a_run_only(tmp_path):
     psi = np.deg2rad(np.tile([170.0, 178, -174, -166, -158, -150, -142], 2))
     read = read_dataset(folder_with(tmp_path, lambda t: t.assign(psi=psi)))

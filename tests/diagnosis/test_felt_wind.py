@@ -51,6 +51,15 @@ def test_a_wind_that_is_where_it_blows_to_is_turned(windy):
     assert "blows to" in line
 
 
+@pytest.mark.parametrize("kept", [-2, -1])
+def test_half_a_wind_is_none_and_said(windy, kept: int):
+    names = windy.inputs
+    half = windy.with_runs([replace(r, inputs=r.inputs[:, [0, 1, 2, 3, kept]], inputs_names=(*names[:4], names[kept])) for r in windy.runs])
+    found, (line,) = with_true_wind(half)
+    assert found is half
+    assert line.startswith(f"{names[kept]} is recorded alone")
+
+
 def test_a_wind_as_felt_makes_no_cause(windy):
     found = diagnose(_felt(windy, 1.0, 1.0), gain=False)
     assert found.verdict == "none"
