@@ -161,7 +161,7 @@ def test_models_lists_names_and_parameters(cli):
 def test_data_commands_find_what_is_there(cli, toy_folder):
     assert {d["name"] for d in json.loads(cli("data", "list", "--json").stdout)} >= {"harbour90", "harbour90_noisy"}
     facts = json.loads(cli("data", "check", toy_folder(), "--json").stdout)
-    assert facts["runs"] == "6 in 6 groups, 246 samples at 1 s, 40 to 40 s long"
+    assert facts["runs"] == "6 in 6 groups, 246 samples at 1 s, 40 s long"
     assert any("propeller not given" in note for note in facts["note"])
     table = json.loads(cli("data", "describe", "toyset", "--json").stdout)["statistics"]
     assert {row["signal"]: row["unit"] for row in table["rows"]}["delta"] == "deg"

@@ -13,7 +13,7 @@ from .tables import Table, TableColumn, number, significant
 def dataset_facts(dataset: Dataset) -> dict[str, Any]:
     """What was found in a data set, for a person who checks a loader or a folder."""
     samples = [len(r) for r in dataset.runs]
-    lengths = sorted((n - 1) * dataset.dt for n in samples)
+    lengths = " to ".join(dict.fromkeys(f"{(n - 1) * dataset.dt:g}" for n in (min(samples), max(samples))))
 
     def counts(key: str) -> str:
         values = [str(r.meta[key]) for r in dataset.runs if key in r.meta]
@@ -23,7 +23,7 @@ def dataset_facts(dataset: Dataset) -> dict[str, Any]:
     return {
         "name": dataset.name,
         "ship": f"{dataset.ship.name}, L = {dataset.ship.L:g} m, B = {dataset.ship.B:g} m, T = {dataset.ship.T:g} m",
-        "runs": f"{len(dataset)} in {len(groups)} groups, {sum(samples)} samples at {dataset.dt:g} s, {lengths[0]:g} to {lengths[-1]:g} s long",
+        "runs": f"{len(dataset)} in {len(groups)} groups, {sum(samples)} samples at {dataset.dt:g} s, {lengths} s long",
         "inputs": ", ".join(dataset.inputs),
         "actuators": dataset.actuators,
         "manoeuvres": counts("manoeuvre"),
