@@ -20,13 +20,11 @@ from .outcome import Candidate, Cause, Estimate, Gain, what_it_is
 from .plant import HULL, NUM_HULL
 from .robust import WITHOUT_WIND, covariance, inflation, least_size
 from .screen import Score, other_kinds_from, places
-from .select import ALIKE, asked_besides, shows_in_record
+from .select import ALIKE, CONFUSED, asked_besides, shows_in_record
 from .settle import Fit
 from .ship_file import whatever_the_ship
 from .term import Term
 
-_TIE = 10.0
-"""Candidates within this of the winner's score (2 log Bayes factor) are called confused with it."""
 _DOUBT = "in the model, but not named while the ship file is in doubt"
 
 
@@ -76,10 +74,10 @@ def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs
 
 
 def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
-    """Effects that were refitted in its place, when it was added, and came within `_TIE` of it."""
+    """Effects that were refitted in its place, when it was added, and came near to it."""
     steps = found.selection.steps
     own = max((s for s in steps if s.term.label == term.label), key=lambda s: (s.round, s.score), default=None)
-    near = [s.term.label for s in steps if own is not None and s.round == own.round and s.score > own.score - _TIE]
+    near = [s.term.label for s in steps if own is not None and s.is_near(own)]
     near += [other for group in ALIKE if term.label in group for other in sorted(group - {term.label})]
     present = {t.label for t in found.final.model.terms}
     return tuple(dict.fromkeys(n for n in near if n not in present))
@@ -127,7 +125,7 @@ def _spread(effect: Effect, q: Sequence[float], name: str, cov: np.ndarray, num:
 def _gear_cause(found: Analysis, g: GearFinding, gain: Gain | None) -> Cause:
     effect = EFFECTS.get(g.effect)
     parameter = effect.parameters[0]
-    near = tuple(x.effect for x in found.all_gears if x.actuator == g.actuator and x.effect != g.effect and x.score > g.score - _TIE)
+    near = tuple(x.effect for x in found.all_gears if x.actuator == g.actuator and x.effect != g.effect and x.score > g.score - CONFUSED)
     runs = int(np.sum(g.per_run > 0))
     return Cause(
         g.effect, 0, g.score, _p(found, g.score), {parameter.name: Estimate(g.value, parameter.unit, g.ci95)}, near, effect.separate if near else

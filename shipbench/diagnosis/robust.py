@@ -7,10 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..data.noise import white_noise
 from ..effects.base import Effect
+from ..signals import DELTA
 from .gram import by_run, shared_alone, solve
 from .model import PLACES
 from .ordinary import STRANGE, is_strange, needed
+from .plant import Segments
 from .screen import evidence
 from .settle import Fit
 from .term import Term
@@ -20,16 +23,19 @@ WITHOUT_WIND = ("wind", "wind_per_run")
 NEGLIGIBLE = 0.05
 """In typical sizes. With enough samples the form of a hull makes tiny causes certain: speeds 0.1 % off, a bank of a 65th of the usual suction."""
 _OWN = {
-    "rudder_delay": 0.6, "rudder_lag": 0.3, "rudder_asymmetry": 0.25, "current_per_run": 0.15, "wind_per_run": 0.15, "rudder_stall": 0.5,
+    "rudder_delay": 0.6, "rudder_lag": 0.4, "rudder_asymmetry": 0.25, "current_per_run": 0.15, "wind_per_run": 0.15, "rudder_stall": 0.5,
     "thruster_lag": 0.42,
 }  # fmt: skip
-"""Likewise. How soon a ship answers her rudder depends on heel and on the flow's memory, which eq. (2) does not know (S175 with heel, nothing
-hidden: 0.5 to 0.7 s early, 0.3 to 0.42 of the typical size; a ship whose lift builds up over half a length: 0.51 late; a lag is about as late); the
-race of a single screw turns, and meets the rudder more on one side (5 % more race to one side, 4 % less to the other: 0.15 to 0.22 of the typical
+"""Likewise. How soon a ship answers her rudder depends on heel and on the flow's memory, which eq. (2) does not know (S175 with heel, nothing hidden:
+0.5 to 0.7 s early, 0.3 to 0.42 of the typical size; a ship whose lift builds up over half a length: 0.51 late; over a third: a lag of 0.31 and 0.32);
+the race of a single screw turns, and meets the rudder more on one side (5 % more race to one side, 4 % less to the other: 0.15 to 0.22 of the typical
 size); gusts and swell do not average out in a run (gusts of 1.5 m/s that last 20 s have means over 120 s of 0.11 of the typical wind), and push a
 ship about as currents of single runs do; lift grows more slowly than the sine of the angle on many a rudder (one with a flap, whose lift goes as
 tanh: 0.19 lost, 0.4 of the typical size); thrusters whose record is their order lag by 2 s, but ordinary ones by up to 4.5 s
 (`gear_kinds.ORDINARY`)."""
+_NOISES = 6.0
+"""Play behind a record of the rudder, in standard deviations of its noise, which such play takes out. (A boat of 12 m with noise of 0.1 deg and no
+play, beside a lag of 0.2 s: 0.35 and 0.37 deg, worth 90 and 106; without the noise none.)"""
 _REACH = 0.75
 """Lengths from midship within which a thruster acts, whatever the hull makes of its jet. (A lever of 1.0 was named for what a hull lacked.)"""
 _TRIMS = 0.06
@@ -179,14 +185,21 @@ def is_sure(fit: Fit, index: int) -> bool:
 
 def least_size(fit: Fit, term: Term) -> float:
     """Below which a cause does not matter, in typical sizes. Of a gear's time half a sample, too, for which an order may have stood before it was
-    recorded. Beside the delay of another sensor as of the rudder's: by what positions are later than velocities, the track tells; which of the two is
-    late, how soon the ship answers alone."""
+    recorded; of play behind a record what the record's noise makes of it. Beside the delay of another sensor as of the rudder's: by what positions
+    are later than velocities, the track tells; which of the two is late, how soon the ship answers alone."""
     least = _OWN.get(term.label, NEGLIGIBLE)
     if term.effect.late and any(t.effect.late for t in fit.model.terms if t.label != term.label):
         least = max(least, _OWN["rudder_delay"])
     if term.effect.enters == "gear" and term.effect.parameters[0].unit == "s":
         least = max(least, 0.5 * fit.plant.seg.dt / float(fit.scales.amplitudes(term, fit.plant.c.L)[0]))
+    if term.label == "rudder_backlash" and not fit.plant.seg.commanded:
+        least = max(least, _NOISES * _rudder_noise(fit.plant.seg) / float(fit.scales.amplitudes(term, fit.plant.c.L)[0]))
     return least
+
+
+def _rudder_noise(seg: Segments) -> float:
+    """Standard deviation of the noise of the record of the rudder, in rad."""
+    return float(np.median([white_noise(delta[real]) for delta, real in zip(seg.states[..., DELTA], seg.mask, strict=True)]))
 
 
 def matters(fit: Fit, index: int) -> bool:

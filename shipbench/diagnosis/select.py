@@ -55,6 +55,9 @@ ALIKE = ({"mass_change", "thrust_gain"},)
 """Told as confused with each other however far apart: a ship that is slow to gain speed has more mass or less thrust, and for what else they do the
 hull's derivatives make up. (Five simulators: in six of eight sets with the thrust off mass was ahead, by 4 to 24; in two of six with the mass off
 thrust was, by 3 and 12.)"""
+CONFUSED, _OF_FORMULAS, _PUSH_ALIKE = 10.0, 0.1, ({"wind", "wave_drift"}, {"wind_per_run", "wave_drift"})
+"""Candidates within this of the winner's score are called confused with it; of these, within this share of it: how far they lie apart, their formulas
+decide. (Drift in waves by another formula: wind 706, waves 681.)"""
 _CHANGES, _CHANGE_MARGIN, _OWN_MARGIN = 2, 14.0, 4.0
 """A beginning is chosen among all effects: it must beat the best cause without one by this; the second where that is the same effect."""
 _INSEPARABLE = ({"wind", "wind_per_run", "wave_drift"},)
@@ -78,6 +81,11 @@ class Step:
     @classmethod
     def of(cls, number: int, tried: Fit, now: Fit, score: float) -> Step:
         return cls(number, tried.model.terms[-1], score, int(np.sum(tried.solution.per_run > now.solution.per_run)))
+
+    def is_near(self, best: Step) -> bool:
+        """Whether the data do not tell it from the step that was taken instead."""
+        share = _OF_FORMULAS * ({self.term.label, best.term.label} in _PUSH_ALIKE)
+        return self.round == best.round and self.score > best.score - max(CONFUSED, share * best.score)
 
 
 @dataclass(frozen=True)
@@ -213,8 +221,9 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
 
     def gain(tried: Fit) -> float:
         term = tried.model.terms[-1]
-        # every ship is a little unequal, every run has a breath of wind: what is too small of that stays, and others are judged beside it
-        if careful and not (term.effect.breaks_symmetry or term.per_run or matters(tried, -1)):
+        # every ship is a little unequal, every run has a breath of wind, every record is a little late: what is too small of that stays, and others
+        # are judged beside it
+        if careful and not (term.effect.breaks_symmetry or term.per_run or term.effect.enters == "gear" or matters(tried, -1)):
             return -np.inf
         return 2.0 * (tried.evidence - now.evidence) - besides(tried, -1)
 

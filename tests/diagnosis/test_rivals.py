@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import pytest
+
 from shipbench.diagnosis.causes import rivals_of
+from shipbench.diagnosis.select import Step
+from shipbench.diagnosis.term import Term
+from shipbench.effects.base import EFFECTS
 
 
-def step(number: int, label: str, score: float) -> SimpleNamespace:
-    return SimpleNamespace(round=number, term=SimpleNamespace(label=label), score=score)
+def step(number: int, label: str, score: float) -> Step:
+    return Step(number, Term(EFFECTS.get(label)), score, 0)
 
 
 def test_only_what_came_near_in_the_round_in_which_a_cause_was_added_is_its_rival():
@@ -25,3 +30,11 @@ def test_mass_and_thrust_are_always_told_as_confused():
     steps, mass = [step(0, "mass_change", 40.0), step(0, "thrust_gain", 18.0), step(0, "wind", 17.0)], SimpleNamespace(label="mass_change")
     found = SimpleNamespace(selection=SimpleNamespace(steps=steps), final=SimpleNamespace(model=SimpleNamespace(terms=[mass])))
     assert rivals_of(found, mass) == ("thrust_gain",)
+
+
+@pytest.mark.parametrize(("named", "other", "told"), [("wind", "wave_drift", True), ("wave_drift", "wind", True), ("current", "wave_drift", False)])
+def test_wind_and_waves_are_told_as_confused_where_their_formulas_decide(named: str, other: str, told: bool):
+    """Drift in waves by another formula on a tanker: wind was ahead by 25 of 706, and waves not spoken of."""
+    steps, cause = [step(0, named, 706.0), step(0, other, 681.0)], SimpleNamespace(label=named)
+    found = SimpleNamespace(selection=SimpleNamespace(steps=steps), final=SimpleNamespace(model=SimpleNamespace(terms=[cause])))
+    assert rivals_of(found, cause) == ((other,) if told else ())

@@ -16,6 +16,7 @@ from shipbench.diagnosis.robust import bends, covariance, inflation, is_borne_by
 from shipbench.diagnosis.select import asked_besides
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
+from shipbench.signals import DELTA
 
 RUNS = 20
 _NONE = np.zeros(0, dtype=int), np.zeros(0)
@@ -163,6 +164,15 @@ def _sized(effect: str, values: np.ndarray, dt: float = 1.0, L: float = 130.0) -
 def test_a_time_of_less_than_half_a_sample_does_not_matter(dt: float, wanted: bool):
     assert matters(_sized("rudder_delay", np.array([0.7]), dt), 0) is wanted  # 1.05 s
     assert matters(_sized("rudder_stall", np.array([0.7]), dt), 0)
+
+
+@pytest.mark.parametrize(("noise", "commanded", "wanted"), [(0.1, False, False), (0.05, False, True), (0.1, True, True)])
+def test_play_that_takes_the_noise_out_of_a_record_is_none(noise: float, commanded: bool, wanted: bool):
+    """0.5 deg of it, with noise of 0.1 deg on a boat of 12 m that had none; beside orders there is no noise to take out."""
+    fit, states = _sized("rudder_backlash", np.array([0.25])), np.zeros((8, 61, 10))
+    states[..., DELTA] = np.deg2rad(noise * np.random.default_rng(2).standard_normal(states.shape[:2]))
+    fit.plant.seg = SimpleNamespace(dt=0.5, commanded=commanded, states=states, mask=np.ones(states.shape[:2], dtype=bool))
+    assert matters(fit, 0) is wanted
 
 
 @pytest.mark.parametrize(("others", "wanted"), [(("position_delay",), False), (("rudder_delay", "current"), True), ((), True)])
