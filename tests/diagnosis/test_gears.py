@@ -115,6 +115,7 @@ def test_a_rudder_that_is_later_than_its_record_by_part_of_a_sample_has_a_slope_
     assert 0.0 < np.abs(on - at).max() < np.abs(further - at).max() < 2.5 * np.abs(on - at).max()
 
 
+@pytest.mark.long
 def test_a_rudder_that_is_later_than_its_record_is_named():
     """The motion alone shows it: between order and record nothing is late."""
     data = sea_trials(load_mmg_ship("container130"), 5, (), Trials(runs=12))

@@ -137,6 +137,7 @@ def test_the_motion_tells_whether_record_or_order_is_wrong():
     assert low.fingerprint == read_low.fingerprint  # of the data as they were given, though they are read otherwise
 
 
+@pytest.mark.long
 def test_beside_a_named_cause_it_is_a_warning_and_of_a_rudder_the_motion_does_not_tell():
     result = diagnose(
         recorded(sea_trials(load_mmg_ship("kcs"), 7, (Hidden(EFFECTS.get("current"), (0.3, 0.2)),), Trials(runs=12)), DELTA, ERRORS["10 % high"]),

@@ -47,6 +47,7 @@ def test_a_little_of_it_is_ordinary():
     assert named(trials("thruster_speed_loss", 0.0, 0.25)) == []
 
 
+@pytest.mark.long
 def test_a_side_force_that_is_a_share_of_the_thrust_astern_is_named():
     assert named(trials("propeller_walk_astern", 0.0, 0.3, runs=12)) == ["propeller_walk_astern"]
 
@@ -60,6 +61,7 @@ def test_a_list_with_another_side_force_is_named():
     assert low < high < 0.0
 
 
+@pytest.mark.long
 def test_the_scale_of_a_log_with_one_axis_is_named():
     """Sway comes from elsewhere. It had been an `unknown` error of surge that goes with the speed."""
     plain = sea_trials(load_mmg_ship("container130"), 5, (), Trials(runs=12))

@@ -191,6 +191,7 @@ def test_motion_with_the_waves_is_told_from_the_ships_own(ship):
     assert np.all(found.share[[U, V, R]] > 10.0)
 
 
+@pytest.mark.long
 def test_a_cause_is_seen_through_the_motion_with_the_waves():
     """Its score is 17 where that motion passes for errors that last."""
     hidden = [Hidden(EFFECTS.get("rudder_offset"), (0.05,))]

@@ -48,6 +48,7 @@ def test_a_rudder_to_port_is_told_where_turns_are_too_few_for_kinematics():
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
+@pytest.mark.long
 def test_so_it_is_on_ships_in_other_equations_and_read_rightly_there_is_nothing(name: str):
     data = published_trials(PUBLISHED[name], 2, (), PLAN)
     assert found(data) == {}
