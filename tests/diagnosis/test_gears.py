@@ -10,16 +10,20 @@ import pytest
 
 from shipbench import compiled
 from shipbench.diagnosis import gears
+from shipbench.diagnosis.analysis import plain_model
+from shipbench.diagnosis.case_ships import scaled
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.gain import rollout_plant
 from shipbench.diagnosis.gear_kinds import GearFinding, kinds_of, slow_on_any_ship
 from shipbench.diagnosis.gears import _Record, find_in_gears
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.rolling import Active
+from shipbench.diagnosis.select import select
 from shipbench.effects.base import EFFECTS, Effect, Parameter
 from shipbench.ops import Array
 from shipbench.physics.actuators import Gear, gear_path
-from shipbench.physics.mmg import load_mmg_ship
+from shipbench.physics.mmg import MMGShip, load_mmg_ship
+from shipbench.records import Dataset
 from shipbench.signals import DELTA, N
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
@@ -146,6 +150,15 @@ class Behind(Effect):
         gears[self.actuator] = replace(gears[self.actuator], **{self.field: q[0]})
 
 
+def _recorded_before(ship: MMGShip, gear: Behind, size: float, channel: int, trials: Trials) -> Dataset:
+    """The motion with a gear of this size, the record that of the same orders without it."""
+    data, plain = (sea_trials(ship, 6, hidden, trials) for hidden in ((Hidden(gear, (size,)),), ()))
+    runs = [replace(run, states=run.states.copy()) for run in data.runs]
+    for run, other in zip(runs, plain.runs, strict=True):
+        run.states[:, channel] = other.states[:, channel]
+    return data.with_runs(runs)
+
+
 @pytest.mark.parametrize(
     ("effect", "gear", "size", "channel", "told"),
     [
@@ -155,12 +168,7 @@ class Behind(Effect):
     ],
 )
 def test_a_gear_behind_its_record_is_named(effect: str, gear: Behind, size: float, channel: int, told: str):
-    """The record is that of the same orders on a ship without it."""
-    data, plain = (sea_trials(load_mmg_ship("container130"), 6, hidden, Trials(runs=16)) for hidden in ((Hidden(gear, (size,)),), ()))
-    runs = [replace(run, states=run.states.copy()) for run in data.runs]
-    for run, other in zip(runs, plain.runs, strict=True):
-        run.states[:, channel] = other.states[:, channel]
-    found = diagnose(data.with_runs(runs), gain=False)
+    found = diagnose(_recorded_before(load_mmg_ship("container130"), gear, size, channel, Trials(runs=16)), gain=False)
     (cause,) = found.causes
     assert cause.effect == effect
     (value,) = cause.parameters.values()
@@ -168,6 +176,17 @@ def test_a_gear_behind_its_record_is_named(effect: str, gear: Behind, size: floa
     (warning,) = [w for w in found.warnings if w.startswith(f"{effect}: the motion shows ")]
     assert told in warning
     assert found.extended_model == "physics"
+
+
+def test_play_is_judged_beside_a_lag_that_is_too_small_to_matter(monkeypatch: pytest.MonkeyPatch):
+    """On a boat a record that is 0.2 s early was passed over, and play that is not there named for it."""
+    ship, trials = scaled(load_mmg_ship("kcs"), 12.0), Trials(runs=12, samples=120, thrusters=False, astern=False, gusts=0.5, noise=0.3)
+    monkeypatch.setattr("shipbench.diagnosis.select._HOPE_MARGIN", np.inf)  # no refit is given up
+    found = select(plain_model(Plant.of(_recorded_before(ship, Behind("delta", "T2"), 0.2, DELTA, trials))), 10.0)
+    (play,) = [s for s in found.steps if s.term.label == "rudder_backlash" and s.round == 0]
+    assert play.score > 30.0
+    assert {"rudder_delay", "rudder_lag"} <= set(found.tiny)
+    assert not found.final.model.terms
 
 
 @pytest.mark.parametrize(("actuators", "field"), [("measured", "T2"), ("commanded", "T")])

@@ -166,6 +166,12 @@ def test_a_time_of_less_than_half_a_sample_does_not_matter(dt: float, wanted: bo
     assert matters(_sized("rudder_stall", np.array([0.7]), dt), 0)
 
 
+@pytest.mark.parametrize(("lag", "wanted"), [(0.93, False), (4.3, True)])
+def test_a_ship_whose_lift_follows_late_has_no_slow_gear(lag: float, wanted: bool):
+    """A tanker of 120 m without a cause, whose lift builds up over a third of a length."""
+    assert matters(_sized("rudder_lag", np.array([lag]) / EFFECTS.get("rudder_lag").sized(120.0)[0].typical, L=120.0), 0) is wanted
+
+
 @pytest.mark.parametrize(("noise", "commanded", "wanted"), [(0.1, False, False), (0.05, False, True), (0.1, True, True)])
 def test_play_that_takes_the_noise_out_of_a_record_is_none(noise: float, commanded: bool, wanted: bool):
     """0.5 deg of it, with noise of 0.1 deg on a boat of 12 m that had none; beside orders there is no noise to take out."""
