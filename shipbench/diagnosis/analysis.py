@@ -73,7 +73,7 @@ class Analysis:
         return self.selection.final
 
     def score(self, index: int) -> tuple[float, int, str]:
-        """Twice the log evidence that the index-th cause adds, number of runs that support it, and where: beside the others or where it was added.
+        """Twice the log evidence that the index-th cause adds, number of runs that support it, and to what: beside the others or where it was added.
 
         The linear model, asked for the fit without it, does not hold so far from its point: what a refit gained is an upper bound, or all there is.
         """
@@ -82,7 +82,7 @@ class Analysis:
         if added is not None and (score < self.threshold or score > added.score):
             return added.score, added.supporters, "where it was added"
         supporters = int(np.sum(self.final.solution.per_run > self.final.solution_without(index).per_run))
-        return score, supporters, "beside the other causes"
+        return score, supporters, "beside the other causes" if len(self.final.model.terms) > 1 else "of the fit without it"
 
     def extension(self, name_hull: bool) -> Extension:
         """What the diagnosis adds to the plain model."""

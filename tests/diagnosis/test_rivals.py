@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from shipbench.diagnosis.analysis import Analysis
 from shipbench.diagnosis.causes import rivals_of
 from shipbench.diagnosis.select import Step
 from shipbench.diagnosis.term import Term
@@ -38,3 +40,11 @@ def test_wind_and_waves_are_told_as_confused_where_their_formulas_decide(named: 
     steps, cause = [step(0, named, 706.0), step(0, other, 681.0)], SimpleNamespace(label=named)
     found = SimpleNamespace(selection=SimpleNamespace(steps=steps), final=SimpleNamespace(model=SimpleNamespace(terms=[cause])))
     assert rivals_of(found, cause) == ((other,) if told else ())
+
+
+@pytest.mark.parametrize(("names", "told"), [(("wind",), "of the fit without it"), (("wind", "list"), "beside the other causes")])
+def test_a_cause_alone_is_not_told_to_be_beside_others(names: tuple[str, ...], told: str):
+    model, with_it, without = SimpleNamespace(terms=names), SimpleNamespace(per_run=np.ones(3)), SimpleNamespace(per_run=np.zeros(3))
+    final = SimpleNamespace(worth=lambda index: 179.0, model=model, solution=with_it, solution_without=lambda index: without)
+    found = SimpleNamespace(final=final, selection=SimpleNamespace(steps=[]), threshold=10.0)
+    assert Analysis.score(found, 0) == (179.0, 3, told)
