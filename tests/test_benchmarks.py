@@ -19,9 +19,10 @@ SCRIPTS = {
     "rollouts_shipmmg": ("shipmmg",), "fit_scipy": (), "diagnosis_refits": (), "startup": (), "paper_study": (), "mlp_training": (),
     "neural_ode_training": (),
 }  # fmt: skip
+LONG = ("paper_study", "neural_ode_training")
 
 
-@pytest.mark.parametrize("name", SCRIPTS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.long) if name in LONG else name for name in SCRIPTS])
 def test_a_script_runs_and_its_sides_agree(name: str, tmp_path: Path):
     if missing := [package for package in SCRIPTS[name] if importlib.util.find_spec(package) is None]:
         pytest.skip(f"{missing[0]} is not installed")

@@ -34,6 +34,7 @@ def test_runs_are_taken_in_the_order_in_which_they_were_sailed():
     assert f"begins with run {data.runs[BEGINS].id}" in cause.evidence
 
 
+@pytest.mark.long
 def test_a_change_is_named_among_mixed_manoeuvres_and_not_where_other_manoeuvres_begin():
     mixed, apart = changed(manoeuvre=["turn", "zigzag"] * 6), changed(manoeuvre=["turn"] * BEGINS + ["zigzag"] * BEGINS)
     assert [c.effect for c in diagnose(mixed, gain=False).causes] == ["change_point"]

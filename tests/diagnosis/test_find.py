@@ -6,6 +6,7 @@ Draws are fresh: the seed is in the message, and `SHIPBENCH_SEED=n` sets it.
 from __future__ import annotations
 
 import os
+import random
 import secrets
 from dataclasses import replace
 from types import SimpleNamespace
@@ -34,8 +35,11 @@ from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
 
 SEED = int(os.environ.get("SHIPBENCH_SEED", secrets.randbelow(10_000)))
-CLEAR = ("current", "heading_bias", "yaw_rate_bias", "speed_scale", "antenna_offset", "velocity_delay")
-GEARS = ("rudder_lag", "rudder_backlash", "shaft_rate_limit")
+CLEAR = (
+    "current", "heading_bias", "yaw_rate_bias", "speed_scale", "antenna_offset", "velocity_delay", "rudder_lag", "rudder_backlash",
+    "shaft_rate_limit",
+)  # fmt: skip
+DRAWN = tuple(random.Random(SEED).sample(CLEAR, 4))
 SHORT = Trials(runs=16, samples=100)
 
 
@@ -43,7 +47,7 @@ def _trials(*hidden: Hidden, runs: int = 12, samples: int = 90, seed: int = 3) -
     return sea_trials(load_mmg_ship("kcs"), seed, hidden, Trials(runs=runs, samples=samples))
 
 
-@pytest.mark.parametrize("names", [CLEAR[:3], CLEAR[3:], GEARS])
+@pytest.mark.parametrize("names", [DRAWN, pytest.param(CLEAR, marks=pytest.mark.long)], ids=["drawn", "all"])
 def test_fresh_draws_of_clear_effects_at_their_typical_size_are_named_first(names):
     found = {}
     for index in [i for i, name in enumerate(singles()) if name in names]:
@@ -53,7 +57,7 @@ def test_fresh_draws_of_clear_effects_at_their_typical_size_are_named_first(name
         found[case.truth[0]] = [c.effect for c in verdict.causes]
     wrong = {truth: named for truth, named in found.items() if named[:1] != [truth]}
     assert len(found) == len(names)
-    assert len(wrong) <= 1, f"seed {SEED}: {wrong}"
+    assert len(wrong) <= len(names) // 4, f"seed {SEED}: {wrong}"
 
 
 def test_no_workers_are_refused_before_any_work():
@@ -64,7 +68,7 @@ def test_no_workers_are_refused_before_any_work():
 @pytest.fixture(scope="module")
 def drifting() -> tuple[Dataset, Diagnosis]:
     """Runs in a current, and what one process says of them."""
-    data = _trials(Hidden(EFFECTS.get("current"), (0.25, -0.2)))
+    data = _trials(Hidden(EFFECTS.get("current"), (0.25, -0.2)), runs=10, samples=60)
     return data, diagnose(data, workers=1)
 
 
@@ -169,7 +173,7 @@ def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
 
 @pytest.mark.parametrize(
     ("index", "plan"),
-    [(1, SHORT), (3, Trials()), (6, SHORT), (8, SHORT)],
+    [(1, SHORT), (3, Trials()), pytest.param(6, SHORT, marks=pytest.mark.long), pytest.param(8, SHORT, marks=pytest.mark.long)],
     ids=["slow force in time", "thrust lost with the rudder angle, not just lost", "force that goes with the place", "turned log"],
 )
 def test_a_force_or_a_fault_of_a_sensor_that_follows_no_known_cause_is_called_unknown_with_its_variable(index, plan):
@@ -231,6 +235,7 @@ def test_under_doubt_a_wind_of_each_run_and_a_bank_are_not_told(name, told):
     assert whatever_the_ship(name, SimpleNamespace(gears=())) is told
 
 
+@pytest.mark.long
 def test_the_file_of_a_ship_of_another_size_is_doubted():
     """A container ship with the file of a navy ship of a third of her length: no parameter of the fit is out of the ordinary there. That her ordinary
     rudder is slow for so short a ship is not named."""

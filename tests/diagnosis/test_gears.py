@@ -162,7 +162,7 @@ def _recorded_before(ship: MMGShip, gear: Behind, size: float, channel: int, tri
 @pytest.mark.parametrize(
     ("effect", "gear", "size", "channel", "told"),
     [
-        ("rudder_lag", Behind("delta", "T2"), 3.0, DELTA, "by [delay] delta = -"),
+        pytest.param("rudder_lag", Behind("delta", "T2"), 3.0, DELTA, "by [delay] delta = -", marks=pytest.mark.long),
         pytest.param("rudder_backlash", Behind("delta", "backlash"), 0.05, DELTA, "Measure behind that play.", marks=pytest.mark.long),
         pytest.param("shaft_lag", Behind("n", "T2"), 8.0, N, "by [delay] n = -", marks=pytest.mark.long),
     ],
@@ -178,6 +178,7 @@ def test_a_gear_behind_its_record_is_named(effect: str, gear: Behind, size: floa
     assert found.extended_model == "physics"
 
 
+@pytest.mark.long
 def test_play_is_judged_beside_a_lag_that_is_too_small_to_matter(monkeypatch: pytest.MonkeyPatch):
     """On a boat a record that is 0.2 s early was passed over, and play that is not there named for it."""
     ship, trials = scaled(load_mmg_ship("kcs"), 12.0), Trials(runs=12, samples=120, thrusters=False, astern=False, gusts=0.5, noise=0.3)

@@ -71,7 +71,7 @@ def test_a_pull_on_two_axes_is_judged_on_both_and_not_taken_for_the_hull(kcs):
         assert first.score > single + 10.0
 
 
-@pytest.mark.parametrize("seed", [11, 13, 15])
+@pytest.mark.parametrize("seed", [11, *(pytest.param(seed, marks=pytest.mark.long) for seed in (13, 15))])
 def test_a_force_of_its_own_in_each_run_is_not_taken_for_one_that_follows_place_or_heading(seed):
     """Every run has its own of both: place scored 26 and 58, heading 31 and 47, where 16 are asked. What does follow the place still does."""
 
@@ -110,6 +110,7 @@ def test_a_drag_of_thrusters_that_work_either_way_follows_their_size():
     assert (best.axis, best.variable, best.form) == ("surge", "thrusters", "|F_b|")
 
 
+@pytest.mark.long
 def test_a_sail_follows_the_measured_wind_and_nothing_does_without_one():
     """A force across the wind that is felt on board. A current of each run, waves and a bank were named for two rotor sails."""
 

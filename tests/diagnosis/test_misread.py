@@ -123,6 +123,7 @@ def test_a_late_record_is_named_once_and_told_from_a_late_rudder():
     assert "the record is late" in result.causes[0].evidence
 
 
+@pytest.mark.long
 def test_the_motion_tells_whether_record_or_order_is_wrong():
     """Low revolutions passed for a propeller of too much thrust."""
     data = sea_trials(load_mmg_ship("kcs"), 7, (), Trials(runs=12))

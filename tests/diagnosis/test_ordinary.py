@@ -158,6 +158,7 @@ def test_standard_manoeuvres_make_no_cause_and_no_doubt_of_the_form_of_a_hull(ru
     assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
 
 
+@pytest.mark.long
 def test_resistance_that_grows_with_the_speed_itself_is_no_sign_of_a_wrong_ship_file():
     """As in the linear models of control engineers. With the spread of ships (1 of the units) instead: doubt, and `unknown`."""
     tanker = PUBLISHED["tanker"]
@@ -186,6 +187,7 @@ def test_a_ship_with_more_drag_forward_is_turned_where_she_is_pushed_sideways():
     np.testing.assert_allclose(moment(0.3) - moment(0.0), -unit * 0.3 * v * np.abs(v) / 6.0)
 
 
+@pytest.mark.long
 def test_the_waves_of_a_fast_ship_are_no_added_resistance():
     """A fourth power of the Froude number beside the square of the speed was named with a score of 27, the latent force 16 times as large."""
 

@@ -52,6 +52,7 @@ def test_a_side_force_that_is_a_share_of_the_thrust_astern_is_named():
     assert named(trials("propeller_walk_astern", 0.0, 0.3, runs=12)) == ["propeller_walk_astern"]
 
 
+@pytest.mark.long
 def test_a_list_with_another_side_force_is_named():
     """To the other side of what the formula has with this moment, and much larger: it had been an `unknown` yaw moment that goes with the speed."""
     data = sea_trials(load_mmg_ship("kcs"), 2, (Hidden(EFFECTS.get("list"), (0.149, -0.0031)),), Trials(runs=12))
@@ -117,6 +118,7 @@ def test_waves_four_times_as_strong_as_typical_ones_are_no_wind():
     assert named(data) == ["wave_drift"]
 
 
+@pytest.mark.long
 def test_the_banks_of_a_channel_are_named_with_its_breadth():
     """One bank alone scored 39 on a ship that kept to a channel of 150 m, with a 30th of its typical strength."""
     ship, bank = load_mmg_ship("container130"), EFFECTS.get("bank_suction")

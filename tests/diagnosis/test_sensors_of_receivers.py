@@ -205,7 +205,7 @@ def test_a_cause_is_seen_through_the_motion_with_the_waves():
     assert f"  yaw rate: {told['yaw rate']}" in summary_lines(found)
 
 
-@pytest.mark.parametrize(("ship", "period"), [("container130", 16.0), ("kcs", 20.0)])
+@pytest.mark.parametrize(("ship", "period"), [pytest.param("container130", 16.0, marks=pytest.mark.long), ("kcs", 20.0)])
 def test_a_swell_is_told_from_the_ships_own_motion_though_the_latent_force_follows_it(ship, period, monkeypatch):
     """The force in yaw was 24 and 12 times the ordinary one, and hid whatever turns a ship."""
     monkeypatch.setattr(shipbench.simulate.trials, "WAVE_PERIOD", period)
@@ -286,7 +286,7 @@ def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):
     assert "put right before the fit" in position.rejected_because
 
 
-@pytest.mark.parametrize(("channels", "named"), [((U, V, R), ["velocity_delay"]), ((R,), [])])
+@pytest.mark.parametrize(("channels", "named"), [pytest.param((U, V, R), ["velocity_delay"], marks=pytest.mark.long), ((R,), [])])
 def test_a_late_yaw_rate_is_put_back_and_no_late_rudder(trials, channels: tuple[int, ...], named: list[str]):
     def change(S: np.ndarray) -> None:
         S[:] = delayed(S[None], channels, LATE, trials.dt)[0]
@@ -298,7 +298,7 @@ def test_a_late_yaw_rate_is_put_back_and_no_late_rudder(trials, channels: tuple[
     assert not any("yaw rate" in w for w in diagnose(trials, gain=False).warnings)
 
 
-@pytest.mark.parametrize("seed", [3, 7])
+@pytest.mark.parametrize("seed", [3, pytest.param(7, marks=pytest.mark.long)])
 def test_a_piece_in_which_the_ship_was_pushed_is_left_out_and_said_so(monkeypatch, seed: int):
     """The push drags the first fit so far that nothing looks strange where it ends."""
     trials = sea_trials(load_mmg_ship("kcs"), seed, (), Trials(runs=12, samples=120))

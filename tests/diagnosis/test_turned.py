@@ -76,11 +76,12 @@ def test_thrusters_are_not_turned_for_another_rest_of_the_fit(monkeypatch, as_re
     assert bool(turned_actuators(data, null)) is (as_recorded == 0.0)
 
 
-@pytest.mark.parametrize("size", [-0.6, 0.6])
+@pytest.mark.parametrize("size", [-0.6, pytest.param(0.6, marks=pytest.mark.long)])
 def test_weak_or_strong_thrusters_are_not_to_port(size: float):
     assert found(port_trials(4, Hidden(EFFECTS.get("thruster_gain"), (size,)))) == {}
 
 
+@pytest.mark.long
 def test_an_order_that_was_blamed_for_its_actuator_is_cleared():
     data = port_trials(4)
     alone = data.with_runs(replace(run, states=np.where(np.arange(10) == F_B, -run.states, run.states)) for run in data.runs)

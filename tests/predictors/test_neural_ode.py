@@ -106,6 +106,7 @@ def test_the_residual_sees_the_measured_wind(windy):
     np.testing.assert_allclose(seen[3, :, 7:].numpy(), np.stack(expected, axis=1), atol=1e-4)
 
 
+@pytest.mark.long
 def test_a_wrong_wind_force_is_learned_and_the_solvers_agree_on_it(windy, tmp_path):
     model = NeuralODE(epochs=6, hidden=16).fit(windy[0], windy[1], seed=0)
     assert model.improved
