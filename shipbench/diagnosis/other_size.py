@@ -25,7 +25,9 @@ _ABOUT = 5.0
 
 
 def better_size(null: Fit) -> list[str]:
-    """A line if a smaller or a larger ship, with masses, inertia and forces of her size, is far better beside no cause; none if not."""
+    """A line if a smaller or a larger ship, with masses, inertia and forces of her size, is far better beside no cause; none if not. null: beside its
+    own noise, as the other's is (beside the noise that suits a speed log 4.5 % off, the ship of the file was 4878 worse than one of 2.5 times her
+    size, beside its own 128 better)."""
     factor, gain = _best(null, _FACTORS)
     if factor == 1.0 or gain < _LEAST * _times(null):
         return []

@@ -33,6 +33,9 @@ size); gusts and swell do not average out in a run (gusts of 1.5 m/s that last 2
 ship about as currents of single runs do; lift grows more slowly than the sine of the angle on many a rudder (one with a flap, whose lift goes as
 tanh: 0.19 lost, 0.4 of the typical size); thrusters whose record is their order lag by 2 s, but ordinary ones by up to 4.5 s
 (`gear_kinds.ORDINARY`)."""
+_LATE_STALL, _OF_LATE_STALL = 0.3, 0.7
+"""Angle [rad] from which a stall lies where rudders ordinarily stall, and the least size from there on. (A wing that stalls smoothly about 35 deg, on
+two ships with nothing hidden and on one with another hull: 0.28 to 0.31 lost from 20 deg on, worth 17 to 19.)"""
 _NOISES = 6.0
 """Play behind a record of the rudder, in standard deviations of its noise, which such play takes out. (A boat of 12 m with noise of 0.1 deg and no
 play, beside a lag of 0.2 s: 0.35 and 0.37 deg, worth 90 and 106; without the noise none.)"""
@@ -185,9 +188,12 @@ def is_sure(fit: Fit, index: int) -> bool:
 
 def least_size(fit: Fit, term: Term) -> float:
     """Below which a cause does not matter, in typical sizes. Of a gear's time half a sample, too, for which an order may have stood before it was
-    recorded; of play behind a record what the record's noise makes of it. Beside the delay of another sensor as of the rudder's: by what positions
-    are later than velocities, the track tells; which of the two is late, how soon the ship answers alone."""
+    recorded; of play behind a record what the record's noise makes of it; of a stall more where rudders ordinarily stall. Beside the delay of another
+    sensor as of the rudder's: by what positions are later than velocities, the track tells; which of the two is late, how soon the ship answers
+    alone."""
     least = _OWN.get(term.label, NEGLIGIBLE)
+    if term.label == "rudder_stall" and max(term.setting, default=0.0) > _LATE_STALL:
+        least = _OF_LATE_STALL
     if term.effect.late and any(t.effect.late for t in fit.model.terms if t.label != term.label):
         least = max(least, _OWN["rudder_delay"])
     if term.effect.enters == "gear" and term.effect.parameters[0].unit == "s":

@@ -90,12 +90,14 @@ class Step:
 
 @dataclass(frozen=True)
 class Selection:
-    """null: the plain model; final: with the causes found; scores: of every candidate in the first round, and `last` beside the final one; off_form:
-    what a cause for which the form of a hull could pass must be worth besides (`asked_besides`); unsure: effects taken out again, since over the runs
-    their size may be zero, does not explain how runs differ, or asks for a stranger ship; tiny: effects that gain more than the threshold, but are
-    too small to matter; small: the plain model with those of them that it is better with, where nothing else was found."""
+    """null: the plain model, beside the noise that suits the causes; plain: beside its own; final: with the causes found; scores: of every candidate
+    in the first round, and `last` beside the final one; off_form: what a cause for which the form of a hull could pass must be worth besides
+    (`asked_besides`); unsure: effects taken out again, since over the runs their size may be zero, does not explain how runs differ, or asks for a
+    stranger ship; tiny: effects that gain more than the threshold, but are too small to matter; small: the plain model with those of them that it is
+    better with, where nothing else was found."""
 
     null: Fit
+    plain: Fit
     final: Fit
     first: list[Score]
     last: list[Score]
@@ -242,7 +244,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
             steps.append(Step.of(round_, best, now, 2.0 * (best.evidence - now.evidence)))
         now = widened(looking_at(_backward(best, threshold, besides), candidates))
         if round_ == 0 and (again := beside_noise_of(now, null)) is not None:
-            return select(again, threshold, most=most)
+            return replace(select(again, threshold, most=most), plain=null)
         scores = screen(now)
     pruned = _backward(now, threshold, besides, spare_last=False)
     pruned, unsure = _without(pruned, lambda f, i: is_sure(f, i) and not bends(f, i, null)) if careful else (pruned, ())
@@ -254,7 +256,7 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
         if more:
             now, unsure = looking_at(sure, candidates), unsure + more
         scores = screen(now)
-    return Selection(null, now, first, scores, steps, off_form, unsure, (*tiny, *small), whole if small and not now.model.terms else None)
+    return Selection(null, null, now, first, scores, steps, off_form, unsure, (*tiny, *small), whole if small and not now.model.terms else None)
 
 
 def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:

@@ -44,7 +44,7 @@ def doubts_of(found: Analysis) -> list[str]:
         if term.effect.family in ("hull", "propulsion") and np.max(np.abs(value)) > STRANGE_SIZE:
             signs.append(f"{term.label} would have to be {np.max(np.abs(value)):.1f} times its typical size")
     if not signs and np.sum(z**2) > ORDINARY_SUM:
-        signs = better_size(found.selection.null)
+        signs = better_size(found.selection.plain)
     if not signs and _is_odd(z) and (size := _size_instead(found, [term.label for term in fit.model.terms])):
         signs = [_moved(z), *size]
     if not signs:
@@ -80,7 +80,7 @@ def _size_instead(found: Analysis, among: Sequence[str]) -> list[str]:
     """What is said if a ship of nearly the same size does as well as those of the causes `among` that go by the ship file and act as forces."""
     terms = {t.label: i for i, t in enumerate(found.final.model.terms) if t.label in among and not whatever_the_ship(t.label, found)}
     worth = sum(0.5 * found.score(i)[0] for i in terms.values())
-    return size_instead_of(" and ".join(terms), worth, found.selection.null) if terms else []
+    return size_instead_of(" and ".join(terms), worth, found.selection.plain) if terms else []
 
 
 def whatever_the_ship(name: str, found: Analysis) -> bool:

@@ -10,12 +10,19 @@ import pytest
 
 from shipbench.checking.units import UnitFinding
 from shipbench.diagnosis import diagnose as whole
+from shipbench.diagnosis import ship_file
+from shipbench.diagnosis.analysis import THRESHOLD, plain_model
 from shipbench.diagnosis.case_ships import draw_ship
 from shipbench.diagnosis.cases import draw_case, singles
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.ship_file import whatever_the_ship
+from shipbench.diagnosis.model import NUM_BASE
+from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.select import select
+from shipbench.diagnosis.ship_file import doubts_of, whatever_the_ship
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
+from shipbench.physics.mmg import load_mmg_ship
+from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
 
@@ -54,6 +61,19 @@ def test_a_slow_gear_of_an_odd_ship_is_told_with_a_warning():
     assert named == ["rudder_lag", "shaft_lag"]
     (warning,) = [w for w in verdict.warnings if QUESTION in w]
     assert warning.endswith("The file of another ship, too, may make rudder_lag and shaft_lag: believe them only when that is sure.")
+
+
+def test_sizes_are_compared_beside_noise_of_their_own(monkeypatch):
+    """Of a ferry in wind the speed log was 4.5 % off: beside the noise that suits a log so far off, not the sound one of the other size, the ship of
+    the file was 4878 of log evidence behind one of 2.5 times her size; beside her own she was ahead."""
+    data = sea_trials(load_mmg_ship("kcs"), 3, (Hidden(EFFECTS.get("speed_scale"), (0.045,)),), Trials(runs=8, samples=80))
+    null = plain_model(Plant.of(data), ("speed_scale",))
+    found = select(null, THRESHOLD)
+    assert found.null.evidence < null.evidence
+    monkeypatch.setattr(ship_file, "needed", lambda _: np.ones(NUM_BASE))
+    monkeypatch.setattr(ship_file, "better_size", lambda of: ["beside its own noise"] if of is null else [])
+    (doubt,) = doubts_of(SimpleNamespace(selection=found, final=found.final, unknown=None))
+    assert doubt.startswith("beside its own noise")
 
 
 @pytest.mark.parametrize(("changed", "shows"), [("heading_bias", True), ("rudder_offset", True), ("thrust_gain", False)])
