@@ -19,7 +19,7 @@ SCRIPTS = {
     "rollouts_shipmmg": ("shipmmg",), "fit_scipy": (), "diagnosis_refits": (), "startup": (), "paper_study": (), "mlp_training": (),
     "neural_ode_training": (),
 }  # fmt: skip
-LONG = ("paper_study", "neural_ode_training")
+LONG = ("fit_scipy", "paper_study", "mlp_training", "neural_ode_training")
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.long) if name in LONG else name for name in SCRIPTS])

@@ -62,7 +62,7 @@ def test_what_is_real_is_no_fault(kind: str):
     assert check_dataset(replace(make(), simulation=None)) == []
 
 
-@pytest.mark.parametrize("kind", ["MMG ships, rounded", "port manoeuvres, rounded"])
+@pytest.mark.parametrize("kind", ["MMG ships, rounded", pytest.param("port manoeuvres, rounded", marks=pytest.mark.long)])
 def test_values_that_repeat_themselves_for_their_last_digit_are_no_fault(kind: str):
     """Where there is little noise, a yaw rate in steps of a degree a minute stands still for half a minute, and runs agree for some samples."""
     for make in [make for k, make in clean_sets([SEED]) if k == kind]:

@@ -85,8 +85,8 @@ def _arm(states: np.ndarray) -> None:
     ("effect", "fault", "size"),
     [
         ("heading_bias", _turn, np.deg2rad(2.0)),
-        ("speed_scale", _scale, 0.04),
-        ("yaw_rate_bias", _bias, np.deg2rad(0.3)),
+        pytest.param("speed_scale", _scale, 0.04, marks=pytest.mark.long),
+        pytest.param("yaw_rate_bias", _bias, np.deg2rad(0.3), marks=pytest.mark.long),
         ("antenna_offset", _arm, 0.3),
     ],
 )
@@ -96,6 +96,7 @@ def test_a_fault_put_into_real_runs_stands_out_with_its_size(runs, untouched, ef
     assert faulty[effect][1] - untouched[effect][1] == pytest.approx(size, rel=0.15)
 
 
+@pytest.mark.long
 def test_the_lead_of_the_positions_that_the_data_are_known_for_is_found(recorded):
     score, delay = _scores(recorded)["position_delay"]
     assert score > 300.0

@@ -217,7 +217,7 @@ def test_a_propeller_whose_curve_is_not_given_is_not_named_for_what_it_does_besi
     np.testing.assert_allclose(surge(np.log(1.8), 1.0 / 1.8 - 1.0), surge(0.0, 0.0))
 
 
-@pytest.mark.parametrize("diameter", [1.9, 2.26, 2.6])
+@pytest.mark.parametrize("diameter", [1.9, *(pytest.param(d, marks=pytest.mark.long) for d in (2.26, 2.6))])
 def test_a_fit_finds_its_way_from_regressions_that_are_far_off(diameter: float):
     """A small fast ship whose two screws the file gives as one: of the right size, or with up to three times the thrust. Her rudders have no race."""
     navy = PUBLISHED["navy"]

@@ -183,7 +183,7 @@ def test_a_log_through_water_is_seen_and_put_over_ground(number):
         assert line in found.warnings
 
 
-@pytest.mark.parametrize("ship", ["kcs", "container130"])
+@pytest.mark.parametrize("ship", ["kcs", pytest.param("container130", marks=pytest.mark.long)])
 def test_motion_with_the_waves_is_told_from_the_ships_own(ship):
     data = sea_trials(load_mmg_ship(ship), 11, (), Trials(runs=12, samples=120, waves=1.0))
     found = _colour(data)
