@@ -1,4 +1,4 @@
-"""The scripts of benchmarks/: they run and both sides agree. Their times are never tested.
+"""The scripts of benchmarks/: they run and both sides agree (fits and trainings: `pytest -m long`). Their times are never tested.
 
 Those without a peer (growth, stacking, memory) take half a minute each even in their quick mode, and are left to whoever measures.
 """

@@ -173,10 +173,7 @@ def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
 
 @pytest.mark.parametrize(
     ("index", "plan"),
-    [
-        (1, SHORT),
-        *(pytest.param(index, plan, marks=pytest.mark.long) for index, plan in ((3, Trials()), (6, SHORT), (8, SHORT))),
-    ],
+    [(1, SHORT), *(pytest.param(i, plan, marks=pytest.mark.long) for i, plan in ((3, Trials()), (6, SHORT), (8, SHORT)))],
     ids=["slow force in time", "thrust lost with the rudder angle, not just lost", "force that goes with the place", "turned log"],
 )
 def test_a_force_or_a_fault_of_a_sensor_that_follows_no_known_cause_is_called_unknown_with_its_variable(index, plan):

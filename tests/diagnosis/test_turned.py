@@ -62,7 +62,7 @@ def test_thrusters_to_port_are_told(channels: tuple[int, ...]):
     assert found(misread(port_trials(4), channels, -1.0)) == wanted
 
 
-@pytest.mark.parametrize("as_recorded", [0.0, pytest.param(54.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize("as_recorded", [0.0, 54.0])
 def test_thrusters_are_not_turned_for_another_rest_of_the_fit(monkeypatch, as_recorded: float):
     """Of four runs a fit took swell for noise of the sway velocity; read to the other side, for forces, 54 better; as recorded with those, too."""
     data = port_trials(4)
