@@ -55,7 +55,7 @@ def diagnose(
         seed: of the bootstrap and of the folds.
         only: effects to consider (an oracle that knows what is hidden); default all.
         workers: processes for the folds; from two on, a script that calls this needs `if __name__ == "__main__":`.
-        thorough: use up to twice as much of a long record (the folds use half); 90 runs of 120 s are used whole either way.
+        thorough: use up to twice as much of a long record (the folds use a quarter); 90 runs of 120 s are used whole either way.
 
     Raises:
         InputError: the ship never moves, there are too few samples for any fit, or `workers` is less than one.

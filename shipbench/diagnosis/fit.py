@@ -27,6 +27,8 @@ _STALE = 3
 lead to and fro for ever."""
 _LOST = 100.0
 """Excess of the cost where free steps have led astray (a current and positions of 1.5 m noise: 11000, at the regressions still)."""
+_NEAR_REST = 30.0
+"""Excess up to which a fit that goes on from another takes no free steps: they would lead away, and later ones back."""
 _FOLLOWING, _HALVINGS = 6, 5
 """Steps of initial states and latent force alone at the end, and trials of each."""
 
@@ -53,6 +55,8 @@ def fit(
     for number in range(iterations):
         free = number < free_steps
         found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP, seen=seen, far=far and not number)
+        if not (number or far) and found.excess < _NEAR_REST:
+            free_steps = 0
         if number < 2:
             early = found.promise
         if number and found.promise < hope:
