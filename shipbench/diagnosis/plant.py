@@ -28,7 +28,7 @@ _EARLIER = 40.0
 """Seconds of commands (Froude-scaled, 130 m) before a piece: where its actuators stand when it begins."""
 _LONG = 5
 MOST_STEPS, FOLD_STEPS, THOROUGH_STEPS = 24_000, 6_000, 48_000
-"""Of all segments together, per stage: more cost many minutes. (Of 90 runs of 120 s a training part names the same from 86 pieces as from 144, in half
+"""Of all segments together, per stage: more cost many minutes. (A training part of 90 runs names the same from 86 pieces as from 144, in half
 the time; its fits of rollouts take all of its runs.) What differs from run to run, such as the wind, may show only in all of a long record
 (3.5 h of a 3 m model: 48,000)."""
 DEEP = 10.0

@@ -13,6 +13,7 @@ from shipbench.bench import diagnosis_scores as scores
 from shipbench.bench.diagnosis_page import read_rows, render, tables, write_page
 from shipbench.bench.diagnosis_suite import Job, run_case, run_suite, suite_command
 from shipbench.cli import app
+from shipbench.diagnosis import case_ships
 from shipbench.diagnosis.cases import KINDS, count, draw_case
 from shipbench.diagnosis.outcome import Cause, Diagnosis, Estimate, Gain
 from shipbench.errors import InputError
@@ -61,6 +62,13 @@ def value(rows, figure):
     return next(line["value"] for line in scores.figures(rows) if line["figure"] == figure)
 
 
+@pytest.fixture
+def any_ship(monkeypatch):
+    """A stub does not mind how the ship steers, and whether she does takes as long to tell as her runs."""
+    monkeypatch.setattr(case_ships, "steers", lambda ship: True)
+
+
+@pytest.mark.usefixtures("any_ship")
 def test_false_alarms_of_a_stub_that_always_names_are_all_counted(tmp_path):
     rows = run_suite(tmp_path, diagnose=always_current, seeds_per_effect=1, kinds=("none-other",), **QUICK)
     assert len(rows) == count("none-other", 1)
@@ -69,6 +77,7 @@ def test_false_alarms_of_a_stub_that_always_names_are_all_counted(tmp_path):
     assert value(quiet, "false alarms, same structure") == 0.5, "a claim of an unknown cause is an alarm"
 
 
+@pytest.mark.usefixtures("any_ship")
 def test_unknown_is_right_only_with_the_right_variable(tmp_path):
     rows = run_suite(tmp_path, diagnose=time_it_is, seeds_per_effect=1, kinds=("outside",), **QUICK)
     timed = [r for r in rows if r["variables"] == ["time"]]
@@ -77,6 +86,7 @@ def test_unknown_is_right_only_with_the_right_variable(tmp_path):
     assert value(rows, "outside: says unknown") == 1.0
 
 
+@pytest.mark.usefixtures("any_ship")
 def test_a_failing_case_is_a_row_with_its_error_and_counts_as_wrong(tmp_path):
     rows = run_suite(tmp_path, diagnose=failing, seeds_per_effect=1, kinds=("unit",), **QUICK)
     assert {r["status"] for r in rows} == {"failed"}
@@ -86,6 +96,7 @@ def test_a_failing_case_is_a_row_with_its_error_and_counts_as_wrong(tmp_path):
     assert "no motion in the data" in tables(rows)[-1].markdown()
 
 
+@pytest.mark.usefixtures("any_ship")
 def test_resuming_keeps_finished_rows_and_repeats_failed_and_changed_ones(tmp_path):
     CALLS.clear()
     first = run_suite(tmp_path, diagnose=always_current, seeds_per_effect=1, kinds=("unit",), **QUICK)
