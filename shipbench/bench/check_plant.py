@@ -78,6 +78,16 @@ def times(**factors: float) -> Callable[[Planting], None]:
     return plant
 
 
+def silent_log(share: float) -> Callable[[Planting], None]:
+    """Surge and sway recorded as a hundredth of themselves, a sensor's noise about nothing, in the slowest `share` of the samples."""
+
+    def plant(p: Planting) -> None:
+        slow = np.abs(p.table["u"]) < np.quantile(np.abs(p.table["u"]), share)
+        p.table.loc[slow, ["u", "v"]] *= 0.01
+
+    return plant
+
+
 def late(*channels: str, seconds: float) -> Callable[[Planting], None]:
     """Channels recorded `seconds` (at 130 m) late; the first samples of every run, which would need the time before it, are left out."""
 

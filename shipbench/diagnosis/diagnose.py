@@ -32,6 +32,7 @@ from .outcome import Cause, Diagnosis, Gain
 from .over_ground import over_ground
 from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, least_depth
 from .ship_file import doubts_of, odd_for, own_propeller
+from .silent_log import with_speeds_of_the_track
 from .strange import left_out
 from .trace import trace_of
 from .turned import turned_actuators
@@ -155,7 +156,7 @@ def _check(dataset: Dataset) -> list[str]:
 def _mended(dataset: Dataset) -> tuple[Dataset, list[str]]:
     """The data set with what its own record shows to be wrong put right, and lines for the reader."""
     dataset, lines = marked(dataset), []
-    for put_right in (over_ground, with_prompt_yaw_rate, with_true_wind):
+    for put_right in (with_speeds_of_the_track, over_ground, with_prompt_yaw_rate, with_true_wind):
         dataset, told = put_right(dataset)
         lines += told
     return dataset, lines

@@ -43,7 +43,7 @@ def needed(found: Fit, least: float = NOTICEABLE) -> np.ndarray:
     `least`: what so small a force could stand for need not be the ship's."""
     reduced = found.gram.reduce(np.maximum(found.hyper.log_force, 2.0 * np.log(least)))
     z = _base(found, reduced, widths_of(found, reduced))
-    for name, factor in STRUCTURE.wider.items():
+    for name, factor in STRUCTURE.wider(found.plant.ship).items():
         z[PLACES[name]] /= factor
     return z
 

@@ -24,7 +24,7 @@ NEGLIGIBLE = 0.05
 """In typical sizes. With enough samples the form of a hull makes tiny causes certain: speeds 0.1 % off, a bank of a 65th of the usual suction."""
 _OWN = {
     "rudder_delay": 0.6, "rudder_lag": 0.4, "rudder_asymmetry": 0.25, "current_per_run": 0.15, "wind_per_run": 0.15, "rudder_stall": 0.5,
-    "thruster_lag": 0.42,
+    "thruster_lag": 0.42, "wind_drift": 0.3,
 }  # fmt: skip
 """Likewise. How soon a ship answers her rudder depends on heel and on the flow's memory, which eq. (2) does not know (S175 with heel, nothing hidden:
 0.5 to 0.7 s early, 0.3 to 0.42 of the typical size; a ship whose lift builds up over half a length: 0.51 late; over a third: a lag of 0.31 and 0.32);
@@ -32,7 +32,7 @@ the race of a single screw turns, and meets the rudder more on one side (5 % mor
 size); gusts and swell do not average out in a run (gusts of 1.5 m/s that last 20 s have means over 120 s of 0.11 of the typical wind), and push a
 ship about as currents of single runs do; lift grows more slowly than the sine of the angle on many a rudder (one with a flap, whose lift goes as
 tanh: 0.19 lost, 0.4 of the typical size); thrusters whose record is their order lag by 2 s, but ordinary ones by up to 4.5 s
-(`gear_kinds.ORDINARY`)."""
+(`gear_kinds.ORDINARY`); a drift of 0.3 % of the wind is 0.02 m/s, which the form of a hull gives (0.27 % on a cruise ship in calm water)."""
 _LATE_STALL, _OF_LATE_STALL = 0.3, 0.7
 """Angle [rad] from which a stall lies where rudders ordinarily stall, and the least size from there on. (A wing that stalls smoothly about 35 deg, on
 two ships with nothing hidden and on one with another hull: 0.28 to 0.31 lost from 20 deg on, worth 17 to 19.)"""
@@ -41,6 +41,9 @@ _NOISES = 6.0
 play, beside a lag of 0.2 s: 0.35 and 0.37 deg, worth 90 and 106; without the noise none.)"""
 _REACH = 0.75
 """Lengths from midship within which a thruster acts, whatever the hull makes of its jet. (A lever of 1.0 was named for what a hull lacked.)"""
+_MAST = 1.0
+"""Breadths from the centreline within which an antenna stands, whatever the track makes of it. (14.7 m were named on a barge of 9.5 m, whose log read
+nothing below 1.1 m/s.)"""
 _TRIMS = 0.06
 """Lengths by which a shifted centre of gravity trims a ship by about as much (over a longitudinal metacentric height of one length), more than her
 draught. (A shift of 0.08 was named for what a hull's form lacked.)"""
@@ -145,14 +148,18 @@ def blows_on_a_ship(fit: Fit) -> bool:
 
 
 def is_on_a_ship(fit: Fit, index: int) -> bool:
-    """Whether the bow thruster with its shifted lever is on the ship, or near her; whether she floats with her centre of gravity where it is shifted
-    to. True of other causes."""
+    """Whether the bow thruster with its shifted lever, or the antenna, is on the ship, or near her; whether she floats with her centre of gravity
+    where it is shifted to. True of other causes."""
     term = fit.model.terms[index]
-    if term.label not in ("thruster_lever", "center_of_gravity_shift"):
+    if term.label not in ("thruster_lever", "center_of_gravity_shift", "antenna_offset"):
         return True
     c = fit.plant.c
-    (shift,) = fit.values[index] * fit.scales.amplitudes(term, c.L)
-    return bool(abs(c.tunnels.x_bow + shift) < _REACH * c.L if term.label == "thruster_lever" else abs(shift) < _TRIMS * c.L)
+    by = fit.values[index] * fit.scales.amplitudes(term, c.L)
+    if term.label == "thruster_lever":
+        return bool(abs(c.tunnels.x_bow + by[0]) < _REACH * c.L)
+    if term.label == "center_of_gravity_shift":
+        return bool(abs(by[0]) < _TRIMS * c.L)
+    return bool(abs(by[0]) < _REACH * c.L and abs(by[1]) < _MAST * fit.plant.ship.B)
 
 
 def shows_on_any_ship(effect: Effect) -> bool:

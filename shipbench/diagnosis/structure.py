@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
@@ -101,8 +100,6 @@ class Structure(Effect):
         Parameter("drag_forward", "1", 0.2, -2.0, 2.0),
     )
     backing, m_x, astern, braking = 0.5, -0.4, 0.7, -0.7
-    wider: ClassVar = {"windmilling": 3.0, "thrust_backing": 2.5}
-    """How many times more ships differ in them than their spreads say, which are narrow for the sake of the fit (0.31 and 0.8 of B4-70, above)."""
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
 
     def spreads(self, ship: Particulars, measured_wind: bool) -> np.ndarray:
@@ -110,6 +107,13 @@ class Structure(Effect):
         thrust = np.hypot(0.8 * ship.lacks("propeller"), 0.2 * ship.lacks("propeller.kt"))
         own = {"wind_Y": float(measured_wind), "log_thrust": float(thrust)}
         return np.array([p.typical * own.get(p.name, 1.0) for p in self.parameters])
+
+    def wider(self, ship: Particulars) -> dict[str, float]:
+        """How many times more ships differ in them than their spreads say, which are narrow for the sake of the fit: 0.31 and 0.8 of B4-70, above;
+        and waves, which a full hull makes at a lower Froude number, as C_b = 1.12 - 1.68 Fn goes (Alexander, for slow ships; Watson, Practical Ship
+        Design, 1998, eq. 3.11). (A barge with C_b 0.88 lay 9 spreads off at Fn 0.18.)"""
+        waves = (0.25 / max((1.12 - ship.Cb) / 1.68, 0.1)) ** 4
+        return {"windmilling": 3.0, "thrust_backing": 2.5, "wave_resistance": max(waves, 1.0)}
 
     def plain(self) -> np.ndarray:
         """Values, in units of their spreads, at which it adds nothing to eq. (2)."""

@@ -106,7 +106,13 @@ EXACT = Trials(noise=0.0, gusts=0.0)
 def test_a_propeller_of_the_b_series_is_that_of_an_ordinary_ship(name, value):
     """B4-70 lay 6 and 4 spreads off, ships of a third simulator up to 6 in both: half of the sum that doubts a ship file."""
     p = next(p for p in STRUCTURE.parameters if p.name == name)
-    assert value / (p.typical * STRUCTURE.wider[name]) < 2.5
+    assert value / (p.typical * STRUCTURE.wider(load_mmg_ship("kcs").particulars)[name]) < 2.5
+
+
+@pytest.mark.parametrize(("Cb", "factor"), [(0.55, 1.0), (0.65, 1.0), (0.81, 3.4), (0.88, 9.4), (0.99, 39.1)])
+def test_a_full_hull_makes_waves_at_a_lower_froude_number(Cb: float, factor: float):
+    """A barge with a block coefficient of 0.88 needed 9 spreads of it at a Froude number of 0.18, and her file was doubted."""
+    assert STRUCTURE.wider(SimpleNamespace(Cb=Cb))["wave_resistance"] == pytest.approx(factor, rel=0.02)
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +123,7 @@ def exact_mariner() -> Fit:
 
 def test_what_ships_differ_by_more_counts_for_less(exact_mariner, monkeypatch):
     less = needed(exact_mariner)
-    monkeypatch.setattr(type(STRUCTURE), "wider", {})
+    monkeypatch.setattr(type(STRUCTURE), "wider", lambda self, ship: {})
     before = needed(exact_mariner)
     narrow = PLACES["thrust_backing"]
     assert less[narrow] == pytest.approx(before[narrow] / 2.5)

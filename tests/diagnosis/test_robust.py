@@ -155,7 +155,8 @@ def _least(effect: str) -> float:
 
 def _sized(effect: str, values: np.ndarray, dt: float = 1.0, L: float = 130.0, setting: tuple[float, ...] = ()) -> SimpleNamespace:
     term = Term(EFFECTS.get(effect), setting)
-    plant = SimpleNamespace(seg=SimpleNamespace(dt=dt), c=SimpleNamespace(L=L, tunnels=SimpleNamespace(x_bow=0.38 * L)))
+    c, ship = SimpleNamespace(L=L, tunnels=SimpleNamespace(x_bow=0.38 * L)), SimpleNamespace(B=0.12 * L)
+    plant = SimpleNamespace(seg=SimpleNamespace(dt=dt), c=c, ship=ship)
     typical = np.array([abs(p.typical) for p in term.effect.sized(L)])
     return SimpleNamespace(values=(values,), model=SimpleNamespace(terms=(term,)), plant=plant, scales=SimpleNamespace(amplitudes=lambda *_: typical))
 
@@ -211,6 +212,19 @@ def test_a_thruster_acts_on_board(shift: float, wanted: bool):
 def test_a_ship_floats_with_her_centre_of_gravity_where_it_is(shift: float, wanted: bool):
     """On a ferry of 132 m a shift of 10.5 m was named for what her form lacked in water of two to four draughts."""
     assert is_on_a_ship(_sized("center_of_gravity_shift", np.array([shift]), L=132.0), 0) is wanted
+
+
+@pytest.mark.parametrize(("forward", "starboard", "wanted"), [(-30.0, -9.0, True), (0.0, 9.0, True), (-4.4, -14.7, False), (70.0, 0.0, False)])
+def test_an_antenna_stands_on_the_ship(forward: float, starboard: float, wanted: bool):
+    """14.7 m to port were named on a barge 85 m long and 9.5 m wide, whose log read nothing below 1.1 m/s."""
+    at = np.array([forward, starboard]) / [p.typical for p in EFFECTS.get("antenna_offset").sized(85.0)]
+    assert is_on_a_ship(_sized("antenna_offset", at, L=85.0), 0) is wanted
+
+
+@pytest.mark.parametrize(("share", "wanted"), [(0.0027, False), (0.01, True)])
+def test_a_drift_of_a_few_thousandths_of_the_wind_is_none(share: float, wanted: bool):
+    """0.27 % was named on a cruise ship, in a wind that moved no water."""
+    assert matters(_sized("wind_drift", np.array([share / 0.01])), 0) is wanted
 
 
 def test_thrusters_known_by_their_orders_may_be_as_slow_as_ordinary_ones():

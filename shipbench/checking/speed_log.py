@@ -1,0 +1,96 @@
+"""A speed log that reads nothing where the ship makes way: below some speed (a Doppler log, a receiver that holds still), or now and then.
+
+What makes no way through the water drifts with it, steadily for a minute or two. Where a log reads nothing, and the track departs from the nearest
+steady drift by what the log explains nothing of, the log is wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from ..data.noise import white_noise
+from ..records import Dataset, Run
+from ..signals import PSI, U, V, X, Y
+from .finding import Curve, Finding, Picture, labelled
+from .recording import Recording
+from .statistics import stretches
+
+_NOISES, _LEAST = 6.0, 0.002
+"""Standard deviations of a channel's noise, and Froude number, up to which it says nothing."""
+_DEPARTURE, _UNEXPLAINED = 0.03, 0.7
+"""Lengths by which the track departs at least, more than positions wander, and the share of it that the log must leave."""
+_FEWEST, _SHORTEST, _LONGEST = 3, 20.0, 120.0
+"""Pieces that show it, and seconds of each at 130 m: in a longer one a current may change."""
+
+
+@dataclass(frozen=True)
+class Silence:
+    """level: speed [m/s] up to which the log says nothing; pieces that show it, and their share of the samples; departure: the greatest of the track
+    from a steady drift [m], and its seconds; worst: the run with that."""
+
+    level: float
+    pieces: int
+    share: float
+    departure: float
+    seconds: float
+    worst: Run
+
+
+def silence(dataset: Dataset) -> Silence | None:
+    """Where u and v are recorded as nothing though the ship makes way; None where they are not."""
+    L, dt = dataset.ship.L, dataset.dt
+    noise = {c: float(np.median([white_noise(run.states[:, c]) for run in dataset.runs])) for c in (X, Y, U, V)}
+    u, v = (max(_NOISES * noise[c], _LEAST * (9.81 * L) ** 0.5) for c in (U, V))
+    shortest, longest = (max(round(seconds * (L / 130.0) ** 0.5 / dt), 4) for seconds in (_SHORTEST, _LONGEST))
+    found, samples = [], 0
+    for run in dataset.runs:
+        for begin, end in stretches((np.abs(run.states[:, U]) < u) & (np.abs(run.states[:, V]) < v)):
+            for a in range(begin, end, longest):
+                S = run.states[a : min(a + longest, end)]
+                departure, left = _departures(S, dt) if len(S) >= shortest else (0.0, 0.0)
+                if departure > max(_DEPARTURE * L, _NOISES * noise[X], _NOISES * noise[Y]) and left > _UNEXPLAINED * departure:
+                    found.append((departure, len(S) * dt, run))
+                    samples += len(S)
+    if len(found) < _FEWEST:
+        return None
+    return Silence(float(np.hypot(u, v)), len(found), samples / sum(map(len, dataset.runs)), *max(found, key=lambda shown: shown[0]))
+
+
+def in_words(found: Silence) -> str:
+    """What is wrong, with its figures."""
+    return (
+        f"u and v read nothing (below {found.level:.2g} m/s) in {found.pieces} pieces, {found.share:.0%} of the samples, but the ship makes way "
+        f"there: the track departs from a steady drift by up to {found.departure:.3g} m in {found.seconds:.3g} s."
+    )
+
+
+def _departures(S: np.ndarray, dt: float) -> tuple[float, float]:
+    """Greatest distance [m] of the track from the steady drift that is nearest, as recorded and less the way by u and v."""
+    track = S[:, X] + 1j * S[:, Y]
+    way = cumulative_trapezoid((S[:, U] + 1j * S[:, V]) * np.exp(1j * S[:, PSI]), dx=dt, initial=0.0)
+    line = np.column_stack([np.ones(len(S)), np.arange(len(S))]).astype(complex)
+    z = np.column_stack([track, track - way])
+    plain, left = np.max(np.abs(z - line @ np.linalg.lstsq(line, z, rcond=None)[0]), axis=0)
+    return float(plain), float(left)
+
+
+def check(recording: Recording) -> list[Finding]:
+    """One finding, if the log falls silent."""
+    found = silence(recording.dataset)
+    if found is None:
+        return []
+    run = found.worst
+    by_track = np.hypot(*np.gradient(run.states[:, [X, Y]], run.t, axis=0).T)
+    curves = (Curve("u", run.t, run.states[:, U]), Curve("v", run.t, run.states[:, V]), Curve("speed of the track", run.t, by_track))
+    return [Finding(
+        "speed_log", "error", "log reads nothing", in_words(found), channels=("u", "v"),
+        todo="Import the log again without its speeds: `shipbench import` then takes them from the track (`shipbench diagnose` does so by itself).",
+        evidence={"level": found.level, "pieces": found.pieces, "share": found.share, "departure_m": found.departure},
+        picture=Picture(f"Speed in run {recording.name_of(run)}", "time [s]", labelled("u", "v"), curves),
+    )]  # fmt: skip
+
+
+CHECK = check

@@ -1,0 +1,31 @@
+"""Speeds of the track in place of those of a log that falls silent: what it does not say would pass for a force, or for another sensor's fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..checking.speed_log import in_words, silence
+from ..importing.position import to_body
+from ..importing.speeds import derivative
+from ..records import Dataset, Run
+from ..signals import PSI, U, V, X, Y
+from .derived import has_speeds
+
+
+def with_speeds_of_the_track(dataset: Dataset) -> tuple[Dataset, list[str]]:
+    """The data set with u and v from its positions where the log reads nothing though the ship makes way, and a line for the reader."""
+    found = silence(dataset) if has_speeds(dataset) else None
+    if found is None:
+        return dataset, []
+    runs = [_by_track(run, dataset.dt, (dataset.ship.L / 9.81) ** 0.5) for run in dataset.runs]
+    line = f"{in_words(found)} u and v are taken from the positions in all runs instead."
+    return replace(dataset.with_runs(runs), derived=tuple(dict.fromkeys((*dataset.derived, "u", "v")))), [line]
+
+
+def _by_track(run: Run, dt: float, scale: float) -> Run:
+    states, psi = run.states.copy(), np.unwrap(run.states[:, PSI])
+    rate = derivative(run.t, states[:, [X, Y]], run.t, dt, scale).rate
+    states[:, U], states[:, V] = to_body(rate[:, 0], rate[:, 1], psi)
+    return replace(run, states=states)
