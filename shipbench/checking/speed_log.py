@@ -87,7 +87,7 @@ def check(recording: Recording) -> list[Finding]:
     curves = (Curve("u", run.t, run.states[:, U]), Curve("v", run.t, run.states[:, V]), Curve("speed of the track", run.t, by_track))
     return [Finding(
         "speed_log", "error", "log reads nothing", in_words(found), channels=("u", "v"),
-        todo="Import the log again without its speeds: `shipbench import` then takes them from the track (`shipbench diagnose` does so by itself).",
+        todo="Import it again without u and v: `shipbench data import` takes them from the track then, as `shipbench diagnose` does by itself.",
         evidence={"level": found.level, "pieces": found.pieces, "share": found.share, "departure_m": found.departure},
         picture=Picture(f"Speed in run {recording.name_of(run)}", "time [s]", labelled("u", "v"), curves),
     )]  # fmt: skip
