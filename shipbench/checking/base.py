@@ -37,7 +37,7 @@ def _without_consequences(found: list[Finding]) -> list[Finding]:
     """Speeds or a yaw rate that are late against the other motion are late against rudder and shaft, too; a stuck rudder seems late; of a log that
     falls silent the track tells nothing else. Said once."""
     if any(f.kind == "log reads nothing" for f in found):
-        found = [f for f in found if f.check not in ("track", "spikes") or not set(f.channels) <= {"x", "y", "u", "v", "velocity"}]
+        found = [f for f in found if f.check not in ("track", "spikes") or not set(f.channels) <= {"x", "y", "u", "v"}]
     known = {c for f in found if (f.kind, f.check) in (("lag", "track"), ("lag", "yaw"), ("frozen", "samples")) for c in f.channels}
     return [f for f in found if f.check != "response" or not known & {c.removesuffix("_c") for c in f.channels}]
 

@@ -42,11 +42,14 @@ class Silence:
 def silence(dataset: Dataset) -> Silence | None:
     """Where u and v are recorded as nothing though the ship makes way; None where they are not."""
     L, dt = dataset.ship.L, dataset.dt
-    noise = {c: float(np.median([white_noise(run.states[:, c]) for run in dataset.runs])) for c in (X, Y, U, V)}
+    shortest, longest = (max(round(seconds * (L / 130.0) ** 0.5 / dt), 5) for seconds in (_SHORTEST, _LONGEST))
+    runs = [run for run in dataset.runs if len(run) >= shortest]
+    if not runs:
+        return None
+    noise = {c: float(np.median([white_noise(run.states[:, c]) for run in runs])) for c in (X, Y, U, V)}
     u, v = (max(_NOISES * noise[c], _LEAST * (9.81 * L) ** 0.5) for c in (U, V))
-    shortest, longest = (max(round(seconds * (L / 130.0) ** 0.5 / dt), 4) for seconds in (_SHORTEST, _LONGEST))
     found, samples = [], 0
-    for run in dataset.runs:
+    for run in runs:
         for begin, end in stretches((np.abs(run.states[:, U]) < u) & (np.abs(run.states[:, V]) < v)):
             for a in range(begin, end, longest):
                 S = run.states[a : min(a + longest, end)]

@@ -32,7 +32,8 @@ the race of a single screw turns, and meets the rudder more on one side (5 % mor
 size); gusts and swell do not average out in a run (gusts of 1.5 m/s that last 20 s have means over 120 s of 0.11 of the typical wind), and push a
 ship about as currents of single runs do; lift grows more slowly than the sine of the angle on many a rudder (one with a flap, whose lift goes as
 tanh: 0.19 lost, 0.4 of the typical size); thrusters whose record is their order lag by 2 s, but ordinary ones by up to 4.5 s
-(`gear_kinds.ORDINARY`); a drift of 0.3 % of the wind is 0.02 m/s, which the form of a hull gives (0.27 % on a cruise ship in calm water)."""
+(`gear_kinds.ORDINARY`); a drift of 0.3 % of the wind is 0.02 m/s, which the form of a hull gives (0.27 % on a cruise ship
+in a wind that moved no water)."""
 _LATE_STALL, _OF_LATE_STALL = 0.3, 0.7
 """Angle [rad] from which a stall lies where rudders ordinarily stall, and the least size from there on. (A wing that stalls smoothly about 35 deg, on
 two ships with nothing hidden and on one with another hull: 0.28 to 0.31 lost from 20 deg on, worth 17 to 19.)"""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from ..checking.speed_log import in_words, silence
 from ..importing.position import to_body
 from ..importing.speeds import derivative
@@ -25,7 +23,7 @@ def with_speeds_of_the_track(dataset: Dataset) -> tuple[Dataset, list[str]]:
 
 
 def _by_track(run: Run, dt: float, scale: float) -> Run:
-    states, psi = run.states.copy(), np.unwrap(run.states[:, PSI])
+    states = run.states.copy()
     rate = derivative(run.t, states[:, [X, Y]], run.t, dt, scale).rate
-    states[:, U], states[:, V] = to_body(rate[:, 0], rate[:, 1], psi)
+    states[:, U], states[:, V] = to_body(rate[:, 0], rate[:, 1], states[:, PSI])
     return replace(run, states=states)

@@ -32,8 +32,8 @@ def silent(data: Dataset, share: float = 0.3) -> Dataset:
     return data.with_runs(runs)
 
 
-def drifting(slowly: float, water: tuple[float, float]) -> Dataset:
-    """Ships of 130 m that hardly move through water which does: speeds are through water, positions over ground."""
+def drifting(slowly: float, water: tuple[float, float], noise: float = 0.02) -> Dataset:
+    """Ships of 130 m that hardly move through water which does: speeds are through water, positions over ground; noise: of the log [m/s]."""
     plan, t, runs = trials(), np.arange(200.0), []
     for i, run in enumerate(plan.runs):
         rng = np.random.default_rng(i)
@@ -42,7 +42,7 @@ def drifting(slowly: float, water: tuple[float, float]) -> Dataset:
         states[:, X] = np.cumsum(states[:, U]) + water[0] * t
         states[:, Y] = water[1] * t
         states[:, [X, Y]] += 0.3 * rng.standard_normal((len(t), 2))
-        states[:, [U, V]] += 0.02 * rng.standard_normal((len(t), 2))
+        states[:, [U, V]] += noise * rng.standard_normal((len(t), 2))
         runs.append(replace(run, t=t, states=states, inputs=states[:, 6:10]))
     return replace(plan, dt=1.0, runs=tuple(runs))
 
@@ -57,9 +57,23 @@ def test_it_is_told_on_ships_of_any_size(ship, noise, share):
     assert finding.severity == "error"
 
 
+def test_runs_of_a_few_samples_tell_nothing_and_hinder_nothing():
+    short = [replace(run, id=f"{run.id}-short", t=run.t[:3], states=run.states[:3], inputs=run.inputs[:3]) for run in trials().runs]
+    assert silence(trials().with_runs(short)) is None
+    whole = silent(trials())
+    assert silence(whole.with_runs([*whole.runs, *short])).pieces == silence(whole).pieces
+
+
 @pytest.mark.parametrize(("slowly", "water"), [(0.0, (0.5, -0.3)), (0.08, (0.0, 0.0)), (0.08, (1.0, 1.0))])
 def test_a_ship_that_lies_still_in_a_current_or_creeps_has_a_log(slowly, water):
     assert silence(drifting(slowly, water)) is None
+
+
+def test_what_a_noisy_log_says_within_its_noise_counts():
+    """It never reads more than six times its noise, the track departs by 6 m, and the log explains it."""
+    seen = drifting(0.4, (0.5, -0.3), noise=0.1)
+    assert silence(seen) is None
+    assert silence(silent(seen, 1.0)) is not None
 
 
 def test_the_same_creep_with_a_log_that_does_not_see_it_is_told():
