@@ -94,7 +94,7 @@ def diagnose(
                 ahead, work = None, partial(work, dataset=dataset)
         doubts = doubts_of(found) if only is None else []
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts else Worth()
-    warnings += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + said(dataset) + mended + doubts
+    warnings += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + mended + said(dataset) + doubts
     warnings += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     warnings += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
