@@ -232,6 +232,8 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
         late = any(t.label == label and t.since is not None for t in found.final.model.terms)
         return "named as a change_point" if late and "change_point" in named else _DOUBT
     if label in found.selection.unsure:
+        if "bank_suction" in inside and s.term.effect.vector and not s.term.per_run:
+            return "beside a bank named only where it does not point straight at it (that mends the bank's own law) and the runs agree on it"
         unsteady = "one value for each run does not explain how runs differ"
         return unsteady if s.term.per_run else "the runs do not agree that its size is not zero, or no ordinary ship would sail so with it"
     if label in found.selection.tiny:

@@ -1,4 +1,6 @@
-"""The recorded position is that of an antenna, ahead and to starboard of midship: p + R(psi) (forward, starboard)."""
+"""The recorded position is that of an antenna, ahead and to starboard of midship: p + R(psi) (forward, starboard). Its velocity is midship's (a log,
+or an inertial unit that reckons with the lever), or the antenna's own, from the same receiver: u - r starboard, v + r forward. Its own agree with the
+track, so that only the forces tell where on the ship they belong: what is ahead or astern may pass for another hull."""
 
 from __future__ import annotations
 
@@ -7,24 +9,34 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..ops import Array
-from ..signals import PSI, X, Y
+from ..ship import Particulars
+from ..signals import PSI, R, U, V, X, Y
 from .base import Effect, Parameter, per_run
 
 
 class AntennaOffset(Effect):
     family = "sensor"
-    summary = "lever arm of the position sensor"
+    summary = "lever arm of the position sensor, its velocities midship's or its own"
     source = "physics reference, section 5, S61"
-    parameters = (Parameter("forward", "m", 12.0, -80.0, 80.0, scaling="length"), Parameter("starboard", "m", 12.0, -40.0, 40.0, scaling="length"))
+    parameters = (
+        Parameter("forward", "m", 12.0, -80.0, 80.0, scaling="length"),
+        Parameter("starboard", "m", 12.0, -40.0, 40.0, scaling="length"),
+        Parameter("own_velocities", "1", 0.0, 0.0, 1.0, shape=True),
+    )
     separate = "a turn on the spot: the antenna draws a circle"
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
         out = S.copy()
-        forward, starboard = per_run(q[0]), per_run(q[1])
-        c, s = np.cos(S[..., PSI]), np.sin(S[..., PSI])
+        forward, starboard, own = (per_run(value) for value in q)
+        c, s, r = np.cos(S[..., PSI]), np.sin(S[..., PSI]), own * S[..., R]
         out[..., X] += forward * c - starboard * s
         out[..., Y] += forward * s + starboard * c
+        out[..., U] -= r * starboard
+        out[..., V] += r * forward
         return out
+
+    def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
+        return [(0.0,), (1.0,)]
 
 
 EFFECT = AntennaOffset()

@@ -12,7 +12,7 @@ from shipbench.diagnosis.gear_kinds import ORDINARY
 from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
 from shipbench.diagnosis.model import NUM_BASE, PLACES
 from shipbench.diagnosis.plant import ordinary_gears
-from shipbench.diagnosis.robust import bends, covariance, inflation, is_borne_by_one, is_on_a_ship, is_sure, least_size, matters
+from shipbench.diagnosis.robust import bends, covariance, inflation, is_borne_by_one, is_on_a_ship, is_sure, least_size, matters, mends_the_bank
 from shipbench.diagnosis.select import asked_besides
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
@@ -91,6 +91,16 @@ def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
     assert is_sure(fit, 0)
 
 
+@pytest.mark.parametrize(("forward", "own", "sure"), [(0.08, True, False), (0.3, True, True), (0.08, False, True)])
+def test_how_far_ahead_velocities_are_is_as_sure_as_where_the_forces_of_a_hull_act(monkeypatch, forward: float, own: bool, sure: bool):
+    """An antenna 4 m astern with velocities of its own was named on a patrol vessel of 52 m that had none; positions alone tell it by the track."""
+    monkeypatch.setattr(robust, "is_on_a_ship", lambda *_: True)
+    fit = fit_of(np.full(RUNS, forward * 130.0 / 12.0))
+    fit.plant.c, fit.scales = SimpleNamespace(L=130.0), SimpleNamespace(amplitudes=lambda *_: np.array([12.0]))
+    fit.model.terms = (SimpleNamespace(label="antenna_offset", per_run=False, since=None, setting=(float(own),)),)
+    assert is_sure(fit, 0) is sure
+
+
 def _of_runs(gram: Gram, prior: Prior) -> SimpleNamespace:
     """A fit of causes with values of single runs."""
     reduced = gram.reduce(np.zeros(3))
@@ -157,7 +167,7 @@ def _sized(effect: str, values: np.ndarray, dt: float = 1.0, L: float = 130.0, s
     term = Term(EFFECTS.get(effect), setting)
     c, ship = SimpleNamespace(L=L, tunnels=SimpleNamespace(x_bow=0.38 * L)), SimpleNamespace(B=0.12 * L)
     plant = SimpleNamespace(seg=SimpleNamespace(dt=dt), c=c, ship=ship)
-    typical = np.array([abs(p.typical) for p in term.effect.sized(L)])
+    typical = np.array([abs(p.typical) for p in term.effect.sized(L) if not p.shape])
     return SimpleNamespace(values=(values,), model=SimpleNamespace(terms=(term,)), plant=plant, scales=SimpleNamespace(amplitudes=lambda *_: typical))
 
 
@@ -217,8 +227,18 @@ def test_a_ship_floats_with_her_centre_of_gravity_where_it_is(shift: float, want
 @pytest.mark.parametrize(("forward", "starboard", "wanted"), [(-30.0, -9.0, True), (0.0, 9.0, True), (-4.4, -14.7, False), (70.0, 0.0, False)])
 def test_an_antenna_stands_on_the_ship(forward: float, starboard: float, wanted: bool):
     """14.7 m to port were named on a barge 85 m long and 9.5 m wide, whose log read nothing below 1.1 m/s."""
-    at = np.array([forward, starboard]) / [p.typical for p in EFFECTS.get("antenna_offset").sized(85.0)]
+    at = np.array([forward, starboard]) / [p.typical for p in EFFECTS.get("antenna_offset").sized(85.0) if not p.shape]
     assert is_on_a_ship(_sized("antenna_offset", at, L=85.0), 0) is wanted
+
+
+@pytest.mark.parametrize(("towards", "bank", "wanted"), [(4.7, (1.57, 4.3, 0.0), True), (1.6, (1.57, 4.3, 0.0), True), (2.0, (1.57, 4.3, 0.0), False),
+                                                         (4.7, None, False)])  # fmt: skip
+def test_a_wind_straight_at_a_bank_mends_its_law(towards: float, bank: tuple[float, ...] | None, wanted: bool):
+    """A wind of 5.3 m/s from 270 deg and a current to 270 deg were named beside a bank at 90 deg that all runs of a barge followed."""
+    fit = _sized("wind", np.array([np.cos(towards), np.sin(towards)]))
+    if bank is not None:
+        fit.model.terms = (*fit.model.terms, Term(EFFECTS.get("bank_suction"), bank))
+    assert mends_the_bank(fit, 0) is wanted
 
 
 @pytest.mark.parametrize(("share", "wanted"), [(0.0027, False), (0.01, True)])

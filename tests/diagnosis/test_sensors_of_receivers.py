@@ -31,7 +31,7 @@ from shipbench.effects.base import EFFECTS, delayed
 from shipbench.physics.actuators import gear_path
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
-from shipbench.signals import PSI, R, U, V
+from shipbench.signals import PSI, R, U, V, X, Y
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import WAVE_PERIOD, Trials, sea_trials
@@ -284,6 +284,23 @@ def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):
     assert len(verdict.causes) == 1
     position = next(c for c in verdict.candidates if c.effect == "position_delay")
     assert "put right before the fit" in position.rejected_because
+
+
+def test_an_antenna_whose_velocities_are_its_own_is_no_other_hull(trials):
+    """Track and velocities agree, so that only the forces tell where on the ship they belong; on a barge it was another hull (2716), and none."""
+
+    def change(S: np.ndarray) -> None:
+        arm = np.exp(1j * S[:, PSI]) * (-50.0 + 6.0j)
+        S[:, X], S[:, Y] = S[:, X] + arm.real, S[:, Y] + arm.imag
+        S[:, U], S[:, V] = S[:, U] - 6.0 * S[:, R], S[:, V] - 50.0 * S[:, R]
+
+    verdict = diagnose(_changed(trials, change), gain=False)
+    assert [c.effect for c in verdict.causes] == ["antenna_offset"]
+    found = verdict.causes[0].parameters
+    assert found["own_velocities"].value == 1.0
+    for name, truth in (("forward", -50.0), ("starboard", 6.0)):
+        low, high = found[name].ci95
+        assert low < truth < high < truth + 60.0
 
 
 @pytest.mark.parametrize(("channels", "named"), [pytest.param((U, V, R), ["velocity_delay"], marks=pytest.mark.long), ((R,), [])])

@@ -358,6 +358,18 @@ def test_velocities_late_in_the_earths_axes_turn_with_the_ship():
     assert np.max(np.abs(effect.measure(S, (2.3, 0.0), 1.0) - S)) > 0.3
 
 
+@pytest.mark.parametrize("own", [0.0, 1.0])
+def test_the_velocities_of_an_antenna_are_midships_or_its_own(own: float):
+    """On a ship that turns on the spot and drifts: its own are those at which the recorded position moves."""
+    S, dt = np.zeros((1, 400, 10)), 0.05
+    t = dt * np.arange(400)
+    S[0, :, 2], S[0, :, 5] = 0.3 * np.sin(t), 0.3 * np.cos(t)
+    S[0, :, 0], S[0, :, 3], S[0, :, 4] = 2.0 * t, 2.0 * np.cos(S[0, :, 2]), -2.0 * np.sin(S[0, :, 2])
+    x, y, psi, u, v = get("antenna_offset").measure(S, (-9.0, 4.0, own), dt)[0, :, :5].T
+    earth = (u + 1j * v) * np.exp(1j * psi)
+    assert bool(np.max(np.abs(np.gradient(x + 1j * y, dt) - earth)[1:-1]) < 0.01) is bool(own)
+
+
 @pytest.mark.parametrize("name", ["wind", "wind_per_run"])
 def test_stretched_wind_says_the_wind_that_it_pushes_with(name: str):
     plain = get(name)
