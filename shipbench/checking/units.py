@@ -131,8 +131,8 @@ def _signed(channel: str) -> list[float]:
 _FRAMES = {
     "plain": np.eye(2), "y reversed": np.diag([1.0, -1.0]), "x reversed": np.diag([-1.0, 1.0]), _SWAPPED: np.array([[0.0, 1.0], [1.0, 0.0]]),
 }  # fmt: skip
-_LIMITS = np.array([0.15, 0.1, 0.7, 0.7, 6.0, 1.0, 1.0])
-"""Of scale [1], compass error [rad], antenna [L], delay [s at 130 m] and drift [m/s at 130 m]."""
+_LIMITS = np.array([0.15, 0.1, 0.7, 0.7, 6.0, 6.0, 1.0, 1.0])
+"""Of scale [1], compass error [rad], antenna [L], delay in the earth's axes and in the ship's [s at 130 m], and drift [m/s at 130 m]."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ def _motion(dataset: Dataset, runs: Sequence[Run]) -> _Motion:
     if len(pieces) < _FEWEST_WINDOWS:
         return _Motion({}, {}, width * dt, len(pieces))
     S = np.stack(pieces[:: max(1, -(-len(pieces) // _MOST_WINDOWS))])
-    limits = _LIMITS * np.array([1.0, 1.0, L, L, froude, froude, froude])
+    limits = _LIMITS * np.array([1.0, 1.0, L, L, froude, froude, froude, froude])
     moved, turned = S[:, -1, [X, Y]] - S[:, 0, [X, Y]], S[:, -1, PSI] - S[:, 0, PSI]
     track: dict[_Reading, float] = {}
     whole = float(np.sum(moved**2))
@@ -233,9 +233,15 @@ def _track_parts(S: np.ndarray, psi: float, dt: float) -> dict[str, np.ndarray]:
     c, s = np.cos(S[..., PSI] / psi), np.sin(S[..., PSI] / psi)
     ahead, abeam = np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)
     surge, sway = S[..., U, None] * ahead, S[..., V, None] * abeam
+
+    def gained(speed: np.ndarray, axis: np.ndarray) -> np.ndarray:
+        """What a speed changes by along an axis that turns with the ship."""
+        return np.sum(np.diff(speed, axis=1)[..., None] * 0.5 * (axis[:, 1:] + axis[:, :-1]), axis=1)
+
     return {
-        "u": np.trapezoid(surge, dx=dt, axis=1), "du": surge[:, -1] - surge[:, 0], "ahead": ahead[:, -1] - ahead[:, 0],
-        "v": np.trapezoid(sway, dx=dt, axis=1), "dv": sway[:, -1] - sway[:, 0], "abeam": abeam[:, -1] - abeam[:, 0],
+        "u": np.trapezoid(surge, dx=dt, axis=1), "du": surge[:, -1] - surge[:, 0], "own du": gained(S[..., U], ahead),
+        "v": np.trapezoid(sway, dx=dt, axis=1), "dv": sway[:, -1] - sway[:, 0], "own dv": gained(S[..., V], abeam),
+        "ahead": ahead[:, -1] - ahead[:, 0], "abeam": abeam[:, -1] - abeam[:, 0],
     }  # fmt: skip
 
 
@@ -243,10 +249,10 @@ def _track_squares(moved: np.ndarray, parts: dict[str, np.ndarray], span: float,
     """Squares left of the ways `moved` (W, 2) for every reading of u and v."""
     pairs = list(itertools.product(_signed("u"), [*_signed("v"), np.inf]))
     u, v = (np.array(values)[:, None, None] for values in zip(*pairs, strict=True))
-    way, change = parts["u"] / u + parts["v"] / v, parts["du"] / u + parts["dv"] / v
+    way, change, own_change = (parts[f"{of}u"] / u + parts[f"{of}v"] / v for of in ("", "d", "own d"))
     across = np.stack([-way[..., 1], way[..., 0]], axis=-1)
     drift = span * np.eye(2)[:, None, :]
-    shared = np.broadcast_arrays(way, across, parts["ahead"], parts["abeam"], change, drift[0], drift[1])
+    shared = np.broadcast_arrays(way, across, parts["ahead"], parts["abeam"], change, own_change, drift[0], drift[1])
     columns = np.stack(shared, axis=-1).reshape(len(pairs), -1, len(limits))
     return dict(zip(pairs, _bounded_squares((moved - way).reshape(len(pairs), -1), columns, limits).tolist(), strict=True))
 

@@ -227,7 +227,8 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
     if label in named:
         return "named"
     if found.unknown is not None and score > found.threshold:
-        return f"a dependence on {found.unknown.variable} explains more ({found.unknown.score:.0f} against {score:.0f})"
+        own = max((x.score for x in steps if x.term.label == label), default=score)  # once fitted: it may have promised more
+        return f"a dependence on {found.unknown.variable} explains more ({found.unknown.score:.0f} against {own:.0f})"
     if label in inside:
         late = any(t.label == label and t.since is not None for t in found.final.model.terms)
         return "named as a change_point" if late and "change_point" in named else _DOUBT

@@ -30,6 +30,7 @@ from .gain import FoldGain, fold_gain, summarise
 from .noise import noise_in_words
 from .outcome import Cause, Diagnosis, Gain
 from .over_ground import over_ground
+from .parts import in_parts
 from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, least_depth
 from .ship_file import doubts_of, odd_for, own_propeller
 from .silent_log import with_speeds_of_the_track
@@ -64,7 +65,8 @@ def diagnose(
     if workers < 1:
         raise InputError(f"workers: {workers}; accepted: whole numbers from 1.")
     began, fingerprint = time.perf_counter(), dataset.fingerprint
-    warnings = _check(dataset)
+    dataset, told = in_parts(dataset, FEW_RUNS)
+    warnings = told + _check(dataset)
     units = check_units(dataset) if only is None else []
     dataset = corrected(dataset, units)
     dataset, mended = _mended(dataset) if only is None else (dataset, [])

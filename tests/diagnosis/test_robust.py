@@ -183,10 +183,14 @@ def test_a_ship_whose_lift_follows_late_has_no_slow_gear(lag: float, wanted: boo
     assert matters(_sized("rudder_lag", np.array([lag]) / EFFECTS.get("rudder_lag").sized(120.0)[0].typical, L=120.0), 0) is wanted
 
 
-@pytest.mark.parametrize(("noise", "commanded", "wanted"), [(0.1, False, False), (0.05, False, True), (0.1, True, True)])
-def test_play_that_takes_the_noise_out_of_a_record_is_none(noise: float, commanded: bool, wanted: bool):
-    """0.5 deg of it, with noise of 0.1 deg on a boat of 12 m that had none; beside orders there is no noise to take out."""
-    fit, states = _sized("rudder_backlash", np.array([0.25])), np.zeros((8, 61, 10))
+PLAYS = [(1.0, 0.2, False, False), (1.0, 0.05, False, True), (1.0, 0.2, True, True), (0.64, 0.05, False, False)]
+
+
+@pytest.mark.parametrize(("play", "noise", "commanded", "wanted"), PLAYS)
+def test_play_that_takes_the_noise_out_of_a_record_or_the_lag_out_of_a_ship_is_none(play: float, noise: float, commanded: bool, wanted: bool):
+    """0.5 deg of it, with noise of 0.1 deg on a boat of 12 m that had none (beside orders there is no noise to take out); 0.64 deg on a trainer of
+    50 m that answers her rudder late."""
+    fit, states = _sized("rudder_backlash", np.array([play / 2.0])), np.zeros((8, 61, 10))
     states[..., DELTA] = np.deg2rad(noise * np.random.default_rng(2).standard_normal(states.shape[:2]))
     fit.plant.seg = SimpleNamespace(dt=0.5, commanded=commanded, states=states, mask=np.ones(states.shape[:2], dtype=bool))
     assert matters(fit, 0) is wanted
