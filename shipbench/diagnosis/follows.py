@@ -16,6 +16,8 @@ UNITS = {
 _SURROGATES = 199
 _GRID = 181
 _STRONGER = 1.5
+_SAILED = 15.0
+"""Degrees from the nearest heading that was sailed, beyond which nothing is said of a force that follows the heading."""
 
 
 class Follows(NamedTuple):
@@ -27,7 +29,8 @@ class Follows(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """The fitted curve: x in the variable's unit, y and its band (two standard errors, clustered by run) in the force's unit."""
+    """The fitted curve: x in the variable's unit, y and its band (two standard errors, clustered by run) in the force's unit; NaN at headings that
+    nobody sailed."""
 
     x: np.ndarray
     y: np.ndarray
@@ -164,6 +167,9 @@ def curve(trace: Trace, axis: int, name: str) -> Curve | None:
     grid = np.linspace(low, high, _GRID)
     G = np.column_stack([np.ones(_GRID), basis(name, grid, x)])
     fitted, half = G @ q, 2.0 * np.sqrt(np.maximum(np.einsum("gi,ij,gj->g", G, cov, G), 0.0))
+    if name == "heading":
+        apart = (grid[:, None] - np.unique(np.round(x[known])) + 180.0) % 360.0 - 180.0
+        fitted[np.min(np.abs(apart), axis=1) > _SAILED] = np.nan
     return Curve(grid, fitted, fitted - half, fitted + half)
 
 
@@ -176,7 +182,7 @@ def with_speed(trace: Trace, axis: int, name: str, seed: int = 0) -> float:
     runs = np.unique(trace.run)
     if known_curve is None or len(runs) < 8 or name in ("speed", "revolutions", "run", "time"):
         return 1.0
-    shape = np.interp(values[name], known_curve.x, known_curve.y - known_curve.y.mean())
+    shape = np.interp(values[name], known_curve.x, known_curve.y - np.nanmean(known_curve.y))
     y, speed = trace.force[..., axis], values["speed"]
     known = np.isfinite(shape) & np.isfinite(y) & np.isfinite(speed)
     fast = speed > np.median(speed[known])

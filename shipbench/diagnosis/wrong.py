@@ -182,7 +182,7 @@ def force_words(trace: Trace, axis: int, found: Follows) -> str:
     if fitted is None:
         return what
     unit, factor = FORCE_UNITS[axis]
-    ends = sorted((int(np.argmax(fitted.y)), int(np.argmin(fitted.y))), key=lambda i: fitted.x[i])
+    ends = sorted((int(np.nanargmax(fitted.y)), int(np.nanargmin(fitted.y))), key=lambda i: fitted.x[i])
     if name == "run":
         places = [f"{factor * fitted.y[i]:+.2g} {unit} about run {trace.names[round(float(fitted.x[i]))]}" for i in ends]
     else:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis import wrong
-from shipbench.diagnosis.follows import Follows, follows, with_speed
+from shipbench.diagnosis.follows import Follows, curve, follows, with_speed
 from shipbench.diagnosis.outcome import Trace
-from shipbench.diagnosis.wrong import _whiteness, error_tables, what_is_wrong
+from shipbench.diagnosis.wrong import _whiteness, error_tables, force_words, what_is_wrong
 
 
 def make_trace(runs: int = 12, samples: int = 61, seed: int = 0) -> Trace:
@@ -40,6 +40,20 @@ def test_a_force_that_follows_the_heading_is_said_to():
     assert line.depends_on == "heading"
     assert "mm/s^2 at" in line.when
     assert "deg" in line.when
+
+
+def test_nothing_is_said_of_headings_that_nobody_sailed():
+    """On a passage of two courses the harmonics went to 49 m/s^2 between them."""
+    trace = make_trace()
+    trace.measured[..., 2] = np.deg2rad(np.where(np.arange(12) < 6, 190.0, 250.0))[:, None] + 0.05 * np.sin(trace.t / 20.0)
+    trace.force[..., 0] += 3e-3 * np.cos(trace.measured[:, ::5, 2])
+    found = curve(trace, 0, "heading")
+    assert found is not None
+    sailed = np.isfinite(found.y)
+    assert found.x[sailed].min() > 170.0
+    assert found.x[sailed].max() < 270.0
+    assert np.nanmax(np.abs(found.y)) < 6e-3
+    assert "missing surge force" in force_words(trace, 0, Follows("heading", 0.9, 0.01))
 
 
 def test_a_force_that_follows_the_rudder_is_said_to():
