@@ -16,8 +16,9 @@ UNITS = {
 _SURROGATES = 199
 _GRID = 181
 _STRONGER = 1.5
-_SAILED = 15.0
-"""Degrees from the nearest heading that was sailed, beyond which nothing is said of a force that follows the heading."""
+_SAILED, _OPEN = 2.0, 1e-4
+"""Degrees from the nearest heading that was sailed, beyond which nothing is said of a force that follows the heading; and share of the greatest
+information below which a direction of the curve's coefficients is left at zero (two harmonics on two courses)."""
 
 
 class Follows(NamedTuple):
@@ -158,7 +159,7 @@ def curve(trace: Trace, axis: int, name: str) -> Curve | None:
     if known.sum() < 20:
         return None
     A = np.column_stack([np.ones(known.sum()), basis(name, x[known])])
-    bread = np.linalg.pinv(A.T @ A)
+    bread = np.linalg.pinv(A.T @ A, rcond=_OPEN)
     q = bread @ (A.T @ y[known])
     run = np.broadcast_to(trace.run[:, None], x.shape)[known]
     scores = np.stack([A[run == k].T @ (y[known] - A @ q)[run == k] for k in np.unique(run)])
