@@ -52,10 +52,10 @@ def _with(data: Dataset, fault: Callable[[np.ndarray], None]) -> Dataset:
 
 
 def _scores(data: Dataset) -> dict[str, tuple[float, float]]:
-    """Score and size of every fault of a sensor beside the plain model."""
+    """Score and size of every fault of a sensor beside the plain model, in its first form."""
     plant = Plant.of(data)
     scales = Scales(plant)
-    scores = screen(null_fit(plant, scales, [t for t in candidates_for(plant) if t.label in FAULTS]))
+    scores = screen(null_fit(plant, scales, [t for t in candidates_for(plant) if t.label in FAULTS and not any(t.setting)]))
     return {s.term.label: (s.score, float(s.estimate[0] * scales.amplitudes(s.term, plant.c.L)[0])) for s in reversed(scores)}
 
 

@@ -59,12 +59,12 @@ def test_slopes_by_parameters_are_those_of_the_log_determinant(fitted):
     assert np.abs(found - numeric).max() < 0.05 * np.abs(numeric).max()
 
 
-CAUSES = ("mass_change", "rudder_gain", "added_resistance", "speed_scale", "antenna_offset", "rudder_delay")
+ANTENNAS = [Term(EFFECTS.get("antenna_offset"), (own,)) for own in (0.0, 1.0)]
+CAUSES = [*(Term(EFFECTS.get(name)) for name in ("mass_change", "rudder_gain", "added_resistance", "speed_scale", "rudder_delay")), *ANTENNAS]
 
 
-@pytest.mark.parametrize("name", CAUSES)
-def test_slopes_by_causes_of_every_kind_are_those_of_the_log_determinant(fitted, name):
-    term = Term(EFFECTS.get(name))
+@pytest.mark.parametrize("term", CAUSES)
+def test_slopes_by_causes_of_every_kind_are_those_of_the_log_determinant(fitted, term):
     found = _by_column(fitted, [term])[NUM_BASE:]
     for a in range(term.size):
         ends = [replace(fitted.point, terms=(term,), values=(step * np.eye(term.size)[a],)) for step in (0.1, -0.1)]
@@ -72,10 +72,9 @@ def test_slopes_by_causes_of_every_kind_are_those_of_the_log_determinant(fitted,
         assert found[a] == pytest.approx(numeric, rel=0.1, abs=0.1)
 
 
-@pytest.mark.parametrize("name", ["speed_scale", "antenna_offset"])
-def test_slopes_by_a_sensor_that_errs_already_are_those_of_the_log_determinant(fitted, name):
+@pytest.mark.parametrize("term", [Term(EFFECTS.get("speed_scale")), *ANTENNAS])
+def test_slopes_by_a_sensor_that_errs_already_are_those_of_the_log_determinant(fitted, term):
     """What it does already must not count as the change."""
-    term = Term(EFFECTS.get(name))
     at = replace(fitted.point, terms=(term,), values=(np.full(term.size, 0.7),))
     lin = Linearisation(fitted.plant, fitted.scales, at, fitted.motion, coarse=False)
     now = settle(lin, Model((term,)), fitted.hyper, {}, leap=0.0)
