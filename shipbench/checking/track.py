@@ -26,9 +26,8 @@ LEAST_SCALE, LEAST_SWAY_SCALE, LEAST_HEADING, LEAST_CURRENT, LEAST_LAG = 0.02, 0
 """What matters at all: shares, rad, share of the speed, s at 130 m (and a quarter of a sample)."""
 _SURE, _SMALL = 6.0, 3.0
 """Standard errors from which a drift is taken out unasked, and below which a lag may be none."""
-_NO_LAG = 2.0
-"""Seconds at 130 m, which the track must rule out by two standard errors where no lag is to be looked for by other means: a typical one. (Of a supply
-vessel on a passage with nothing hidden the track said 0.5 s, standard error 0.4; her rudder, whose lift builds up, made it 1.8.)"""
+_NO_LAG = 0.7
+"""Seconds at 130 m, which the track must rule out by two standard errors where no lag is to be looked for by other means."""
 _LAGS = {"lag of u, v": (U, V), "lag of position": (X, Y), "lag of heading": (PSI,)}
 _SCALES = frozenset({"scale of u and v", "scale of u", "scale of v"})
 _LATE = frozenset({"lag of u, v", "lag of position"})
@@ -143,16 +142,27 @@ def late_velocities(recording: Recording) -> tuple[float, float] | None:
     return (lag, float(found.first.sd["lag of position"][0])) if lag >= least_lag(recording) else None
 
 
-def keeps_time(recording: Recording) -> bool:
-    """Whether the track shows that neither the velocities nor the position are late against the other, by standard errors over the runs, whatever the
-    speed's scale, the heading's reference and the antenna's place."""
+def lags(recording: Recording) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """Seconds by which the velocities in the ship's axes, and the position, are late against the other, each with its standard error over the runs,
+    whatever the speed's scale, the heading's reference and the antenna's place; None where there are too few windows."""
     w = windows(recording, {})
     if w is None:
-        return False
+        return None
     way, cluster = w.surge + w.sway, np.tile(clusters(w.run), 2)
     off, others = _real(w.moved - way)[:, 0], (way, 1j * way, w.turned, 1j * w.turned)
-    lags = [clustered_fit(off, _real(column, *others), cluster) for column in (w.velocity_change, -w.way_change)]
-    return all(abs(f.value[0]) < _SMALL * f.sd[0] and abs(f.value[0]) + 2.0 * f.sd[0] < _NO_LAG * recording.froude for f in lags)
+    own, position = (clustered_fit(off, _real(column, *others), cluster) for column in (w.velocity_change, -w.way_change))
+    return (float(own.value[0]), float(own.sd[0])), (float(position.value[0]), float(position.sd[0]))
+
+
+def keeps_time(recording: Recording) -> bool:
+    """Whether the track shows that neither the velocities nor the position are late against the other."""
+    found = lags(recording)
+    return found is not None and all(may_be_none(f) and abs(f[0]) + 2.0 * f[1] < _NO_LAG * recording.froude for f in found)
+
+
+def may_be_none(lag: tuple[float, float]) -> bool:
+    """Whether a lag and its standard error are no lag."""
+    return abs(lag[0]) < _SMALL * lag[1]
 
 
 def through_water(recording: Recording) -> tuple[float, float] | None:

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from ..checking.recording import Recording
-from ..checking.track import keeps_time, late_velocities
+from ..checking.track import keeps_time, lags, late_velocities, may_be_none
 from ..checking.yaw import late_yaw_rate
 from ..data.corrections import undelayed
 from ..records import Dataset, Run
@@ -22,7 +22,7 @@ from .fit import Origin, fit
 from .gram import by_run
 from .model import Scales
 from .plant import Plant
-from .settle import Model
+from .settle import Fit, Model
 
 NAMES = ("velocity_delay", "position_delay")
 """What kinematics may answer."""
@@ -66,6 +66,26 @@ def check_clocks(dataset: Dataset) -> LateVelocities | None:
 def not_asked(dataset: Dataset, late: LateVelocities | None) -> tuple[str, ...]:
     """Delays that are not asked of the model: all of them once the clocks are put right, or where measured speeds and the track show none."""
     return NAMES if late is not None or (has_speeds(dataset) and keeps_time(Recording(dataset))) else ()
+
+
+def ruled_out(dataset: Dataset, found: Fit) -> tuple[str, ...]:
+    """Delays in a model that the track, which shows none, rules out by two standard errors: something else is late. (A supply vessel on a passage,
+    nothing hidden: 1.8 s by the forces; by the track 0.5 s, standard error 0.4.)"""
+    late = [i for i, t in enumerate(found.model.terms) if t.label in NAMES and t.since is None]
+    seen = lags(Recording(dataset)) if late and has_speeds(dataset) else None
+    if seen is None:
+        return ()
+    own, position = seen
+    out = []
+    for i in late:
+        term = found.model.terms[i]
+        delay = float((found.values[i] * found.scales.amplitudes(term, found.plant.c.L))[0])
+        lag, sd = own if term.label == "velocity_delay" else position
+        if any(term.setting):  # velocities that are late in the earth's axes are a position that is early
+            lag, sd = -position[0], position[1]
+        if may_be_none((lag, sd)) and abs(delay - lag) > 2.0 * sd:
+            out.append(term.label)
+    return tuple(out)
 
 
 def with_prompt_yaw_rate(dataset: Dataset) -> tuple[Dataset, list[str]]:

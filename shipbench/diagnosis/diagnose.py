@@ -22,7 +22,7 @@ from ..records import Dataset
 from . import misread
 from .analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .causes import describe_candidates, describe_causes, remaining, unknown_part, what_is_left
-from .clocks import check_clocks, not_asked, with_prompt_yaw_rate
+from .clocks import check_clocks, not_asked, ruled_out, with_prompt_yaw_rate
 from .derived import faults, has_speeds, marked, said
 from .felt_wind import with_true_wind
 from .fit import Fit
@@ -90,10 +90,10 @@ def diagnose(
             found = analyse(null, only=only, seed=seed, cautious=cautious)
         else:
             as_recorded = dataset
-            found, dataset, turned = _as_it_must_be_read(dataset, null, steps, settled, seed)
+            found, dataset, turned, no_cause = _as_it_must_be_read(dataset, null, steps, settled, seed)
             units = merged([*units, *turned])
-            if dataset is not as_recorded:
-                ahead, work = None, partial(work, dataset=dataset)
+            if dataset is not as_recorded or no_cause != settled:
+                ahead, work = None, partial(work, dataset=dataset, settled=no_cause)
         doubts = doubts_of(found) if only is None else []
         worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts else Worth()
     warnings += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + mended + said(dataset) + doubts
@@ -164,9 +164,12 @@ def _mended(dataset: Dataset) -> tuple[Dataset, list[str]]:
     return dataset, lines
 
 
-def _as_it_must_be_read(dataset: Dataset, null: Fit, steps: int, settled: Sequence[str], seed: int) -> tuple[Analysis, Dataset, list[UnitFinding]]:
-    """What is found in runs of which `null` is the plain model, the runs as actuators must be read in them, and those that are read to the other side
-    (which the model cannot tell of another ship than that of the file)."""
+def _as_it_must_be_read(
+    dataset: Dataset, null: Fit, steps: int, settled: Sequence[str], seed: int
+) -> tuple[Analysis, Dataset, list[UnitFinding], Sequence[str]]:
+    """What is found in runs of which `null` is the plain model, the runs as actuators must be read in them, those that are read to the other side
+    (which the model cannot tell of another ship than that of the file), and what is not asked of the model, `settled` and delays that the track rules
+    out."""
 
     def plain(read: Dataset) -> Fit:
         return plain_model(Plant.of(read, steps), settled=settled)
@@ -179,7 +182,10 @@ def _as_it_must_be_read(dataset: Dataset, null: Fit, steps: int, settled: Sequen
     if wrong := [e for e in found.misread if e.contradicted]:
         read = misread.read_rightly(read, wrong)
         found = analyse(plain(read), seed=seed, misread=wrong)
-    return found, read, turned
+    if late := ruled_out(read, found.final):
+        settled = (*settled, *late)
+        found = analyse(plain(read), seed=seed, misread=wrong)
+    return found, read, turned, settled
 
 
 def _of_depth(dataset: Dataset, plant: Plant) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.select import select
 from shipbench.diagnosis.settle import Model
 from shipbench.diagnosis.strange import left_out
+from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS, delayed
 from shipbench.physics.actuators import gear_path
 from shipbench.physics.mmg import load_mmg_ship
@@ -284,6 +286,24 @@ def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):
     assert len(verdict.causes) == 1
     position = next(c for c in verdict.candidates if c.effect == "position_delay")
     assert "put right before the fit" in position.rejected_because
+
+
+DELAYS = [
+    ("velocity_delay", 0.0, 1.8, (0.5, 0.4), True), ("velocity_delay", 0.0, 1.2, (0.5, 0.4), False), ("velocity_delay", 0.0, 1.8, (1.4, 0.1), False),
+    ("velocity_delay", 1.0, 1.8, (0.5, 0.4), False), ("position_delay", None, 1.8, (0.5, 0.4), True),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "earth", "delay", "track", "out"), DELAYS)
+def test_a_delay_that_the_track_rules_out_is_none(trials, monkeypatch, name: str, earth: float | None, delay: float, track, out: bool):
+    """Of the forces of a supply vessel with nothing hidden; where the track shows a lag, or cannot tell, the forces are asked."""
+    monkeypatch.setattr(clocks, "lags", lambda _: (track, (-1.9, 0.3) if earth else (0.1, 0.2)))
+    term = Term(EFFECTS.get(name), () if earth is None else (earth,))
+    model = SimpleNamespace(terms=(term,))
+    fit = SimpleNamespace(
+        model=model, values=(np.array([delay]),), scales=SimpleNamespace(amplitudes=lambda *_: np.ones(1)), plant=SimpleNamespace(c=trials.ship)
+    )
+    assert clocks.ruled_out(trials, fit) == ((name,) if out else ())
 
 
 def test_an_antenna_whose_velocities_are_its_own_is_no_other_hull(trials):
