@@ -30,7 +30,7 @@ from .gain import FoldGain, fold_gain, summarise
 from .noise import noise_in_words
 from .outcome import Cause, Diagnosis, Gain
 from .over_ground import over_ground
-from .parts import in_parts
+from .parts import in_parts, runs_in_words
 from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, least_depth
 from .ship_file import doubts_of, odd_for, own_propeller
 from .silent_log import with_speeds_of_the_track
@@ -127,16 +127,12 @@ class Worth:
     hull: bool = False
 
 
-def _runs(dataset: Dataset) -> str:
-    return "1 run" if len(dataset) == 1 else f"{len(dataset)} runs"
-
-
 def _check(dataset: Dataset) -> list[str]:
     """Refuse what cannot be fitted; warn of what cannot be trusted."""
     samples = sum(len(r) for r in dataset.runs)
     if samples < 20:
         raise InputError(
-            f"data set '{dataset.name}' has {samples} samples in {_runs(dataset)}; a diagnosis needs at least 20, better 24 runs of 120 s."
+            f"data set '{dataset.name}' has {samples} samples in {runs_in_words(dataset)}; a diagnosis needs at least 20, better 24 runs of 120 s."
         )
     states = np.concatenate([r.states for r in dataset.runs])
     L = dataset.ship.L
@@ -147,7 +143,7 @@ def _check(dataset: Dataset) -> list[str]:
     warnings = []
     if len(dataset) < FEW_RUNS or samples < FEW_SAMPLES:
         warnings.append(
-            f"{_runs(dataset)} and {samples} samples are too few to name a cause (at least {FEW_RUNS} runs and {FEW_SAMPLES} samples): "
+            f"{runs_in_words(dataset)} and {samples} samples are too few to name a cause (at least {FEW_RUNS} runs and {FEW_SAMPLES} samples): "
             "candidates are ranked, none is named."
         )
     if np.std(states[:, 7]) < 1e-3 and np.std(states[:, 5]) < 1e-5:
