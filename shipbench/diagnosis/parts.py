@@ -34,8 +34,8 @@ def in_parts(dataset: Dataset, few: int) -> tuple[Dataset, list[str]]:
     if len(parts) < _FEWEST:
         return dataset, []
     line = (
-        f"{runs_in_words(dataset)} of {total:.0f} s in all: cut into {len(parts)} parts of about {total / len(parts):.0f} s, which count as runs. What "
-        "a run has as a whole (its wind and current, its load, the error of a sensor on that day) passes for the ship's own: sail other days and "
-        "courses."
+        f"{runs_in_words(dataset)} of {total:.0f} s in all: cut into {len(parts)} parts of about {total / len(parts):.0f} s, which count as runs. "
+        "What a run has as a whole (its wind and current, its load, the error of a sensor on that day) passes for the ship's own: sail other days "
+        "and courses."
     )
     return dataset.with_runs(parts), [line]
