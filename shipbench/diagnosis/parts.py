@@ -30,7 +30,7 @@ def in_parts(dataset: Dataset, few: int) -> tuple[Dataset, list[str]]:
     parts = []
     for run, lasts in zip(dataset.runs, seconds, strict=True):
         edges = np.linspace(0, len(run) - 1, max(1, int(lasts / length)) + 1).round().astype(int)
-        parts += [run.slice(a, b + 1, f" from {run.t[a] - run.t[0]:.0f} s") for a, b in pairwise(edges)]
+        parts += [run.slice(a, b + 1, f" + {run.t[a] - run.t[0]:.0f} s") for a, b in pairwise(edges)]
     if len(parts) < _FEWEST:
         return dataset, []
     line = (
