@@ -28,9 +28,39 @@ def open_excel(path: Path, layout: Layout) -> Table:
         InputError: openpyxl is not installed, or the file is no workbook, holds more than 1 GB (100 MB of texts), or has several sheets and none
             is named.
     """
+    _check_book(path)
+    header = next(itertools.islice(_rows(path, layout), (layout.header or layout.skip + 1) - 1, None), None)
+    if header is None or all(cell is None for cell in header):
+        raise InputError(f"{path}: row {layout.header} holds no header ([file] header = {layout.header}). Set the number of the row with the names.")
+    columns = tuple("" if cell is None else str(cell).strip() for cell in header)
+    if not layout.header:
+        columns = tuple(str(k + 1) for k in range(len(columns)))
+    if len(columns) > MOST_COLUMNS:
+        raise InputError(f"{path} has {len(columns)} columns; accepted: up to {MOST_COLUMNS}.")
+
+    def stream(wanted: Sequence[str]) -> Iterator[pa.RecordBatch]:
+        places = [columns.index(name) for name in wanted]
+        body = itertools.islice(_rows(path, layout), layout.header + layout.skip, None)
+        empty = True
+        while block := list(itertools.islice(body, _ROWS)):
+            empty = False
+            yield as_batch({name: [_cell(row[i]) if i < len(row) else None for row in block] for name, i in zip(wanted, places, strict=True)})
+        if empty:
+            raise InputError(f"{path} has a header and no rows. Give a log with one row per sample.")
+
+    return Table(path, columns, stream, layout.header + layout.skip + 1, "Excel")
+
+
+def first_rows(path: Path, layout: Layout, count: int) -> list[list[Any]]:
+    """The cells of the first rows of a sheet, whatever they hold: for one that looks for the header."""
+    _check_book(path)
+    return [[_cell(cell) for cell in row] for row in itertools.islice(_rows(path, layout), count)]
+
+
+def _check_book(path: Path) -> None:
+    """The library is there, and the file is a workbook of a size that can be read."""
     try:
-        import openpyxl
-        from openpyxl.utils.exceptions import InvalidFileException
+        import openpyxl  # noqa: F401
     except ImportError:
         raise InputError(
             f"{path}: reading .xlsx needs openpyxl. Install it with `pip install 'shipbench[excel]'`, or save the sheet as CSV."
@@ -47,40 +77,28 @@ def open_excel(path: Path, layout: Layout) -> Table:
             "Save the sheet as CSV, which is streamed."
         )
 
-    def rows() -> Iterator[tuple[Any, ...]]:
-        try:
-            book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        except (InvalidFileException, KeyError, SyntaxError, zipfile.BadZipFile, TypeError, AttributeError) as error:
-            raise ValueError(f"damaged workbook ({type(error).__name__}: {error})") from None  # tables.reading makes the message
-        try:
-            if layout.sheet is None and len(book.sheetnames) > 1:
-                raise InputError(f'{path} has the sheets {", ".join(book.sheetnames)}. Name one: [file] sheet = "..." in the mapping.')
-            if layout.sheet is not None and layout.sheet not in book.sheetnames:
-                raise InputError(f"{path} has no sheet '{layout.sheet}'; it has {', '.join(book.sheetnames)}.")
-            yield from book[layout.sheet or book.sheetnames[0]].iter_rows(values_only=True)
-        except (KeyError, SyntaxError, zipfile.BadZipFile, TypeError, AttributeError) as error:
-            raise ValueError(f"damaged workbook ({type(error).__name__}: {error})") from None
-        finally:
-            book.close()
 
-    header = next(itertools.islice(rows(), layout.header - 1, None), None)
-    if header is None or all(cell is None for cell in header):
-        raise InputError(f"{path}: row {layout.header} holds no header ([file] header = {layout.header}). Set the number of the row with the names.")
-    columns = tuple("" if cell is None else str(cell).strip() for cell in header)
-    if len(columns) > MOST_COLUMNS:
-        raise InputError(f"{path} has {len(columns)} columns; accepted: up to {MOST_COLUMNS}.")
+def _rows(path: Path, layout: Layout) -> Iterator[tuple[Any, ...]]:
+    """The rows of the sheet from the top, its cells as values."""
+    import openpyxl
+    from openpyxl.utils.exceptions import InvalidFileException
 
-    def stream(wanted: Sequence[str]) -> Iterator[pa.RecordBatch]:
-        places = [columns.index(name) for name in wanted]
-        body = itertools.islice(rows(), layout.header + layout.skip, None)
-        empty = True
-        while block := list(itertools.islice(body, _ROWS)):
-            empty = False
-            yield as_batch({name: [_cell(row[i]) if i < len(row) else None for row in block] for name, i in zip(wanted, places, strict=True)})
-        if empty:
-            raise InputError(f"{path} has a header and no rows. Give a log with one row per sample.")
-
-    return Table(path, columns, stream, layout.header + layout.skip + 1, "Excel")
+    try:
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    except (InvalidFileException, KeyError, SyntaxError, zipfile.BadZipFile, TypeError, AttributeError) as error:
+        raise ValueError(f"damaged workbook ({type(error).__name__}: {error})") from None  # tables.reading makes the message
+    try:
+        if layout.sheet is None and len(book.sheetnames) > 1:
+            raise InputError(
+                f'{path} has the sheets {", ".join(book.sheetnames)}. Name one: [file] sheet = "..." in the mapping, or --sheet with --propose.'
+            )
+        if layout.sheet is not None and layout.sheet not in book.sheetnames:
+            raise InputError(f"{path} has no sheet '{layout.sheet}'; it has {', '.join(book.sheetnames)}.")
+        yield from book[layout.sheet or book.sheetnames[0]].iter_rows(values_only=True)
+    except (KeyError, SyntaxError, zipfile.BadZipFile, TypeError, AttributeError) as error:
+        raise ValueError(f"damaged workbook ({type(error).__name__}: {error})") from None
+    finally:
+        book.close()
 
 
 def _cell(value: Any) -> Any:

@@ -61,12 +61,13 @@ class Clock(_Part):
 
 
 class Layout(_Part):
-    """How the file is written. `header` is the number of the header's row, `skip` the rows between it and the data (such as a row of units)."""
+    """How the file is written. `header` is the number of the header's row, 0 where there is none (columns are then called "1", "2", ...);
+    `skip` the rows between it and the data (such as a row of units); `delimiter = " "` stands for runs of blanks."""
 
     delimiter: str | None = Field(None, min_length=1, max_length=1)
     decimal: Literal[".", ","] = "."
     encoding: str = "utf-8"
-    header: int = Field(1, ge=1, le=10_000)
+    header: int = Field(1, ge=0, le=10_000)
     skip: int = Field(0, ge=0, le=10_000)
     sheet: str | None = None
 

@@ -20,9 +20,12 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from ..errors import InputError, unknown_name
+from .blanks import Collapsed
 from .mapping import Layout
 
-DELIMITERS = (",", ";", "\t", "|")
+BLANKS = " "
+"""The delimiter that stands for runs of blanks and tabs."""
+DELIMITERS = (",", ";", "\t", "|", BLANKS)
 MOST_COLUMNS = 10_000
 TEXT_BLOCK = 1 << 22
 """Bytes in which the header must stand, and the size of the blocks in which text is read."""
@@ -108,7 +111,7 @@ def check_columns(table: Table, wanted: Sequence[str]) -> None:
             raise InputError(f"{table.path}: {count} columns are named '{name}'; accepted: one. Rename all but one in the file.")
         if count == 0:
             found = table.columns if len(table.columns) <= 60 else (*table.columns[:60], f"and {len(table.columns) - 60} more")
-            if len(table.columns) == 1 and (other := [d for d in DELIMITERS if d in table.columns[0]]):
+            if len(table.columns) == 1 and (other := [d for d in DELIMITERS if d in table.columns[0].strip()]):
                 hint = f" Its header reads as one column; is the delimiter {other[0]!r}? Set [file] delimiter in the mapping."
                 raise InputError(f"{table.path}: no column '{name}'.{hint} Header: {table.columns[0][:200]}")
             raise unknown_name(f"column of {table.path}:", name, found)
@@ -164,9 +167,15 @@ def _open_text(path: Path, layout: Layout, magic: bytes) -> Table:
         raise InputError(f"{path} holds no text. Give a log with a header and rows.")
     encoding = _encoding(path, head, layout)
     header, first = _first_lines(path, head, encoding, layout)
-    delimiter = layout.delimiter or max(DELIMITERS, key=header.count)
+    delimiter = layout.delimiter or max(DELIMITERS[:-1], key=header.count)
+    if delimiter == BLANKS:
+        header = " ".join(header.split())
+        if encoding not in ("utf-8", "utf-8-sig", "ascii") and codecs.lookup(encoding).name.startswith("utf-"):
+            raise InputError(f"{path} is {encoding} text with blanks between the columns; accepted with blanks: UTF-8 or Latin-1. Save it as UTF-8.")
     columns = tuple(name.strip() for name in next(csv.reader([header], delimiter=delimiter)))
-    if first.rstrip().endswith(delimiter) and len(next(csv.reader([first], delimiter=delimiter))) == len(columns) + 1:
+    if not layout.header:
+        columns = tuple(str(k + 1) for k in range(len(columns)))
+    elif first.rstrip().endswith(delimiter) and len(next(csv.reader([first], delimiter=delimiter))) == len(columns) + 1:
         columns += ("",)  # every row ends with a delimiter that the header lacks
     if any(ord(c) < 32 and c != "\t" for c in header):
         raise InputError(f"{path}: its header (row {layout.header}) holds control characters: the file is binary. Accepted: {KINDS}.")
@@ -183,7 +192,7 @@ def _open_text(path: Path, layout: Layout, magic: bytes) -> Table:
         convert = pa.csv.ConvertOptions(include_columns=at, column_types={i: pa.string() for i in at}, strings_can_be_null=False)
         with _uncompressed(path, magic) as raw:
             try:
-                reader = pa.csv.open_csv(raw, read, pa.csv.ParseOptions(delimiter=delimiter), convert)
+                reader = pa.csv.open_csv(Collapsed(raw) if delimiter == BLANKS else raw, read, pa.csv.ParseOptions(delimiter=delimiter), convert)
             except pa.ArrowInvalid as error:
                 if "Empty CSV" in str(error) or "Could not skip" in str(error):
                     raise InputError(f"{path} has a header and no rows. Give a log with one row per sample.") from None
@@ -196,8 +205,8 @@ def _open_text(path: Path, layout: Layout, magic: bytes) -> Table:
 
 
 def _first_lines(path: Path, head: bytes, encoding: str, layout: Layout) -> tuple[str, str]:
-    """The header and the first row of data (empty where there is none)."""
-    number = layout.header
+    """The header and the first row of data (empty where there is none); of a table without a header, the first row twice."""
+    number = layout.header or layout.skip + 1
     text = codecs.getincrementaldecoder(encoding)
     try:
         decoded = text().decode(head, final=False)
@@ -206,12 +215,14 @@ def _first_lines(path: Path, head: bytes, encoding: str, layout: Layout) -> tupl
             f"{path} is not {encoding} text (byte {error.start}); if it is text, set [file] encoding = 'latin-1' (or what it is) in the mapping."
         ) from None
     lines = io.StringIO(decoded, newline=None)
-    first = [line.rstrip("\n") for line, _ in zip(lines, range(number + layout.skip + 1), strict=False)]
+    first = [line.rstrip("\n") for line, _ in zip(lines, range(layout.header + layout.skip + 1), strict=False)]
+    if not layout.header and (len(first) < number or not first[number - 1].strip()):
+        raise InputError(f"{path}: row {number} is empty; accepted with [file] header = 0: the first row of data after `skip` rows. Correct `skip`.")
     if len(first) < number or not first[number - 1].strip():
         raise InputError(f"{path}: row {number} holds no header ([file] header = {number}). Set the number of the row with the columns' names.")
     if len(decoded) == len(first[0]) and len(head) >= TEXT_BLOCK:
         raise InputError(f"{path}: its first line is longer than {TEXT_BLOCK >> 20} MB. Accepted: {KINDS}.")
-    return first[number - 1], first[number + layout.skip] if len(first) > number + layout.skip else ""
+    return first[number - 1], first[layout.header + layout.skip] if len(first) > layout.header + layout.skip else ""
 
 
 def as_batch(columns: dict[str, Any]) -> pa.RecordBatch:
