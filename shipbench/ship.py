@@ -6,7 +6,6 @@ Units are SI; lengths along the ship are measured from midship, forward positive
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from .errors import InputError, unknown_name
+from .toml_files import read_toml
 
 _LEAST_FULLNESS = 0.1
 """Block coefficient over the whole breadth below which a unit is wrong."""
@@ -130,20 +130,6 @@ class Ship(_Part):
     def to_toml(self) -> str:
         """The particulars as the text of a `ship.toml`."""
         return tomli_w.dumps(self.model_dump(exclude_none=True))
-
-
-def read_toml(path: str | Path) -> dict[str, Any]:
-    """Parse a TOML file.
-
-    Raises:
-        InputError: the file is missing, unreadable or not TOML.
-    """
-    try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}. Give the path of an existing TOML file.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} is not valid TOML: {error}. Mend the line that the message names.") from None
 
 
 class Particulars(BaseModel):

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from ..errors import InputError, unknown_name
 from ..metrics.base import METRICS
-from ..ship import read_toml
+from ..toml_files import read_toml
 
 DEFAULT_METRICS = ("ed", "edh", "cvdm", "final_displacement", "heading_error", "position_rmse", "signal_rmse", "trial_indices")
 _NOT_IDENTITY = {"models", "metrics", "seeds", "title"}

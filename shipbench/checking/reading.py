@@ -12,8 +12,9 @@ from ..data.corrections import SIGNALS, correct_run, split_meta
 from ..data.files import Description, complete_columns, convert_table, read_description, read_table
 from ..errors import InputError
 from ..records import Dataset, Run
-from ..ship import Ship, read_toml
+from ..ship import Ship
 from ..signals import MOTION, STATES
+from ..toml_files import read_toml
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
 from .statistics import some

@@ -16,8 +16,9 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from ..errors import InputError, unknown_name
 from ..records import Dataset, Run
-from ..ship import Ship, read_toml
+from ..ship import Ship
 from ..signals import ACTUATORS, COMMANDS, ENVIRONMENT, STATES, wrap_angle
+from ..toml_files import read_toml
 from .corrections import Corrections, check_names, correct_run, split_meta, to_ned
 from .units import sign_factor, unit_factor
 

@@ -10,8 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..data.units import sign_factor, unit_factor
 from ..errors import InputError, unknown_name
-from ..ship import read_toml
 from ..signals import COMMANDS, ENVIRONMENT, STATES, UNITS
+from ..toml_files import read_toml
 
 EXTRA_UNITS = {"lat": "rad", "lon": "rad", "sog": "m/s", "cog": "rad", "apparent_wind_speed": "m/s", "apparent_wind_from": "rad"}
 """What a log may hold beside our signals: WGS84 position, speed and course over ground (course clockwise from north), and the wind felt on board,

@@ -11,7 +11,8 @@ from typing import Any
 
 from ..errors import InputError, unknown_name
 from ..ops import Array, cos, sin, where
-from ..ship import Ship, read_toml
+from ..ship import Ship
+from ..toml_files import read_toml
 from . import hull, propeller, rudder, shallow_water, thruster, wind
 from .modifiers import Modifiers, is_neutral
 
