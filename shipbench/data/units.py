@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 
 from ..errors import unknown_name
 from ..signals import UNITS
 
 LENGTHS = {"m": 1.0, "km": 1000.0, "ft": 0.3048, "nmi": 1852.0}
-_ANGLE = {"rad": 1.0, "deg": math.pi / 180.0}
-_SPEED = {"m/s": 1.0, "kn": 1852.0 / 3600.0, "km/h": 1.0 / 3.6, "ft/s": 0.3048}
-_RATE = {"rad/s": 1.0, "deg/s": math.pi / 180.0, "deg/min": math.pi / 10800.0}
+_ANGLE = {"rad": 1.0, "deg": math.pi / 180.0, "cdeg": math.pi / 18_000.0}
+_SPEED = {"m/s": 1.0, "kn": 1852.0 / 3600.0, "km/h": 1.0 / 3.6, "ft/s": 0.3048, "cm/s": 0.01}
+_RATE = {"rad/s": 1.0, "deg/s": math.pi / 180.0, "deg/min": math.pi / 10800.0, "cdeg/s": math.pi / 18_000.0}
 _SHAFT = {"rpm": 1.0, "rev/s": 60.0, "rad/s": 60.0 / (2.0 * math.pi)}
 _FORCE = {"N": 1.0, "kN": 1e3, "MN": 1e6, "tf": 9806.65}
+_PARTS = re.compile(r"(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?) (\S+)")
 _BY_OURS = {"m": LENGTHS, "rad": _ANGLE, "m/s": _SPEED, "rad/s": _RATE, "rpm": _SHAFT, "N": _FORCE}
 
 _FLIPS = {
@@ -26,15 +28,17 @@ _KEEPS = {
 
 
 def unit_factor(signal: str, unit: str) -> float:
-    """Factor from `unit` to our unit of `signal`.
+    """Factor from `unit` to our unit of `signal`; "1e-7 deg" and "0.1 kn" are units for logs that count in such steps.
 
     Raises:
         InputError: the unit is not known for this signal.
     """
     table = _BY_OURS[UNITS[signal]]
-    if unit not in table:
+    steps = _PARTS.fullmatch(unit)
+    size, name = (float(steps[1]), steps[2]) if steps else (1.0, unit)
+    if name not in table or not 0.0 < size < math.inf:
         raise unknown_name(f"unit of '{signal}'", unit, table)
-    return table[unit]
+    return size * table[name]
 
 
 def sign_factor(signal: str, positive: str) -> float:

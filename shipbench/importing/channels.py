@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from ..errors import InputError
+from .cells import Cells, Counts
 from .clock import check_format, counts, is_daily, shown, to_seconds
-from .mapping import Channel, Mapping, Source, channel_factor
-from .tables import Table, open_table, reading
-
-_EMPTY = ("", "NA", "N/A", "NaN", "nan", "NAN", "null", "NULL", "None", "#N/A", "NaT")
-_GREATEST = 1e30
-_TEXTS = (pa.types.is_string, pa.types.is_large_string, pa.types.is_string_view)
-_NUMBERS = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_boolean, pa.types.is_null)
+from .entries import Channel
+from .mapping import Mapping, Source
+from .tables import open_table, reading
+from .values import channel_values
 
 
 @dataclass(frozen=True)
@@ -33,15 +29,6 @@ class Block:
         return Block(self.t[select], self.values[select])
 
 
-@dataclass
-class Counts:
-    """What was met while reading, for the summary."""
-
-    rows: int = 0
-    what: Counter[str] = field(default_factory=Counter)
-    forms: dict[str, str] = field(default_factory=dict)
-
-
 def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str | None, Block]]:
     """(name in the run column or None, block) of a log, rows of one run after another.
 
@@ -52,14 +39,13 @@ def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str |
     met.forms[path.name] = table.form
     clock, channels = source.time, list(source.channels.values())
     check_format(clock, str(path))
-    columns = [*clock.names, *(c.column for c in channels), *([source.run] if source.run else [])]
-    factors = [channel_factor(name, c) for name, c in source.channels.items()]
+    columns = [*clock.names, *(n for c in channels for n in c.every_column), *([source.run] if source.run else [])]
     done = 0
     for batch in table.batches(columns):
         where = f"{path}, rows from {table.first_row + done}"
         with reading(path):  # cells may be of any kind and size
-            cells = _Cells(table, batch, source, table.first_row + done, met)
-            values = np.column_stack([f * (cells.numbers(c.column) + c.offset) for f, c in zip(factors, channels, strict=True)])
+            cells = Cells(table.path, batch, source, table.first_row + done, table.first_row, met)
+            values = np.column_stack([channel_values(cells, name, c) for name, c in source.channels.items()])
             if clock.rate is not None:
                 t = (done + np.arange(batch.num_rows)) / clock.rate + clock.shift
             else:
@@ -67,7 +53,6 @@ def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str |
                 numbers = cells.numbers(clock.names[0]) if counts(clock) and not typed else None
                 t = to_seconds(clock, [batch.column(n) for n in clock.names], numbers, where)
             names = cells.names(source.run) if source.run else None
-        _check_range(source, values, where)
         done += batch.num_rows
         met.rows += batch.num_rows
         stamped = np.isfinite(t)
@@ -75,72 +60,6 @@ def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str |
         yield from _by_name(Block(t, values), stamped, names, met)
     if done == 0:
         raise InputError(f"{path} has a header and no rows. Give a log with one row per sample.")
-
-
-def _reads(text: str) -> bool:
-    try:
-        pa.scalar(text).cast(pa.float64())
-    except pa.ArrowInvalid:
-        return False
-    return True
-
-
-class _Cells:
-    """The cells of one batch as numbers or names."""
-
-    def __init__(self, table: Table, batch: pa.RecordBatch, source: Source, first_row: int, met: Counts) -> None:
-        self.table, self.batch, self.source, self.first_row, self.met = table, batch, source, first_row, met
-        self.texts = [m for m in source.missing if isinstance(m, str)]
-        self.marks = [m for m in source.missing if not isinstance(m, str)]
-
-    def numbers(self, column: str) -> np.ndarray:
-        """(n,) floats; NaN where the cell is empty or one of the mapping's `missing`."""
-        array = self.batch.column(column)
-        if pa.types.is_dictionary(array.type):
-            array = array.dictionary_decode()
-        if any(is_kind(array.type) for is_kind in _TEXTS):
-            array = self._parsed(column, array.cast(pa.large_string()))
-        elif not any(is_kind(array.type) for is_kind in _NUMBERS):
-            raise InputError(f"{self.table.path}: column '{column}' holds {array.type}; accepted: numbers.")
-        values = pc.fill_null(array.cast(pa.float64(), safe=False), np.nan).to_numpy(zero_copy_only=False).astype(float)
-        absurd = np.abs(values) > _GREATEST
-        self.met.what[f"infinite values (above {_GREATEST:g}), taken as missing"] += int(absurd.sum())
-        return np.where(absurd | np.isin(values, self.marks), np.nan, values)
-
-    def _parsed(self, column: str, array: pa.Array) -> pa.Array:
-        text = pc.utf8_trim_whitespace(array)
-        text = pc.if_else(pc.is_in(text, pa.array([*_EMPTY, *self.texts], text.type)), None, text)
-        number = pc.replace_substring(text, ",", ".") if self.source.file.decimal == "," else text
-        try:
-            return number.cast(pa.float64())
-        except pa.ArrowInvalid:
-            raise self._unread(column, text, number) from None
-
-    def _unread(self, column: str, text: pa.Array, number: pa.Array) -> InputError:
-        """The error for the first cell that is no number."""
-        cells = enumerate(zip(text.to_pylist(), number.to_pylist(), strict=True))
-        row, cell = next((k, c) for k, (c, n) in cells if n is not None and not _reads(n))
-        hint = ' Set [file] decimal = "," in the mapping if it is a decimal comma.' if "," in cell and self.source.file.decimal == "." else ""
-        if self.first_row == self.table.first_row and row == 0:
-            hint += " If the rows under the header are units or remarks, set [file] skip."
-        return InputError(
-            f"{self.table.path}, row {self.first_row + row}: '{column}' is '{cell[:60]}', not a number.{hint} "
-            f'Accepted: decimal numbers, empty cells, and what [missing] lists: missing = ["{cell[:20]}"] takes it as missing.'
-        )
-
-    def names(self, column: str) -> np.ndarray:
-        """(n,) text, None where empty."""
-        array = self.batch.column(column)
-        text = pc.utf8_trim_whitespace(array.cast(pa.string()))
-        return pc.if_else(pc.equal(pc.utf8_length(text), 0), None, text).to_numpy(zero_copy_only=False)
-
-
-def _check_range(source: Source, values: np.ndarray, where: str) -> None:
-    for j, name in enumerate(source.channels):
-        limit = {"lat": np.pi / 2, "lon": 2 * np.pi}.get(name)
-        if limit is not None and (np.abs(values[:, j]) > limit + 1e-9).any():
-            worst = np.rad2deg(np.nanmax(np.abs(values[:, j])))
-            raise InputError(f"{where}: '{name}' reaches {worst:g} deg; accepted: up to {np.rad2deg(limit):g}. Check unit and format of its column.")
 
 
 def _by_name(block: Block, keep: np.ndarray, names: np.ndarray | None, met: Counts) -> Iterator[tuple[str | None, Block]]:

@@ -15,7 +15,8 @@ import numpy as np
 from ..errors import InputError
 from ..ship import Ship
 from ..signals import COMMANDS
-from .channels import Block, Counts, all_channels, in_order, read_blocks
+from .cells import Counts
+from .channels import Block, all_channels, in_order, read_blocks
 from .clock import is_absolute
 from .mapping import Mapping, Source
 from .runs import Piece, on_grid, outliers, shortest_run, windows, without_standing

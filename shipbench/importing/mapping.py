@@ -6,43 +6,16 @@ import difflib
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
-from ..data.units import sign_factor, unit_factor
-from ..errors import InputError, unknown_name
-from ..signals import COMMANDS, ENVIRONMENT, STATES, UNITS
+from ..errors import InputError
 from ..toml_files import read_toml
+from .entries import Channel, Part, check_channel
 
-EXTRA_UNITS = {"lat": "rad", "lon": "rad", "sog": "m/s", "cog": "rad", "apparent_wind_speed": "m/s", "apparent_wind_from": "rad"}
-"""What a log may hold beside our signals: WGS84 position, speed and course over ground (course clockwise from north), and the wind felt on board,
-its direction where it comes from, clockwise from the bow."""
-CHANNELS = (*STATES, *COMMANDS, *ENVIRONMENT, *EXTRA_UNITS)
-ANGLES = ("psi", "cog", "wind_from", "apparent_wind_from")
-"""Angles that wrap around; lon is made a position before anything else."""
-_SIGN_WORDS = {"lat": ("north", "south"), "lon": ("east", "west"), "cog": ("clockwise", "counterclockwise"),
-               "apparent_wind_from": ("clockwise", "counterclockwise")}  # fmt: skip
-_UNITS_LIKE = {"lat": "psi", "lon": "psi", "sog": "u", "cog": "psi", "apparent_wind_speed": "u", "apparent_wind_from": "psi"}
 SOURCE_KEYS = ("files", "time", "file", "channels", "missing", "antenna", "speed_sensor", "run")
 
 
-class _Part(BaseModel):
-    """An unknown key is an error, never ignored."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=True)
-
-
-class Channel(_Part):
-    """One column: ours = sign x unit x factor x (reading + offset). `gap` [s] replaces the mapping's for this channel (inf: logged on change)."""
-
-    column: str
-    unit: str
-    sign: str | None = None
-    offset: float = Field(0.0, allow_inf_nan=False)
-    factor: float = Field(1.0, allow_inf_nan=False)
-    gap: float | None = Field(None, gt=0)
-
-
-class Clock(_Part):
+class Clock(Part):
     """Where time stands. `rate` [Hz] alone serves a log without a time column; `shift` [s] is added to every time."""
 
     column: str | None = None
@@ -60,46 +33,48 @@ class Clock(_Part):
         return self.columns or ((self.column,) if self.column else ())
 
 
-class Layout(_Part):
+class Layout(Part):
     """How the file is written. `header` is the number of the header's row, 0 where there is none (columns are then called "1", "2", ...);
-    `skip` the rows between it and the data (such as a row of units); `delimiter = " "` stands for runs of blanks."""
+    `skip` the rows between it and the data (such as a row of units); `delimiter = " "` stands for runs of blanks; `thousands` stands between groups
+    of three digits."""
 
     delimiter: str | None = Field(None, min_length=1, max_length=1)
     decimal: Literal[".", ","] = "."
+    thousands: Literal[".", ",", " ", "'"] | None = None
     encoding: str = "utf-8"
     header: int = Field(1, ge=0, le=10_000)
     skip: int = Field(0, ge=0, le=10_000)
     sheet: str | None = None
 
 
-class Point(_Part):
+class Point(Part):
     """A place on board [m]: x forward of midship, y to starboard of the centre line."""
 
     x: float = Field(allow_inf_nan=False)
     y: float = Field(0.0, allow_inf_nan=False)
 
 
-class Origin(_Part):
+class Origin(Part):
     """Where the local plane touches the earth [deg]."""
 
     lat: float = Field(ge=-90, le=90)
     lon: float = Field(ge=-180, le=180)
 
 
-class Source(_Part):
+class Source(Part):
     """One kind of file. `antenna` is the point that x, y, lat, lon, sog and cog belong to, `speed_sensor` the one of u and v (default: midship)."""
 
     files: str = "*"
     time: Clock
     file: Layout = Layout()
     channels: dict[str, Channel] = Field(min_length=1)
-    missing: list[str | float] = []
+    missing: list[str | float] = Field(default_factory=list)
     antenna: Point | None = None
     speed_sensor: Point | None = None
     run: str | None = None
 
 
-class Split(_Part):
+class Split(Part):
     """How logs become runs; all in s and m/s. `gap`: longer pauses split; `window`: runs of that length; `shortest`: shorter ones are left out;
     `longest`: longer ones are cut in parts of one group; `still_speed`: stretches slower than that for `still_time` are left out."""
 
@@ -111,7 +86,7 @@ class Split(_Part):
     still_time: float = Field(60.0, gt=0)
 
 
-class Mapping(_Part):
+class Mapping(Part):
     """The whole of mapping.toml. A mapping of one kind of file has the keys of `Source` at the top; of several, tables [sources.NAME]."""
 
     name: str = Field(min_length=1)
@@ -156,8 +131,10 @@ def load_mapping(path: str | Path, **overrides: Any) -> Mapping:
     except ValidationError as error:
         raise _explained(error, path, single) from None
     for source in mapping.sources.values():
+        if source.file.thousands == source.file.decimal:
+            raise InputError(f"{path}: [file] decimal and thousands are both '{source.file.decimal}'; accepted: two marks. Correct one.")
         for name, channel in source.channels.items():
-            _check_channel(name, channel, path)
+            check_channel(name, channel, path)
         _check_clock(source.time, path)
     _check_together(mapping, path)
     return mapping
@@ -187,33 +164,6 @@ def _accepted(loc: list[str], single: bool) -> list[str]:
         return [*keys, *SOURCE_KEYS] if single else keys
     model = Source if loc[0] == "sources" and len(loc) == 2 else parts.get(loc[-1], Channel)
     return list(model.model_fields)
-
-
-def channel_factor(name: str, channel: Channel) -> float:
-    """Factor from (reading + offset) to our unit and sign.
-
-    Raises:
-        InputError: unknown unit or sign.
-    """
-    factor = channel.factor * unit_factor(_UNITS_LIKE.get(name, name), channel.unit)
-    if channel.sign is None:
-        return factor
-    if name in _SIGN_WORDS:
-        if channel.sign not in _SIGN_WORDS[name]:
-            raise unknown_name(f"sign of '{name}'", channel.sign, _SIGN_WORDS[name])
-        return -factor if channel.sign == _SIGN_WORDS[name][1] else factor
-    return factor * sign_factor(name, channel.sign)
-
-
-def _check_channel(name: str, channel: Channel, path: str | Path) -> None:
-    if name not in CHANNELS:
-        raise unknown_name(f"channel in [channels] of {path}:", name, CHANNELS)
-    try:
-        channel_factor(name, channel)
-    except InputError as error:
-        raise InputError(f"{path}: channel '{name}', column '{channel.column}': {error}") from None
-    if channel.factor == 0.0:
-        raise InputError(f"{path}: channel '{name}': factor = 0; accepted: any other number (it multiplies the reading).")
 
 
 def _check_clock(clock: Clock, path: str | Path) -> None:
@@ -256,8 +206,3 @@ def _check_together(mapping: Mapping, path: str | Path) -> None:
         raise InputError(f"{path}: split.window = {mapping.split.window:g} s is below dt = {mapping.dt:g} s; accepted: two samples or more.")
     if mapping.split.gap < mapping.dt * 0.5:
         raise InputError(f"{path}: split.gap = {mapping.split.gap:g} s is below dt = {mapping.dt:g} s; give the longest pause to be bridged.")
-
-
-def unit_of(channel: str) -> str:
-    """Our unit of a channel."""
-    return EXTRA_UNITS.get(channel) or UNITS[channel]

@@ -16,7 +16,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from ..errors import InputError
-from .mapping import CHANNELS, Layout, unit_of
+from .entries import CHANNELS, unit_of
+from .mapping import Layout
 from .tables import Table, open_table
 from .writer import run_name
 

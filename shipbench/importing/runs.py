@@ -11,7 +11,8 @@ import numpy as np
 from ..physics.wind import true_wind
 from ..ship import Ship
 from ..signals import COMMANDS, ENVIRONMENT, STATES
-from .mapping import ANGLES, Mapping, Point
+from .entries import ANGLES
+from .mapping import Mapping, Point
 from .position import to_body, to_midship, to_plane, velocity_at_midship
 from .resample import interval_means, interval_values, sample
 from .speeds import Smoothed, derivative

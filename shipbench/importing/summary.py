@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..signals import COMMANDS, STATES
-from .channels import Counts, all_channels
+from .cells import Counts
+from .channels import all_channels
 from .clock import is_absolute, moment
-from .mapping import Mapping, unit_of
+from .entries import unit_of
+from .mapping import Mapping
 from .runs import Piece, shortest_run
 from .stretches import Cut
 
@@ -80,7 +82,7 @@ class Summary:
             steps += [f"offset {channel.offset:+g} {channel.unit}"] if channel.offset else []
             rate = self.steps.get(name, math.inf)
             every = f", every {rate:.4g} s" if math.isfinite(rate) else ""
-            lines.append(f"{name} [{unit_of(name)}] = '{channel.column}'{' (' + ', '.join(steps) + ')' if steps else ''}{every}")
+            lines.append(f"{name} [{unit_of(name)}] = {channel}{' (' + ', '.join(steps) + ')' if steps else ''}{every}")
         return lines
 
     def derived(self) -> list[str]:
@@ -122,6 +124,7 @@ class Summary:
         if self.mapping.split.window:
             lines.append(f"runs are windows of {self.mapping.split.window:g} s; those of one recording may follow each other without a pause")
         lines += [f"DOUBTFUL: {count} samples of {what}: outliers, or a wrong unit" for what, count in self.doubtful.items() if count]
+        lines += [f"DOUBTFUL: {count} {what}" for what, count in self.met.doubtful.items() if count]
         if self.part_length is not None:
             lines.append(f"densely sampled: parts of at most {self.part_length:g} s, to keep memory small")
         return lines

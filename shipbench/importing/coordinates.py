@@ -1,0 +1,138 @@
+"""Latitude and longitude as logs write them: letters of the hemisphere, degrees with minutes, both in one cell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from ..errors import InputError
+from .cells import Cells
+from .entries import MINUTES, Channel
+
+SIDES = {"lat": {"N": 1.0, "S": -1.0}, "lon": {"E": 1.0, "W": -1.0}}
+_WORDS = {"NORTH": "N", "SOUTH": "S", "EAST": "E", "WEST": "W"}
+_LETTERED = r"^(?P<before>[NSEWnsew]?)\s*(?P<number>[^NSEWnsew]*?)\s*(?P<after>[NSEWnsew]?)$"
+_SEXAGESIMAL = (
+    r"^(?P<minus>[-\x{2212}]?)(?P<d>\d{1,3})\s*[\x{00b0}\x{00ba}]\s*(?P<m>\d{1,2}(?:[.,]\d*)?)\s*['\x{2032}\x{2019}]?"
+    r"\s*(?:(?P<s>\d{1,2}(?:[.,]\d*)?)\s*(?:[\"\x{2033}\x{201d}]|'')?)?$"
+)
+
+
+def coordinates(cells: Cells, name: str, channel: Channel, missing: Sequence[str | float]) -> np.ndarray:
+    """(n,) readings of a lat or lon, north and east positive, in the channel's unit; of `ddmm.mmmm` in degrees.
+
+    Raises:
+        InputError: a cell is no number, its letters belong to the other axis or contradict its sign, or its minutes are 60 or more.
+    """
+    (column,) = channel.columns
+    if not cells.is_text(column):
+        if channel.part is not None:
+            raise InputError(f"{cells.path}: column '{column}' holds one number a cell; part = {channel.part} serves cells with two. Remove part.")
+        values, sides = cells.numbers(column, missing), None
+    else:
+        text = cells.texts(column, missing)
+        if channel.part is not None:
+            text = _part(cells, column, text, channel.part)
+        text, sides = _letters(text)
+        values = _numbers(cells, column, text, channel, missing)
+    if channel.unit == MINUTES[1] and (sides is None or any(s is None for s in sides[np.isfinite(values)])):
+        row = 0 if sides is None else int(np.flatnonzero(np.isfinite(values) & (sides == None))[0])  # noqa: E711
+        raise cells.unread(column, row, f' Unit "{MINUTES[1]}" needs a letter, such as 3347.63S. Without letters: unit = "{MINUTES[0]}".')
+    if channel.hemisphere is not None:
+        if sides is not None and any(s is not None for s in sides):
+            raise InputError(f"{cells.path}: '{column}' has letters of the hemisphere in its cells; accepted: one of them. Remove hemisphere.")
+        sides = _sides_of(cells, channel.hemisphere)
+        nameless = np.isfinite(values) & np.array([s is None for s in sides])
+        cells.met.what[f"readings of {name} without a letter in '{channel.hemisphere}', left out"] += int(nameless.sum())
+        values = np.where(nameless, np.nan, values)
+    if channel.unit in MINUTES:
+        values = _degrees(cells, column, values)
+    return values if sides is None else _signed(cells, name, channel, values, sides)
+
+
+def _part(cells: Cells, column: str, text: pa.Array, part: int) -> pa.Array:
+    """The first or second of the two numbers in each cell."""
+    text = pc.utf8_trim(text, "()[]{} ")
+    gap = r"\s*[;/]\s*|\s+" if cells.source.file.decimal == "," else r"\s*[,;/]\s*|\s+"
+    text = pc.replace_substring_regex(text, r"\s*([NSEWnsew])\b", r"\1")
+    halves = pc.split_pattern_regex(text, gap)
+    odd = pc.fill_null(pc.not_equal(pc.list_value_length(halves), 2), False).to_numpy(zero_copy_only=False)
+    if odd.any():
+        raise cells.unread(column, int(np.argmax(odd)), f" With part = {part}, cells with two numbers are accepted, such as 52.0, 4.0.")
+    return pc.list_element(halves, part - 1)
+
+
+def _letters(text: pa.Array) -> tuple[pa.Array, np.ndarray | None]:
+    """The cells without their letters, and the letter of each (n,) or None where no cell has one."""
+    found = pc.extract_regex(text, _LETTERED)
+    before, number, after = (pc.struct_field(found, k) for k in range(3))
+    letter = pc.if_else(pc.equal(before, ""), after, before)
+    there = pc.fill_null(pc.not_equal(letter, ""), False)
+    if not pc.any(there).as_py():
+        return text, None
+    return pc.if_else(there, number, text), pc.if_else(there, pc.utf8_upper(letter), None).to_numpy(zero_copy_only=False)
+
+
+def _numbers(cells: Cells, column: str, text: pa.Array, channel: Channel, missing: Sequence[str | float]) -> np.ndarray:
+    """Numbers, or degrees, minutes and seconds with their marks."""
+    found = pc.extract_regex(text, _SEXAGESIMAL)
+    marked = pc.is_valid(found)
+    if channel.unit != "deg" or not pc.any(marked).as_py():
+        row = pc.index(pc.fill_null(pc.match_substring_regex(text, r"\d[\s,;]+[-+]?\d"), False), True).as_py()
+        try:
+            return cells.finite(cells.parsed(column, text), missing)
+        except InputError:
+            if row >= 0 and channel.part is None:
+                hint = " If the cells hold latitude and longitude, write part = 1 in lat and part = 2 in lon."
+                raise cells.unread(column, row, hint) from None
+            raise
+    plain = cells.finite(cells.parsed(column, pc.if_else(marked, None, text)), missing)
+    minus = pc.fill_null(pc.not_equal(pc.struct_field(found, 0), ""), False).to_numpy(zero_copy_only=False)
+    degrees, minutes, seconds = (
+        pc.fill_null(pc.replace_substring(pc.if_else(pc.equal(part, ""), "0", part), ",", ".").cast(pa.float64()), 0.0).to_numpy()
+        for part in (pc.struct_field(found, k) for k in (1, 2, 3))
+    )
+    high = (minutes >= 60.0) | (seconds >= 60.0)
+    if high.any():
+        raise cells.unread(column, int(np.argmax(high)), " Minutes and seconds are accepted below 60.")
+    size = degrees + minutes / 60.0 + seconds / 3600.0
+    return np.where(marked.to_numpy(zero_copy_only=False), np.where(minus, -size, size), plain)
+
+
+def _degrees(cells: Cells, column: str, values: np.ndarray) -> np.ndarray:
+    """Degrees of ddmm.mmmm."""
+    whole, minutes = np.divmod(np.abs(values), 100.0)
+    high = minutes >= 60.0
+    if high.any():
+        hint = ' Its last two whole digits are minutes, accepted below 60. Is it in degrees? Then unit = "deg".'
+        raise cells.unread(column, int(np.argmax(high)), hint)
+    return np.copysign(whole + minutes / 60.0, values)
+
+
+def _sides_of(cells: Cells, column: str) -> np.ndarray:
+    if not cells.is_text(column):
+        raise InputError(f"{cells.path}: hemisphere column '{column}' holds numbers; accepted: N, S, E or W.")
+    text = pc.utf8_upper(cells.texts(column))
+    for word, letter in _WORDS.items():
+        text = pc.if_else(pc.equal(text, word), letter, text)
+    return text.to_numpy(zero_copy_only=False)
+
+
+def _signed(cells: Cells, name: str, channel: Channel, values: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """North and east positive; a minus is accepted where it says the same as the letter."""
+    there = np.isfinite(values) & np.array([s is not None for s in sides])
+    accepted = SIDES[name]
+    strange = there & ~np.isin(sides.astype(str), list(accepted))
+    column = channel.hemisphere or channel.columns[0]
+    if strange.any():
+        raise cells.unread(column, int(np.argmax(strange)), f" The letters of {name} are {' and '.join(accepted)}.")
+    if channel.sign is not None and there.any():
+        raise InputError(f"{cells.path}: '{column}' has letters of the hemisphere, and sign = '{channel.sign}' is set. Remove sign.")
+    signs = np.array([accepted.get(s, 1.0) for s in sides])
+    against = there & (values < 0.0) & (signs > 0.0)
+    if against.any():
+        raise cells.unread(channel.columns[0], int(np.argmax(against)), f" Its minus contradicts the letter {sides[np.argmax(against)]}.")
+    return signs * np.abs(values)

@@ -1,0 +1,76 @@
+"""Values of a channel, in our unit and sign, from the cells of a block: columns, expressions of columns, positions as written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..errors import InputError
+from .cells import Cells
+from .coordinates import coordinates
+from .entries import ANGLES, Channel, channel_factor
+
+_LIMITS = {"lat": np.pi / 2, "lon": 2 * np.pi}
+
+
+def channel_values(cells: Cells, name: str, channel: Channel) -> np.ndarray:
+    """(n,) values in our unit and sign, NaN where there is none.
+
+    Raises:
+        InputError: a cell is no number, or a position is none on earth.
+    """
+    missing = [*cells.source.missing, *(channel.missing or [])]
+    if name in ("lat", "lon") and channel.kinds == ("column",):
+        readings = coordinates(cells, name, channel, missing)
+    else:
+        columns = [cells.numbers(column, missing) for column in channel.columns]
+        readings = _EXPRESSIONS[channel.kinds[0]](columns)
+        if channel.kinds == ("mean",) and name in ANGLES:
+            readings = _mean_angle(columns, abs(channel_factor(name, channel)))
+    values = channel_factor(name, channel) * (readings + channel.offset - channel.neutral)
+    _check_range(cells, name, channel, values)
+    return values
+
+
+def _mean_angle(columns: Sequence[np.ndarray], factor: float) -> np.ndarray:
+    """Mean direction, in the unit that `factor` makes radians of: of 359 and 1 degrees it is 0, not 180."""
+    angles = factor * np.stack(columns)
+    return np.arctan2(np.sin(angles).mean(axis=0), np.cos(angles).mean(axis=0)) / factor
+
+
+def _arc(columns: Sequence[np.ndarray]) -> np.ndarray:
+    """Angle of [y, x] in radians; none where both are zero."""
+    y, x = columns
+    return np.where((y == 0.0) & (x == 0.0), np.nan, np.arctan2(y, x))
+
+
+def _heading(columns: Sequence[np.ndarray]) -> np.ndarray:
+    """Rotation about the vertical [rad] of the body-to-earth quaternion [x, y, z, w], of any length but zero."""
+    x, y, z, w = columns
+    return _arc([2.0 * (w * z + x * y), w * w + x * x - y * y - z * z])
+
+
+_EXPRESSIONS: dict[str, Callable[[Sequence[np.ndarray]], np.ndarray]] = {
+    "column": lambda columns: columns[0],
+    "mean": lambda columns: np.mean(columns, axis=0),
+    "sum": lambda columns: np.sum(columns, axis=0),
+    "diff": lambda columns: columns[0] - columns[1],
+    "atan2": _arc,
+    "quaternion": _heading,
+}
+
+
+def _check_range(cells: Cells, name: str, channel: Channel, values: np.ndarray) -> None:
+    limit = _LIMITS.get(name)
+    if limit is None or not (np.abs(values) > limit + 1e-9).any():
+        return
+    worst = float(np.rad2deg(np.nanmax(np.abs(values))))
+    where = f"{cells.path}, rows from {cells.first_row}: '{name}' reaches {worst:g} deg"
+    hint = "Check unit and format of its column."
+    if channel.unit == "deg":
+        if worst <= np.rad2deg(limit) * 1e7 and worst >= 1e5:
+            hint = f'Is it counted in 1e-7 deg? Then write unit = "1e-7 deg" (or factor = 1e-7) in {name}.'
+        elif worst <= np.rad2deg(limit) * 100.0 and (np.abs(np.rad2deg(values[np.isfinite(values)])) % 100.0 < 60.0).all():
+            hint = f'Are the last two whole digits minutes? Then write unit = "ddmm.mmmm" in {name}, and hemisphere = "COLUMN" for N/S or E/W.'
+    raise InputError(f"{where}; accepted: up to {np.rad2deg(limit):g}. {hint}")
