@@ -132,6 +132,10 @@ def test_a_plug_in_that_calls_itself_otherwise_is_refused(installed):
 
 def test_a_changed_plug_in_is_another_model_for_resume(installed, toy, tmp_path):
     installed("predictors", mine="stranger:Mine")
+    about = tmp_path / "stranger-1.0.dist-info"  # the model runs in a process of its own, which reads what is installed
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: stranger\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text("[shipbench.predictors]\nmine = stranger:Mine\n")
     write_dataset(toy(runs=4), tmp_path / "toy")
     task = make_task({"dataset": str(tmp_path / "toy"), "models": ["mine", "hold"], "folds": 2, "horizon_s": 20.0})
 

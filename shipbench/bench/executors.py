@@ -35,8 +35,8 @@ class Execution:
     """Where the jobs run and what each may use.
 
     Args:
-        executor: "local" (one after another in this process; in a child process if there are limits), "processes" (`workers` child processes at
-            a time) or "dask" (the workers of the Dask cluster at `scheduler`).
+        executor: "local" (one after another in this process; in a child process if there are limits, or if the code of the model is not
+            shipbench's), "processes" (`workers` child processes at a time) or "dask" (the workers of the Dask cluster at `scheduler`).
         workers: number of processes; None: one for each CPU.
         scheduler: address, such as "tcp://host:8786".
         limits: of each cell.
@@ -102,6 +102,8 @@ class _Local(Workers):
         super().__init__(_Here(), room=1)
 
     def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
+        if job.foreign:  # a stranger's code never runs beside the truth, nor in this process's folder, threads and streams
+            return self.executor.submit(work_isolated, job, folds, Limits(), thread_settings())
         # Copies, as a child process gets them, each fold's apart: what a model writes into them stays its own.
         answer = self.executor.submit(work, job, [pickle.loads(pickle.dumps(fold)) for fold in folds])
         _give_back_memory()

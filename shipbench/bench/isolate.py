@@ -15,10 +15,12 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
+from . import supervise
 from .work import Answer, FoldData, Job, work
 
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -48,20 +50,38 @@ def thread_settings() -> dict[str, str]:
 
 def work_isolated(job: Job, folds: Sequence[FoldData], limits: Limits, threads: Mapping[str, str]) -> list[Answer]:
     """`work` in a process of its own; where it does not answer, each of its cells fails with the reason."""
+    answers, reason = call_isolated(_work_on, (job, *folds), limits, threads, cells=len(folds))
+    return [Answer("failed", f"fit or prediction: {reason}") for _ in folds] if reason else answers
+
+
+def _work_on(job: Job, *folds: FoldData) -> list[Answer]:
+    try:
+        return work(job, folds)
+    except KeyboardInterrupt:  # nobody presses Ctrl-C here: the model raised it
+        return [Answer("failed", "fit or prediction: KeyboardInterrupt") for _ in folds]
+
+
+def call_isolated(
+    function: Callable[..., Any], parts: Sequence[Any], limits: Limits | None = None, threads: Mapping[str, str] | None = None, cells: int = 1
+) -> tuple[Any, str]:
+    """What `function(*parts)` returns in a process of its own, or None and why it did not answer.
+
+    All that it started ends with it. The parts are sent apart: what is shared by two of them here is not shared there.
+    """
+    limits, threads = limits or Limits(), thread_settings() if threads is None else threads
     alive, held = os.pipe()
     with tempfile.TemporaryDirectory(prefix="shipbench-") as scratch:
         environment = {name: value for name, value in os.environ.items() if name not in THREADS}
         environment |= {**threads, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "TMPDIR": scratch}
         process = subprocess.Popen(
-            [sys.executable, "-P", "-c", f"from {__name__} import main; main({alive})"],
+            [sys.executable, "-P", "-c", f"from {supervise.__name__} import main; main({alive})"],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=[alive], start_new_session=True, env=environment,
         )  # fmt: skip
         _running.add(process)
         try:
-            # Folds apart, since they share windows: what a model writes into one must not reach another.
-            question = b"".join(pickle.dumps(part) for part in ((job, len(folds)), *folds))
-            answer, reason = _attend(process, question, limits, len(folds))
-            return [Answer("failed", f"fit or prediction: {reason}") for _ in folds] if reason else pickle.loads(answer)
+            question = b"".join(pickle.dumps(part) for part in ((function, len(parts)), *parts))
+            answer, reason = _attend(process, question, limits, cells)
+            return (None, reason) if reason else (pickle.loads(answer), "")
         finally:
             _kill(process)
             _running.discard(process)
@@ -125,13 +145,17 @@ def _ending(code: int) -> str:
 
 
 def _end_group(process: subprocess.Popen[bytes]) -> None:
-    """Kill the process and all that it started."""
-    with suppress(ProcessLookupError):  # they have all ended
-        os.killpg(process.pid, signal.SIGKILL)
+    """Have the process end all that it started, and itself; kill it where it does not within two seconds."""
+    with suppress(ProcessLookupError):
+        process.terminate()
+    try:
+        process.wait(2.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
-    """The same, and clean up after them."""
+    """The same, and clean up after it."""
     _end_group(process)
     process.wait()
     for pipe in (process.stdin, process.stdout):
@@ -139,19 +163,12 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
             pipe.close()
 
 
-def _end_with_parent(alive: int) -> None:
-    """The parent never writes to this pipe: reading ends when the parent does, also by `kill -9`."""
-    os.read(alive, 1)
-    os._exit(1)
-
-
-def main(alive: int) -> None:
-    """The process: a job from stdin, its answers to stdout; what the model prints goes to stderr."""
+def answer() -> None:
+    """The worker: a question from stdin, its answer to stdout; what the model prints goes to stderr."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    threading.Thread(target=_end_with_parent, args=(alive,), daemon=True).start()
-    job, count = pickle.load(sys.stdin.buffer)  # a pipe from our own parent, never a file
-    folds = [pickle.load(sys.stdin.buffer) for _ in range(count)]
-    pickle.dump(work(job, folds), answers)
+    function, count = pickle.load(sys.stdin.buffer)  # a pipe from our own parent, never a file
+    parts = [pickle.load(sys.stdin.buffer) for _ in range(count)]
+    pickle.dump(function(*parts), answers)
     answers.close()
     os._exit(0)  # without waiting for threads that a model has left behind

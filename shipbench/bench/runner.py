@@ -17,14 +17,15 @@ from ..errors import InputError
 from ..specs import Spec, parse_spec
 from .executors import Execution, Workers, answers_of, open_workers
 from .folds import make_folds, select_runs
-from .plan import Part, Study, new_model
+from .models import facts_of
+from .plan import Part, Study
 from .progress import Progress, Silent
 from .provenance import code_version, machine
 from .results import PROTOCOL, Cell, Frame, Results, assemble, scored_before, write_cell, write_json, write_truth
 from .scoring import columns, divergence, measure
 from .study_folder import claimed
 from .task import Task
-from .work import Answer
+from .work import Answer, digests
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,7 @@ def run_tasks(
             for part, answers in _answers(todo, workers, progress, execution.device):
                 for cell, key, answer in zip(part.cells, part.keys, answers, strict=True):
                     record = _score(part.study, part.spec, cell, answer)
-                    summary = record.summary | about | {"key": key}
+                    summary = record.summary | about | _identity(part, key, answer)
                     write_cell(out, cell, record.rows, summary, answer.S, answer.files)
                     finished.add(cell)
                     progress.done(cell.label, _outcome_text(summary))
@@ -104,13 +105,12 @@ def check_task(task: Task) -> None:
 
 def _prepare(task: Task) -> Study:
     specs = [parse_spec(text) for text in task.models]
-    for spec in specs:
-        new_model(spec)  # an unknown model or parameter is told before anything is loaded or fitted
+    facts = [facts_of(spec) for spec in specs]  # an unknown model or parameter is told before anything is loaded or fitted
     data, notes = select_runs(load_dataset(task.dataset), task)
     folds = make_folds(data, task)
     batches = [fold.test.batch(task.history(data.dt)) for fold in folds]
     found = [asdict(c) for c in columns(task.metrics, task.horizon_s, data.dt)]
-    return Study(task, data, folds, batches, specs, (*data.notes, *notes), found)
+    return Study(task, data, folds, batches, specs, facts, (*data.notes, *notes), found)
 
 
 def _refuse_same_names(names: list[str]) -> None:
@@ -144,9 +144,16 @@ def _answers(parts: Sequence[Part], workers: Workers, progress: Progress, device
         for future in wait(running, return_when=FIRST_COMPLETED).done:
             part = running.pop(future)
             answers = answers_of(future, len(part.cells))
-            if not workers.sends_files:
-                part.refuse_changed_files()
             yield part, answers
+
+
+def _identity(part: Part, key: str, answer: Answer) -> dict[str, Any]:
+    """The cell's key and the digests of the user's code behind it; no key where the model loaded code that the key does not cover."""
+    identity: dict[str, Any] = {"key": key, "model_code": {name: digest[:16] for name, digest in digests(part.facts.files).items()}}
+    if unknown := part.uncovered(answer):
+        more = f"the model loaded {', '.join(unknown[:3])} while it ran; --resume cannot tell whether that changes, and runs this cell again"
+        identity |= {"key": "", "key_note": more}
+    return identity
 
 
 @dataclass(frozen=True, eq=False)

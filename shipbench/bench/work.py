@@ -7,12 +7,13 @@ not depend on where and in which order jobs run.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import random
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from pathlib import Path
@@ -21,14 +22,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import ShipbenchError
+from ..predictors._user_file import code_of, on_import_path
 from ..predictors.base import History, make_predictor
 from ..records import Dataset
 from ..specs import Spec
 from .cost import count_parameters
 from .provenance import machine
 
-_RAISED = (Exception, SystemExit)
-"""What a user's own model may raise, and only its own rows say so (after `_let_stop_through`)."""
+_RAISED = BaseException
+"""What a model may raise, and only its own rows say so (after `_let_stop_through`): also asyncio's CancelledError and an exit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +48,9 @@ class FoldData:
 class Job:
     """A model and a seed, to be fitted on one or several folds.
 
-    `code`: digests of the packages that it takes (`package_digest`). `files`: content by relative name of the user's model file or saved
-    folder, where the worker may not have it; None: it is read in place. `device`: where it computes, unless its spec says.
+    `code`: digests of the packages that it takes (`package_digest`). `files`: content by relative name of the user's code or saved
+    folder, where the worker may not have it; None: it is read in place. `device`: where it computes, unless its spec says. `foreign`: it runs code
+    that is not shipbench's, so that it needs a process of its own.
     """
 
     spec: Spec
@@ -55,6 +58,7 @@ class Job:
     code: dict[str, str]
     files: dict[str, bytes] | None = None
     device: str | None = None
+    foreign: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +75,7 @@ class Answer:
         files: saved model and fitted equations, content by relative name.
         notes: why the model could not be saved or described.
         machine: where it was computed.
+        code: digests by relative name of the user's code that was loaded in the end; empty for other models.
     """
 
     status: str = ""
@@ -84,16 +89,27 @@ class Answer:
     files: dict[str, bytes] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
     machine: dict[str, Any] = field(default_factory=machine)
+    code: dict[str, str] = field(default_factory=dict)
 
 
 def work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
     """Fit and predict; whatever the model raises becomes the answer of its cells (one for each of `folds`)."""
     try:
         with _at_hand(job) as spec:
-            return _work(replace(job, spec=spec), folds)
+            if spec.path is None or spec.class_name is None:
+                return _work(replace(job, spec=spec), folds)
+            with on_import_path(spec.path):  # a model may import a module as late as in `predict`
+                answers = _work(replace(job, spec=spec), folds)
+            code = digests(code_of(spec.path))
+            return [replace(answer, code=code) for answer in answers]
     except _RAISED as error:
         _let_stop_through(error)
         return [Answer("failed", one_line(error)) for _ in folds]
+
+
+def digests(files: Mapping[str, bytes]) -> dict[str, str]:
+    """SHA-256 of each file."""
+    return {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
 
 
 def _let_stop_through(error: BaseException) -> None:
@@ -114,8 +130,11 @@ def one_line(error: BaseException) -> str:
 @contextmanager
 def _at_hand(job: Job) -> Iterator[Spec]:
     """The job's spec, with the files behind it in a temporary folder where they were sent along."""
-    if job.files is None or job.spec.path is None:
+    if job.spec.path is None:
         yield job.spec
+        return
+    if job.files is None:
+        yield replace(job.spec, path=job.spec.path.absolute())  # also after a model has changed the working folder
         return
     with tempfile.TemporaryDirectory(prefix="shipbench-") as folder:
         for name, content in job.files.items():
@@ -210,7 +229,8 @@ def _kept(model: Any) -> tuple[dict[str, bytes], dict[str, str]]:
         try:
             with tempfile.TemporaryDirectory(prefix="shipbench-") as folder:
                 model.save(Path(folder, "model"))
-                files = {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(Path(folder).rglob("*")) if p.is_file()}
+                own = (p for p in sorted(Path(folder).rglob("*")) if p.is_file() and not p.is_symlink())  # a link may lead anywhere
+                files = {p.relative_to(folder).as_posix(): p.read_bytes() for p in own}
         except _RAISED as error:  # its predictions are good all the same
             notes["save_failed"] = one_line(error)
     if callable(getattr(model, "describe", None)):

@@ -6,10 +6,8 @@ A part is one file of this folder whose class is bound to `PREDICTOR`. Its datac
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
-import sys
 from abc import ABC, abstractmethod
 from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
@@ -21,6 +19,7 @@ from ..errors import InputError, unknown_name
 from ..records import Dataset
 from ..signals import COMMANDS, STATES
 from ..specs import Spec, parse_spec
+from ._user_file import class_from_file
 from .device import check_device
 from .registered import PREDICTORS, not_installed
 
@@ -156,21 +155,6 @@ class PredictorFamily(PredictorBase):
         """
 
 
-def _class_from_file(path: Path, class_name: str) -> Any:
-    if not path.is_file():
-        raise InputError(f"model file {path} does not exist; give path/to/model.py:ClassName.")
-    module_spec = importlib.util.spec_from_file_location(f"shipbench_user_{path.stem}", path)
-    if module_spec is None or module_spec.loader is None:
-        raise InputError(f"model file {path} cannot be imported; it must be a Python file.")
-    module = importlib.util.module_from_spec(module_spec)
-    sys.modules[module_spec.name] = module
-    module_spec.loader.exec_module(module)
-    if not hasattr(module, class_name):
-        classes = [k for k, v in vars(module).items() if isinstance(v, type) and v.__module__ == module_spec.name]
-        raise unknown_name(f"class in {path}", class_name, classes)
-    return getattr(module, class_name)
-
-
 def _no_effects(spec: Spec) -> InputError:
     added = "+".join(e.name for e in spec.effects)
     return InputError(f"model spec '{spec.text}': effects extend 'physics' and 'neural_ode', '{spec.name}' takes none. Write physics+{added}.")
@@ -195,7 +179,7 @@ def _made(spec: Spec) -> Any:
         kind = json.loads((spec.path / "model.json").read_text()).get("predictor", "?")
         return PREDICTORS.get(kind).load(spec.path)
     family, _, member = (spec.name, "", "") if spec.path is not None else spec.name.partition(":")
-    cls = _class_from_file(spec.path, str(spec.class_name)) if spec.path is not None else PREDICTORS.get(family)
+    cls = class_from_file(spec.path, str(spec.class_name)) if spec.path is not None else PREDICTORS.get(family)
     if spec.effects and not hasattr(cls, "extend"):
         raise _no_effects(spec)
     params = {k: v for k, v in spec.params.items() if k != "seed"}

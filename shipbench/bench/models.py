@@ -1,0 +1,92 @@
+"""What a study knows of a model before it fits it: whose code it is, which files it is made of, and how it wants to be fitted."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..effects.base import EFFECTS
+from ..errors import InputError, ShipbenchError
+from ..predictors._user_file import code_of
+from ..predictors.base import PREDICTORS, make_predictor
+from ..registry import package_digest, reason
+from ..specs import Spec
+from .isolate import call_isolated
+from .provenance import source_digest
+
+
+@dataclass(frozen=True)
+class ModelFacts:
+    """What is known of the model of a spec.
+
+    Args:
+        foreign: it runs code that is not shipbench's (a model file, a plug-in), which is loaded in processes of its own only.
+        seeded: it draws random numbers.
+        together: its class fits several folds at once.
+        files: content by relative name of the user's code, or of the saved folder.
+        plugins: versions of the model's and its effects' plug-ins ("" for shipbench's own).
+        code: digests of the packages that it takes, by which a worker knows its own (`package_digest`).
+    """
+
+    foreign: bool
+    seeded: bool = True
+    together: bool = False
+    files: dict[str, bytes] = field(default_factory=dict)
+    plugins: list[str] = field(default_factory=list)
+    code: dict[str, str] = field(default_factory=dict)
+
+
+def facts_of(spec: Spec) -> ModelFacts:
+    """The facts of a model; making it once tells of an unknown name or parameter before anything is loaded or fitted.
+
+    Raises:
+        InputError: the model cannot be made.
+    """
+    kind = _kind(spec)
+    taken = [(EFFECTS, effect.name) for effect in spec.effects] + ([(PREDICTORS, kind)] if kind in PREDICTORS else [])
+    packages = sorted({package for registry, name in taken if (package := registry.package(name))})
+    foreign = bool(packages) or spec.class_name is not None
+    if foreign:
+        made, unanswered = call_isolated(_made, (spec,))
+        if unanswered:
+            raise InputError(f"model '{spec.text}' cannot be made: {unanswered}. Correct its file.")
+    else:
+        made = _made(spec)
+    if isinstance(made, ShipbenchError):
+        raise made
+    seeded, together, files = made
+    plugins = [registry.digest(name) for registry, name in taken]
+    code = {"shipbench": source_digest(), **{package: package_digest(package) for package in packages}}
+    return ModelFacts(foreign, seeded, together, files, plugins, code)
+
+
+def _kind(spec: Spec) -> str:
+    """The registered predictor behind a spec, "" for a model file."""
+    if spec.class_name is not None:
+        return ""
+    if spec.path is None:
+        return spec.name.partition(":")[0]
+    try:
+        return str(json.loads((spec.path / "model.json").read_text(encoding="utf-8"))["predictor"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""  # `make_predictor` says what is wrong with the folder
+
+
+def _made(spec: Spec) -> tuple[bool, bool, dict[str, bytes]] | ShipbenchError:
+    """seeded, together and files; or why the model cannot be made."""
+    try:
+        model: Any = make_predictor(spec)
+        return getattr(model, "seeded", True) is not False, hasattr(type(model), "fit_group"), _files(spec)
+    except ShipbenchError as error:
+        return error
+    except (Exception, SystemExit) as error:  # a user's own module is imported here
+        return InputError(f"model '{spec.text}' cannot be made: {reason(error)}. Correct its file.")
+
+
+def _files(spec: Spec) -> dict[str, bytes]:
+    if spec.path is None:
+        return {}
+    if spec.class_name is not None:
+        return code_of(spec.path)
+    return {p.relative_to(spec.path.parent).as_posix(): p.read_bytes() for p in sorted(spec.path.rglob("*")) if p.is_file()}

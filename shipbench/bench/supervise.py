@@ -1,0 +1,80 @@
+"""The process that a job's worker is a child of: whatever the worker starts ends with it, also what left its session or was orphaned.
+
+It loads nothing but Python's library before it forks, so that it costs little and has no threads.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import resource
+import signal
+import sys
+import threading
+import time
+from contextlib import suppress
+
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+"""Linux, prctl(2): a process ends with its parent; orphans below a process become its children, not those of process 1."""
+
+_PASSES = 50
+"""Most rounds of ending processes that start others meanwhile; 20 ms each."""
+
+
+def main(alive: int) -> None:
+    """Answer one question (`isolate.answer`) in a child process, end all that it left, and end as it did.
+
+    Args:
+        alive: reading end of a pipe that the study holds: it ends with the study, also by `kill -9`.
+    """
+    _prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    worker = os.fork()
+    if worker == 0:
+        _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        os.close(alive)
+        os.setsid()  # a model that signals its own group does not reach this process
+        from .isolate import answer
+
+        answer()
+    os.close(0)
+    os.dup2(2, 1)
+    signal.signal(signal.SIGTERM, _stop)
+    threading.Thread(target=_end_with_study, args=(alive,), daemon=True).start()
+    _, status = os.waitpid(worker, 0)
+    end_descendants()
+    code = os.waitstatus_to_exitcode(status)
+    if code < 0:
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        signal.signal(-code, signal.SIG_DFL) if -code not in (signal.SIGKILL, signal.SIGSTOP) else None
+        os.kill(os.getpid(), -code)
+    os._exit(code)
+
+
+def _prctl(option: int, value: int) -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
+
+
+def end_descendants() -> None:
+    """Kill everything below this process, until nothing is left."""
+    import psutil
+
+    for _ in range(_PASSES):
+        below = [p for p in psutil.Process().children(recursive=True) if p.status() != psutil.STATUS_ZOMBIE]
+        if not below:
+            return
+        for process in below:
+            with suppress(psutil.NoSuchProcess):  # it has just ended
+                process.kill()
+        time.sleep(0.02)
+
+
+def _stop(*_: object) -> None:
+    end_descendants()
+    os._exit(1)
+
+
+def _end_with_study(alive: int) -> None:
+    """The study never writes to this pipe."""
+    os.read(alive, 1)
+    _stop()

@@ -1,0 +1,129 @@
+"""A user's model file: imported with its folder on the import path, and which files of code it is made of."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import site
+import sys
+import sysconfig
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ..errors import InputError, unknown_name
+
+_brought: set[str] = set()
+"""Modules of users that earlier model files imported: the next file imports its own, changed or of another folder."""
+
+
+def class_from_file(path: Path, class_name: str) -> Any:
+    """The class `class_name` of the Python file `path`.
+
+    Raises:
+        InputError: there is no such file or class.
+    """
+    if not path.is_file():
+        raise InputError(f"model file {path} does not exist; give path/to/model.py:ClassName.")
+    name = f"shipbench_user_{path.stem}"
+    found = importlib.util.spec_from_file_location(name, path)
+    if found is None or found.loader is None:
+        raise InputError(f"model file {path} cannot be imported; it must be a Python file.")
+    for old in _brought:
+        sys.modules.pop(old, None)
+    _brought.clear()
+    before = set(sys.modules)
+    module = importlib.util.module_from_spec(found)
+    sys.modules[name] = module
+    with on_import_path(path):
+        try:
+            found.loader.exec_module(module)
+        finally:
+            _brought.update(n for n in set(sys.modules) - before - {name} if _own_file(sys.modules[n]))
+    if not hasattr(module, class_name):
+        raise unknown_name(f"class in {path}", class_name, [k for k, v in vars(module).items() if isinstance(v, type) and v.__module__ == name])
+    return getattr(module, class_name)
+
+
+@contextmanager
+def on_import_path(file: Path) -> Iterator[None]:
+    """Modules beside the model file are found, as where Python runs the file itself."""
+    folder = str(file.resolve().parent)
+    sys.path.insert(0, folder)
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)
+
+
+def code_of(path: Path) -> dict[str, bytes]:
+    """Content of the model file and of all code of the user's that it imports, by name relative to where it is imported from.
+
+    To be asked after `class_from_file`, in a process that imported no other user's code. Of a package all its Python files belong to it. Modules
+    that functions import by name later are found in the source.
+    """
+    files = {path.name: path}
+    for name, module in list(sys.modules.items()):
+        if (file := _own_file(module)) is not None and not name.startswith("shipbench_user_"):
+            files |= _whole(file, name.split("."))
+    roots = [path.resolve().parent, *(Path(p) for p in sys.path if p and _outside(Path(p)))]
+    waiting = [path, *files.values()]
+    while waiting:
+        for name in _imported_in(waiting.pop()):
+            if (file := _beside(name, roots)) is not None:
+                more = {key: found for key, found in _whole(file, [name]).items() if key not in files}
+                files |= more
+                waiting += more.values()
+    return {name: file.read_bytes() for name, file in sorted(files.items())}
+
+
+def _whole(file: Path, name: list[str]) -> dict[str, Path]:
+    """The files of the top-level module or package behind the module `name` at `file`, by name relative to its root."""
+    depth = len(name) - (file.stem != "__init__")
+    if depth == 0 or file.parts[-depth - 1 : -1] != tuple(name[:depth]):  # a module of one file, or one that is not where its name says
+        return {file.name: file}
+    top = file.parents[depth - 1]
+    return {p.relative_to(top.parent).as_posix(): p for p in [*top.rglob("*.py"), file]}
+
+
+def _beside(name: str, roots: list[Path]) -> Path | None:
+    """The user's file that `import name` finds below `roots`, or None."""
+    for root in roots:
+        for file in (root / name / "__init__.py", root / f"{name}.py"):
+            if file.is_file() and _outside(file):
+                return file
+    return None
+
+
+def _imported_in(file: Path) -> set[str]:
+    """First parts of the names that a Python file imports, also inside functions; none where it is not Python."""
+    try:
+        nodes = list(ast.walk(ast.parse(file.read_bytes())))
+    except (SyntaxError, ValueError):
+        return set()
+    names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    names += [str(node.module) for node in nodes if isinstance(node, ast.ImportFrom) and not node.level]
+    return {name.partition(".")[0] for name in names}
+
+
+def _own_file(module: ModuleType) -> Path | None:
+    """The file of a module that is neither Python's, nor an installed package's, nor shipbench's own; else None."""
+    file = getattr(module, "__file__", None)
+    return Path(file) if isinstance(file, str) and Path(file).is_file() and _outside(Path(file)) else None
+
+
+def _outside(path: Path) -> bool:
+    """Whether a path lies outside the environment: Python's library, installed packages, shipbench."""
+    return not any(path.absolute().is_relative_to(root) or path.resolve().is_relative_to(root) for root in _environment())
+
+
+@cache
+def _environment() -> tuple[Path, ...]:
+    paths = sysconfig.get_paths()
+    roots = {paths[key] for key in ("stdlib", "platstdlib", "purelib", "platlib")}
+    roots |= {*site.getsitepackages(), site.getusersitepackages(), str(Path(__file__).parent.parent)}
+    return tuple(p for root in roots for p in {Path(root).absolute(), Path(root).resolve()})
