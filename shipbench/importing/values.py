@@ -9,7 +9,8 @@ import numpy as np
 from ..errors import InputError
 from .cells import Cells
 from .coordinates import coordinates
-from .entries import ANGLES, Channel, channel_factor
+from .entries import ANGLES, ARCS, Channel, channel_factor
+from .sentinels import CODES, not_available
 
 _LIMITS = {"lat": np.pi / 2, "lon": 2 * np.pi}
 
@@ -20,17 +21,48 @@ def channel_values(cells: Cells, name: str, channel: Channel) -> np.ndarray:
     Raises:
         InputError: a cell is no number, or a position is none on earth.
     """
-    missing = [*cells.source.missing, *(channel.missing or [])]
+    factor = channel_factor(name, channel)
+    missing = _missing(cells, name, channel)
     if name in ("lat", "lon") and channel.kinds == ("column",):
-        readings = coordinates(cells, name, channel, missing)
+        columns = [coordinates(cells, name, channel, missing)]
     else:
         columns = [cells.numbers(column, missing) for column in channel.columns]
-        readings = _EXPRESSIONS[channel.kinds[0]](columns)
-        if channel.kinds == ("mean",) and name in ANGLES:
-            readings = _mean_angle(columns, abs(channel_factor(name, channel)))
-    values = channel_factor(name, channel) * (readings + channel.offset - channel.neutral)
+    if channel.kinds[0] not in ARCS and channel.missing != []:
+        columns = [_available(cells, name, readings, factor) for readings in columns]
+    circular = channel.kinds == ("mean",) and name in ANGLES
+    readings = _mean_angle(columns, abs(factor)) if circular else _EXPRESSIONS[channel.kinds[0]](columns)
+    values = factor * (readings + channel.offset - channel.neutral)
     _check_range(cells, name, channel, values)
     return values
+
+
+def _missing(cells: Cells, name: str, channel: Channel) -> list[str | float]:
+    """What stands for a missing value in a channel: its own list, and the source's without codes of other channels: 511 is no heading, but may be
+    a shaft speed."""
+    kept = []
+    for mark in cells.source.missing:
+        of = [other for other, codes in CODES.items() if any(mark == code for code, _, _ in codes)]
+        if name in of or not set(of) & set(cells.source.channels):
+            kept.append(mark)
+        else:
+            count = int(sum((cells.numbers(column, ()) == mark).sum() for column in channel.columns))
+            cells.met.doubtful[
+                f"readings of {name} that are {mark:g}, kept: `missing` of the source is taken for the code of {of[0]}. "
+                f"If they are none: missing = [{mark:g}] in channels.{name}"
+            ] += count
+    return [*kept, *(channel.missing or [])]
+
+
+def _available(cells: Cells, name: str, readings: np.ndarray, factor: float) -> np.ndarray:
+    """Readings without those that stand for "not available"; what is taken out or looks like it is counted for the summary."""
+    masks, doubtful = not_available(name, readings, factor)
+    for words, mask in masks.items():
+        cells.met.what[f"readings of {name} that are {words}, taken as missing"] += int(mask.sum())
+    for value in np.unique(readings[doubtful]):
+        cells.met.doubtful[
+            f"readings of {name} are {value:.10g}, far from all others. If it stands for no reading: missing = [{value:.10g}] in channels.{name}"
+        ] += int((readings == value).sum())
+    return np.where(np.logical_or.reduce([np.zeros(len(readings), bool), *masks.values()]), np.nan, readings)
 
 
 def _mean_angle(columns: Sequence[np.ndarray], factor: float) -> np.ndarray:

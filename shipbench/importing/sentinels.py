@@ -1,0 +1,105 @@
+"""Readings that stand for "not available": AIS codes, fill values of recorders, the largest integer of a field. Judged for each channel by itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .entries import ANGLES
+
+_DEG, _KNOT, _TURN = np.pi / 180.0, 1852.0 / 3600.0, 2.0 * np.pi
+_AIS, _NO_FIX = "AIS: not available", "no fix"
+CODES: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "lat": ((91.0, _DEG, f"91 deg ({_AIS})"), (0.0, _DEG, f"0 deg ({_NO_FIX})")),
+    "lon": ((181.0, _DEG, f"181 deg ({_AIS})"), (0.0, _DEG, f"0 deg ({_NO_FIX})")),
+    "psi": ((511.0, _DEG, f"511 deg ({_AIS})"),),
+    "cog": ((511.0, _DEG, f"511 deg ({_AIS})"), (360.0, _DEG, f"360 deg ({_AIS})")),
+    "sog": ((102.3, _KNOT, f"102.3 kn ({_AIS})"),),
+    "r": ((-128.0, _DEG / 60.0, f"-128 deg/min ({_AIS})"), (-731.386, _DEG / 60.0, f"-731 deg/min ({_AIS})")),
+}
+"""Value, its unit in ours, in words: position reports of the AIS (ITU-R M.1371-5, table 48; -731 deg/min is the decoded -128), receivers without a
+fix."""
+_LARGEST = {
+    "lat": 90.0 * _DEG, "lon": _TURN, **dict.fromkeys(ANGLES, _TURN), "u": 50.0, "v": 50.0, "sog": 50.0, "r": _TURN, "delta": 0.5 * np.pi,
+    "delta_c": 0.5 * np.pi, "n": 9000.0, "n_c": 9000.0, "wind_speed": 120.0, "apparent_wind_speed": 120.0, "depth": 11_000.0,
+}  # fmt: skip
+"""What no ship, shaft, sea or storm reaches, in our units; a fill value beyond it is no reading, whatever the others are."""
+_ORDERED = ("n", "delta", "F_b", "F_s", "n_c", "delta_c", "F_b_c", "F_s_c")
+"""Channels that may step to any value at once; the others are continuous."""
+_NINES = np.array([999.0, 9999.0, 99_999.0, 999_999.0])
+_WHOLE = np.array([32_767.0, 32_768.0, 65_535.0, 2_147_483_647.0, 2_147_483_648.0, 4_294_967_295.0])
+_FILLS = np.unique(np.concatenate([(np.r_[_NINES, _WHOLE][:, None] / 10.0 ** np.arange(8)).ravel(), [99.9, 99.99]]))
+_SMALLEST = 99.0
+"""Fill values below are too near to readings to be told from them."""
+
+
+def not_available(name: str, readings: np.ndarray, factor: float) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """(masks (n,) of readings that are none, by what they are; mask of readings that look like fill values, but may be readings).
+
+    Args:
+        name: the channel.
+        readings: (n,) as in the log, NaN where there is none.
+        factor: of a reading to our unit; its sign does not matter.
+    """
+    values = abs(factor) * readings
+    known = {words: np.isclose(values, code * unit, rtol=1e-4, atol=0.0) for code, unit, words in CODES.get(name, ())}
+    beyond = np.abs(values) > _LARGEST.get(name, np.inf) * (1.0 + 1e-6)
+    if name == "depth":
+        beyond |= values < 0.0
+    fills = (np.isin(np.abs(readings), _FILLS) & (np.abs(readings) >= _SMALLEST)) | (beyond & _is_fill(values))
+    hits = np.logical_or.reduce([fills, *known.values()])
+    if not hits.any():
+        return {}, hits
+    others = np.isfinite(values) & ~hits
+    counted_on = name in ANGLES and bool((np.abs(values[others]) > _TURN + _DEG).any())  # over north: readings beyond a turn are readings
+    sure = hits & beyond & (not counted_on)
+    doubtful = np.zeros(len(values), bool)
+    if name in _ORDERED:
+        far, alike = _far(values, others)
+        sure, doubtful = sure | (hits & far & (not alike)), hits & ~sure & far & alike
+    else:
+        sure |= _unled(values, hits & ~sure, hits, name in ANGLES and not counted_on)
+    masks = {words: mask & sure for words, mask in known.items()}
+    rest = sure & ~np.logical_or.reduce([np.zeros(len(values), bool), *known.values()])
+    masks |= {f"{value:.10g} (a fill value)": rest & (readings == value) for value in np.unique(readings[rest])}
+    return {words: mask for words, mask in masks.items() if mask.any()}, doubtful
+
+
+def _is_fill(values: np.ndarray) -> np.ndarray:
+    """Whether values are fill values that were converted from another unit of ours."""
+    sizes = np.array([_DEG, _DEG / 60.0, _KNOT, 1.0 / 3.6, 0.3048, 60.0])
+    whole = np.concatenate([(_NINES[:, None] * sizes).ravel(), (_WHOLE[:3, None] * sizes * 0.01).ravel()])
+    near, size = np.sort(whole), np.abs(values)
+    place = np.clip(np.searchsorted(near, size), 1, len(near) - 1)
+    return np.isclose(size, near[place], rtol=1e-5, atol=0.0) | np.isclose(size, near[place - 1], rtol=1e-5, atol=0.0)
+
+
+def _far(values: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, bool]:
+    """(values farther from the others than these are from each other, whether the others are all alike)."""
+    if not others.any():
+        return np.zeros(len(values), bool), True
+    low, high = values[others].min(), values[others].max()
+    return (values > high + (high - low)) | (values < low - (high - low)), bool(high == low)
+
+
+def _unled(values: np.ndarray, hit: np.ndarray, suspect: np.ndarray, wraps: bool) -> np.ndarray:
+    """Hits that a continuous channel cannot have come to: the steps to the readings beside that are not suspect exceed every step between such
+    readings in the block."""
+    others = np.flatnonzero(np.isfinite(values) & ~suspect)
+    if len(others) < 2 or not hit.any():
+        return np.zeros(len(values), bool)
+
+    def distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        gap = np.abs(a - b)
+        return np.minimum(gap % _TURN, -gap % _TURN) if wraps else gap
+
+    whole = np.diff(np.cumsum(suspect)[others]) == 0
+    steps = distance(values[others[1:]], values[others[:-1]])[whole]
+    largest = steps.max() if len(steps) else 0.0
+    rows = np.flatnonzero(hit)
+    place = np.searchsorted(others, rows)
+    before = np.where(place > 0, distance(values[rows], values[others[np.maximum(place - 1, 0)]]), np.inf)
+    after = np.where(place < len(others), distance(values[rows], values[others[np.minimum(place, len(others) - 1)]]), np.inf)
+    limit = np.maximum(largest, _DEG if wraps else 0.01 * np.abs(values[rows]))  # a flicker of the last digit is no step
+    unled = np.zeros(len(values), bool)
+    unled[rows] = np.minimum(before, after) > limit
+    return unled
