@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from ..errors import InputError
 from .cells import Cells, Counts
-from .clock import check_format, counts, is_daily, shown, to_seconds
+from .clock import check_format, is_daily, shown, to_seconds
 from .entries import Channel
 from .mapping import Mapping, Source
 from .tables import open_table, reading
@@ -49,9 +49,7 @@ def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str |
             if clock.rate is not None:
                 t = (done + np.arange(batch.num_rows)) / clock.rate + clock.shift
             else:
-                typed = pa.types.is_timestamp(batch.column(clock.names[0]).type)
-                numbers = cells.numbers(clock.names[0]) if counts(clock) and not typed else None
-                t = to_seconds(clock, [batch.column(n) for n in clock.names], numbers, where)
+                t = to_seconds(clock, [batch.column(n) for n in clock.names], cells.numbers, where)
             names = cells.names(source.run) if source.run else None
         done += batch.num_rows
         met.rows += batch.num_rows

@@ -16,7 +16,11 @@ SOURCE_KEYS = ("files", "time", "file", "channels", "missing", "antenna", "speed
 
 
 class Clock(Part):
-    """Where time stands. `rate` [Hz] alone serves a log without a time column; `shift` [s] is added to every time."""
+    """Where time stands. `rate` [Hz] alone serves a log without a time column; `shift` [s] is added to every time.
+
+    `repeated`: rows that share a stamp keep it ("first"), or are spread evenly until the next stamp. `backwards`: rows that go back in time are
+    refused, left out ("drop"), sorted, or begin a recording of their own ("split": the clock was set back).
+    """
 
     column: str | None = None
     columns: tuple[str, str] | None = None
@@ -25,7 +29,7 @@ class Clock(Part):
     rate: float | None = Field(None, gt=0, allow_inf_nan=False)
     shift: float = Field(0.0, allow_inf_nan=False)
     repeated: Literal["first", "spread"] = "first"
-    backwards: Literal["error", "drop"] = "error"
+    backwards: Literal["error", "drop", "sort", "split"] = "error"
 
     @property
     def names(self) -> tuple[str, ...]:
