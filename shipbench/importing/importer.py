@@ -83,6 +83,35 @@ def import_logs(
     return summary
 
 
+def rehearse(logs: Sequence[Path], mapping: Mapping, ship: Ship, rows: int) -> Summary:
+    """Import the first `rows` rows of each recording without writing anything.
+
+    Raises:
+        InputError: what the import would raise.
+    """
+    met, summary = Counts(), Summary(mapping)
+    for log in _recordings(logs, mapping, met):
+        log.feeds = {name: _beginning(blocks, rows) for name, blocks in log.feeds.items()}
+        for name, group, piece, _ in _named(log, mapping, ship, summary):
+            summary.doubtful.update(outliers(piece, ship))
+            summary.add(name, log.files, piece, group)
+        if met.rows > rows * len(mapping.sources):
+            break
+    summary.complete(met)
+    if not summary.runs:
+        raise InputError(summary.no_runs())
+    return summary
+
+
+def _beginning(blocks: Iterator[Block], rows: int) -> Iterator[Block]:
+    """The blocks with the first `rows` rows."""
+    for block in blocks:
+        yield block.rows(slice(0, rows))
+        rows -= len(block.t)
+        if rows <= 0:
+            return
+
+
 def _free(name: str, taken: Counter[str]) -> str:
     """`name`, or with a number where it is taken."""
     candidate = name

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pyarrow as pa
 import pyarrow.csv
@@ -64,6 +64,27 @@ def open_table(path: Path, layout: Layout) -> Table:
     Raises:
         InputError: missing, empty, binary, damaged or unknown.
     """
+    kind = kind_of(path)
+    with reading(path):
+        if kind == "Parquet":
+            return _open_parquet(path)
+        if kind == "MATLAB":
+            from .matlab import open_matlab
+
+            return open_matlab(path)
+        if kind == "Excel":
+            from .excel import open_excel
+
+            return open_excel(path, layout)
+        return _open_text(path, layout)
+
+
+def kind_of(path: Path) -> Literal["Parquet", "MATLAB", "Excel", "text"]:
+    """The kind of a file by its first bytes and its suffix.
+
+    Raises:
+        InputError: it is missing, empty or a folder, or of a kind that is not read.
+    """
     if path.is_dir():
         raise InputError(f"{path} is a folder; give the log files themselves, such as {path}/*.csv.")
     try:
@@ -73,20 +94,15 @@ def open_table(path: Path, layout: Layout) -> Table:
         raise InputError(f"cannot read {path}: {error.strerror}. Give the path of an existing log.") from None
     if not magic:
         raise InputError(f"{path} is empty (0 bytes). Give a log with a header and rows.")
-    with reading(path):
-        if magic.startswith(b"PAR1") or path.suffix == ".parquet":
-            return _open_parquet(path)
-        if path.suffix.lower() == ".mat" or magic.startswith(b"MATLAB"):
-            from .matlab import open_matlab
-
-            return open_matlab(path)
-        if path.suffix.lower() in (".xlsx", ".xlsm") or magic.startswith(b"PK\x03\x04"):
-            from .excel import open_excel
-
-            return open_excel(path, layout)
-        if magic.startswith(b"\xd0\xcf\x11\xe0"):
-            raise InputError(f"{path} is in Excel's old format (.xls). Save it as .xlsx or .csv.")
-        return _open_text(path, layout, magic)
+    if magic.startswith(b"PAR1") or path.suffix == ".parquet":
+        return "Parquet"
+    if path.suffix.lower() == ".mat" or magic.startswith(b"MATLAB"):
+        return "MATLAB"
+    if path.suffix.lower() in (".xlsx", ".xlsm") or magic.startswith(b"PK\x03\x04"):
+        return "Excel"
+    if magic.startswith(b"\xd0\xcf\x11\xe0"):
+        raise InputError(f"{path} is in Excel's old format (.xls). Save it as .xlsx or .csv.")
+    return "text"
 
 
 @contextmanager
@@ -137,7 +153,10 @@ def _check_number(path: Path, columns: int) -> None:
         raise InputError(f"{path} has {columns} columns; accepted: up to {MOST_COLUMNS}. Save the columns that you need as a file of their own.")
 
 
-def _uncompressed(path: Path, magic: bytes) -> Any:
+def uncompressed(path: Path) -> Any:
+    """A binary file, unpacked while it is read where it is a .gz, .bz2 or .xz."""
+    with path.open("rb") as file:
+        magic = file.read(8)
     if magic.startswith(b"\x1f\x8b"):
         return gzip.open(path, "rb")
     if magic.startswith(b"BZh"):
@@ -160,8 +179,8 @@ def _encoding(path: Path, head: bytes, layout: Layout) -> str:
     return layout.encoding
 
 
-def _open_text(path: Path, layout: Layout, magic: bytes) -> Table:
-    with _uncompressed(path, magic) as file:
+def _open_text(path: Path, layout: Layout) -> Table:
+    with uncompressed(path) as file:
         head = file.read(TEXT_BLOCK)
     if not head.strip():
         raise InputError(f"{path} holds no text. Give a log with a header and rows.")
@@ -190,7 +209,7 @@ def _open_text(path: Path, layout: Layout, magic: bytes) -> Table:
         )  # fmt: skip
         at = [places[name] for name in wanted]
         convert = pa.csv.ConvertOptions(include_columns=at, column_types={i: pa.string() for i in at}, strings_can_be_null=False)
-        with _uncompressed(path, magic) as raw:
+        with uncompressed(path) as raw:
             try:
                 reader = pa.csv.open_csv(Collapsed(raw) if delimiter == BLANKS else raw, read, pa.csv.ParseOptions(delimiter=delimiter), convert)
             except pa.ArrowInvalid as error:

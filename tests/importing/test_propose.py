@@ -116,15 +116,18 @@ def test_a_slow_source_has_a_gap_of_its_own_and_an_unknown_one_is_left_to_the_re
     assert "belongs to no source" in CliRunner().invoke(app, [*command, "other.csv", "--force"]).stderr
 
 
-def test_vectors_of_several_lengths_in_one_matlab_file(propose, tmp_path):
+def test_vectors_of_several_lengths_in_one_matlab_file_are_instruments(propose, tmp_path):
     from scipy.io import savemat
 
-    savemat(
-        tmp_path / "log.mat",
-        {"gps": {"t": np.arange(20.0), "lat": 52 + np.zeros(20)}, "gyro": {"t": np.arange(0, 20, 0.1), "heading": np.zeros(200)}},
-    )
+    slow, fast = np.arange(0.0, 60.0), np.arange(0.0, 60.0, 0.1)
+    gps = {"t": slow, "lat": 52 + 4e-5 * slow, "lon": 4 + 0 * slow}
+    savemat(tmp_path / "log.mat", {"gps": gps, "gyro": {"t": fast, "heading": 0.01 * fast}, "gain": np.ones(3)})
     assert propose(tmp_path / "log.mat").exit_code == 0
-    assert {"lat", "psi"} <= set(columns((tmp_path / "draft.toml").read_text()))
+    sources = tomllib.loads((tmp_path / "draft.toml").read_text())["sources"].values()
+    assert [set(source["channels"]) for source in sources] == [{"lat", "lon"}, {"psi"}]
+    done = CliRunner().invoke(app, ["data", "import", "log.mat", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"])
+    assert done.exit_code == 0, done.output
+    assert load_dataset("out").runs[0].t[-1] == pytest.approx(59.0)
 
 
 def test_decimal_commas_and_german_dates_are_seen(propose, tmp_path):

@@ -1,0 +1,5 @@
+"""A draft of mapping.toml from the heads and cells of logs; every guess is called one in the file, for a person to check."""
+
+from .proposal import write_proposal
+
+__all__ = ["write_proposal"]

@@ -1,0 +1,282 @@
+"""What the columns say about each other: the track's direction and speed against heading, yaw rate and speeds.
+
+Heads often name no unit, or one word for heading and course. A ship moves about where she points, at the speed that the log has, and her heading
+changes by the yaw rate: whatever unit, axis or clock contradicts that is told, and where the head leaves it open the one that agrees is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...data.units import unit_factor
+from ...errors import InputError
+from ..cells import Counts
+from ..channels import read_blocks
+from ..mapping import Source
+from ..position import to_plane
+from .assign import Assigned, Entry
+from .clock import Time
+from .columns import Sample
+
+_WINDOW = 5.0
+"""Time over which the track is looked at [s]; longer where the log is slow."""
+_AGREES = 0.9
+"""Mean cosine between heading and track: 25 degrees apart."""
+_COURSE = np.deg2rad(1.0)
+"""A column that follows the track's direction so closely through turns is the course: a turning hull drifts by several degrees."""
+_TURNING = np.deg2rad(30.0)
+"""Range of directions from which on a log turns enough to tell."""
+_CLOSE = 0.15
+"""Relative difference within which two speeds, or two yaw rates, are the same."""
+_UNITS = {"rad": ("deg", "rad", "cdeg"), "rad/s": ("rad/s", "deg/s", "deg/min"), "m/s": ("m/s", "kn", "km/h", "ft/s")}
+_CLOCKS = {1e3: "ms", 1e6: "us", 1.0 / 60.0: "min", 1.0 / 3600.0: "h"}
+
+
+@dataclass(frozen=True)
+class _Track:
+    """The track in windows: times (m,) [s], direction from north [rad], speed [m/s]; only where the ship moves."""
+
+    t: np.ndarray
+    direction: np.ndarray
+    speed: np.ndarray
+
+
+def examine(sample: Sample, time: Time, found: Assigned, extra: dict[str, Any]) -> None:
+    """Correct units, axes and the meaning of a course in `found`, and the unit of a clock without one in `time`, where the columns agree on them."""
+    specs = {e.channel: e.spec for e in found.entries.values() if not e.missing}
+    try:
+        source = Source(time=time.spec, file=sample.file, channels=specs, **extra)
+        series = _series(sample, source)
+    except (InputError, ValueError):  # the trial of the draft tells it
+        return
+    track = _track(series)
+    if track is not None and "psi" in series:
+        _heading(track, series, found)
+    if "psi" in found.entries and "r" in series and "psi" in series:
+        _yaw_rate(series, found)
+    if track is not None:
+        _clock_unit(track, series, time, found)
+        for channel in ("sog", "u"):
+            if channel in series and channel in found.entries:
+                _speed(channel, track, series, found)
+        _sway_as_surge(found)
+
+
+def _series(sample: Sample, source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Times and values of each channel in our units, by the import's own reader; of a log with several runs the first."""
+    first, t, values, rows = None, [], [], 0
+    for name, block in read_blocks(sample.path, source, Counts()):
+        first = name if not t else first
+        if name == first:
+            t.append(block.t)
+            values.append(block.values)
+        rows += len(block.t)
+        if rows > 20_000:
+            break
+    if not t:
+        return {}
+    at, table = np.concatenate(t), np.vstack(values)
+    order = np.argsort(at, kind="stable")
+    at, table = at[order], table[order]
+    there = {name: np.isfinite(table[:, j]) for j, name in enumerate(source.channels)}
+    return {name: (at[keep], table[keep, j]) for j, (name, keep) in enumerate(there.items()) if keep.sum() > 5}
+
+
+def _track(series: dict[str, tuple[np.ndarray, np.ndarray]]) -> _Track | None:
+    pair = ("x", "y") if "x" in series and "y" in series else ("lat", "lon")
+    if pair[0] not in series or pair[1] not in series:
+        return None
+    (ta, a), (tb, b) = series[pair[0]], series[pair[1]]
+    t, first, second = np.intersect1d(ta, tb, return_indices=True)
+    x, y = a[first], b[second]
+    if pair == ("lat", "lon") and len(t):
+        x, y = to_plane(x, y, (x[0], y[0]))
+    moved = np.r_[True, (np.diff(x) != 0) | (np.diff(y) != 0)]  # a fix that is repeated until the next is one fix
+    t, x, y = t[moved], x[moved], y[moved]
+    if len(t) < 10:
+        return None
+    window = min(max(_WINDOW, 2.0 * float(np.median(np.diff(t)))), (t[-1] - t[0]) / 8)
+    ends = np.searchsorted(t, t + window)
+    starts = np.flatnonzero(ends < len(t))
+    ends = ends[starts]
+    lasted = t[ends] - t[starts]
+    near = (lasted > 0) & (lasted < 3 * window)
+    starts, ends, lasted = starts[near], ends[near], lasted[near]
+    if len(starts) < 5:
+        return None
+    north, east = x[ends] - x[starts], y[ends] - y[starts]
+    speed = np.hypot(north, east) / lasted
+    moving = speed > 0.5 * np.quantile(speed, 0.9)
+    return _Track(0.5 * (t[starts] + t[ends])[moving], np.arctan2(east, north)[moving], speed[moving])
+
+
+def _heading(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned) -> None:
+    entry = found.entries["psi"]
+    if "as given" in entry.why or ("x" in found.entries and "as given" in found.entries["x"].why):
+        return
+    factor = unit_factor("psi", entry.spec.get("unit", "rad"))
+    raw = (series["psi"][0], series["psi"][1] / factor)
+    named = bool(entry.columns[0].head.units.get("angle")) or "quaternion" in entry.spec
+    units = ("rad",) if "quaternion" in entry.spec else (entry.spec["unit"],) if named else _UNITS["rad"]
+    scores = {}
+    for unit in units:
+        psi = _at(track.t, raw[0], np.unwrap(raw[1] * unit_factor("psi", unit)))
+        for turned in (False, True):
+            for axes, way in _ways(track.direction, found).items():
+                scores[unit, turned, axes] = float(np.mean(np.cos(way - (np.pi / 2 - psi if turned else psi))))
+    spread = float(np.ptp(np.unwrap(track.direction)))
+    plain = {k: v for k, v in scores.items() if k[1:] == (False, "")}
+    best = max(plain, key=lambda k: plain[k])
+    if plain[best] >= _AGREES:
+        _settle_unit(entry, best[0], plain[best], found)
+        _heading_or_course(entry, _at(track.t, raw[0], np.unwrap(raw[1] * unit_factor("psi", best[0]))), track, spread, found)
+        return
+    any_way = max(scores, key=lambda k: (round(scores[k], 2), -bool(k[1]), -len(k[2])))
+    degrees = np.rad2deg(np.arccos(np.clip(plain[best], -1, 1)))
+    if scores[any_way] >= _AGREES and spread > _TURNING:
+        _turn(entry, any_way, found)
+        entry.why.append(f"NOT SURE: only so the heading agrees with the track (as it stands they are {degrees:.0f} deg apart)")
+        return
+    found.notes.append(f"NOT SURE: heading '{entry.columns[0].name}' and the direction of the track are {degrees:.0f} deg apart; check both.")
+
+
+def _ways(direction: np.ndarray, found: Assigned) -> dict[str, np.ndarray]:
+    """Directions of the track with its axes as they are (""), and in the other ways that the heads leave open."""
+    ways = {"": direction}
+    named = {word for c in ("x", "y") if c in found.entries for word in found.entries[c].columns[0].head.base} & _AXES
+    if "x" in found.entries and not named:
+        ways["exchanged"] = np.pi / 2 - direction
+    if "lat" in found.entries and not {"sign", "hemisphere"} & {*found.entries["lat"].spec, *found.entries["lon"].spec}:
+        ways |= {"south": np.pi - direction, "west": -direction, "south and west": np.pi + direction}
+    return ways
+
+
+_AXES = {"north", "northing", "east", "easting", "nord", "norte", "ost", "est", "este", "n", "e", "hochwert", "rechtswert"}
+
+
+def _turn(entry: Entry, way: tuple[str, bool, str], found: Assigned) -> None:
+    """Write into the draft the axes and the sense of the heading with which heading and track agree."""
+    unit, turned, axes = way
+    if "quaternion" not in entry.spec:
+        entry.spec["unit"] = unit
+    if turned:
+        entry.spec |= {"sign": "counterclockwise", "offset": round(-np.pi / 2 / unit_factor("psi", unit), 6)}
+        found.notes.append(f"NOT SURE: '{entry.columns[0].name}' counts from east, counter-clockwise: only so it agrees with the track.")
+    if axes == "exchanged":
+        x, y = found.entries["x"], found.entries["y"]
+        x.spec["column"], y.spec["column"] = y.spec["column"], x.spec["column"]
+        x.columns, y.columns = y.columns, x.columns
+        found.notes.append(f"NOT SURE: x and y are exchanged: '{x.spec['column']}' is taken as north. Only so heading and track agree.")
+    for word, channel in (("south", "lat"), ("west", "lon")):
+        if word in axes:
+            found.entries[channel].spec["sign"] = word
+            found.notes.append(f"NOT SURE: {channel} is taken as positive to the {word}: only so heading and track agree.")
+
+
+def _settle_unit(entry: Entry, unit: str, score: float, found: Assigned) -> None:
+    if "quaternion" in entry.spec:
+        return
+    if entry.spec["unit"] != unit:
+        entry.spec["unit"] = unit
+    entry.why.append(f"agrees with the track's direction (mean cosine {score:.2f})")
+    _no_doubt_of_unit(entry, found)
+
+
+def _heading_or_course(entry: Entry, psi: np.ndarray, track: _Track, spread: float, found: Assigned) -> None:
+    """A column that may be either is the course where it follows the track through turns."""
+    if not any("may be heading or course" in why for why in entry.why) or spread < _TURNING:
+        return
+    apart = float(np.sqrt(np.mean(np.angle(np.exp(1j * (track.direction - psi))) ** 2)))
+    name = entry.columns[0].name
+    if apart < _COURSE:
+        del found.entries["psi"]
+        found.notes[:] = [n for n in found.notes if f"'{name}' may be the heading" not in n]
+        found.notes.append(f"'{name}' follows the track within {np.rad2deg(apart):.2g} deg through turns: it is the course, no heading.")
+        return
+    entry.why.append(f"{np.rad2deg(apart):.2g} deg r.m.s. from the track's direction, as a drifting hull's heading is")
+
+
+def _yaw_rate(series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned) -> None:
+    entry = found.entries["r"]
+    t, psi = series["psi"]
+    psi = np.unwrap(psi)
+    at, r = series["r"]
+    window = max(2.0, 2.0 * float(np.median(np.diff(at))))
+    inside = at[(at >= t[0] + window) & (at <= t[-1] - window)]
+    if len(inside) < 10:
+        return
+    change = (np.interp(inside + window / 2, t, psi) - np.interp(inside - window / 2, t, psi)) / window
+    steady = np.abs(change) < 8 * max(float(np.median(np.abs(change))), 1e-9)  # leaves out where a heading was interpolated across 360/0
+    change, rate = change[steady], _mean_over(inside[steady], at, r, window)
+    if np.std(change) == 0 or np.std(rate) == 0 or abs(correlation := float(np.corrcoef(change, rate)[0, 1])) < 0.8:
+        return
+    ratio = float(np.sum(change * rate) / np.sum(rate * rate))
+    _settle(entry, "r", ratio, "the change of the heading", found)
+    if correlation < 0 and "sign" not in entry.spec and "as given" not in entry.why:
+        entry.spec["sign"] = "port"
+        entry.why.append("NOT SURE: positive to port, against the change of the heading")
+        found.notes.append(f"NOT SURE: '{entry.columns[0].name}' is taken as positive to port: it runs against the change of the heading.")
+
+
+def _mean_over(times: np.ndarray, at: np.ndarray, values: np.ndarray, window: float) -> np.ndarray:
+    return np.mean([np.interp(times + shift * window, at, values) for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)], axis=0)
+
+
+def _speed(channel: str, track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned) -> None:
+    recorded = np.abs(_at(track.t, *series[channel]))
+    moving = recorded > 0.3 * np.quantile(recorded, 0.9)
+    if moving.sum() >= 5:
+        _settle(found.entries[channel], channel, float(np.median(track.speed[moving] / recorded[moving])), "the track", found)
+
+
+def _sway_as_surge(found: Assigned) -> None:
+    """v is in the unit of u, where the head of neither names one."""
+    u, v = found.entries.get("u"), found.entries.get("v")
+    if u and v and not u.columns[0].head.units and not v.columns[0].head.units and "as given" not in v.why:
+        v.spec["unit"] = u.spec["unit"]
+        v.why = [*(w for w in v.why if not w.startswith("unit NOT SURE")), f"unit as u, {u.spec['unit']}"]
+        _no_doubt_of_unit(v, found)
+
+
+def _no_doubt_of_unit(entry: Entry, found: Assigned) -> None:
+    found.notes[:] = [n for n in found.notes if not n.startswith(f"NOT SURE: the head of '{entry.columns[0].name}' names no unit")]
+
+
+def _settle(entry: Entry, channel: str, ratio: float, what: str, found: Assigned) -> None:
+    """Take the unit with which the channel is `ratio` times what it is now; a unit that the head names is kept and the difference told."""
+    if "as given" in entry.why or not entry.columns:
+        return
+    like = "u" if channel == "sog" else channel
+    now = unit_factor(like, entry.spec["unit"])
+    units = {u: unit_factor(like, u) / now for u in _UNITS["rad/s" if channel == "r" else "m/s"]}
+    unit = min(units, key=lambda u: abs(np.log(units[u] / abs(ratio)))) if ratio else entry.spec["unit"]
+    fits = ratio != 0 and abs(np.log(units[unit] / abs(ratio))) < _CLOSE
+    name, named = entry.columns[0].name, entry.columns[0].head.units
+    if fits and (not named or unit == entry.spec["unit"]):
+        entry.spec["unit"] = unit
+        entry.why = [w for w in entry.why if not w.startswith("unit NOT SURE")] + [f"unit {unit} agrees with {what}"]
+        _no_doubt_of_unit(entry, found)
+    elif fits:
+        found.notes.append(f"NOT SURE: '{name}' says {entry.spec['unit']}; {what} says {unit}. The head is kept.")
+    elif abs(np.log(abs(ratio) or 1e-9)) > 2 * _CLOSE:
+        found.notes.append(f"NOT SURE: '{name}' is 1/{abs(ratio):.3g} of what {what} says, which is no unit that is accepted.")
+
+
+def _clock_unit(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], time: Time, found: Assigned) -> None:
+    """The unit of a clock without one, from the time that the ship takes over her way."""
+    channel = next((c for c in ("sog", "u") if c in series and c in found.entries and found.entries[c].columns[0].head.units), None)
+    if channel is None or "no unit" not in time.why:
+        return
+    recorded = np.abs(_at(track.t, *series[channel]))
+    ratio = float(np.median(recorded) / np.median(track.speed))
+    for factor, form in _CLOCKS.items():
+        if abs(np.log(ratio / factor)) < _CLOSE:
+            time.spec["format"] = form
+            found.notes.append(f"NOT SURE: the time is taken in {form}: only so the ship runs along her track at the recorded speed.")
+
+
+def _at(times: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.interp(times, t, values)

@@ -1,0 +1,114 @@
+"""`write_proposal`: logs in, a draft of mapping.toml out, tried by the import's own reader."""
+
+from __future__ import annotations
+
+import fnmatch
+import os
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ...errors import InputError
+from ...toml_files import read_toml
+from ..mapping import SOURCE_KEYS
+from ..writer import run_name
+from .columns import read_samples
+from .groups import group
+from .source import SLOW, SourceDraft, channel_gaps, clocks_apart, draft_source, missing_channels
+from .text import draft_text
+from .trial import try_draft
+
+
+def write_proposal(
+    logs: Sequence[Path], path: Path, force: bool = False, *, file: dict[str, Any] | None = None, partial: Path | None = None
+) -> list[str]:  # fmt: skip
+    """Write a draft mapping for `logs` to `path`; return lines that say what is guessed, what is not sure and what is missing.
+
+    Args:
+        logs: files of one kind, or of several instruments; each kind becomes a source.
+        path: where the draft goes.
+        force: replace a file that is there.
+        file: keys of [file] that are known, such as encoding, sheet and header.
+        partial: a mapping that says a part; what it says is kept.
+
+    Raises:
+        InputError: a log cannot be read, or `path` is there already and `force` is not set.
+    """
+    if path.exists() and not force:
+        raise InputError(f"{path} is there already. Give --propose another name, or --force to replace it.")
+    if partial is not None and path.exists() and partial.resolve() == path.resolve():
+        raise InputError(f"--propose and --map are both {path}; accepted: two files. Give --propose another name.")
+    known = read_toml(partial) if partial is not None else {}
+    sources, notes = _sources(logs, known, file or {})
+    top, split = _top(sources, known, logs[0])
+    for source in sources:
+        channel_gaps(source, split["gap"])
+        notes += [*source.notes, *source.found.notes, *_left_notes(source)]
+    notes += missing_channels(sources) + clocks_apart(sources)
+    kept = {*known, *(f"split.{key}" for key in known.get("split", {}))}
+    fresh = path.with_name(f".{path.name}.tmp")
+
+    def write() -> Path:
+        try:
+            fresh.write_text(draft_text(top, split, kept, sources, notes), encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"cannot write {path}: {error.strerror}. Give --propose a path that can be written.") from None
+        return fresh
+
+    try:
+        if not any(note.startswith("MISSING: no column") or note.startswith("MISSING: no position") for note in notes):
+            notes += try_draft(write, list(dict.fromkeys(log for source in sources for log in source.logs)), sources, split)
+        os.replace(write(), path)
+    finally:
+        fresh.unlink(missing_ok=True)
+    command = f"shipbench data import LOG --map {shlex.quote(str(path))} --ship ship.toml --out FOLDER"
+    return [*notes, f"Draft: {path}. Check every line marked GUESS, then: {command}"]
+
+
+def _left_notes(source: SourceDraft) -> list[str]:
+    names = [c.name for c in source.left]
+    if not names:
+        return []
+    return [f"{source.sample.path.name}: {len(names)} columns were not taken: {', '.join(names[:8])}{' ...' if len(names) > 8 else ''}."]
+
+
+def _sources(logs: Sequence[Path], known: dict[str, Any], file: dict[str, Any]) -> tuple[list[SourceDraft], list[str]]:
+    """A draft for each kind of log, and notes on logs that fit none."""
+    named = known.get("sources", {})
+    drafts, notes, rest = [], [], list(logs)
+    for name, kept in named.items():
+        own = [log for log in rest if fnmatch.fnmatch(log.name, kept.get("files", "*"))]
+        if own:
+            rest = [log for log in rest if log not in own]
+            draft = draft_source(name, own, read_samples(own[0], kept.get("file", {}) | file)[0], kept)
+            draft.named = True
+            drafts.append(draft)
+    kept = {} if named else {key: known[key] for key in SOURCE_KEYS if key in known}
+    more, told = group(rest, kept, kept.get("file", {}) | file, len(drafts)) if rest else ([], [])
+    drafts += more
+    notes += told
+    seen: set[str] = set()
+    for draft in drafts:
+        twice = [c for c in draft.found.entries if c in seen]
+        for channel in twice:
+            entry = draft.found.entries.pop(channel)
+            notes.append(
+                f"{draft.sample.path.name}: {channel} ('{', '.join(c.name for c in entry.columns)}') is in another log, too; that one is taken."
+            )
+        seen |= set(draft.found.entries)
+    return drafts, notes
+
+
+def _top(sources: Sequence[SourceDraft], known: dict[str, Any], log: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The keys at the top of the mapping and those of [split]."""
+    steps = [s.step for s in sources if s.found.entries] or [1.0]
+    finest = min(steps)
+    top: dict[str, Any] = {
+        "name": run_name(log.name.split(".")[0]),
+        "dt": 0.5 if finest <= 0.5 else 1.0 if finest <= 1.0 else float(f"{finest:.2g}"),
+    }
+    top |= {key: entry for key, entry in known.items() if key not in (*SOURCE_KEYS, "sources", "split")}
+    slow = [step for step in steps if step <= SLOW] or [finest]
+    split = {"gap": float(f"{max(3.0, 3.0 * max(slow)):.3g}")} | known.get("split", {})
+    return top, split
