@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 from . import cli_check, cli_contract, cli_data, cli_diagnosis, cli_import, cli_leaderboard, cli_report
 from .cli_common import SETTINGS, DatasetArgument, Device, Json, Quiet, console_for_tables, exit_if_failed, parse_seeds, print_json, show_boards
 from .errors import InputError, ShipbenchError
+from .names import file_name
 
 
 class _Group(TyperGroup):
@@ -97,7 +98,6 @@ def run(
     from .bench.isolate import Limits
     from .bench.leaderboard import write_boards
     from .bench.progress import make_progress
-    from .bench.results import slug
     from .bench.runner import run_tasks
     from .bench.task import load_tasks
 
@@ -107,7 +107,7 @@ def run(
     }  # fmt: skip
     execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit), device)
     tasks = load_tasks(config, overrides)
-    folder = out or Path("runs") / (Path(config).stem if config else slug(Path(tasks[0].dataset).name))
+    folder = out or Path("runs") / (Path(config).stem if config else file_name(Path(tasks[0].dataset).name))
     outcome = run_tasks(tasks, folder, resume=resume, execution=execution, progress=make_progress(quiet), command=str(ctx.obj))
     written = write_boards(outcome.results, folder, str(ctx.obj))
     if as_json:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from .cli_common import DatasetArgument, Json, Quiet, print_json
+from .names import file_name
 
 
 def diagnose(
@@ -26,13 +27,12 @@ def diagnose(
     """Show what the physics model gets wrong on a data set, name the cause, and measure what naming it is worth."""
     from .bench.diagnosis_report import write_diagnosis
     from .bench.diagnosis_text import summary_lines
-    from .bench.results import slug
     from .data.base import load_dataset
     from .diagnosis.diagnose import diagnose as run
 
     data = load_dataset(dataset)
     found = replace(run(data, gain=gain, seed=seed, workers=workers, thorough=thorough), spec=dataset)
-    written = write_diagnosis(found, out or Path("diagnoses") / slug(Path(data.name).name))
+    written = write_diagnosis(found, out or Path("diagnoses") / file_name(Path(data.name).name))
     if as_json:
         print_json(found.document())
         return

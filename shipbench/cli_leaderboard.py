@@ -9,6 +9,7 @@ import typer
 
 from .cli_common import Device, Json, Quiet, exit_if_failed, parse_numbers, parse_seeds, print_json, show_boards
 from .errors import InputError
+from .names import file_name
 
 if TYPE_CHECKING:
     from .bench.results import Results
@@ -98,14 +99,13 @@ def learning_curve(
     from .bench.curve import run_curve
     from .bench.executors import Execution
     from .bench.progress import make_progress
-    from .bench.results import slug
     from .bench.task import load_tasks
 
     overrides = {
         "models": model or None, "datasets": [dataset] if dataset else None, "folds": folds, "seeds": parse_seeds(seeds), "horizon_s": horizon,
     }  # fmt: skip
     task = load_tasks(config, overrides)[0]
-    folder = out or Path("runs") / f"curve-{slug(Path(task.dataset).name)}"
+    folder = out or Path("runs") / f"curve-{file_name(Path(task.dataset).name)}"
     numbers = parse_numbers("--sizes", sizes)
     curve = run_curve(task, numbers, folder, resume=resume, execution=Execution(device=device), progress=make_progress(quiet), command=str(ctx.obj))
     if as_json:

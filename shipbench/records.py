@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError
+from .names import check_label, check_name, check_run
 from .ship import Ship
 from .signals import COMMANDS, STATES
 
@@ -37,6 +38,9 @@ class Run:
     meta: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        check_run(self.id, "run")
+        for key, label in (("group", self.group), ("manoeuvre", self.kind)):
+            check_run(label, f"run '{self.id}': {key}")
         n = len(self.t)
         if self.states.shape != (n, len(STATES)) or self.inputs.shape != (n, len(self.inputs_names)):
             raise InputError(
@@ -107,7 +111,7 @@ class Dataset:
     """Runs of one ship with one sample time and one list of inputs.
 
     Args:
-        name: registered name or folder name.
+        name: registered name, or the `name` of dataset.toml (see `names.check_name`).
         ship: the vessel's particulars.
         dt: sample time [s].
         runs: the runs.
@@ -130,6 +134,7 @@ class Dataset:
     derived: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        check_name(self.name, "name")
         if not self.runs:
             raise InputError(f"data set '{self.name}' has no runs; at least one is needed.")
         if self.actuators not in ("measured", "commanded"):

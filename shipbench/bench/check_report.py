@@ -11,8 +11,8 @@ from typing import Any
 from ..checking.finding import Finding, Picture, merged, toml_line
 from ..checking.recording import Recording
 from ..errors import InputError
+from ..names import file_name
 from .dataset_facts import dataset_facts
-from .results import slug
 from .tables import Table, TableColumn
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -54,7 +54,7 @@ def write_findings(recording: Recording, findings: Sequence[Finding], folder: Pa
         written.append(_write(folder / "dataset_lines.toml", document["lines"] + "\n"))
         for number, finding in enumerate(findings, 1):
             if finding.picture is not None:
-                written.append(_draw(finding.picture, folder / f"{number:02d}-{slug(finding.kind.replace(' ', '_'))}.png"))
+                written.append(_draw(finding.picture, folder / f"{number:02d}-{file_name(finding.kind.replace(' ', '_'))}.png"))
     except OSError as error:
         raise InputError(f"cannot write to {folder}: {error.strerror}. Give a folder that can be written.") from None
     return written

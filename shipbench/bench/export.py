@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,7 +50,7 @@ def predictions(folder: Path) -> Iterator[Predicted]:
         cell = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"])
         try:
             batch, S = read_truth(folder, cell.dataset, cell.fold), read_predictions(folder, cell)
-        except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        except InputError as error:
             raise InputError(
                 f"{folder}: the saved predictions of {cell.label} cannot be read ({error}). Give the folder that `shipbench run` wrote, whole."
             ) from None

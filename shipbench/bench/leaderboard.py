@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..names import file_name
 from . import board_statistics, board_tables
 from .board_scores import Scores, cluster_of
 from .cost import parameters_by_model
@@ -137,11 +138,18 @@ def _head(rows: Frame, summaries: list[dict[str, Any]]) -> list[str]:
 
 
 def write_boards(
-    results: Results, out: str | Path, command: str, *, plots: bool = True, formats: Sequence[str] = ("md",), baseline: str | None = None
+    results: Results,
+    out: str | Path,
+    command: str,
+    *,
+    plots: bool = True,
+    formats: Sequence[str] = ("md",),
+    baseline: str | None = None,
+    tell: Callable[[str], None] = lambda line: None,
 ) -> list[tuple[Board, Path]]:
     """Render every data set of `results` into `out/<dataset>.md` (and the other `formats`), with its plots beside it in `out/<dataset>/`.
 
-    Several data sets with several models in common also get a page over all of them.
+    Several data sets with several models in common also get a page over all of them. `tell` gets a line on each plot that cannot be drawn.
 
     Returns:
         Each board with the path of its page in the first format.
@@ -158,19 +166,24 @@ def write_boards(
     images: dict[str, list[Path]] = {}
     overall = over_data_sets([scores_of(results, name, baseline) for name in names])
     if overall is not None:
+        if overall.board.dataset in names:
+            raise InputError(f"a data set is named '{overall.board.dataset}', as the page over all data sets is. Rename the data set, or give it alone.")
         boards.append(overall.board)
         images[overall.board.dataset] = [overall.draw(out / overall.board.dataset)] if plots and overall.can_draw else []
     written = []
     for board in boards:
+        page = file_name(board.dataset)
         if plots and board.dataset not in images:
             from .plots import draw_all
 
-            images[board.dataset] = draw_all(results, board.dataset, board.ranking, out / board.dataset)
+            images[board.dataset], left_out = draw_all(results, board.dataset, board.ranking, out / page)
+            for line in left_out:
+                tell(f"{board.dataset}: {line}")
         out.mkdir(parents=True, exist_ok=True)
         paths = []
         for name in formats:
             suffix, text = render(board, name, command, images.get(board.dataset, []), out)
-            part, path = out / f".{board.dataset}.{os.getpid()}.tmp", out / f"{board.dataset}{suffix}"
+            part, path = out / f".{page}.{os.getpid()}.tmp", out / f"{page}{suffix}"
             part.write_text(text, encoding="utf-8")
             os.replace(part, path)
             paths.append(path)

@@ -13,7 +13,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import re
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -25,7 +24,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..names import file_name
 from ..records import Batch
+from ..regular_files import read_npz
+from ..signals import COMMANDS, STATES
 from .regimes import window_features
 from .scoring import measure
 
@@ -36,12 +38,7 @@ Frame = Any
 """A pandas DataFrame. pandas' own annotations are unions of all that a method can return, which no checker can follow."""
 
 STATUSES = ("ok", "diverged", "failed", "skipped")
-
-
-def slug(text: str) -> str:
-    """`text` as a folder name; a changed text keeps a digest so that two specs never share a folder."""
-    safe = re.sub(r"[^\w.+=,\[\]-]+", "-", text)[:80]
-    return safe if safe == text else f"{safe}-{hashlib.sha256(text.encode()).hexdigest()[:6]}"
+_WHOLE = "Give the folder that `shipbench run` wrote, whole."
 
 
 @dataclass(frozen=True)
@@ -61,7 +58,7 @@ class Cell:
     @property
     def folder(self) -> Path:
         """Relative to the study's folder."""
-        return Path("cells", slug(self.dataset), slug(self.model), f"fold{self.fold}-seed{self.seed}")
+        return Path("cells", file_name(self.dataset), file_name(self.model), f"fold{self.fold}-seed{self.seed}")
 
 
 @contextmanager
@@ -91,24 +88,54 @@ def write_rows(path: Path, rows: Frame) -> None:
 
 def write_truth(out: Path, dataset: str, fold: int, batch: Batch) -> None:
     """Save what every model of this fold is scored against."""
-    with _in_one_step(out / "truth" / slug(dataset) / f"fold{fold}.npz") as part, part.open("wb") as file:
+    with _in_one_step(truth_path(out, dataset, fold)) as part, part.open("wb") as file:
         np.savez_compressed(file, ids=np.array(batch.ids), s0=batch.s0, U=batch.U, truth=batch.truth)
 
 
+def truth_path(out: Path, dataset: str, fold: int) -> Path:
+    """Where the truth of a fold is saved."""
+    return out / "truth" / file_name(dataset) / f"fold{fold}.npz"
+
+
 def read_truth(out: Path, dataset: str, fold: int) -> Batch:
-    """What `write_truth` saved (without history)."""
-    # the file is opened here, since numpy leaves a damaged one open
-    with (out / "truth" / slug(dataset) / f"fold{fold}.npz").open("rb") as opened, np.load(opened) as file:
-        return Batch(tuple(file["ids"].tolist()), file["s0"], file["U"], file["truth"])
+    """What `write_truth` saved (without history).
+
+    Raises:
+        InputError: it is not there, is damaged, or its arrays are of other shapes.
+    """
+    path = truth_path(out, dataset, fold)
+    found = _arrays(path, ("ids", "s0", "U", "truth"))
+    ids, s0, U, truth = (found[name] for name in ("ids", "s0", "U", "truth"))
+    steps = (len(ids), truth.shape[1]) if ids.ndim == 1 and truth.ndim == 3 else (0, 0)
+    shapes = s0.shape == (len(ids), len(STATES)) and truth.shape == (*steps, len(STATES)) and U.shape[:2] == steps and U.ndim == 3
+    if not shapes or 0 in steps or U.shape[2] < len(COMMANDS) or ids.dtype.kind != "U" or any(a.dtype.kind != "f" for a in (s0, U, truth)):
+        raise InputError(f"{path}: ids {ids.shape}, s0 {s0.shape}, U {U.shape}, truth {truth.shape} are no truth of windows. {_WHOLE}")
+    if not all(np.isfinite(a).all() for a in (s0, U, truth)):
+        raise InputError(f"{path}: the truth holds values that are not finite. {_WHOLE}")
+    return Batch(tuple(ids.tolist()), s0, U, truth)
 
 
 def read_predictions(out: Path, cell: Cell) -> np.ndarray | None:
-    """S (batch, K, 10) of a cell, or None where nothing was predicted (failed, skipped)."""
+    """S (batch, K, 10) of a cell, or None where nothing was predicted (failed, skipped).
+
+    Raises:
+        InputError: the file is damaged, or its array is of another shape.
+    """
     path = out / cell.folder / "predictions.npz"
-    if not path.is_file():
+    if not path.exists():
         return None
-    with path.open("rb") as opened, np.load(opened) as file:
-        return file["S"]
+    S = _arrays(path, ("S",))["S"]
+    if S.ndim != 3 or S.shape[2] != len(STATES) or S.dtype.kind != "f":
+        raise InputError(f"{path}: S {S.shape} of {S.dtype} is no prediction; accepted: numbers (batch, K, {len(STATES)}). {_WHOLE}")
+    return S
+
+
+def _arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """The arrays of these names in a .npz file."""
+    found = read_npz(path)
+    if missing := [name for name in names if name not in found]:
+        raise InputError(f"{path} lacks {', '.join(missing)}. {_WHOLE}")
+    return found
 
 
 def write_cell(out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, files: Mapping[str, bytes]) -> None:

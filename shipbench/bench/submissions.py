@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -120,7 +118,7 @@ def verify(results: Results) -> tuple[list[str], list[str]]:
             continue
         try:
             batch, S = read_truth(source, cell.dataset, cell.fold), read_predictions(source, cell)
-        except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        except InputError as error:
             raise InputError(f"{source}: the saved truth or predictions of {cell.label} cannot be read ({error}); --verify needs them.") from None
         if S is None:
             raise InputError(f"{source}: no saved predictions of {cell.label}; --verify needs the whole folder that `shipbench run` wrote.")

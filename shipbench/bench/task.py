@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from ..errors import InputError, unknown_name
 from ..metrics.base import METRICS
+from ..names import LONGEST_LABEL, check_label
 from ..toml_files import read_toml
 
 DEFAULT_METRICS = ("ed", "edh", "cvdm", "final_displacement", "heading_error", "position_rmse", "signal_rmse", "trial_indices")
@@ -49,6 +50,11 @@ class Task(BaseModel):
     @classmethod
     def _once_each(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
         return tuple(dict.fromkeys(value))
+
+    @field_validator("models")
+    @classmethod
+    def _labels(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(check_label(model, "model", LONGEST_LABEL) for model in value)
 
     @field_validator("metrics")
     @classmethod

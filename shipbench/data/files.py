@@ -15,6 +15,7 @@ import tomli_w
 from pydantic import ConfigDict, Field, ValidationError
 
 from ..errors import InputError, unknown_name
+from ..names import check_name
 from ..records import Dataset, Run
 from ..ship import Ship
 from ..signals import ACTUATORS, COMMANDS, ENVIRONMENT, STATES, wrap_angle
@@ -90,6 +91,7 @@ def read_description(path: Path) -> Description:
         key = ".".join(str(k) for k in first["loc"])
         value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:80]})"
         raise InputError(f"{path}: {key}: {first['msg']}{value}. Accepted keys: {', '.join(Description.model_fields)}.") from None
+    check_name(description.name, f"{path}: name")
     check_names(description, description.runs, path.name)
     return description
 

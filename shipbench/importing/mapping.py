@@ -9,6 +9,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field, ValidationError
 
 from ..errors import InputError
+from ..names import check_name
 from ..toml_files import read_toml
 from .entries import Channel, Part, check_channel
 
@@ -134,6 +135,7 @@ def load_mapping(path: str | Path, **overrides: Any) -> Mapping:
         mapping = Mapping.model_validate(data)
     except ValidationError as error:
         raise _explained(error, path, single) from None
+    check_name(mapping.name, f"{path}: name")
     for source in mapping.sources.values():
         if source.file.thousands == source.file.decimal:
             raise InputError(f"{path}: [file] decimal and thousands are both '{source.file.decimal}'; accepted: two marks. Correct one.")

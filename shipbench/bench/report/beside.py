@@ -12,7 +12,8 @@ from typing import Any
 from urllib.parse import quote
 
 from ...errors import InputError
-from ..results import Cell, Results, slug
+from ...names import file_name
+from ..results import Cell, Results
 
 _PARAMETER = re.compile(r"^\s+(\w+)\s+=\s+([-+]?\d[\d.]*(?:e[-+]?\d+)?)\s+(\S.*)$", re.IGNORECASE)
 _LONGEST = 20_000
@@ -81,7 +82,7 @@ def diagnoses(results: Results, dataset: str, given: Sequence[Path], page: Path)
     found = {}
     for folder in dict.fromkeys(results.sources):
         up = folder.resolve().parent
-        for near in (folder, folder / "diagnosis", *(root / "diagnoses" / slug(Path(dataset).name) for root in (up, up.parent))):
+        for near in (folder, folder / "diagnosis", *(root / "diagnoses" / file_name(Path(dataset).name) for root in (up, up.parent))):
             if (near / "diagnosis.json").is_file():
                 try:
                     found[near.resolve()] = _told(near, _read(near), fingerprint, page)

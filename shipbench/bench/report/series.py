@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -87,7 +85,7 @@ class _Reading:
         try:
             batch = self._batch(cell, source)
             S = read_predictions(source, cell)
-        except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        except InputError as error:
             reason = " ".join(str(error).split())
             self.missing.append(f"The predictions of `{cell.model}`, fold {cell.fold}, are not drawn; they cannot be read: {reason}.")
             return
