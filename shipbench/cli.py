@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from . import cli_check, cli_contract, cli_data, cli_diagnosis, cli_import, cli_leaderboard, cli_report
-from .cli_common import SETTINGS, DatasetArgument, Device, Json, Quiet, console_for_tables, exit_if_failed, parse_seeds, print_json, show_boards
+from .cli_common import SETTINGS, DatasetArgument, Device, Json, Quiet, console_for_tables, exit_if_failed, parse_seeds, print_json, say, show_boards
 from .errors import InputError, ShipbenchError
 from .names import file_name
 
@@ -37,7 +37,7 @@ class _Group(TyperGroup):
             if error.errno in (None, errno.EPIPE):  # a reader that has read enough (| head) is no error; typer ends quietly
                 raise
             code, text = 1, f"{error.filename or 'a file'}: {error.strerror}."
-        typer.echo(f"error: {text}", err=True)
+        say(f"error: {text}", err=True)
         raise typer.Exit(code)
 
 
@@ -109,15 +109,16 @@ def run(
     tasks = load_tasks(config, overrides)
     folder = out or Path("runs") / (Path(config).stem if config else file_name(Path(tasks[0].dataset).name))
     outcome = run_tasks(tasks, folder, resume=resume, execution=execution, progress=make_progress(quiet), command=str(ctx.obj))
-    written = write_boards(outcome.results, folder, str(ctx.obj))
+    tell = say if not quiet and not as_json else lambda line: None
+    written = write_boards(outcome.results, folder, str(ctx.obj), tell=tell)
     if as_json:
         boards = {board.dataset: board.as_json() for board, _ in written}
         print_json({"out": str(folder), "leaderboards": boards, "failed": outcome.failed})
     elif not quiet:
         show_boards([board for board, _ in written])
-        typer.echo(f"Results in {folder}; leaderboard: {', '.join(str(path) for _, path in written)}")
+        say(f"Results in {folder}; leaderboard: {', '.join(str(path) for _, path in written)}")
         if equations := sorted(folder.glob("cells/*/*/*/equations.txt")):
-            typer.echo(f"Fitted equations of {len(equations)} models beside their predictions, e.g. {equations[0]}")
+            say(f"Fitted equations of {len(equations)} models beside their predictions, e.g. {equations[0]}")
     exit_if_failed(outcome.failed, f"{len(outcome.failed)} of {len(outcome.summaries)} fits")
 
 
@@ -175,7 +176,7 @@ def predict(
 
     predicted = predict_runs(model, load_dataset(dataset), horizon, device)
     write_csv(predicted, out)
-    typer.echo(f"Written: {out} ({len(predicted)} runs)")
+    say(f"Written: {out} ({len(predicted)} runs)")
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .errors import InputError
+from .names import shown
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,6 +22,11 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON document to s
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No progress.")]
 Device = Annotated[str | None, typer.Option(help="Where networks compute: cpu, cuda or cuda:1 (default cpu); physics stays on the CPU.")]
 DatasetArgument = Annotated[str, typer.Argument(metavar="DATASET", help="Registered name or folder.")]
+
+
+def say(text: str, err: bool = False) -> None:
+    """Print text that may hold names and words of a stranger's: what a terminal would take for a command is shown."""
+    typer.echo(shown(text, keep="\n\t"), err=err)
 
 
 def print_json(data: Any) -> None:
@@ -58,7 +64,7 @@ def exit_if_failed(failed: Sequence[str], what: str) -> None:
     if failed:
         typer.echo(f"{what} failed:", err=True)
         for line in failed:
-            typer.echo(f"  {line}", err=True)
+            say(f"  {line}", err=True)
         raise typer.Exit(1)
 
 
@@ -66,6 +72,6 @@ def show_boards(boards: Sequence[Board]) -> None:
     """Print leaderboards on a terminal."""
     console = console_for_tables()
     for board in boards:
-        console.print(f"\n{board.title}", style="bold", markup=False)
+        console.print(f"\n{shown(board.title)}", style="bold", markup=False)
         for table in board.tables:
             table.show(console)

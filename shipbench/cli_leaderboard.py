@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .cli_common import Device, Json, Quiet, exit_if_failed, parse_numbers, parse_seeds, print_json, show_boards
+from .cli_common import Device, Json, Quiet, exit_if_failed, parse_numbers, parse_seeds, print_json, say, show_boards
 from .errors import InputError
 from .names import file_name
 
@@ -29,7 +29,7 @@ def leaderboard(
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the pages.")] = Path("leaderboards"),
     formats: Annotated[str, typer.Option("--format", help="md, latex, csv, html; several with commas between.")] = "md",
     baseline: Annotated[str | None, typer.Option(help="Model that the skill is counted from (default: hold).")] = None,
-    verify: Annotated[bool, typer.Option("--verify", help="First compute every score again from the saved predictions.")] = False,
+    verify: Annotated[bool, typer.Option("--verify", help="First compute everything shown again from the saved predictions.")] = False,
     submission: Annotated[Path | None, typer.Option(help="Also write rows, summary and windows there: the one folder to hand in.")] = None,
     plots: Annotated[bool, typer.Option(help="Draw the plots.")] = True,
     quiet: Quiet = False,
@@ -37,40 +37,44 @@ def leaderboard(
 ) -> None:
     """Render leaderboards and plots from the results of one or several people."""
     from .bench.leaderboard import write_boards
-    from .bench.results import read_results, write_submission
+    from .bench.results import check_target, read_results, write_submission
 
     found = read_results(results or [_newest_results()])
+    if submission is not None:
+        check_target(found, submission)
     if verify:
         _verify(found, quiet or as_json)
     names = [name.strip() for name in formats.split(",") if name.strip()]
-    written = write_boards(found, out, str(ctx.obj), plots=plots, formats=names, baseline=baseline)
+    tell = say if not quiet and not as_json else lambda line: None
+    written = write_boards(found, out, str(ctx.obj), plots=plots, formats=names, baseline=baseline, tell=tell)
     if submission is not None:
         write_submission(found, submission)
     if as_json:
         print_json({board.dataset: board.as_json() for board, _ in written})
     elif not quiet:
         show_boards([board for board, _ in written])
-        typer.echo(f"Written: {', '.join(str(path) for _, path in written)}")
+        say(f"Written: {', '.join(str(path) for _, path in written)}")
         if submission is not None:
-            typer.echo(f"Submission: {submission}")
+            say(f"Submission: {submission}")
 
 
 def _verify(results: Results, silent: bool) -> None:
-    """Stop with exit code 1 and a line on each row that differs."""
-    from .bench.submissions import verify
+    """Stop with exit code 1 and a line on each figure that differs."""
+    from .bench.verify import verify
 
     differences, notes = verify(results)
-    for note in notes:
-        typer.echo(f"note: {note}", err=True)
     if differences:
-        typer.echo(f"{len(differences)} scores are not what the saved predictions give:", err=True)
+        say(f"{len(differences)} scores are not what the saved predictions give:", err=True)
         for line in differences[:50]:
-            typer.echo(f"  {line}", err=True)
+            say(f"  {line}", err=True)
         if len(differences) > 50:
-            typer.echo(f"  ... and {len(differences) - 50} more", err=True)
+            say(f"  ... and {len(differences) - 50} more", err=True)
+    for note in notes:
+        say(f"note: {note}", err=True)
+    if differences:
         raise typer.Exit(1)
     if not silent:
-        typer.echo(f"Verified: {len(results.rows)} rows are what the saved predictions give.")
+        say(f"Verified: {len(results.rows)} rows are what the saved predictions give. Times of fits and rollouts are as reported.")
 
 
 def _newest_results() -> Path:
@@ -112,5 +116,5 @@ def learning_curve(
         print_json({"out": str(folder), "page": str(curve.page), "curve": curve.board.as_json(), "failed": curve.failed})
     elif not quiet:
         show_boards([curve.board])
-        typer.echo(f"Results in {folder}; page: {curve.page}")
+        say(f"Results in {folder}; page: {curve.page}")
     exit_if_failed(curve.failed, f"{len(curve.failed)} fits")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_common import Json, Quiet, print_json
+from .cli_common import Json, Quiet, print_json, say
 
 
 def report(
@@ -29,8 +29,8 @@ def report(
     if not quiet:
         for dataset, lines in written.left_out.items():
             for line in lines:
-                typer.echo(f"{dataset}: {line}")
-    typer.echo(f"Written: {written.path} ({written.size / 1e6:.1f} MB)")
+                say(f"{dataset}: {line}")
+    say(f"Written: {written.path} ({written.size / 1e6:.1f} MB)")
 
 
 def register(app: typer.Typer) -> None:

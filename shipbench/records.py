@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError
-from .names import check_label, check_name, check_run
+from .names import check_name, check_run
 from .ship import Ship
 from .signals import COMMANDS, STATES
 

@@ -26,7 +26,7 @@ def test_the_name_of_a_data_set_is_no_path_and_has_nothing_unseen(name):
     with pytest.raises(InputError, match="name = ") as caught:
         Dataset(name, TOY_SHIP, 1.0, (run(),))
     assert str(caught.value).isprintable()
-    with pytest.raises(InputError, match="mapping.toml: name = "):
+    with pytest.raises(InputError, match=r"mapping\.toml: name = "):
         check_name(name, "mapping.toml: name")
 
 

@@ -68,13 +68,13 @@ def _write(path: Path, text: str) -> Path:
 
 
 def _draw(picture: Picture, path: Path) -> Path:
-    from .plots import new_figure, save
+    from .plots import new_figure, plain, save
 
     figure = new_figure(8.0, 4.5)
     axes = figure.add_subplot()
     for i, curve in enumerate(picture.curves):
-        axes.plot(curve.x, curve.y, curve.style, color=_COLOURS[i % len(_COLOURS)], label=curve.label, markersize=4, linewidth=1.2)
-    axes.set(title=picture.title, xlabel=picture.xlabel, ylabel=picture.ylabel)
+        axes.plot(curve.x, curve.y, curve.style, color=_COLOURS[i % len(_COLOURS)], label=plain(curve.label), markersize=4, linewidth=1.2)
+    axes.set(title=plain(picture.title), xlabel=picture.xlabel, ylabel=picture.ylabel)
     axes.grid(alpha=0.3)
     axes.legend()
     return save(figure, path)

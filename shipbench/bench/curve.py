@@ -94,7 +94,7 @@ def _figures(scores: Scores, model: str) -> dict[str, float]:
 
 def draw(found: dict[int, Scores], dataset: str) -> Figure:
     """ED against the number of training runs, one line with its 95 % band for each model; both axes logarithmic."""
-    from .plots import new_figure, short_name, style
+    from .plots import new_figure, plain, short_name, style
 
     models = next(iter(found.values())).models
     figure = new_figure(8.0, 5.2)
@@ -115,7 +115,7 @@ def draw(found: dict[int, Scores], dataset: str) -> Figure:
     axis.set_ylabel("ED [m]")
     axis.grid(alpha=0.25, which="both")
     axis.legend(fontsize=9)
-    axis.set_title(f"{dataset}: error against number of training runs (band: 95 % over runs)", fontsize=11)
+    axis.set_title(f"{plain(dataset)}: error against number of training runs (band: 95 % over runs)", fontsize=11)
     return figure
 
 

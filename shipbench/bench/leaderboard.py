@@ -166,26 +166,32 @@ def write_boards(
     images: dict[str, list[Path]] = {}
     overall = over_data_sets([scores_of(results, name, baseline) for name in names])
     if overall is not None:
-        if overall.board.dataset in names:
-            raise InputError(f"a data set is named '{overall.board.dataset}', as the page over all data sets is. Rename the data set, or give it alone.")
+        page = overall.board.dataset
+        if page in names:
+            raise InputError(f"a data set is named '{page}', as the page over all data sets is. Rename the data set, or give it alone.")
         boards.append(overall.board)
-        images[overall.board.dataset] = [overall.draw(out / overall.board.dataset)] if plots and overall.can_draw else []
+        images[page] = [overall.draw(out / page)] if plots and overall.can_draw else []
     written = []
     for board in boards:
-        page = file_name(board.dataset)
         if plots and board.dataset not in images:
-            from .plots import draw_all
-
-            images[board.dataset], left_out = draw_all(results, board.dataset, board.ranking, out / page)
-            for line in left_out:
-                tell(f"{board.dataset}: {line}")
-        out.mkdir(parents=True, exist_ok=True)
-        paths = []
-        for name in formats:
-            suffix, text = render(board, name, command, images.get(board.dataset, []), out)
-            part, path = out / f".{page}.{os.getpid()}.tmp", out / f"{page}{suffix}"
-            part.write_text(text, encoding="utf-8")
-            os.replace(part, path)
-            paths.append(path)
+            images[board.dataset] = _draw(results, board, out, tell)
+        paths = [_write(board, name, command, images.get(board.dataset, []), out) for name in formats]
         written.append((board, paths[0]))
     return written
+
+
+def _draw(results: Results, board: Board, out: Path, tell: Callable[[str], None]) -> list[Path]:
+    from .plots import draw_all
+
+    return draw_all(results, board.dataset, board.ranking, out / file_name(board.dataset), lambda line: tell(f"{board.dataset}: {line}"))
+
+
+def _write(board: Board, form: str, command: str, images: Sequence[Path], out: Path) -> Path:
+    """The page in one format, in one step."""
+    suffix, text = render(board, form, command, images, out)
+    out.mkdir(parents=True, exist_ok=True)
+    page = file_name(board.dataset)
+    part, path = out / f".{page}.{os.getpid()}.tmp", out / f"{page}{suffix}"
+    part.write_text(text, encoding="utf-8", errors="replace")
+    os.replace(part, path)
+    return path

@@ -5,14 +5,16 @@ from __future__ import annotations
 import itertools
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..metrics.ed import ed
+from ..names import shown
 from ..signals import PSI, X, Y
 from .results import Cell, Frame, Results, read_predictions, read_truth
 
@@ -49,13 +51,28 @@ def _predictions(results: Results, dataset: str, model: str) -> Iterator[_Predic
         S = read_predictions(source, Cell(dataset, model, summary["fold"], summary["seed"]))
         if S is not None:
             batch = read_truth(source, dataset, summary["fold"])
+            if S.shape != batch.truth.shape or len(S) != len(summary["run_status"]):
+                raise InputError(f"{source}: predictions of shape {S.shape} for a truth of shape {batch.truth.shape}.")
             yield _Prediction(batch.ids, batch.s0, batch.truth, S, np.array([s == "ok" for s in summary["run_status"]]))
+
+
+def _readable(results: Results, dataset: str, model: str) -> bool:
+    """Whether any scored window of the model can be drawn."""
+    try:
+        return any(cell.ok.any() for cell in _predictions(results, dataset, model))
+    except InputError:
+        return False
 
 
 def short_name(model: str) -> str:
     """A spec that fits a legend: no folders, at most 28 characters."""
     name = Path(model).name if "/" in model else model
-    return name if len(name) <= 28 else f"{name[:25]}..."
+    return plain(name if len(name) <= 28 else f"{name[:25]}...")
+
+
+def plain(text: str) -> str:
+    """Text for matplotlib, which would take what stands between dollar signs for a formula."""
+    return shown(text).replace("$", r"\$")
 
 
 def style(models: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -89,11 +106,17 @@ def save(figure: Figure, path: Path) -> Path:
     return path
 
 
-def draw_all(results: Results, dataset: str, ranking: Sequence[str], folder: Path) -> list[Path]:
-    """Draw every plot of a data set into `folder`; models without a single scored run are left out."""
+def draw_all(results: Results, dataset: str, ranking: Sequence[str], folder: Path, tell: Callable[[str], None] = lambda line: None) -> list[Path]:
+    """Draw every plot of a data set into `folder`. Models without a single scored run are left out, and those without saved predictions, of which
+    `tell` gets one line."""
     rows = results.rows[results.rows["dataset"] == dataset]
     scored = set(rows.loc[rows["status"] == "ok", "model"])
-    models = [m for m in ranking if m in scored]
+    models, without = [], []
+    for model in (m for m in ranking if m in scored):
+        (models if _readable(results, dataset, model) else without).append(model)
+    if without:
+        what = f"plots without {', '.join(without[:5])}{' and others' if len(without) > 5 else ''}" if models else "no plots"
+        tell(f"{what}: no saved predictions. Give the folder that `shipbench run` wrote, whole, or --no-plots.")
     if not models:
         return []
     summary = next(s for s in results.summaries if s["dataset"] == dataset)
@@ -136,17 +159,19 @@ def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[
                     _track(axis, cell.s0[i], cell.S[i], summary, label=model, **styles[model])
     for axis, (name, run) in zip(axes, chosen.items(), strict=True):
         error = rows[(rows["run"] == run) & (rows["status"] == "ok")].groupby("model")["ed"].mean()
-        axis.set_title(f"{name} run: {run}", fontsize=11)
+        axis.set_title(f"{name} run: {plain(run)}", fontsize=11)
         axis.set_xlabel("east y [m]")
         axis.set_ylabel("north x [m]")
         axis.set_aspect("equal", adjustable="datalim")
         axis.grid(alpha=0.25)
         handles = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
+        if not handles:  # none of the drawn models predicted this run
+            continue
         order = ["true", *[m for m in models if m in handles]]
         texts = ["true", *[f"{short_name(m)} (ED {error[m]:.3g} m)" for m in order[1:]]]
         axis.legend([handles[m] for m in order], texts, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
     figure.suptitle(
-        f"{dataset}: tracks over {summary['task']['horizon_s']:g} s; the true ship every quarter, the predicted ones at the end", fontsize=12
+        f"{plain(dataset)}: tracks over {summary['task']['horizon_s']:g} s; the true ship every quarter, the predicted ones at the end", fontsize=12
     )
     return figure
 
@@ -199,7 +224,7 @@ def boxes(rows: Frame, models: Sequence[str], summary: dict[str, Any]) -> Figure
         axis.grid(axis="y", alpha=0.25)
         _readable_limits(axis, [g for _, g in shown])
     what = f"error of each run (mean over {summary['task']['horizon_s']:g} s); box quartiles, whiskers 5 to 95 %, diamond mean"
-    figure.suptitle(f"{summary['dataset']}: {what}", fontsize=11)
+    figure.suptitle(f"{plain(summary['dataset'])}: {what}", fontsize=11)
     return figure
 
 
@@ -223,5 +248,5 @@ def against_horizon(results: Results, dataset: str, models: Sequence[str], dt: f
     axis.set_ylabel("position error ED [m]")
     axis.grid(alpha=0.25, which="both" if axis.get_yscale() == "log" else "major")
     axis.legend(fontsize=9)
-    axis.set_title(f"{dataset}: error against horizon (median and quartiles over runs)", fontsize=11)
+    axis.set_title(f"{plain(dataset)}: error against horizon (median and quartiles over runs)", fontsize=11)
     return figure

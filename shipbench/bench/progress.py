@@ -6,6 +6,8 @@ import sys
 import time
 from typing import Any, Protocol, TextIO
 
+from ..names import shown
+
 
 class Progress(Protocol):
     """What the runner tells: `total` cells; which model is being worked on; each cell as it ends."""
@@ -50,13 +52,13 @@ class Lines:
         self.total, self.count, self.began = total, 0, time.monotonic()
 
     def working(self, label: str) -> None:
-        print(f"        {label} ...", file=self.stream, flush=True)
+        print(shown(f"        {label} ..."), file=self.stream, flush=True)
 
     def done(self, label: str, outcome: str) -> None:
         self.count += 1
         left = (time.monotonic() - self.began) / self.count * (self.total - self.count)
         after = f"; about {duration(left)} left" if self.count < self.total else ""
-        print(f"{f'[{self.count}/{self.total}]':>8s} {label}: {outcome}{after}", file=self.stream, flush=True)
+        print(shown(f"{f'[{self.count}/{self.total}]':>8s} {label}: {outcome}{after}"), file=self.stream, flush=True)
 
     def finish(self) -> None:
         how = "finished in" if self.count == self.total else "stopped after"
@@ -72,7 +74,7 @@ class Bar:
 
         self.progress = Progress(
             SpinnerColumn(), BarColumn(bar_width=24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("left"),
-            TimeRemainingColumn(), TextColumn("{task.description}"), console=Console(stderr=True), speed_estimate_period=3600,
+            TimeRemainingColumn(), TextColumn("{task.description}", markup=False), console=Console(stderr=True), speed_estimate_period=3600,
         )  # fmt: skip
         self.bar: Any = None
 
@@ -81,12 +83,12 @@ class Bar:
         self.progress.start()
 
     def working(self, label: str) -> None:
-        self.progress.update(self.bar, description=label)
+        self.progress.update(self.bar, description=shown(label))
 
     def done(self, label: str, outcome: str) -> None:
         self.progress.advance(self.bar)
         if not outcome.startswith("ok"):
-            self.progress.console.print(f"{label}: {outcome}", highlight=False, markup=False)
+            self.progress.console.print(shown(f"{label}: {outcome}"), highlight=False, markup=False)
 
     def finish(self) -> None:
         self.progress.update(self.bar, description="")

@@ -26,7 +26,7 @@ import numpy as np
 from ..errors import InputError
 from ..names import file_name
 from ..records import Batch
-from ..regular_files import read_npz
+from ..regular_files import open_regular, read_json, read_npz
 from ..signals import COMMANDS, STATES
 from .regimes import window_features
 from .scoring import measure
@@ -38,6 +38,8 @@ Frame = Any
 """A pandas DataFrame. pandas' own annotations are unions of all that a method can return, which no checker can follow."""
 
 STATUSES = ("ok", "diverged", "failed", "skipped")
+_MOST_ROWS = 10_000_000
+"""Rows of a table of results; 200 models on 10,000 runs have 2 million."""
 _WHOLE = "Give the folder that `shipbench run` wrote, whole."
 
 
@@ -208,15 +210,37 @@ def window_table(out: Path, summaries: Sequence[dict[str, Any]]) -> Frame:
 
 def _read_windows(folder: Path, summaries: list[dict[str, Any]]) -> Frame | None:
     """`windows.parquet` of a study, made from the saved truth where it is missing; None without both."""
-    import pandas as pd
+    from .submissions import check_windows_of
 
-    try:
-        path = folder / "windows.parquet"
-        return pd.read_parquet(path) if path.is_file() else window_table(folder, summaries)
-    except FileNotFoundError:
+    path = folder / "windows.parquet"
+    if path.exists():
+        windows = read_frame(path)
+    elif all(truth_path(folder, s["dataset"], s["fold"]).exists() for s in summaries):
+        windows = window_table(folder, summaries)
+    else:
         return None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{folder}: windows.parquet cannot be read ({error}). Give the folder that `shipbench run` wrote, whole.") from None
+    check_windows_of(folder, windows, summaries)
+    return windows
+
+
+def read_frame(path: Path) -> Frame:
+    """A parquet table. What pandas wrote of itself into the file is not read: it can be damaged, and decides types.
+
+    Raises:
+        InputError: it is no regular file, is damaged, or declares more rows than a study has.
+    """
+    import pyarrow
+    import pyarrow.parquet
+
+    with open_regular(path, "parquet file") as file:
+        try:
+            table = pyarrow.parquet.ParquetFile(file)
+            rows = table.metadata.num_rows
+            if rows <= _MOST_ROWS:
+                return table.read().to_pandas(ignore_metadata=True)
+        except (pyarrow.ArrowException, OSError, ValueError, KeyError, TypeError, MemoryError) as error:
+            raise InputError(f"{path} cannot be read ({' '.join(str(error).split())[:160]}). {_WHOLE}") from None
+    raise InputError(f"{path} declares {rows} rows; accepted: at most {_MOST_ROWS}. {_WHOLE}")
 
 
 @dataclass(frozen=True)
@@ -242,34 +266,41 @@ def read_results(folders: Sequence[str | Path]) -> Results:
     """Read the result folders of `shipbench run`.
 
     Raises:
-        InputError: a folder holds no results, they contradict themselves (see `submissions`), or the same cell stands in two of them.
+        InputError: a folder holds no results, they contradict themselves or one another (see `submissions`), or the same cell stands in two of
+            them.
     """
     import pandas as pd
 
-    from .submissions import check_submission
+    from .submissions import check_submission, check_together
 
     frames, summaries, sources = [], [], []
     for folder in map(Path, folders):
+        if missing := [name for name in ("rows.parquet", "summary.json") if not (folder / name).exists()]:
+            raise InputError(f"{folder} holds no results: it has no {' and no '.join(missing)}. Give a folder that `shipbench run --out` wrote.")
         try:
-            frames.append(pd.read_parquet(folder / "rows.parquet"))
-            found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"{folder} holds no results: {error}. Give a folder that `shipbench run --out` wrote.") from None
-        check_submission(folder, frames[-1], found)
+            rows, found = read_frame(folder / "rows.parquet"), read_json(folder / "summary.json")
+        except InputError as error:
+            raise InputError(f"{folder} holds no results: {error}") from None
+        frames.append(check_submission(folder, rows, found))
         summaries += found
         sources += [folder] * len(found)
     if not summaries:
         raise InputError(f"no finished cell in {', '.join(map(str, folders))}; run `shipbench run` (again, with --resume) first.")
-    seen: dict[tuple[Any, ...], Path] = {}
-    for summary, source in zip(summaries, sources, strict=True):
-        cell = (summary["dataset"], summary["fingerprint"], summary["model"], summary["fold"], summary["seed"])
-        if cell in seen:
-            raise InputError(
-                f"'{summary['model']}' on '{summary['dataset']}', fold {summary['fold']}, seed {summary['seed']} stands in {seen[cell]} "
-                f"and in {source}; leave one of them out."
-            )
-        seen[cell] = source
-    return Results(pd.concat(frames, ignore_index=True), summaries, sources)
+    rows = pd.concat(frames, ignore_index=True)
+    check_together(rows, summaries, sources)
+    return Results(rows, summaries, sources)
+
+
+def check_target(results: Results, folder: Path) -> None:
+    """Refuse a folder for a submission whose own results it would replace.
+
+    Raises:
+        InputError: it is one of the folders that were read, or holds a study.
+    """
+    same = folder.resolve() in {source.resolve() for source in results.sources}
+    if same or (folder / "study.json").exists() or (folder / "cells").exists():
+        what = "is one of the result folders" if same else "holds the results of a study"
+        raise InputError(f"--submission {folder} {what}, which it would replace. Give another folder.")
 
 
 def write_submission(results: Results, folder: Path) -> None:

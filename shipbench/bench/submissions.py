@@ -1,167 +1,174 @@
-"""What a result folder must be before it is ranked beside others, and its scores computed again from the saved predictions."""
+"""What a result folder must be before it is ranked beside others: types and values (see `entry`), and rows and summaries that belong together."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from ..errors import InputError
+from ..names import shown
+from .entry import TEXTS, TIMES, WHOLE, check_columns, check_entry, check_labels, check_scores, check_task_of, check_windows
+from .results import PROTOCOL, Cell, Frame
+from .task import make_task
 
-from ..data.base import load_dataset
-from ..errors import InputError, ShipbenchError
-from .folds import make_folds, select_runs
-from .results import PROTOCOL, STATUSES, Cell, Frame, Results, read_predictions, read_truth
-from .scoring import divergence, measure
-from .task import Task, make_task
-
-IDENTITY = ("protocol", "dataset", "fingerprint", "task", "model", "fold", "seed", "run", "parent", "kind", "status", "reason")
-_TIMES = ("fit_s", "fit_shared_by", "predict_s")
-_SUMMARY = ("protocol", "dataset", "fingerprint", "task_key", "task", "model", "fold", "seed", "columns", "runs", "ship_L", "dt", "code", "machine")
 _CELL = ["dataset", "model", "fold", "seed"]
-TOLERANCE = 1e-9
-"""Relative difference of a score that another processor's rounding can make."""
+_WINDOW = ["dataset", "fingerprint", "task", "fold", "run"]
+_SHIP = ("ship", "ship_L", "ship_B", "dt", "inputs")
+_GIVE = "Give the folder as `shipbench run` wrote it."
 
 
-def check_submission(folder: Path, rows: Frame, summaries: list[dict[str, Any]]) -> None:
-    """Refuse rows and summaries that contradict themselves or cannot be ranked here.
+def check_submission(folder: Path, rows: Frame, summaries: Any) -> Frame:
+    """Refuse rows and summaries that contradict themselves or cannot be ranked here; the rows without columns that no entry speaks of.
 
     Raises:
-        InputError: a column or key is missing, a row stands twice, the protocol or the task is not known here, rows and summaries do not belong
-            together, a status is unknown, or a scored row has no score.
+        InputError: a column or key is missing or of another type, a row stands twice, the protocol or the task is not known here, rows and summaries
+            do not belong together, a status is unknown, or a score is none.
     """
 
-    def refuse(what: str, help_: str = "Give the folder as `shipbench run` wrote it.") -> InputError:
-        return InputError(f"{folder}: {what}. {help_}")
+    def refuse(what: str, help_: str = _GIVE) -> InputError:
+        return InputError(f"{folder}: {what.rstrip('.')}. {help_}")
 
+    if not isinstance(summaries, list):
+        raise refuse("summary.json is no list of entries")
     keys: dict[str, str] = {}  # of tasks that were looked at already: cells share them
     for summary in summaries:
-        missing = [key for key in _SUMMARY if key not in summary]
-        if missing:
-            raise refuse(f"an entry of summary.json lacks {', '.join(missing)}")
-        cell = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"])
-        if summary["protocol"] != PROTOCOL:
+        if isinstance(summary, dict) and isinstance(summary.get("protocol"), int) and summary["protocol"] != PROTOCOL:
+            label = " ".join(shown(summary.get(key))[:80] for key in ("dataset", "model"))
             raise refuse(
-                f"{cell.label} is of protocol {summary['protocol']}, this version ranks protocol {PROTOCOL}",
-                "Run the models again with this version.",
+                f"{label} is of protocol {summary['protocol']}, this version ranks protocol {PROTOCOL}", "Run the models again with this version."
             )
-        _check_task(summary, cell, keys, refuse)
+        check_entry(summary, refuse)
+        _check_task(summary, keys, refuse)
     if rows.empty and not summaries:
-        return
-    wanted = [*IDENTITY, *(c["name"] for s in summaries for c in s["columns"]), *_TIMES]
-    missing = [name for name in dict.fromkeys(wanted) if name not in rows]
-    if missing:
-        raise refuse(f"rows.parquet lacks the columns {', '.join(missing)}")
+        return rows
+    scores = list(dict.fromkeys(c["name"] for s in summaries for c in s["columns"]))
+    check_columns(rows, lambda what: refuse(f"rows.parquet {what}"), TEXTS, WHOLE, (*scores, *TIMES))
+    rows = rows[[name for name in rows.columns if name in {*TEXTS, *WHOLE, *scores, *TIMES, "group"}]]
+    check_labels(rows, refuse)
     twice = rows[rows.duplicated([*_CELL, "run"])]
     if len(twice):
         first = twice.iloc[0]
         raise refuse(
             f"the row of {first['model']} on {first['dataset']}, fold {first['fold']}, seed {first['seed']}, run {first['run']} stands twice"
         )
-    _check_cells(rows, summaries, refuse)
-    unknown = sorted(set(rows["status"]) - set(STATUSES))
-    if unknown:
-        raise refuse(f"unknown status '{unknown[0]}'; accepted: {', '.join(STATUSES)}")
-    scored = rows["status"] == "ok"
-    bad = rows[(scored & ~(rows["ed"] >= 0)) | (~scored & rows["ed"].notna())]
-    if len(bad):
-        first = bad.iloc[0]
-        where = f"{first['model']} on {first['dataset']}, fold {first['fold']}, run {first['run']}"
-        raise refuse(f"{where}: status '{first['status']}' with ED = {first['ed']}; a score of at least 0 goes with 'ok', none with all others")
+    cells = _cells(rows, summaries, refuse)
+    check_scores(rows, dict.fromkeys(name for s in summaries for name in s["task"]["metrics"]), scores, refuse)
+    for summary, part in cells:
+        _check_cell(summary, part, scores, refuse)
+    return rows
 
 
-def _check_task(summary: dict[str, Any], cell: Cell, keys: dict[str, str], refuse: Any) -> None:
-    text = json.dumps([summary["task"], summary["fingerprint"]], sort_keys=True)
+def _check_task(summary: dict[str, Any], keys: dict[str, str], refuse: Any) -> None:
+    label = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"]).label
+    text = json.dumps([summary["task"], summary["fingerprint"], summary["columns"], summary["dt"]], sort_keys=True)
     try:
-        key = keys[text] if text in keys else keys.setdefault(text, make_task(summary["task"]).key(summary["fingerprint"]))
+        if text not in keys:
+            keys[text] = make_task(summary["task"]).key(summary["fingerprint"])
     except InputError as error:
-        raise refuse(f"{cell.label}: this version does not know the task ({error})", "Update shipbench, or run the models again.") from None
-    if key != summary["task_key"]:
-        raise refuse(f"{cell.label}: unknown task '{summary['task_key']}'; the task that is written beside it has the key '{key}'")
+        raise refuse(f"{label}: this version does not know the task ({error})", "Update shipbench, or run the models again.") from None
+    if keys[text] != summary["task_key"]:
+        raise refuse(f"{label}: unknown task '{shown(summary['task_key'])[:40]}'; the task that is written beside it has the key '{keys[text]}'")
+    check_task_of(summary, refuse)
 
 
-def _check_cells(rows: Frame, summaries: list[dict[str, Any]], refuse: Any) -> None:
+def _cells(rows: Frame, summaries: Sequence[dict[str, Any]], refuse: Any) -> list[tuple[dict[str, Any], Frame]]:
+    """Each entry with its rows, in the order of its scored runs."""
     cells = {(s["dataset"], s["model"], s["fold"], s["seed"]): s for s in summaries}
+    if len(cells) < len(summaries):
+        raise refuse("two entries of summary.json are of the same data set, model, fold and seed")
     groups = {key: part for key, part in rows.groupby(_CELL, sort=False)}
     for key in sorted(groups.keys() - cells.keys()):
         raise refuse(f"rows of {Cell(*key).label} have no entry in summary.json")
+    found = []
     for key, summary in cells.items():
-        label = Cell(*key).label
+        label, test = Cell(*key).label, summary["runs"]["test"]
         if key not in groups:
             raise refuse(f"{label} has an entry in summary.json and no rows")
         part = groups[key]
         for column, name in (("protocol", "protocol"), ("fingerprint", "fingerprint"), ("task", "task_key")):
-            found = set(part[column]) - {summary[name]}
-            if found:
-                raise refuse(f"{label}: {column} is {sorted(found)[0]} in the rows and {summary[name]} in summary.json")
-        if sorted(part["run"]) != sorted(summary["runs"]["test"]):
-            raise refuse(f"{label}: the runs of the rows are not the scored runs of summary.json ({len(part)} and {len(summary['runs']['test'])})")
-
-
-def verify(results: Results) -> tuple[list[str], list[str]]:
-    """Compute every score again from the saved predictions and truth.
-
-    Returns:
-        One line on each row that differs, and notes on what could not be checked (the truth, where the data set is not at hand).
-
-    Raises:
-        InputError: a folder has no saved predictions or truth, or they cannot be read.
-    """
-    differences: list[str] = []
-    notes: dict[str, None] = {}
-    wrong: dict[tuple[Path, str, int], list[str]] = {}
-    rows = results.rows.set_index([*_CELL, "run"]).sort_index()
-    for summary, source in zip(results.summaries, results.sources, strict=True):
-        cell = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"])
-        own = rows.loc[(cell.dataset, cell.model, cell.fold, cell.seed)]
-        if set(own["status"]) <= {"failed", "skipped"}:
-            continue
-        try:
-            batch, S = read_truth(source, cell.dataset, cell.fold), read_predictions(source, cell)
-        except InputError as error:
-            raise InputError(f"{source}: the saved truth or predictions of {cell.label} cannot be read ({error}); --verify needs them.") from None
-        if S is None:
-            raise InputError(f"{source}: no saved predictions of {cell.label}; --verify needs the whole folder that `shipbench run` wrote.")
-        if S.shape != batch.truth.shape:
-            differences.append(f"{cell.label}: predictions of shape {S.shape} for a truth of shape {batch.truth.shape}.")
-            continue
-        at = (source, cell.dataset, cell.fold)
-        if at not in wrong:
-            wrong[at] = _compare_truth(summary, cell, batch, notes)
-            differences += wrong[at]
-        if not wrong[at]:  # scores against another truth say nothing
-            differences += _compare(summary, cell, own.loc[list(batch.ids)], batch, S)
-    return differences, list(notes)
-
-
-def _compare(summary: dict[str, Any], cell: Cell, own: Frame, batch: Any, S: np.ndarray) -> list[str]:
-    reasons = divergence(batch.truth, S, summary["dt"])
-    ok = np.array([not reason for reason in reasons])
-    again = measure(summary["task"]["metrics"], batch, S, L=summary["ship_L"], dt=summary["dt"], ok=ok)
-    found = []
-    for i, run in enumerate(batch.ids):
-        status = "ok" if ok[i] else "diverged"
-        if own["status"].iloc[i] != status:
-            found.append(f"{cell.label}, run {run}: status is '{own['status'].iloc[i]}' in the rows, '{status}' from the predictions.")
-            continue
-        for name, values in again.items():
-            said = float(own[name].iloc[i])
-            if not np.isclose(said, values[i], rtol=TOLERANCE, atol=1e-12, equal_nan=True):
-                found.append(f"{cell.label}, run {run}: {name} is {said:.10g} in the rows, {values[i]:.10g} from the predictions.")
+            different = set(part[column]) - {summary[name]}
+            if different:
+                raise refuse(f"{label}: {column} is {shown(sorted(different)[0])} in the rows and {shown(summary[name])} in summary.json")
+        if sorted(part["run"]) != sorted(test):
+            raise refuse(f"{label}: the runs of the rows are not the scored runs of summary.json ({len(part)} and {len(test)})")
+        found.append((summary, part.set_index("run").loc[test]))
     return found
 
 
-def _compare_truth(summary: dict[str, Any], cell: Cell, batch: Any, notes: dict[str, None]) -> list[str]:
-    """The saved truth against the data set itself, where it is at hand and the same."""
-    task: Task = make_task(summary["task"])
-    try:
-        data, _ = select_runs(load_dataset(task.dataset), task)
-    except ShipbenchError as error:
-        notes[f"the truth of '{cell.dataset}' was not compared with the data set, which is not at hand ({str(error).splitlines()[0][:120]})"] = None
-        return []
-    if data.fingerprint != summary["fingerprint"]:
-        notes[f"the truth of '{cell.dataset}' was not compared with the data set: the one at hand has another fingerprint"] = None
-        return []
-    theirs = make_folds(data, task)[cell.fold].test.batch(task.history(data.dt))
-    same = theirs.ids == batch.ids and all(np.array_equal(getattr(theirs, n), getattr(batch, n)) for n in ("s0", "U", "truth"))
-    return [] if same else [f"{cell.dataset} fold {cell.fold}: the saved truth is not that of the data set."]
+def _check_cell(summary: dict[str, Any], part: Frame, scores: Iterable[str], refuse: Any) -> None:
+    """What stands in the rows and in the entry is the same, and no column is filled that the entry does not name."""
+    label = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"]).label
+    statuses = part["status"].tolist()
+    if statuses != summary["run_status"]:
+        raise refuse(f"{label}: the statuses of the rows are not those of run_status in summary.json")
+    whole = statuses[0] if statuses[0] in ("failed", "skipped") else "diverged" if "diverged" in statuses else "ok"
+    if whole != summary["status"] or (whole in ("failed", "skipped") and len(set(statuses)) > 1):
+        raise refuse(f"{label}: status is '{summary['status']}' in summary.json; its rows make it '{whole}'")
+    for name in (*TIMES, "fit_shared_by"):
+        if (part[name] != summary[name]).any():
+            raise refuse(f"{label}: {name} is {part[name].iloc[0]} in the rows and {summary[name]} in summary.json")
+    named = {c["name"] for c in summary["columns"]}
+    filled = [name for name in scores if name not in named and part[name].notna().any()]
+    if filled:
+        raise refuse(f"{label}: the rows hold {filled[0]}, which is not among its columns in summary.json")
+
+
+def check_together(rows: Frame, summaries: Sequence[dict[str, Any]], sources: Sequence[Path]) -> None:
+    """Refuse studies that say different things of the same data: of the ship, of the runs of a fold, or of where a window was cut from.
+
+    Raises:
+        InputError: see above, or the same cell stands twice.
+    """
+    seen: dict[tuple[Any, ...], Path] = {}
+    facts: dict[tuple[Any, ...], tuple[Any, Path]] = {}
+    for summary, source in zip(summaries, sources, strict=True):
+        data = (summary["dataset"], summary["fingerprint"])
+        cell = (*data, summary["model"], summary["fold"], summary["seed"])
+        if cell in seen:
+            raise InputError(
+                f"'{summary['model']}' on '{summary['dataset']}', fold {summary['fold']}, seed {summary['seed']} stands in {seen[cell]} "
+                f"and in {source}; leave one of them out."
+            )
+        seen[cell] = source
+        for key in _SHIP:
+            _agree(facts, (*data, key), summary[key], source)
+        for side, runs in summary["runs"].items():
+            _agree(facts, (*data, f"runs.{side} of fold {summary['fold']}", summary["task_key"]), runs, source)
+    for name in ("parent", "kind", *(["group"] if "group" in rows else [])):
+        told = rows[[*_WINDOW, name]].dropna().drop_duplicates()
+        twice = told[told.duplicated(_WINDOW)]
+        if len(twice):
+            first = twice.iloc[0]
+            raise InputError(
+                f"{', '.join(map(str, dict.fromkeys(sources)))}: rows of run {first['run']} of '{first['dataset']}', fold {first['fold']}, "
+                f"differ in {name}. {_GIVE}"
+            )
+
+
+def _agree(facts: dict[tuple[Any, ...], tuple[Any, Path]], key: tuple[Any, ...], value: Any, source: Path) -> None:
+    other, where = facts.setdefault(key, (value, source))
+    if other != value:
+        raise InputError(
+            f"{source}: {key[2]} of '{key[0]}' is {shown(value)[:60]}; another entry, of {where}, says {shown(other)[:60]} for the same data. {_GIVE}"
+        )
+
+
+def check_windows_of(folder: Path, windows: Frame, summaries: Sequence[dict[str, Any]]) -> None:
+    """Refuse a windows.parquet that is damaged or speaks of windows that were not scored: slices would be cut by them.
+
+    Raises:
+        InputError: see above.
+    """
+
+    def refuse(what: str) -> InputError:
+        return InputError(f"{folder}: windows.parquet {what}. {_GIVE}")
+
+    check_windows(windows, refuse)
+    scored = {(s["dataset"], s["fingerprint"], s["task_key"], s["fold"], run) for s in summaries for run in s["runs"]["test"]}
+    there = list(zip(*(windows[name] for name in _WINDOW), strict=True))
+    if len(set(there)) < len(there):
+        raise refuse("holds a window twice")
+    if others := [key for key in there if key not in scored]:
+        raise refuse(f"holds a window that was not scored: run {shown(others[0][-1])[:80]} of '{shown(others[0][0])[:80]}', fold {others[0][3]}")

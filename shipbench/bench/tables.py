@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from ..names import shown
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -120,19 +122,19 @@ class Table:
         from rich.text import Text
 
         def cell(column: TableColumn, row: dict[str, Any]) -> Text:
-            text, between = Text(column.text(row)), column.interval_text(row) if narrow else ""
+            text, between = Text(shown(column.text(row), keep="\n")), column.interval_text(row) if narrow else ""
             return text.append(f"\n{between}", style="dim") if between else text
 
         narrow = sum(c.interval for c in self.columns) <= MOST_INTERVALS
-        table = RichTable(title=Text(self.title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+        table = RichTable(title=Text(shown(self.title)), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
         for column in self.columns:
             numeric = column.format is not None
-            table.add_column(Text(column.header), justify="right" if numeric else "left", no_wrap=numeric, overflow="fold")
+            table.add_column(Text(shown(column.header)), justify="right" if numeric else "left", no_wrap=numeric, overflow="fold")
         for row in self.rows:
             table.add_row(*[cell(c, row) for c in self.columns], style="italic dim" if row.get("_reference") else None)
         console.print(table)
         for note in self.notes:
-            console.print(Text(note, style="dim"))
+            console.print(Text(shown(note), style="dim"))
 
     def as_json(self) -> dict[str, Any]:
         """Title, rows with raw values (NaN as null), notes."""

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import InputError
 from ...metrics.ed import ed
 from ...records import Batch
 from ...signals import PSI, X, Y, wrap_angle

@@ -1,0 +1,237 @@
+"""One entry of summary.json and the columns of rows.parquet and windows.parquet as pages read them: types and values, checked in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import asdict
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ..errors import InputError
+from ..metrics.base import METRICS
+from ..metrics.trial_indices import COLUMNS as TRIAL_COLUMNS
+from ..names import LONGEST_LABEL, check_label, check_name, check_run, shown
+from .regimes import COLUMNS as FEATURES
+from .results import STATUSES, Frame
+from .scoring import DIVERGED_DISTANCE, HORIZONS_S, columns
+from .task import make_task
+
+Refuse = Callable[[str], InputError]
+"""Makes the error from what is wrong; it adds the folder."""
+Status = Literal["ok", "diverged", "failed", "skipped"]
+Seconds = Annotated[float, Field(ge=0)]
+
+TEXTS = ("dataset", "fingerprint", "task", "model", "run", "parent", "kind", "status", "reason")
+WHOLE = ("protocol", "fold", "seed", "fit_shared_by")
+TIMES = ("fit_s", "predict_s")
+_TASK_KEYS = ("dataset", "models", "horizon_s", "history_s", "folds", "split", "seeds", "metrics")
+_SIGNED = frozenset(c.name for c in TRIAL_COLUMNS)
+"""Metrics that may be negative. They and cVDM are undefined in some windows."""
+_UNDEFINED = _SIGNED | {"cvdm"}
+_MOST_STEPS = 10**8
+"""Time steps of a window; far beyond it dt is no sample time."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False, frozen=True)
+
+
+class _Column(_Part):
+    name: str
+    label: str
+    unit: str
+
+
+class _Code(_Part):
+    shipbench: str
+    source: str
+    git: str
+
+
+class _Machine(_Part):
+    cpus: int
+    python: str
+    torch: str
+
+
+class _Runs(_Part):
+    train: list[str]
+    valid: list[str]
+    test: list[str] = Field(min_length=1)
+
+
+class Entry(_Part):
+    """One cell of summary.json: the keys that pages and checks read. Other keys are kept and shown nowhere."""
+
+    protocol: int
+    dataset: str
+    fingerprint: str
+    task_key: str
+    task: dict[str, Any]
+    model: str
+    fold: int = Field(ge=0)
+    seed: int
+    ship: str
+    ship_L: float = Field(gt=0)
+    ship_B: float = Field(gt=0)
+    dt: float = Field(gt=0)
+    inputs: list[str]
+    columns: list[_Column]
+    notes: list[str]
+    source: str
+    licence: str
+    command: str
+    finished: str
+    runs: _Runs
+    status: Status
+    reason: str
+    run_status: list[Status]
+    fit_s: Seconds
+    fit_shared_by: int = Field(ge=1)
+    predict_s: Seconds
+    parameters: int | None = Field(None, ge=0)
+    code: _Code
+    machine: _Machine
+
+
+def check_entry(summary: Any, refuse: Refuse) -> None:
+    """Refuse an entry with a missing key, a value of another type, or one that no study has.
+
+    Raises:
+        InputError: see above.
+    """
+    try:
+        entry = Entry.model_validate(summary)
+    except ValidationError as error:
+        missing = [".".join(map(str, e["loc"])) for e in error.errors() if e["type"] == "missing"]
+        if missing:
+            raise refuse(f"an entry of summary.json lacks {', '.join(missing)}") from None
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"])) or "an entry"
+        raise refuse(f"summary.json: {key} = {shown(repr(first['input']))[:60]}; accepted: {_accepted(first['msg'])}") from None
+    try:
+        check_name(entry.dataset, "dataset")
+        check_label(entry.model, "model", LONGEST_LABEL)
+        for run in (*entry.runs.train, *entry.runs.valid, *entry.runs.test):
+            check_run(run, "run")
+    except InputError as error:
+        raise refuse(f"summary.json: {error}") from None
+    if len(entry.run_status) != len(entry.runs.test):
+        raise refuse(f"summary.json: {len(entry.run_status)} statuses in run_status for {len(entry.runs.test)} scored runs")
+
+
+def _accepted(message: str) -> str:
+    """pydantic's "Input should be a valid string" as what is accepted: "a valid string"."""
+    return message.removeprefix("Input should be ")
+
+
+def check_task_of(summary: dict[str, Any], refuse: Refuse) -> None:
+    """Refuse a task that is written otherwise than a task is, and columns that are not those of its metrics.
+
+    Raises:
+        InputError: see above.
+    """
+    given = summary["task"]
+    if missing := [key for key in _TASK_KEYS if key not in given]:
+        raise refuse(f"summary.json: task lacks {', '.join(missing)}")
+    task = make_task(given)
+    for key, value in task.model_dump(mode="json").items():
+        if key in given and (given[key] != value or isinstance(given[key], str) != isinstance(value, str)):
+            raise refuse(f"summary.json: task.{key} = {shown(repr(given[key]))[:60]}; accepted: {value!r}")
+    dt = summary["dt"]
+    if not 0.5 <= task.horizon_s / dt <= _MOST_STEPS:
+        raise refuse(f"summary.json: dt = {dt:g} s for a horizon of {task.horizon_s:g} s; accepted: the sample time of the data")
+    expected = [asdict(c) for c in columns(task.metrics, task.horizon_s, dt)]
+    if [dict(c) for c in summary["columns"]] != expected:
+        raise refuse("summary.json: columns are not those of task.metrics: " + ", ".join(c["name"] for c in expected))
+
+
+def check_columns(rows: Frame, refuse: Refuse, texts: Iterable[str], whole: Iterable[str], numbers: Iterable[str]) -> None:
+    """Refuse a table that lacks one of these columns, has one twice, or has one of another type.
+
+    Raises:
+        InputError: see above.
+    """
+    from pandas.api import types
+
+    kinds: list[tuple[Iterable[str], Callable[[Any], bool], str]] = [
+        (texts, lambda values: types.infer_dtype(values, skipna=False) == "string", "text in every row"),
+        (whole, types.is_integer_dtype, "whole numbers"),
+        (numbers, lambda values: types.is_numeric_dtype(values) and not types.is_bool_dtype(values), "numbers"),
+    ]
+    names = list(rows.columns)
+    kinds = [(tuple(group), is_kind, accepted) for group, is_kind, accepted in kinds]
+    if missing := [name for group, _, _ in kinds for name in group if name not in names]:
+        raise refuse(f"lacks the columns {', '.join(missing)}")
+    if twice := sorted({str(name) for name in names if names.count(name) > 1}):
+        raise refuse(f"has the column '{twice[0]}' twice")
+    for group, is_kind, accepted in kinds:
+        for name in group:
+            if len(rows) and not is_kind(rows[name]):
+                raise refuse(f"column '{name}' is of type {rows[name].dtype}; accepted: {accepted}")
+
+
+def check_labels(rows: Frame, refuse: Refuse) -> None:
+    """Refuse names that cannot stand in a table (see `names`).
+
+    Raises:
+        InputError: see above.
+    """
+    try:
+        for name in ("run", "parent", "kind", *(["group"] if "group" in rows else [])):
+            for value in rows[name].dropna().unique():
+                check_run(value, name)
+    except InputError as error:
+        raise refuse(f"rows.parquet: {error}") from None
+
+
+def check_scores(rows: Frame, metrics: Iterable[str], scores: Iterable[str], refuse: Refuse) -> None:
+    """Refuse scores that no prediction gives: not finite, negative, missing in a scored row, or there in a row that was not scored.
+
+    Args:
+        rows: of one folder.
+        metrics: the names of the metrics behind the columns `scores`.
+
+    Raises:
+        InputError: see above.
+    """
+    unknown = sorted(set(rows["status"]) - set(STATUSES))
+    if unknown:
+        raise refuse(f"unknown status '{shown(unknown[0])[:40]}'; accepted: {', '.join(STATUSES)}")
+    scored = (rows["status"] == "ok").to_numpy()
+    own = {c.name for name in metrics if name in METRICS.built_in() for c in METRICS.get(name).columns} | {f"ed_at_{h:g}s" for h in HORIZONS_S}
+    for name in scores:
+        values = rows[name].to_numpy(float, na_value=np.nan)
+        label, known = "ED" if name == "ed" else name, np.isfinite(values)
+        bad = np.isinf(values) | (~scored & ~np.isnan(values))
+        if name in own and name not in _SIGNED:
+            bad |= scored & (values < 0)
+        if name in own and name not in _UNDEFINED:
+            bad |= scored & ~known
+        if name == "ed":
+            bad |= scored & ~(values <= DIVERGED_DISTANCE)
+        if bad.any():
+            first = rows.iloc[int(np.argmax(bad))]
+            where = f"{first['model']} on {first['dataset']}, fold {first['fold']}, run {first['run']}"
+            raise refuse(
+                f"{where}: status '{first['status']}' with {label} = {first[name]}; a finite score goes with 'ok', at least 0 if it is an error, "
+                "and none with all others"
+            )
+    for name in TIMES:
+        values = rows[name].to_numpy(float, na_value=np.nan)
+        if len(values) and not (np.isfinite(values) & (values >= 0)).all():
+            raise refuse(f"rows.parquet: {name} = {values[int(np.argmin(np.isfinite(values) & (values >= 0)))]}; accepted: seconds, at least 0")
+
+
+def check_windows(windows: Frame, refuse: Refuse) -> None:
+    """Refuse a table of windows whose columns or values are not those of windows.
+
+    Raises:
+        InputError: see above.
+    """
+    check_columns(windows, refuse, ("dataset", "fingerprint", "task", "run"), ("fold",), FEATURES)
+    regimes = windows[list(FEATURES[:5])].to_numpy(float, na_value=np.nan)
+    if not (np.isfinite(regimes) & (regimes >= 0)).all() or np.isinf(windows[list(FEATURES)].to_numpy(float, na_value=np.nan)).any():
+        raise refuse("holds values that no window has; accepted: finite numbers, at least 0 for speed, drift, rudder, astern and thrusters")
