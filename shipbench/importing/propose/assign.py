@@ -18,6 +18,9 @@ _SIDES = ({"+port", "+starboard"}, {"+first", "+second"})
 _PAIRS = (("lat", "lon"), ("x", "y"), ("sog", "cog"), ("wind_speed", "wind_from"), ("apparent_wind_speed", "apparent_wind_from"))
 _LATLON = re.compile(r"[^\d+-]*([-+]?\d+\.\d+)[^\d+-]+([-+]?\d+\.\d+)\D*")
 
+_LETTERED = re.compile(r"[NSEWOnsewo]?\s*[-+]?\d[\d.,°'\"\u2032\u2033 ]*\s*[NSEWOnsewo]?")
+"""A coordinate with the letter of its hemisphere before or after it."""
+
 
 @dataclass
 class Entry:
@@ -78,9 +81,12 @@ def _names(value: Any) -> list[str]:
 
 def _holds(column: Column, found: Assigned) -> bool:
     """Whether a column holds numbers at all; a named one without is told."""
-    if len(column.known) >= 0.5 * max(len(column.texts()), 1):
+    cells = column.texts()
+    if len(column.known) >= 0.5 * max(len(cells), 1):
         return True
-    if column.texts():
+    if column.head.channel in ("lat", "lon") and 2 * sum(bool(_LETTERED.fullmatch(cell)) for cell in cells) > len(cells):
+        return True
+    if cells:
         found.notes.append(f"'{column.name}' is named like {column.head.channel} and holds no numbers ({column.evidence()}); not taken.")
     return False
 

@@ -15,6 +15,7 @@ from ...data.units import unit_factor
 from ...errors import InputError
 from ..cells import Counts
 from ..channels import read_blocks
+from ..entries import Channel
 from ..mapping import Source
 from ..position import to_plane
 from .assign import Assigned, Entry
@@ -54,7 +55,12 @@ def examine(sample: Sample, time: Time, found: Assigned, extra: dict[str, Any]) 
         return
     track = _track(series)
     if track is not None and "psi" in series:
+        before = dict(found.entries["psi"].spec)
         _heading(track, series, found)
+        if "psi" in found.entries and found.entries["psi"].spec != before:
+            series = _series(sample, source.model_copy(update={"channels": {"psi": Channel(**found.entries["psi"].spec)}})) | {
+                channel: values for channel, values in series.items() if channel != "psi"
+            }
     if "psi" in found.entries and "r" in series and "psi" in series:
         _yaw_rate(series, found)
     if track is not None:
