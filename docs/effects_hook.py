@@ -62,7 +62,7 @@ def _commands(effect: Any) -> tuple[Any, Any]:
 
 
 def _picture(effect: Any) -> str | None:
-    """An inline SVG of the tracks with and without the effect at its typical size, or None where it needs another effect or channel to mean something."""
+    """An inline SVG of the tracks with and without the effect at its typical size; None where nothing can be drawn."""
     import matplotlib as mpl
     import numpy as np
     from matplotlib.figure import Figure
