@@ -183,7 +183,9 @@ CSV: dict[str, Callable[[], bytes]] = {
     "twelve hours": lambda: clocked((STAMPS + pd.Timedelta("2h")).strftime("%m/%d/%Y %I:%M:%S %p")),
     "month by name": lambda: clocked(STAMPS.strftime("%d-%b-%Y %H:%M:%S")),
     "offset from UTC": lambda: clocked(STAMPS.strftime("%Y-%m-%d %H:%M:%S +0200")),
-    "date and time of day in two columns": lambda: text(log(STAMPS.strftime("%H:%M:%S"), PLAIN | {"t": "Time"}).assign(Date=STAMPS.strftime("%d.%m.%Y"))),
+    "date and time of day in two columns": lambda: text(
+        log(STAMPS.strftime("%H:%M:%S"), PLAIN | {"t": "Time"}).assign(Date=STAMPS.strftime("%d.%m.%Y"))
+    ),
     "ddmm.mmmm with columns of hemispheres": lambda: placed(lat=minutes(LATS, 2), ns="S", lon=minutes(LONS, 3), ew="W"),
     "degrees with letters in the cell": lambda: placed(lat=[f"{-v:.7f} S" for v in LATS], lon=[f"{-v:.7f} W" for v in LONS]),
     "1e-7 degrees": lambda: placed(lat=np.round(LATS * 1e7).astype(int), lon=np.round(LONS * 1e7).astype(int)),
