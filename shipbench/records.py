@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,26 @@ from .names import check_name, check_run
 from .ship import Ship
 from .signals import COMMANDS, STATES
 
+LARGEST = 1e12
+"""Of any signal in our unit: beyond every sensor, and squares of it are still numbers."""
+_UNEVEN = 2e-3
+"""Of a sample time: the farthest that two steps of one run lie apart."""
+
+
+def _numbers(given: Any, what: str) -> np.ndarray:
+    """An array of float64; values that are masked become not-a-number.
+
+    Raises:
+        InputError: they are no real numbers, or rows differ in length.
+    """
+    try:
+        array = np.ma.filled(given.astype(float), np.nan) if isinstance(given, np.ma.MaskedArray) else np.asarray(given)
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{what} is no array: {error}. Accepted: an array of real numbers.") from None
+    if array.dtype.kind not in "fiu":
+        raise InputError(f"{what} holds {array.dtype}; accepted: an array of real numbers, such as float64.")
+    return array.astype(float, copy=False)
+
 
 @dataclass(frozen=True, eq=False)
 class Run:
@@ -23,7 +44,7 @@ class Run:
 
     Args:
         id: unique inside the data set.
-        t: (samples,) [s].
+        t: (samples,) [s], growing by the same step.
         states: (samples, 10), order and units of `signals.STATES`; heading unwrapped.
         inputs: (samples, inputs), the four commands, then the environment channels; row k is held on [t_k, t_k+1).
         inputs_names: names of the columns of `inputs`.
@@ -41,20 +62,44 @@ class Run:
         check_run(self.id, "run")
         for key, label in (("group", self.group), ("manoeuvre", self.kind)):
             check_run(label, f"run '{self.id}': {key}")
-        n = len(self.t)
-        if self.states.shape != (n, len(STATES)) or self.inputs.shape != (n, len(self.inputs_names)):
+        for part in ("t", "states", "inputs"):
+            object.__setattr__(self, part, _numbers(getattr(self, part), f"run '{self.id}': {part}"))
+        object.__setattr__(self, "inputs_names", tuple(self.inputs_names))
+        names = self.inputs_names
+        if names[: len(COMMANDS)] != COMMANDS or len(set(names)) != len(names):
+            raise InputError(f"run '{self.id}': inputs_names are {names}; accepted: {', '.join(COMMANDS)}, then other names, each once.")
+        n = len(self.t) if self.t.ndim == 1 else 0
+        if n == 0 or self.states.shape != (n, len(STATES)) or self.inputs.shape != (n, len(names)):
             raise InputError(
-                f"run '{self.id}': t has {n} samples, states {self.states.shape}, inputs {self.inputs.shape}; "
-                f"accepted: states ({n}, {len(STATES)}), inputs ({n}, {len(self.inputs_names)})."
+                f"run '{self.id}': t has the shape {self.t.shape}, states {self.states.shape}, inputs {self.inputs.shape}; "
+                f"accepted: t (samples,), states (samples, {len(STATES)}), inputs (samples, {len(names)}), and one sample at least."
             )
-        for array, names in ((self.states, STATES), (self.inputs, self.inputs_names)):
-            bad = np.argwhere(~np.isfinite(array))
-            if len(bad):
-                k, j = bad[0]
-                raise InputError(
-                    f"run '{self.id}', t = {self.t[k]:g} s: {names[j]} is {array[k, j]} ({len(bad)} such values in the run). "
-                    "Every value must be finite: cut the run there or fill the gap before loading."
-                )
+        self._check_values(self.states, STATES)
+        self._check_values(self.inputs, names)
+        self._check_time()
+
+    def _check_values(self, array: np.ndarray, names: tuple[str, ...]) -> None:
+        if np.abs(array).max() <= LARGEST:  # not-a-number is not
+            return
+        bad = np.argwhere(~(np.abs(array) <= LARGEST))
+        k, j = bad[0]
+        accepted = f"at most {LARGEST:g} in size" if np.isfinite(array[k, j]) else "finite"
+        raise InputError(
+            f"run '{self.id}', t = {self.t[k]:g} s: {names[j]} is {array[k, j]} ({len(bad)} such values in the run). "
+            f"Every value must be {accepted}: cut the run there or fill the gap before loading."
+        )
+
+    def _check_time(self) -> None:
+        steps = np.diff(self.t)
+        typical = float(steps.mean()) if len(steps) else 1.0
+        if np.isfinite(self.t).all() and typical > 0.0 and (np.abs(steps - typical) <= _UNEVEN * typical).all():
+            return
+        typical = float(np.nanmedian(steps)) if len(steps) else 1.0  # of most steps: some may be far off
+        k = int(np.argmax(~(np.abs(steps - typical) <= _UNEVEN * abs(typical)))) if len(steps) else 0
+        raise InputError(
+            f"run '{self.id}': t goes from {self.t[k]:g} s to {self.t[min(k + 1, len(steps))]:g} s; accepted: t that grows by the same step"
+            f"{f', {typical:g} s here' if typical > 0.0 else ''}. Resample the run."
+        )
 
     def __len__(self) -> int:
         return len(self.t)
@@ -135,6 +180,11 @@ class Dataset:
 
     def __post_init__(self) -> None:
         check_name(self.name, "name")
+        object.__setattr__(self, "runs", tuple(self.runs))
+        if isinstance(self.dt, bool) or not isinstance(self.dt, Real) or not 0.0 < self.dt < np.inf:
+            raise InputError(f"data set '{self.name}': dt = {self.dt!r}; accepted: a number of seconds above 0.")
+        if not all(isinstance(run, Run) for run in self.runs):
+            raise InputError(f"data set '{self.name}': runs holds {type(self.runs[0]).__name__}; accepted: objects of shipbench.records.Run.")
         if not self.runs:
             raise InputError(f"data set '{self.name}' has no runs; at least one is needed.")
         if self.actuators not in ("measured", "commanded"):

@@ -13,53 +13,59 @@ import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from .errors import InputError, unknown_name
-from .toml_files import read_toml
+from .toml_files import Number, Whole, fault, read_toml
 
+_LENGTHS = (1e-3, 1000.0)
+"""Main dimensions [m] of every ship and model; the longest ship has 458 m."""
 _LEAST_FULLNESS = 0.1
 """Block coefficient over the whole breadth below which a unit is wrong."""
 _WITHIN, _DIAMETER, _RUDDER, _GYRATION = 0.6, 2.0, 0.15, (0.1, 0.5)
 """Beyond every ship, so that a unit or an axis is wrong: place over L, propeller over T, rudder over L T (0.1 on yachts and tugs), radius of gyration
 over L (0.2 to 0.3)."""
+_SPAN, _FRONTAL, _LATERAL, _THRUST = 2.0, 10.0, 1.0, 1.0
+"""Likewise: rudder's span over T (1 at most), wind areas over B^2 (1 to 3) and L^2 (0.05 to 0.2), thruster force over the ship's weight (0.01)."""
+_PITCH, _KT = 5.0, 5.0
+"""Likewise: pitch ratio (0.5 to 2), and each coefficient of K_T (below 1 in size)."""
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Propeller(_Part):
     """One fixed-pitch screw. `kt` are k0, k1, k2 of K_T = k0 + k1 J + k2 J^2."""
 
-    diameter: float = Field(gt=0)
-    x: float | None = None
-    pitch_ratio: float | None = Field(None, gt=0)
-    blades: int | None = Field(None, ge=2, le=7)
-    area_ratio: float | None = Field(None, gt=0, le=1.5)
-    kt: tuple[float, float, float] | None = None
-    wake: float | None = Field(None, ge=0, lt=1)
-    thrust_deduction: float | None = Field(None, ge=0, lt=1)
+    diameter: Number = Field(gt=0)
+    x: Number | None = None
+    pitch_ratio: Number | None = Field(None, gt=0, le=_PITCH)
+    blades: Whole | None = Field(None, ge=2, le=7)
+    area_ratio: Number | None = Field(None, gt=0, le=1.5)
+    kt: tuple[Number, Number, Number] | None = None
+    wake: Number | None = Field(None, ge=0, lt=1)
+    thrust_deduction: Number | None = Field(None, ge=0, lt=1)
 
 
 class Rudder(_Part):
     """Movable rudder area [m^2], span `height` [m], position `x` [m]."""
 
-    area: float = Field(gt=0)
-    height: float | None = Field(None, gt=0)
-    x: float | None = None
+    area: Number = Field(gt=0)
+    height: Number | None = Field(None, gt=0)
+    x: Number | None = None
 
 
 class Thrusters(_Part):
     """Tunnel thrusters: positions [m] and greatest force of each [N]."""
 
-    x_bow: float = 0.0
-    x_stern: float = 0.0
-    max_force: float = Field(0.0, ge=0)
+    x_bow: Number = 0.0
+    x_stern: Number = 0.0
+    max_force: Number = Field(0.0, ge=0)
 
 
 class Wind(_Part):
     """Areas above water [m^2]."""
 
-    frontal_area: float = Field(gt=0)
-    lateral_area: float = Field(gt=0)
+    frontal_area: Number = Field(gt=0)
+    lateral_area: Number = Field(gt=0)
 
 
 _TABLES: dict[str, type[_Part]] = {"propeller": Propeller, "rudder": Rudder, "thrusters": Thrusters, "wind": Wind}
@@ -69,15 +75,15 @@ class Ship(_Part):
     """Main dimensions [m], displacement [m^3] or mass [kg], and the optional rest of `ship.toml` (contract, section 3)."""
 
     name: str
-    L: float = Field(gt=0)
-    B: float = Field(gt=0)
-    T: float = Field(gt=0)
-    displacement: float | None = Field(None, gt=0)
-    mass: float | None = Field(None, gt=0)
-    Cb: float | None = Field(None, gt=0, le=1)
-    xG: float | None = None
-    Izz: float | None = Field(None, gt=0)
-    rho: float = Field(1025.0, ge=900, le=1200)
+    L: Number = Field(ge=_LENGTHS[0], le=_LENGTHS[1])
+    B: Number = Field(ge=_LENGTHS[0], le=_LENGTHS[1])
+    T: Number = Field(ge=_LENGTHS[0], le=_LENGTHS[1])
+    displacement: Number | None = Field(None, gt=0)
+    mass: Number | None = Field(None, gt=0)
+    Cb: Number | None = Field(None, gt=0, le=1)
+    xG: Number | None = None
+    Izz: Number | None = Field(None, gt=0)
+    rho: Number = Field(1025.0, ge=900, le=1200)
     propeller: Propeller | None = None
     rudder: Rudder | None = None
     thrusters: Thrusters | None = None
@@ -103,16 +109,13 @@ class Ship(_Part):
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
         except ValidationError as error:
-            first = error.errors()[0]
-            if first["type"] == "extra_forbidden":
-                *table, name = (str(k) for k in first["loc"])
+            place, kind, wrong = fault(error)
+            if kind == "extra_forbidden":
+                *table, name = place
                 accepted = _TABLES[table[0]].model_fields if table else cls.model_fields
                 raise InputError(f"{where}: {f'[{table[0]}] ' if table else ''}{unknown_name('key', name, accepted)}") from None
-            key = ".".join(str(k) for k in first["loc"]) or "ship"
-            more = f" ({error.error_count() - 1} more faults)" if error.error_count() > 1 else ""
-            value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:80]})"
             raise InputError(
-                f"{where}: {key}: {first['msg']}{value}{more}. Required: name, L, B, T [m], displacement [m^3] or mass [kg]; "
+                f"{where}: {'.'.join(place) or 'ship'}: {wrong}. Required: name, L, B, T [m], displacement [m^3] or mass [kg]; "
                 "optional: Cb, xG, Izz, rho, [propeller], [rudder], [thrusters], [wind] (SI)."
             ) from None
 
@@ -250,8 +253,18 @@ def _check_proportions(ship: Ship, mass: float) -> None:
             faults.append(f"{name} is {x:g} m; accepted: {-_WITHIN * ship.L:.4g} to {most:.4g} (from midship, forward positive)")
     if propeller and propeller.diameter > _DIAMETER * ship.T:
         faults.append(f"propeller.diameter is {propeller.diameter:g} m; accepted: up to {_DIAMETER:g} T = {_DIAMETER * ship.T:.4g}")
+    if propeller and propeller.kt and max(map(abs, propeller.kt)) > _KT:
+        faults.append(f"propeller.kt is {list(propeller.kt)}; accepted: {-_KT:g} to {_KT:g} each, of K_T = k0 + k1 J + k2 J^2")
     if rudder and rudder.area > _RUDDER * ship.L * ship.T:
         faults.append(f"rudder.area is {rudder.area:g} m^2; accepted: up to {_RUDDER:g} L T = {_RUDDER * ship.L * ship.T:.4g}")
+    if rudder and rudder.height and rudder.height > _SPAN * ship.T:
+        faults.append(f"rudder.height is {rudder.height:g} m; accepted: up to {_SPAN:g} T = {_SPAN * ship.T:.4g}")
+    if ship.wind and ship.wind.frontal_area > _FRONTAL * ship.B**2:
+        faults.append(f"wind.frontal_area is {ship.wind.frontal_area:g} m^2; accepted: up to {_FRONTAL:g} B^2 = {_FRONTAL * ship.B**2:.4g}")
+    if ship.wind and ship.wind.lateral_area > _LATERAL * ship.L**2:
+        faults.append(f"wind.lateral_area is {ship.wind.lateral_area:g} m^2; accepted: up to {_LATERAL:g} L^2 = {_LATERAL * ship.L**2:.4g}")
+    if thrusters and thrusters.max_force > _THRUST * mass * 9.81:
+        faults.append(f"thrusters.max_force is {thrusters.max_force:g} N; accepted: up to the weight of the ship, {mass * 9.81:.4g}")
     low, high = (mass * (k * ship.L) ** 2 for k in _GYRATION)
     if ship.Izz is not None and not low <= ship.Izz <= high:
         faults.append(f"Izz is {ship.Izz:.4g} kg m^2; accepted: {low:.3g} to {high:.3g}, radii of gyration of {_GYRATION[0]:g} to {_GYRATION[1]:g} L")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import reprlib
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any
@@ -92,6 +93,8 @@ def fault(error: ValidationError) -> tuple[tuple[str, ...], str, str]:
     """The first fault that pydantic found: the place as keys, the kind of fault, and what is wrong with the value received, in words."""
     first = error.errors()[0]
     place = tuple(str(key) for key in first["loc"])
-    value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:_LONGEST_SHOWN]})"
+    received = first["input"]
+    shown = reprlib.repr(received) if isinstance(received, dict | list | tuple) else str(received)[:_LONGEST_SHOWN]
+    value = "" if first["type"] == "missing" else f" (value: {shown})"
     more = f" ({error.error_count() - 1} more faults)" if error.error_count() > 1 else ""
     return place, first["type"], f"{first['msg'].removeprefix('Value error, ')}{value}{more}"

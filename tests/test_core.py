@@ -11,7 +11,7 @@ from shipbench.errors import InputError
 from shipbench.integrate import rk4_step
 from shipbench.records import Dataset, Run
 from shipbench.registry import Registry
-from shipbench.ship import Propeller, Rudder, Ship, Thrusters, complete
+from shipbench.ship import Propeller, Rudder, Ship, Thrusters, Wind, complete
 from shipbench.signals import COMMANDS, STATES, UNITS, wrap_angle
 from shipbench.specs import EffectSpec, parse_spec
 
@@ -136,9 +136,25 @@ def test_a_ship_in_other_units_is_refused_with_the_figures(wrong):
         ({"B": 6.0, "T": 16.0}, "L, B, T are 100, 6, 16 m; accepted: L >= B >= T"),
         ({"thrusters": Thrusters(x_bow=110.0, x_stern=10.0)}, "thrusters.x_bow is 110 m; accepted: -60 to 60"),
         ({"Izz": 6e6}, "Izz is 6e+06 kg m^2; accepted: 6.15e+08 to 1.54e+10"),
-        ({"xG": float("nan"), "Izz": 1.0}, "xG is nan m; accepted: -60 to 60 (from midship, forward positive); Izz is 1 kg m^2"),
+        ({"xG": 1e9, "Izz": 1.0}, "xG is 1e+09 m; accepted: -60 to 60 (from midship, forward positive); Izz is 1 kg m^2"),
+        ({"propeller": Propeller(diameter=4.0, kt=(0.4, -0.3, 1e6))}, "propeller.kt is [0.4, -0.3, 1000000.0]; accepted: -5 to 5 each"),
+        ({"rudder": Rudder(area=10.0, height=5000.0)}, "rudder.height is 5000 m; accepted: up to 2 T = 12"),
+        ({"wind": Wind(frontal_area=3e8, lateral_area=1e9)}, "wind.frontal_area is 3e+08 m^2; accepted: up to 10 B^2 = 2560; wind.lateral_area"),
+        ({"thrusters": Thrusters(max_force=6e8)}, "thrusters.max_force is 6e+08 N; accepted: up to the weight of the ship, 6.033e+07"),
     ],
-    ids=["diameter in mm", "area in square feet", "from the stern", "exchanged", "thrusters from the stern", "in t m^2", "two faults"],
+    ids=[
+        "diameter in mm",
+        "area in square feet",
+        "from the stern",
+        "exchanged",
+        "thrusters from the stern",
+        "in t m^2",
+        "two faults",
+        "K_T",
+        "span in mm",
+        "areas in mm^2",
+        "force",
+    ],
 )
 def test_what_no_ship_has_is_refused_with_what_is_accepted(wrong, told):
     """A propeller in mm once ended in an OverflowError of the diagnosis, a rudder at the bow in `none`. It is refused where the file is read."""
@@ -147,6 +163,24 @@ def test_what_no_ship_has_is_refused_with_what_is_accepted(wrong, told):
         complete(ship)
     with pytest.raises(InputError, match=re.escape(f"her.toml: ship 's': {told}")):
         Ship.from_dict(ship.model_dump(), "her.toml")
+
+
+INF, NAN, HUGE = float("inf"), float("nan"), 10**400
+NO_PARTICULARS: dict[str, dict[str, list]] = {
+    "": {"L": ["100", True, INF, 1e300, HUGE], "T": [1e-300], "mass": [-1.0], "rho": [1.0], "xG": [NAN], "Cb": ["0.6"], "Izz": [INF], "name": [3]},
+    "propeller": {"kt.0": [NAN, "1"], "pitch_ratio": [INF, 50.0], "blades": ["4", True, 3.5]},
+    "rudder": {"height": [INF]},
+    "wind": {"frontal_area": [INF]},
+    "thrusters": {"max_force": [INF, "9"]},
+}
+NEEDED = {"": {}, "propeller": {"diameter": 4.0}, "rudder": {"area": 10.0}, "wind": {"lateral_area": 1.0}, "thrusters": {}}
+
+
+@pytest.mark.parametrize(("table", "key", "value"), [(t, k, v) for t, keys in NO_PARTICULARS.items() for k, values in keys.items() for v in values])
+def test_text_truth_values_and_infinities_are_no_particulars(table, key, value):
+    given = {**NEEDED[table], "kt": [value, 0, 0]} if key == "kt.0" else {**NEEDED[table], key: value}
+    with pytest.raises(InputError, match=rf"^her.toml: {re.escape('.'.join(filter(None, (table, key))))}: .+ \(value: .+\)"):
+        Ship.from_dict(SHIP.model_dump(exclude_none=True) | ({table: given} if table else given), "her.toml")
 
 
 @pytest.mark.parametrize(
@@ -162,6 +196,64 @@ def test_what_no_ship_has_is_refused_with_what_is_accepted(wrong, told):
 def test_a_key_that_a_ship_file_does_not_know_is_told_with_those_it_knows(wrong, told):
     with pytest.raises(InputError, match=re.escape(f"her.toml: {told}")):
         Ship.from_dict(SHIP.model_dump(exclude_none=True) | wrong, "her.toml")
+
+
+def wrong_run(t=None, states=None, inputs=None, **others) -> Run:
+    given = {"id": "r1", "t": np.arange(4.0), "states": np.zeros((4, 10)), "inputs": np.zeros((4, 4))}
+    return Run(**given | {k: v for k, v in {"t": t, "states": states, "inputs": inputs}.items() if v is not None} | others)
+
+
+MASKED = np.ma.array(np.zeros((4, 10)), mask=np.eye(4, 10))
+OBJECTS = np.zeros((4, 10), dtype=object)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"states": np.zeros((4, 9))}, r"states \(4, 9\)"),
+        ({"states": np.zeros(4)}, r"states \(4,\)"),
+        ({"states": [[0.0] * 10] * 3}, r"states \(3, 10\)"),
+        ({"states": [[0.0] * 10, [0.0]]}, "states is no array"),
+        ({"states": OBJECTS}, "states holds object"),
+        ({"states": np.zeros((4, 10), dtype=bool)}, "states holds bool"),
+        ({"states": np.zeros((4, 10), dtype=complex)}, "states holds complex128"),
+        ({"states": np.full((4, 10), "1")}, "states holds <U1"),
+        ({"states": MASKED}, "x is nan"),
+        ({"states": np.full((4, 10), np.inf)}, r"x is inf \(40 such values"),
+        ({"states": np.full((4, 10), 1e308)}, "at most 1e.12"),
+        ({"inputs": np.full((4, 4), np.nan)}, "n_c is nan"),
+        ({"inputs": np.zeros((4, 5))}, r"inputs \(4, 5\)"),
+        ({"inputs": None, "inputs_names": ("a", "b", "c", "d")}, "inputs_names are"),
+        ({"inputs": np.zeros((4, 5)), "inputs_names": (*COMMANDS, "n_c")}, "inputs_names are"),
+        ({"t": np.zeros((4, 1))}, r"t has the shape \(4, 1\)"),
+        ({"t": [0.0, 1.0, np.nan, 3.0]}, "t goes from 1 s to nan s"),
+        ({"t": np.arange(4.0)[::-1]}, "t goes from 3 s to 2 s"),
+        ({"t": np.zeros(4)}, "t goes from 0 s to 0 s"),
+        ({"t": [0.0, 1.0, 2.5, 3.5]}, "t goes from 1 s to 2.5 s; accepted: t that grows by the same step, 1 s here"),
+        ({"t": ["a", "b", "c", "d"]}, "t holds <U1"),
+        ({"t": [], "states": np.zeros((0, 10)), "inputs": np.zeros((0, 4))}, "one sample at least"),
+    ],
+)
+def test_a_run_of_wrong_arrays_is_refused_with_its_name(wrong, told):
+    with pytest.raises(InputError, match=rf"run 'r1'.*{told}"):
+        wrong_run(**wrong)
+
+
+def test_a_run_takes_whatever_holds_real_numbers():
+    run = wrong_run(t=[0, 1, 2, 3], states=np.zeros((4, 10), dtype=np.int32), inputs=np.ones((4, 4), dtype=np.float32))
+    assert (run.dt, run.states.dtype, run.inputs.dtype) == (1.0, np.dtype(float), np.dtype(float))
+    states = np.zeros((4, 10))
+    assert wrong_run(states=states).states is states
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [({"dt": -1.0}, "dt = -1"), ({"dt": np.nan}, "dt = nan"), ({"dt": "1"}, "dt = '1'"), ({"dt": True}, "dt = True"),
+     ({"dt": 2.0}, "run 'r1' is sampled"), ({"runs": ()}, "no runs"), ({"runs": (3,)}, "runs holds int")],
+)  # fmt: skip
+def test_a_data_set_of_wrong_parts_is_refused(wrong, told):
+    with pytest.raises(InputError, match=told):
+        Dataset(**{"name": "d", "ship": SHIP, "dt": 1.0, "runs": (wrong_run(),)} | wrong)
 
 
 def test_rk4_is_of_fourth_order_on_an_oscillator():

@@ -5,16 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from ..errors import InputError, unknown_name
 from ..metrics.base import METRICS
 from ..names import LONGEST_LABEL, check_label
-from ..toml_files import read_toml
+from ..toml_files import Number, Whole, fault, read_toml
 
 DEFAULT_METRICS = ("ed", "edh", "cvdm", "final_displacement", "heading_error", "position_rmse", "signal_rmse", "trial_indices")
+_Seed = Annotated[Whole, Field(ge=0, lt=2**32)]
 _NOT_IDENTITY = {"models", "metrics", "seeds", "title"}
 
 
@@ -29,21 +30,21 @@ class Task(BaseModel):
     that many runs, evenly spread over the data set.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     dataset: str
     models: tuple[str, ...] = Field(min_length=1)
-    horizon_s: float = Field(120.0, gt=0)
-    history_s: float = Field(0.0, ge=0)
-    folds: int = Field(5, ge=2)
+    horizon_s: Number = Field(120.0, gt=0)
+    history_s: Number = Field(0.0, ge=0)
+    folds: Whole = Field(5, ge=2)
     split: Literal["folds", "published", "kind", "speed"] = "folds"
-    stride_s: float | None = Field(None, gt=0)
-    seeds: tuple[int, ...] = Field((0,), min_length=1)
+    stride_s: Number | None = Field(None, gt=0)
+    seeds: tuple[_Seed, ...] = Field((0,), min_length=1)
     metrics: tuple[str, ...] = DEFAULT_METRICS
-    valid_runs: int | None = Field(None, ge=0)
-    train_runs: int | None = Field(None, ge=2)
-    max_runs: int | None = Field(None, ge=2)
-    fold_seed: int = 0
+    valid_runs: Whole | None = Field(None, ge=0)
+    train_runs: Whole | None = Field(None, ge=2)
+    max_runs: Whole | None = Field(None, ge=2)
+    fold_seed: _Seed = 0
     title: str = ""
 
     @field_validator("models", "seeds", "metrics")
@@ -88,7 +89,7 @@ class Task(BaseModel):
 
 
 def _samples(seconds: float, dt: float, name: str) -> int:
-    count = round(seconds / dt)
+    count = round(min(seconds / dt, 1e18))  # the quotient of a huge number may be infinite
     if count < 1 or abs(count * dt - seconds) > 1e-3 * dt:
         raise InputError(f"{name} = {seconds:g} s is not a whole number of samples of {dt:g} s; give a multiple of {dt:g} s.")
     return count
@@ -103,14 +104,13 @@ def make_task(data: dict[str, Any], where: str = "task") -> Task:
     try:
         return Task.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(k) for k in first["loc"])
-        if first["type"] == "extra_forbidden":
+        place, kind, wrong = fault(error)
+        key = ".".join(place)
+        if kind == "extra_forbidden":
             raise InputError(f"{where}: {unknown_name('key', key, [*Task.model_fields, 'datasets'])}") from None
-        if key == "models" and first["type"] in ("missing", "too_short"):
+        if key == "models" and kind in ("missing", "too_short"):
             raise InputError(f"{where}: no model is given; name at least one (--model physics). `shipbench models` lists them.") from None
-        value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:80]})"
-        raise InputError(f"{where}: {key}: {first['msg']}{value}. Keys: {', '.join(Task.model_fields)}.") from None
+        raise InputError(f"{where}: {key}: {wrong}. Keys: {', '.join(Task.model_fields)}.") from None
 
 
 def configs_folder() -> Path:

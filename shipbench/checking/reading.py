@@ -9,11 +9,11 @@ import pandas as pd
 
 from ..data.base import load_dataset
 from ..data.corrections import SIGNALS, correct_run, split_meta
-from ..data.files import Description, complete_columns, convert_table, read_description, read_table
+from ..data.files import Description, complete_columns, convert_table, read_description, read_table, ship_file
 from ..errors import InputError
 from ..records import Dataset, Run
 from ..ship import Ship
-from ..signals import MOTION, STATES
+from ..signals import STATES
 from ..toml_files import read_toml
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
@@ -35,14 +35,8 @@ def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
         dataset = load_dataset(spec)
         return Recording(dataset, recorded=frozenset((*STATES, *dataset.inputs))), []
     description = read_description(folder / "dataset.toml")
-    ship = Ship.load(folder / description.ship)
+    ship = Ship.load(ship_file(folder, description))
     table, where = read_table(folder, description)
-    missing = [c for c in ("trajectory", "t", *STATES[MOTION]) if c not in table]
-    if missing:
-        raise InputError(
-            f"{where}: missing columns: {', '.join(missing)}. Found: {', '.join(map(str, table.columns))}. "
-            "Name theirs under [columns] in dataset.toml (theirs = ours)."
-        )
     found: list[Finding] = []
     table = _clean(table, description, found)
     _possible(table, str(where))

@@ -21,7 +21,9 @@ from ..registry import Registry
 from ..specs import parse_spec
 from .public import PublicData
 
-_HELPERS = frozenset({"base", "corrections", "coverage", "describe", "export", "files", "mat", "noise", "public", "sensitivity", "units"})
+_HELPERS = frozenset({
+    "base", "corrections", "coverage", "describe", "export", "files", "mat", "noise", "public", "sensitivity", "trajectories", "units",
+})  # fmt: skip
 DATASETS = Registry("data set", "data", "DATASET", helpers=_HELPERS, group="datasets")
 
 _log = logging.getLogger(__name__)

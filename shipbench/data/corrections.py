@@ -6,19 +6,30 @@ velocities, cuts and gaps, delays, kind of wind, antenna. Values are in our unit
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from ..errors import InputError, unknown_name
 from ..physics.wind import true_wind
 from ..signals import COMMANDS, ENVIRONMENT, STATES, wrap_angle
+from ..toml_files import Number, fault
 
 SIGNALS = (*STATES, *COMMANDS, *ENVIRONMENT)
 VECTOR = "velocity"
 _SPLIT_FEWEST = 2
+
+
+def _in_order(interval: tuple[float, float]) -> tuple[float, float]:
+    if interval[0] > interval[1]:
+        raise ValueError(f"the interval ends before it begins; accepted: [from, to] in s with from <= to, such as [{interval[1]:g}, {interval[0]:g}]")
+    return interval
+
+
+Interval = Annotated[tuple[Number, Number], AfterValidator(_in_order)]
+"""[from, to] in s, both included."""
 
 
 class RunCorrections(BaseModel):
@@ -29,10 +40,10 @@ class RunCorrections(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    cut: list[tuple[float, float]] = []
-    fill: dict[str, list[tuple[float, float]]] = {}
-    bias: dict[str, float] = {}
-    current: tuple[float, float] | None = None
+    cut: list[Interval] = []
+    fill: dict[str, list[Interval]] = {}
+    bias: dict[str, Number] = {}
+    current: tuple[Number, Number] | None = None
 
 
 class Corrections(BaseModel):
@@ -49,13 +60,13 @@ class Corrections(BaseModel):
 
     frame: Literal["NED", "ENU", "east-north"] = "NED"
     velocities: Literal["body", "earth", "earth-east-north", "water"] = "body"
-    current: tuple[float, float] | None = None
+    current: tuple[Number, Number] | None = None
     wind: Literal["true", "apparent", "apparent-north", "true-bow"] = "true"
-    antenna: tuple[float, float] | None = None
+    antenna: tuple[Number, Number] | None = None
     gaps: Literal["refuse", "split"] = "refuse"
-    scale: dict[str, float] = {}
-    bias: dict[str, float] = {}
-    delay: dict[str, float] = {}
+    scale: dict[str, Number] = {}
+    bias: dict[str, Number] = {}
+    delay: dict[str, Number] = {}
 
 
 def check_names(corrections: Corrections, runs: dict[str, dict[str, Any]], where: str) -> None:
@@ -91,10 +102,9 @@ def split_meta(name: str, meta: dict[str, Any], where: str) -> tuple[RunCorrecti
     try:
         return RunCorrections.model_validate(own), {k: v for k, v in meta.items() if k not in own}
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(k) for k in first["loc"])
+        place, _, wrong = fault(error)
         accepted = "cut = [[from, to], ...] s, fill = {r = [[from, to], ...]}, bias = {r = 0.001}, current = [north, east]"
-        raise InputError(f"{where}: [runs.{name}] {key}: {first['msg']} (value: {str(first['input'])[:80]}). Accepted: {accepted}.") from None
+        raise InputError(f"{where}: [runs.{name}] {'.'.join(place)}: {wrong}. Accepted: {accepted}.") from None
 
 
 def to_ned(table: pd.DataFrame, corrections: Corrections) -> None:
@@ -198,7 +208,7 @@ def undelayed(frame: pd.DataFrame, delay: dict[str, float], dt: float) -> pd.Dat
             vector = np.interp(t + lag, t, (frame["u"].to_numpy() + 1j * frame["v"].to_numpy()) * turn) * np.conj(turn)
             frame["u"], frame["v"] = vector.real, vector.imag
             continue
-        shift = round(lag / dt) * dt if signal in COMMANDS else lag
+        shift = float(np.rint(lag / dt)) * dt if signal in COMMANDS else lag
         if signal == "wind_from":
             frame[signal] = wrap_angle(np.interp(t + shift, t, np.unwrap(frame[signal].to_numpy())))
         else:

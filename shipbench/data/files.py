@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-import warnings
-import zlib
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal
 
 import numpy as np
@@ -19,8 +17,9 @@ from ..names import check_name
 from ..records import Dataset, Run
 from ..ship import Ship
 from ..signals import ACTUATORS, COMMANDS, ENVIRONMENT, STATES, wrap_angle
-from ..toml_files import read_toml
+from ..toml_files import Number, fault, read_toml
 from .corrections import Corrections, check_names, correct_run, split_meta, to_ned
+from .trajectories import read_trajectories
 from .units import sign_factor, unit_factor
 
 TABLES = ("trajectories.parquet", "trajectories.csv.gz", "trajectories.csv")
@@ -28,8 +27,8 @@ _ACTUATORS = STATES[ACTUATORS]
 _MOTION = STATES[: ACTUATORS.start]
 _SIGNALS = (*STATES, *COMMANDS, *ENVIRONMENT)
 _KNOWN = ("trajectory", "t", *_SIGNALS)
-_EMPTY = ["", "NA", "N/A", "NaN", "nan", "NAN", "null", "NULL", "None", "#N/A"]
-"""What stands for a missing number; in the column of run names it is a name like any other."""
+_SHOWN = 60
+"""Most columns that a message lists."""
 
 
 class Description(Corrections):
@@ -38,7 +37,7 @@ class Description(Corrections):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     name: str
     ship: str = "ship.toml"
-    dt: float = Field(gt=0)
+    dt: Number = Field(gt=0)
     actuators: Literal["measured", "commanded"]
     source: str = ""
     licence: str = ""
@@ -61,7 +60,7 @@ def read_dataset(folder: str | Path) -> Dataset:
     """
     folder = Path(folder)
     description = read_description(folder / "dataset.toml")
-    ship = Ship.load(folder / description.ship)
+    ship = Ship.load(ship_file(folder, description))
     table, where = read_table(folder, description)
     notes = list(description.notes)
     check_columns(table, where)
@@ -87,63 +86,67 @@ def read_description(path: Path) -> Description:
     try:
         description = Description.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(k) for k in first["loc"])
-        value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:80]})"
-        raise InputError(f"{path}: {key}: {first['msg']}{value}. Accepted keys: {', '.join(Description.model_fields)}.") from None
+        place, _, wrong = fault(error)
+        raise InputError(f"{path}: {'.'.join(place)}: {wrong}. Accepted keys: {', '.join(Description.model_fields)}.") from None
     check_name(description.name, f"{path}: name")
     check_names(description, description.runs, path.name)
     return description
 
 
+def ship_file(folder: Path, description: Description) -> Path:
+    """Path of the ship's file, which lies in the folder of the data set.
+
+    Raises:
+        InputError: the description names a file elsewhere.
+    """
+    given = description.ship
+    if any(pure(given).is_absolute() or pure(given).drive or ".." in pure(given).parts for pure in (PurePosixPath, PureWindowsPath)):
+        raise InputError(
+            f'{folder / "dataset.toml"}: ship = {given!r} lies outside the folder of the data set; accepted: a file in it, such as "ship.toml". '
+            "Copy the ship's file there."
+        )
+    return folder / given
+
+
 def read_table(folder: Path, description: Description) -> tuple[pd.DataFrame, Path]:
-    """The table under our column names, and its path."""
-    found = [folder / name for name in TABLES if (folder / name).is_file()]
+    """The columns of the table that are ours, under our names, and the table's path.
+
+    Raises:
+        InputError: no table or several, a required column is missing, two columns are one signal, or as `read_trajectories`.
+    """
+    found = [folder / name for name in TABLES if os.path.lexists(folder / name)]
     if not found:
         raise InputError(f"folder {folder} has no trajectories; accepted: {', '.join(TABLES)}.")
     if len(found) > 1:
         raise InputError(f"folder {folder} has {' and '.join(p.name for p in found)}; accepted: one table. Remove the others.")
-    path = found[0]
-    ids = next((theirs for theirs, ours in description.columns.items() if ours == "trajectory"), "trajectory")
-    try:
-        table = pd.read_parquet(path) if path.suffix == ".parquet" else _read_csv(path, ids)
-    except (ValueError, OSError, EOFError, zlib.error, pd.errors.ParserError, pd.errors.ParserWarning) as error:
-        reason = " ".join(str(error).split())[:160]
-        raise InputError(f"{path} cannot be read: {reason}. It must be a table with the columns trajectory, t and the states.") from None
-    if table.empty:
-        raise InputError(f"{path} has no rows; it needs one row per sample.")
-    return _rename(table, description.columns, path), path
+    path, ours = found[0], description.columns
+    ids = next((theirs for theirs, signal in ours.items() if signal == "trajectory"), "trajectory")
+    table = read_trajectories(path, ids, lambda names: _needed(list(names), ours, path))
+    return table.rename(columns=ours), path
 
 
-def _read_csv(path: Path, ids: str) -> pd.DataFrame:
-    """Run names stay the text that they are ("001", "NA"); a row with more fields than the header is an error, not a shift of all columns."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", pd.errors.ParserWarning)
-        empty = {column: _EMPTY for column in pd.read_csv(path, nrows=0, index_col=False).columns if column != ids}
-        return pd.read_csv(path, dtype={ids: str}, keep_default_na=False, na_values=empty, index_col=False, low_memory=False)
-
-
-def _rename(table: pd.DataFrame, columns: dict[str, str], where: Path) -> pd.DataFrame:
+def _needed(names: list[str], columns: dict[str, str], where: Path) -> list[str]:
+    """Those of the table's columns that are ours, or become so by [columns]."""
     for theirs, ours in columns.items():
-        if theirs not in table:
-            raise unknown_name(f"column of {where.name} in [columns] of dataset.toml:", theirs, map(str, table.columns))
+        if theirs not in names:
+            raise unknown_name(f"column of {where.name} in [columns] of dataset.toml:", theirs, names)
         if ours not in _KNOWN:
             raise unknown_name(f"signal for '{theirs}' in [columns] of dataset.toml:", ours, _KNOWN)
-    table = table.rename(columns=columns)
-    names = list(table.columns)
+    renamed = [columns.get(name, name) for name in names]
     for name in _KNOWN:
-        if names.count(name) > 1 or (name in names and f"{name}.1" in names):  # pandas calls a header's second "x" "x.1"
+        if renamed.count(name) > 1 or (name in renamed and f"{name}.1" in renamed):  # pandas calls a header's second "x" "x.1"
             raise InputError(f"{where}: two columns are '{name}'; accepted: one. Remove one, or correct [columns] in dataset.toml.")
-    return table
+    for column in ("trajectory", "t", *_MOTION):
+        if column not in renamed:
+            near = difflib.get_close_matches(column.lower(), renamed, n=1, cutoff=0.5)
+            hint = f" Did you mean '{near[0]}'? Then write [columns] {near[0]} = \"{column}\" in dataset.toml." if near else ""
+            shown = renamed if len(renamed) <= _SHOWN else [*renamed[:_SHOWN], f"and {len(renamed) - _SHOWN} more"]
+            raise InputError(f"{where}: column '{column}' is missing.{hint} Found: {', '.join(shown)}.")
+    return [name for name, signal in zip(names, renamed, strict=True) if signal in _KNOWN]
 
 
 def check_columns(table: pd.DataFrame, where: Path) -> None:
-    """Required columns are there, run names are whole blocks of rows, and every signal is numeric (then float)."""
-    for column in ("trajectory", "t", *_MOTION):
-        if column not in table:
-            near = difflib.get_close_matches(column.lower(), [str(c) for c in table.columns], n=1, cutoff=0.5)
-            hint = f" Did you mean '{near[0]}'? Then write [columns] {near[0]} = \"{column}\" in dataset.toml." if near else ""
-            raise InputError(f"{where}: column '{column}' is missing.{hint} Found: {', '.join(map(str, table.columns))}.")
+    """Run names are whole blocks of rows, and every signal is numeric (then float)."""
     nameless = (table["trajectory"].isna() | (table["trajectory"].astype(str).str.strip() == "")).to_numpy()
     if nameless.any():
         row = int(np.argmax(nameless)) + 2
@@ -160,9 +163,9 @@ def check_columns(table: pd.DataFrame, where: Path) -> None:
         )
     for column in ("t", *(c for c in _SIGNALS if c in table)):
         if not pd.api.types.is_numeric_dtype(table[column]):
-            unread = np.isnan(np.asarray(pd.to_numeric(table[column], errors="coerce"), dtype=float))
+            unread = ~np.isfinite(np.asarray(pd.to_numeric(table[column], errors="coerce"), dtype=float))
             row = int(np.argmax(unread & table[column].notna().to_numpy()))
-            value = table[column].iloc[row]
+            value = str(table[column].iloc[row])[:80]
             raise InputError(f"{where}, row {row + 2}: {column} is '{value}', not a number. Accepted: decimal numbers with a point.")
         table[column] = table[column].astype(float)
 

@@ -59,6 +59,17 @@ def test_shipped_configs_are_found_by_name_and_valid(name):
         ('dataset = "a"\ndatasets = ["b"]\nmodels = ["hold"]', r"both 'dataset' and 'datasets'"),
         ('datasets = "b"\nmodels = ["hold"]', r"datasets = 'b'; accepted: a list"),
         ("folds = 5", r"no model is given"),
+        ('models = ["hold"]\nhorizon_s = true', r"horizon_s: .*not true or false \(value: True\)"),
+        ('models = ["hold"]\nhorizon_s = "60"', r"horizon_s: .*not text \(value: 60\)"),
+        ('models = ["hold"]\nhorizon_s = inf', r"horizon_s: .*finite number"),
+        ('models = ["hold"]\nstride_s = nan', r"stride_s: .*finite number"),
+        ('models = ["hold"]\nfolds = "5"', r"folds: .*not text"),
+        ('models = ["hold"]\nfolds = true', r"folds: .*not true or false"),
+        ('models = ["hold"]\nseeds = [0, "1"]', r"seeds.1: .*not text"),
+        ('models = ["hold"]\nseeds = [-1]', r"seeds.0: .*\(value: -1\)"),
+        ('models = ["hold"]\nfold_seed = 5000000000', r"fold_seed: .*\(value: 5000000000\)"),
+        ('models = "hold"', r"models: .*\(value: hold\)"),
+        ('models = ["hold"]\ntitle = 3', r"title: .*string"),
         ("models = []", r"no model is given"),
         ("models = [", r"is not valid TOML"),
     ],
@@ -77,6 +88,8 @@ def test_a_missing_config_names_its_path(tmp_path):
 
 def test_a_horizon_between_two_samples_is_refused():
     assert task(horizon_s=60.0).steps(0.1) == 600
+    with pytest.raises(InputError, match="not a whole number"):
+        task(horizon_s=1e308).steps(0.1)
     with pytest.raises(InputError, match=r"horizon_s = 60\.5 s is not a whole number of samples of 1 s"):
         task(horizon_s=60.5).steps(1.0)
 

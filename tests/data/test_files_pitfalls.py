@@ -123,8 +123,10 @@ def _lines(change: Callable[[str], str]) -> Callable[[Path], object]:
     return lambda folder: (folder / "trajectories.csv").write_text(change((folder / "trajectories.csv").read_text()))
 
 
-def _without_dt(folder: Path) -> None:
-    (folder / "dataset.toml").write_text((folder / "dataset.toml").read_text().replace("dt = 1.0\n", ""))
+def _toml(folder: Path, old: str, new: str) -> None:
+    text = (folder / "dataset.toml").read_text()
+    assert old in text
+    (folder / "dataset.toml").write_text(text.replace(old, new))
 
 
 BAD: dict[str, tuple[Edit | None, str, Callable[[Path], object] | None, str]] = {
@@ -147,7 +149,20 @@ BAD: dict[str, tuple[Edit | None, str, Callable[[Path], object] | None, str]] = 
     ),
     "metadata of no run": (None, '\n[runs.zz]\ngroup = "g"\n', None, "'zz'"),
     "unknown key": (None, "\n[unit]\n", None, "unit: Extra inputs"),
-    "no dt": (None, "", _without_dt, "dt: Field required"),
+    "dt as text": (None, "", lambda f: _toml(f, "dt = 1.0", 'dt = "1"'), "dt: .*not text"),
+    "dt as truth value": (None, "", lambda f: _toml(f, "dt = 1.0", "dt = true"), "dt: .*not true or false"),
+    "dt without end": (None, "", lambda f: _toml(f, "dt = 1.0", "dt = inf"), "dt: .*finite"),
+    "scale as text": (None, '\n[scale]\nu = "2"\n', None, "scale.u: .*not text"),
+    "bias as truth value": (None, "\n[bias]\nu = true\n", None, "bias.u: .*not true or false"),
+    "delay beyond the run": (None, "\n[delay]\nu = 1e308\ndelta_c = 1e308\n", None, "leave no two samples"),
+    "antenna as texts": (None, "", lambda f: _toml(f, "dt = 1.0", 'dt = 1.0\nantenna = ["1", 2]'), "antenna.0: .*not text"),
+    "notes of numbers": (None, "", lambda f: _toml(f, "notes = [", "notes = [3, "), "notes.0: "),
+    "a cut that ends before it begins": (None, "\n[runs.a]\ncut = [[4, 2]]\n", None, r"\[runs.a\] cut.0: .*such as \[2, 4\]"),
+    "a fill that ends before it begins": (None, "\n[runs.a]\nfill = {r = [[4, 2]]}\n", None, "fill.r.0: .*ends before it begins"),
+    "a cut of texts": (None, '\n[runs.a]\ncut = [["1", "2"]]\n', None, "cut.0.0: .*not text"),
+    "a cut without an end": (None, "\n[runs.a]\ncut = [[1]]\n", None, "cut.0.1: "),
+    "a run as a number": (None, "\n[runs]\na = 3\n", None, "runs.a: "),
+    "no dt": (None, "", lambda f: _toml(f, "dt = 1.0\n", ""), "dt: Field required"),
     "no dataset.toml": (None, "", lambda f: (f / "dataset.toml").unlink(), "cannot read .*dataset.toml"),
     "two tables": (None, "", lambda f: (f / "trajectories.csv.gz").write_bytes(b""), "accepted: one table"),
     "binary gzip": (None, "", _raw("trajectories.csv.gz", bytes(range(256))), "cannot be read"),
