@@ -8,14 +8,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .cli_common import DatasetArgument, Json, Quiet, console_for_tables, print_json
+from .errors import InputError
 
 if TYPE_CHECKING:
+    from .checking.applying import Laid
     from .checking.finding import Finding
 
 
 def data_check(
     dataset: DatasetArgument,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for findings.json and a picture of each finding.")] = None,
+    apply: Annotated[
+        bool, typer.Option("--apply", help="Write the proposed lines into dataset.toml; the old file stays beside it as dataset.toml.before-check.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Find faults of a data set from the data themselves: units, signs, frames, clocks, samples, copies.
@@ -24,15 +29,25 @@ def data_check(
     """
     from .bench.check_report import check_document, check_tables, write_findings
     from .bench.dataset_facts import dataset_facts
+    from .checking.applying import laid, write_lines
     from .checking.base import check_path
 
+    if apply and not Path(dataset, "dataset.toml").is_file():
+        raise InputError(
+            f"'{dataset}' has no dataset.toml to apply lines to; accepted: a folder with one. Make it: shipbench data export {dataset} --out FOLDER"
+        )
     recording, findings = check_path(dataset)
-    facts = dataset_facts(recording.dataset)
+    facts, document = dataset_facts(recording.dataset), check_document(recording, findings)
+    proposed = [f for f in findings if f.severity != "note"]
     written = write_findings(recording, findings, out) if out is not None else []
+    lines, before = write_lines(Path(dataset), proposed) if apply else (laid(recording.given, proposed), None)
     if as_json:
-        print_json(check_document(recording, findings))
+        print_json(document | ({"before": str(before) if before else None} if apply else {}))
     else:
         _show(facts, findings, check_tables(findings))
+        _show_lines(lines, apply)
+        if before is not None:
+            typer.echo(f"Written: {Path(dataset, 'dataset.toml')} (the old file: {before.name}). Next: shipbench data check {dataset}")
         if written:
             typer.echo(f"Written: {out} ({len(written)} files)")
     if any(f.severity == "error" for f in findings):
@@ -40,8 +55,6 @@ def data_check(
 
 
 def _show(facts: dict[str, Any], findings: list[Finding], tables: list[Any]) -> None:
-    from .checking.finding import merged, toml_line
-
     for key, value in facts.items():
         for line in value if isinstance(value, list) else [value]:
             typer.echo(f"{key + ':':<13s}{line}")
@@ -49,15 +62,25 @@ def _show(facts: dict[str, Any], findings: list[Finding], tables: list[Any]) -> 
     for table in tables:
         table.show(console)
     counts = {severity: sum(f.severity == severity for f in findings) for severity in ("error", "warning", "note")}
-    typer.echo(f"Findings: {counts['error']} errors, {counts['warning']} warnings, {counts['note']} notes.")
-    lines = [f.line for f in findings if f.line and f.severity != "note"]
-    if lines:
-        text = toml_line(merged({}, lines)).split("\n")
-        typer.echo("\nFor dataset.toml, after you have looked at each finding:")
+    said = [f"{number} {severity}{'s' * (number != 1)}" for severity, number in counts.items()]
+    typer.echo(f"Findings: {', '.join(said)}.")
+
+
+def _show_lines(lines: Laid, applied: bool) -> None:
+    """The entries of dataset.toml that the findings change, and what is left out."""
+    from .checking.finding import toml_line
+
+    if lines.changed:
+        text = toml_line(lines.changed).split("\n")
+        typer.echo("\nIn dataset.toml now:" if applied else "\nFor dataset.toml, after you have looked at each finding:")
         for row in text[:40]:
             typer.echo(f"  {row if len(row) <= 140 else row[:137] + '...'}")
         if len(text) > 40 or any(len(row) > 140 for row in text):
             typer.echo("  (shortened: --out FOLDER writes them all into dataset_lines.toml)")
+    for line in lines.refused:
+        typer.echo(f"Left out: {line}. Look at these findings and write the right line yourself.")
+    if applied and not lines.changed:
+        typer.echo("Nothing to write into dataset.toml.")
 
 
 def suite_check(

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..checking.finding import Finding, Picture, merged, toml_line
+from ..checking.applying import laid
+from ..checking.finding import Finding, Picture, toml_line
 from ..checking.recording import Recording
 from ..errors import InputError
 from ..names import file_name
@@ -35,8 +36,10 @@ def check_tables(findings: Sequence[Finding]) -> list[Table]:
 
 def check_document(recording: Recording, findings: Sequence[Finding]) -> dict[str, Any]:
     """Facts of the data set, findings, and all lines for dataset.toml together."""
-    lines = [f.line for f in findings if f.line]
-    return dataset_facts(recording.dataset) | {"findings": [f.as_json() for f in findings], "lines": toml_line(merged({}, lines))}
+    lines = laid(recording.given, findings)
+    return dataset_facts(recording.dataset) | {
+        "findings": [f.as_json() for f in findings], "lines": toml_line(lines.changed), "contradictions": list(lines.refused),
+    }  # fmt: skip
 
 
 def write_findings(recording: Recording, findings: Sequence[Finding], folder: Path) -> list[Path]:

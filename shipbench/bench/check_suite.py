@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import tempfile
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import tomli_w
 
+from ..checking.applying import write_lines
 from ..checking.base import check_dataset, check_path
-from ..checking.finding import Finding, merged
+from ..checking.finding import Finding
 from ..data.files import read_dataset
 from ..errors import InputError
 from ..records import Dataset
@@ -59,8 +59,7 @@ def write_planted(dataset: Dataset, fault: Fault | None, seed: int, folder: Path
 
 def apply_lines(folder: Path, findings: Sequence[Finding]) -> None:
     """Lay the lines of findings into a folder's dataset.toml."""
-    path = folder / "dataset.toml"
-    path.write_text(tomli_w.dumps(merged(tomllib.loads(path.read_text(encoding="utf-8")), [f.line for f in findings if f.line])), encoding="utf-8")
+    write_lines(folder, findings)
 
 
 def run_case(fault: Fault, source: str, seed: int, folder: Path) -> Outcome:

@@ -13,7 +13,9 @@ from .gross import mend
 from .reading import read_recording
 from .recording import Recording
 
-_HELPERS = frozenset({"base", "finding", "gross", "reading", "recording", "rudder_side", "selection", "statistics", "units", "wind_reading"})
+_HELPERS = frozenset(
+    {"applying", "base", "finding", "gross", "reading", "recording", "rudder_side", "selection", "statistics", "track", "units", "wind_reading"}
+)
 CHECKS = Registry("check", "checking", "CHECK", helpers=_HELPERS, group="checks")
 
 
@@ -23,10 +25,12 @@ def _checks() -> tuple[Callable[[Recording], list[Finding]], ...]:
 
 
 def check_recording(recording: Recording) -> list[Finding]:
-    """Findings of the gross checks, then those of every other on the data with the gross errors taken out; errors first."""
+    """Findings of the gross checks, then those of every other on the data with the gross errors taken out; errors first. None is about a channel
+    that import made of others: it is as good as these."""
     mended, found = mend(recording)
     for check in _checks():
         found += check(mended)
+    found = [f for f in found if not f.channels or not set(f.channels) <= set(recording.dataset.derived)]
     found = _without_consequences(found)
     if recording.wrapped:
         found.append(_wrapped(recording))
@@ -35,9 +39,11 @@ def check_recording(recording: Recording) -> list[Finding]:
 
 def _without_consequences(found: list[Finding]) -> list[Finding]:
     """Speeds or a yaw rate that are late against the other motion are late against rudder and shaft, too; a stuck rudder seems late; of a log that
-    falls silent the track tells nothing else. Said once."""
+    falls silent the track tells nothing else, and a yaw rate that is none tells nothing of the rudder. Said once."""
     if any(f.kind == "log reads nothing" for f in found):
         found = [f for f in found if f.check not in ("track", "spikes") or not set(f.channels) <= {"x", "y", "u", "v"}]
+    if any(f.kind == "unrelated" for f in found):
+        found = [f for f in found if f.check != "response" or "r" not in f.channels]
     known = {c for f in found if (f.kind, f.check) in (("lag", "track"), ("lag", "yaw"), ("frozen", "samples")) for c in f.channels}
     return [f for f in found if f.check != "response" or not known & {c.removesuffix("_c") for c in f.channels}]
 

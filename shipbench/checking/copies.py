@@ -5,6 +5,7 @@ Windows of rounded samples of u, v, r are hashed, so that the cost grows with th
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +21,8 @@ _DIGITS = 1e-5
 """Rounding, as a share of the channel's spread."""
 _REST = 1e-3
 """Froude number of a ship at rest."""
+_SAME = 0.98
+"""Share of a run's samples that makes it a copy, or a piece, of another."""
 _FEWEST = 20
 """Equal samples without a break, each other than the one before, that make two runs copies."""
 
@@ -79,14 +82,36 @@ def _alike(a: Run, b: Run, offset: int, size: np.ndarray) -> int:
 def check(recording: Recording) -> list[Finding]:
     """Copies and pieces, then logs that were cut; what shares a group already is not reported. All runs that hang together get one group."""
     shared = {pair: part for pair, part in overlaps(recording).items() if _apart([recording.runs[i] for i in pair])}
-    chains = [chain for chain in _chains(recording) if _apart(chain)]
+    chains = [chain for chain in _chains(recording) if _apart(chain) and not _cut_by_import(chain)]
     families = _families(recording, [*([recording.runs[i] for i in pair] for pair in shared), *chains])
-    found = [_copy(recording, recording.runs[i], recording.runs[j], *part, families) for (i, j), part in shared.items()]
-    return found + [_log(recording, chain, families) for chain in chains]
+    together: dict[tuple[str, ...], list[tuple[int, int]]] = {}
+    for pair in shared:
+        together.setdefault(families[recording.name_of(recording.runs[pair[0]])], []).append(pair)
+    return [_cluster(recording, pairs, shared, families) for pairs in together.values()] + [_log(recording, chain, families) for chain in chains]
 
 
 def _apart(runs: list[Run]) -> bool:
     return len({run.group for run in runs}) > 1
+
+
+def _cut_by_import(chain: list[Run]) -> bool:
+    """Whether the runs are windows that import cut from one recording, as its description says: their owner chose so."""
+    files = {run.meta.get("file") for run in chain}
+    return len(files) == 1 and None not in files and all({"from", "to"} <= run.meta.keys() for run in chain)
+
+
+def _cluster(
+    recording: Recording, pairs: list[tuple[int, int]], shared: dict[tuple[int, int], tuple[int, int]], families: dict[str, tuple[str, ...]]
+) -> Finding:
+    """One finding on runs that share samples with one another, with the pair that shares most."""
+    i, j = max(pairs, key=lambda pair: shared[pair][0])
+    finding = _copy(recording, (i, j), shared[i, j], families)
+    names = recording.names(recording.runs[k] for k in sorted({k for pair in pairs for k in pair}))
+    if len(names) == len(finding.runs):
+        return finding
+    text = f"{len(names)} runs share samples with one another ({some(names)}). The most: {finding.text}"
+    kind = finding.kind if len({_kind(recording, pair, shared[pair]) for pair in pairs}) == 1 else "overlapping runs"
+    return replace(finding, kind=kind, text=text, runs=names, evidence={**finding.evidence, "runs": len(names)})
 
 
 def _families(recording: Recording, sets: list[list[Run]]) -> dict[str, tuple[str, ...]]:
@@ -106,21 +131,28 @@ def _lines(family: tuple[str, ...]) -> str:
     return toml_line({"runs": {name: {"group": family[0]} for name in family}})
 
 
-def _copy(recording: Recording, a: Run, b: Run, samples: int, offset: int, families: dict[str, tuple[str, ...]]) -> Finding:
+def _kind(recording: Recording, pair: tuple[int, int], part: tuple[int, int]) -> str:
+    longest, shortest = sorted((len(recording.runs[i]) for i in pair), reverse=True)
+    return "duplicate run" if part[0] >= _SAME * longest else "piece of a run" if part[0] >= _SAME * shortest else "overlapping runs"
+
+
+def _copy(recording: Recording, pair: tuple[int, int], part: tuple[int, int], families: dict[str, tuple[str, ...]]) -> Finding:
+    a, b = (recording.runs[i] for i in pair)
+    samples, offset = part
     names = (recording.name_of(a), recording.name_of(b))
     longer, shorter = (a, b) if len(a) >= len(b) else (b, a)
     start = offset if longer is a else -offset
-    if samples >= 0.98 * len(longer):
-        kind, text = "duplicate run", f"runs '{names[0]}' and '{names[1]}' hold the same {samples} samples"
-    elif samples >= 0.98 * len(shorter):
+    kind = _kind(recording, pair, part)
+    if kind == "duplicate run":
+        text = f"runs '{names[0]}' and '{names[1]}' hold the same {samples} samples"
+    elif kind == "piece of a run":
         where = max(start, 0) * recording.dt
-        kind = "piece of a run"
         text = (
             f"run '{recording.name_of(shorter)}' ({samples} samples) is a piece of '{recording.name_of(longer)}' ({len(longer)} samples), from "
             f"{where:g} s to {where + (samples - 1) * recording.dt:g} s of it"
         )
     else:
-        kind, text = "overlapping runs", f"runs '{names[0]}' ({len(a)} samples) and '{names[1]}' ({len(b)}) share {samples} samples"
+        text = f"runs '{names[0]}' ({len(a)} samples) and '{names[1]}' ({len(b)}) share {samples} samples"
     i, j = max(offset, 0), max(-offset, 0)
     n = min(len(a) - i, len(b) - j)
     t = np.arange(n) * recording.dt

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -102,24 +100,3 @@ def _plain(value: Any) -> Any:
         return [_plain(v) for v in value]
     value = value.item() if hasattr(value, "item") else value
     return float(f"{value:.6g}") if isinstance(value, float) else value
-
-
-def merged(base: dict[str, Any], lines: Iterable[str]) -> dict[str, Any]:
-    """`base` (a parsed dataset.toml, or {}) with the lines of findings laid into it; lists of intervals grow, other values are replaced."""
-    result = dict(base)
-    for line in lines:
-        result = _laid(result, tomllib.loads(line))
-    return result
-
-
-def _laid(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
-    result = dict(old)
-    for key, value in new.items():
-        before = result.get(key)
-        if isinstance(before, dict) and isinstance(value, dict):
-            result[key] = _laid(before, value)
-        elif isinstance(before, list) and isinstance(value, list) and value and isinstance(value[0], list):
-            result[key] = before + [v for v in value if v not in before]
-        else:
-            result[key] = value
-    return result

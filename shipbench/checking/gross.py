@@ -22,6 +22,7 @@ from .units import BETTER, UnitFinding, check_units, corrected
 from .wind_reading import mend_wind
 
 _POOR = 0.15
+_HEMISPHERES = "Did the import leave N/S or E/W of latitude and longitude unread? Then import again with `hemisphere` in the mapping."
 _FLIPPED = {
     "x": ("south", "north"), "y": ("west", "east"), "psi": ("counterclockwise", "clockwise"), "u": ("astern", "ahead"), "v": ("port", "starboard"),
     "r": ("port", "starboard"), "delta": ("port", "starboard"), "n": ("astern", "ahead"), "F_b": ("port", "starboard"), "F_s": ("port", "starboard"),
@@ -122,17 +123,23 @@ def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
     """The recording with gross errors taken out, and what they were."""
     findings: list[Finding] = []
     plain = _misfit(recording, recording.dataset)
-    units = check_units(recording.dataset)
-    if plain is not None and (plain.track > _POOR or len(_errors(units)) > 1):
-        best = _best_reading(recording, plain, units)
-        if best is not None:
-            reading, dataset, left = best
-            findings.append(_frame_finding(reading, plain, left))
-            recording = recording.with_dataset(dataset)
-            units = check_units(recording.dataset)
+    units = _units(recording)
+    best = _best_reading(recording, plain, units) if plain is not None else None
+    if plain is not None and best is not None:
+        reading, dataset, left = best
+        findings.append(_frame_finding(reading, plain, left))
+        recording = replace(recording, dataset=dataset, turned=recording.turned or "velocities" in reading.line)
+        units = _units(recording)
     findings += [_unit_finding(recording, f, units) for f in units if not _follows(f, units)]
     recording, wind = mend_wind(recording.with_dataset(corrected(recording.dataset, units)))
     return recording, findings + wind
+
+
+def _units(recording: Recording) -> list[UnitFinding]:
+    """Errors of unit and sign; of two speeds that come from one velocity over ground none has a unit of its own."""
+    found = check_units(recording.dataset)
+    factors = {f.channel: f.factor for f in found}
+    return [f for f in found if not (recording.turned and f.channel in ("u", "v") and factors.get("u") != factors.get("v"))]
 
 
 def _best_reading(recording: Recording, plain: _Misfit, units: list[UnitFinding]) -> tuple[_Reading, Dataset, _Misfit] | None:
@@ -159,8 +166,15 @@ def _errors(units: list[UnitFinding]) -> list[UnitFinding]:
 
 
 def _follows(f: UnitFinding, units: list[UnitFinding]) -> bool:
-    """A command with its actuator's error."""
+    """A command with its actuator's error, and y where both axes of the position are reversed."""
+    if f.channel == "y":
+        return _reversed(units)
     return f.channel.endswith("_c") and any(o.channel == f.channel.removesuffix("_c") and abs(o.factor / f.factor - 1.0) < 0.02 for o in units)
+
+
+def _reversed(units: list[UnitFinding]) -> bool:
+    """Whether both axes of the position have the other sign."""
+    return {("x", "sign"), ("y", "sign")} <= {(f.channel, f.kind) for f in units}
 
 
 def _picture(plain: _Misfit, left: _Misfit) -> Picture:
@@ -187,19 +201,29 @@ def _frame_finding(reading: _Reading, plain: _Misfit, left: _Misfit) -> Finding:
     )  # fmt: skip
 
 
+def _side(recording: Recording, channel: str) -> str:
+    """The word of `[signs]` that turns a channel round; a sign that the file declares already is taken back."""
+    flipped, kept = _FLIPPED[channel.removesuffix("_c")]
+    return kept if recording.given.get("signs", {}).get(channel) == flipped else flipped
+
+
 def _unit_finding(recording: Recording, f: UnitFinding, units: list[UnitFinding]) -> Finding:
-    """In words and as lines; a sign that the file declares already is taken back."""
+    """In words and as lines."""
     if f.kind == "exchanged with y":
         text = f"x is east and y north. {f.evidence}"
         line = toml_line({"frame": "east-north"})
         return Finding(
             "gross", "error", "ENU", text, line, channels=("x", "y"), evidence={"factor": f.factor}, picture=_channel(recording, f.channel)
         )
-    given, lines, kinds, todo = recording.given, {}, [], ""
+    if f.channel == "x" and _reversed(units):
+        line = toml_line({"signs": {axis: _side(recording, axis) for axis in ("x", "y")}})
+        text = f"x and y are both reversed: x grows to the south and y to the west. {f.evidence}"
+        todo = f"{_HEMISPHERES} A heading that is off by 180 degrees looks the same: then write [bias] psi = {math.pi:.5f} instead."
+        return Finding("gross", "error", "position reversed", text, line, todo, ("x", "y"), picture=_channel(recording, "x"))
+    lines, kinds, todo = {}, [], _HEMISPHERES if f.channel in ("x", "y") else ""
     for part in f.kind.split(", "):
         if part == "sign":
-            flipped, kept = _FLIPPED[f.channel.removesuffix("_c")]
-            lines["signs"] = {f.channel: kept if given.get("signs", {}).get(f.channel) == flipped else flipped}
+            lines["signs"] = {f.channel: _side(recording, f.channel)}
             kinds.append("sign")
         elif part:
             lines["units"] = {f.channel: _UNITS[part]}

@@ -59,7 +59,8 @@ def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
         name=description.name, ship=ship, dt=dt, runs=tuple(runs), actuators=description.actuators, source=description.source,
         licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)), derived=tuple(description.derived),
     )  # fmt: skip
-    return Recording(dataset, read_toml(folder / "dataset.toml"), recorded, wrapped, parent), found
+    turned = description.velocities.startswith("earth") or bool(description.from_course)
+    return Recording(dataset, read_toml(folder / "dataset.toml"), recorded, wrapped, parent, turned), found
 
 
 def _error(

@@ -18,7 +18,8 @@ class Recording:
 
     dataset: runs without missing values, uniform in time (pieces of one run share the group `parent`). given: dataset.toml as written, {} for a
     registered set. recorded: columns that stand in the table (states that were filled in do not). wrapped: runs whose heading was wrapped.
-    parent: id of a piece -> id of the run that it is a piece of.
+    parent: id of a piece -> id of the run that it is a piece of. turned: u, v were velocities over ground, turned into the ship's axes by psi: the
+    track says nothing of psi.
     """
 
     dataset: Dataset
@@ -26,6 +27,7 @@ class Recording:
     recorded: frozenset[str] = frozenset(STATES)
     wrapped: tuple[str, ...] = ()
     parent: dict[str, str] = field(default_factory=dict)
+    turned: bool = False
 
     @property
     def runs(self) -> tuple[Run, ...]:

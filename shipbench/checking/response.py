@@ -39,11 +39,13 @@ class _Pair:
     late, early: smallest lag of the cause, or lead, that is reported [s at 130 m], and the log likelihood that it must gain. agreed: what a lag must
     gain where the actuator waits for its order, too. Noise in the motion and forces that are not recorded make the rudder seem late, never early;
     early None: a lead is not told from the dead time of a gear.
-    order: the cause is an order, which is held until the next sample, and windows that it does not explain count; else these are left out.
+    of: the state of the effect. order: the cause is an order, which is held until the next sample, and windows that it does not explain count; else
+    these are left out.
     """
 
     cause: str
     effect: str
+    of: str
     columns: _Columns
     late: tuple[float, float]
     agreed: float
@@ -75,10 +77,10 @@ def _gear(actuator: int) -> _Columns:
 
 
 _PAIRS = (
-    _Pair("delta", "yaw rate", _yaw, (3.5, 20.0), 10.0, (3.0, 6.0), False),
-    _Pair("n", "surge", _surge, (5.0, 6.0), 2.0, (4.0, 10.0), False),
-    _Pair("delta_c", "rudder", _gear(DELTA), (1.5, 10.0), 10.0, None, True),
-    _Pair("n_c", "shaft", _gear(N), (1.5, 10.0), 10.0, None, True),
+    _Pair("delta", "yaw rate", "r", _yaw, (3.5, 20.0), 10.0, (3.0, 6.0), False),
+    _Pair("n", "surge", "u", _surge, (5.0, 6.0), 2.0, (4.0, 10.0), False),
+    _Pair("delta_c", "rudder", "delta", _gear(DELTA), (1.5, 10.0), 10.0, None, True),
+    _Pair("n_c", "shaft", "n", _gear(N), (1.5, 10.0), 10.0, None, True),
 )
 
 
@@ -143,14 +145,16 @@ def _changes(values: np.ndarray, windows: np.ndarray, ahead: int, edge: int) -> 
 
 
 def check(recording: Recording) -> list[Finding]:
-    """At most one finding for each pair; none where actuators are commands: the lag is that of the gear then.
+    """At most one finding for each pair; none where actuators are commands: the lag is that of the gear then. A motion that import made of another
+    is not asked.
 
     Where rudder or revolutions are missing from the record, what they do is laid on the other's lag: the motion is not asked.
     """
     if recording.dataset.actuators != "measured" or command_like(recording):
         return []
     missing = standing(recording.dataset)
-    asked = [pair for pair in _PAIRS if pair.cause in recording.recorded and (pair.order or not missing)]
+    made = {pair.cause for pair in _PAIRS if pair.of in recording.dataset.derived}
+    asked = [pair for pair in _PAIRS if pair.cause in recording.recorded - made and (pair.order or not missing)]
     searches = {pair.cause: _search(recording, pair) for pair in asked}
     waits = {cause: -float(s.lags[s.best]) for cause, s in searches.items() if s is not None and s.gain >= _WAITS_GAIN}
     found = [

@@ -54,9 +54,9 @@ def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
     sign = float(np.sign(likeness))
     if abs(likeness) < _ALIKE_TURNS or slope[0] * sign < _SURE * sd:
         return Side()
+    against = int(np.sum(turn * helm < 0.0))
     text = (
-        f"The {len(turn)} turns by more than {np.rad2deg(_TURN):.0f} degrees in {width * dataset.dt:.3g} s go to the other side than their rudder "
-        f"(cosine {likeness:.2f}), and just after it the yaw rate does ({abs(slope[0]) / sd:.0f} sigma)."
+        f"In {against} of {len(turn)} turns the ship turns against the recorded rudder (correlation {likeness:.2f}). The rudder sign looks reversed."
     )
     return Side(sign, text)
 

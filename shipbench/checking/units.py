@@ -37,6 +37,7 @@ _KEEPING, _KEPT, _FEWEST_KEPT, _MORE_KEPT = 30.0, 0.99, 5, 3
 """Seconds (Froude-scaled, 130 m) over which a ship keeps her speed, share of it that she keeps, and number of such stretches, at least, and for each
 with the revolutions. (A ship that stops by her engine does not keep it, unless a current carries her.)"""
 _SWAPPED = "exchanged with y"
+_REVERSED = "x and y reversed"
 
 
 @dataclass(frozen=True)
@@ -55,18 +56,19 @@ class UnitFinding:
 def check_units(dataset: Dataset) -> list[UnitFinding]:
     """Gross unit and sign errors of a data set; empty when nothing is beyond doubt.
 
-    Seen are: units and sign of psi, r, u, v; x or y reversed or exchanged; unit and side of delta; unit and sign of n; units of the thrusters;
+    Seen are: units and sign of psi, r, u, v; x, y or both reversed, or exchanged; unit and side of delta; unit and sign of n; units of the thrusters;
     commands beside their actuators. Not seen is a mirror image of everything.
     """
     runs = [run for run in dataset.runs if len(run) >= 3]
     if not runs:
         return []
     findings = _actuator_units(dataset, runs)
-    motion = _motion(dataset, runs)
-    side = rudder_side(dataset, runs, abs(motion.choose(Side()).r))
-    chosen = motion.choose(side)
-    findings += motion.findings(chosen)
-    findings += _shaft_sign(runs, dataset.dt, (dataset.ship.L / 130.0) ** 0.5, np.sign(chosen.u))
+    motion, froude = _motion(dataset, runs), (dataset.ship.L / 130.0) ** 0.5
+    shaft = {ahead: _shaft_sign(runs, dataset.dt, froude, ahead) for ahead in (1.0, -1.0)}
+    astern = tuple(ahead for ahead, found in shaft.items() if found)
+    side = rudder_side(dataset, runs, abs(motion.choose(Side(), astern).r))
+    chosen = motion.choose(side, astern)
+    findings += motion.findings(chosen) + shaft[float(np.sign(chosen.u))]
     if side.sign * np.sign(chosen.r) < 0:
         findings.append(UnitFinding("delta", "sign", -1.0, side.evidence))
     return merged(findings + check_commands(runs, dataset.dt, findings))
@@ -108,7 +110,7 @@ def merged(findings: Sequence[UnitFinding]) -> list[UnitFinding]:
 
 @dataclass(frozen=True)
 class _Reading:
-    """Factors recorded over true; frame: (x, y) as recorded from true: plain, y or x reversed, exchanged."""
+    """Factors recorded over true; frame: (x, y) as recorded from true: plain, y, x or both reversed, exchanged."""
 
     frame: str = "plain"
     psi: float = 1.0
@@ -144,12 +146,13 @@ class _Motion:
     window: float
     windows: int
 
-    def choose(self, side: Side) -> _Reading:
-        """The reading with the fewest errors among those that explain the data as well as any; the plain one unless it fails by far."""
+    def choose(self, side: Side, astern: Sequence[float]) -> _Reading:
+        """The reading with the fewest errors among those that explain the data as well as any; the plain one unless it fails by far.
+        astern: signs of u with which the shaft would turn the wrong way."""
         plain = _Reading()
         suits = self._tracks(plain) if self.track else [replace(plain, psi=psi) for psi in self._headings()]
         options = [(replace(k, r=r), self.track.get(k, 0.0)) for k in suits for r in self._rates(k.psi)]
-        return min(options, key=lambda o: (o[0].errors + (side.sign * np.sign(o[0].r) < 0), o[1]))[0]
+        return min(options, key=lambda o: (o[0].errors + (side.sign * np.sign(o[0].r) < 0) + (np.sign(o[0].u) in astern), o[1]))[0]
 
     def _tracks(self, plain: _Reading) -> list[_Reading]:
         """Readings of the track that suit."""
@@ -186,9 +189,10 @@ class _Motion:
             plain, left = self.track[_Reading()] ** 0.5, self.track[replace(chosen, r=1.0)] ** 0.5
             text = f"The track departs from heading and speeds by {plain:.1%} of its length as recorded, by {left:.1%} read so"
             text += f" ({self.windows} windows of {self.window:.3g} s)."
-        if chosen.frame != "plain":
-            channel, kind = ("x", _SWAPPED) if chosen.frame == _SWAPPED else (chosen.frame[0], "sign")
-            found.append(UnitFinding(channel, kind, 1.0 if kind == _SWAPPED else -1.0, text))
+        if chosen.frame == _SWAPPED:
+            found.append(UnitFinding("x", _SWAPPED, 1.0, text))
+        elif chosen.frame != "plain":
+            found += [UnitFinding(channel, "sign", -1.0, text) for channel in ("xy" if chosen.frame == _REVERSED else chosen.frame[0])]
         for channel, factor in (("psi", chosen.psi), ("u", chosen.u), ("v", chosen.v)):
             if factor != 1.0:
                 found.append(_finding(channel, factor, text))
@@ -212,16 +216,19 @@ def _motion(dataset: Dataset, runs: Sequence[Run]) -> _Motion:
     moved, turned = S[:, -1, [X, Y]] - S[:, 0, [X, Y]], S[:, -1, PSI] - S[:, 0, PSI]
     track: dict[_Reading, float] = {}
     whole = float(np.sum(moved**2))
+    headings = [f for f in _signed("psi") if abs(f) == 1.0 or np.ptp(S[..., PSI]) > 2.0 * np.pi]  # degrees: else all courses would be one
     if whole > len(S) * (0.02 * L) ** 2:
         floor = 2.0 * len(S) * (0.001 * L) ** 2
-        for psi in _signed("psi"):
+        for psi in headings:
             parts = _track_parts(S, psi, dt)
             for frame, matrix in _FRAMES.items():
                 for (u, v), left in _track_squares(moved @ matrix.T, parts, width * dt, limits).items():
                     track[_Reading(frame, psi, u, v)] = (left + floor) / whole
+    for k in [k for k in track if k.frame == "plain"]:  # the same way is made with both speeds reversed
+        track[replace(k, frame=_REVERSED, u=-k.u, v=k.v if np.isinf(k.v) else -k.v)] = track[k]
     yaw: dict[tuple[float, float], float] = {}
     rate, jump = np.trapezoid(S[:, :, R], dx=dt, axis=1), S[:, -1, R] - S[:, 0, R]
-    for psi, r in itertools.product(_signed("psi"), _signed("r")) if np.sum(turned**2) > len(S) * 0.01**2 else ():
+    for psi, r in itertools.product(headings, _signed("r")) if np.sum(turned**2) > len(S) * 0.01**2 else ():
         columns = np.stack([rate / r, np.full(len(S), width * dt), jump / r], axis=-1)
         left = _bounded_squares((turned / psi - rate / r)[None], columns[None], np.array([0.15, 0.1 / froude, limits[4]]))[0]
         yaw[psi, r] = (float(left) + len(S) * 0.003**2) / float(np.sum((turned / psi) ** 2))

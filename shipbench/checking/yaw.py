@@ -12,9 +12,9 @@ import numpy as np
 from ..signals import PSI, R
 from .finding import Curve, Finding, Picture, Severity, toml_line
 from .recording import Recording
-from .selection import Chosen, select
+from .selection import UNEXPLAINED, Chosen, select
 from .statistics import some, spread
-from .track import WINDOW, least_lag, shifted
+from .track import WINDOW, least_lag, possible_scale, shifted
 
 _LEAST_SCALE, _LEAST_BIAS = 0.02, 0.01
 """Shares: of the rate, and of the typical yaw rate (root mean square)."""
@@ -35,8 +35,8 @@ def _windows(recording: Recording, lag: float) -> tuple[np.ndarray, np.ndarray, 
     return np.array([i for i, _ in pieces]), rows, width * recording.dt
 
 
-def _explain(run: np.ndarray, rows: np.ndarray, span: float) -> Chosen:
-    groups = {"scale": rows[:, 1:2], "bias": np.full((len(run), 1), span), "lag": rows[:, 2:3]}
+def _explain(run: np.ndarray, rows: np.ndarray, span: float, lag: bool = True) -> Chosen:
+    groups = {"scale": rows[:, 1:2], "bias": np.full((len(run), 1), span), **({"lag": rows[:, 2:3]} if lag else {})}
     whole = float(np.sqrt(np.mean(rows[:, 0] ** 2))) + 1e-9
     return select(rows[:, 0] - rows[:, 1], groups, np.zeros((len(run), 1)), run, 1, whole)
 
@@ -77,10 +77,12 @@ def late_yaw_rate(recording: Recording) -> tuple[float, float] | None:
 
 
 def check(recording: Recording) -> list[Finding]:
-    """Findings of the yaw rate; none where the ship hardly turns."""
-    found = _settled(recording)
+    """Findings of the yaw rate; none where the ship hardly turns, or where the yaw rate was made from the heading."""
+    found = None if "r" in recording.dataset.derived else _settled(recording)
     if found is None:
         return []
+    if found.chosen.left["all chosen"] ** 2 > UNEXPLAINED:
+        return [_unrelated(found)]
     made, first, chosen, lag, lag_sd = found
     return _lag(recording, made, first, chosen, lag, lag_sd) + _scale(made, first, chosen) + _biases(recording, made, first, chosen)
 
@@ -100,17 +102,27 @@ def _picture(made: tuple[np.ndarray, np.ndarray, float], what: str) -> Picture:
     )  # fmt: skip
 
 
+def _unrelated(found: _Settled) -> Finding:
+    left = found.chosen.left["all chosen"]
+    text = (
+        f"r is not the rate of psi: the heading departs from the integral of r by {found.first.left['plain']:.0%} of its change. "
+        f"With any bias, scale and lag it still does by {left:.0%}."
+    )
+    todo = "Look for the yaw rate, or the heading, in another column. Without a yaw rate, import makes it from the heading."
+    return Finding("yaw", "error", "unrelated", text, "", todo, ("psi", "r"), evidence={"left": left}, picture=_picture(found.made, "scale"))
+
+
 def _shares(first: Chosen, chosen: Chosen) -> str:
     plain, left = first.left["plain"], chosen.left["all chosen"]
     return f"the heading departs from the integral of r by {plain:.1%} of its change as recorded, by {left:.1%} with it"
 
 
 def _lag(recording: Recording, made: tuple, first: Chosen, chosen: Chosen, lag: float, sd: float) -> list[Finding]:
-    if abs(lag) < least_lag(recording):
+    plain = _windows(recording, 0.0) or made
+    if not least_lag(recording) <= abs(lag) <= 0.5 * made[2] or chosen.out > UNEXPLAINED * _explain(*plain, lag=False).out:
         return []
     late, other = ("r", "the heading") if lag > 0.0 else ("psi", "the yaw rate")  # sensors are late, not early
     text = f"{late} lags {other} by {abs(lag):.2g} s (standard error {sd:.1g} s): {_shares(first, chosen)}."
-    plain = _windows(recording, 0.0) or made
     return [Finding(
         "yaw", "warning", "lag", text, toml_line({"delay": {late: round(abs(lag), 3)}}), channels=(late,), evidence={"lag_s": abs(lag), "sd_s": sd},
         picture=_picture(plain, "lag"),
@@ -118,10 +130,10 @@ def _lag(recording: Recording, made: tuple, first: Chosen, chosen: Chosen, lag: 
 
 
 def _scale(made: tuple, first: Chosen, chosen: Chosen) -> list[Finding]:
-    if "scale" not in chosen.names:
+    if chosen.held.get("scale", 1.0) > UNEXPLAINED:
         return []
     factor, sd = 1.0 / (1.0 + float(chosen.value["scale"][0])), float(chosen.sd["scale"][0])
-    if abs(factor - 1.0) < _LEAST_SCALE:
+    if abs(factor - 1.0) < _LEAST_SCALE or not possible_scale(factor):
         return []
     text = f"r reads {factor:.3f} of the heading's rate (standard error {sd:.3f}): {_shares(first, chosen)}."
     line = toml_line({"scale": {"r": round(factor, 4)}})

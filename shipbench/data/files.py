@@ -23,6 +23,8 @@ from .trajectories import read_trajectories
 from .units import sign_factor, unit_factor
 
 TABLES = ("trajectories.parquet", "trajectories.csv.gz", "trajectories.csv")
+BEFORE_CHECK = "dataset.toml.before-check"
+"""Beginning of the names under which `data check --apply` keeps the old dataset.toml."""
 _ACTUATORS = STATES[ACTUATORS]
 _MOTION = STATES[: ACTUATORS.start]
 _SIGNALS = (*STATES, *COMMANDS, *ENVIRONMENT)
@@ -44,6 +46,7 @@ class Description(Corrections):
     simulation: str | None = None
     notes: list[str] = Field(default_factory=list)
     derived: list[Literal["u", "v", "r"]] = Field(default_factory=list)
+    from_course: list[Literal["u", "v"]] = Field(default_factory=list)
     units: dict[str, str] = Field(default_factory=dict)
     signs: dict[str, str] = Field(default_factory=dict)
     columns: dict[str, str] = Field(default_factory=dict)
@@ -82,7 +85,15 @@ def read_description(path: Path) -> Description:
     Raises:
         InputError: the file is missing, is not TOML, or has a missing, unknown or impossible entry.
     """
-    data = read_toml(path)
+    return parse_description(read_toml(path), path)
+
+
+def parse_description(data: dict[str, Any], path: Path) -> Description:
+    """The content of a dataset.toml, validated; `path` is named where it is wrong.
+
+    Raises:
+        InputError: an entry is missing, unknown or impossible.
+    """
     try:
         description = Description.model_validate(data)
     except ValidationError as error:

@@ -97,8 +97,7 @@ class Summary:
                 lines.append(f"positions moved to midship from an antenna at x = {source.antenna.x:g} m, y = {source.antenna.y:g} m")
             if source.speed_sensor:
                 lines.append(f"u, v moved to midship from x = {source.speed_sensor.x:g} m, y = {source.speed_sensor.y:g} m")
-        from_course = [n for n in "uv" if mapping.has("sog") and not mapping.has(n)]
-        if from_course:
+        if from_course := self.from_course():
             lines.append(f"{', '.join(from_course)} from sog, cog and psi (over ground)")
         for names, base, unit, factor in ((("u", "v"), "x, y and psi", "m", 1.0), (("r",), "psi", "deg", 180.0 / math.pi)):
             found = [n for n in names if n in self.times]
@@ -111,6 +110,10 @@ class Summary:
         if mapping.has("apparent_wind_speed") and not mapping.has("wind_speed"):
             lines.append("true wind from the apparent wind, psi, u and v")
         return lines
+
+    def from_course(self) -> list[str]:
+        """Speeds that are the velocity over ground, turned by the heading."""
+        return [n for n in "uv" if self.mapping.has("sog") and not self.mapping.has(n)]
 
     def left_out(self) -> list[str]:
         """What was cut or skipped, and why."""
@@ -137,11 +140,11 @@ class Summary:
     def description(self) -> dict[str, Any]:
         """The content of dataset.toml."""
         files = ", ".join(self.met.forms)
-        derived = [name for name in "uvr" if name in self.times]
+        own = {"derived": [name for name in "uvr" if name in self.times], "from_course": self.from_course()}
         source = self.mapping.source or f"imported from {files if len(files) < 200 else f'{len(self.met.forms)} logs'}"
         return {
             "name": self.mapping.name, "ship": "ship.toml", "dt": self.mapping.dt, "actuators": self.actuators(), "source": source,
-            "licence": self.mapping.licence, "notes": self.notes(), **({"derived": derived} if derived else {}), "runs": self.meta,
+            "licence": self.mapping.licence, "notes": self.notes(), **{key: names for key, names in own.items() if names}, "runs": self.meta,
         }  # fmt: skip
 
     def no_runs(self) -> str:

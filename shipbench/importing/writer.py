@@ -17,7 +17,7 @@ import pyarrow.csv
 import pyarrow.parquet
 import tomli_w
 
-from ..data.files import TABLES
+from ..data.files import BEFORE_CHECK, TABLES
 from ..errors import InputError
 from ..ship import Ship
 
@@ -111,7 +111,7 @@ def _check_target(out: Path, force: bool) -> None:
     held = sorted(p.name for p in out.iterdir())
     if held and not force:
         raise InputError(f"folder {out} is there already ({', '.join(held[:4])}). Give another --out, or --force to replace that data set.")
-    if others := [name for name in held if name not in _OURS]:
+    if others := [name for name in held if name not in _OURS and not name.startswith(BEFORE_CHECK)]:
         raise InputError(f"folder {out} holds more than a data set ({', '.join(others[:4])}); --force replaces only a data set. Give another --out.")
 
 

@@ -58,14 +58,14 @@ def test_a_clean_set_exits_0_and_says_so(clean):
 def test_an_error_exits_1_with_figures_and_the_line(tmp_path):
     result = check(write_planted(base_set(SHIP, SEED), BY_NAME["rudder in degrees"], SEED, tmp_path / "set"))
     assert result.exit_code == 1
-    assert "Findings: 1 errors" in result.stdout
+    assert "Findings: 1 error, 0 warnings, 0 notes." in result.stdout
     assert 'delta = "deg"' in result.stdout
 
 
 def test_a_warning_exits_0(tmp_path):
     result = check(write_planted(base_set(SHIP, SEED), BY_NAME["yaw rate late"], SEED, tmp_path / "set"))
     assert result.exit_code == 0
-    assert "0 errors, 1 warnings" in result.stdout
+    assert "0 errors, 1 warning, 0 notes" in result.stdout
     assert "[delay]" in result.stdout
 
 
@@ -94,6 +94,25 @@ def test_the_printed_lines_laid_at_the_end_of_dataset_toml_heal(tmp_path):
     with (folder / "dataset.toml").open("a") as file:
         file.write("\n" + lines + "\n")
     assert "0 errors, 0 warnings, 0 notes" in check(folder).stdout
+
+
+def test_apply_writes_the_lines_keeps_comments_and_the_old_file_and_leaves_nothing_to_find(tmp_path):
+    folder = write_planted(base_set(SHIP, SEED), BY_NAME["speeds in knots"], SEED, tmp_path / "set")
+    old = "# my ship\n" + (folder / "dataset.toml").read_text()
+    (folder / "dataset.toml").write_text(old)
+    assert check(folder, "--apply").exit_code == 1
+    assert (folder / "dataset.toml.before-check").read_text() == old
+    text = (folder / "dataset.toml").read_text()
+    assert text.startswith("# my ship\n")
+    assert tomllib.loads(text)["units"] == {"u": "kn", "v": "kn"}
+    assert "0 errors, 0 warnings, 0 notes" in check(folder, "--apply").stdout
+    assert sorted(p.name for p in folder.iterdir()) == ["dataset.toml", "dataset.toml.before-check", "ship.toml", "trajectories.parquet"]
+
+
+def test_apply_on_a_registered_set_exits_2():
+    result = check("harbour90", "--apply")
+    assert result.exit_code == 2
+    assert "no dataset.toml to apply lines to" in result.stderr
 
 
 def test_lines_name_runs_with_any_character(table, folder):

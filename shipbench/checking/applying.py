@@ -1,0 +1,169 @@
+"""Lines of findings laid into dataset.toml: they add to what stands there, and those that contradict it or one another are left out."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from ..data.files import BEFORE_CHECK, parse_description
+from ..errors import InputError
+from ..toml_files import read_toml
+from .finding import Finding, toml_line
+
+_Path = tuple[str, ...]
+_KEPT = ("units", "frame", "velocities", "wind")
+"""Keys by which the table was read already: another value is no correction of the first."""
+
+
+@dataclass(frozen=True)
+class Laid:
+    """description: dataset.toml with the lines in it; changed: those of its entries that are new; refused: what was left out, and why."""
+
+    description: dict[str, Any]
+    changed: dict[str, Any] = field(default_factory=dict)
+    refused: tuple[str, ...] = ()
+
+
+def laid(given: dict[str, Any], findings: Sequence[Finding]) -> Laid:
+    """Lay the lines of all findings into `given`, a parsed dataset.toml ({}: none). They were found in the data as `given` has them read."""
+    entries = [(f, dict(_leaves(tomllib.loads(f.line)))) for f in findings if f.line]
+    clashes: dict[int, str] = {}
+    for i, (finding, mine) in enumerate(entries):
+        for key in mine:
+            if key[0] in _KEPT and _at(given, key) not in (None, mine[key]):
+                clashes[i] = f"{_said(key, mine[key])} ({finding.kind}) contradicts {_said(key, _at(given, key))} in dataset.toml"
+            for j, (other, theirs) in enumerate(entries[:i]):
+                if key in theirs and not _alike(mine[key], theirs[key]):
+                    words = f"{_said(key, theirs[key])} ({other.kind}) and {_said(key, mine[key])} ({finding.kind}) contradict each other"
+                    clashes |= {i: words, j: words}
+    found: dict[_Path, Any] = {}
+    for mine in (mine for i, (_, mine) in enumerate(entries) if i not in clashes):
+        for key, value in mine.items():
+            found[key] = _joined(found.get(key, []), value) if _intervals(value) else found.get(key, value)
+    new = {key: _composed(given, key, value) for key, value in found.items()}
+    new = {key: value for key, value in new.items() if value != _at(given, key)}
+    return Laid(_with(given, new), _with({}, new), tuple(dict.fromkeys(clashes.values())))
+
+
+def _leaves(table: dict[str, Any], path: _Path = ()) -> Iterator[tuple[_Path, Any]]:
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _leaves(value, (*path, key))
+        else:
+            yield (*path, key), value
+
+
+def _at(table: Any, path: _Path) -> Any:
+    """Value under a path, or None."""
+    for key in path:
+        table = table.get(key) if isinstance(table, dict) else None
+    return table
+
+
+def _with(table: dict[str, Any], new: dict[_Path, Any]) -> dict[str, Any]:
+    """A copy of a table with these entries."""
+    result = {key: _with(value, {}) if isinstance(value, dict) else value for key, value in table.items()}
+    for path, value in new.items():
+        here = result
+        for key in path[:-1]:
+            here = here.setdefault(key, {})
+        here[path[-1]] = value
+    return result
+
+
+def _said(key: _Path, value: Any) -> str:
+    return toml_line(_with({}, {key: value})).replace("\n", " ")
+
+
+def _intervals(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], list)
+
+
+def _alike(a: Any, b: Any) -> bool:
+    """Whether two findings say the same of one entry: intervals add up, and estimates of one number may differ by their error."""
+    if _intervals(a) and _intervals(b):
+        return True
+    if isinstance(a, list) and isinstance(b, list):
+        return all(map(_alike, a, b))
+    return math.isclose(a, b, rel_tol=0.5) if isinstance(a, float) and isinstance(b, float) else bool(a == b)
+
+
+def _joined(old: list[Any], new: list[Any]) -> list[Any]:
+    return sorted([*old, *(v for v in new if v not in old)])
+
+
+def _composed(given: dict[str, Any], path: _Path, value: Any) -> Any:
+    """The entry that stands for what is given and then what was found: (reading - bias) / scale twice over, delays and vectors added."""
+    old, kind = _at(given, path), path[-2] if len(path) > 1 else path[0]
+    if _intervals(value):
+        return _joined(old or [], value)
+    if kind == "scale":
+        return _round(value * (old or 1.0))
+    if kind == "bias":
+        before = old if old is not None else _at(given, ("bias", path[-1])) or 0.0
+        return _round(before + value * (_at(given, ("scale", path[-1])) or 1.0))
+    if kind == "delay":
+        return _round(value + (old or 0.0))
+    if path[-1] in ("current", "antenna"):
+        before = old or (_at(given, ("current",)) if path[-1] == "current" else None) or (0.0, 0.0)
+        return [_round(a + b) for a, b in zip(before, value, strict=True)]
+    return value
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+def write_lines(folder: Path, findings: Sequence[Finding]) -> tuple[Laid, Path | None]:
+    """Lay the lines of findings into a folder's dataset.toml; its comments stay, and the old file is kept beside it.
+
+    Returns:
+        What was laid, and the copy of the old file (None where nothing changed).
+
+    Raises:
+        InputError: the file cannot be read or written, or would not be a description of a data set any more.
+    """
+    path = folder / "dataset.toml"
+    found = laid(read_toml(path), findings)
+    if not found.changed:
+        return found, None
+    parse_description(found.description, path)
+    try:
+        text = _edited(path.read_text(encoding="utf-8"), found)
+        old = next(p for n in range(1, 10_000) if not (p := path.with_name(BEFORE_CHECK + f".{n}" * (n > 1))).exists())
+        shutil.copy2(path, old)
+        part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}. Give a folder that can be written.") from None
+    return found, old
+
+
+def _edited(text: str, found: Laid) -> str:
+    """The file's text with the new entries in it."""
+    try:
+        document: Any = tomlkit.parse(text)
+        for key, value in _leaves(found.changed):
+            here = document
+            for part in key[:-1]:
+                if part not in here:
+                    here[part] = tomlkit.table()
+                here = here[part]
+            here[key[-1]] = value
+        edited = tomlkit.dumps(document)
+        if tomllib.loads(edited) == found.description:
+            return edited
+    except (TOMLKitError, tomllib.TOMLDecodeError, KeyError, TypeError):
+        pass
+    return tomli_w.dumps(found.description)  # written in a way that does not let a key be added: without its comments
