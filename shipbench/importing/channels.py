@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from ..errors import InputError
-from .cells import Cells, Counts
+from .cells import EMPTY, Cells, Counts, is_text
 from .clock import check_format, is_daily, shown, to_seconds
+from .coordinates import unread_hemispheres
 from .entries import Channel
 from .mapping import Mapping, Source
-from .tables import open_table, reading
+from .tables import Table, open_table, reading
 from .values import channel_values
 
 
@@ -39,8 +42,9 @@ def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str |
     clock, channels = source.time, list(source.channels.values())
     check_format(clock, str(path))
     columns = [*clock.names, *(n for c in channels for n in c.every_column), *([source.run] if source.run else [])]
+    met.doubtful.update(unread_hemispheres(table, source))
     done = 0
-    for batch in table.batches(columns):
+    for batch in _without_footer(table, columns, source):
         where = f"{path}, rows from {table.first_row + done}"
         with reading(path):  # cells may be of any kind and size
             cells = Cells(table.path, batch, source, table.first_row + done, table.first_row, met)
@@ -55,8 +59,38 @@ def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str |
         stamped = np.isfinite(t)
         met.what["rows without a time, left out"] += int((~stamped).sum())
         yield from _by_name(Block(t, values), stamped, names, met)
+    met.notes += [note for note in table.notes if note not in met.notes]
     if done == 0:
         raise InputError(f"{path} has a header and no rows. Give a log with one row per sample.")
+
+
+def _without_footer(table: Table, columns: Sequence[str], source: Source) -> Iterator[pa.RecordBatch]:
+    """The batches of a log, the last without a footer; what is left out is noted in the table."""
+    batches = table.batches(columns)
+    batch = next(batches, None)
+    while batch is not None:
+        after = next(batches, None)
+        if after is None and source.time.names and (end := _footer(batch, source)) < len(batch):
+            word = batch.column(source.time.names[0])[end].as_py()
+            table.notes.append(f"{table.path.name}: {len(batch) - end} rows at the end, left out: '{word[:40]}' stands for their time")
+            batch = batch.slice(0, end)
+        yield batch
+        batch = after
+
+
+def _footer(batch: pa.RecordBatch, source: Source) -> int:
+    """The row where a footer begins, such as "Total" or "End of log": a word for the time, empty cells beside it, and no time after it."""
+    clock = batch.column(source.time.names[0])
+    if not is_text(clock):
+        return len(batch)
+    text = pc.utf8_trim_whitespace(clock.cast(pa.large_string()))
+    none = pc.fill_null(pc.is_in(text, pa.array([*EMPTY, *map(str, source.missing)], text.type)), True)
+    timed = pc.fill_null(pc.match_substring_regex(text, r"\d"), False).to_numpy(zero_copy_only=False)
+    begin = int(np.flatnonzero(timed)[-1]) + 1 if timed.any() else len(batch)
+    words = np.flatnonzero(~none.to_numpy(zero_copy_only=False)[begin:]) + begin
+    if len(words) and any(str(cells[int(words[0])].as_py() or "").strip() == "" for cells in batch.columns):
+        return int(words[0])
+    return len(batch)
 
 
 def _by_name(block: Block, keep: np.ndarray, names: np.ndarray | None, met: Counts) -> Iterator[tuple[str | None, Block]]:

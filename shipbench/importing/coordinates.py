@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,8 +10,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from ..errors import InputError
-from .cells import Cells
+from .cells import Cells, is_text
 from .entries import MINUTES, Channel
+from .mapping import Source
+from .tables import Table
 
 SIDES = {"lat": {"N": 1.0, "S": -1.0}, "lon": {"E": 1.0, "W": -1.0}}
 _WORDS = {"NORTH": "N", "SOUTH": "S", "EAST": "E", "WEST": "W"}
@@ -51,6 +54,30 @@ def coordinates(cells: Cells, name: str, channel: Channel, missing: Sequence[str
     if channel.unit in MINUTES:
         values = _degrees(cells, column, values)
     return values if sides is None else _signed(cells, name, channel, values, sides)
+
+
+def unread_hemispheres(table: Table, source: Source) -> Counter[str]:
+    """Readings of lat and lon beside a column with S or W that the mapping does not name, by what to do."""
+    told: Counter[str] = Counter()
+    found = {n: c for n in SIDES if (c := source.channels.get(n)) and c.kinds == ("column",) and not (c.hemisphere or c.sign)}
+    used = {n for c in source.channels.values() for n in c.every_column} | {*source.time.names, source.run}
+    free = [n for n in table.columns if n and n not in used and table.columns.count(n) == 1]
+    if table.form == "MATLAB" or not free or not found:  # vectors of several lengths may stand in one MATLAB file
+        return told
+    batch = next(table.batches([*free, *dict.fromkeys(c.columns[0] for c in found.values())]), None)
+    for column, array in zip(free, batch.columns if batch is not None else (), strict=False):
+        letters = {str(v).strip().upper() for v in pc.unique(array).to_pylist() if v not in (None, "")} if is_text(array) else set()
+        for name, channel in found.items():
+            if letters <= set(SIDES[name]) and letters & {"S", "W"} and (count := _without_sign(batch.column(channel.columns[0]))):
+                entry = f'{name} = {{ column = "{channel.columns[0]}", unit = "{channel.unit}", hemisphere = "{column}" }}'
+                told[f"or more readings of {name} go without the {' or '.join(sorted(letters))} of column '{column}'. Write {entry}"] += count
+    return told
+
+
+def _without_sign(array: pa.Array) -> int:
+    """Cells with a number without sign or letter."""
+    plain = pc.match_substring_regex(array, r"^\s*[\d.,]+\s*$") if is_text(array) else pc.greater(array, 0)
+    return pc.sum(plain).as_py() or 0
 
 
 def _part(cells: Cells, column: str, text: pa.Array, part: int) -> pa.Array:

@@ -16,6 +16,10 @@ from .entries import Channel, Part, check_channel
 SOURCE_KEYS = ("files", "time", "file", "channels", "missing", "antenna", "speed_sensor", "run")
 
 
+LATEST = 7.3e9
+"""Seconds from 1970 to 2200; no time of a log lies further from another."""
+
+
 class Clock(Part):
     """Where time stands. `rate` [Hz] alone serves a log without a time column; `shift` [s] is added to every time.
 
@@ -28,7 +32,7 @@ class Clock(Part):
     format: str = "s"
     zone: str | None = None
     rate: float | None = Field(None, gt=0, allow_inf_nan=False)
-    shift: float = Field(0.0, allow_inf_nan=False)
+    shift: float = Field(0.0, ge=-LATEST, le=LATEST)
     repeated: Literal["first", "spread"] = "first"
     backwards: Literal["error", "drop", "sort", "split"] = "error"
 

@@ -128,6 +128,7 @@ class Summary:
             lines.append(f"runs are windows of {self.mapping.split.window:g} s; those of one recording may follow each other without a pause")
         lines += [f"DOUBTFUL: {count} samples of {what}: outliers, or a wrong unit" for what, count in self.doubtful.items() if count]
         lines += [f"DOUBTFUL: {count} {what}" for what, count in self.met.doubtful.items() if count]
+        lines += self.met.notes
         if self.part_length is not None:
             lines.append(f"densely sampled: parts of at most {self.part_length:g} s, to keep memory small")
         return lines

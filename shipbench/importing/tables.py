@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import bz2
-import codecs
-import csv
 import gzip
 import io
 import lzma
+import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 import pyarrow as pa
-import pyarrow.csv
 import pyarrow.parquet
 
 from ..errors import InputError, unknown_name
-from .blanks import Collapsed
 from .mapping import Layout
 
 BLANKS = " "
@@ -30,7 +27,9 @@ MOST_COLUMNS = 10_000
 TEXT_BLOCK = 1 << 22
 """Bytes in which the header must stand, and the size of the blocks in which text is read."""
 _ROWS = 50_000
-_UNREADABLE = (ValueError, OSError, EOFError, zlib.error, lzma.LZMAError, pa.ArrowException, MemoryError)
+_DENSEST, _ALWAYS = 200, 10_000_000
+"""Unpacked over packed size of a compressed log, and bytes that are unpacked whatever the packed size; those of logs are below 100."""
+_UNREADABLE = (zipfile.BadZipFile, ValueError, OSError, EOFError, zlib.error, lzma.LZMAError, pa.ArrowException, MemoryError)
 KINDS = "CSV or other delimited text (.csv, .txt, .dat, .tsv, also .gz, .bz2, .xz), Parquet, MATLAB .mat, Excel .xlsx"
 
 
@@ -38,7 +37,7 @@ KINDS = "CSV or other delimited text (.csv, .txt, .dat, .tsv, also .gz, .bz2, .x
 class Table:
     """A log that was opened: its columns, what was found of its form, and a function that streams some columns as Arrow batches.
 
-    `first_row` is the number of the first data row in the file, for messages.
+    `first_row` is the number of the first data row in the file, for messages. `notes` says how the file was read; the stream adds to it.
     """
 
     path: Path
@@ -46,6 +45,7 @@ class Table:
     stream: Callable[[Sequence[str]], Iterator[pa.RecordBatch]]
     first_row: int = 1
     form: str = ""
+    notes: list[str] = field(default_factory=list)
 
     def batches(self, columns: Sequence[str]) -> Iterator[pa.RecordBatch]:
         """The columns, block by block, in their order in the argument.
@@ -64,8 +64,8 @@ def open_table(path: Path, layout: Layout) -> Table:
     Raises:
         InputError: missing, empty, binary, damaged or unknown.
     """
-    kind = kind_of(path)
     with reading(path):
+        kind = kind_of(path)
         if kind == "Parquet":
             return _open_parquet(path)
         if kind == "MATLAB":
@@ -76,7 +76,9 @@ def open_table(path: Path, layout: Layout) -> Table:
             from .excel import open_excel
 
             return open_excel(path, layout)
-        return _open_text(path, layout)
+        from .delimited import open_text
+
+        return open_text(path, layout)
 
 
 def kind_of(path: Path) -> Literal["Parquet", "MATLAB", "Excel", "text"]:
@@ -99,10 +101,25 @@ def kind_of(path: Path) -> Literal["Parquet", "MATLAB", "Excel", "text"]:
     if path.suffix.lower() == ".mat" or magic.startswith(b"MATLAB"):
         return "MATLAB"
     if path.suffix.lower() in (".xlsx", ".xlsm") or magic.startswith(b"PK\x03\x04"):
+        if not path.suffix.lower().startswith(".xls"):
+            _check_packed(path)
         return "Excel"
     if magic.startswith(b"\xd0\xcf\x11\xe0"):
         raise InputError(f"{path} is in Excel's old format (.xls). Save it as .xlsx or .csv.")
     return "text"
+
+
+def _check_packed(path: Path) -> None:
+    """A zip archive is a workbook."""
+    if not zipfile.is_zipfile(path):
+        return
+    with zipfile.ZipFile(path) as packed:
+        names = packed.namelist()
+    if "content.xml" in names:
+        raise InputError(f"{path} is an OpenDocument file. Save the sheet as .xlsx or .csv.")
+    if "[Content_Types].xml" not in names:
+        inside = f"{', '.join(names[:3])}{' and more' if len(names) > 3 else ''}"
+        raise InputError(f"{path} is a zip archive (it holds {inside}). Unpack it, and give the logs in it: unzip {path.name}")
 
 
 @contextmanager
@@ -144,11 +161,12 @@ def _open_parquet(path: Path) -> Table:
             for batch in file.iter_batches(_ROWS, columns=list(wanted), use_threads=False):
                 yield batch.select(list(wanted))
 
-    _check_number(path, len(columns))
+    check_number(path, len(columns))
     return Table(path, columns, stream, 1, "Parquet")
 
 
-def _check_number(path: Path, columns: int) -> None:
+def check_number(path: Path, columns: int) -> None:
+    """Not more columns than a log has."""
     if columns > MOST_COLUMNS:
         raise InputError(f"{path} has {columns} columns; accepted: up to {MOST_COLUMNS}. Save the columns that you need as a file of their own.")
 
@@ -157,91 +175,37 @@ def uncompressed(path: Path) -> Any:
     """A binary file, unpacked while it is read where it is a .gz, .bz2 or .xz."""
     with path.open("rb") as file:
         magic = file.read(8)
-    if magic.startswith(b"\x1f\x8b"):
-        return gzip.open(path, "rb")
-    if magic.startswith(b"BZh"):
-        return bz2.open(path, "rb")
-    if magic.startswith(b"\xfd7zXZ"):
-        return lzma.open(path, "rb")
+    for mark, module in ((b"\x1f\x8b", gzip), (b"BZh", bz2), (b"\xfd7zXZ", lzma)):
+        if magic.startswith(mark):
+            return Bounded(path, module.open(path, "rb"))
     return path.open("rb")
 
 
-def _encoding(path: Path, head: bytes, layout: Layout) -> str:
-    for mark, name in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
-        if head.startswith(mark):
-            return name
-    if b"\0" in head:
-        raise InputError(f"{path} is binary (it holds zero bytes), and of no known kind. Accepted: {KINDS}.")
-    try:
-        codecs.lookup(layout.encoding)
-    except LookupError:
-        raise InputError(f"[file] encoding = '{layout.encoding}' is unknown; accepted: Python's names, such as 'utf-8' or 'latin-1'.") from None
-    return layout.encoding
+class Bounded(io.RawIOBase):
+    """An unpacked stream that ends with an error where it is far larger than any log of its packed size."""
 
+    def __init__(self, path: Path, raw: Any) -> None:
+        super().__init__()
+        self._path, self._raw, self._count = path, raw, 0
+        self._most = max(_DENSEST * path.stat().st_size, _ALWAYS)
 
-def _open_text(path: Path, layout: Layout) -> Table:
-    with uncompressed(path) as file:
-        head = file.read(TEXT_BLOCK)
-    if not head.strip():
-        raise InputError(f"{path} holds no text. Give a log with a header and rows.")
-    encoding = _encoding(path, head, layout)
-    header, first = _first_lines(path, head, encoding, layout)
-    delimiter = layout.delimiter or max(DELIMITERS[:-1], key=header.count)
-    if delimiter == BLANKS:
-        header = " ".join(header.split())
-        if encoding not in ("utf-8", "utf-8-sig", "ascii") and codecs.lookup(encoding).name.startswith("utf-"):
-            raise InputError(f"{path} is {encoding} text with blanks between the columns; accepted with blanks: UTF-8 or Latin-1. Save it as UTF-8.")
-    columns = tuple(name.strip() for name in next(csv.reader([header], delimiter=delimiter)))
-    if not layout.header:
-        columns = tuple(str(k + 1) for k in range(len(columns)))
-    elif first.rstrip().endswith(delimiter) and len(next(csv.reader([first], delimiter=delimiter))) == len(columns) + 1:
-        columns += ("",)  # every row ends with a delimiter that the header lacks
-    if any(ord(c) < 32 and c != "\t" for c in header):
-        raise InputError(f"{path}: its header (row {layout.header}) holds control characters: the file is binary. Accepted: {KINDS}.")
-    _check_number(path, len(columns))
-    places = {name: str(i) for i, name in enumerate(columns)}
+    def readable(self) -> bool:
+        return True
 
-    def stream(wanted: Sequence[str]) -> Iterator[pa.RecordBatch]:
-        # All as text: numbers are read by channels.py, which can name the row and the cell that is none.
-        read = pa.csv.ReadOptions(
-            use_threads=False, block_size=TEXT_BLOCK, skip_rows=layout.header + layout.skip, column_names=[str(i) for i in range(len(columns))],
-            encoding="utf-8" if encoding == "utf-8-sig" else encoding,
-        )  # fmt: skip
-        at = [places[name] for name in wanted]
-        convert = pa.csv.ConvertOptions(include_columns=at, column_types={i: pa.string() for i in at}, strings_can_be_null=False)
-        with uncompressed(path) as raw:
-            try:
-                reader = pa.csv.open_csv(Collapsed(raw) if delimiter == BLANKS else raw, read, pa.csv.ParseOptions(delimiter=delimiter), convert)
-            except pa.ArrowInvalid as error:
-                if "Empty CSV" in str(error) or "Could not skip" in str(error):
-                    raise InputError(f"{path} has a header and no rows. Give a log with one row per sample.") from None
-                raise
-            for batch in reader:
-                yield batch.rename_columns(list(wanted))
+    def readinto(self, buffer: Any) -> int:
+        block = self._raw.read(len(buffer))
+        self._count += len(block)
+        if self._count > self._most:
+            raise InputError(
+                f"{self._path} unpacks to more than {_DENSEST} times its size ({self._most / 1e6:.0f} MB); logs have up to 100 times. "
+                "If it is a log, unpack it first and give that file."
+            )
+        buffer[: len(block)] = block
+        return len(block)
 
-    form = f"text, delimiter {delimiter!r}, {encoding}"
-    return Table(path, columns, stream, layout.header + layout.skip + 1, form)
-
-
-def _first_lines(path: Path, head: bytes, encoding: str, layout: Layout) -> tuple[str, str]:
-    """The header and the first row of data (empty where there is none); of a table without a header, the first row twice."""
-    number = layout.header or layout.skip + 1
-    text = codecs.getincrementaldecoder(encoding)
-    try:
-        decoded = text().decode(head, final=False)
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path} is not {encoding} text (byte {error.start}); if it is text, set [file] encoding = 'latin-1' (or what it is) in the mapping."
-        ) from None
-    lines = io.StringIO(decoded, newline=None)
-    first = [line.rstrip("\n") for line, _ in zip(lines, range(layout.header + layout.skip + 1), strict=False)]
-    if not layout.header and (len(first) < number or not first[number - 1].strip()):
-        raise InputError(f"{path}: row {number} is empty; accepted with [file] header = 0: the first row of data after `skip` rows. Correct `skip`.")
-    if len(first) < number or not first[number - 1].strip():
-        raise InputError(f"{path}: row {number} holds no header ([file] header = {number}). Set the number of the row with the columns' names.")
-    if len(decoded) == len(first[0]) and len(head) >= TEXT_BLOCK:
-        raise InputError(f"{path}: its first line is longer than {TEXT_BLOCK >> 20} MB. Accepted: {KINDS}.")
-    return first[number - 1], first[layout.header + layout.skip] if len(first) > layout.header + layout.skip else ""
+    def close(self) -> None:
+        self._raw.close()
+        super().close()
 
 
 def as_batch(columns: dict[str, Any]) -> pa.RecordBatch:

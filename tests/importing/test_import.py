@@ -159,8 +159,13 @@ def test_a_header_in_latin_1(trial_import, tmp_path):
     path = tmp_path / "log.csv"
     logged(T[::5]).rename(columns={"rudder": "rudder [°]"}).to_csv(path, index=False, encoding="latin-1")
     plan = mapping(body=channels(delta='{ column = "rudder [°]", unit = "deg" }'))
-    assert "set [file] encoding = 'latin-1'" in trial_import([path], plan).stderr
-    assert trial_import([path], plan.replace("[channels]", '[file]\nencoding = "latin-1"\n[channels]')).exit_code == 0
+    told = trial_import([path], plan)
+    assert told.exit_code == 0
+    assert "log.csv is not UTF-8; read as Latin-1" in told.stdout
+    named = trial_import([path], plan.replace("[channels]", '[file]\nencoding = "latin-1"\n[channels]'), "--force")
+    assert named.exit_code == 0
+    assert "is not UTF-8" not in named.stdout
+    assert "is not utf-8 text" in trial_import([path], plan.replace("[channels]", '[file]\nencoding = "utf-8"\n[channels]'), "--force").stderr
 
 
 def test_a_gap_splits_and_is_never_bridged(trial_import):
