@@ -197,6 +197,14 @@ def _complete_pairs(found: Assigned, kept: dict[str, Any]) -> None:
         found.notes.append(f"The position is there twice; {' and '.join(names)} are not taken. To take them instead, replace lat and lon by x and y.")
     if speeds := [c.name for m, c in found.candidates.items() if m in ("north velocity", "east velocity") and c.name not in found.used()]:
         found.notes.append(f"{', '.join(speeds)} are velocities in earth axes and not taken; u and v come from the track, or map them after turning.")
+    psi, x = found.entries.get("psi"), found.entries.get("x")
+    if (
+        psi
+        and x
+        and "yaw" in psi.columns[0].head.base
+        and x.columns[0].head.base in (("x",), ("pose", "position", "x"), ("pos", "x"), ("position", "x"))
+    ):
+        found.notes.append("NOT SURE: x is taken as north and yaw as clockwise from it. ROS has x east, y north and yaw counter-clockwise from east.")
     if (speed := found.candidates.get("stw")) is not None and speed.name not in found.used():
         found.notes.append(f"'{speed.name}' is a speed through the water; u and v are over ground, so it is not taken.")
 

@@ -53,7 +53,7 @@ def refusal(columns: Sequence[Column]) -> str | None:
                 try:
                     read_time({"column": column.name, "format": form}, columns)
                 except InputError as error:
-                    return f"'{column.name}' looks like the time and is not read: {error}"
+                    return f"'{column.name}' looks like the time and is not read: {str(error).split(' Accepted: ')[0]}"
     return None
 
 
@@ -172,9 +172,9 @@ def _tried(spec: dict[str, Any], columns: Sequence[Column], trust: float, why: s
         return
     known = t[np.isfinite(t)]
     steps = np.diff(known)
-    if len(known) < 2 or (steps >= 0).mean() < _FORWARD or len(known) < 0.5 * len(t):
-        return
     runs = float((steps > 0).any())
+    if len(known) < 2 or (steps >= 0).mean() < _FORWARD or len(known) < 0.5 * len(t) or (not runs and steps.any()):
+        return
     yield Time(
         spec, t, usual_step(t), tuple(c.name for c in columns), why, (), (runs, trust, round(float((steps >= 0).mean()), 2), round(_evenness(t), 2))
     )

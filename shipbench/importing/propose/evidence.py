@@ -215,7 +215,7 @@ def _yaw_rate(series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned)
     if len(inside) < 10:
         return
     change = (np.interp(inside + window / 2, t, psi) - np.interp(inside - window / 2, t, psi)) / window
-    steady = np.abs(change) < 8 * max(float(np.median(np.abs(change))), 1e-9)  # leaves out where a heading was interpolated across 360/0
+    steady = np.abs(change) <= 3 * np.quantile(np.abs(change), 0.9)  # leaves out where a heading was interpolated across 360/0
     change, rate = change[steady], _mean_over(inside[steady], at, r, window)
     if np.std(change) == 0 or np.std(rate) == 0 or abs(correlation := float(np.corrcoef(change, rate)[0, 1])) < 0.8:
         return

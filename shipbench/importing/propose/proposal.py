@@ -102,7 +102,7 @@ def _sources(logs: Sequence[Path], known: dict[str, Any], file: dict[str, Any]) 
 
 def _top(sources: Sequence[SourceDraft], known: dict[str, Any], log: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """The keys at the top of the mapping and those of [split]."""
-    steps = [s.step for s in sources if s.found.entries] or [1.0]
+    steps = [s.step for s in sources if s.found.entries] or [s.step for s in sources]
     finest = min(steps)
     top: dict[str, Any] = {
         "name": run_name(log.name.split(".")[0]),
