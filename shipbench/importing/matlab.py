@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import warnings
 import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -13,11 +14,14 @@ import pyarrow as pa
 
 from ..errors import InputError
 from .matlab73 import open_matlab73
+from .matlab_objects import not_read, object_vectors
 from .tables import MOST_COLUMNS, Table, as_batch
 
 _LARGEST = 1_100_000_000
 _COMPRESSED = 15
 _ROWS = 50_000
+_OBJECTS = "\0objects"
+"""Where names of objects are gathered among the vectors; no variable is called so."""
 
 
 def open_matlab(path: Path) -> Table:
@@ -29,8 +33,8 @@ def open_matlab(path: Path) -> Table:
     from scipy.io import loadmat
 
     with path.open("rb") as file:
-        head = file.read(128)
-    if head.startswith(b"\x89HDF") or b"MATLAB 7.3" in head:
+        head = file.read(520)
+    if b"\x89HDF" in (head[:4], head[512:516]):
         return open_matlab73(path)
     if _unpacked_size(path) > _LARGEST:
         raise InputError(
@@ -38,7 +42,9 @@ def open_matlab(path: Path) -> Table:
             "Save it with '-v7.3', or as CSV (writetable) or Parquet (parquetwrite): these are streamed."
         )
     try:
-        content = loadmat(path, squeeze_me=True, struct_as_record=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # two objects go by one name in scipy; mat-io reads them
+            content = loadmat(path, squeeze_me=True, struct_as_record=False)
     except NotImplementedError:
         raise InputError(f"{path} is of a MATLAB version that is not read. In MATLAB: save('log.mat', ..., '-v7').") from None
     except (TypeError, KeyError, IndexError, struct.error, AttributeError, OverflowError, RuntimeError) as error:
@@ -47,6 +53,13 @@ def open_matlab(path: Path) -> Table:
     for name, value in content.items():
         if not name.startswith("__"):
             _collect(name, value, vectors, 0)
+    notes: list[str] = []
+    if objects := vectors.pop(_OBJECTS, None):
+        found = object_vectors(path)
+        if not found and not vectors:
+            raise InputError(not_read(path, objects))
+        notes += [] if found else [not_read(path, objects)]
+        vectors |= {name: value for name, value in found.items() if name not in vectors}
     if not vectors:
         raise InputError(f"{path} holds no vectors of two or more numbers. Accepted: vectors, matrices with a sample per row, and structs of them.")
     if len(vectors) > MOST_COLUMNS:
@@ -60,7 +73,7 @@ def open_matlab(path: Path) -> Table:
         for begin in range(0, max(lengths.values()), _ROWS):
             yield as_batch({name: _numbers(vectors[name][begin : begin + _ROWS]) for name in wanted})
 
-    return Table(path, tuple(vectors), stream, 1, "MATLAB")
+    return Table(path, tuple(vectors), stream, 1, "MATLAB", notes)
 
 
 def _unpacked_size(path: Path) -> int:
@@ -86,11 +99,16 @@ def _unpacked_size(path: Path) -> int:
 
 def _numbers(values: Any) -> Any:
     """Numbers as floats, block by block so that small integers stay small in memory; text as it is."""
-    return values.astype(float) if isinstance(values, np.ndarray) else values
+    return values.astype(float) if isinstance(values, np.ndarray) and values.dtype.kind in "fiub" else values
 
 
 def _collect(name: str, value: Any, vectors: dict[str, Any], depth: int) -> None:
     """Put what can serve as a column into `vectors`, under its MATLAB name."""
+    from scipy.io.matlab import MatlabOpaque
+
+    if isinstance(value, MatlabOpaque):
+        vectors.setdefault(_OBJECTS, []).append(value["s0"].item().decode(errors="replace") if name == "None" else name)
+        return
     fields = getattr(value, "_fieldnames", None)
     if fields is not None and depth < 8:
         for field in fields:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,12 +12,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from .matlab_objects import how_to_save, not_read, object_vectors
 from .tables import MOST_COLUMNS, Table, as_batch
 
 _ROWS = 50_000
 _DEEPEST = 8
 _LARGEST_CHUNK = 200_000_000
 """Bytes that one piece of a data set may unpack to; MATLAB's have some 100 kB."""
+_LARGEST = 1_100_000_000
+"""Bytes of a file with objects, which are read whole."""
 _MOST_LETTERS = 100
 
 
@@ -31,31 +35,75 @@ class _Vector:
 
 
 def open_matlab73(path: Path) -> Table:
-    """The vectors, columns of matrices and struct fields of the file under their MATLAB names. Cells and objects (such as tables) are passed over.
+    """The vectors, columns of matrices, struct fields and tables of the file under their MATLAB names. Cells are passed over.
 
     Raises:
-        InputError: h5py is not installed, or the file is damaged or holds no numeric vectors.
+        InputError: h5py is not installed, or the file is damaged, declares more than it holds, or has no numeric vectors.
     """
     vectors: dict[str, _Vector] = {}
+    objects: list[str] = []
     with _opened(path) as file:
-        _collect("", file, vectors, set())
-    if not vectors:
+        _collect("", file, vectors, objects, set())
+        size = _declared(file) if objects else 0
+    whole: dict[str, Any] = {}
+    notes: list[str] = []
+    if objects:
+        if size > _LARGEST:
+            raise InputError(f"{path} holds objects such as a table, and {size / 1e6:.0f} MB; accepted with objects: {_LARGEST / 1e6:.0f} MB. "
+                             f"{how_to_save(objects)}.")  # fmt: skip
+        whole = object_vectors(path, sorted({name.split(".")[0] for name in objects}))
+        if not whole and not vectors:
+            raise InputError(not_read(path, objects))
+        notes += [] if whole else [not_read(path, objects)]
+    if not vectors and not whole:
         raise InputError(
             f"{path} holds no vectors of two or more numbers. Accepted: vectors, matrices with a sample per row, and structs of them; "
             "a table or timetable: save it with writetable, or its variables one by one."
         )
 
     def stream(wanted: Sequence[str]) -> Iterator[Any]:
-        lengths = {name: vectors[name].length for name in wanted}
+        lengths = {name: vectors[name].length if name in vectors else len(whole[name]) for name in wanted}
         if len(set(lengths.values())) > 1:
             told = ", ".join(f"{name} {n}" for name, n in lengths.items())
             raise InputError(f"{path}: vectors of one source differ in length: {told}. Give each rate a [sources.NAME] with its own time column.")
         for begin in range(0, max(lengths.values()), _ROWS):
             with _opened(path) as file:  # opened for each block: nothing stays open where the reader stops
-                block = {name: _read(file[vectors[name].path], vectors[name], begin) for name in wanted}
+                block = {
+                    name: _read(file[vectors[name].path], vectors[name], begin) if name in vectors else whole[name][begin : begin + _ROWS]
+                    for name in wanted
+                }
             yield as_batch(block)
 
-    return Table(path, tuple(vectors), stream, 1, "MATLAB")
+    return Table(path, (*vectors, *(name for name in whole if name not in vectors)), stream, 1, "MATLAB", notes)
+
+
+def _declared(file: Any) -> int:
+    """Bytes that all data sets of a file unpack to; those that declare more than they hold are refused."""
+    import h5py
+
+    sizes = []
+
+    def add(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset):
+            _check_stored(name, item)
+            sizes.append(item.size * item.dtype.itemsize)
+
+    file.visititems(add)
+    return sum(sizes)
+
+
+def _check_stored(name: str, item: Any) -> None:
+    """A data set holds the samples that it declares."""
+    if item.size is None or "MATLAB_empty" in item.attrs:
+        return
+    if item.chunks:
+        pieces, stored = math.prod(math.ceil(n / c) for n, c in zip(item.shape, item.chunks, strict=True)), item.id.get_num_chunks()
+    else:
+        pieces, stored = item.size * item.dtype.itemsize, item.id.get_storage_size()
+    if stored < pieces:
+        raise InputError(
+            f"{item.file.filename}: '{name}' declares {item.size} values and holds {stored / pieces:.0%} of them: the file is damaged. Save it anew."
+        )
 
 
 @contextmanager
@@ -74,8 +122,11 @@ def _opened(path: Path) -> Iterator[Any]:
         raise ValueError(f"damaged MATLAB 7.3 file ({type(error).__name__}: {error})") from None  # tables.reading makes the message
 
 
-def _collect(name: str, group: Any, vectors: dict[str, _Vector], seen: set[int]) -> None:
-    """Put what can serve as a column into `vectors`. Only hard links are followed, each group once: no other files, no circles."""
+def _collect(name: str, group: Any, vectors: dict[str, _Vector], objects: list[str], seen: set[int]) -> None:
+    """Put what can serve as a column into `vectors`, names of objects into `objects`.
+
+    Only hard links are followed, each group once: no other files, no circles.
+    """
     import h5py
 
     seen.add(h5py.h5o.get_info(group.id).addr)
@@ -85,9 +136,12 @@ def _collect(name: str, group: Any, vectors: dict[str, _Vector], seen: set[int])
         item, full = group[key], f"{name}.{key}" if name else key
         if isinstance(item, h5py.Group):
             if h5py.h5o.get_info(item.id).addr not in seen and full.count(".") < _DEEPEST:
-                _collect(full, item, vectors, seen)
+                _collect(full, item, vectors, objects, seen)
         elif isinstance(item, h5py.Dataset) and not item.is_virtual and item.external is None and "MATLAB_empty" not in item.attrs:
-            _add(full, item, vectors)
+            if "MATLAB_object_decode" in item.attrs:
+                objects.append(full)
+            else:
+                _add(full, item, vectors)
         if len(vectors) > MOST_COLUMNS:
             raise InputError(f"{group.file.filename} holds more than {MOST_COLUMNS} vectors; accepted: up to that. Save those that you need.")
 
@@ -98,6 +152,7 @@ def _add(name: str, item: Any, vectors: dict[str, _Vector]) -> None:
         return
     if item.chunks and np.prod(item.chunks, dtype=float) * item.dtype.itemsize > _LARGEST_CHUNK:
         raise InputError(f"{item.file.filename}: '{name}' is packed in pieces above {_LARGEST_CHUNK / 1e6:.0f} MB; accepted: smaller ones.")
+    _check_stored(name, item)
     if item.attrs.get("MATLAB_class", b"") == b"char":
         if item.ndim == 2 and item.shape[0] <= _MOST_LETTERS and item.shape[1] > 1:  # a row of letters for each sample, such as time stamps
             vectors[name] = _Vector(item.name, (None,), item.shape[1], text=True)

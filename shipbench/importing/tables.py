@@ -147,7 +147,7 @@ def check_columns(table: Table, wanted: Sequence[str]) -> None:
             if len(table.columns) == 1 and (other := [d for d in DELIMITERS if d in table.columns[0].strip()]):
                 hint = f" Its header reads as one column; is the delimiter {other[0]!r}? Set [file] delimiter in the mapping."
                 raise InputError(f"{table.path}: no column '{name}'.{hint} Header: {table.columns[0][:200]}")
-            raise unknown_name(f"column of {table.path}:", name, found)
+            raise InputError(" ".join([str(unknown_name(f"column of {table.path}:", name, found)), *table.notes]))
 
 
 def _open_parquet(path: Path) -> Table:
