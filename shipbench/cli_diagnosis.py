@@ -21,6 +21,7 @@ def diagnose(
     seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
     workers: Annotated[int, typer.Option(help="Processes for the folds.")] = 2,
     thorough: Annotated[bool, typer.Option("--thorough", help="Use up to twice as much of a long record (twice the time or more).")] = False,
+    cpu_limit: Annotated[float, typer.Option(min=1.0, max=86_400.0, help="CPU seconds after which no other search begins; it is said.")] = 900.0,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -28,10 +29,11 @@ def diagnose(
     from .bench.diagnosis_report import write_diagnosis
     from .bench.diagnosis_text import summary_lines
     from .data.base import load_dataset
+    from .diagnosis.budget import Budget
     from .diagnosis.diagnose import diagnose as run
 
     data = load_dataset(dataset)
-    found = replace(run(data, gain=gain, seed=seed, workers=workers, thorough=thorough), spec=dataset)
+    found = replace(run(data, gain=gain, seed=seed, workers=workers, thorough=thorough, budget=Budget(seconds=cpu_limit)), spec=dataset)
     written = write_diagnosis(found, out or Path("diagnoses") / file_name(Path(data.name).name))
     if as_json:
         print_json(found.document())

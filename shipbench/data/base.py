@@ -22,7 +22,7 @@ from ..specs import parse_spec
 from .public import PublicData
 
 _HELPERS = frozenset({
-    "base", "corrections", "coverage", "describe", "export", "files", "mat", "noise", "public", "sensitivity", "trajectories", "units",
+    "base", "corrections", "coverage", "describe", "export", "files", "mat", "noise", "public", "reread", "sensitivity", "trajectories", "units",
 })  # fmt: skip
 DATASETS = Registry("data set", "data", "DATASET", helpers=_HELPERS, group="datasets")
 

@@ -18,7 +18,8 @@ from .generic import Dependence
 from .model import FREE, hull_changes
 from .outcome import Candidate, Cause, Estimate, Gain, what_it_is
 from .plant import HULL, NUM_HULL
-from .robust import WITHOUT_WIND, covariance, inflation, least_size
+from .possible import why_not
+from .robust import covariance, inflation, least_size
 from .screen import Score, other_kinds_from, places
 from .select import ALIKE, CONFUSED, asked_besides, shows_in_record
 from .settle import Fit
@@ -296,17 +297,13 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str], measured: bo
     elif name in NAMES:
         put_right = "the clocks of position and velocities were put right before the fit"
         reason = put_right if "velocity_delay" in named else "by the track, position and velocities are recorded at the same time"
-    elif (name in WITHOUT_WIND and plant.seg.wind is not None) or (name == "shallow_water" and plant.water):
-        reason = f"the {'depth' if name == 'shallow_water' else 'wind'} is measured and in the model already"
-    elif effect.channels and plant.seg.wind is None:
-        reason = f"{' and '.join(effect.channels)} are not measured"
+    elif why := why_not(effect, plant):
+        reason = why
     elif name == "change_point" and (barred := other_kinds_from(plant.seg.kinds)):
         where = f"{len(barred)} of {len(places(plant.seg.runs))} places"
         reason = f"no sign of it; not looked for at {where} where other kinds of manoeuvre follow, in which the model may lack something"
     elif name in ("change_point", "unit_or_sign_error"):
         reason = "no sign of it"
-    elif effect.family == "thruster":
-        reason = "the thrusters are not used in these runs"
     elif not plant.seg.commanded and shows_in_record(effect):
         reason = "this actuator is not commanded in these runs"
     elif shows_in_record(effect):

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
 
@@ -15,12 +15,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..checking.standing import standing
-from ..checking.units import UnitFinding, check_units, corrected, merged
+from ..checking.units import UnitFinding, corrected
 from ..effects.base import EFFECTS
 from ..errors import InputError
 from ..records import Dataset
 from . import misread
 from .analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
+from .budget import Budget, is_spent, limited
 from .causes import describe_candidates, describe_causes, remaining, unknown_part, what_is_left
 from .clocks import check_clocks, not_asked, ruled_out, with_prompt_yaw_rate
 from .derived import faults, has_speeds, marked, said
@@ -31,7 +32,8 @@ from .noise import noise_in_words
 from .outcome import Cause, Diagnosis, Gain
 from .over_ground import over_ground
 from .parts import in_parts, runs_in_words
-from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, least_depth
+from .plant import FOLD_STEPS, MOST_STEPS, SEGMENT, THOROUGH_STEPS, Plant, least_depth
+from .record import Record, corrected_record, joined, refuse_contradictions
 from .ship_file import doubts_of, odd_for, own_propeller
 from .silent_log import with_speeds_of_the_track
 from .strange import left_out
@@ -47,8 +49,9 @@ NOT_A_MODEL = ("unit_or_sign_error", "change_point")
 
 @threadpool_limits.wrap(limits=1)  # its matrices are small: the threads of two processes on two cores wait for each other (24 runs: 81 s, now 36 s)
 def diagnose(
-    dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequence[str] | None = None, workers: int = 1, thorough: bool = False
-) -> Diagnosis:
+    dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequence[str] | None = None, workers: int = 1, thorough: bool = False,
+    budget: Budget | None = None,
+) -> Diagnosis:  # fmt: skip
     """Show what the plain physics model gets wrong on measured runs, name the causes, and measure what naming them is worth.
 
     Args:
@@ -58,24 +61,31 @@ def diagnose(
         only: effects to consider (an oracle that knows what is hidden); default all.
         workers: processes for the folds; from two on, a script that calls this needs `if __name__ == "__main__":`.
         thorough: use up to twice as much of a long record (the folds use a quarter); 90 runs of 120 s are used whole either way.
+        budget: how much work the fits of the whole may take; default that of `Budget`. A warning says where it has acted.
 
     Raises:
-        InputError: the ship never moves, there are too few samples for any fit, or `workers` is less than one.
+        InputError: the ship never moves, there are too few samples for any fit, the record contradicts itself, or `workers` is less than one.
     """
     if workers < 1:
         raise InputError(f"workers: {workers}; accepted: whole numbers from 1.")
+    with limited(budget or Budget()) as used:
+        return _diagnosed(dataset, gain, seed, only, workers, THOROUGH_STEPS if thorough else MOST_STEPS, used)
+
+
+def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | None, workers: int, steps: int, used: Budget) -> Diagnosis:
+    """As `diagnose`, within a budget that is counted."""
     began, fingerprint = time.perf_counter(), dataset.fingerprint
     dataset, told = in_parts(dataset, FEW_RUNS)
     warnings = told + _check(dataset)
-    units = check_units(dataset) if only is None else []
-    dataset = corrected(dataset, units)
-    dataset, mended = _mended(dataset) if only is None else (dataset, [])
+    record = corrected_record(dataset) if only is None else Record(dataset, [], [])
+    units = record.errors
+    dataset, mended = _mended(record.dataset) if only is None else (dataset, [])
+    refuse_contradictions(dataset)
     dataset = _in_time(dataset)
     late = check_clocks(dataset) if only is None and has_speeds(dataset) else None
     if late is not None:
         dataset = late.mended
     settled = (*(not_asked(dataset, late) if only is None else ()), *faults(dataset))
-    steps = THOROUGH_STEPS if thorough else MOST_STEPS
     cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
     apart = len({run.group for run in dataset.runs}) > 1
     if not apart and len(dataset) > 1:
@@ -86,24 +96,28 @@ def diagnose(
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
         null = plain_model(Plant.of(dataset, steps), only, settled)
-        if only is not None or cautious:
-            found = analyse(null, only=only, seed=seed, cautious=cautious)
+        if only is not None or cautious or is_spent():
+            found = analyse(null, only=only, seed=seed, cautious=cautious or is_spent())
         else:
             as_recorded = dataset
             found, dataset, turned, no_cause = _as_it_must_be_read(dataset, null, steps, settled, seed)
-            units = merged([*units, *turned])
+            units = joined([*units, *turned])
             if dataset is not as_recorded or no_cause != settled:
                 ahead, work = None, partial(work, dataset=dataset, settled=no_cause)
         doubts = doubts_of(found) if only is None else []
-        worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts else Worth()
-    warnings += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + mended + said(dataset) + doubts
-    warnings += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
+        overrun = used.is_overrun
+        if overrun:  # its last fits do not rest
+            found = analyse(null, only=only, seed=seed, cautious=True)
+        worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts and not is_spent() else Worth()
+    lines = record.told + warnings + used.said(overrun) + list(worth.told)
+    lines += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + mended + said(dataset) + doubts
+    lines += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
-    warnings += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
+    lines += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
     behind = _behind_its_record(found, causes)
-    warnings += [f"{name}: {text}" for name, text in behind.items()]
-    warnings += what_is_left(found) if causes and not doubts else []
-    warnings += odd_for(found, [c.effect for c in causes]) if only is None and not doubts else []
+    lines += [f"{name}: {text}" for name, text in behind.items()]
+    lines += what_is_left(found) if causes and not doubts else []
+    lines += odd_for(found, [c.effect for c in causes]) if only is None and not doubts else []
     trace = trace_of(dataset, found, worth.hull)
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
     verdict = "unknown" if unknown else "found" if causes else "none"
@@ -113,18 +127,19 @@ def diagnose(
         candidates=tuple(describe_candidates(found, [c.effect for c in causes], worth.gain is not None)),
         what_is_wrong=what_is_wrong(trace), unexplained_after=remaining(found) | {"taken_as_noise": noise_in_words(found.final)},
         extended_model="+".join(["physics", *names]), fingerprint=fingerprint, seconds=time.perf_counter() - began,
-        warnings=tuple(warnings), gain=worth.gain if causes else None, unknown=unknown_part(found),
+        warnings=tuple(lines), gain=worth.gain if causes else None, unknown=unknown_part(found),
         gain_per_run=worth.per_run if causes else (), trace=trace,
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Worth:
-    """Held-out gain, ED of every run before and after [m], and whether the hull's derivatives are worth naming."""
+    """Held-out gain, ED of every run before and after [m], whether the hull's derivatives are worth naming, and lines for the reader."""
 
     gain: Gain | None = None
     per_run: tuple[tuple[str, float, float], ...] = ()
     hull: bool = False
+    told: tuple[str, ...] = ()
 
 
 def _check(dataset: Dataset) -> list[str]:
@@ -134,8 +149,14 @@ def _check(dataset: Dataset) -> list[str]:
         raise InputError(
             f"data set '{dataset.name}' has {samples} samples in {runs_in_words(dataset)}; a diagnosis needs at least 20, better 24 runs of 120 s."
         )
-    states = np.concatenate([r.states for r in dataset.runs])
     L = dataset.ship.L
+    rarest = SEGMENT * (L / 130.0) ** 0.5
+    if dataset.dt > rarest:
+        raise InputError(
+            f"data set '{dataset.name}' has a sample every {dataset.dt:g} s. A ship of {L:g} m turns in less. Accepted: up to {rarest:.3g} s. "
+            "Give t and dt in dataset.toml in seconds."
+        )
+    states = np.concatenate([r.states for r in dataset.runs])
     if np.max(np.hypot(states[:, 3], states[:, 4])) < 0.01 * L**0.5:
         raise InputError(
             f"data set '{dataset.name}': the ship never moves faster than {0.01 * L**0.5:.2f} m/s; check the columns u and v and their units."
@@ -216,8 +237,9 @@ def _one_fold(
     test = _folds(dataset, seed)[fold]
     train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
     plant = Plant.of(dataset.with_runs(train), FOLD_STEPS)
-    extension, plain = causes_of(plant, threshold, only, settled)
-    return fold_gain(dataset, test, extension, plain, hull)
+    with limited(Budget()) as used:
+        extension, plain = causes_of(plant, threshold, only, settled)
+    return replace(fold_gain(dataset, test, extension, plain, hull), stopped=used.stopped is not None)
 
 
 def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
@@ -272,4 +294,6 @@ def _cross_validated(
     if name_hull:
         after = with_hull
     rows = tuple((run.id, float(b), float(a)) for run, b, a in zip(dataset.runs, before, after, strict=True))
-    return Worth(summarise(before, after, seed, groups), rows, name_hull)
+    stopped = sum(part.stopped for part in parts)
+    told = (f"of the selections on training parts {stopped} of {len(parts)} were stopped by the limit on work: the gain may be too small.",)
+    return Worth(summarise(before, after, seed, groups), rows, name_hull, told if stopped else ())

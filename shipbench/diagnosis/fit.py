@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .budget import count
 from .gram import Hyper
 from .model import NUM_BASE, Linearisation, Point, Scales
 from .plant import Plant
@@ -70,7 +71,7 @@ def fit(
         promised = -np.inf if free else max(promised, found.promise)
         if best is None or worth > best[0]:
             best = worth, found, lin
-        if stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
+        if count() or stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
             break
         before = found.evidence
         after, seen = _step(lin, found, number + 1 < free_steps, 0.5**stale) if number < iterations - 1 else (None, None)

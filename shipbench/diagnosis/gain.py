@@ -146,13 +146,15 @@ def distance(plant: Plant, scales: Scales, model: Rollout) -> tuple[np.ndarray, 
 
 @dataclass(frozen=True)
 class FoldGain:
-    """ED [m] of the test runs: by the plain model, with the causes, and with the hull's derivatives fitted as well; what the training runs led to."""
+    """ED [m] of the test runs: by the plain model, with the causes, and with the hull's derivatives fitted as well; what the training runs led to,
+    and whether their selection was stopped by its budget."""
 
     test: np.ndarray
     before: np.ndarray
     after: np.ndarray
     with_hull: np.ndarray
     names: tuple[str, ...]
+    stopped: bool = False
 
 
 def fold_gain(dataset: Dataset, test: np.ndarray, extension: Extension, plain: dict[str, Gear], hull: bool) -> FoldGain:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from .budget import is_spent
 from .model import Scales
 from .plain import first_evidence, null_fit
 from .settle import Fit
@@ -45,6 +46,8 @@ def size_instead_of(causes: str, worth: float, null: Fit) -> list[str]:
 
 def _best(null: Fit, factors: Sequence[float]) -> tuple[float, float]:
     """The best factor of the size, and the log evidence that it gains; 0 where none gains any."""
+    if is_spent():
+        return 1.0, 0.0
     few = null.plant.thinned(_PIECES)
     own = null if few is null.plant else null_fit(few, Scales(few))
     best, most = 1.0, 0.0

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..checking.standing import standing
 from ..effects.base import EFFECTS
 from ..effects.hull_derivatives import EFFECT as HULL
 from ..ops import Array
@@ -17,7 +18,7 @@ from ..physics.actuators import Gear, gear_path
 from ..predictors._actuator_fit import DEFAULT_ACTUATORS
 from ..records import Dataset
 from ..ship import Particulars, complete
-from ..signals import MOTION, STATES
+from ..signals import ACTUATORS, MOTION, STATES
 from .averaging import averaged
 from .rolling import Active, Course, Vessel
 
@@ -52,7 +53,7 @@ class Segments:
     Shapes: states (B, K + 1, 10), commands (B, K + 1, 4), wind (B, K + 1, 2) or None, mask (B, K + 1) of real samples, run (B,) index of the run,
     start (B,) time since the run began [s]; earlier (B, P, 4): the commands before the piece (the first, before the run), without any where actuators
     are recorded; kinds: of manoeuvre, by run, "" where not given; seen (6,): what of the motion was measured; depth (B,): mean of the recorded one
-    [m], None where none is, or deep water, or less than the draught.
+    [m], None where none is, or deep water, or less than the draught; working: names of the actuators that work in any run.
     """
 
     dt: float
@@ -68,6 +69,7 @@ class Segments:
     kinds: tuple[str, ...]
     seen: np.ndarray = field(default_factory=lambda: np.ones(6, dtype=bool))
     depth: np.ndarray | None = None
+    working: frozenset[str] = frozenset(STATES[ACTUATORS])
 
     def thinned(self, most: int) -> Segments:
         """At most `most` segments, evenly spread; every run keeps at least one."""
@@ -125,8 +127,14 @@ def cut(dataset: Dataset, steps: int) -> Segments:
         wind=None if wind_columns is None else inputs[..., wind_columns], mask=np.stack([np.arange(K + 1) <= b - a for _, _, a, b in pieces]),
         run=np.array([p[0] for p in pieces]), start=np.array([p[2] * dataset.dt for p in pieces]), runs=len(dataset),
         kinds=tuple(run.kind for run in dataset.runs),
-        seen=~np.isin(STATES[MOTION], dataset.derived), depth=depth,
+        seen=~np.isin(STATES[MOTION], dataset.derived), depth=depth, working=working(dataset),
     )  # fmt: skip
+
+
+def working(dataset: Dataset) -> frozenset[str]:
+    """Actuators that are not zero throughout, nor stand still while the ship does what they alone can do."""
+    ever = np.any([np.any(run.states[:, ACTUATORS], axis=0) for run in dataset.runs], axis=0)
+    return frozenset(np.array(STATES[ACTUATORS])[ever].tolist()) - set(standing(dataset))
 
 
 def least_depth(dataset: Dataset) -> float:
@@ -172,6 +180,8 @@ class Plant:
         self.course = Course(Vessel(dataset_ship, self.c), segments.dt / self.substeps, t, wind)
         self.water = [] if segments.depth is None else [Active(EFFECTS.get("shallow_water"), (dataset_ship.T / segments.depth,))]
         """What the recorded depth does."""
+        self.inputs = frozenset(("wind_speed", "wind_from") * (wind is not None) + ("depth",) * bool(self.water))
+        """Measured inputs that the model takes into account."""
         self.ordinary: dict[str, Gear] = {}
         self.drive((ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR)) | (gears or {}))
 

@@ -18,8 +18,8 @@ from .screen import evidence
 from .settle import Fit
 from .term import Term
 
-WITHOUT_WIND = ("wind", "wind_per_run")
-"""Causes only where the wind is not measured."""
+_WINDS = ("wind", "wind_per_run")
+"""Causes whose superstructure is fitted."""
 NEGLIGIBLE = 0.05
 """In typical sizes. With enough samples the form of a hull makes tiny causes certain: speeds 0.1 % off, a bank of a 65th of the usual suction."""
 _OWN = {
@@ -43,20 +43,12 @@ play, beside a lag of 0.2 s: 0.35 and 0.37 deg, worth 90 and 106; without the no
 _UNSEEN_PLAY = 0.4
 """Likewise in typical sizes: it makes a ship answer her rudder later, as a lag does. (A trainer of 50 m whose lift builds up, without any: 0.39 and
 0.64 deg, 0.19 and 0.32 of the typical size.)"""
-_REACH = 0.75
-"""Lengths from midship within which a thruster acts, whatever the hull makes of its jet. (A lever of 1.0 was named for what a hull lacked.)"""
-_MAST = 1.0
-"""Breadths from the centreline within which an antenna stands, whatever the track makes of it. (14.7 m were named on a barge of 9.5 m, whose log read
-nothing below 1.1 m/s.)"""
 _ABREAST = 0.1
 """Angle [rad] to the normal of a bank that was found, within which a steady wind or current makes up for its law. (Beside a bank that all runs of a
 barge followed, at 89 to 91 deg: a wind of 5.3 m/s and a current of 0.1 m/s from and to 270 deg, of which there were none.)"""
 _WHERE_FORCES_ACT = 0.08
 """Lengths by which the forces of a hull act elsewhere than those of a fitted one. (An antenna whose velocities are its own, at 0.1 to 0.4
 lengths on six ships: root mean square of the errors; with none on a patrol vessel 0.08 and 0.06 were named, worth 85 and 26.)"""
-_TRIMS = 0.06
-"""Lengths by which a shifted centre of gravity trims a ship by about as much (over a longitudinal metacentric height of one length), more than her
-draught. (A shift of 0.08 was named for what a hull's form lacked.)"""
 _DOUBT, _DOUBT_LATE = 0.05, 1e-5
 """Probability that a size is zero from which it is not sure; of a cause that begins with a run, which is chosen among hundreds of effects and runs.
 (Ten standard manoeuvres with nothing hidden: 0.01 to 1e-4; changes hidden in 24 runs: 1e-6 and less.)"""
@@ -162,18 +154,15 @@ def blows_on_a_ship(fit: Fit) -> bool:
 
 
 def is_on_a_ship(fit: Fit, index: int) -> bool:
-    """Whether the bow thruster with its shifted lever, or the antenna, is on the ship, or near her; whether she floats with her centre of gravity
-    where it is shifted to. True of other causes."""
-    term = fit.model.terms[index]
-    if term.label not in ("thruster_lever", "center_of_gravity_shift", "antenna_offset"):
-        return True
-    c = fit.plant.c
-    by = fit.values[index] * fit.scales.amplitudes(term, c.L)
-    if term.label == "thruster_lever":
-        return bool(abs(c.tunnels.x_bow + by[0]) < _REACH * c.L)
-    if term.label == "center_of_gravity_shift":
-        return bool(abs(by[0]) < _TRIMS * c.L)
-    return bool(abs(by[0]) < _REACH * c.L and abs(by[1]) < _MAST * fit.plant.ship.B)
+    """Whether a ship may have a cause of the size found (`Effect.plausible`); of values of single runs their root mean square counts."""
+    term, values = fit.model.terms[index], fit.values[index] * fit.scales.amplitudes(fit.model.terms[index], fit.plant.c.L)
+    size = np.sqrt(np.mean(values**2, axis=0)) if term.per_run else values
+    return bool(term.effect.plausible((*size, *term.setting), fit.plant.ship))
+
+
+def stands(fit: Fit, index: int) -> bool:
+    """Whether a cause is sure, and a ship may have it of that size."""
+    return is_on_a_ship(fit, index) and is_sure(fit, index)
 
 
 def mends_the_bank(fit: Fit, index: int) -> bool:
@@ -199,14 +188,14 @@ def bends(fit: Fit, index: int, null: Fit) -> bool:
 
 def is_sure(fit: Fit, index: int) -> bool:
     """Whether the values of a cause differ from zero (Hotelling's test over the runs), and the other runs do not speak against it where one bears it;
-    where each run has its own, whether they last for the run. Of a wind, whether it could blow on a ship; of a place, whether it is on one; of a
-    steady wind or current, whether it does not merely mend the law of a bank."""
+    where each run has its own, whether they last for the run. Of a wind, whether it could blow on a ship; of a steady wind or current, whether it
+    does not merely mend the law of a bank."""
     from scipy.stats import f
 
     term = fit.model.terms[index]
-    if term.label in WITHOUT_WIND and not blows_on_a_ship(fit):
+    if term.label in _WINDS and not blows_on_a_ship(fit):
         return False
-    if not is_on_a_ship(fit, index) or mends_the_bank(fit, index):
+    if mends_the_bank(fit, index):
         return False
     if term.per_run:
         return lasts(fit) and tells_runs_apart(fit)

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import product, takewhile
 
 import numpy as np
 
 from ..effects.base import EFFECTS, Effect
+from .backward import needed_only, wanted_only
+from .budget import is_spent
 from .fit import Origin, fit, looking_at
 from .model import Linearisation
 from .ordinary import STRANGE_SIZE, widened
 from .plain import REFIT_ITERATIONS, beside_noise_of
 from .plant import Plant
-from .robust import WITHOUT_WIND, bends, is_sure, matters
+from .possible import why_not
+from .robust import bends, matters, stands
 from .screen import Score, changes, glance, overlap, screen
 from .settle import Fit, hull_evidence, settle
 from .term import Term
@@ -127,11 +130,7 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Se
         effect = EFFECTS.get(name)
         if name in NOT_SCREENED or name in settled or (not plant.seg.commanded and shows_in_record(effect)):
             continue
-        if plant.seg.wind is None and effect.channels:
-            continue
-        if (plant.seg.wind is not None and name in WITHOUT_WIND) or (plant.water and name == "shallow_water"):
-            continue
-        if effect.family == "thruster" and not np.any(plant.seg.states[..., 8:]):
+        if why_not(effect, plant):
             continue
         ways = list(product(effect.fitted(plant.c.L), effect.settings(plant.seg.states[..., :2], plant.ship)))
         found += [Term(way, setting, effect.per_run, choices=len(ways)) for way, setting in ways]
@@ -184,6 +183,8 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
     seen = {s.term: s.score for s in glance(start.seen)}
     found, best, least = [], threshold, -np.inf
     for score in sorted(scores, key=lambda s: -seen[s.term]):
+        if found and is_spent():
+            break
         tried = start.refit(score, least)
         if threshold - _NEAR < 2.0 * (tried.evidence - now.evidence) < threshold:
             tried = fit(tried.plant, tried.scales, tried.model, tried.point, tried.hyper, tried.log_tau2, guess=tried.motion)
@@ -199,64 +200,85 @@ def _least(best: Fit, now: Fit) -> float:
     return 2.0 * (_HOPE * (best.evidence - now.evidence) - max(best.promise - best.early, 0.0)) - _HOPE_MARGIN
 
 
-def without(before: Fit, index: int) -> Fit:
-    """`before` without one of its terms, refitted."""
-    terms = tuple(t for i, t in enumerate(before.model.terms) if i != index)
-    values = tuple(v for i, v in enumerate(before.point.values) if i != index)
-    log_tau2 = {i - (i > index): v for i, v in before.log_tau2.items() if i != index}
-    model, point = replace(before.model, terms=terms), replace(before.point, terms=terms, values=values)
-    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=REFIT_ITERATIONS, guess=before.motion)
-
-
 def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selection:
     """Add the best candidate while it gains more than `threshold` and than what the causes found leave; drop what a later one has made needless.
 
-    `null` must carry the candidates. Candidates are refitted if their linear score is among the best, or the best of their family.
+    `null` must carry the candidates. Candidates are refitted if their linear score is among the best, or the best of their family. Where other noise
+    suits the first cause than suits the plain model, this begins once more beside that.
     """
-    candidates, first = null.candidates, screen(null)
-    careful = threshold > 0.0  # who is told the names needs no such care
-    off_form = _OFF_FORM * max(hull_evidence(null), 0.0) if careful else 0.0
-    now, scores, steps, tiny, origin = null, first, [], set[str](), Origin.of(null.plant, null.scales)
+    plain, grown = null, _grown(null, threshold, most)
+    if grown.again is not None:
+        null = grown.again
+        grown = _grown(null, threshold, most, again=True)
+    now, scores, careful = grown.now, grown.scores, threshold > 0.0
+    pruned = needed_only(now, threshold, grown.besides, spare_last=False)
+    pruned, unsure = wanted_only(pruned, lambda f, i: stands(f, i) and not bends(f, i, null)) if careful else (pruned, ())
+    whole = pruned
+    pruned, small = wanted_only(pruned, matters) if careful else (pruned, ())
+    if pruned is not now:
+        now = looking_at(pruned, null.candidates)
+        sure, more = wanted_only(now, stands) if small else (now, ())  # without what is too small, too
+        if more:
+            now, unsure = looking_at(sure, null.candidates), unsure + more
+        scores = screen(now)
+    return Selection(
+        null, plain, now, grown.first, scores, grown.steps, grown.off_form, unsure, (*grown.tiny, *small),
+        whole if small and not now.model.terms else None,
+    )  # fmt: skip
 
-    def besides(found: Fit, index: int) -> float:
-        return asked_besides(found.model.terms[index], off_form, np.max(np.abs(found.values[index]))) if careful else 0.0
 
-    def gain(tried: Fit) -> float:
+@dataclass(frozen=True)
+class _Grown:
+    """A model `now` with every cause that was worth adding to the plain one, and the steps to it, as in `Selection`; again: the plain model beside
+    other noise, from which to begin once more; then `now` holds the first cause alone. careful: whether causes are chosen, not given."""
+
+    now: Fit
+    first: list[Score]
+    scores: list[Score]
+    steps: list[Step]
+    tiny: set[str]
+    off_form: float
+    careful: bool
+    again: Fit | None = None
+
+    def besides(self, found: Fit, index: int) -> float:
+        """What a cause must be worth besides the threshold."""
+        return asked_besides(found.model.terms[index], self.off_form, np.max(np.abs(found.values[index]))) if self.careful else 0.0
+
+    def gain(self, tried: Fit) -> float:
+        """2 log evidence of the last term of `tried` beyond that; a tiny one gains nothing."""
         term = tried.model.terms[-1]
         # every ship is a little unequal, every run has a breath of wind, every record is a little late: what is too small of that stays, and others
         # are judged beside it
-        if careful and not (term.effect.breaks_symmetry or term.per_run or term.effect.enters == "gear" or matters(tried, -1)):
+        if self.careful and not (term.effect.breaks_symmetry or term.per_run or term.effect.enters == "gear" or matters(tried, -1)):
             return -np.inf
-        return 2.0 * (tried.evidence - now.evidence) - besides(tried, -1)
+        return 2.0 * (tried.evidence - self.now.evidence) - self.besides(tried, -1)
 
-    for round_ in range(most):
-        tried = refits(now, worth_a_refit(scores, now, threshold), origin, threshold)
+
+def _grown(null: Fit, threshold: float, most: int, again: bool = False) -> _Grown:
+    """Forward selection; again: do not ask for other noise once more."""
+    first, careful = screen(null), threshold > 0.0  # who is told the names needs no such care
+    state = _Grown(null, first, first, [], set(), _OFF_FORM * max(hull_evidence(null), 0.0) if careful else 0.0, careful)
+    origin = Origin.of(null.plant, null.scales)
+    for round_ in takewhile(lambda _: not is_spent(), range(most)):
+        now = state.now
+        tried = refits(now, worth_a_refit(state.scores, now, threshold), origin, threshold)
         if all(2.0 * (f.evidence - now.evidence) < threshold for f, _ in tried):
             tried += refits(now, absorbed([f for f, _ in tried], now, threshold, origin), origin, threshold)
-        steps += [Step.of(round_, f, now, score) for f, score in tried]
-        tiny |= {f.model.terms[-1].label for f, score in tried if score > threshold and not matters(f, -1)}
-        best = _or_change(now, max((f for f, _ in tried), key=gain, default=None), origin)
+        state.steps.extend(Step.of(round_, f, now, score) for f, score in tried)
+        state.tiny.update(f.model.terms[-1].label for f, score in tried if score > threshold and not matters(f, -1))
+        best = _or_change(now, max((f for f, _ in tried), key=state.gain, default=None), origin)
         imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
         # what a fit that does not rest could still gain by itself is no gain of the next cause
-        if best is None or gain(best) < threshold + imprecise + now.excess:
+        if best is None or state.gain(best) < threshold + imprecise + now.excess:
             break
         if best.model.terms[-1].since is not None:
-            steps.append(Step.of(round_, best, now, 2.0 * (best.evidence - now.evidence)))
-        now = widened(looking_at(_backward(best, threshold, besides), candidates))
-        if round_ == 0 and (again := beside_noise_of(now, null)) is not None:
-            return replace(select(again, threshold, most=most), plain=null)
-        scores = screen(now)
-    pruned = _backward(now, threshold, besides, spare_last=False)
-    pruned, unsure = _without(pruned, lambda f, i: is_sure(f, i) and not bends(f, i, null)) if careful else (pruned, ())
-    whole = pruned
-    pruned, small = _without(pruned, matters) if careful else (pruned, ())
-    if pruned is not now:
-        now = looking_at(pruned, candidates)
-        sure, more = _without(now, is_sure) if small else (now, ())  # without what is too small, too
-        if more:
-            now, unsure = looking_at(sure, candidates), unsure + more
-        scores = screen(now)
-    return Selection(null, null, now, first, scores, steps, off_form, unsure, (*tiny, *small), whole if small and not now.model.terms else None)
+            state.steps.append(Step.of(round_, best, now, 2.0 * (best.evidence - now.evidence)))
+        now = widened(looking_at(needed_only(best, threshold, state.besides), null.candidates))
+        if round_ == 0 and not again and (other := beside_noise_of(now, null)) is not None:
+            return replace(state, now=now, again=other)
+        state = replace(state, now=now, scores=screen(now))
+    return state
 
 
 def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
@@ -272,7 +294,7 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
     for score in late:
         found = start.refit(score, _least(best, now) if best is not None and gain > _CHANGE_MARGIN else -np.inf)
         own = plain is not None and plain.model.terms[-1].label == score.term.label
-        if 2.0 * (found.evidence - now.evidence) > gain + (_OWN_MARGIN if own else _CHANGE_MARGIN) and is_sure(found, -1):
+        if 2.0 * (found.evidence - now.evidence) > gain + (_OWN_MARGIN if own else _CHANGE_MARGIN) and stands(found, -1):
             best, gain = found, 2.0 * (found.evidence - now.evidence)
     return best
 
@@ -325,26 +347,3 @@ def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -
     least = max(threshold, _FAR_BEHIND * max(s.score for s in best.values()))
     seen = _beside(now) | {f.model.terms[-1].label for f in tried}
     return [s for label, s in best.items() if label not in seen and s.score > least][:_RIVALS]
-
-
-def _backward(found: Fit, threshold: float, besides: Callable[[Fit, int], float], spare_last: bool = True) -> Fit:
-    """Drop terms that are no longer worth the threshold and what is asked of them `besides`, judged on the linearisation, then by a refit."""
-    index = 0
-    while index < len(found.model.terms) - spare_last:
-        least = threshold + besides(found, index)
-        if found.worth(index) < least:
-            less = without(found, index)
-            if 2.0 * (found.evidence - less.evidence) < least:
-                found = less
-                continue
-        index += 1
-    return found
-
-
-def _without(found: Fit, wanted: Callable[[Fit, int], bool]) -> tuple[Fit, tuple[str, ...]]:
-    """Without the terms that are not `wanted`, the last first, and their effects."""
-    dropped: tuple[str, ...] = ()
-    while others := [i for i in range(len(found.model.terms)) if not wanted(found, i)]:
-        dropped += (found.model.terms[others[-1]].label,)
-        found = without(found, others[-1])
-    return found, dropped

@@ -27,7 +27,7 @@ class Term:
     @property
     def size(self) -> int:
         """Number of free amplitudes."""
-        return len(self.effect.parameters) - len(self.setting)
+        return sum(not p.shape for p in self.effect.parameters)
 
     @property
     def label(self) -> str:

@@ -17,6 +17,10 @@ class AddedResistance(Effect):
     parameters = (Parameter("share", "1", 0.3, -0.6, 3.0),)
     separate = "coast down with the shaft stopped, from two speeds"
 
+    @property
+    def acts_through(self) -> tuple[str, ...]:
+        return ()  # a towed ship has it, too
+
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.scale_hull(resistance=1.0 + q[0])
 

@@ -1,6 +1,8 @@
 """The recorded position is that of an antenna, ahead and to starboard of midship: p + R(psi) (forward, starboard). Its velocity is midship's (a log,
 or an inertial unit that reckons with the lever), or the antenna's own, from the same receiver: u - r starboard, v + r forward. Its own agree with the
-track, so that only the forces tell where on the ship they belong: what is ahead or astern may pass for another hull."""
+track, so that only the forces tell where on the ship they belong: what is ahead or astern may pass for another hull.
+
+It stands on the ship or near her: within three quarters of the length from midship, and within a breadth of the centreline."""
 
 from __future__ import annotations
 
@@ -34,6 +36,9 @@ class AntennaOffset(Effect):
         out[..., U] -= r * starboard
         out[..., V] += r * forward
         return out
+
+    def plausible(self, q: Sequence[float], ship: Particulars) -> bool:
+        return super().plausible(q, ship) and abs(q[0]) < 0.75 * ship.L and abs(q[1]) < ship.B
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
         return [(0.0,), (1.0,)]

@@ -25,13 +25,15 @@ EFFECTS = Registry("effect", "effects", "EFFECT", helpers=frozenset({"base"}))
 
 _FROUDE = {"1": 0.0, "speed": 0.5, "time": 0.5, "rate": -0.5, "length": 1.0, "area": 2.0, "rpm rate": -1.0}
 _REFERENCE_LENGTH = 130.0
+_ACTS_THROUGH = {"rudder": ("delta",), "propulsion": ("n",), "thruster": ("F_b", "F_s")}
 
 
 @dataclass(frozen=True)
 class Parameter:
     """One value of an effect.
 
-    typical, low, high are for a ship of 130 m; `scaling` says how they go with the length (Froude's law): a key of `_FROUDE`.
+    typical, low, high are for a ship of 130 m; `scaling` says how they go with the length (Froude's law): a key of `_FROUDE`. A fit is held between
+    low and high; a size beyond them is not named (`Effect.plausible`).
     A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes are zero. An `other` one is
     the amplitude of another form of the same cause, which a ship may have in its place: fitted, but not drawn for the suite.
     """
@@ -56,7 +58,8 @@ class Effect:
 
     Class attributes: `family` (environment, rudder, propulsion, thruster, hull, sensor, time), `summary`, `source`, `parameters`, `per_run` (every
     run has its own values), `vector` (names of size and direction that two earth-fixed components are reported as), `separate` (the manoeuvre that
-    tells it from its look-alikes), `channels` (measured inputs without which it means nothing), `breaks_symmetry` (a force that knows port from
+    tells it from its look-alikes), `channels` (measured inputs without which it means nothing), `known_with` (measured inputs with which the model
+    has it already), `scales` (channels that it records (1 + q) times too large), `breaks_symmetry` (a force that knows port from
     starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that are wrong), `late` (tells of another
     time, and as much of the motion as a sensor in time, but where a record begins or ends), `unrecorded` (of a gear's: it may also act behind the
     record of the actuator, where the motion alone shows it). `way`: how one of those that `fitted` gives acts, where the user should be told.
@@ -71,6 +74,8 @@ class Effect:
     vector: ClassVar[tuple[str, str] | None] = None
     separate: ClassVar[str] = ""
     channels: ClassVar[tuple[str, ...]] = ()
+    known_with: ClassVar[tuple[str, ...]] = ()
+    scales: ClassVar[tuple[str, ...]] = ()
     breaks_symmetry: ClassVar[bool] = False
     late: ClassVar[bool] = False
     unrecorded: ClassVar[bool] = False
@@ -84,6 +89,15 @@ class Effect:
         """Where it enters: "force", "gear" or "sensor"."""
         cls = type(self)
         return "gear" if cls.gear is not Effect.gear else "sensor" if cls.measure is not Effect.measure else "force"
+
+    @property
+    def acts_through(self) -> tuple[str, ...]:
+        """Actuators of which one at least must work for it to act; none where it needs no actuator."""
+        return _ACTS_THROUGH.get(self.family, ())
+
+    def plausible(self, q: Sequence[float], ship: Particulars) -> bool:
+        """Whether a ship may have it of the size `q`: within the bounds of all parameters."""
+        return all(p.shape or p.low <= value <= p.high for p, value in zip(self.sized(ship.L), q, strict=True))
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         """Write the effect of size `q` into `e`, at the instant `s`."""

@@ -1,4 +1,6 @@
-"""The compass reads too much by a constant: psi recorded = psi + bias."""
+"""The compass reads too much by a constant: psi recorded = psi + bias. Surge and sway are of a sensor in the ship's own axes (a log), or velocities
+over ground from satellites that the same compass turned into the ship's axes: u cos + v sin, v cos - u sin of the bias. Those agree with the track
+and the heading, so that only the forces tell: they act along the ship."""
 
 from __future__ import annotations
 
@@ -8,21 +10,33 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..ops import Array
-from ..signals import PSI
+from ..ship import Particulars
+from ..signals import PSI, U, V
 from .base import Effect, Parameter, per_run
 
 
 class HeadingBias(Effect):
     family = "sensor"
-    summary = "compass error"
+    summary = "compass error, the velocities turned by it or not"
     source = "physics reference, section 5, S58"
-    parameters = (Parameter("bias", "rad", math.radians(2.0), -0.3, 0.3),)
+    parameters = (
+        Parameter("bias", "rad", math.radians(2.0), -0.3, 0.3),
+        Parameter("turned_velocities", "1", 0.0, 0.0, 1.0, shape=True),
+    )
     separate = "straight runs on one course at two speeds"
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
+        """As `Effect.measure`; without a second value the velocities are not turned."""
+        bias, *turned = (per_run(value) for value in q)
         out = S.copy()
-        out[..., PSI] += per_run(q[0])
+        out[..., PSI] += bias
+        if turned:
+            own = (S[..., U] + 1j * S[..., V]) * np.exp(-1j * bias * turned[0])
+            out[..., U], out[..., V] = own.real, own.imag
         return out
+
+    def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
+        return [(0.0,), (1.0,)]
 
 
 EFFECT = HeadingBias()

@@ -16,6 +16,7 @@ class ShallowWater(Effect):
     summary = "finite water depth"
     source = "Kijima, Tang, Ankudinov and Furukawa as collected in physics reference, section 5, E07"
     parameters = (Parameter("draught_to_depth", "1", 0.6, 0.0, 0.85),)
+    known_with = ("depth",)
     separate = "the same steady turn at two depths: drift over yaw rate changes with depth and not with rudder force"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

@@ -18,6 +18,7 @@ class SpeedScale(Effect):
     summary = "scale of the speed log"
     source = "physics reference, section 5, S62"
     parameters = (Parameter("scale", "1", 0.05, -0.5, 0.5),)
+    scales = ("u", "v")
     separate = "straight runs on reciprocal courses"
     sway = 1.0
 

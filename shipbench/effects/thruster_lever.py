@@ -1,4 +1,5 @@
-"""The bow thruster stands elsewhere than the ship file says: its lever + shift, forward positive."""
+"""The bow thruster stands elsewhere than the ship file says: its lever + shift, forward positive. It acts within three quarters of the
+length from midship, whatever the hull makes of its jet."""
 
 from __future__ import annotations
 
@@ -16,6 +17,9 @@ class ThrusterLever(Effect):
     source = "physics reference, section 5, T44"
     parameters = (Parameter("shift", "m", -20.0, -60.0, 60.0, scaling="length"),)
     separate = "bow and stern thruster alone, at rest"
+
+    def plausible(self, q: Sequence[float], ship: Particulars) -> bool:
+        return super().plausible(q, ship) and abs(ship.x_bow + q[0]) < 0.75 * ship.L
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.lever = e.lever + q[0]

@@ -20,6 +20,7 @@ class Wind(Effect):
     parameters = (Parameter("north", "m/s", 7.0, -60.0, 60.0, scaling="speed"), Parameter("east", "m/s", 7.0, -60.0, 60.0, scaling="speed"))
     breaks_symmetry = True
     vector = ("speed", "from")
+    known_with = ("wind_speed", "wind_from")
     separate = "the same manoeuvre at two speeds and on reciprocal courses: wind forces do not grow with the ship's speed"
     stretch: tuple[float, float] | None = None
     moment: float = 1.0

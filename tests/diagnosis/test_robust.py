@@ -165,7 +165,7 @@ def _least(effect: str) -> float:
 
 def _sized(effect: str, values: np.ndarray, dt: float = 1.0, L: float = 130.0, setting: tuple[float, ...] = ()) -> SimpleNamespace:
     term = Term(EFFECTS.get(effect), setting)
-    c, ship = SimpleNamespace(L=L, tunnels=SimpleNamespace(x_bow=0.38 * L)), SimpleNamespace(B=0.12 * L)
+    c, ship = SimpleNamespace(L=L), SimpleNamespace(L=L, B=0.12 * L, x_bow=0.38 * L)
     plant = SimpleNamespace(seg=SimpleNamespace(dt=dt), c=c, ship=ship)
     typical = np.array([abs(p.typical) for p in term.effect.sized(L) if not p.shape])
     return SimpleNamespace(values=(values,), model=SimpleNamespace(terms=(term,)), plant=plant, scales=SimpleNamespace(amplitudes=lambda *_: typical))
@@ -232,7 +232,7 @@ def test_a_ship_floats_with_her_centre_of_gravity_where_it_is(shift: float, want
 def test_an_antenna_stands_on_the_ship(forward: float, starboard: float, wanted: bool):
     """14.7 m to port were named on a barge 85 m long and 9.5 m wide, whose log read nothing below 1.1 m/s."""
     at = np.array([forward, starboard]) / [p.typical for p in EFFECTS.get("antenna_offset").sized(85.0) if not p.shape]
-    assert is_on_a_ship(_sized("antenna_offset", at, L=85.0), 0) is wanted
+    assert is_on_a_ship(_sized("antenna_offset", at, L=85.0, setting=(0.0,)), 0) is wanted
 
 
 @pytest.mark.parametrize(("towards", "bank", "wanted"), [(4.7, (1.57, 4.3, 0.0), True), (1.6, (1.57, 4.3, 0.0), True), (2.0, (1.57, 4.3, 0.0), False),

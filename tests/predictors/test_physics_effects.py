@@ -64,7 +64,7 @@ def test_a_hidden_current_is_found_and_the_rollouts_gain_on_runs_not_fitted(seed
     assert rollout_error(hull, unseen) < rollout_error(extended, unseen)
 
 
-@pytest.mark.parametrize(("name", "q"), [("heading_bias", (-0.05,)), ("yaw_rate_bias", (0.003,)), ("speed_scale", (0.08,))])
+@pytest.mark.parametrize(("name", "q"), [("heading_bias", (-0.05, 0.0)), ("yaw_rate_bias", (0.003,)), ("speed_scale", (0.08,))])
 def test_a_fault_of_a_sensor_is_found_within_a_fifth(name, q):
     data, unseen = trials(2, (name, q)), trials(102, (name, q))
     plain, extended = fitted("physics", data), fitted(f"physics+{name}", data)

@@ -1,0 +1,131 @@
+"""Errors of the record itself, before anything is fitted. What `shipbench data check` calls an error is corrected where the check has a line of
+dataset.toml for it, as often as one correction shows the next; a record that contradicts itself even so is refused: no model explains it."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..checking.base import check_dataset
+from ..checking.finding import Finding, merged
+from ..checking.units import UnitFinding
+from ..checking.units import merged as one_per_channel
+from ..data.reread import reread
+from ..data.units import sign_factor, unit_factor
+from ..effects.base import EFFECTS
+from ..errors import InputError
+from ..records import Dataset, Run
+from ..ship import Particulars, complete
+from ..signals import COMMANDS, PSI, STATES, X, Y
+from .derived import beside_heading, beside_track
+from .plant import SEGMENT
+
+_ROUNDS = 3
+"""After the unit of the speeds, that of the positions may be seen."""
+_LEAST = {"way": 0.1, "turn": np.deg2rad(30.0)}
+"""Way [lengths] and turn [rad] in a piece of `SEGMENT` below which noise, or a gyro's constant error, decides what the record says."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """A data set with the errors of its record taken out, those of them that are causes (of wrong numbers, not of double runs), and lines for the
+    reader."""
+
+    dataset: Dataset
+    errors: list[UnitFinding]
+    told: list[str]
+
+
+def joined(errors: Sequence[UnitFinding]) -> list[UnitFinding]:
+    """One error per channel; frames and kinds of velocities, which are no factors, first."""
+    return [e for e in errors if e.factor == 1.0] + one_per_channel([e for e in errors if e.factor != 1.0])
+
+
+def corrected_record(dataset: Dataset) -> Record:
+    """The data set as it must be read, by the errors that the check finds. A fault that an effect of the library is, of a size that it may have, is
+    left to the fit, which tells how large it is and what it is worth.
+
+    Raises:
+        InputError: errors are left however often they are corrected.
+    """
+    errors: list[UnitFinding] = []
+    told: dict[str, str] = {}
+    ship = complete(dataset.ship)
+    for round_ in range(_ROUNDS + 1):
+        found = [f for f in check_dataset(dataset) if f.severity == "error" and f.line and f.text not in told and not _has_effect(f, ship)]
+        if not found:
+            break
+        if round_ == _ROUNDS:
+            raise InputError(
+                f"data set '{dataset.name}': {found[0].text} This is left after {_ROUNDS} corrections, so nothing is fitted. Accepted: a record "
+                "without errors. Correct dataset.toml by the lines of `shipbench data check`, one at a time."
+            )
+        dataset = reread(dataset, merged({}, (f.line for f in found)))
+        told |= {
+            f.text: f"{f.text} Corrected before the fit; `shipbench data check` has the lines for dataset.toml: {_inline(f.line)}." for f in found
+        }
+        errors += [e for f in found for e in _errors(f)]
+    return Record(dataset, joined(errors), list(told.values()))
+
+
+def refuse_contradictions(dataset: Dataset) -> None:
+    """Refuse runs whose positions and speeds, or heading and yaw rate, say different things most of the time.
+
+    Raises:
+        InputError: in most pieces in which the ship moves, more than half of the squared way, or turn, is unexplained.
+    """
+    length = max(1, round(SEGMENT * (dataset.ship.L / 130.0) ** 0.5 / dataset.dt))
+    track, turns = (np.concatenate(parts) for parts in zip(*(_ends(run, length) for run in dataset.runs), strict=True))
+    for (made, said), least, what, by, unit, channels in (
+        (track.T, _LEAST["way"] * dataset.ship.L, "positions move", "heading and speeds say", "m", "x, y, psi, u, v"),
+        (np.rad2deg(turns.T), np.rad2deg(_LEAST["turn"]), "the heading turns", "the yaw rate says", "deg", "psi, r"),
+    ):
+        larger = np.maximum(np.abs(made), np.abs(said))
+        moving = larger > least
+        against = moving & (2.0 * np.abs(made - said) ** 2 > larger**2)
+        if 2 * np.sum(against) > np.sum(moving):
+            one, other = (float(np.median(np.abs(values[against]))) for values in (made, said))
+            raise InputError(
+                f"data set '{dataset.name}' contradicts itself, so nothing is fitted. In {np.sum(against)} of {np.sum(moving)} pieces {what} by "
+                f"{one:.3g} {unit} where {by} {other:.3g} {unit}, or another way. Accepted: 0.7 to 1.4 times as much. Correct the unit, sign or "
+                f"column of {channels}, or the unit of t, in dataset.toml. Look with: shipbench data check FOLDER."
+            )
+
+
+def _ends(run: Run, length: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of pieces of a run, way by positions and by speeds (east as imaginary part), and turn by heading and by yaw rate, (pieces, 2) each."""
+    edges = np.linspace(0, len(run) - 1, max(1, -(-(len(run) - 1) // length)) + 1).round().astype(int)
+    plane = np.array([1.0, 1j])
+    pairs = ((run.states[:, [X, Y]] @ plane, beside_track(run) @ plane), (run.states[:, PSI], beside_heading(run)[:, 0]))
+    track, turn = (np.column_stack([np.diff(made[edges]), np.diff((made - off)[edges])]) for made, off in pairs)
+    return track, turn
+
+
+def _has_effect(found: Finding, ship: Particulars) -> bool:
+    """Whether an effect of the library is the fault that was found, of a size that it may have."""
+    scales = tomllib.loads(found.line).get("scale", {})
+    effects = [e for e in map(EFFECTS.get, EFFECTS.names()) if scales and set(scales) <= set(e.scales)]
+    return any(e.plausible((value - 1.0,), ship) for e in effects for value in scales.values())
+
+
+def _errors(found: Finding) -> Sequence[UnitFinding]:
+    """Channels that a finding's line reads in another unit, sign or scale, commands beside their actuators; or in another frame."""
+    entries = tomllib.loads(found.line)
+    factors = {channel: float(value) for channel, value in entries.get("scale", {}).items() if channel in STATES}
+    kinds = dict.fromkeys(factors, "recorded in another scale")
+    for table, factor_of, kind in (("units", unit_factor, "recorded in {}"), ("signs", sign_factor, "recorded positive {}")):
+        for channel, word in entries.get(table, {}).items():
+            for name in (channel, *({f"{channel}_c"} & set(COMMANDS))) if channel in STATES else ():
+                factors[name] = factors.get(name, 1.0) / factor_of(channel, word)
+                kinds[name] = ", ".join(filter(None, (kinds.get(name), kind.format(word))))
+    if not factors and found.channels and found.channels[0] in STATES:
+        return [UnitFinding(found.channels[0], found.kind, 1.0, found.text)]
+    return [UnitFinding(name, kinds[name], factor, found.text) for name, factor in factors.items()]
+
+
+def _inline(line: str) -> str:
+    """Lines of TOML in a sentence: tables with their entries, separated by commas."""
+    return line.replace("]\n", "] ").replace("\n[", "; [").replace("\n", ", ")
