@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checking.applying import laid
 from ..checking.base import check_dataset
-from ..checking.finding import Finding, merged
+from ..checking.finding import Finding
 from ..checking.units import UnitFinding
 from ..checking.units import merged as one_per_channel
 from ..data.reread import reread
@@ -58,12 +59,13 @@ def corrected_record(dataset: Dataset) -> Record:
         found = [f for f in check_dataset(dataset) if f.severity == "error" and f.line and f.text not in told and not _has_effect(f, ship)]
         if not found:
             break
-        if round_ == _ROUNDS:
+        lines = laid({}, found)
+        if round_ == _ROUNDS or lines.refused:
             raise InputError(
-                f"data set '{dataset.name}': {found[0].text} This is left after {_ROUNDS} corrections, so nothing is fitted. Accepted: a record "
+                f"data set '{dataset.name}': {found[0].text} This is left after {round_} corrections, so nothing is fitted. Accepted: a record "
                 "without errors. Correct dataset.toml by the lines of `shipbench data check`, one at a time."
             )
-        dataset = reread(dataset, merged({}, (f.line for f in found)))
+        dataset = reread(dataset, lines.description)
         told |= {
             f.text: f"{f.text} Corrected before the fit; `shipbench data check` has the lines for dataset.toml: {_inline(f.line)}." for f in found
         }
