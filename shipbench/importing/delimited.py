@@ -20,6 +20,7 @@ from .tables import BLANKS, DELIMITERS, KINDS, TEXT_BLOCK, Table, check_number, 
 _NO_TEXT = ("idna", "punycode", "undefined", "unicode_escape", "raw_unicode_escape")
 """Codecs of Python that make text of text, not of a file's bytes."""
 _WIDE = ("utf-16", "utf-32")
+_MOST_ODD = 1000
 _BEGINS_DATA = re.compile(r"\s*[\"']?[-+\u2212]?[.,]?\d")
 
 
@@ -67,6 +68,7 @@ def open_text(path: Path, layout: Layout) -> Table:
                     odd.check(batch.num_rows)
                     yield batch.rename_columns(list(wanted))
             except pa.ArrowInvalid as error:
+                odd.refuse()
                 raise _explained(path, error) from None
         notes.extend(note for note in odd.left_out() if note not in notes)
 
@@ -85,15 +87,26 @@ class _OddRows:
     """Rows with more or fewer fields than the header; `first` is the number of the first row of data."""
 
     def __init__(self, path: Path, first: int) -> None:
-        self.path, self.first, self.good = path, first, 0
+        self.path, self.first, self.good, self.blank = path, first, 0, 0
         self.rows: list[pa.csv.InvalidRow] = []
+        self._blank_before: list[int] = []
 
     def met(self, row: pa.csv.InvalidRow) -> str:
-        """Take a row out, for now."""
+        """Take a row out, for now; one of delimiters alone is an empty line. Reading ends at too many: an exception would be lost in pyarrow."""
+        if not row.text.strip(" \t,;|"):
+            self.blank += 1
+            return "skip"
         self.rows.append(row)
-        if len(self.rows) > 1000:
+        self._blank_before.append(self.blank)
+        return "error" if len(self.rows) > _MOST_ODD else "skip"
+
+    def refuse(self) -> None:
+        """
+        Raises:
+            InputError: reading ended since too many rows do not fit.
+        """
+        if len(self.rows) > _MOST_ODD:
             raise self._refused(self.rows[0])
-        return "skip"
 
     def check(self, good: int) -> None:
         """Count whole rows.
@@ -103,7 +116,7 @@ class _OddRows:
         """
         self.good += good
         for k, row in enumerate(self.rows):
-            if self.good > row.number - self.first - k:
+            if self.good > row.number - self.first - k - self._blank_before[k]:
                 raise self._refused(row)
 
     def left_out(self) -> list[str]:

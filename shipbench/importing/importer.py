@@ -83,8 +83,8 @@ def import_logs(
     return summary
 
 
-def rehearse(logs: Sequence[Path], mapping: Mapping, ship: Ship, rows: int) -> Summary:
-    """Import the first `rows` rows of each recording without writing anything.
+def rehearse(logs: Sequence[Path], mapping: Mapping, ship: Ship, rows: int, read: int) -> Summary:
+    """Import the first `rows` rows of each recording without writing anything, and read the logs on to row `read`.
 
     Raises:
         InputError: what the import would raise.
@@ -95,7 +95,14 @@ def rehearse(logs: Sequence[Path], mapping: Mapping, ship: Ship, rows: int) -> S
         for name, group, piece, _ in _named(log, mapping, ship, summary):
             summary.doubtful.update(outliers(piece, ship))
             summary.add(name, log.files, piece, group)
-        if met.rows > rows * len(mapping.sources):
+        if met.rows > read * len(mapping.sources):
+            break
+    met = Counts()
+    for log in _recordings(logs, mapping, met):
+        for blocks in log.feeds.values():
+            for _ in _beginning(blocks, read):
+                pass
+        if met.rows > read * len(mapping.sources):
             break
     summary.complete(met)
     if not summary.runs:

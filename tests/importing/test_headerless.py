@@ -59,3 +59,17 @@ def test_a_header_with_blanks_names_the_columns(tmp_path):
     table = open_table(path, Layout(delimiter=" "))
     assert table.columns == ("t", "x")
     assert pd.concat([b.to_pandas() for b in table.batches(["x"])])["x"].tolist() == ["1.0", "2.0"]
+
+
+def test_rows_of_delimiters_alone_are_empty_lines(trial_import, tmp_path):
+    table = logged(T)[["time", "north", "east", "HDG"]].to_csv(index=False, header=False, sep="\t")
+    done = trial_import(table + 2000 * "\t\t\n", mapping(time='column = "1"', tables='[file]\nheader = 0\ndelimiter = "\\t"\n', body=NUMBERED))
+    assert done.exit_code == 0, done.output
+    assert len(load_dataset(tmp_path / "out").runs[0].t) == len(T)
+
+
+def test_many_rows_that_do_not_fit_are_one_message(trial_import, capfd):
+    done = trial_import(logged(T).to_csv(index=False) + 2000 * "1,2,3\n")
+    assert done.exit_code == 2
+    assert "has 3 fields; accepted: 10" in done.stderr
+    assert "Traceback" not in capfd.readouterr().err

@@ -231,3 +231,26 @@ def test_thousands_are_seen_where_a_column_runs_over_1000(propose, tmp_path):
     _, _, plan = propose(log)
     assert plan["file"]["thousands"] == "."
     np.testing.assert_allclose(imported(log).runs[0].states[:, 6], np.round(n), atol=1.0)
+
+
+@pytest.mark.parametrize("order", [("north", "east", "HDG", "surge", "sway", "ROT", "rpm"), ("rpm", "ROT", "sway", "HDG", "east", "surge", "north")])
+def test_columns_without_heads_are_known_by_the_motion(propose, tmp_path, order):
+    """What does not take part in the motion, such as the shaft speed, stays with the reader."""
+    t = np.arange(0.0, 240.0)
+    log = write(tmp_path, "log.csv", logged(t)[["time", *order]].to_csv(index=False, header=False).encode())
+    done, text, plan = propose(log)
+    wanted = {"x": "north", "y": "east", "psi": "HDG", "u": "surge", "v": "sway", "r": "ROT"}
+    assert {c: e["column"] for c, e in plan["channels"].items()} == {c: str(order.index(name) + 2) for c, name in wanted.items()}
+    assert "NOT SURE: the columns have no heads" in done.stdout
+    assert f'column "{order.index("rpm") + 2}": first values 110' in text
+    run = imported(log).runs[0]
+    np.testing.assert_allclose(run.states[:, 4], motion(run.t)["v"], atol=0.01)
+
+
+def test_columns_without_heads_are_not_guessed_where_the_ship_does_not_turn(propose, tmp_path):
+    t = np.arange(0.0, 240.0)
+    table = pd.DataFrame({"t": t, "x": 4.0 * t, "y": 0.01 * np.sin(t), "psi": 0.01 * np.cos(t / 9), "r": -0.001 * np.sin(t / 9)})
+    done, text, plan = propose(write(tmp_path, "log.csv", table.to_csv(index=False, header=False).encode()))
+    assert not plan["channels"]
+    assert "MISSING" in done.stdout
+    assert 'column "3": first values' in text

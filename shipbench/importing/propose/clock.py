@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -90,9 +91,9 @@ def _candidates(columns: Sequence[Column]) -> Iterator[Time]:
     for column in stamps:
         yield from _of_one(column, 0.5)
     if not named and not stamps:
-        for column in columns:
-            if not column.head.name and len(column.known) > 2 and (np.diff(column.known) > 0).all():
-                yield from _of_one(column, 0.0)
+        forward = (c for c in columns if not c.head.name and len(c.known) > 2 and (np.diff(c.known) >= 0).all() and np.ptp(c.known) > 0)
+        for column in itertools.islice(forward, 1):
+            yield from _of_one(column, 0.0)
 
 
 def _pairs(columns: Sequence[Column]) -> Iterator[Time]:

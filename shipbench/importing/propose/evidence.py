@@ -30,6 +30,8 @@ _COURSE = np.deg2rad(1.0)
 """A column that follows the track's direction so closely through turns is the course: a turning hull drifts by several degrees."""
 _TURNING = np.deg2rad(30.0)
 """Range of directions from which on a log turns enough to tell."""
+_ALIKE = 0.9
+"""Correlation from which on a column is taken as the sway of the track."""
 _CLOSE = 0.15
 """Relative difference within which two speeds, or two yaw rates, are the same."""
 _UNITS = {"rad": ("deg", "rad", "cdeg"), "rad/s": ("rad/s", "deg/s", "deg/min"), "m/s": ("m/s", "kn", "km/h", "ft/s")}
@@ -68,7 +70,7 @@ def examine(sample: Sample, time: Time, found: Assigned, extra: dict[str, Any]) 
         for channel in ("sog", "u"):
             if channel in series and channel in found.entries:
                 _speed(channel, track, series, found)
-        _sway_as_surge(found)
+        _sway(track, series, found)
 
 
 def _series(sample: Sample, source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -238,13 +240,20 @@ def _speed(channel: str, track: _Track, series: dict[str, tuple[np.ndarray, np.n
         _settle(found.entries[channel], channel, float(np.median(track.speed[moving] / recorded[moving])), "the track", found)
 
 
-def _sway_as_surge(found: Assigned) -> None:
-    """v is in the unit of u, where the head of neither names one."""
-    u, v = found.entries.get("u"), found.entries.get("v")
-    if u and v and not u.columns[0].head.units and not v.columns[0].head.units and "as given" not in v.why:
+def _sway(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned) -> None:
+    """The unit of v from the track beside the heading; where these are too coarse for it, the unit of u."""
+    v, u = found.entries.get("v"), found.entries.get("u")
+    if v is None or "v" not in series or "psi" not in found.entries or "psi" not in series:
+        return
+    beside = track.speed * np.sin(track.direction - _at(track.t, series["psi"][0], np.unwrap(series["psi"][1])))
+    recorded = _at(track.t, *series["v"])
+    if np.std(beside) > 0 and np.std(recorded) > 0 and np.corrcoef(beside, recorded)[0, 1] > _ALIKE:
+        _settle(v, "v", float(np.sum(beside * recorded) / np.sum(recorded**2)), "the track beside the heading", found)
+    elif u and not u.columns[0].head.units and not v.columns[0].head.units and "as given" not in v.why:
         v.spec["unit"] = u.spec["unit"]
-        v.why = [*(w for w in v.why if not w.startswith("unit NOT SURE")), f"unit as u, {u.spec['unit']}"]
+        v.why.append("the unit of u")
         _no_doubt_of_unit(v, found)
+        found.notes.append(f"NOT SURE: the head of '{v.columns[0].name}' names no unit; v is taken in the unit of u, {u.spec['unit']}.")
 
 
 def _no_doubt_of_unit(entry: Entry, found: Assigned) -> None:

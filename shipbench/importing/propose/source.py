@@ -19,6 +19,7 @@ from .assign import Assigned, assign
 from .clock import Time, find_time, read_time, refusal, usual_step
 from .columns import Column, Sample
 from .evidence import examine
+from .headless import identify
 from .units import set_units
 
 SLOW = 5.0
@@ -98,6 +99,8 @@ def draft_source(name: str, logs: list[Path], sample: Sample, kept: dict[str, An
     own = set(time.names) if time else set()
     others = [c for c in sample.columns if c.name not in own]
     found = assign(others, kept.get("channels", {}), kept.get("run"))
+    if time is not None:
+        identify(others, time.t, found)
     set_units(found)
     draft = SourceDraft(name, logs, sample, found, time, kept, spec)
     draft.extra = {k: v for k, v in kept.items() if k in ("missing", "antenna", "speed_sensor")}

@@ -14,7 +14,8 @@ from ..mapping import load_mapping
 from ..summary import Summary
 from .source import SourceDraft
 
-_ROWS = 100_000
+_ROWS, _READ = 3000, 200_000
+"""Rows of each recording that are imported, and rows that are read for cells and times that cannot be."""
 _MOST_CORRECTIONS = 20
 _NEEDED = ("psi", "x", "y", "lat", "lon")
 _ANY_SHIP = Ship(name="any", L=50.0, B=8.0, T=3.0, mass=9e5)
@@ -26,7 +27,7 @@ def try_draft(write: Callable[[], Path], logs: Sequence[Path], sources: Sequence
     corrected: list[str] = []
     for _ in range(_MOST_CORRECTIONS):
         try:
-            summary = rehearse(logs, load_mapping(write()), _ANY_SHIP, _ROWS)
+            summary = rehearse(logs, load_mapping(write()), _ANY_SHIP, _ROWS, _READ)
         except InputError as error:
             told = _correct(str(error), sources, split)
             if told is None or told in corrected:
@@ -40,7 +41,9 @@ def try_draft(write: Callable[[], Path], logs: Sequence[Path], sources: Sequence
 def _of_success(summary: Summary) -> list[str]:
     seconds = sum(run["seconds"] for run in summary.runs)
     runs = f"{len(summary.runs)} run{'s' * (len(summary.runs) != 1)}"
-    lines = [f"Tried with the import on the first {summary.met.rows} rows: {runs}, {seconds:g} s of {summary.seconds:g} s."]
+    lines = [
+        f"Tried with the import on the beginning of each recording: {runs}, {seconds:g} s of {summary.seconds:g} s. Read: {summary.met.rows} rows."
+    ]
     return [*lines, *(f"The import leaves out: {line}" for line in summary.left_out()), *(n for n in summary.notes() if n.startswith("DOUBTFUL"))]
 
 

@@ -1,0 +1,123 @@
+"""Columns without heads, by how a ship moves: which are the position, the heading, the yaw rate and the velocities.
+
+The heading changes by the yaw rate, and the track's velocity, turned into body axes by the heading, is surge and sway. In a log in which the ship
+turns, no other choice of columns fulfils both. Rudder, shaft speed and the rest fulfil nothing of that kind and stay with the reader.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...data.units import unit_factor
+from .assign import Assigned, Entry
+from .columns import Column
+
+_MOST = 24
+"""Columns that are looked at; the number of choices goes with its third power."""
+_ROWS = 2000
+_CORRELATION = 0.95
+"""Between the change of the heading and the yaw rate, and between sway by the track and by the log. Filters and noise take a few per cent."""
+_CLOSE = 0.1
+"""Relative difference within which a factor between two columns is that of a unit."""
+_TURNS = np.deg2rad(5.0)
+"""Range of headings below which nothing can be told."""
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """Means (m,) of each column over a window and their change over it [1/s]."""
+
+    means: np.ndarray
+    changes: np.ndarray
+
+
+def identify(columns: Sequence[Column], t: np.ndarray, found: Assigned) -> None:
+    """Add the channels that the motion tells to `found`, each called not sure."""
+    free = [c for c in columns if c.name not in found.used() and not c.head.name and len(c.known) > 0.9 * len(t)]
+    free = [c for c in free if np.ptp(c.known) > 0]
+    if found.entries or not 3 <= len(free) <= _MOST:
+        return
+    motion = _motion(np.array([c.values for c in free]), t)
+    if motion is None:
+        return
+    best = max(_choices(motion), default=None, key=lambda choice: choice[0])
+    if best is None:
+        return
+    _, units, places = best
+    for channel, place in places.items():
+        column = free[place]
+        found.entries[channel] = Entry(channel, {"column": column.name, "unit": units[channel]}, (column,), ["no head; identified by the motion"])
+    told = ", ".join(f"{channel} '{free[place].name}' [{units[channel]}]" for channel, place in places.items())
+    found.notes.append(f"NOT SURE: the columns have no heads; taken as {told}: only so heading, yaw rate, track and speeds agree.")
+
+
+def _motion(values: np.ndarray, t: np.ndarray) -> _Motion | None:
+    new = np.r_[True, np.diff(np.maximum.accumulate(np.nan_to_num(t, nan=-np.inf))) > 0] & np.isfinite(t) & np.isfinite(values).all(axis=0)
+    t, values = t[new], values[:, new]
+    if len(t) < 60:
+        return None
+    window = max(2.0, 4.0 * float(np.median(np.diff(t))))
+    at = np.linspace(t[0] + window / 2, t[-1] - window / 2, min(_ROWS, len(t)))
+    parts = np.array([[np.interp(at + shift * window, t, v) for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)] for v in values])
+    return _Motion(parts.mean(axis=1), (parts[:, 4] - parts[:, 0]) / window)
+
+
+def _choices(motion: _Motion) -> list[tuple[float, dict[str, str], dict[str, int]]]:
+    """(score, units, places) of each choice of heading, yaw rate and position that agrees."""
+    found = []
+    count = len(motion.means)
+    for psi, r in itertools.permutations(range(count), 2):
+        fit = _line(motion.means[r], motion.changes[psi])
+        if fit is None or fit[1] < _CORRELATION:
+            continue
+        for psi_unit, r_unit in itertools.product(("deg", "rad"), ("deg/s", "rad/s", "deg/min")):
+            heading = motion.means[psi] * unit_factor("psi", psi_unit)
+            if np.ptp(heading) < _TURNS or not _is_unit(fit[0] * unit_factor("psi", psi_unit), unit_factor("r", r_unit)):
+                continue
+            for x, y in itertools.permutations([k for k in range(count) if k not in (psi, r)], 2):
+                scored = _track(motion, heading, x, y)
+                if scored is None:
+                    continue
+                units = {"x": "m", "y": "m", "psi": psi_unit, "r": r_unit} | scored[1]
+                found.append((scored[0] + fit[1], units, {"x": x, "y": y, "psi": psi, "r": r} | scored[2]))
+    return found
+
+
+def _track(motion: _Motion, heading: np.ndarray, x: int, y: int) -> tuple[float, dict[str, str], dict[str, int]] | None:
+    """How well a position agrees with the heading, with the columns of surge and sway where there are any."""
+    north, east = motion.changes[x], motion.changes[y]
+    surge, sway = north * np.cos(heading) + east * np.sin(heading), east * np.cos(heading) - north * np.sin(heading)
+    if np.mean(surge > 0) < 0.95 or np.sqrt(np.mean(sway**2)) > 0.5 * np.sqrt(np.mean(surge**2)):
+        return None
+    units: dict[str, str] = {}
+    places: dict[str, int] = {}
+    score = 0.0
+    for channel, wanted in (("v", sway), ("u", surge)):
+        for k in range(len(motion.means)):
+            fit = _line(motion.means[k], wanted)
+            unit = next((u for u in ("m/s", "kn") if fit and fit[1] > _CORRELATION and _is_unit(fit[0], unit_factor("u", u))), None)
+            if fit and unit and k not in (x, y):
+                units[channel], places[channel] = unit, k
+                score += fit[1]
+                break
+    way = np.unwrap(np.arctan2(east, north))
+    apart = np.angle(np.exp(1j * (way - heading)))
+    followed = 1.0 - float(np.var(apart) / np.var(way)) if np.var(way) > 0 else 0.0
+    if "v" not in places and followed < 0.7:
+        return None
+    return score + followed, units, places
+
+
+def _line(of: np.ndarray, wanted: np.ndarray) -> tuple[float, float] | None:
+    """Slope through zero and correlation of `wanted` over `of`."""
+    if np.std(of) == 0 or np.std(wanted) == 0:
+        return None
+    return float(np.sum(of * wanted) / np.sum(of * of)), float(np.corrcoef(of, wanted)[0, 1])
+
+
+def _is_unit(slope: float, factor: float) -> bool:
+    return slope > 0 and abs(np.log(slope / factor)) < _CLOSE
