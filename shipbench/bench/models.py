@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from typing import Any
 
 from ..effects.base import EFFECTS
 from ..errors import InputError, ShipbenchError
+from ..predictors._saved import Origin, read_meta
 from ..predictors._user_file import code_of
 from ..predictors.base import PREDICTORS, make_predictor
 from ..registry import package_digest, reason
@@ -27,6 +27,7 @@ class ModelFacts:
         files: content by relative name of the user's code, or of the saved folder.
         plugins: versions of the model's and its effects' plug-ins ("" for shipbench's own).
         code: digests of the packages that it takes, by which a worker knows its own (`package_digest`).
+        origin: what a saved model was fitted on.
     """
 
     foreign: bool
@@ -35,6 +36,7 @@ class ModelFacts:
     files: dict[str, bytes] = field(default_factory=dict)
     plugins: list[str] = field(default_factory=list)
     code: dict[str, str] = field(default_factory=dict)
+    origin: Origin | None = None
 
 
 def facts_of(spec: Spec) -> ModelFacts:
@@ -55,10 +57,10 @@ def facts_of(spec: Spec) -> ModelFacts:
         made = _made(spec)
     if isinstance(made, ShipbenchError):
         raise made
-    seeded, together, files = made
+    seeded, together, files, origin = made
     plugins = [registry.digest(name) for registry, name in taken]
     code = {"shipbench": source_digest(), **{package: package_digest(package) for package in packages}}
-    return ModelFacts(foreign, seeded, together, files, plugins, code)
+    return ModelFacts(foreign, seeded, together, files, plugins, code, origin)
 
 
 def _kind(spec: Spec) -> str:
@@ -67,17 +69,14 @@ def _kind(spec: Spec) -> str:
         return ""
     if spec.path is None:
         return spec.name.partition(":")[0]
-    try:
-        return str(json.loads((spec.path / "model.json").read_text(encoding="utf-8"))["predictor"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return ""  # `make_predictor` says what is wrong with the folder
+    return str(read_meta(spec.path)["predictor"])
 
 
-def _made(spec: Spec) -> tuple[bool, bool, dict[str, bytes]] | ShipbenchError:
-    """seeded, together and files; or why the model cannot be made."""
+def _made(spec: Spec) -> tuple[bool, bool, dict[str, bytes], Origin | None] | ShipbenchError:
+    """seeded, together, files and origin; or why the model cannot be made."""
     try:
         model: Any = make_predictor(spec)
-        return getattr(model, "seeded", True) is not False, hasattr(type(model), "fit_group"), _files(spec)
+        return getattr(model, "seeded", True) is not False, hasattr(type(model), "fit_group"), _files(spec), getattr(model, "origin", None)
     except ShipbenchError as error:
         return error
     except (Exception, SystemExit) as error:  # a user's own module is imported here

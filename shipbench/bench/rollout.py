@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..predictors._saved import check_origin
 from ..predictors.base import make_predictor
 from ..records import Dataset
 from ..signals import STATES
@@ -23,18 +24,14 @@ def predict_runs(model: str, dataset: Dataset, horizon_s: float | None = None, d
     `device` (see `check_device`).
 
     Raises:
-        InputError: the folder is no saved model, its inputs are not those of the data set, a run is shorter than the horizon, or the device is
-            not here.
+        InputError: the folder is no saved model, its inputs or sample time are not those of the data set, a run is shorter than the
+            horizon, or the device is not here.
     """
     spec = parse_spec(model)
     if spec.path is None or spec.class_name is not None:
         raise InputError(f"'{model}' is not a saved model; give a folder that holds model.json (cells/<dataset>/<model>/fold0-seed0/model).")
     predictor = make_predictor(spec, device)
-    if tuple(predictor.inputs) != dataset.inputs:
-        raise InputError(
-            f"the model uses the inputs {', '.join(predictor.inputs)}; data set '{dataset.name}' has {', '.join(dataset.inputs)}. "
-            "Give data with the same channels."
-        )
+    check_origin(model, getattr(predictor, "origin", None), dataset)
     rollouts = []
     for run in dataset.runs:
         steps = len(run) - 1 if horizon_s is None else round(horizon_s / dataset.dt)

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..data.base import load_dataset
 from ..errors import InputError
+from ..predictors._saved import check_origin
 from ..specs import Spec, parse_spec
 from .executors import Execution, Workers, answers_of, open_workers
 from .folds import make_folds, select_runs
@@ -107,6 +108,7 @@ def _prepare(task: Task) -> Study:
     specs = [parse_spec(text) for text in task.models]
     facts = [facts_of(spec) for spec in specs]  # an unknown model or parameter is told before anything is loaded or fitted
     data, notes = select_runs(load_dataset(task.dataset), task)
+    notes += tuple(note for spec, known in zip(specs, facts, strict=True) for note in check_origin(spec.text, known.origin, data))
     folds = make_folds(data, task)
     batches = [fold.test.batch(task.history(data.dt)) for fold in folds]
     found = [asdict(c) for c in columns(task.metrics, task.horizon_s, data.dt)]

@@ -6,8 +6,6 @@ A part is one file of this folder whose class is bound to `PREDICTOR`. Its datac
 
 from __future__ import annotations
 
-import json
-import os
 from abc import ABC, abstractmethod
 from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
@@ -19,6 +17,7 @@ from ..errors import InputError, unknown_name
 from ..records import Dataset
 from ..signals import COMMANDS, STATES
 from ..specs import Spec, parse_spec
+from ._saved import Origin, damaged, described, origin_of, read_arrays, read_meta, remembers_origin, remembers_origins, write_saved
 from ._user_file import class_from_file
 from .device import check_device
 from .registered import PREDICTORS, not_installed
@@ -50,6 +49,25 @@ class PredictorBase(ABC):
     """Optional packages, as they are imported, that a model of this class cannot do without; shipbench has an extra of the predictor's name."""
     inputs: tuple[str, ...] = COMMANDS
     """Names of the columns of U, known after `fit`."""
+    origin: Origin | None = None
+    """What it was fitted on, known after `fit`."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Every `fit` and `fit_group` remembers what it was given: a saved model can then refuse other data."""
+        super().__init_subclass__(**options)
+        if "fit" in cls.__dict__:
+            cls.fit = remembers_origin(cls.__dict__["fit"])  # type: ignore[method-assign]
+        if "fit_group" in cls.__dict__:
+            cls.fit_group = classmethod(remembers_origins(cls.__dict__["fit_group"].__func__))  # type: ignore[attr-defined]
+
+    @property
+    def fitted(self) -> bool:
+        """Whether it can predict."""
+        return True
+
+    def _refuse_unfitted(self, what: str) -> None:
+        if not self.fitted:
+            raise InputError(f"{self.name}: {what} was called before fit; fit or load the model first.")
 
     def skip(self, dataset: Dataset) -> str | None:
         """Why this model cannot take `dataset`, or None; a study then has rows with the status `skipped` and this reason."""
@@ -86,13 +104,20 @@ class PredictorBase(ABC):
             S (batch, K, 10) or (K, 10); S[:, k] is the state at t_k+1.
 
         Raises:
-            InputError: a shape does not fit or a value is not finite.
+            InputError: the model is not fitted, a shape does not fit, or a value is not finite.
         """
-        s0, U = np.asarray(s0, dtype=float), np.asarray(U, dtype=float)
+        self._refuse_unfitted("predict")
+        # Contiguous: PyTorch takes no array with a negative stride, such as s0[::-1].
+        try:
+            s0, U = np.ascontiguousarray(s0, dtype=float), np.ascontiguousarray(U, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"s0 and U cannot be read as numbers ({error}); accepted: arrays of floats.") from None
         single = s0.ndim == 1
         if single:
             s0, U = s0[None], U[None]
             history = None if history is None else (np.asarray(history[0])[None], np.asarray(history[1])[None])
+        if history is not None:
+            history = np.ascontiguousarray(history[0], dtype=float), np.ascontiguousarray(history[1], dtype=float)
         if s0.ndim != 2 or s0.shape[1] != len(STATES):
             raise InputError(f"s0 has shape {s0.shape}; accepted: (batch, {len(STATES)}) or ({len(STATES)},): {', '.join(STATES)}.")
         if U.ndim != 3 or U.shape[0] != s0.shape[0] or U.shape[2] != len(self.inputs) or U.shape[1] == 0:
@@ -109,36 +134,36 @@ class PredictorBase(ABC):
         return S[0] if single else S
 
     def save(self, path: str | Path) -> None:
-        """Write the model into the folder `path` (JSON and plain arrays: nothing is pickled)."""
-        folder = Path(path)
-        folder.mkdir(parents=True, exist_ok=True)
+        """Write the model into the folder `path` (JSON and plain arrays: nothing is pickled).
+
+        Raises:
+            InputError: it is not fitted.
+        """
+        self._refuse_unfitted("save")
         params: dict[str, Any] = asdict(self) if is_dataclass(self) else {}
-        meta = {"predictor": self.name, "params": params, "inputs": list(self.inputs), "meta": self._meta()}
-        arrays = folder / ".arrays.tmp.npz"
-        np.savez(arrays, allow_pickle=False, **self._arrays())
-        os.replace(arrays, folder / "arrays.npz")
-        text = folder / ".model.tmp.json"
-        text.write_text(json.dumps(meta, indent=1))
-        os.replace(text, folder / "model.json")
+        meta = {"predictor": self.name, "params": params, "inputs": list(self.inputs), "meta": self._meta(), **described(self.origin)}
+        write_saved(Path(path), meta, self._arrays())
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read a model that `save` wrote.
 
         Raises:
-            InputError: the folder holds no saved model of this kind.
+            InputError: the folder holds no saved model of this kind, or a damaged one.
         """
         folder = Path(path)
+        meta = read_meta(folder)
+        arrays = read_arrays(folder, meta)
         try:
-            meta = json.loads((folder / "model.json").read_text())
-            with np.load(folder / "arrays.npz", allow_pickle=False) as file:
-                arrays = {k: file[k] for k in file.files}
             # Where it was trained says nothing of where it is read: a model from a machine with a GPU predicts on one without.
             model = cls(**{key: value for key, value in meta["params"].items() if key != "device"})
             model.inputs = tuple(meta["inputs"])
             model._restore(arrays, meta["meta"])
-        except (OSError, KeyError, ValueError, TypeError) as error:
-            raise InputError(f"{folder} is not a saved '{cls.name}' model: {error}. Give a folder that save() wrote.") from None
+            model.origin = origin_of(meta)
+        except InputError:
+            raise
+        except Exception as error:  # a stranger's file may hold anything
+            raise damaged(folder, error) from None
         return model
 
 
@@ -176,8 +201,7 @@ def _made(spec: Spec) -> Any:
     if spec.path is not None and spec.class_name is None:
         if spec.effects:
             raise _no_effects(spec)
-        kind = json.loads((spec.path / "model.json").read_text()).get("predictor", "?")
-        return PREDICTORS.get(kind).load(spec.path)
+        return PREDICTORS.get(read_meta(spec.path)["predictor"]).load(spec.path)
     family, _, member = (spec.name, "", "") if spec.path is not None else spec.name.partition(":")
     cls = class_from_file(spec.path, str(spec.class_name)) if spec.path is not None else PREDICTORS.get(family)
     if spec.effects and not hasattr(cls, "extend"):

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..records import Dataset
 from ..signals import MOTION, PSI, X, Y
+from ._saved import sample_time
 from .base import History, PredictorBase
 
 
@@ -21,6 +22,11 @@ class Hold(PredictorBase):
 
     def __post_init__(self) -> None:
         self.dt = float("nan")
+
+    @property
+    def fitted(self) -> bool:
+        """Whether it can predict."""
+        return not np.isnan(self.dt)
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Nothing is learned but the sample time and the list of inputs."""
@@ -44,7 +50,7 @@ class Hold(PredictorBase):
         return {"dt": self.dt}
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
-        self.dt = float(meta["dt"])
+        self.dt = sample_time(meta)
 
 
 PREDICTOR = Hold

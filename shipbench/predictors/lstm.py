@@ -14,9 +14,10 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..errors import InputError
 from ..records import Dataset
 from ..signals import COMMANDS, PSI
+from ._numbers import RATE, ROUNDS, WEIGHT, WIDTH, check_numbers
+from ._saved import check_shapes, sample_time
 from ._stacked import (
     CHANNELS,
     InputFeatures,
@@ -188,11 +189,14 @@ class LSTM(PredictorBase):
 
     def __post_init__(self) -> None:
         check_device(self.device)
-        for key in ("hidden", "epochs"):
-            if getattr(self, key) < 1:
-                raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
+        check_numbers(self, {"hidden": WIDTH, "epochs": ROUNDS, "lr": RATE, "pose_weight": WEIGHT})
         self._weights: dict[str, np.ndarray] = {}
         self._dt, self._stride, self._commanded = 0.0, 1, False
+
+    @property
+    def fitted(self) -> bool:
+        """Whether it can predict."""
+        return bool(self._weights)
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Train on windows of `train`; `valid` chooses the weights that are kept."""
@@ -236,8 +240,6 @@ class LSTM(PredictorBase):
 
     def _network(self) -> _Network:
         """The fitted network of this one member in float64."""
-        if not self._weights:
-            raise InputError("lstm: predict was called before fit; fit or load the model first.")
         w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
         y, u, dy = (Scaler(w[f"scale_{k}.mean"], w[f"scale_{k}.std"]) for k in ("y", "u", "dy"))
         net = _Network(InputFeatures(self.inputs), self.hidden, (y, u, dy), generators([0]), self._commanded).double()
@@ -265,8 +267,14 @@ class LSTM(PredictorBase):
         return {"dt": self._dt, "stride": self._stride, "commanded": self._commanded}
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
-        self._weights, self._dt = arrays, float(meta["dt"])
+        sizes = (("y", _Y), ("u", InputFeatures(self.inputs).count), ("dy", _Y))
+        check_shapes(arrays, {f"scale_{k}.{what}": (1, 1, size) for k, size in sizes for what in ("mean", "std")})
+        check_shapes(arrays, {"initial.layers.0.weight": (1, _Y, self.hidden)})  # before a network of that width is made
+        self._weights, self._dt = arrays, sample_time(meta)
         self._stride, self._commanded = int(meta["stride"]), bool(meta["commanded"])
+        if self._stride < 1:
+            raise ValueError(f"stride = {self._stride}; accepted: 1 or more")
+        self._network()
 
 
 def _between(y0: Tensor, y: Tensor, stride: int) -> Tensor:

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, ClassVar, Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from ..errors import InputError
 from ..records import Dataset
+from ._numbers import LAYERS, RATE, ROUNDS, WEIGHT, WIDTH, check_numbers
 from ._one_step import NUM_CHANNELS, check_target, one_step_rollout, transitions
+from ._saved import check_shapes, sample_time
 from ._stacked import InputFeatures, Scaler, StackedMLP, StackedRuns, generators, padded, with_valid
 from .base import History, PredictorBase
 from .device import check_device
@@ -106,12 +108,17 @@ class MLP(PredictorBase):
     def __post_init__(self) -> None:
         check_device(self.device)
         check_target(self.target)
-        for key in ("hidden", "layers", "epochs", "batch", "patience"):
-            if getattr(self, key) < 1:
-                raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
+        check_numbers(
+            self, {"hidden": WIDTH, "layers": LAYERS, "epochs": ROUNDS, "batch": ROUNDS, "patience": ROUNDS, "lr": RATE, "min_delta": WEIGHT}
+        )
         self._weights: dict[str, np.ndarray] = {}
         self._dt = 0.0
         self._epochs_run = 0
+
+    @property
+    def fitted(self) -> bool:
+        """Whether it can predict."""
+        return bool(self._weights)
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Train on the transitions of `train`; `valid` stops it."""
@@ -137,8 +144,6 @@ class MLP(PredictorBase):
             model._epochs_run = int(watch.validations[m])
 
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
-        if not self._weights:
-            raise InputError("mlp: predict was called before fit; fit or load the model first.")
         w = {k: torch.as_tensor(v, dtype=torch.float64, device=self.device) for k, v in self._weights.items()}
         layers = [(w[f"net.layers.{i}.weight"][0], w[f"net.layers.{i}.bias"][0]) for i in range(self.layers + 1)]
 
@@ -158,7 +163,12 @@ class MLP(PredictorBase):
         return {"dt": self._dt, "epochs_run": self._epochs_run}
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
-        self._weights, self._dt, self._epochs_run = arrays, float(meta["dt"]), int(meta["epochs_run"])
+        sizes = [NUM_CHANNELS + InputFeatures(self.inputs).count, *[self.hidden] * self.layers, NUM_CHANNELS]
+        shapes = {f"net.layers.{i}.weight": (1, *pair) for i, pair in enumerate(pairwise(sizes))}
+        shapes |= {f"net.layers.{i}.bias": (1, 1, size) for i, size in enumerate(sizes[1:])}
+        shapes |= {f"scale_{k}.{what}": (1, 1, size) for k, size in (("x", sizes[0]), ("z", sizes[-1])) for what in ("mean", "std")}
+        check_shapes(arrays, shapes)
+        self._weights, self._dt, self._epochs_run = arrays, sample_time(meta), int(meta["epochs_run"])
 
 
 PREDICTOR = MLP

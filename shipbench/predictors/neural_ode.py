@@ -20,7 +20,9 @@ from ..integrate import motion_rhs, rk4_step
 from ..records import Dataset
 from ..signals import ACTUATORS, MOTION, R, U
 from ..specs import EffectSpec
+from ._numbers import RATE, ROUNDS, WEIGHT, WIDTH, check_numbers
 from ._residual import Drive, Grid, Residual, features, solve, typical_accelerations
+from ._saved import check_shapes
 from ._stacked import Scaler, generators, hold_error, padded, position_score, random_windows, shares_of, trapezoid_pose, with_valid
 from .base import History, PredictorBase
 from .device import check_device
@@ -115,9 +117,7 @@ class NeuralODE(PredictorBase):
 
     def __post_init__(self) -> None:
         check_device(self.device)
-        for key in ("hidden", "epochs"):
-            if getattr(self, key) < 1:
-                raise ValueError(f"{key} = {getattr(self, key)}; accepted: 1 or more")
+        check_numbers(self, {"hidden": WIDTH, "epochs": ROUNDS, "lr": RATE, "penalty": WEIGHT, "weight_decay": WEIGHT})
         self.physics = Physics()
         self.effects: tuple[EffectSpec, ...] = ()
         self._weights: dict[str, np.ndarray] = {}
@@ -144,6 +144,11 @@ class NeuralODE(PredictorBase):
     def skip(self, dataset: Dataset) -> str | None:
         """Why this model cannot take `dataset`: the physics beneath cannot."""
         return self.physics.skip(dataset)
+
+    @property
+    def fitted(self) -> bool:
+        """Whether it can predict."""
+        return bool(self._weights)
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Fit the physics on `train` and `valid`, train the residual on `train`; `valid` decides what is kept."""
@@ -191,8 +196,6 @@ class NeuralODE(PredictorBase):
 
     @torch.no_grad()
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
-        if not self._weights:
-            raise InputError("neural_ode: predict was called before fit; fit or load the model first.")
         base = self.physics
         if not self.improved:
             return base._rollout(s0, U, history)
@@ -224,6 +227,10 @@ class NeuralODE(PredictorBase):
         self.effects = tuple(EffectSpec(e["name"], e["params"]) for e in meta["physics"].get("effects", []))
         self._weights = {k: v for k, v in arrays.items() if not k.startswith("physics.")}
         self.improved = bool(meta["improved"])
+        size = 7 + 2 * bool(self.physics._wind_columns())
+        check_shapes(arrays, {"scale_in.mean": (1, 1, size), "scale_in.std": (1, 1, size), "scale_out": (1, 1, 3)})
+        check_shapes(arrays, {"net.layers.0.weight": (1, size, self.hidden)})  # before a network of that width is made
+        self._residual()
 
 
 PREDICTOR = NeuralODE

@@ -12,6 +12,7 @@ from ..physics.mmg import load_mmg_ship
 from ..records import Dataset
 from ..signals import COMMANDS
 from ..simulate.simulator import Simulator
+from ._saved import sample_time
 from .base import History, PredictorBase
 
 
@@ -25,6 +26,11 @@ class Oracle(PredictorBase):
     def skip(self, dataset: Dataset) -> str | None:
         """Why this model cannot take `dataset`, or None."""
         return None if dataset.simulation else f"data set '{dataset.name}' was not made by this simulator"
+
+    @property
+    def fitted(self) -> bool:
+        """Whether it can predict."""
+        return hasattr(self, "_simulator")
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Nothing is learned but which ship made the data.
@@ -48,7 +54,7 @@ class Oracle(PredictorBase):
         return {"ship": self.ship, "dt": self.dt}
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
-        self._set(meta["ship"], float(meta["dt"]), self.inputs)
+        self._set(meta["ship"], sample_time(meta), self.inputs)
 
 
 PREDICTOR = Oracle

@@ -16,9 +16,11 @@ from ..ship import Ship, complete
 from ..signals import ACTUATORS, COMMANDS, MOTION
 from ..specs import EffectSpec
 from ._actuator_fit import DEFAULT_ACTUATORS, fit_actuators
+from ._numbers import check_numbers
 from ._physics_effects import Extension, extension_of, geared, measured, no_gear, roll, true_start
 from ._physics_gears import fit_gears, gears_of
 from ._physics_rollout import Rolling, actuators_after
+from ._saved import check_shapes, sample_time
 from .base import History, PredictorBase
 
 if TYPE_CHECKING:
@@ -61,7 +63,8 @@ class Physics(PredictorBase):
     name: ClassVar[str] = "physics"
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.piece < np.inf:
+        check_numbers(self, {"iterations": (0, 10_000), "tolerance": (0.0, 1.0)})
+        if isinstance(self.piece, bool) or not isinstance(self.piece, (int, float)) or not 0.0 <= self.piece < np.inf:
             raise ValueError(f"piece = {self.piece}; accepted: 0 (whole runs), or a time in s")
         self.extension: Extension | None = None
         self.held: dict[int, str] = {}
@@ -86,6 +89,11 @@ class Physics(PredictorBase):
             if missing := [c for c in term.effect.channels if c not in dataset.inputs]:
                 return f"effect '{term.name}' needs {' and '.join(missing)}, which data set '{dataset.name}' lacks"
         return None
+
+    @property
+    def fitted(self) -> bool:
+        """Whether it can predict."""
+        return hasattr(self, "p")
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Fit actuator dynamics, then p0..p10, over full rollouts of all runs of `train` and `valid` (nothing is tuned on `valid`).
@@ -239,11 +247,14 @@ class Physics(PredictorBase):
         return meta
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
-        self._set_ship(Ship.from_dict(meta["ship"], "saved model"), self.inputs, float(meta["dt"]), bool(meta["commanded"]))
+        num = len(PARAMETERS)
+        check_shapes(arrays, {"p": (num,), "ci95": (num, 2), "actuators": (len(ACTUATOR_PARAMETERS),)})
+        self._set_ship(Ship.from_dict(meta["ship"], "saved model"), self.inputs, sample_time(meta), bool(meta["commanded"]))
         self.p, self.ci95, self.actuator_params, self.cost = arrays["p"], arrays["ci95"], arrays["actuators"], float(meta["cost"])
         if "effects" in meta:
             asked = extension_of([EffectSpec(e["name"], e["params"]) for e in meta["effects"]])
             at = np.cumsum([0, *(len(t.given) for t in asked.terms)])
+            check_shapes(arrays, {"effect_values": (at[-1],), "effect_ci95": (at[-1], 2)})
             values = [tuple(float(v) for v in arrays["effect_values"][a:b]) for a, b in pairwise(at)]
             self.extension, self.held = Extension(asked.terms, values, arrays["effect_ci95"]), asked.held()
 

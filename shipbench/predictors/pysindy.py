@@ -13,12 +13,13 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import torch
 
-from ..errors import InputError
 from ..integrate import motion_rhs, rk4_step
 from ..physics.actuators import lag_with_rate_limit
 from ..records import Dataset
 from ..signals import ACTUATORS, COMMANDS, MOTION, PSI, STATES, VELOCITY
 from ._actuator_fit import fit_actuators
+from ._numbers import WEIGHT, check_numbers
+from ._saved import check_shapes, sample_time
 from ._stacked import InputFeatures
 from .base import History, PredictorBase
 
@@ -46,14 +47,16 @@ class PySINDy(PredictorBase):
     derivative: str = "finite_difference"
 
     def __post_init__(self) -> None:
-        if self.degree < 1:
-            raise ValueError(f"degree = {self.degree}; accepted: 1 or more")
-        if not self.threshold >= 0 or not self.alpha >= 0:
-            raise ValueError(f"threshold = {self.threshold}, alpha = {self.alpha}; accepted: 0 or more")
+        check_numbers(self, {"degree": (1, 10), "threshold": WEIGHT, "alpha": WEIGHT})
         if self.derivative not in ("finite_difference", "smoothed"):
             raise ValueError(f"derivative = '{self.derivative}'; accepted: 'finite_difference' or 'smoothed'")
         self._dt = 0.0
         self._found: dict[str, np.ndarray] = {}
+
+    @property
+    def fitted(self) -> bool:
+        """Whether it can predict."""
+        return bool(self._found)
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Find the equations from all runs of `train` and `valid` (nothing here stops early); the seed has no part in it."""
@@ -99,8 +102,6 @@ class PySINDy(PredictorBase):
         return (terms[:, None, :] * f["coefficients"]).sum(axis=2) * f["scale_rate"]
 
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
-        if not self._found:
-            raise InputError("pysindy: predict was called before fit; fit or load the model first.")
         S = np.full((len(s0), U.shape[1], len(STATES)), np.nan)
         state, actuator = tuple(s0[:, MOTION].T), s0[:, ACTUATORS]
         limit = _BEYOND * np.maximum(self._found["largest"], 1e-12)
@@ -151,7 +152,11 @@ class PySINDy(PredictorBase):
         return {"dt": self._dt}
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
-        self._found, self._dt = arrays, float(meta["dt"])
+        others = InputFeatures(self.inputs).count
+        terms, used = arrays["powers"].shape[0], 3 + int(np.count_nonzero(arrays["moving"]))
+        check_shapes(arrays, {"powers": (terms, used), "coefficients": (3, terms), "moving": (others,), "scale_w": (others,), "actuators": (6,)})
+        check_shapes(arrays, {"scale_x": (3,), "scale_rate": (3,), "largest": (3,)})
+        self._found, self._dt = arrays, sample_time(meta)
 
 
 def _root_mean_square(a: np.ndarray) -> np.ndarray:

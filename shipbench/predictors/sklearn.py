@@ -15,6 +15,7 @@ import torch
 from ..errors import InputError, unknown_name
 from ..records import Dataset
 from ._one_step import NUM_CHANNELS, check_target, one_step_rollout, transitions
+from ._saved import check_shapes, sample_time
 from ._stacked import InputFeatures, StackedRuns
 from .base import History, PredictorFamily, not_installed
 
@@ -94,6 +95,11 @@ class SklearnOneStep(PredictorFamily):
             made.set_params(random_state=seed)
         return made if made.__sklearn_tags__().target_tags.multi_output else MultiOutputRegressor(made)
 
+    @property
+    def fitted(self) -> bool:
+        """Whether it can predict."""
+        return self._fitted is not None
+
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Fit on the transitions of `train` and, since nothing here stops early by it, of `valid`.
 
@@ -128,8 +134,6 @@ class SklearnOneStep(PredictorFamily):
         return torch.from_numpy(z)
 
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
-        if self._fitted is None:
-            raise InputError("sklearn: predict was called before fit; fit or load the model first.")
         return one_step_rollout(self._step, s0, U, InputFeatures(self.inputs), self._dt, increment=self.target == "increment")
 
     def num_parameters(self) -> int | None:
@@ -157,7 +161,8 @@ class SklearnOneStep(PredictorFamily):
         import sklearn
 
         self._x, self._z = arrays["x"], arrays["z"]
-        self._dt, self._seed = float(meta["dt"]), int(meta["seed"])
+        check_shapes(arrays, {"x": (len(self._x), NUM_CHANNELS + InputFeatures(self.inputs).count), "z": (len(self._x), NUM_CHANNELS)})
+        self._dt, self._seed = sample_time(meta), int(meta["seed"])
         self._fit_regressor()
         if not np.allclose(self._probe(), arrays["probe"], rtol=1e-9, atol=1e-12):
             raise InputError(

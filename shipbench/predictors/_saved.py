@@ -1,0 +1,194 @@
+"""Saved models: what they were made for, their two files, and whether these are whole."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import logging
+import os
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..records import Dataset
+
+_log = logging.getLogger(__name__)
+_LARGEST_JSON = 16_000_000
+"""Bytes of a model.json; what a fit finds stands in arrays.npz."""
+_SHIP_DIFFERS = 0.01
+"""Relative difference of a main dimension that is more than rounding in a ship file."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a model was fitted on: sample time [s], inputs, actuators ("measured" or "commanded"), the ship's name, L, B, T [m] and displacement [m^3]
+    (empty where an older saved model does not tell)."""
+
+    dt: float
+    inputs: tuple[str, ...]
+    actuators: str = ""
+    ship: str = ""
+    size: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, data: Dataset) -> Origin:
+        ship = data.ship
+        volume = ship.displacement if ship.displacement is not None else float(ship.mass or 0.0) / ship.rho
+        return cls(data.dt, data.inputs, data.actuators, ship.name, (ship.L, ship.B, ship.T, volume))
+
+
+def remembers_origin(fit: Callable[..., Any]) -> Callable[..., Any]:
+    """`fit`, after which the model's `origin` is that of its training data."""
+
+    @functools.wraps(fit)
+    def fitted(self: Any, train: Dataset, *args: Any, **options: Any) -> Any:
+        model = fit(self, train, *args, **options)
+        self.origin = Origin.of(train)
+        return model
+
+    return fitted
+
+
+def remembers_origins(fit_group: Callable[..., Any]) -> Callable[..., Any]:
+    """The same for the class method that fits many."""
+
+    @functools.wraps(fit_group)
+    def fitted(cls: Any, models: Any, trains: Any, *args: Any, **options: Any) -> Any:
+        found = fit_group(cls, models, trains, *args, **options)
+        for model, train in zip(models, trains, strict=True):
+            model.origin = Origin.of(train)
+        return found
+
+    return fitted
+
+
+def check_origin(name: str, origin: Origin | None, data: Dataset) -> list[str]:
+    """What a reader must know where the saved model `name` is used on `data`: another ship, or other actuators. Each is told in one line of the log.
+
+    Raises:
+        InputError: the data have another sample time or other channels than the model was made for.
+    """
+    if origin is None:
+        return []
+    if abs(origin.dt - data.dt) > 1e-3 * origin.dt:
+        raise InputError(
+            f"the saved model {name} steps {origin.dt:g} s; data set '{data.name}' is sampled at {data.dt:g} s. Accepted: data at {origin.dt:g} s. "
+            f"Import the log with --dt {origin.dt:g}, or fit the model on these data."
+        )
+    if origin.inputs != data.inputs:
+        raise InputError(
+            f"the model uses the inputs {', '.join(origin.inputs)}; data set '{data.name}' has {', '.join(data.inputs)}. "
+            "Give data with the same channels."
+        )
+    notes, here = [], Origin.of(data)
+    words = zip(("L", "B", "T", "displacement"), origin.size, here.size, ("m", "m", "m", "m^3"), strict=False)
+    differs = [f"{key} = {now:.4g} {unit} (model: {then:.4g})" for key, then, now, unit in words if abs(now - then) > _SHIP_DIFFERS * then]
+    if differs:
+        notes.append(f"the saved model {name} was fitted on ship '{origin.ship}'; these data are of another: {', '.join(differs)}")
+    if origin.actuators and origin.actuators != data.actuators:
+        notes.append(f"the saved model {name} was fitted on {origin.actuators} actuators; these data have {data.actuators} ones")
+    for note in notes:
+        _log.warning("warning: %s", note)
+    return notes
+
+
+def write_saved(folder: Path, meta: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
+    """`meta` as model.json and `arrays` as arrays.npz, each in one step, with a digest by which damage is found."""
+    folder.mkdir(parents=True, exist_ok=True)
+    part = folder / ".arrays.tmp.npz"
+    np.savez(part, allow_pickle=False, **arrays)
+    digest = _digest(meta, part.read_bytes())
+    os.replace(part, folder / "arrays.npz")
+    text = folder / ".model.tmp.json"
+    text.write_text(json.dumps({**meta, "digest": digest}, indent=1), encoding="utf-8")
+    os.replace(text, folder / "model.json")
+
+
+def read_meta(folder: Path) -> dict[str, Any]:
+    """The content of model.json.
+
+    Raises:
+        InputError: it is missing, damaged, or not what `write_saved` writes.
+    """
+    try:
+        path = folder / "model.json"
+        if path.stat().st_size > _LARGEST_JSON:
+            raise ValueError(f"model.json has {path.stat().st_size} bytes, more than {_LARGEST_JSON}")
+        meta = json.loads(path.read_text(encoding="utf-8"))
+        for key, kind in (("predictor", str), ("params", dict), ("inputs", list), ("meta", dict)):
+            if not isinstance(meta, dict) or not isinstance(meta.get(key), kind):
+                raise ValueError(f"model.json has no '{key}' that is a {kind.__name__}")
+        if not all(isinstance(name, str) for name in meta["inputs"]):
+            raise ValueError("model.json: the inputs are not names")
+    except (OSError, ValueError, RecursionError) as error:
+        raise damaged(folder, error) from None
+    return meta
+
+
+def read_arrays(folder: Path, meta: dict[str, Any]) -> dict[str, np.ndarray]:
+    """The arrays that belong to `meta`, whole.
+
+    Raises:
+        InputError: they are missing, damaged, or of another model.
+    """
+    path = folder / "arrays.npz"
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if (broken := archive.testzip()) is not None:
+                raise ValueError(f"arrays.npz is damaged at {broken}")
+        if "digest" in meta and meta["digest"] != _digest({k: v for k, v in meta.items() if k != "digest"}, path.read_bytes()):
+            raise ValueError("its files were changed after it was saved, or are damaged")
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        for name, array in arrays.items():
+            if array.dtype.kind not in "fiub":
+                raise ValueError(f"array '{name}' holds no numbers")
+    except Exception as error:  # zipfile, zlib and numpy raise anything on a damaged file
+        raise damaged(folder, error) from None
+    return arrays
+
+
+def damaged(folder: Path, error: Exception) -> InputError:
+    """The message on a folder that holds no saved model, or a damaged one."""
+    why = str(error) or type(error).__name__
+    return InputError(f"{folder} is not a saved model, or it is damaged: {why}. Give a folder that save() wrote, whole, or fit the model again.")
+
+
+def check_shapes(arrays: Mapping[str, np.ndarray], shapes: Mapping[str, tuple[int, ...]]) -> None:
+    """Raises ValueError where an array is missing or has another shape."""
+    for name, shape in shapes.items():
+        found = arrays[name].shape if name in arrays else "none"
+        if found != shape:
+            raise ValueError(f"array '{name}' has shape {found}; accepted: {shape}")
+
+
+def sample_time(meta: Mapping[str, Any]) -> float:
+    """The dt [s] of a saved model. Raises ValueError where it is none."""
+    dt = float(meta["dt"])
+    if not 0.0 < dt < np.inf:
+        raise ValueError(f"dt = {dt}; accepted: a positive number of seconds")
+    return dt
+
+
+def origin_of(meta: dict[str, Any]) -> Origin | None:
+    """What a saved model was made for; of one from before this was kept, its dt and inputs. None where it does not tell."""
+    if isinstance(made := meta.get("made_for"), dict):
+        return Origin(sample_time(made), tuple(made["inputs"]), str(made["actuators"]), str(made["ship"]), tuple(map(float, made["size"])))
+    inner = meta["meta"].get("physics", meta["meta"])
+    return Origin(sample_time(inner), tuple(meta["inputs"])) if "dt" in inner else None
+
+
+def _digest(meta: Mapping[str, Any], arrays: bytes) -> str:
+    text = json.dumps(meta, sort_keys=True).encode()
+    return hashlib.sha256(text + b"\0" + arrays).hexdigest()[:32]
+
+
+def described(origin: Origin | None) -> dict[str, Any]:
+    """For model.json."""
+    return {} if origin is None else {"made_for": asdict(origin)}
