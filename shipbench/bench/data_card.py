@@ -22,6 +22,7 @@ from ..records import Dataset
 from ..signals import UNITS
 from .data_card_plots import Picture, pictures
 from .dataset_facts import dataset_facts, describe_tables
+from .escaping import content_policy, markdown_text
 from .tables import Table, TableColumn, display_unit, number, significant
 
 _NOISE = (
@@ -172,16 +173,11 @@ def _lines(facts: dict[str, Any]) -> list[tuple[str, str]]:
     return [(key, str(line)) for key, value in facts.items() for line in (value if isinstance(value, list) else [value])]
 
 
-def _plain(text: str) -> str:
-    """Text from the data in Markdown: one line, no HTML."""
-    return escape(" ".join(text.split()), quote=False)
-
-
 def markdown(card: Card, drawn: Sequence[Picture]) -> str:
     """The card as Markdown; pictures are files beside it."""
-    parts = [f"# Data card: {_plain(card.name)}\n", "\n".join(f"- {key}: {_plain(line)}" for key, line in _lines(card.facts)) + "\n"]
+    parts = [f"# Data card: {markdown_text(card.name)}\n", "\n".join(f"- {key}: {markdown_text(line)}" for key, line in _lines(card.facts)) + "\n"]
     coverage = "## Coverage\n\n" + "\n\n".join(f"![{p.title}]({p.name}.png)\n\n{p.caption}" for p in drawn) + "\n"
-    texts = [t.markdown().replace("<", "&lt;") for t in card.page()]
+    texts = [t.markdown() for t in card.page()]
     return "\n".join([*parts, texts[0], coverage, *texts[1:]])
 
 
@@ -209,6 +205,7 @@ def html(card: Card, drawn: Sequence[Picture]) -> str:
     title = f"Data card: {escape(card.name)}"
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width,initial-scale=1">'
+        f'<meta http-equiv="Content-Security-Policy" content="{content_policy(_STYLE, images=True)}">'
         f"<title>{title}</title><style>{_STYLE}</style></head><body><h1>{title}</h1><dl>{facts}</dl>"
         f'<section id="gaps">{tables[0]}</section><h2>Coverage</h2><div class="plots">{figures}</div>{"".join(tables[1:])}</body></html>\n'
     )

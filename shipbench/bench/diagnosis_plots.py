@@ -56,7 +56,7 @@ def panel(draw: Callable[[Axes], object], caption: str = "", shows: str = "", wi
         figure.savefig(buffer, format="svg", transparent=True, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     text = buffer.getvalue()
     text = re.sub(r'<g id="[^"]*"', "<g", text[text.index("<svg") :])
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r"<metadata>.*?</metadata>|<defs>\s*<style.*?</style>\s*</defs>", "", text, flags=re.DOTALL)  # the page's style holds that rule
     for placeholder, css in _CSS.items():
         text = text.replace(placeholder, css)
     own = hashlib.sha256(text.encode()).hexdigest()[:8]  # many pictures share a page: their ids must not

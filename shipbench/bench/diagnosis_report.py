@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ..diagnosis.outcome import Cause, Diagnosis, what_it_is
 from .diagnosis_text import detectable, figure, gain_words, headline, interval, next_command, strength, summary_lines
+from .escaping import content_policy
 
 _STYLE = """
 :root { color-scheme: light dark; --ink: #1c2733; --paper: #fff; --soft: #f1f4f6; --line: #d5dde3; --accent: #00707f; --warn: #9a5200;
@@ -30,6 +31,7 @@ nav { font-size: .87rem; line-height: 1.9; margin: 1rem 0; } nav a { color: var(
 .small, figcaption { font-size: .85rem; opacity: .85; } .grid { display: grid; gap: .9rem; grid-template-columns: repeat(auto-fill,
   minmax(min(100%, 17.5rem), 1fr)); }
 figure { margin: 0; min-width: 0; } figcaption { overflow-wrap: anywhere; line-height: 1.35; padding: 0 .3rem; }
+figure svg * { stroke-linejoin: round; stroke-linecap: butt; }
 figure svg { width: 100%; height: auto; display: block; } figure svg text { font-family: inherit !important; }
 .wide { overflow-x: auto; } .wide figure { min-width: 34rem; max-width: 54rem; }
 .key { font-size: .87rem; margin: .4rem 0; } .key span { margin-right: 1.1rem; white-space: nowrap; }
@@ -89,6 +91,7 @@ def page(d: Diagnosis) -> str:
     ]  # fmt: skip
     head = (
         '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
+        f'<meta http-equiv="Content-Security-Policy" content="{content_policy(_STYLE, images=True, style_attributes=True)}">'
         f"<title>Diagnosis of {escape(d.dataset)}</title><style>{_STYLE}</style>"
     )
     return f'<!doctype html><html lang="en"><head>{head}</head><body>{"".join(body)}</body></html>\n'

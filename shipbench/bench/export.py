@@ -15,6 +15,7 @@ from ..data.mat import cells, save_mat, struct_array
 from ..errors import InputError
 from ..records import Batch
 from ..signals import STATES, UNITS
+from .escaping import csv_text
 from .results import Cell, Frame, read_predictions, read_results, read_truth, write_rows
 
 
@@ -93,6 +94,8 @@ def _write(path: Path, table: Frame) -> None:
         write_rows(path, table)
         return
     part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    words = [name for name in table if table[name].dtype.kind not in "biuf"]
+    table = table.assign(**{name: table[name].map(csv_text) for name in words})
     table.to_csv(part, index=False)  # the shortest decimals that give the same number back
     os.replace(part, path)
 

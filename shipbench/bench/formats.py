@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, unknown_name
+from ..names import shown
+from .escaping import content_policy, csv_text, latex_text, one_line
 from .tables import Table
 
 if TYPE_CHECKING:
@@ -17,11 +19,6 @@ if TYPE_CHECKING:
 
 FORMATS = {"md": ".md", "latex": ".tex", "csv": ".csv", "html": ".html"}
 """Name of a format -> suffix of its file."""
-
-_LATEX = {
-    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "%": r"\%", "_": r"\_", "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}", "<": "$<$", ">": "$>$", "|": "$|$", "\u03bc": r"$\mu$", "\u03c3": r"$\sigma$",
-}  # fmt: skip
 
 
 def check_formats(formats: Sequence[str]) -> None:
@@ -50,16 +47,10 @@ def render(board: Board, name: str, command: str, images: Sequence[Path], folder
     return FORMATS[name], text
 
 
-def latex_text(text: str) -> str:
-    """Any text with what LaTeX would take as a command escaped; `code` in typewriter."""
-    parts = re.split(r"`([^`]*)`", text)
-    escaped = ["".join(_LATEX.get(c, c) for c in part) for part in parts]
-    return "".join(rf"\texttt{{{part}}}" if i % 2 else part for i, part in enumerate(escaped))
-
-
 def latex(board: Board, command: str) -> str:
     """Tables for `\\input`; they need the packages booktabs and graphicx."""
-    parts = [f"% {board.title}. Rendered by: {command}", *[f"% {line}" for line in board.head], r"% \usepackage{booktabs,graphicx}", ""]
+    about = [f"{board.title}. Rendered by: {command}", *board.head]
+    parts = [*[f"% {one_line(line)}" for line in about], r"% \usepackage{booktabs,graphicx}", ""]
     for table in board.tables:
         parts += [
             r"\begin{table}[tbp]", r"\centering", rf"\caption{{{latex_text(f'{board.dataset}: {table.title}')}}}", r"\resizebox{\textwidth}{!}{%",
@@ -89,14 +80,11 @@ def csv(board: Board) -> str:
     for table in board.tables:
         names = [c for c in table.columns if c.format is None]
         for row in table.as_json()["rows"]:
-            label = {
-                "dataset": board.dataset,
-                "table": table.title,
-                "row": " | ".join(str(row[c.key]) for c in names if row[c.key] not in (None, "")),
-            }
+            words = [str(row[c.key]) for c in names if row[c.key] not in (None, "")]
+            label = {"dataset": csv_text(board.dataset), "table": csv_text(table.title), "row": csv_text(" | ".join(words))}
             for column in (c for c in table.columns if c.format is not None):
                 ends = {end: row.get(f"{column.key}_{end}") for end in ("low", "high")}
-                lines.append(label | {"figure": column.header, "value": row[column.key], **ends})
+                lines.append(label | {"figure": csv_text(column.header), "value": row[column.key], **ends})
     return pd.DataFrame(lines, columns=["dataset", "table", "row", "figure", "value", "low", "high"]).to_csv(index=False, lineterminator="\n")
 
 
@@ -106,10 +94,14 @@ def html(board: Board, command: str, images: Sequence[Path]) -> str:
     from markupsafe import Markup
 
     def marked(text: str) -> Markup:
-        return Markup(re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(text)))
+        return Markup(re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(shown(text))))
 
-    pages = Environment(loader=FileSystemLoader(Path(__file__).with_name("templates")), autoescape=True, trim_blocks=True)
+    templates = Path(__file__).with_name("templates")
+    style = (templates / "leaderboard.css").read_text(encoding="utf-8")
+    pages = Environment(loader=FileSystemLoader(templates), autoescape=True, trim_blocks=True)
     pages.filters["marked"] = marked
     drawn = [{"name": p.stem.replace("-", " "), "source": f"data:image/png;base64,{base64.b64encode(p.read_bytes()).decode()}"} for p in images]
     about = [*board.head, f"Rendered by `{command}`."]
-    return pages.get_template("leaderboard.html").render(title=board.title, about=about, tables=board.tables, images=drawn) + "\n"
+    policy = content_policy(style, images=True)
+    page = pages.get_template("leaderboard.html")
+    return page.render(title=board.title, about=about, tables=board.tables, images=drawn, style=Markup(style), policy=policy) + "\n"

@@ -13,6 +13,7 @@ from ..names import file_name
 from . import board_statistics, board_tables
 from .board_scores import Scores, cluster_of
 from .cost import parameters_by_model
+from .escaping import markdown_text
 from .formats import check_formats, render
 from .results import PROTOCOL, Frame, Results
 from .tables import Table
@@ -42,7 +43,7 @@ class Board:
 
     def markdown(self, command: str, plots: Sequence[str] = ()) -> str:
         """The whole page; `command` is what rendered it, `plots` are image paths relative to it."""
-        lines = [f"# {self.title}", "", *[f"- {line}" for line in self.head], f"- Rendered by `{command}`.", ""]
+        lines = [f"# {markdown_text(self.title)}", "", *[f"- {markdown_text(line)}" for line in [*self.head, f"Rendered by `{command}`."]], ""]
         tables = [table.markdown() for table in self.tables]
         images = [f"![{Path(p).stem.replace('-', ' ')}]({p})\n" for p in plots]
         return "\n".join(["\n".join(lines), *tables[:1], *images, *tables[1:]])

@@ -14,6 +14,7 @@ from ..predictors.base import make_predictor
 from ..records import Dataset
 from ..signals import STATES
 from ..specs import parse_spec
+from .escaping import csv_text
 
 Rollout = tuple[str, np.ndarray, np.ndarray]
 """Run id, t (K + 1,) [s] and states (K + 1, 10), the first being the recorded start."""
@@ -46,7 +47,7 @@ def predict_runs(model: str, dataset: Dataset, horizon_s: float | None = None, d
 
 
 def write_csv(rollouts: list[Rollout], path: str | Path) -> None:
-    """Columns trajectory, t and the ten states (SI, `n` in rpm), written in one step."""
+    """Columns trajectory, t and the ten states (SI, `n` in rpm), written in one step; of run names see `csv_text`."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
@@ -54,5 +55,5 @@ def write_csv(rollouts: list[Rollout], path: str | Path) -> None:
         writer = csv.writer(file)
         writer.writerow(["trajectory", "t", *STATES])
         for run, t, states in rollouts:
-            writer.writerows([run, f"{time:.10g}", *(f"{value:.10g}" for value in state)] for time, state in zip(t, states, strict=True))
+            writer.writerows([csv_text(run), f"{time:.10g}", *(f"{value:.10g}" for value in state)] for time, state in zip(t, states, strict=True))
     os.replace(part, path)

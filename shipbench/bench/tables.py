@@ -9,6 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from ..names import shown
+from .escaping import markdown_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -93,17 +94,21 @@ class Table:
 
     def markdown(self) -> str:
         """Heading, table and notes."""
-        lines = [f"## {self.title}", ""]
-        lines.append("| " + " | ".join(c.header.replace("|", "\\|") for c in self.columns) + " |")
+
+        def cell_text(text: str) -> str:
+            return markdown_text(" ".join(text.split())).replace("|", "\\|")
+
+        lines = [f"## {markdown_text(self.title)}", ""]
+        lines.append("| " + " | ".join(cell_text(c.header) for c in self.columns) + " |")
         lines.append("|" + "|".join("---:" if c.format else ":---" for c in self.columns) + "|")
         for row in self.rows:
-            cells = [" ".join(c.text(row).split()).replace("|", "\\|") for c in self.columns]
+            cells = [cell_text(c.text(row)) for c in self.columns]
             intervals = [c.interval_text(row).replace(" to ", " to\u00a0") for c in self.columns]  # wraps once at most
             cells = [f"{cell}<br><sub>{between}</sub>" if between else cell for cell, between in zip(cells, intervals, strict=True)]
             if row.get("_reference"):
                 cells = [f"*{cell}*" if cell else "" for cell in cells]
             lines.append("| " + " | ".join(cells) + " |")
-        lines += [""] + [f"{note}  " for note in self.notes]
+        lines += [""] + [f"{markdown_text(note)}  " for note in self.notes]
         return "\n".join(lines).rstrip() + "\n"
 
     def html(self) -> str:

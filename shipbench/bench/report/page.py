@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import contextlib
-import hashlib
 import json
 import os
 import re
@@ -16,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ..escaping import content_policy
 from ..leaderboard import Board, build_board, scores_of
 from ..provenance import code_version
 from ..results import Frame, Results
@@ -70,11 +69,10 @@ def render(sections: Sequence[dict[str, Any]], results: Results, command: str) -
     environment.filters["ticks"] = _ticks
     environment.filters["short"] = lambda model: Path(model).name if "/" in model else model
     script = (_HERE / "report.js").read_text(encoding="utf-8")
-    # the digest lets the browser run this script and no other, whatever a name of a run may hold
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    style = (_HERE / "report.css").read_text(encoding="utf-8")
     bad = sum(s["status"] != "ok" for s in results.summaries)
     return environment.get_template("report.html.j2").render(
-        sections=sections, style=(_HERE / "report.css").read_text(encoding="utf-8"), script=script, digest=digest, command=command,
+        sections=sections, style=style, script=script, policy=content_policy(style, script), command=command,
         code=code_version(), cells=len(results.summaries), bad=bad, title=", ".join(s["name"] for s in sections),
     )  # fmt: skip
 
