@@ -9,36 +9,19 @@ rounding.
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import logging
 import math
-import os
-import platform
-import shlex
-import shutil
-import subprocess
-import tempfile
 from collections.abc import Callable, Sequence
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .cache import cache_folder
+from .kept_code import machine_code
 
 if TYPE_CHECKING:
     import casadi
 
-_log = logging.getLogger(__name__)
-_SECONDS = 120
 _LANES_ARGUMENTS = (ctypes.c_void_p, ctypes.c_longlong, *[ctypes.c_void_p] * 4)
-_FLAGS = (
-    "-std=gnu11", "-O1", "-ftree-vectorize", "-march=native", "-mprefer-vector-width=512", "-fopenmp-simd",
-    "-fno-math-errno", "-fno-trapping-math",  # neither is ever read; without them no square root would be a vector's
-    "-fno-builtin-sin", "-fno-builtin-cos",  # gcc would join them to sincos, which has no vector form
-    "-w", "-shared", "-fPIC",
-)  # fmt: skip
 
 _HEAD = """
 #include <math.h>
@@ -168,7 +151,7 @@ class Lanes:
     def of(cls, function: casadi.Function) -> Lanes | None:
         """Of a function in SX, one vector per bundle, to one vector. None where there is no compiler, or it holds an operation that is not known: use
         the formula itself."""
-        compiled = _machine_code(c_source(function), "lanes", _LANES_ARGUMENTS)
+        compiled = machine_code(c_source(function), "lanes", _LANES_ARGUMENTS)
         return None if compiled is None else cls(tuple(function.numel_in(i) for i in range(function.n_in())), function.numel_out(0), compiled)
 
     def __call__(self, given: Sequence[np.ndarray], shape: tuple[int, int, int, int], out: np.ndarray, carried: bool = False) -> None:
@@ -213,62 +196,6 @@ def _instructions(function: casadi.Function, places: Sequence[str]) -> str | Non
     return "\n".join(lines)
 
 
-@cache
-def _compiler() -> tuple[tuple[str, ...], str]:
-    """The C compiler's command (empty: there is none) and what tells its version and this processor apart.
-
-    SHIPBENCH_COMPILER names another than `cc`; "none" switches compiling off.
-    """
-    command = tuple(shlex.split(os.environ.get("SHIPBENCH_COMPILER") or "cc"))
-    if command == ("none",) or shutil.which(command[0]) is None:
-        return (), ""
-    try:
-        found = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=_SECONDS, check=True).stdout
-        cpu = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").is_file() else platform.processor()
-    except (OSError, subprocess.SubprocessError):
-        return (), ""
-    flags = next((line for line in cpu.splitlines() if line.startswith(("flags", "Features"))), cpu)
-    return command, "\n".join([found, platform.machine(), platform.libc_ver()[1], flags])
-
-
 def c_function(code: str, name: str, arguments: Sequence[Any]) -> Callable[..., Any] | None:
     """A C function of other code that treats vectors `v` of W numbers, with what the code above has; None where there is no compiler."""
-    return _machine_code(_HEAD + code, name, arguments)
-
-
-def _machine_code(source: str | None, function: str, arguments: Sequence[Any]) -> Callable[..., Any] | None:
-    """The C function of `source`, compiled or taken from the cache folder; None where that cannot be done."""
-    command, machine = _compiler()
-    if source is None or not command:
-        return None
-    name = hashlib.sha256("\n".join([source, *command, *_FLAGS, machine]).encode()).hexdigest()[:24] + ".so"
-    kept = cache_folder() / "compiled" / name
-    try:
-        if not kept.is_file():
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            _compile(command, source, kept)
-        return _function(kept, function, arguments)
-    except (OSError, subprocess.SubprocessError) as error:
-        _log.debug("%s: %s", kept, error)
-    try:  # the cache folder cannot be written, or holds no code that runs
-        with tempfile.TemporaryDirectory(prefix="shipbench-") as folder:
-            _compile(command, source, Path(folder) / name)
-            return _function(Path(folder) / name, function, arguments)
-    except (OSError, subprocess.SubprocessError) as error:
-        _log.debug("the C compiler %s failed, CasADi interprets instead: %s", command[0], error)
-        return None
-
-
-def _compile(command: tuple[str, ...], source: str, path: Path) -> None:
-    """Write the shared library `path` in one step: processes that compile the same at the same time do not meet."""
-    with tempfile.TemporaryDirectory(prefix=".", dir=path.parent) as folder:
-        written, made = Path(folder) / "rollout.c", Path(folder) / "rollout.so"
-        written.write_text(source)
-        subprocess.run([*command, *_FLAGS, "-o", str(made), str(written), "-lm"], capture_output=True, timeout=_SECONDS, check=True)
-        os.replace(made, path)
-
-
-def _function(path: Path, name: str, arguments: Sequence[Any]) -> Callable[..., Any]:
-    function = getattr(ctypes.CDLL(str(path)), name)
-    function.argtypes, function.restype = list(arguments), None
-    return function
+    return machine_code(_HEAD + code, name, arguments)

@@ -7,7 +7,7 @@ import stat
 import numpy as np
 import pytest
 
-from shipbench import compiled
+from shipbench import kept_code
 from shipbench.compiled import Lanes, Rollout, c_source
 
 ca = pytest.importorskip("casadi")
@@ -25,7 +25,7 @@ def every_operation() -> ca.Function:
 
 @pytest.fixture
 def compiler():
-    if not compiled._compiler()[0]:
+    if not kept_code.compiler()[0]:
         pytest.skip("no C compiler here")
 
 
@@ -33,10 +33,10 @@ def compiler():
 def fresh_cache(tmp_path, monkeypatch):
     """An empty cache folder; what is known of the compiler is asked again before and after."""
     monkeypatch.setenv("SHIPBENCH_CACHE", str(tmp_path / "cache"))
-    compiled._compiler.cache_clear()
+    kept_code.compiler.cache_clear()
     yield tmp_path / "cache"
     monkeypatch.undo()
-    compiled._compiler.cache_clear()
+    kept_code.compiler.cache_clear()
 
 
 def inputs(runs: int, samples: int = 7) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench import compiled
+from shipbench import kept_code
 from shipbench.diagnosis import gears
 from shipbench.diagnosis.analysis import plain_model
 from shipbench.diagnosis.case_ships import scaled
@@ -31,7 +31,7 @@ from shipbench.simulate.trials import Trials, sea_trials
 
 @pytest.fixture
 def compiler():
-    if not compiled._compiler()[0]:
+    if not kept_code.compiler()[0]:
         pytest.skip("no C compiler here")
 
 

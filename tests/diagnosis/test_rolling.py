@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench import compiled
+from shipbench import kept_code
 from shipbench.diagnosis import rolling
 from shipbench.diagnosis.gain import plain_base, rollout_plant
 from shipbench.diagnosis.model import NUM_BASE, Linearisation, Point, Scales
@@ -59,7 +59,7 @@ def point(plant: Plant, *names: str, since: int | None = None, size: float = 0.3
 @pytest.fixture
 def compiler(monkeypatch):
     """Nothing built before the test."""
-    if not compiled._compiler()[0]:
+    if not kept_code.compiler()[0]:
         pytest.skip("no C compiler here")
     monkeypatch.setattr(rolling, "_built", {})
 
