@@ -9,15 +9,17 @@ import logging
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..cache import cache_folder
+from ..cache import cache_folder, make_private, stranger
 from ..errors import InputError, ShipbenchError, unknown_name
 from ..records import Dataset
 from ..registry import Registry
+from ..regular_files import read_text
 from ..specs import parse_spec
 from .public import PublicData
 
@@ -26,6 +28,8 @@ _HELPERS = frozenset({
 })  # fmt: skip
 DATASETS = Registry("data set", "data", "DATASET", helpers=_HELPERS, group="datasets")
 
+_LEFT_S = 3600.0
+"""Age [s] beyond which nobody is writing a data set any more: the largest takes a minute."""
 _log = logging.getLogger(__name__)
 
 
@@ -66,7 +70,7 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
 
     folder = Path(spec)
     exported = folder.suffix == ".mat" and folder.is_file()
-    if exported or (folder / "dataset.toml").is_file():
+    if exported or os.path.lexists(folder / "dataset.toml"):
         if options:
             raise InputError(f"{folder} is read from files and takes no parameters; given: {', '.join(options)}.")
         return read_mat(folder) if exported else read_dataset(folder)
@@ -120,12 +124,16 @@ def _from_cache(folder: Path) -> Dataset | None:
     """The cached data set, or None where there is none or it is damaged (said in the log, then made anew)."""
     from .files import read_dataset
 
-    if not folder.is_dir():
+    if not os.path.lexists(folder):
+        return None
+    if reason := stranger(folder):
+        advice = "Set SHIPBENCH_CACHE to a folder of your own that only you can write."
+        _log.warning("the cached data set %s is not used: %s; it is made anew. %s", folder, reason, advice)
         return None
     try:
         dataset = read_dataset(folder)
-        promised = (folder / "fingerprint.txt").read_text().strip()
-    except (ShipbenchError, OSError, ValueError) as error:
+        promised = read_text(folder / "fingerprint.txt").strip()
+    except ShipbenchError as error:
         _log.warning("the cached data set %s cannot be read (%s); it is made anew", folder, error)
         return None
     if dataset.fingerprint != promised:
@@ -134,17 +142,28 @@ def _from_cache(folder: Path) -> Dataset | None:
     return dataset
 
 
+def _clear(folder: Path) -> None:
+    """Remove whatever stands in the place of a cached data set."""
+    if folder.is_dir() and not folder.is_symlink():
+        shutil.rmtree(folder)
+    else:
+        folder.unlink(missing_ok=True)
+
+
 def _to_cache(dataset: Dataset, folder: Path) -> None:
     """Write beside the cache, then move: a reader sees a whole data set or none. A cache that cannot be written costs time, not results."""
     from .files import write_dataset
 
     fresh: Path | None = None
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
+        make_private()
+        for left in folder.parent.glob(".making-*"):  # by a process that was killed
+            if time.time() - left.stat().st_mtime > _LEFT_S:
+                _clear(left)
         fresh = Path(tempfile.mkdtemp(prefix=".making-", dir=folder.parent))
         write_dataset(dataset, fresh, format="parquet")
         (fresh / "fingerprint.txt").write_text(dataset.fingerprint)
-        shutil.rmtree(folder, ignore_errors=True)
+        _clear(folder)
         os.replace(fresh, folder)
     except (ShipbenchError, OSError) as error:
         _log.warning("the data set '%s' cannot be kept in %s (%s); it will be made again next time", dataset.name, folder.parent, error)

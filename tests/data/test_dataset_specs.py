@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import logging
+import os
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -77,6 +80,53 @@ def test_a_spoilt_cache_is_made_anew_and_said_so(made, tmp_path, caplog, file, c
         assert load_dataset("made").fingerprint == make().fingerprint
     assert len(made) == 2
     assert "made anew" in caplog.text
+
+
+def open_to_others(folder: Path) -> None:
+    folder.chmod(0o777)
+
+
+def a_file(folder: Path) -> None:
+    shutil.rmtree(folder)
+    folder.write_text("")
+
+
+def a_link(folder: Path) -> None:
+    folder.rename(folder.with_name("moved"))
+    (folder.parent / "moved" / "fingerprint.txt").write_text("0")
+    folder.symlink_to("moved")
+
+
+def a_pipe(folder: Path) -> None:
+    (folder / "fingerprint.txt").unlink()
+    os.mkfifo(folder / "fingerprint.txt")
+
+
+def of_another(folder: Path) -> None:
+    if os.geteuid() != 0:
+        pytest.skip("only root can give files away")
+    os.chown(folder, 65534, 65534)
+
+
+@pytest.mark.parametrize("spoil", [open_to_others, a_file, a_link, a_pipe, of_another])
+def test_a_cache_that_others_could_have_made_is_made_anew_once(made, tmp_path, caplog, spoil):
+    load_dataset("made")
+    folder = tmp_path / "cache" / "made-v1"
+    assert [p.stat().st_mode & 0o777 for p in (folder.parent, folder)] == [0o700, 0o700]
+    spoil(folder)
+    with caplog.at_level(logging.WARNING):
+        assert load_dataset("made").fingerprint == load_dataset("made").fingerprint == make().fingerprint
+    assert len(made) == 2
+    assert caplog.text.count("made anew") == 1
+
+
+def test_what_a_killed_process_left_is_removed_when_it_is_old(made, tmp_path):
+    old, young = tmp_path / "cache" / ".making-old", tmp_path / "cache" / ".making-young"
+    old.mkdir(parents=True)
+    young.mkdir()
+    os.utime(old, (0, 0))
+    load_dataset("made")
+    assert (old.exists(), young.exists()) == (False, True)
 
 
 def test_a_cache_that_fails_in_the_middle_costs_no_result_and_leaves_nothing(made, monkeypatch, tmp_path, caplog):
