@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..records import Dataset, Run
+from ..regular_files import open_regular
 from ..ship import Propeller, Rudder, Ship, Wind
 from ..signals import COMMANDS, DELTA, PSI, N, R, U, V, X, Y
 from .base import DatasetPart, public_folder
@@ -95,7 +96,10 @@ def _index(folder: Path) -> pd.DataFrame:
         kinds, splits = [stem.split("_")[0] for stem in stems], ["test" if stem in _PUBLISHED_TEST else "" for stem in stems]
         return pd.DataFrame({"file": [find(folder, name) for name in names], "kind": kinds, "wakita2022": splits})
     try:
-        index = pd.read_csv(folder / "runs.csv")[["file", "kind", "wakita2022"]]
+        with open_regular(folder / "runs.csv") as file:
+            index = pd.read_csv(file)[["file", "kind", "wakita2022"]]
+        if outside := [name for name in map(str, index["file"]) if Path(name).is_absolute() or ".." in Path(name).parts]:
+            raise ValueError(f"it names '{outside[0]}', outside the folder")
     except (OSError, ValueError, KeyError) as error:
         reason = " ".join(str(error).split())[:160]
         raise InputError(f"{folder / 'runs.csv'} cannot be read: {reason}. It needs the columns file, kind, wakita2022.") from None
@@ -156,7 +160,8 @@ def _read_run(file: Path, stem: str, every: int, wind: bool, kind: str, test: bo
     import pandas as pd
 
     try:
-        table = pd.read_csv(file)
+        with open_regular(file) as opened:
+            table = pd.read_csv(opened, compression="gzip" if file.suffix == ".gz" else None)
         raw = table[["t [s]", *_COLUMNS.values(), _RPS, _RUDDER, _WIND_SPEED, _WIND_FROM]].to_numpy(float)
     except (OSError, ValueError, KeyError, EOFError, zlib.error) as error:
         raise InputError(f"{file} cannot be read: {' '.join(str(error).split())[:160]}. Take a fresh copy of the public data.") from None
@@ -196,7 +201,10 @@ def _read_run(file: Path, stem: str, every: int, wind: bool, kind: str, test: bo
     # Files of one log carry its time stamp and a number: they stay in one fold.
     head, _, last = stem.rpartition("_")
     group = head if kind == "random" and len(last) == 1 else stem.replace("_cut", "")
-    began = datetime.strptime(group[-20:], "%d-%b-%Y_%H_%M_%S").isoformat()
+    try:
+        began = datetime.strptime(group[-20:], "%d-%b-%Y_%H_%M_%S").isoformat()
+    except ValueError:
+        raise InputError(f"{file}: its name holds no time such as 05-Aug-2021_10_20_30; accepted: the names of the public files.") from None
     return Run(stem, t, states, inputs, names, {"manoeuvre": kind, "group": group, "split": "test" if test else "train", "from": began})
 
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import gzip
 import hashlib
-import shutil
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, WorkError
+from ..regular_files import open_regular
 
 _TIMEOUT_S = 30
+_LARGEST = 1_000_000_000
+"""Bytes of one file, unpacked."""
 
 
 @dataclass(frozen=True)
@@ -118,11 +120,25 @@ def find(folder: Path, name: str) -> Path | None:
 
 def _digest(path: Path) -> str:
     """SHA-256 of the content, uncompressed; a broken archive has none."""
+    digest = hashlib.sha256()
     try:
-        data = path.read_bytes()
-        return hashlib.sha256(gzip.decompress(data) if path.suffix == ".gz" else data).hexdigest()
-    except (OSError, EOFError, zlib.error):
+        for part in _content(path):
+            digest.update(part)
+    except (InputError, OSError, EOFError, zlib.error):
         return ""
+    return digest.hexdigest()
+
+
+def _content(path: Path) -> Iterator[bytes]:
+    """The content, uncompressed, piece by piece; OSError where it is larger than any published file."""
+    with open_regular(path) as file:
+        opened = gzip.GzipFile(fileobj=file) if path.suffix == ".gz" else file
+        size = 0
+        while part := opened.read(1 << 20):
+            size += len(part)
+            if size > _LARGEST:
+                raise OSError(f"it holds more than {_LARGEST / 1e6:.0f} MB")
+            yield part
 
 
 @dataclass(frozen=True)
@@ -136,8 +152,8 @@ class _Copy:
         path = find(self.folder, url.removeprefix(pup.base_url))
         if path is None:
             raise FileNotFoundError(f"{url} is gone")
-        with (gzip.open if path.suffix == ".gz" else open)(path, "rb") as there, open(output_file, "wb") as here:
-            shutil.copyfileobj(there, here)
+        with open(output_file, "wb") as here:
+            here.writelines(_content(path))
 
 
 def _short(error: Exception) -> str:

@@ -157,3 +157,12 @@ def test_without_a_copy_the_message_says_where_the_data_are_and_how_to_name_them
     monkeypatch.setenv("SHIPBENCH_ESSO_OSAKA", str(tmp_path))
     with pytest.raises(InputError, match=r"FRT-DS-ESSO.*path=FOLDER.*SHIPBENCH_ESSO_OSAKA"):
         load_dataset("esso_osaka")
+
+
+@pytest.mark.parametrize("named", ["../secret.csv", "/etc/passwd", "a/../../secret.csv", "no_time_in_its_name.csv"])
+def test_an_index_names_public_files_in_its_folder(tmp_path, named):
+    (tmp_path / "copy").mkdir()
+    recorded().to_csv(tmp_path / "copy" / "no_time_in_its_name.csv", index=False)
+    (tmp_path / "copy" / "runs.csv").write_text(f"file,kind,wakita2022\n{named},zigzag,train\n")
+    with pytest.raises(InputError, match=r"outside the folder|its name holds no time"):
+        make(str(tmp_path / "copy"))

@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 
 from shipbench.cli import app
 from shipbench.data import esso_osaka
+from shipbench.data import public as public_module
 from shipbench.data.base import DATASETS, load_dataset
 from shipbench.data.public import PublicData
 from shipbench.errors import WorkError
@@ -224,3 +225,13 @@ def test_the_real_copy_has_the_published_checksums_and_gives_the_same_runs_throu
     ours = {r.id: r for r in direct.runs}
     for run in fetched.runs:
         np.testing.assert_array_equal(run.states, ours[run.id].states)
+
+
+def test_a_file_that_unpacks_without_end_is_not_the_published_one(tmp_path, monkeypatch):
+    content = b"0" * 3_000_000
+    (tmp_path / "a.csv.gz").write_bytes(gzip.compress(content))
+    assert public_module._digest(tmp_path / "a.csv.gz") == hashlib.sha256(content).hexdigest()
+    monkeypatch.setattr(public_module, "_LARGEST", 2_000_000)
+    assert public_module._digest(tmp_path / "a.csv.gz") == ""
+    os.mkfifo(tmp_path / "b.csv")
+    assert public_module._digest(tmp_path / "b.csv") == ""
