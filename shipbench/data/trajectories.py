@@ -63,6 +63,7 @@ def _read_csv(file: IO[bytes], path: Path, ids: str, needed: Callable[[Sequence[
         file.seek(0)
         return gzip.GzipFile(fileobj=file) if path.suffix == ".gz" else file
 
+    _check_marks(text().readline(_LONGEST_LINE), path)
     rows = _count_lines(text(), path)
     _check_size(path, 1, 1, text().readline(_LONGEST_LINE).split(b"\r")[0].count(b",") + 1)
     with warnings.catch_warnings():
@@ -76,7 +77,30 @@ def _read_csv(file: IO[bytes], path: Path, ids: str, needed: Callable[[Sequence[
         # All columns are parsed, in blocks, and ours kept: with `usecols`, pandas would shift rows that have more fields than the header.
         options = {"keep_default_na": False, "na_values": empty, "index_col": False, "low_memory": False, "chunksize": max(1, _CELLS // len(names))}
         read = [_without_truth_values(block[columns]) for block in pd.read_csv(text(), dtype={ids: str}, **options)]
+    _check_decimals(read[0].drop(columns=ids, errors="ignore"), path)
     return pd.concat(read)
+
+
+def _check_marks(header: bytes, path: Path) -> None:
+    """Commas stand between the columns."""
+    for mark, name in ((b";", "semicolons"), (b"\t", "tabs")):
+        if header.count(mark) > header.count(b","):
+            raise InputError(
+                f"{path} has {name} between its columns, as with decimal commas; accepted: commas there, and points in its numbers. "
+                f"Save it so, or import it: shipbench data import {path} --propose mapping.toml"
+            )
+
+
+def _check_decimals(block: pd.DataFrame, path: Path) -> None:
+    """Numbers have decimal points."""
+    for column in block.select_dtypes(exclude="number").columns:
+        commas = block[column].astype(str).str.fullmatch(r"\s*[-+\u2212]?\d[\d.]*,[\d,.]+\s*")
+        if commas.any():
+            row = int(np.argmax(commas.to_numpy()))
+            raise InputError(
+                f"{path}, row {row + 2}: '{column}' is '{block[column].iloc[row]}', with a comma; accepted: decimal points, and no mark between "
+                f"thousands. Save it so, or import it: shipbench data import {path} --propose mapping.toml"
+            )
 
 
 def _count_lines(text: Any, path: Path) -> int:

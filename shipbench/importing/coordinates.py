@@ -155,7 +155,11 @@ def _signed(cells: Cells, name: str, channel: Channel, values: np.ndarray, sides
     strange = there & ~np.isin(sides.astype(str), list(accepted))
     column = channel.hemisphere or channel.columns[0]
     if strange.any():
-        raise cells.unread(column, int(np.argmax(strange)), f" The letters of {name} are {' and '.join(accepted)}.")
+        row = int(np.argmax(strange))
+        raise InputError(
+            f"{cells.path}, row {cells.first_row + row}: '{column}' names the hemisphere {str(sides[row])[:20]}; "
+            f"accepted for {name}: {' and '.join(accepted)}. Correct the column, or name another."
+        )
     if channel.sign is not None and there.any():
         raise InputError(f"{cells.path}: '{column}' has letters of the hemisphere, and sign = '{channel.sign}' is set. Remove sign.")
     signs = np.array([accepted.get(s, 1.0) for s in sides])

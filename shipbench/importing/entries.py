@@ -134,14 +134,14 @@ def check_channel(name: str, channel: Channel, path: str | Path) -> None:
     if len(channel.kinds) != 1:
         raise InputError(f"{path}: channel '{name}' has {' and '.join(channel.kinds) or 'no column'}; accepted: one of {', '.join(EXPRESSIONS)}.")
     where = f"{path}: channel '{name}', column {channel}"
+    if channel.kinds[0] in ARCS and channel.unit != "rad":
+        raise InputError(f'{where}: unit = "{channel.unit}"; {channel.kinds[0]} makes radians. Remove unit.')
     try:
         channel_factor(name, channel)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     if channel.factor == 0.0 or channel.full == 0.0:
         raise InputError(f"{where}: factor or full is 0; accepted: any other number (it multiplies the reading).")
-    if channel.kinds[0] in ARCS and channel.unit != "rad":
-        raise InputError(f'{where}: unit = "{channel.unit}"; {channel.kinds[0]} makes radians. Remove unit.')
     if channel.unit not in _OF_FULL and (channel.full is not None or channel.full_unit is not None):
         raise InputError(f'{where}: full belongs to unit = "%" or "pwm", not to "{channel.unit}". Remove full and full_unit.')
     as_written = [k for k in ("hemisphere", "part") if getattr(channel, k) is not None] + [channel.unit] * (channel.unit in MINUTES)

@@ -214,3 +214,18 @@ def test_the_ship_lies_in_the_folder(tmp_path, ship):
     with (tmp_path / "dataset.toml").open("a") as file:
         file.write(f'ship = "{ship}"\n')
     refused(tmp_path, "lies outside the folder of the data set; accepted")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (table().to_csv(index=False, sep=";", decimal=","), "has semicolons between its columns, as with decimal commas; accepted: commas there"),
+        (table().to_csv(index=False, sep="\t"), "has tabs between its columns"),
+        (table().assign(x=["0,0", "4,126667", *["5,5"] * 6]).to_csv(index=False), "row 2: 'x' is '0,0', with a comma; accepted: decimal points"),
+        (table().assign(n=["990", "1,090", *["999"] * 6]).to_csv(index=False), "row 3: 'n' is '1,090', with a comma"),
+    ],
+)
+def test_other_delimiters_and_decimal_commas_say_how_to_save_the_table(tmp_path, text, message):
+    described(tmp_path)
+    (tmp_path / "trajectories.csv").write_text(text)
+    refused(tmp_path, message)
