@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from . import cli_check, cli_contract, cli_data, cli_diagnosis, cli_import, cli_leaderboard, cli_report
+from . import cli_check, cli_contract, cli_data, cli_demo, cli_diagnosis, cli_import, cli_leaderboard, cli_report
 from .cli_common import SETTINGS, DatasetArgument, Device, Json, Quiet, console_for_tables, exit_if_failed, parse_seeds, print_json, say, show_boards
 from .errors import InputError, ShipbenchError
 from .names import file_name
@@ -45,6 +45,7 @@ app = typer.Typer(
     name="shipbench", cls=_Group, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, **SETTINGS,
     help="Benchmark of ship-motion prediction: every model on the same runs, folds, rollouts and metrics.",
 )  # fmt: skip
+cli_demo.register(app)
 cli_data.register(app)
 cli_import.register(cli_data.data_app)
 cli_diagnosis.register(app)

@@ -1,0 +1,30 @@
+"""The command `demo`: from a trial with a hidden current to its name, its size, a better model and a page."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+from typer.testing import CliRunner
+
+from shipbench.cli import app
+from shipbench.data.demo import SPEED, TOWARDS
+
+
+def test_demo_finds_the_current_and_says_so_in_five_lines(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["demo", "-q"])
+    assert done.exit_code == 0, done.output
+    lines = done.stdout.splitlines()
+    assert len(lines) == 5
+    found = json.loads((tmp_path / "demo" / "diagnosis" / "diagnosis.json").read_text())
+    assert [cause["effect"] for cause in found["causes"]] == ["current"]
+    size = found["causes"][0]["parameters"]
+    assert abs(size["speed"]["value"] - SPEED) < 0.05
+    assert abs(size["to"]["value"] - TOWARDS) < np.deg2rad(5.0)
+    errors = {name: float(value) for name, value in re.findall(r"(\S+) ([\d.]+) m[,.]", lines[1])}
+    assert errors["physics+current"] < 0.5 * errors["physics"]
+    page = (tmp_path / "demo" / "report.html").read_text()
+    assert "physics+current" in page
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["demo"]
