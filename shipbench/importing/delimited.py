@@ -34,7 +34,7 @@ def open_text(path: Path, layout: Layout) -> Table:
         head = file.read(TEXT_BLOCK)
     if not head.strip():
         raise InputError(f"{path} holds no text. Give a log with a header and rows.")
-    encoding, notes = _encoding(path, head, layout)
+    encoding, notes = find_encoding(path, head, layout)
     header, first = _first_lines(path, head, encoding, layout)
     delimiter = layout.delimiter or max(DELIMITERS[:-1], key=header.count)
     if delimiter == BLANKS:
@@ -142,8 +142,12 @@ class _OddRows:
         )
 
 
-def _encoding(path: Path, head: bytes, layout: Layout) -> tuple[str, list[str]]:
-    """The encoding of a text by its mark, by the mapping, or by trial; with a note where it was tried out."""
+def find_encoding(path: Path, head: bytes, layout: Layout) -> tuple[str, list[str]]:
+    """The encoding of a text by its mark, by the mapping, or by trial; with a note where it was tried out.
+
+    Raises:
+        InputError: the text is binary, or the mapping names no encoding of text.
+    """
     for mark, name in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
         if head.startswith(mark):
             return name, []
@@ -175,7 +179,7 @@ def check_encoding(name: str) -> str:
 def _decodes(head: bytes, encoding: str) -> bool:
     try:
         codecs.getincrementaldecoder(encoding)().decode(head, final=False)
-    except UnicodeDecodeError:
+    except UnicodeError:
         return False
     return True
 
@@ -186,9 +190,11 @@ def _first_lines(path: Path, head: bytes, encoding: str, layout: Layout) -> tupl
     text = codecs.getincrementaldecoder(encoding)
     try:
         decoded = text().decode(head, final=False)
-    except UnicodeDecodeError as error:
+    except UnicodeError as error:
+        place = f" (byte {error.start})" if isinstance(error, UnicodeDecodeError) else ""
         raise InputError(
-            f"{path} is not {encoding} text (byte {error.start}); if it is text, set [file] encoding = 'latin-1' (or what it is) in the mapping."
+            f"{path} is not {encoding} text{place}; if it is text, set [file] encoding = 'latin-1' (or what it is) in the mapping, "
+            "or --encoding with --propose."
         ) from None
     lines = io.StringIO(decoded, newline=None)
     first = [line.rstrip("\n") for line, _ in zip(lines, range(layout.header + layout.skip + 1), strict=False)]

@@ -40,12 +40,13 @@ def test_a_latin_1_log_is_read_and_the_encoding_can_be_given(propose, tmp_path):
     table = logged(T).rename(columns={"HDG": "Steuerkurs [°]"})
     log = write(tmp_path, "log.csv", table.to_csv(index=False).encode("latin-1"))
     done, _, plan = propose(log)
-    assert "not UTF-8; read as cp1252" in done.stdout
+    assert "not UTF-8; read as Latin-1" in done.stdout
     assert plan["channels"]["psi"]["column"] == "Steuerkurs [°]"
     assert propose(log, options=["--encoding", "latin-1"])[2]["file"]["encoding"] == "latin-1"
-    wrong, _, _ = propose(log, options=["--encoding", "utf-8"])
-    assert wrong.exit_code == 2
-    assert "--encoding" in wrong.stderr
+    for name in ("utf-8", "utf-16", "rot13", "nonsense"):
+        wrong, _, _ = propose(log, options=["--encoding", name])
+        assert wrong.exit_code == 2, name
+        assert "latin-1" in wrong.stderr
 
 
 @pytest.mark.parametrize("name", ["--encoding", "--sheet", "--header"])

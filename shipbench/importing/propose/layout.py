@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
+from ..delimited import find_encoding
 from ..excel import first_rows
 from ..mapping import Layout
 from ..tables import BLANKS, DELIMITERS, TEXT_BLOCK, kind_of, reading, uncompressed
@@ -53,17 +54,16 @@ def find_form(path: Path, given: dict[str, Any]) -> Form:
         return _form(path, rows, dict(given), ())
     if kind != "text":
         return Form(Layout(**given), given=dict(given))
-    found, notes = dict(given), []
+    found = dict(given)
     with reading(path), uncompressed(path) as file:
         head = file.read(TEXT_BLOCK)
-    encoding = _encoding(head, given.get("encoding"))
-    if encoding not in ("utf-8", "utf-8-sig", "utf-16") and "encoding" not in given:
+    encoding, notes = find_encoding(path, head, Layout(**{k: v for k, v in given.items() if k == "encoding"}))
+    if notes:
         found["encoding"] = encoding
-        notes.append(f"{path.name} is not UTF-8; read as {encoding}. To choose another: --encoding NAME.")
     try:
         text = codecs.getincrementaldecoder(encoding)().decode(head, final=False)
-    except (LookupError, UnicodeDecodeError):
-        raise InputError(f"{path} is no {encoding} text. Accepted: Python's names, such as --encoding latin-1 or --encoding utf-8.") from None
+    except UnicodeError:
+        raise InputError(f"{path} is not {encoding} text. Accepted: Python's names of encodings, such as --encoding latin-1.") from None
     lines = [line.rstrip("\n") for line, _ in zip(io.StringIO(text, newline=None), range(_LINES), strict=False)]
     delimiter = given.get("delimiter") or _delimiter(lines)
     return _form(path, [_split(line, delimiter or ",") for line in lines], found, tuple(notes), delimiter, lines)
@@ -100,21 +100,6 @@ def _form(
     if delimiter is not None and (head is None or by_number or max(DELIMITERS[:-1], key=lines[head].count) != delimiter):
         found["delimiter"] = delimiter
     return Form(Layout(**found), heads if by_number else (), texts, notes, found)
-
-
-def _encoding(head: bytes, given: str | None) -> str:
-    for mark, name in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
-        if head.startswith(mark):
-            return name
-    if given:
-        return given
-    for name in ("utf-8", "cp1252"):
-        try:
-            codecs.getincrementaldecoder(name)().decode(head, final=False)
-        except UnicodeDecodeError:
-            continue
-        return name
-    return "latin-1"
 
 
 def _split(line: str, delimiter: str) -> list[str]:
