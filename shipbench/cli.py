@@ -96,6 +96,7 @@ def run(
 ) -> None:
     """Fit, roll out and score models; print the leaderboard."""
     from .bench.executors import Execution
+    from .bench.fit_notes import fit_notes
     from .bench.isolate import Limits
     from .bench.leaderboard import write_boards
     from .bench.progress import make_progress
@@ -120,6 +121,8 @@ def run(
         say(f"Results in {folder}; leaderboard: {', '.join(str(path) for _, path in written)}")
         if equations := sorted(folder.glob("cells/*/*/*/equations.txt")):
             say(f"Fitted equations of {len(equations)} models beside their predictions, e.g. {equations[0]}")
+    for (name, model_name), note in fit_notes(outcome.summaries).items():
+        typer.echo(f"warning: {name}, {model_name}: {note}", err=True)
     exit_if_failed(outcome.failed, f"{len(outcome.failed)} of {len(outcome.summaries)} fits")
 
 

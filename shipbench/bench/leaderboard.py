@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,10 @@ from . import board_statistics, board_tables
 from .board_scores import Scores, cluster_of
 from .cost import parameters_by_model
 from .escaping import markdown_text
+from .fit_notes import MARK, fit_notes
 from .formats import check_formats, render
 from .results import PROTOCOL, Frame, Results
-from .tables import Table
+from .tables import Table, TableColumn
 
 SPLITS = {
     "folds": "{folds} folds by run", "published": "published split", "kind": "{folds} folds, each scored on a kind of manoeuvre left out of training",
@@ -78,7 +79,7 @@ def scores_of(results: Results, dataset: str, baseline: str | None = None) -> Sc
 
 
 def _board(scores: Scores, summaries: list[dict[str, Any]]) -> Board:
-    tables: list[Table | None] = [board_tables.table_iii(scores)]
+    tables: list[Table | None] = [_marked(board_tables.table_iii(scores), scores.dataset, summaries)]
     if scores.beside_paper and {"physics", "mlp"} <= set(scores.models):
         tables.append(board_tables.claim(scores))
     tables.append(board_statistics.comparison_table(scores))
@@ -90,6 +91,16 @@ def _board(scores: Scores, summaries: list[dict[str, Any]]) -> Board:
     tables += [board_statistics.slice_table(scores), board_statistics.trial_table(scores)]
     tables.append(board_tables.status_table(scores, parameters_by_model(summaries)))
     return Board(scores.dataset, scores.models, [t for t in tables if t is not None], _head(scores.rows, summaries))
+
+
+def _marked(table: Table, dataset: str, summaries: list[dict[str, Any]]) -> Table:
+    """The table with a mark and a note at every model whose physics does not follow its own training runs."""
+    notes = {model: note for (name, model), note in fit_notes(summaries).items() if name == dataset}
+    if not notes:
+        return table
+    rows = [row | {"fit": MARK} if row.get("model") in notes else row for row in table.rows]
+    columns = [*table.columns[:3], TableColumn("fit", "fit"), *table.columns[3:]]
+    return replace(table, columns=columns, rows=rows, notes=[*table.notes, *(f"{MARK} `{model}`: {note}" for model, note in notes.items())])
 
 
 def _refuse_mixtures(rows: Frame, summaries: list[dict[str, Any]], dataset: str) -> None:

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ShipbenchError
+from ..predictors._fit_report import FitReport
 from ..predictors._user_file import code_of, on_import_path
 from ..predictors.base import History, make_predictor
 from ..records import Dataset
@@ -73,7 +74,7 @@ class Answer:
         params: the model's settings, or None if it does not state them.
         parameters: how many numbers the fit set (see `cost`), or None if that cannot be told.
         files: saved model and fitted equations, content by relative name.
-        notes: why the model could not be saved or described.
+        notes: why the model could not be saved or described, and how it follows its own training runs (`fit_report`).
         machine: where it was computed.
         code: digests by relative name of the user's code that was loaded in the end; empty for other models.
     """
@@ -87,7 +88,7 @@ class Answer:
     params: dict[str, Any] | None = None
     parameters: int | None = None
     files: dict[str, bytes] = field(default_factory=dict)
-    notes: dict[str, str] = field(default_factory=dict)
+    notes: dict[str, Any] = field(default_factory=dict)
     machine: dict[str, Any] = field(default_factory=machine)
     code: dict[str, str] = field(default_factory=dict)
 
@@ -208,6 +209,8 @@ def _predicted(fit: _Fit, fold: FoldData) -> Answer:
         _let_stop_through(error)
         return Answer("failed", f"predict: {one_line(error)}", fit_s=fit.seconds, shared_by=fit.shared_by)
     files, notes = _kept(fit.model)
+    if isinstance(report := getattr(fit.model, "report", None), FitReport):
+        notes["fit_report"] = report.as_dict()
     return Answer("", "", S, fit.seconds, fit.shared_by, predict_s, params, count_parameters(fit.model), files, notes)
 
 
@@ -221,10 +224,10 @@ def _predict(model: Any, fold: FoldData) -> np.ndarray:
     return S
 
 
-def _kept(model: Any) -> tuple[dict[str, bytes], dict[str, str]]:
+def _kept(model: Any) -> tuple[dict[str, bytes], dict[str, Any]]:
     """The saved model and its equations as files, and a note where a foreign model fails to save or to describe itself."""
     files: dict[str, bytes] = {}
-    notes: dict[str, str] = {}
+    notes: dict[str, Any] = {}
     if callable(getattr(model, "save", None)):
         try:
             with tempfile.TemporaryDirectory(prefix="shipbench-") as folder:

@@ -231,9 +231,7 @@ def inverse_size(batch: Batch, dt: float) -> np.ndarray:
 
 def _hold_error(batch: Batch, dt: float) -> np.ndarray:
     """Root mean square error (6,) of keeping u, v, r: x and y share the position's."""
-    hold = Hold()
-    hold.dt = dt
-    error = (hold.predict(batch.s0, batch.U[:, :, : len(COMMANDS)]) - batch.truth)[:, :, MOTION]
+    error = (Hold.at(dt).predict(batch.s0, batch.U[:, :, : len(COMMANDS)]) - batch.truth)[:, :, MOTION]
     size = np.sqrt(np.mean(error**2, axis=(0, 1)))
     size[:2] = np.sqrt(np.mean(size[:2] ** 2))
     return np.maximum(size, 1e-9)

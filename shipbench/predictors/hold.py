@@ -23,6 +23,13 @@ class Hold(PredictorBase):
     def __post_init__(self) -> None:
         self.dt = float("nan")
 
+    @classmethod
+    def at(cls, dt: float) -> Self:
+        """Of runs sampled at `dt` [s]."""
+        model = cls()
+        model.dt = dt
+        return model
+
     @property
     def fitted(self) -> bool:
         """Whether it can predict."""

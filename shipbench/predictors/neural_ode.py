@@ -20,6 +20,7 @@ from ..integrate import motion_rhs, rk4_step
 from ..records import Dataset
 from ..signals import ACTUATORS, MOTION, R, U
 from ..specs import EffectSpec
+from ._fit_report import FitReport
 from ._numbers import RATE, ROUNDS, WEIGHT, WIDTH, check_numbers
 from ._residual import Drive, Grid, Residual, features, solve, typical_accelerations
 from ._saved import check_shapes
@@ -140,6 +141,11 @@ class NeuralODE(PredictorBase):
                 )
         self.effects = tuple(effects)
         return self
+
+    @property
+    def report(self) -> FitReport | None:
+        """How the physics beneath follows its own runs."""
+        return self.physics.report
 
     def skip(self, dataset: Dataset) -> str | None:
         """Why this model cannot take `dataset`: the physics beneath cannot."""

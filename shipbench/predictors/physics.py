@@ -16,12 +16,14 @@ from ..ship import Ship, complete
 from ..signals import ACTUATORS, COMMANDS, MOTION
 from ..specs import EffectSpec
 from ._actuator_fit import DEFAULT_ACTUATORS, fit_actuators
+from ._fit_report import FitReport, position_error, with_reversed_shaft
 from ._numbers import check_numbers
 from ._physics_effects import Extension, extension_of, geared, measured, no_gear, roll, true_start
 from ._physics_gears import fit_gears, gears_of
 from ._physics_rollout import Rolling, actuators_after
 from ._saved import check_shapes, sample_time
 from .base import History, PredictorBase
+from .hold import Hold
 
 if TYPE_CHECKING:
     from ._physics_fit import Fit
@@ -68,6 +70,7 @@ class Physics(PredictorBase):
             raise ValueError(f"piece = {self.piece}; accepted: 0 (whole runs), or a time in s")
         self.extension: Extension | None = None
         self.held: dict[int, str] = {}
+        self.report: FitReport | None = None
 
     def extend(self, effects: Sequence[EffectSpec]) -> Self:
         """Add effects to what is fitted (`physics+current`): their formulas are those of `shipbench.effects`.
@@ -119,7 +122,24 @@ class Physics(PredictorBase):
         if not np.isfinite(result.cost):
             raise WorkError(f"the physics fit of '{data.name}' found no finite rollouts; check units and signs with `shipbench data check`.")
         self.p, self.ci95, self.cost = result.p, result.ci95, result.cost
+        self.report = self._report(batch)
         return self
+
+    def _report(self, batch: Batch) -> FitReport:
+        """How the fit follows its own runs."""
+        from ._physics_fit import bounds, fit_parameters, parameter_scale
+
+        low, high = bounds(parameter_scale(self.c))
+        edge = 1e-4 * (high - low)
+        at = [s for i, (s, _, _) in enumerate(PARAMETERS) if i not in self.held and not low[i] + edge[i] < self.p[i] < high[i] - edge[i]]
+        kept = Hold.at(self.dt)._rollout(batch.s0, batch.U, None)
+        error = position_error(self._rollout(batch.s0, batch.U, None), batch)
+
+        def error_on(other: Batch) -> float:
+            p = fit_parameters(self._rolling(), other, self.iterations, self.tolerance).p
+            return position_error(self._rolling().states(other.s0, other.U, p), other)
+
+        return with_reversed_shaft(FitReport(tuple(at), len(PARAMETERS) - len(self.held), error, position_error(kept, batch)), batch, error_on)
 
     def _pieces(self, data: Dataset) -> Dataset:
         """The runs, cut into pieces of `piece` seconds, or of the shortest run where that is shorter."""
@@ -232,6 +252,7 @@ class Physics(PredictorBase):
                 for (symbol, meaning, unit), value in zip(ACTUATOR_PARAMETERS, self.actuator_params, strict=True)
             ]
         lines += self.extension.describe() if self.extension is not None else []
+        lines += [f"  fit: {self.report.summary}", *([f"  {self.report.note}"] if self.report.note else [])] if self.report is not None else []
         return "\n".join(lines + [f"  note: {n}" for n in self.particulars.notes])
 
     def _arrays(self) -> dict[str, np.ndarray]:
@@ -242,6 +263,8 @@ class Physics(PredictorBase):
 
     def _meta(self) -> dict[str, Any]:
         meta = {"ship": self.ship.model_dump(exclude_none=True), "dt": self.dt, "commanded": self.commanded, "cost": float(self.cost)}
+        if self.report is not None:
+            meta["report"] = self.report.as_dict()
         if self.extension is not None:
             meta["effects"] = [{"name": t.spec.name, "params": t.spec.params} for t in self.extension.terms]
         return meta
@@ -251,6 +274,7 @@ class Physics(PredictorBase):
         check_shapes(arrays, {"p": (num,), "ci95": (num, 2), "actuators": (len(ACTUATOR_PARAMETERS),)})
         self._set_ship(Ship.from_dict(meta["ship"], "saved model"), self.inputs, sample_time(meta), bool(meta["commanded"]))
         self.p, self.ci95, self.actuator_params, self.cost = arrays["p"], arrays["ci95"], arrays["actuators"], float(meta["cost"])
+        self.report = FitReport.from_dict(meta["report"]) if "report" in meta else None
         if "effects" in meta:
             asked = extension_of([EffectSpec(e["name"], e["params"]) for e in meta["effects"]])
             at = np.cumsum([0, *(len(t.given) for t in asked.terms)])
