@@ -13,7 +13,7 @@ ROOT = Path(__file__).parent.parent / "shipbench"
 FILES = sorted(ROOT.rglob("*.py"))
 
 LAYERS = {
-    "cache": 0, "kept_code": 0.5, "errors": 0, "ops": 0, "signals": 0, "regular_files": 0.3, "names": 0.5, "toml_files": 0.6,
+    "cache": 0, "kept_code": 0.5, "errors": 0, "ops": 0, "signals": 0, "matlab_files": 0, "regular_files": 0.3, "names": 0.5, "toml_files": 0.6,
     "registry": 1, "specs": 1, "compiled": 1, "integrate": 1, "ship": 1,
     "records": 2, "physics": 2, "metrics": 2.5, "effects": 2.7, "simulate": 3, "predictors": 3.5, "data": 4, "importing": 4.3,
     "checking": 4.5, "diagnosis": 4.7, "contract": 4.8, "bench": 5,

@@ -19,7 +19,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..matlab_files import check_matlab
 from ..records import Dataset, Run
+from ..regular_files import open_regular
 from ..ship import Ship
 from ..signals import COMMANDS, ENVIRONMENT, STATES, UNITS
 
@@ -98,7 +100,11 @@ def read_mat(path: str | Path) -> Dataset:
     from scipy.io import loadmat
 
     try:
-        found = loadmat(path, variable_names=["dataset", "runs"])
+        with open_regular(path, ".mat file") as file:
+            check_matlab(file)
+            found = loadmat(file, variable_names=["dataset", "runs"])
+    except InputError:
+        raise
     except NotImplementedError:
         raise InputError(f"{path} is a MATLAB file of version 7.3, which is not read; save it again with save(..., '-v7').") from None
     except Exception as error:  # the reader raises whatever a damaged file leads it to
@@ -109,7 +115,7 @@ def read_mat(path: str | Path) -> Dataset:
         given = {key: str(about[key]) for key in ("name", "actuators", "source", "licence")}
         dt, notes, simulation, ship = float(about["dt"]), tuple(about["notes"]), about["simulation"] or None, about["ship"]
         derived = tuple(str(name) for name in about.get("derived", ()))
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         fields = f"accepted: the variables dataset and runs, each run with {', '.join(_RUN_FIELDS)}"
         raise InputError(f"{path} does not have the form that `data export` writes ({type(error).__name__}: {error}); {fields}.") from None
     return Dataset(

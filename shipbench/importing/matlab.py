@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 import warnings
-import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,12 +12,12 @@ import numpy as np
 import pyarrow as pa
 
 from ..errors import InputError
+from ..matlab_files import check_matlab
+from ..regular_files import open_regular
 from .matlab73 import open_matlab73
 from .matlab_objects import not_read, object_vectors
 from .tables import MOST_COLUMNS, Table, as_batch
 
-_LARGEST = 1_100_000_000
-_COMPRESSED = 15
 _ROWS = 50_000
 _OBJECTS = "\0objects"
 """Where names of objects are gathered among the vectors; no variable is called so."""
@@ -32,15 +31,16 @@ def open_matlab(path: Path) -> Table:
     """
     from scipy.io import loadmat
 
-    with path.open("rb") as file:
+    with open_regular(path, "log") as file:
         head = file.read(520)
-    if b"\x89HDF" in (head[:4], head[512:516]):
-        return open_matlab73(path)
-    if _unpacked_size(path) > _LARGEST:
-        raise InputError(
-            f"{path} holds more than {_LARGEST / 1e6:.0f} MB unpacked; .mat files are read whole, so that is the limit. "
-            "Save it with '-v7.3', or as CSV (writetable) or Parquet (parquetwrite): these are streamed."
-        )
+        if b"\x89HDF" in (head[:4], head[512:516]):
+            return open_matlab73(path)
+        file.seek(0)
+        try:
+            check_matlab(file)
+        except ValueError as error:
+            advice = "Save it with '-v7.3', or as CSV (writetable) or Parquet (parquetwrite): these are streamed."
+            raise InputError(f"{path} is not read: {error}. {advice}") from None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # two objects go by one name in scipy; mat-io reads them
@@ -74,27 +74,6 @@ def open_matlab(path: Path) -> Table:
             yield as_batch({name: _numbers(vectors[name][begin : begin + _ROWS]) for name in wanted})
 
     return Table(path, tuple(vectors), stream, 1, "MATLAB", notes)
-
-
-def _unpacked_size(path: Path) -> int:
-    """Bytes of a file's content without its compression, counted until they are too many; what is no MATLAB file counts as it is."""
-    with path.open("rb") as file:
-        head = file.read(128)
-        order = {b"IM": "<", b"MI": ">"}.get(head[126:128])
-        if order is None:
-            return path.stat().st_size
-        total = 0
-        while total <= _LARGEST and len(tag := file.read(8)) == 8:
-            kind, size = struct.unpack(f"{order}II", tag)
-            if kind != _COMPRESSED:
-                total += size
-                file.seek(size, 1)
-                continue
-            packed = zlib.decompressobj()
-            while size > 0 and total <= _LARGEST and (part := file.read(min(size, 1 << 16))):
-                size -= len(part)
-                total += len(packed.decompress(part))
-    return total
 
 
 def _numbers(values: Any) -> Any:

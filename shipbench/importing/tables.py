@@ -18,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from ..errors import InputError, unknown_name
+from ..regular_files import open_regular
 from .mapping import Layout
 
 BLANKS = " "
@@ -89,11 +90,8 @@ def kind_of(path: Path) -> Literal["Parquet", "MATLAB", "Excel", "text"]:
     """
     if path.is_dir():
         raise InputError(f"{path} is a folder; give the log files themselves, such as {path}/*.csv.")
-    try:
-        with path.open("rb") as file:
-            magic = file.read(8)
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}. Give the path of an existing log.") from None
+    with open_regular(path, "log") as file:
+        magic = file.read(8)
     if not magic:
         raise InputError(f"{path} is empty (0 bytes). Give a log with a header and rows.")
     if magic.startswith(b"PAR1") or path.suffix == ".parquet":
@@ -173,12 +171,12 @@ def check_number(path: Path, columns: int) -> None:
 
 def uncompressed(path: Path) -> Any:
     """A binary file, unpacked while it is read where it is a .gz, .bz2 or .xz."""
-    with path.open("rb") as file:
+    with open_regular(path, "log") as file:
         magic = file.read(8)
     for mark, module in ((b"\x1f\x8b", gzip), (b"BZh", bz2), (b"\xfd7zXZ", lzma)):
         if magic.startswith(mark):
             return Bounded(path, module.open(path, "rb"))
-    return path.open("rb")
+    return open_regular(path, "log")
 
 
 class Bounded(io.RawIOBase):

@@ -126,7 +126,7 @@ def excel_of_zeros(path):
     ],
 )
 def test_a_small_file_that_unpacks_to_a_large_one_is_refused_before_it_is_read(trial_import, tmp_path, monkeypatch, name, write_log, expected):
-    monkeypatch.setattr("shipbench.importing.matlab._LARGEST", 1_000_000)
+    monkeypatch.setattr("shipbench.matlab_files.MOST_MATLAB", 1_000_000)
     write_log(tmp_path / name)
     assert (tmp_path / name).stat().st_size < 1_000_000
     result = trial_import([tmp_path / name])
@@ -374,3 +374,18 @@ def test_a_source_without_its_file_is_named(trial_import, tmp_path):
     result = trial_import(TEXT, plan, name="gps.csv")
     assert result.exit_code == 2
     assert "no log for the source 'b'" in result.stderr
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+@pytest.mark.parametrize("which", ["log.csv", "mapping.toml", "ship.toml"])
+def test_what_is_no_regular_file_is_refused_and_not_waited_for(kind, which, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("log.csv", "mapping.toml", "ship.toml"):
+        (tmp_path / name).write_text("t,x\n0,1\n" if name == "log.csv" else "")
+    (tmp_path / "mapping.toml").write_text('name = "a"\ndt = 1.0\n[time]\ncolumn = "t"\n[channels]\nx = {column = "x", unit = "m"}\n')
+    (tmp_path / "ship.toml").write_text('name = "toy"\nL = 50.0\nB = 8.0\nT = 3.0\nmass = 9e5\n')
+    (tmp_path / which).unlink()
+    os.mkfifo(tmp_path / which) if kind == "pipe" else (tmp_path / which).symlink_to("/dev/zero")
+    result = CliRunner().invoke(app, ["data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ship.toml", "--out", "out"])
+    assert result.exit_code == 2
+    assert "not a regular file" in result.stderr or "mapping.toml" in result.stderr
