@@ -27,9 +27,12 @@ _ORDERED = ("n", "delta", "F_b", "F_s", "n_c", "delta_c", "F_b_c", "F_s_c")
 """Channels that may step to any value at once; the others are continuous."""
 _NINES = np.array([999.0, 9999.0, 99_999.0, 999_999.0])
 _WHOLE = np.array([32_767.0, 32_768.0, 65_535.0, 2_147_483_647.0, 2_147_483_648.0, 4_294_967_295.0])
-_FILLS = np.unique(np.concatenate([(np.r_[_NINES, _WHOLE][:, None] / 10.0 ** np.arange(8)).ravel(), [99.9, 99.99]]))
 _SMALLEST = 99.0
 """Fill values below are too near to readings to be told from them."""
+_SCALED = np.unique((np.r_[_NINES, _WHOLE][:, None] / 10.0 ** np.arange(8)).ravel())
+_FILLS = _SCALED[_SCALED > _SMALLEST]
+_CONVERTED = np.unique((np.r_[_NINES, 0.01 * _WHOLE[:3]][:, None] * np.array([_DEG, _DEG / 60.0, _KNOT, 1.0 / 3.6, 0.3048, 60.0])).ravel())
+"""Fill values that somebody converted to our unit from degrees, knots, km/h, feet or rev/s."""
 
 
 def not_available(name: str, readings: np.ndarray, factor: float) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -45,7 +48,9 @@ def not_available(name: str, readings: np.ndarray, factor: float) -> tuple[dict[
     beyond = np.abs(values) > _LARGEST.get(name, np.inf) * (1.0 + 1e-6)
     if name == "depth":
         beyond |= values < 0.0
-    fills = (np.isin(np.abs(readings), _FILLS) & (np.abs(readings) >= _SMALLEST)) | (beyond & _is_fill(values))
+    fills = _is_one_of(_FILLS, np.abs(readings), 0.0)
+    if beyond.any():
+        fills |= beyond & _is_one_of(_CONVERTED, np.abs(values), 1e-5)
     hits = np.logical_or.reduce([fills, *known.values()])
     if not hits.any():
         return {}, hits
@@ -64,13 +69,11 @@ def not_available(name: str, readings: np.ndarray, factor: float) -> tuple[dict[
     return {words: mask for words, mask in masks.items() if mask.any()}, doubtful
 
 
-def _is_fill(values: np.ndarray) -> np.ndarray:
-    """Whether values are fill values that were converted from another unit of ours."""
-    sizes = np.array([_DEG, _DEG / 60.0, _KNOT, 1.0 / 3.6, 0.3048, 60.0])
-    whole = np.concatenate([(_NINES[:, None] * sizes).ravel(), (_WHOLE[:3, None] * sizes * 0.01).ravel()])
-    near, size = np.sort(whole), np.abs(values)
-    place = np.clip(np.searchsorted(near, size), 1, len(near) - 1)
-    return np.isclose(size, near[place], rtol=1e-5, atol=0.0) | np.isclose(size, near[place - 1], rtol=1e-5, atol=0.0)
+def _is_one_of(table: np.ndarray, values: np.ndarray, tolerance: float) -> np.ndarray:
+    """Whether values (n,) are in a sorted table, to a relative tolerance."""
+    place = np.clip(np.searchsorted(table, values), 1, len(table) - 1)
+    near = np.minimum(np.abs(values - table[place]), np.abs(values - table[place - 1]))
+    return near <= tolerance * values
 
 
 def _far(values: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, bool]:
@@ -103,3 +106,18 @@ def _unled(values: np.ndarray, hit: np.ndarray, suspect: np.ndarray, wraps: bool
     unled = np.zeros(len(values), bool)
     unled[rows] = np.minimum(before, after) > limit
     return unled
+
+
+def beyond_a_turn(values: np.ndarray) -> np.ndarray:
+    """Angles (n,) [rad] outside of -180 to 360 degrees that the ship did not turn to: they begin and end with a step of half a turn or more."""
+    rows = np.flatnonzero(np.isfinite(values))
+    found = np.zeros(len(values), bool)
+    out = (values[rows] > _TURN + _DEG) | (values[rows] < -0.5 * _TURN - _DEG)
+    jumps = np.abs(np.diff(values[rows])) >= 0.5 * _TURN
+    edges = np.diff(out.astype(int))
+    begins, ends = np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1
+    for begin in begins:
+        after = ends[ends > begin]
+        if len(after) and jumps[begin - 1] and jumps[after[0] - 1]:
+            found[rows[begin : after[0]]] = True
+    return found

@@ -10,7 +10,7 @@ from ..errors import InputError
 from .cells import Cells
 from .coordinates import coordinates
 from .entries import ANGLES, ARCS, Channel, channel_factor
-from .sentinels import CODES, not_available
+from .sentinels import CODES, beyond_a_turn, not_available
 
 _LIMITS = {"lat": np.pi / 2, "lon": 2 * np.pi}
 
@@ -29,6 +29,10 @@ def channel_values(cells: Cells, name: str, channel: Channel) -> np.ndarray:
         columns = [cells.numbers(column, missing) for column in channel.columns]
     if channel.kinds[0] not in ARCS and channel.missing != []:
         columns = [_available(cells, name, readings, factor) for readings in columns]
+        if name in ANGLES:
+            for readings in columns:
+                odd = beyond_a_turn(abs(factor) * readings)
+                cells.met.doubtful[f"readings of {name} jump beyond -180 to 360 deg: outliers, or a code to list in `missing`"] += int(odd.sum())
     circular = channel.kinds == ("mean",) and name in ANGLES
     readings = _mean_angle(columns, abs(factor)) if circular else _EXPRESSIONS[channel.kinds[0]](columns)
     values = factor * (readings + channel.offset - channel.neutral)

@@ -7,7 +7,7 @@ import pytest
 from trial import channels, logged, mapping
 
 from shipbench.data.base import load_dataset
-from shipbench.importing.sentinels import not_available
+from shipbench.importing.sentinels import beyond_a_turn, not_available
 
 DEG, KNOT = np.pi / 180.0, 1852.0 / 3600.0
 T = np.arange(0.0, 60.0, 0.5)
@@ -64,6 +64,19 @@ def test_the_same_numbers_are_readings_where_the_others_lead_to_them(name, readi
 
 def test_a_fill_value_that_may_be_a_reading_is_doubtful():
     assert found("n_c", [500, 500, 999, 500], 1.0) == ([], [2])
+
+
+def test_headings_far_beyond_a_turn_are_told_from_headings_that_are_counted_on(trial_import):
+    def rows(degrees: list[float]) -> list[int]:
+        return np.flatnonzero(beyond_a_turn(np.radians(degrees))).tolist()
+
+    assert rows([350, 355, 800, 800, 5, 10, -400, 12]) == [2, 3, 6]
+    assert rows([350, 359, 362, 500, 640, 700, 10, 20]) == []  # turned to; then another run begins
+    assert rows([700, 720, 730]) == []
+    assert rows([359, 1, 358, 2]) == []
+    table = logged(T)
+    table.loc[40:42, "HDG"] = 872.5
+    assert "DOUBTFUL: 3 readings of psi jump beyond -180 to 360 deg" in trial_import(table).stdout
 
 
 def test_headings_of_511_are_bridged_and_reported(trial_import):
