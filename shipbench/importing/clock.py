@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from ..errors import InputError
-from .mapping import Clock
+from .mapping import LATEST, Clock
 from .stamps import parsed, text_durations
 
 RELATIVE = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
@@ -67,6 +67,11 @@ def to_seconds(clock: Clock, columns: list[pa.Array], numbers: Callable[[str], n
                 f"{where}: [time] format = '{clock.format}' makes a time in the year {year:.0f}; accepted: 1900 to 2199. "
                 f"Check the format, such as 'unix_ms' for 'unix'. Accepted formats: {', '.join(FORMATS)}."
             )
+    elif (np.abs(seconds) > LATEST).any():
+        raise InputError(
+            f"{where}: [time] format = '{clock.format}' makes a time of {np.nanmax(np.abs(seconds)):.3g} s; accepted: up to {LATEST:g} s, 230 years. "
+            "Check the format, such as 'ms' for 's'."
+        )
     return seconds + clock.shift
 
 

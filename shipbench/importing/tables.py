@@ -153,6 +153,11 @@ def _open_parquet(path: Path) -> Table:
         columns, rows = tuple(file.schema_arrow.names), file.metadata.num_rows
     if rows == 0:
         raise InputError(f"{path} has no rows. Give a log with one row per sample.")
+    if 8 * rows * len(columns) > max(_DENSEST * path.stat().st_size, 10 * _ALWAYS):
+        raise InputError(
+            f"{path} declares {rows} rows of {len(columns)} columns in {path.stat().st_size / 1e6:.3g} MB; "
+            f"accepted: up to {_DENSEST} times its size. If it is a log, save it as CSV."
+        )
 
     def stream(wanted: Sequence[str]) -> Iterator[pa.RecordBatch]:
         with pa.parquet.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20) as file:

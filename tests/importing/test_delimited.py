@@ -96,6 +96,8 @@ def test_a_log_that_unpacks_to_200_times_its_size_is_refused(trial_import, tmp_p
 
 
 def test_times_that_are_too_far_away_are_refused(trial_import):
+    late = TEXT.replace("\n30.5,", "\n1e25,", 1)
+    assert "makes a time of 1e+25 s; accepted: up to 7.3e+09 s" in trial_import(late).stderr
     refused = trial_import(TEXT, mapping(time='column = "time"\nshift = 1e300'))
     assert refused.exit_code == 2
     assert "time.shift" in refused.stderr
