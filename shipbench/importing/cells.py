@@ -24,12 +24,14 @@ _NUMBERS = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.t
 
 @dataclass
 class Counts:
-    """What was met while reading, for the summary: `what` was left out, `doubtful` was kept, `notes` says how files were read."""
+    """What was met while reading, for the summary: `what` was left out, `doubtful` was kept, `notes` says how files were read, `clock` what was found
+    of their clocks."""
 
     rows: int = 0
     what: Counter[str] = field(default_factory=Counter)
     doubtful: Counter[str] = field(default_factory=Counter)
     notes: list[str] = field(default_factory=list)
+    clock: list[str] = field(default_factory=list)
     forms: dict[str, str] = field(default_factory=dict)
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from ..errors import InputError
+from .blocks import Block
 from .cells import EMPTY, Cells, Counts, is_text
-from .clock import check_format, is_daily, shown, to_seconds
+from .clock import check_format, to_seconds
 from .coordinates import unread_hemispheres
 from .entries import Channel
 from .mapping import Mapping, Source
@@ -20,19 +20,23 @@ from .tables import Table, open_table, reading
 from .values import channel_values
 
 
-@dataclass(frozen=True)
-class Block:
-    """Some rows of a log: times (n,) [s], values (n, channels) in our units with NaN where there is none."""
-
-    t: np.ndarray
-    values: np.ndarray
-
-    def rows(self, select: slice | np.ndarray) -> Block:
-        return Block(self.t[select], self.values[select])
-
-
 def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str | None, Block]]:
     """(name in the run column or None, block) of a log, rows of one run after another.
+
+    Raises:
+        InputError: a column is missing, or a cell is not a number or not a time.
+    """
+    for names, block in read_named(path, source, met):
+        if source.run is None:
+            yield None, block
+            continue
+        starts = np.flatnonzero(np.r_[True, names[1:] != names[:-1]]) if len(names) else np.array([], int)
+        for begin, end in zip(starts, [*starts[1:], len(names)], strict=True):
+            yield str(names[begin]), block.rows(slice(begin, end))
+
+
+def read_named(path: Path, source: Source, met: Counts) -> Iterator[tuple[np.ndarray, Block]]:
+    """(names (n,) in the run column, if any, and block) of a log, as the file has them; rows without a time or a name are left out.
 
     Raises:
         InputError: a column is missing, or a cell is not a number or not a time.
@@ -52,13 +56,16 @@ def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str |
             if clock.rate is not None:
                 t = (done + np.arange(batch.num_rows)) / clock.rate + clock.shift
             else:
-                t = to_seconds(clock, [batch.column(n) for n in clock.names], cells.numbers, where)
-            names = cells.names(source.run) if source.run else None
+                t = to_seconds(clock, [batch.column(n) for n in clock.names], cells.numbers, where, met.clock)
+            names = cells.names(source.run) if source.run else np.full(len(t), None)
         done += batch.num_rows
         met.rows += batch.num_rows
-        stamped = np.isfinite(t)
-        met.what["rows without a time, left out"] += int((~stamped).sum())
-        yield from _by_name(Block(t, values), stamped, names, met)
+        keep = np.isfinite(t)
+        met.what["rows without a time, left out"] += int((~keep).sum())
+        nameless = np.array([n is None for n in names], bool) if source.run else np.zeros(len(t), bool)
+        met.what["rows without a run name, left out"] += int((nameless & keep).sum())
+        keep &= ~nameless
+        yield names[keep], Block(t, values).rows(keep)
     met.notes += [note for note in table.notes if note not in met.notes]
     if done == 0:
         raise InputError(f"{path} has a header and no rows. Give a log with one row per sample.")
@@ -91,86 +98,6 @@ def _footer(batch: pa.RecordBatch, source: Source) -> int:
     if len(words) and any(str(cells[int(words[0])].as_py() or "").strip() == "" for cells in batch.columns):
         return int(words[0])
     return len(batch)
-
-
-def _by_name(block: Block, keep: np.ndarray, names: np.ndarray | None, met: Counts) -> Iterator[tuple[str | None, Block]]:
-    if names is None:
-        yield None, block.rows(keep)
-        return
-    nameless = np.array([n is None for n in names])
-    met.what["rows without a run name, left out"] += int((nameless & keep).sum())
-    block, names = block.rows(keep & ~nameless), names[keep & ~nameless]
-    starts = np.flatnonzero(np.r_[True, names[1:] != names[:-1]]) if len(names) else np.array([], int)
-    for begin, end in zip(starts, [*starts[1:], len(names)], strict=True):
-        yield str(names[begin]), block.rows(slice(begin, end))
-
-
-def in_order(blocks: Iterable[Block], source: Source, where: str, met: Counts) -> Iterator[Block]:
-    """The blocks with times that never go back; rows that repeat a time stay where each brings other channels.
-
-    Raises:
-        InputError: time goes back, or so many rows repeat a time that the stamps are coarser than the samples.
-    """
-    last, last_row, rows, repeats = -np.inf, None, 0, 0
-    if is_daily(source.time):
-        blocks = _over_midnight(blocks)
-    for block in _spread(blocks) if source.time.repeated == "spread" else blocks:
-        if len(block.t) == 0:
-            continue
-        high = np.maximum.accumulate(np.r_[last, block.t])[:-1]
-        back = block.t < high
-        if back.any():
-            k = int(np.argmax(back))
-            if source.time.backwards == "error":
-                raise InputError(
-                    f"{where}: time goes back from {shown(source.time, high[k])} to {shown(source.time, block.t[k])} "
-                    f"({int(back.sum())} such rows in one block). Sort the log; or, if it holds several runs, name their column (`run = ...`); "
-                    'or leave such rows out with [time] backwards = "drop".'
-                )
-            met.what["rows that go back in time, left out"] += int(back.sum())
-            block = block.rows(~back)
-        before = np.vstack([np.full_like(block.values[:1], np.nan) if last_row is None else last_row, block.values[:-1]])
-        same = np.diff(block.t, prepend=last) == 0.0
-        repeats += int((same & (np.isfinite(before) & np.isfinite(block.values)).any(axis=1)).sum())
-        rows += len(block.t)
-        last, last_row = block.t[-1], block.values[-1:]
-        yield block
-    met.what["readings at a time that was there before, left out"] += repeats
-    if repeats > 0.2 * rows:
-        raise InputError(
-            f"{where}: {repeats} of {rows} rows repeat the time of the row before: the stamps are coarser than the samples. "
-            'Set [time] repeated = "spread" '
-            "to spread such rows evenly until the next stamp, or use a finer time column."
-        )
-
-
-def _over_midnight(blocks: Iterable[Block]) -> Iterator[Block]:
-    """Times of day, counted on: a step back by more than half a day is a new day."""
-    last, days = -np.inf, 0
-    for block in blocks:
-        if len(block.t):
-            new = days + np.cumsum(np.diff(block.t, prepend=last) < -43_200.0)
-            last, days = block.t[-1], int(new[-1])
-            yield Block(block.t + 86_400.0 * new, block.values)
-
-
-def _spread(blocks: Iterable[Block]) -> Iterator[Block]:
-    """Rows with one stamp, spread evenly until the next stamp; the last group is spread like the one before it."""
-    rest: Block | None = None
-    step = 0.0
-    for block in blocks:
-        if rest is not None:
-            block = Block(np.r_[rest.t, block.t], np.vstack([rest.values, block.values]))
-        starts = np.flatnonzero(np.diff(block.t, prepend=np.nan) != 0.0)
-        if len(starts) > 1:
-            lengths = np.diff(starts)
-            steps = np.diff(block.t[starts]) / lengths
-            within = np.arange(starts[-1]) - np.repeat(starts[:-1], lengths)
-            step = steps[-1]
-            yield Block(block.t[: starts[-1]] + within * np.repeat(steps, lengths), block.values[: starts[-1]])
-        rest = block.rows(slice(starts[-1], None)) if len(starts) else None
-    if rest is not None:
-        yield Block(rest.t + step * np.arange(len(rest.t)), rest.values)
 
 
 def all_channels(mapping: Mapping) -> dict[str, Channel]:

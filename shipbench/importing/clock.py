@@ -47,18 +47,19 @@ def moment(seconds: float) -> str:
     return datetime.fromtimestamp(round(seconds, 3), UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
-def to_seconds(clock: Clock, columns: list[pa.Array], numbers: Callable[[str], np.ndarray], where: str) -> np.ndarray:
+def to_seconds(clock: Clock, columns: list[pa.Array], numbers: Callable[[str], np.ndarray], where: str, told: list[str] | None = None) -> np.ndarray:
     """Times of a block (n,) [s]; NaN where the log has none.
 
     Args:
         columns: the one or two columns of the clock.
         numbers: reads a column as numbers (n,), where the format counts.
         where: file and rows, for messages.
+        told: takes what is worth a word.
 
     Raises:
         InputError: unknown format, unreadable stamps, stamps of which only some have a zone, or moments outside 1900 to 2199.
     """
-    seconds = _read(clock, columns, numbers, where)
+    seconds = _read(clock, columns, numbers, where, [] if told is None else told)
     if is_absolute(clock):
         far = ~((seconds >= _1900) & (seconds < _2200)) & np.isfinite(seconds)
         if far.any():
@@ -104,7 +105,7 @@ def check_format(clock: Clock, where: str) -> None:
         raise InputError(f"{where}: [time] format = '{form}' reads a zone, and zone = '{clock.zone}' is set; accepted: one. Remove `zone`.")
 
 
-def _read(clock: Clock, columns: list[pa.Array], numbers: Callable[[str], np.ndarray], where: str) -> np.ndarray:
+def _read(clock: Clock, columns: list[pa.Array], numbers: Callable[[str], np.ndarray], where: str, told: list[str]) -> np.ndarray:
     columns = [c.dictionary_decode() if pa.types.is_dictionary(c.type) else c for c in columns]
     kinds = [c.type for c in columns]
     if len(columns) == 2 and any(_is_date(kind) for kind in kinds):
@@ -124,7 +125,7 @@ def _read(clock: Clock, columns: list[pa.Array], numbers: Callable[[str], np.nda
     joined = _joined(columns)
     if clock.format in ("timedelta", "s"):
         return text_durations(joined, where)
-    stamps = _seconds(parsed(joined, clock, FORMATS, where), clock, where)
+    stamps = _seconds(parsed(joined, clock, FORMATS, where, told), clock, where)
     return stamps - (_1900 if is_daily(clock) else 0.0)
 
 

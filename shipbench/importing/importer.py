@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import fnmatch
-import itertools
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,11 +14,16 @@ import numpy as np
 from ..errors import InputError
 from ..ship import Ship
 from ..signals import COMMANDS
+from .blocks import Block
 from .cells import Counts
-from .channels import Block, all_channels, in_order, read_blocks
+from .channels import all_channels, read_blocks
 from .clock import is_absolute
+from .fixes import fixes_only
 from .mapping import Mapping, Source
+from .ordering import in_order
+from .recordings import onward, parts, read_recordings
 from .runs import Piece, on_grid, outliers, shortest_run, windows, without_standing
+from .steps import steps_marked
 from .stretches import Feed, Stretches
 from .summary import Summary
 from .writer import FolderWriter, run_name
@@ -31,11 +35,12 @@ _FINEST = 100
 
 @dataclass
 class _Log:
-    """One recording: its name and a stream for each source."""
+    """One recording: its name and a stream for each source; `goes_on` where it is the one before, after its clock was set back."""
 
     name: str
     files: str
     feeds: dict[str, Iterator[Block]] = field(default_factory=dict)
+    goes_on: bool = False
 
 
 def import_logs(
@@ -69,11 +74,12 @@ def import_logs(
     with FolderWriter(out, force) as writer:
         for log in _recordings(logs, mapping, met):
             before = len(summary.runs)
-            for name, group, piece, zero in _named(log, mapping, ship, summary):
+            summary.recording(log.goes_on)
+            for name, (stretch, alone, piece, zero) in _named(log, mapping, ship, summary):
                 run = _free(name, taken)
                 writer.add(run, np.round(piece.t - zero, 9), piece.columns)
                 summary.doubtful.update(outliers(piece, ship))
-                summary.add(run, log.files, piece, None if group is None else f"{log.name}_stretch_{group}")
+                summary.add(run, log.files, piece, None if alone else f"{log.name}_stretch_{stretch:03d}", stretch)
             if len(summary.runs) > before or len(logs) > 1:
                 tell(f"{log.name}: {len(summary.runs) - before} run(s)")
         summary.complete(met)
@@ -133,10 +139,9 @@ def _recordings(logs: Sequence[Path], mapping: Mapping, met: Counts) -> Iterator
     if len(mapping.sources) == 1:
         ((source_name, source),) = mapping.sources.items()
         for path in logs:
-            # groupby shares the stream: a run's blocks are read before those of the next.
-            for name, blocks in itertools.groupby(read_blocks(path, source, met), key=lambda item: item[0]):
-                stream = in_order((block for _, block in blocks), source, str(path), met)
-                yield _Log(run_name(name if name is not None else _stem(path)), path.name, {source_name: stream})
+            for name, blocks in read_recordings(path, source, met):
+                for number, part in enumerate(parts(_clean(blocks, source, mapping, str(path), met))):
+                    yield _Log(run_name(name if name is not None else _stem(path)), path.name, {source_name: part}, number > 0)
         return
     kinds = {is_absolute(s.time) for s in mapping.sources.values()}
     if len(kinds) > 1:
@@ -145,8 +150,16 @@ def _recordings(logs: Sequence[Path], mapping: Mapping, met: Counts) -> Iterator
     files = _share_out(logs, mapping.sources)
     feeds = {}
     for name, source in mapping.sources.items():
-        feeds[name] = in_order(_chained(files[name], source, met), source, ", ".join(map(str, files[name])), met)
+        where = ", ".join(map(str, files[name]))
+        feeds[name] = onward(_clean(_chained(files[name], source, met), source, mapping, where, met), met)
     yield _Log(run_name(mapping.name), ", ".join(p.name for p in logs), feeds)
+
+
+def _clean(blocks: Iterable[Block], source: Source, mapping: Mapping, where: str, met: Counts) -> Iterator[Block]:
+    """The rows of a recording in order, without repeated fixes, and marked where its clock was set."""
+    channels = tuple(source.channels)
+    gap = max((mapping.gap(name) for name in channels if name in ("x", "lat")), default=0.0)
+    return steps_marked(fixes_only(in_order(blocks, source, where, met), channels, met), source, gap, met)
 
 
 def _chained(paths: list[Path], source: Source, met: Counts) -> Iterator[Block]:
@@ -177,20 +190,23 @@ def _stem(path: Path) -> str:
     return Path(name).stem
 
 
-def _named(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator[tuple[str, str | None, Piece, float]]:
-    """(run name, group or None, samples, zero of its time) for each run of a recording; one run alone keeps the recording's name."""
-    waiting: tuple[str, str | None, Piece, float] | None = None
+_Run = tuple[int, bool, Piece, float]
+"""Number of the stretch, whether the run is alone in its group, samples, zero of its time."""
+
+
+def _named(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator[tuple[str, _Run]]:
+    """Name and content of each run of a recording; one run alone keeps the recording's name."""
+    waiting: tuple[str, _Run] | None = None
     count = 0
-    for count, item in enumerate(_runs(log, mapping, ship, summary), start=1):
+    for count, run in enumerate(_runs(log, mapping, ship, summary), start=1):
         if waiting is not None:
             yield waiting
-        group, piece, zero = item
-        waiting = (f"{log.name}_{count:03d}", group, piece, zero)
+        waiting = (f"{log.name}_{count:03d}", run)
     if waiting is not None:
-        yield (log.name if count == 1 else waiting[0], *waiting[1:])
+        yield (log.name if count == 1 else waiting[0], waiting[1])
 
 
-def _runs(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator[tuple[str | None, Piece, float]]:
+def _runs(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator[_Run]:
     channels, dt = all_channels(mapping), mapping.dt
     feeds = [Feed(blocks, tuple(mapping.sources[name].channels)) for name, blocks in log.feeds.items()]
     gaps = {name: mapping.gap(name) for name in channels}
@@ -201,19 +217,19 @@ def _runs(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator
     for stretch in stretches:
         zero = stretches.start if absolute else 0.0
         number += stretch.part == 0
-        group = f"{number:03d}" if not (stretch.last and stretch.part == 0) else None
+        alone = mapping.split.window is not None or (stretch.last and stretch.part == 0)
         if stretch.end - stretch.start < dt:
             summary.cut("shorter than dt", stretch.end - stretch.start)
             continue
         _check_step(mapping, stretches.steps)
-        whole = on_grid(stretch, mapping, ship)
-        for moving in _told(without_standing(whole, mapping), len(whole.t), mapping, summary):
+        samples = on_grid(stretch, mapping, ship)
+        for moving in _told(without_standing(samples, mapping), len(samples.t), mapping, summary):
             for piece in windows(moving, mapping):
                 length = (len(piece.t) - 1) * dt
                 if length < shortest_run(mapping) * (1 - 1e-9):
                     summary.cut(f"shorter than {shortest_run(mapping):g} s", length)
                 else:
-                    yield None if mapping.split.window else group, piece, zero
+                    yield number, alone, piece, zero
     if math.isnan(stretches.start):
         return
     summary.steps |= stretches.steps

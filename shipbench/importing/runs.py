@@ -105,9 +105,13 @@ def _positions_at_midship(series: Series, mapping: Mapping) -> tuple[float, floa
 
 
 def _together(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Samples of two channels at their common times; one source gives both, so that only missing cells differ."""
+    """Samples of two channels of one source at their common times; where they are renewed in different rows, at the times of both."""
     t, i, j = np.intersect1d(a[0], b[0], assume_unique=True, return_indices=True)
-    return t, a[1][i], b[1][j]
+    if len(t) >= 0.5 * min(len(a[0]), len(b[0])):
+        return t, a[1][i], b[1][j]
+    t = np.union1d(a[0], b[0])
+    t = t[(t >= max(a[0][0], b[0][0])) & (t <= min(a[0][-1], b[0][-1]))]
+    return t, np.interp(t, *a), np.interp(t, *b)
 
 
 def _velocity_at_midship(

@@ -41,7 +41,7 @@ def text_durations(texts: pa.Array, where: str) -> np.ndarray:
     return np.nan_to_num(days) * 86_400.0 + sign * (3600.0 * hours + 60.0 * minutes + seconds)
 
 
-def parsed(texts: pa.Array, clock: Clock, accepted: tuple[str, ...], where: str) -> pd.Series:
+def parsed(texts: pa.Array, clock: Clock, accepted: tuple[str, ...], where: str, told: list[str]) -> pd.Series:
     """Stamps (n,) as datetimes, with a zone where they carry one.
 
     Only ISO stamps, and those of a pattern with %z or %Z, carry an offset: what ends like one elsewhere is a year. A stamp without the fraction that
@@ -65,6 +65,7 @@ def parsed(texts: pa.Array, clock: Clock, accepted: tuple[str, ...], where: str)
     values = pd.Series(texts.to_pandas()).astype("string")
     leap = pc.fill_null(pc.match_substring_regex(texts, _LEAP), False).to_numpy(zero_copy_only=False)
     if leap.any():
+        told.append(f"leap second: the stamp '{values[leap].iloc[0]}' is taken as the next midnight")
         values = values.where(~leap, values.str.replace(r"59(:?)60", r"59\g<1>59", n=1, regex=True))
     try:
         with warnings.catch_warnings():

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .channels import Block
+from .blocks import Block
 from .resample import usual_step
 
 _SLACK = 1e-6
@@ -22,7 +22,7 @@ _MOST_SAMPLES = 1_000_000
 class Stretch:
     """A time span [start, end] [s] without gaps: `series` maps each channel to its times (m,) and values (m,), with some context before and after.
 
-    `part` counts the parts of a span that is longer than the longest run, from 0; `last` says that the span ends here.
+    `part` counts the parts of a span that is longer than the longest run, or in which a clock was set, from 0; `last` says that the span ends here.
     """
 
     start: float
@@ -48,6 +48,7 @@ class Feed:
         self.blocks, self.channels, self.done = blocks, channels, False
         self.t, self.values = np.empty(0), np.empty((0, len(channels)))
         self.first, self.last = np.nan, -np.inf
+        self.breaks: list[tuple[float, float]] = []  # last time before, and first time after the clock was set
         self._old: dict[str, tuple[float, float]] = {}  # last sample of each channel that was dropped: what is held from then on
 
     def fill(self, until: float) -> None:
@@ -59,6 +60,8 @@ class Feed:
                 self.done = True
             elif len(block.t):
                 self.first = block.t[0] if np.isnan(self.first) else self.first
+                before = np.r_[self.last, block.t[:-1]]
+                self.breaks += [(float(before[k]), float(block.t[k])) for k in np.flatnonzero(block.new) if np.isfinite(before[k])]
                 self.last = float(block.t[-1])
                 t.append(block.t)
                 values.append(block.values)
@@ -128,7 +131,9 @@ class Stretches:
             pieces = {name: self._pieces(feed, name) for feed in self.feeds for name in feed.channels}
             resume = None
             for begin, end in _common(list(pieces.values()), at, max(f.last for f in self.feeds)):
-                if begin != expected:  # not the continuation of the part before
+                if self._clock_set(covered, begin):
+                    covered = begin
+                elif begin != expected:  # not the continuation of the part before
                     part = 0
                     self._note(covered, begin, pieces)
                     covered = begin
@@ -138,7 +143,7 @@ class Stretches:
                 cut = end - begin > self.longest * (1 + _SLACK)
                 if cut:
                     end = begin + self.longest
-                yield Stretch(begin, end, self._context(begin, end, pieces), part, not cut)
+                yield Stretch(begin, end, self._context(begin, end, pieces), part, not cut and not self._clock_set(end))
                 covered, part = end, part + 1
                 if cut:
                     resume = expected = end + self.step
@@ -150,6 +155,12 @@ class Stretches:
             at = resume
         self.end = max(f.last for f in self.feeds)
         self._note(covered, self.end, pieces)
+
+    def _clock_set(self, end: float, begin: float = np.inf) -> bool:
+        """Whether a clock was set just after `end` (and just before `begin`): no pause, but nothing may be joined there."""
+        near = self.finite_gap * (1 + _SLACK)
+        breaks = [b for feed in self.feeds for b in feed.breaks]
+        return any(end <= before <= end + near and (after <= begin <= after + near or begin == np.inf) for before, after in breaks)
 
     def _limit_memory(self) -> None:
         """Shorten the parts of a log that is sampled so densely that the longest part would not fit."""
@@ -164,6 +175,9 @@ class Stretches:
             return np.empty((0, 2))
         gap = self.gaps[channel] * (1 + _SLACK)
         breaks = np.flatnonzero(np.diff(t) > gap)
+        if channel not in self.held:  # what was ordered stays ordered when the clock is set
+            set_at = np.array([after for _, after in feed.breaks])
+            breaks = np.union1d(breaks, np.searchsorted(t, set_at[(set_at > t[0]) & (set_at <= t[-1])]) - 1)
         ends = t[np.r_[breaks, len(t) - 1]]
         if channel in self.held:  # a command holds until the next, at most as long as the limit
             ends = np.minimum(ends + self.gaps[channel], max(f.last for f in self.feeds))

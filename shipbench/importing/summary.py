@@ -37,10 +37,13 @@ class Summary:
         self.met = Counts()
         self.doubtful: Counter[str] = Counter()
         self.part_length: float | None = None
+        self._before: list[str] = []  # runs of the last stretch before the clock was set back
+        self._last: list[str] = []
+        self._stretch = 0
         self.absolute = is_absolute(next(iter(mapping.sources.values())).time)
 
-    def add(self, run: str, file: str, piece: Piece, group: str | None) -> None:
-        """A run that was written; `group` names the pieces of one uninterrupted stretch."""
+    def add(self, run: str, file: str, piece: Piece, group: str | None, stretch: int) -> None:
+        """A run that was written, of the recording's stretch of that number; `group` names the pieces of one uninterrupted stretch."""
         begin, end = float(piece.t[0]), float(piece.t[-1])
         written: list[Any] = [moment(begin), moment(end)] if self.absolute else [round(begin, 6), round(end, 6)]
         self.meta[run] = {"file": file, "from": written[0], "to": written[1]}
@@ -49,10 +52,28 @@ class Summary:
         if group is not None:
             self.meta[run]["group"] = group
         self.runs.append({"id": run, "seconds": round(end - begin, 6), "samples": len(piece.t), **self.meta[run]})
+        self._follow(run, stretch)
         self.columns = tuple(piece.columns)
         for name, smoothed in piece.derived.items():
             self.times.setdefault(name, []).append(smoothed.time_constant)
             self.scatter.setdefault(name, []).append(smoothed.noise)
+
+    def recording(self, goes_on: bool) -> None:
+        """What is added from now on is another recording; `goes_on`: the one before, after its clock was set back."""
+        self._before = self._last if goes_on and not self.mapping.split.window else []
+        self._last, self._stretch = [], 0
+
+    def _follow(self, run: str, stretch: int) -> None:
+        """Put the first stretch after a clock was set back into the group of the last one before: the ship went on."""
+        if stretch != self._stretch:
+            self._last, self._stretch = [], stretch
+        self._last.append(run)
+        if stretch == 1 and self._before:
+            group = self.meta[self._before[0]].get("group", f"{self._before[0]}_goes_on")
+            for name in (*self._before, run):
+                self.meta[name]["group"] = group
+            for written in self.runs:
+                written.update(self.meta[written["id"]])
 
     def cut(self, reason: str, seconds: float) -> None:
         """Time that a rule of the mapping left out."""
@@ -127,6 +148,7 @@ class Summary:
         if self.mapping.split.window:
             lines.append(f"runs are windows of {self.mapping.split.window:g} s; those of one recording may follow each other without a pause")
         lines += [f"DOUBTFUL: {count} samples of {what}: outliers, or a wrong unit" for what, count in self.doubtful.items() if count]
+        lines += [*self.met.clock[:_SHOWN], *([f"... and {len(self.met.clock) - _SHOWN} more of the clock"] if len(self.met.clock) > _SHOWN else [])]
         lines += [f"DOUBTFUL: {count} {what}" for what, count in self.met.doubtful.items() if count]
         lines += self.met.notes
         if self.part_length is not None:

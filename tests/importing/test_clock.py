@@ -21,12 +21,12 @@ START = pd.Timestamp("2025-05-04 10:00:00", tz="UTC").timestamp()
 def seconds(cells, **clock):
     """Times of one column of text, or of typed cells."""
     column = cells if isinstance(cells, pa.Array) else pa.array(cells)
-    return to_seconds(Clock(column="t", **clock), [column], lambda name: np.array([float(c) for c in column.to_pylist()]), "log")
+    return to_seconds(Clock(column="t", **clock), [column], lambda name: np.array([float(c) for c in column.to_pylist()]), "log", [])
 
 
 def two(first, second, **clock):
     columns = {"a": pa.array(first), "b": pa.array(second)}
-    return to_seconds(Clock(columns=("a", "b"), **clock), list(columns.values()), lambda name: columns[name].to_numpy().astype(float), "log")
+    return to_seconds(Clock(columns=("a", "b"), **clock), list(columns.values()), lambda name: columns[name].to_numpy().astype(float), "log", [])
 
 
 @pytest.mark.parametrize("form", ["%H:%M:%S %d-%m-%Y", "%d-%m-%Y %H:%M:%S", "%H:%M:%S %m-%d-%Y", "%H:%M %z%d-%m-%Y", "%H.%M.%S %d+%Y%m"])

@@ -1,0 +1,59 @@
+"""Clocks that stepped inside a pause of a log: found by the track, which shows how much time really passed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from .blocks import Block, with_context
+from .cells import Counts
+from .clock import shown
+from .mapping import Source
+from .ordering import CONTEXT
+from .track import jumps, positions, usual, velocities
+
+_LEAST = 0.5
+"""A pause is looked at where it is longer than the usual step by this or more, and a step of the clock is one of this or more [s]."""
+
+
+def steps_marked(blocks: Iterable[Block], source: Source, gap: float, met: Counts) -> Iterator[Block]:
+    """The blocks, `new` where the clock stepped in a pause of up to `gap` [s] that would be bridged: a plain pause stays one.
+
+    In a plain pause the ship goes on by its speed times the pause; where the clock stepped, by less (set ahead) or more (set back).
+    """
+    channels = list(source.channels)
+    for block, begin, end in with_context(blocks, CONTEXT):
+        new = block.new.copy()
+        track = positions(block.t, block.values, channels)
+        if track is not None:
+            for row, seconds in _steps(block, track, velocities(block.t, block.values, channels), gap):
+                if begin <= row < end:
+                    new[row] = True
+                    way = "ahead" if seconds > 0 else "back"
+                    met.clock.append(
+                        f"the clock stepped {way} by about {abs(seconds):.2g} s in the pause from {shown(source.time, block.t[row - 1])} "
+                        f"to {shown(source.time, block.t[row])}: the track shows less time than the stamps"
+                    )
+        yield Block(block.t, block.values, new).rows(slice(begin, end))
+
+
+def _steps(block: Block, track: np.ndarray, stated: np.ndarray | None, gap: float) -> list[tuple[int, float]]:
+    """(first row after, seconds that the clock went ahead) of each step."""
+    rows = np.flatnonzero(np.isfinite(track).all(axis=1))
+    t = block.t[rows]
+    pauses = np.diff(t)
+    anew = np.flatnonzero(np.diff(np.cumsum(block.new)[rows]) > 0) + 1
+    joints = np.flatnonzero((pauses >= usual(pauses) + _LEAST) & (pauses <= gap * (1 + 1e-6))) + 1
+    joints = np.setdiff1d(joints, anew)
+    if not len(joints):
+        return []
+    bounds = np.r_[0, anew, len(rows)]
+    low = bounds[np.searchsorted(bounds, joints, side="right") - 1]
+    high = bounds[np.searchsorted(bounds, joints, side="right")]
+    found = jumps(t, track[rows], None if stated is None else stated[rows], joints, low, high)
+    steps = []
+    for k in np.flatnonzero(found.certain(_LEAST)):
+        a, b = rows[joints[k] - 1], rows[joints[k]]
+        steps.append((int(a + 1 + np.argmax(np.diff(block.t[a : b + 1]))), float(found.seconds[k])))
+    return steps
