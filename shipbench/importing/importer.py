@@ -98,9 +98,9 @@ def rehearse(logs: Sequence[Path], mapping: Mapping, ship: Ship, rows: int, read
     met, summary = Counts(), Summary(mapping)
     for log in _recordings(logs, mapping, met):
         log.feeds = {name: _beginning(blocks, rows) for name, blocks in log.feeds.items()}
-        for name, group, piece, _ in _named(log, mapping, ship, summary):
+        for name, (stretch, _, piece, _) in _named(log, mapping, ship, summary):
             summary.doubtful.update(outliers(piece, ship))
-            summary.add(name, log.files, piece, group)
+            summary.add(name, log.files, piece, None, stretch)
         if met.rows > read * len(mapping.sources):
             break
     met = Counts()
