@@ -43,13 +43,17 @@ class Ranking:
 
 
 def candidate_terms(plant: Plant, names: Sequence[str] | None = None) -> list[Term]:
-    """Terms of the effects that can act on this ship, one per setting of their shape parameters."""
+    """Terms of the effects that can act on this ship, one per setting of their shape parameters, in the forms that the suite draws."""
     terms = []
     for name in names or singles():
         effect = EFFECTS.get(name)
         if effect.family == "thruster" and not np.any(plant.seg.states[..., 8:10]):
             continue
-        terms += [Term(effect, tuple(s), effect.per_run) for s in effect.settings(plant.seg.states[..., :2], plant.ship)]
+        others = [p.other for p in effect.parameters if p.shape]
+        settings = [
+            s for s in effect.settings(plant.seg.states[..., :2], plant.ship) if not any(v for v, other in zip(s, others, strict=True) if other)
+        ]
+        terms += [Term(effect, tuple(s), effect.per_run) for s in settings]
     return terms
 
 

@@ -27,8 +27,8 @@ def expected_ratio(null: Fit, effect: Effect, values: Sequence[np.ndarray]) -> f
     plant = null.plant
     if effect.enters == "gear" and not plant.seg.commanded:
         return max([g.score for g in find_in_gears(plant)[0] if g.effect == effect.name], default=0.0)
-    amplitudes = [np.broadcast_to(v, (plant.seg.runs,)) for v, p in zip(values, effect.parameters, strict=True) if not p.shape]
-    setting = tuple(float(np.ravel(v)[0]) for v, p in zip(values, effect.parameters, strict=True) if p.shape)
+    amplitudes = [np.broadcast_to(v, (plant.seg.runs,)) for v, p in zip(values, effect.parameters, strict=False) if not p.shape]
+    setting = tuple(float(np.ravel(v)[0]) for v, p in zip(values, effect.parameters, strict=False) if p.shape)  # a shape may be left out
     term = Term(effect, setting)
     c = np.stack(amplitudes, axis=-1) / null.scales.amplitudes(term, plant.c.L)
     fit = settle(Linearisation(plant, null.scales, null.point, null.motion), null.model, null.hyper, null.log_tau2, [term], cycles=0)

@@ -14,12 +14,9 @@ class AddedResistance(Effect):
     family = "propulsion"
     summary = "resistance of the hull"
     source = "physics reference, section 5, P39"
+    acts_through = ()  # a towed ship has it, too
     parameters = (Parameter("share", "1", 0.3, -0.6, 3.0),)
     separate = "coast down with the shaft stopped, from two speeds"
-
-    @property
-    def acts_through(self) -> tuple[str, ...]:
-        return ()  # a towed ship has it, too
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.scale_hull(resistance=1.0 + q[0])

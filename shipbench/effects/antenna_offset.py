@@ -23,7 +23,7 @@ class AntennaOffset(Effect):
     parameters = (
         Parameter("forward", "m", 12.0, -80.0, 80.0, scaling="length"),
         Parameter("starboard", "m", 12.0, -40.0, 40.0, scaling="length"),
-        Parameter("own_velocities", "1", 0.0, 0.0, 1.0, shape=True),
+        Parameter("own_velocities", "1", 0.0, 0.0, 1.0, shape=True, other=True),
     )
     separate = "a turn on the spot: the antenna draws a circle"
 

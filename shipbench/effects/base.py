@@ -34,8 +34,8 @@ class Parameter:
 
     typical, low, high are for a ship of 130 m; `scaling` says how they go with the length (Froude's law): a key of `_FROUDE`. A fit is held between
     low and high; a size beyond them is not named (`Effect.plausible`).
-    A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes are zero. An `other` one is
-    the amplitude of another form of the same cause, which a ship may have in its place: fitted, but not drawn for the suite.
+    A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes are zero. An `other` one
+    is the amplitude, or chooses, another form of the same cause, which a ship may have in its place: fitted, but not drawn for the suite.
     """
 
     name: str
@@ -96,8 +96,8 @@ class Effect:
         return _ACTS_THROUGH.get(self.family, ())
 
     def plausible(self, q: Sequence[float], ship: Particulars) -> bool:
-        """Whether a ship may have it of the size `q`: within the bounds of all parameters."""
-        return all(p.shape or p.low <= value <= p.high for p, value in zip(self.sized(ship.L), q, strict=True))
+        """Whether a ship may have it of the size `q`, shapes left out or not: within the bounds of all parameters."""
+        return all(p.shape or p.low <= value <= p.high for p, value in zip(self.sized(ship.L), q, strict=False))
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         """Write the effect of size `q` into `e`, at the instant `s`."""

@@ -21,7 +21,7 @@ class HeadingBias(Effect):
     source = "physics reference, section 5, S58"
     parameters = (
         Parameter("bias", "rad", math.radians(2.0), -0.3, 0.3),
-        Parameter("turned_velocities", "1", 0.0, 0.0, 1.0, shape=True),
+        Parameter("turned_velocities", "1", 0.0, 0.0, 1.0, shape=True, other=True),
     )
     separate = "straight runs on one course at two speeds"
 

@@ -232,7 +232,7 @@ def test_a_ship_floats_with_her_centre_of_gravity_where_it_is(shift: float, want
 def test_an_antenna_stands_on_the_ship(forward: float, starboard: float, wanted: bool):
     """14.7 m to port were named on a barge 85 m long and 9.5 m wide, whose log read nothing below 1.1 m/s."""
     at = np.array([forward, starboard]) / [p.typical for p in EFFECTS.get("antenna_offset").sized(85.0) if not p.shape]
-    assert is_on_a_ship(_sized("antenna_offset", at, L=85.0, setting=(0.0,)), 0) is wanted
+    assert is_on_a_ship(_sized("antenna_offset", at, L=85.0), 0) is wanted
 
 
 @pytest.mark.parametrize(("towards", "bank", "wanted"), [(4.7, (1.57, 4.3, 0.0), True), (1.6, (1.57, 4.3, 0.0), True), (2.0, (1.57, 4.3, 0.0), False),
