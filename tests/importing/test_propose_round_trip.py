@@ -203,6 +203,86 @@ CSV: dict[str, Callable[[], bytes]] = {
 }  # fmt: skip
 
 
+def grouped(mark: str, decimal: str) -> bytes:
+    """Shaft speed with a mark between groups of three digits, and the decimal mark of its country."""
+    cells = [f"{v:,.1f}".replace(".", "D").replace(",", mark).replace("D", decimal) for v in truth()["n"]]
+    return text(log(T, PLAIN).assign(RPM=cells), sep=";", decimal=decimal)
+
+
+def stamped(stamps: list[str], head: str = "time", **columns: object) -> bytes:
+    return text(log(stamps, PLAIN | {"t": head}).assign(**columns))
+
+
+def with_commas_before_fractions() -> bytes:
+    t = np.arange(0.0, 240.0, 0.5)
+    stamps = [f"{s:%d.%m.%Y %H:%M:%S},{s.microsecond // 1000:03d}" for s in START + pd.to_timedelta(t, "s")]
+    return text(log(stamps, PLAIN, t=t), sep=";", decimal=",")
+
+
+def ardupilot() -> bytes:
+    table = log((T * 1e6).astype(int), PLAIN | {"t": "TimeUS", "psi": "Yaw"}, {"psi": 100 * DEG}).drop(columns=["x [m]", "y [m]"])
+    return text(table.assign(Yaw=table["Yaw"].round().astype(int), Lat=np.round(LATS * 1e7).astype(int), Lng=np.round(LONS * 1e7).astype(int)))
+
+
+def east_north_up() -> bytes:
+    half = (np.pi / 2 - truth()["psi"]) / 2
+    turn = {f"orientation.{k}": v for k, v in zip("xyzw", (0 * T, 0 * T, np.sin(half), np.cos(half)), strict=True)}
+    table = log(T, {k: v for k, v in PLAIN.items() if k not in ("psi", "x", "y")})
+    return text(table.assign(**turn, Latitude=LATS, Longitude=LONS))
+
+
+def renewed_each_second() -> bytes:
+    """Ten rows a second, positions in one of them."""
+    t = np.arange(0.0, 240.0, 0.1).round(1)
+    table = log(t, PLAIN, t=t)
+    table.loc[np.arange(len(t)) % 10 != 0, ["x [m]", "y [m]"]] = np.nan
+    return text(table)
+
+
+def sexagesimal(degrees: np.ndarray, letter: str) -> list[str]:
+    return [f"{int(-d)}°{(-d % 1) * 60:.5f}'{letter}" for d in degrees]
+
+
+GERMAN = ("Uhrzeit [s]", "Nord [m]", "Ost [m]", "Kreiselkurs [°]", "Fahrt über Grund [kn]", "Kurs über Grund [°]", "Wendegeschwindigkeit [°/min]",
+          "Propellerdrehzahl [min-1]", "Ruderwinkel [°]")  # fmt: skip
+FRENCH_TOO = ("heure [s]", "x nord [m]", "y est [m]", "cap gyro [°]", "vitesse [nds]", "route [°]", "vitesse de lacet [°/min]",
+              "tours hélice [tr/min]", "safran [°]")  # fmt: skip
+SPANISH_TOO = ("hora [s]", "norte [m]", "este [m]", "proa [°]", "velocidad sobre fondo [nudos]", "rumbo sobre fondo [°]", "razón de giro [°/min]",
+               "régimen del motor [rpm]", "ángulo de pala [°]")  # fmt: skip
+NORWEGIAN_TOO = ("Tid [s]", "nord [m]", "aust [m]", "Heading [°]", "Fart [knop]", "Kurs [°]", "ROT [°/min]", "Turtall [rpm]", "Ror [°]")
+CSV |= {
+    "apostrophes": lambda: grouped("'", "."),
+    "narrow blanks and decimal commas": lambda: grouped("\u202f", ","),
+    "commas before fractions of a second": with_commas_before_fractions,
+    "hhmmss over midnight": lambda: stamped([f"{s:%H%M%S}" for s in STAMPS + pd.Timedelta("14h")]),
+    "the date and time of NMEA": lambda: stamped([f"{s:%H%M%S}.00" for s in STAMPS], date=[f"{s:%d%m%y}" for s in STAMPS]),
+    "one number for date and time": lambda: stamped([f"{s:%Y%m%d%H%M%S}" for s in STAMPS], "timestamp"),
+    "seconds and nanoseconds of ROS 2": lambda: stamped(
+        [str(1_746_352_800 + int(t)) for t in T], "header.stamp.sec", **{"header.stamp.nanosec": 0}
+    ),
+    "nanoseconds from zero": lambda: clocked((T * 1e9).astype("int64"), "t_ns"),
+    "minutes": lambda: clocked(T / 60.0, "time [min]"),
+    "days of Excel": lambda: clocked([f"{45000.4 + t / 86400:.9f}" for t in T], "Datum Zeit"),
+    "days of MATLAB": lambda: clocked([f"{739000.4 + t / 86400:.9f}" for t in T], "datenum"),
+    "minutes and seconds": lambda: clocked([f"{int(t) // 60:02d}:{int(t) % 60:02d}.0" for t in T]),
+    "ddmm.mmmm with letters": lambda: placed(lat=[m + "S" for m in minutes(LATS, 2)], lon=[m + "W" for m in minutes(LONS, 3)]),
+    "degrees and minutes with their marks": lambda: placed(lat=sexagesimal(LATS, "S"), lon=sexagesimal(LONS, "W")),
+    "longitude before latitude in one cell": lambda: placed(**{"lon/lat": [f"{b:.7f} {a:.7f}" for a, b in zip(LATS, LONS, strict=True)]}),
+    "coordinates in radians, without a word": lambda: placed(lat=np.deg2rad(LATS).round(10), lon=np.deg2rad(LONS).round(10)),
+    "the integers of ArduPilot": ardupilot,
+    "quaternion from east": east_north_up,
+    "positions in one row of ten": renewed_each_second,
+    "UTM": lambda: text(log(T, {"t": "t", "psi": "HDG", "u": "u", "v": "v", "r": "ROT", "n": "RPM", "delta": "rudder"}).assign(
+        Northing=truth()["x"] + 5_760_000, Easting=truth()["y"] + 570_000)),
+    "a mark of comment before the heads": lambda: b"# " + text(log(T, PLAIN)),
+    "a footer": lambda: text(log(T, PLAIN)) + b"# end of log\n",
+    "german instruments": lambda: course(GERMAN),
+    "french instruments": lambda: course(FRENCH_TOO),
+    "spanish instruments": lambda: course(SPANISH_TOO),
+    "norwegian instruments": lambda: course(NORWEGIAN_TOO),
+}  # fmt: skip
+
+
 @pytest.fixture
 def there_and_back(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -143,6 +144,9 @@ def _of_one(column: Column, trust: float) -> Iterator[Time]:
 
 def _counted(column: Column, texts: list[str]) -> Iterator[tuple[str, str]]:
     """Formats of a column of numbers, with the reason."""
+    if all(re.fullmatch(r"(19|20)\d{12}", text) for text in texts):
+        yield "%Y%m%d%H%M%S", f"date and time of day in one number: {texts[0]}"
+        return
     middle, unit = float(np.median(column.known)), column.head.units.get("time")
     steps = np.abs(np.diff(column.known))
     for form, low, high in _SIZES:

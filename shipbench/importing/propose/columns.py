@@ -20,6 +20,8 @@ from .layout import Form, find_form
 _ROWS = 20_000
 _MARKS = ((".", ""), (",", ""), (".", ","), (",", "."), (".", " "), (",", " "), (".", "'"), (",", "'"))
 """Decimal and thousands marks, the usual ones first."""
+_GROUPING = {".": "[.]", ",": ",", " ": "[ \u00a0\u2009\u202f]", "'": "['\u2019]"}
+"""The characters that a thousands mark stands for, as the import reads them."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ def numbers(array: pa.Array, decimal: str, thousands: str) -> np.ndarray:
         text = pc.replace_substring(pc.utf8_trim_whitespace(array.cast(pa.string())), "\u2212", "-")
         good = pc.match_substring_regex(text, _pattern(decimal, thousands))
         text = pc.if_else(good, text, None)
-        text = pc.replace_substring(text, thousands, "") if thousands else text
+        text = pc.replace_substring_regex(text, _GROUPING[thousands], "") if thousands else text
         return pc.replace_substring(text, decimal, ".").cast(pa.float64()).to_numpy(zero_copy_only=False)
     if not (pa.types.is_integer(array.type) or pa.types.is_floating(array.type) or pa.types.is_decimal(array.type)):
         return np.full(len(array), np.nan)
@@ -136,7 +138,7 @@ def numbers(array: pa.Array, decimal: str, thousands: str) -> np.ndarray:
 
 
 def _pattern(decimal: str, thousands: str) -> str:
-    whole = r"\d+" + (rf"|\d{{1,3}}([{thousands}]\d{{3}})+" if thousands else "")
+    whole = r"\d+" + (rf"|\d{{1,3}}({_GROUPING[thousands]}\d{{3}})+" if thousands else "")
     return rf"^[-+]?(({whole})([{decimal}]\d*)?|[{decimal}]\d+)([eE][-+]?\d+)?$"
 
 

@@ -56,6 +56,10 @@ def examine(sample: Sample, time: Time, found: Assigned, extra: dict[str, Any]) 
     except (InputError, ValueError):  # the trial of the draft tells it
         return
     track = _track(series)
+    if track is not None and _in_radians(track, series, found):
+        channels = {e.channel: e.spec for e in found.entries.values() if not e.missing}
+        series = _series(sample, Source(time=time.spec, file=sample.file, channels=channels, **extra))
+        track = _track(series)
     if track is not None and "psi" in series:
         before = dict(found.entries["psi"].spec)
         _heading(track, series, found)
@@ -277,7 +281,22 @@ def _settle(entry: Entry, channel: str, ratio: float, what: str, found: Assigned
     elif fits:
         found.notes.append(f"NOT SURE: '{name}' says {entry.spec['unit']}; {what} says {unit}. The head is kept.")
     elif abs(np.log(abs(ratio) or 1e-9)) > 2 * _CLOSE:
-        found.notes.append(f"NOT SURE: '{name}' is 1/{abs(ratio):.3g} of what {what} says, which is no unit that is accepted.")
+        found.notes.append(f"NOT SURE: '{name}' and {what} differ by a factor of {abs(ratio):.3g}, which is no unit that is accepted.")
+
+
+def _in_radians(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned) -> bool:
+    """Take latitude and longitude in radians where only so the track is as fast as the recorded speed."""
+    pair = [found.entries[c] for c in ("lat", "lon") if c in found.entries]
+    channel = next((c for c in ("sog", "u") if c in series and c in found.entries and found.entries[c].columns[0].head.units), None)
+    if channel is None or len(pair) < 2 or any(e.spec["unit"] != "deg" or e.columns[0].head.units or "as given" in e.why for e in pair):
+        return False
+    ratio = float(np.median(np.abs(_at(track.t, *series[channel]))) / np.median(track.speed))
+    if abs(np.log(ratio * unit_factor("psi", "deg"))) > _CLOSE:
+        return False
+    for entry in pair:
+        entry.spec["unit"] = "rad"
+    found.notes.append("NOT SURE: latitude and longitude are taken in radians: only so the track is as fast as the recorded speed.")
+    return True
 
 
 def _clock_unit(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], time: Time, found: Assigned) -> None:

@@ -21,7 +21,7 @@ from .heads import read_head, units_of
 
 _LINES = 400
 _SIGN = "[-+\u2212]?"
-_NUMBER = rf"{_SIGN}(\d+([.,]\d*)?|[.,]\d+|\d{{1,3}}([ .,'\u00a0]\d{{3}})+([.,]\d+)?)([eE][-+]?\d+)?"
+_NUMBER = rf"{_SIGN}(\d+([.,]\d*)?|[.,]\d+|\d{{1,3}}([ .,'\u00a0\u2009\u202f\u2019]\d{{3}})+([.,]\d+)?)([eE][-+]?\d+)?"
 _DATE = r"\d{1,4}[-./]([A-Za-z]{3,9}|\d{1,2})[-./]\d{2,4}"
 _CLOCK = r"\d+:\d\d(:\d\d)?([.,]\d+)?( ?[AaPp][Mm])?"
 _STAMP = rf"({_CLOCK}|{_DATE}([T ]+{_CLOCK})?|{_CLOCK}[T ]+{_DATE}|\d+ days.*)( ?(Z|[+-]\d\d:?\d\d|[A-Z]{{3,4}}))?"
