@@ -30,6 +30,7 @@ class Counts:
     rows: int = 0
     what: Counter[str] = field(default_factory=Counter)
     doubtful: Counter[str] = field(default_factory=Counter)
+    reach: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     clock: list[str] = field(default_factory=list)
     forms: dict[str, str] = field(default_factory=dict)
@@ -76,7 +77,7 @@ class Cells:
     def unread(self, column: str, row: int, hint: str = "") -> InputError:
         """The error for a cell (rows of the batch from 0) that is no number."""
         cell = str(self._array(column)[row].as_py()).strip()
-        if not hint and self.first_row == self.top and row == 0:
+        if not hint and self.first_row == self.top and row == 0 and not any(c.isdigit() for c in cell):
             hint = " If the rows under the header are units or remarks, set [file] skip."
         return no_number(f"{self.path}, row {self.first_row + row}", column, cell, hint)
 

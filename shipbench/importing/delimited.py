@@ -20,6 +20,10 @@ from .tables import BLANKS, DELIMITERS, KINDS, TEXT_BLOCK, Table, check_number, 
 _NO_TEXT = ("idna", "punycode", "undefined", "unicode_escape", "raw_unicode_escape")
 """Codecs of Python that make text of text, not of a file's bytes."""
 _WIDE = ("utf-16", "utf-32")
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)  # fmt: skip
 _MOST_ODD = 1000
 _BEGINS_DATA = re.compile(r"\s*[\"']?[-+\u2212]?[.,]?\d")
 
@@ -148,12 +152,15 @@ def find_encoding(path: Path, head: bytes, layout: Layout) -> tuple[str, list[st
     Raises:
         InputError: the text is binary, or the mapping names no encoding of text.
     """
-    for mark, name in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
+    for mark, name in _MARKS:
         if head.startswith(mark):
             return name, []
     given = check_encoding(layout.encoding)
     if b"\0" in head and not given.startswith(_WIDE):
-        raise InputError(f"{path} is binary (it holds zero bytes), and of no known kind. Accepted: {KINDS}.")
+        raise InputError(
+            f"{path} is binary (it holds zero bytes), and of no known kind. Accepted: {KINDS}. "
+            'If it is text of two bytes a letter: [file] encoding = "utf-16-le".'
+        )
     if "encoding" in layout.model_fields_set or _decodes(head, given):
         return layout.encoding, []
     name = "cp1252" if _decodes(head, "cp1252") else "latin-1"

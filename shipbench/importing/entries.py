@@ -124,8 +124,8 @@ def channel_factor(name: str, channel: Channel) -> float:
 
 def _full_of(name: str) -> str:
     """An example of what 100 % means."""
-    value, unit = {"rad": ("35.0", "deg"), "rpm": ("120.0", "rpm"), "N": ("100.0", "kN")}.get(unit_of(name), ("1.0", unit_of(name)))
-    return f'the value at full deflection, such as full = {value}, full_unit = "{unit}"'
+    value, unit = {"rad": (35.0, "deg"), "rpm": (120.0, "rpm"), "N": (100.0, "kN")}.get(unit_of(name), (1.0, unit_of(name)))
+    return f'the value at full deflection, such as full = {value}, full_unit = "{unit}" (of %, the same as factor = {value / 100:g}, unit = "{unit}")'
 
 
 def check_channel(name: str, channel: Channel, path: str | Path) -> None:

@@ -14,6 +14,7 @@ CODES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "psi": ((511.0, _DEG, f"511 deg ({_AIS})"),),
     "cog": ((511.0, _DEG, f"511 deg ({_AIS})"), (360.0, _DEG, f"360 deg ({_AIS})")),
     "sog": ((102.3, _KNOT, f"102.3 kn ({_AIS})"),),
+    "u": ((102.3, _KNOT, f"102.3 kn ({_AIS})"),),
     "r": ((-128.0, _DEG / 60.0, f"-128 deg/min ({_AIS})"), (-731.386, _DEG / 60.0, f"-731 deg/min ({_AIS})")),
 }
 """Value, its unit in ours, in words: position reports of the AIS (ITU-R M.1371-5, table 48; -731 deg/min is the decoded -128), receivers without a
@@ -59,8 +60,8 @@ def not_available(name: str, readings: np.ndarray, factor: float) -> tuple[dict[
     sure = hits & beyond & (not counted_on)
     doubtful = np.zeros(len(values), bool)
     if name in _ORDERED:
-        far, alike = _far(values, others)
-        sure, doubtful = sure | (hits & far & (not alike)), hits & ~sure & far & alike
+        far, idle = _far(values, others)
+        sure, doubtful = sure | (hits & far & (not idle)), hits & ~sure & far & idle
     else:
         sure |= _unled(values, hits & ~sure, hits, name in ANGLES and not counted_on)
     masks = {words: mask & sure for words, mask in known.items()}
@@ -77,11 +78,12 @@ def _is_one_of(table: np.ndarray, values: np.ndarray, tolerance: float) -> np.nd
 
 
 def _far(values: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, bool]:
-    """(values farther from the others than these are from each other, whether the others are all alike)."""
+    """(values farther from the others than these are from each other, or from zero where all are alike; whether all others are zero)."""
     if not others.any():
         return np.zeros(len(values), bool), True
     low, high = values[others].min(), values[others].max()
-    return (values > high + (high - low)) | (values < low - (high - low)), bool(high == low)
+    span = high - low if high > low else abs(high)
+    return (values > high + span) | (values < low - span), bool(span == 0.0)
 
 
 def _unled(values: np.ndarray, hit: np.ndarray, suspect: np.ndarray, wraps: bool) -> np.ndarray:

@@ -150,6 +150,10 @@ class Summary:
         lines += [f"DOUBTFUL: {count} samples of {what}: outliers, or a wrong unit" for what, count in self.doubtful.items() if count]
         lines += [*self.met.clock[:_SHOWN], *([f"... and {len(self.met.clock) - _SHOWN} more of the clock"] if len(self.met.clock) > _SHOWN else [])]
         lines += [f"DOUBTFUL: {count} {what}" for what, count in self.met.doubtful.items() if count]
+        lines += [
+            f'{name} reaches {most:.4g} deg: taken as counted on over north. If it is in steps of 0.01 deg: unit = "cdeg"'
+            for name, most in self.met.reach.items()
+        ]
         lines += self.met.notes
         if self.part_length is not None:
             lines.append(f"densely sampled: parts of at most {self.part_length:g} s, to keep memory small")

@@ -30,9 +30,7 @@ def channel_values(cells: Cells, name: str, channel: Channel) -> np.ndarray:
     if channel.kinds[0] not in ARCS and channel.missing != []:
         columns = [_available(cells, name, readings, factor) for readings in columns]
         if name in ANGLES:
-            for readings in columns:
-                odd = beyond_a_turn(abs(factor) * readings)
-                cells.met.doubtful[f"readings of {name} jump beyond -180 to 360 deg: outliers, or a code to list in `missing`"] += int(odd.sum())
+            _tell_turns(cells, name, abs(factor) * np.concatenate(columns))
     circular = channel.kinds == ("mean",) and name in ANGLES
     readings = _mean_angle(columns, abs(factor)) if circular else _EXPRESSIONS[channel.kinds[0]](columns)
     values = factor * (readings + channel.offset - channel.neutral)
@@ -67,6 +65,15 @@ def _available(cells: Cells, name: str, readings: np.ndarray, factor: float) -> 
             f"readings of {name} are {value:.10g}, far from all others. If it stands for no reading: missing = [{value:.10g}] in channels.{name}"
         ] += int((readings == value).sum())
     return np.where(np.logical_or.reduce([np.zeros(len(readings), bool), *masks.values()]), np.nan, readings)
+
+
+def _tell_turns(cells: Cells, name: str, angles: np.ndarray) -> None:
+    """Angles [rad] beyond 360 degrees by more than a turn, for the summary: those that jump, and how far they go."""
+    odd = beyond_a_turn(angles)
+    cells.met.doubtful[f"readings of {name} jump beyond -180 to 360 deg: outliers, or a code to list in `missing`"] += int(odd.sum())
+    there = np.rad2deg(angles[np.isfinite(angles) & ~odd])
+    if len(there) and (there.max() > 720.0 or there.min() < -360.0):
+        cells.met.reach[name] = max(cells.met.reach.get(name, 0.0), float(np.abs(there).max()))
 
 
 def _mean_angle(columns: Sequence[np.ndarray], factor: float) -> np.ndarray:

@@ -37,6 +37,7 @@ def found(name: str, readings: list[float], factor: float) -> tuple[list[int], l
         ("x", [5, 10, -999, 15, 20], 1.0, [2]),
         ("u", [5.0, -999.0 * KNOT, 5.0], 1.0, [1]),
         ("n", [90, 92, -999, 90], 1.0, [2]),
+        ("n", [90, 90, -999, 90], 1.0, [2]),
         ("delta", [5, 10, 99.9, 327.67, 5], DEG, [2, 3]),
         ("depth", [20, -999, 20.5], 1.0, [1]),
     ],
@@ -63,7 +64,8 @@ def test_the_same_numbers_are_readings_where_the_others_lead_to_them(name, readi
 
 
 def test_a_fill_value_that_may_be_a_reading_is_doubtful():
-    assert found("n_c", [500, 500, 999, 500], 1.0) == ([], [2])
+    assert found("n_c", [500, 500, 999, 500], 1.0) == ([], [])
+    assert found("n_c", [0, 0, 999, 0], 1.0) == ([], [2])
 
 
 def test_headings_far_beyond_a_turn_are_told_from_headings_that_are_counted_on(trial_import):
@@ -77,6 +79,14 @@ def test_headings_far_beyond_a_turn_are_told_from_headings_that_are_counted_on(t
     table = logged(T)
     table.loc[40:42, "HDG"] = 872.5
     assert "DOUBTFUL: 3 readings of psi jump beyond -180 to 360 deg" in trial_import(table).stdout
+
+
+def test_a_heading_that_is_counted_on_is_read_and_its_reach_reported(trial_import):
+    table = logged(T)
+    table["HDG"] += 1080.0
+    told = trial_import(table).stdout
+    assert 'psi reaches 1298 deg: taken as counted on over north. If it is in steps of 0.01 deg: unit = "cdeg"' in told
+    assert "DOUBTFUL" not in told
 
 
 def test_headings_of_511_are_bridged_and_reported(trial_import):
