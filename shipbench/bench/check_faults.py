@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import check_plant as plant
+from . import check_plant_logging as logging
 from .check_plant import DEG, KNOT, Planting
 
 
@@ -55,6 +56,7 @@ FAULTS: tuple[Fault, ...] = (
     Fault("x east, y north", plant.swapped, _any("ENU")),
     Fault("ENU, v and r ours", plant.enu(1.0, 1.0), _any("ENU")),
     Fault("ENU, v to port, r to port", plant.enu(-1.0, -1.0), _any("ENU") + _of("sign", "delta")),
+    Fault("position reversed", plant.times(x=-1.0, y=-1.0), _any("position reversed")),
     Fault("heading from east", plant.from_east, _any("heading from east")),
     Fault("velocities north, east", plant.earth("u", "v"), _any("earth-fixed velocities")),
     Fault("velocities east, north", plant.earth("v", "u"), _any("earth-fixed velocities")),
@@ -77,6 +79,24 @@ FAULTS: tuple[Fault, ...] = (
     Fault("yaw rate bias, some runs", plant.plus(0.2, r=np.deg2rad(0.1)), _any("yaw rate bias"), size="0.1 deg/s in a fifth"),
     Fault("yaw rate 10 % high", plant.times(r=1.1), _of("scale", "r")),
     Fault("repeated positions", plant.repeated, _any("repeated samples"), size="5 % of samples"),
+    Fault("held fixes", logging.held_fixes, _of("held fixes", "x", "y"), size="one in five samples"),
+    Fault(
+        "heading placeholder",
+        logging.placeholder("psi", np.deg2rad(511.0)),
+        _of("placeholder", "psi"),
+        size="511 deg, 8 s",
+        also=("wrapped heading",),
+    ),
+    Fault("speed placeholder", logging.placeholder("u", 102.3 / KNOT), _of("placeholder", "u"), size="102.3 kn, 8 s"),
+    Fault(
+        "heading interpolated",
+        logging.interpolated_north,
+        _any("interpolated across north"),
+        size="from every third sample",
+        also=("wrapped heading",),
+    ),
+    Fault("clock set back", logging.clock_set(6.0), _any("clock step"), size="6 s in a turn", also=("jump",)),
+    Fault("clock set ahead", logging.clock_ahead(6.0), _any("clock step"), size="6 s in a gap of 10 s", also=("gap",)),
     Fault("frozen yaw rate", plant.frozen("r"), _of("frozen", "r"), size="15 s"),
     Fault("frozen heading", plant.frozen("psi"), _of("frozen", "psi"), size="15 s"),
     Fault("frozen position", plant.frozen("x", "y"), _of("frozen", "x", "y"), size="15 s", also=("jump",)),

@@ -9,13 +9,17 @@ from ..records import Dataset
 from ..registry import Registry
 from ..signals import STATES
 from .finding import SEVERITIES, Finding
-from .gross import mend
+from .gross import mend as mend_gross
+from .held import mend_held
+from .north import mend_north
+from .placeholders import mend_placeholders
 from .reading import read_recording
 from .recording import Recording
 
-_HELPERS = frozenset(
-    {"applying", "base", "finding", "gross", "reading", "recording", "rudder_side", "selection", "statistics", "track", "units", "wind_reading"}
-)
+_HELPERS = frozenset({
+    "applying", "base", "finding", "gross", "held", "north", "placeholders", "reading", "recording", "rudder_side", "selection", "statistics",
+    "track", "units", "wind_reading",
+})  # fmt: skip
 CHECKS = Registry("check", "checking", "CHECK", helpers=_HELPERS, group="checks")
 
 
@@ -27,7 +31,10 @@ def _checks() -> tuple[Callable[[Recording], list[Finding]], ...]:
 def check_recording(recording: Recording) -> list[Finding]:
     """Findings of the gross checks, then those of every other on the data with the gross errors taken out; errors first. None is about a channel
     that import made of others: it is as good as these."""
-    mended, found = mend(recording)
+    mended, found = recording, []
+    for mend in (mend_placeholders, mend_north, mend_held, mend_gross):
+        mended, more = mend(mended)
+        found += more
     for check in _checks():
         found += check(mended)
     found = [f for f in found if not f.channels or not set(f.channels) <= set(recording.dataset.derived)]

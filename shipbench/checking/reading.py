@@ -45,12 +45,15 @@ def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
     notes = list(description.notes)
     inputs = complete_columns(table, notes)
     frames = {str(name): rows.drop(columns="trajectory").reset_index(drop=True) for name, rows in table.groupby("trajectory", sort=False)}
-    frames = {name: _ordered(name, rows, found) for name, rows in frames.items()}
+    ordered = {name: _ordered(name, rows, found) for name, rows in frames.items()}
+    frames = {_part(name, number): part for name, parts in ordered.items() for number, part in enumerate(parts, 1)}
+    owner = {_part(name, number): name for name, parts in ordered.items() for number in range(1, len(parts) + 1)}
     dt = _sample_time(frames, description, found)
     _missing_values(frames, description, recorded, found)
     _time_steps(frames, description, dt, found)
-    wrapped = tuple(name for name, rows in frames.items() if _unwrap(rows))
-    runs, parent = _runs(frames, description, inputs, dt, str(where), found)
+    turn = _turn(frames)
+    wrapped = tuple(name for name, rows in frames.items() if np.any(np.abs(_heading_steps(rows)) > 0.5 * turn))
+    runs, parent = _runs(frames, owner, description, inputs, dt, turn, str(where), found)
     if not runs:
         empty = [c for c in ("t", *SIGNALS) if c in table and not np.isfinite(table[c]).any()]
         without = f" Without a single number: {', '.join(empty)}." if empty else ""
@@ -60,7 +63,7 @@ def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
         licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)), derived=tuple(description.derived),
     )  # fmt: skip
     turned = description.velocities.startswith("earth") or bool(description.from_course)
-    return Recording(dataset, read_toml(folder / "dataset.toml"), recorded, wrapped, parent, turned), found
+    return Recording(dataset, read_toml(folder / "dataset.toml"), recorded, wrapped, parent, turned, turn), found
 
 
 def _error(
@@ -109,19 +112,28 @@ def _possible(table: pd.DataFrame, where: str) -> None:
             raise InputError(f"{message} Leave the cell empty where the sensor gave nothing.")
 
 
-def _ordered(name: str, rows: pd.DataFrame, found: list[Finding]) -> pd.DataFrame:
-    """Rows in order of time, one per time."""
+def _part(name: str, number: int) -> str:
+    return name if number == 1 else f"{name} (part {number})"
+
+
+def _ordered(name: str, rows: pd.DataFrame, found: list[Finding]) -> list[pd.DataFrame]:
+    """Rows in order of time, one per time; in parts where sorting would mix two recordings, because the clock was set back between them."""
     t = rows["t"].to_numpy()
     known = np.isfinite(t)
-    back = np.flatnonzero(np.diff(t[known]) <= 0.0)
-    if len(back):
-        k = int(back[0])
-        message = f"run '{name}': t does not grow in {len(back)} steps, the first from {t[known][k]:g} s to {t[known][k + 1]:g} s."
-        found.append(
-            _error("time runs back", message, todo="Sort the rows, remove those that stand twice, or name two runs.", runs=(name,), steps=len(back))
-        )
-        rows = rows.sort_values("t", kind="stable").drop_duplicates("t")
-    return rows.reset_index(drop=True)
+    steps = np.diff(t[known])
+    back = np.flatnonzero(steps <= 0.0)
+    if not len(back):
+        return [rows.reset_index(drop=True)]
+    k = int(back[0])
+    message = f"run '{name}': t does not grow in {len(back)} steps, the first from {t[known][k]:g} s to {t[known][k + 1]:g} s."
+    todo = "Sort the rows, remove those that stand twice, or name two runs."
+    parts = [rows.sort_values("t", kind="stable").drop_duplicates("t")]
+    if np.min(np.diff(rows[known].drop_duplicates()["t"].sort_values().to_numpy()), initial=np.inf) < 0.5 * float(np.median(steps)):
+        parts = [part.drop_duplicates("t") for _, part in rows[known].groupby(np.cumsum(np.concatenate([[0], steps < 0.0])))]
+        message += f" The clock was set back by {float(np.median(steps)) - steps[k]:.3g} s there: the same times stand with other values."
+        todo = "Give the rows after it a run name of their own."
+    found.append(_error("time runs back", message, todo=todo, runs=(name,), steps=len(back)))
+    return [part.reset_index(drop=True) for part in parts]
 
 
 def _sample_time(frames: dict[str, pd.DataFrame], description: Description, found: list[Finding]) -> float:
@@ -198,34 +210,32 @@ def _time_steps(frames: dict[str, pd.DataFrame], description: Description, dt: f
         )
 
 
-def _unwrap(rows: pd.DataFrame) -> bool:
-    """Make the heading continuous, in rad or in degrees that nobody declared; True where it was wrapped."""
-    psi = rows["psi"].to_numpy(copy=True)
-    known = np.isfinite(psi)
-    steps = np.abs(np.diff(psi[known]))
-    if not (steps > np.pi).any():
-        return False
-    period = 2.0 * np.pi if np.max(steps) < 4.0 * np.pi else 360.0
-    wrapped = bool((steps > 0.5 * period).any())
-    psi[known] = np.unwrap(psi[known], period=period)
-    rows["psi"] = psi
-    return wrapped
+def _turn(frames: dict[str, pd.DataFrame]) -> float:
+    """A whole turn of the headings as they stand: 2 pi, or 360 where they jump by more than two turns (degrees that nobody declared)."""
+    most = max((np.max(np.abs(_heading_steps(rows)), initial=0.0) for rows in frames.values()), default=0.0)
+    return 360.0 if most > 4.0 * np.pi else 2.0 * np.pi
+
+
+def _heading_steps(rows: pd.DataFrame) -> np.ndarray:
+    return np.asarray(np.diff(rows["psi"].dropna().to_numpy()))
 
 
 def _runs(
-    frames: dict[str, pd.DataFrame], description: Description, inputs: tuple[str, ...], dt: float, where: str, found: list[Finding]
-) -> tuple[list[Run], dict[str, str]]:
-    """Whole pieces of every run, and which run each is a piece of."""
+    frames: dict[str, pd.DataFrame], owner: dict[str, str], description: Description, inputs: tuple[str, ...], dt: float, turn: float, where: str,
+    found: list[Finding],
+) -> tuple[list[Run], dict[str, str]]:  # fmt: skip
+    """Whole pieces of every run, and which run each is a piece of; owner: name of a frame -> the run's."""
     runs, parent = [], {}
     tolerant = description.model_copy(update={"gaps": "split"})
     for name, rows in frames.items():
-        own, meta = split_meta(name, description.runs.get(name, {}), where)
-        pieces = correct_run(rows, tolerant, own, dt, f"{where}: run '{name}'", unwrap=False)
+        own, meta = split_meta(owner[name], description.runs.get(owner[name], {}), where)
+        pieces = correct_run(rows, tolerant, own, dt, f"{where}: run '{name}'", turn)
         if not pieces:
             message = f"run '{name}' has no two samples in a row with all values ({len(rows)} rows)."
             found.append(_error("empty run", message, todo="Remove the run from the table.", runs=(name,)))
         for i, part in enumerate(pieces, 1):
             run = name if len(pieces) == 1 else f"{name}#{i}"
-            runs.append(Run(run, part["t"].to_numpy(), part[list(STATES)].to_numpy(), part[list(inputs)].to_numpy(), inputs, {"group": name, **meta}))
-            parent[run] = name
+            meta = {"group": owner[name], **meta}
+            runs.append(Run(run, part["t"].to_numpy(), part[list(STATES)].to_numpy(), part[list(inputs)].to_numpy(), inputs, meta))
+            parent[run] = owner[name]
     return runs, parent

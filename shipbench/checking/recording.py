@@ -10,6 +10,7 @@ import numpy as np
 
 from ..records import Dataset, Run
 from ..signals import STATES, R, U, V
+from .statistics import stretches
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +20,7 @@ class Recording:
     dataset: runs without missing values, uniform in time (pieces of one run share the group `parent`). given: dataset.toml as written, {} for a
     registered set. recorded: columns that stand in the table (states that were filled in do not). wrapped: runs whose heading was wrapped.
     parent: id of a piece -> id of the run that it is a piece of. turned: u, v were velocities over ground, turned into the ship's axes by psi: the
-    track says nothing of psi.
+    track says nothing of psi. turn: a whole turn in the unit of psi (degrees that nobody declared are read as they are).
     """
 
     dataset: Dataset
@@ -28,6 +29,7 @@ class Recording:
     wrapped: tuple[str, ...] = ()
     parent: dict[str, str] = field(default_factory=dict)
     turned: bool = False
+    turn: float = 2.0 * np.pi
 
     @property
     def runs(self) -> tuple[Run, ...]:
@@ -71,6 +73,20 @@ class Recording:
 
     def names(self, runs: Any) -> tuple[str, ...]:
         return tuple(dict.fromkeys(self.name_of(run) for run in runs))
+
+    def without(self, bad: dict[str, np.ndarray]) -> Recording:
+        """The recording without samples, bad[run id] (samples,), split there as a cut would."""
+        runs, parent = [], dict(self.parent)
+        for run in self.runs:
+            pieces = stretches(~bad[run.id]) if run.id in bad else [(0, len(run))]
+            for number, (a, b) in enumerate(pieces, 1):
+                if len(pieces) == 1 and b - a == len(run):
+                    runs.append(run)
+                elif b - a >= 2:
+                    piece, name = f"{run.id}/{number}", self.name_of(run)
+                    runs.append(Run(piece, run.t[a:b], run.states[a:b], run.inputs[a:b], run.inputs_names, {"group": name, **run.meta}))
+                    parent[piece] = name
+        return replace(self, dataset=self.dataset.with_runs(runs), parent=parent)
 
     def with_dataset(self, dataset: Dataset) -> Recording:
         return replace(self, dataset=dataset)

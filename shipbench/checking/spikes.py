@@ -14,12 +14,15 @@ import numpy as np
 from ..records import Run
 from ..signals import DELTA, PSI, STATES, N, R, U, V, X, Y
 from .actuators import check as command_like
+from .clock_steps import clock_finding
+from .clock_steps import set_back as clock_set_back
 from .finding import Curve, Finding, Picture, labelled, toml_line
 from .recording import Recording
 from .statistics import some, spread, times
 
 _FAR, _NEIGHBOURS = 8.0, 6.0
 _JUMP = 10.0
+_PLACES = ((X, Y), (PSI,))
 _LEAST = {X: 0.01, Y: 0.01, PSI: 0.01}
 """Least spike or jump: of the length of the ship, and rad."""
 _LEAST_SHARE = 0.03
@@ -137,29 +140,51 @@ def _spikes(recording: Recording, channel: int, by_run: dict[str, np.ndarray]) -
 
 
 def _jumps(recording: Recording) -> list[Finding]:
-    """Steps of position less integrated speeds, and of heading less integrated yaw rate, that stay."""
+    """Steps of position less integrated speeds, and of heading less integrated yaw rate, that stay; both at once along the motion: the clock's."""
     levels = {run.id: _levels(recording, run) for run in recording.runs if len(run) >= 9}
-    states = {run.id: run.states for run in recording.runs}
-    found = []
-    for channels in ((X, Y), (PSI,)):
-        combined = {k: each[X] + 1j * each[Y] if X in channels else each[PSI] + 0j for k, each in levels.items()}
-        if not combined:
-            continue
-        steps = np.concatenate([np.diff(v) for v in combined.values()])
-        noise = float(np.hypot(spread(steps.real), spread(steps.imag)))
-        limit = max(_JUMP * noise, 2.0 * _least(recording, channels[0], []))
-        at = {
-            name: places
-            for name, v in combined.items()
-            if (
-                places := [
-                    int(k) for k in np.flatnonzero(_steps(v, states[name], channels[0]) > limit) if abs(_level_change(v, int(k))) > 0.6 * limit
-                ]
-            )
-        }
-        if at:
-            found.append(_jump(recording, channels, at, combined))
+    combined = {channels: {k: _combined(each, channels) for k, each in levels.items()} for channels in _PLACES}
+    at = {channels: _places(recording, channels, combined[channels]) for channels in _PLACES if levels}
+    set_back: dict[tuple[str, int], float] = {}
+    for run in recording.runs if at else ():
+        for k in set.intersection(*(set(places.get(run.id, ())) for places in at.values())):
+            leap, turned = (_level_change(combined[channels][run.id], k) for channels in _PLACES)
+            if (seconds := clock_set_back(run, k, leap, turned.real)) is not None:
+                set_back[run.id, k] = seconds
+    found = [clock_finding(recording, set_back)] if set_back else []
+    for channels, places in at.items():
+        left = {name: rest for name, ks in places.items() if (rest := [k for k in ks if (name, k) not in set_back])}
+        found += [_jump(recording, channels, left, combined[channels])] if left else []
     return found
+
+
+def _combined(each: dict[int, np.ndarray], channels: tuple[int, ...]) -> np.ndarray:
+    return np.asarray(each[X] + 1j * each[Y] if X in channels else each[PSI] + 0j)
+
+
+def _places(recording: Recording, channels: tuple[int, ...], levels: dict[str, np.ndarray]) -> dict[str, list[int]]:
+    """Run id -> last samples before the jumps of position or heading."""
+    steps = np.concatenate([np.diff(v) for v in levels.values()])
+    noise = float(np.hypot(spread(steps.real), spread(steps.imag)))
+    limit = max(_JUMP * noise, 2.0 * _least(recording, channels[0], []))
+    made = {"u", "v"} if X in channels else {"r"}
+    found = {}
+    for run in recording.runs:
+        if run.id not in levels:
+            continue
+        v, size = levels[run.id], _steps(levels[run.id], run.states, channels[0])
+        if made & set(recording.dataset.derived):  # rates smoothed of this very record lag behind a sharp turn: a jump stands out by itself
+            size = np.minimum(size, _beside(run.states, channels))
+        places = [int(k) for k in np.flatnonzero(size > limit) if abs(_level_change(v, int(k))) > 0.6 * limit]
+        if places:
+            found[run.id] = places
+    return found
+
+
+def _beside(S: np.ndarray, channels: tuple[int, ...]) -> np.ndarray:
+    """(samples - 1,): by how much each step of the record differs from the nearer of the steps beside it; 0 at the ends."""
+    d = np.diff(S[:, list(channels)], axis=0)
+    off = np.minimum(*(np.linalg.norm(d[1:-1] - other, axis=1) for other in (d[:-2], d[2:])))
+    return np.concatenate([[0.0], off, [0.0]])
 
 
 def _steps(v: np.ndarray, S: np.ndarray, channel: int) -> np.ndarray:

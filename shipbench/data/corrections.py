@@ -55,7 +55,8 @@ class Corrections(BaseModel):
     "apparent-north" (as felt on board, from north), "true-bow" (the true wind, its direction from the bow). antenna: [forward, starboard] m from
     midship of the point whose position is recorded. gaps: "refuse", or "split" runs at gaps in time and at rows that lack values. scale: recorded
     over true. bias: recorded less true. delay: s by which the record of a signal is late; "velocity" is the vector of u and v in earth axes (late or
-    filtered there, then turned by the heading of the moment).
+    filtered there, then turned by the heading of the moment). held: x, y or psi whose values a faster record repeats until the next one; straight
+    lines from value to value take their place.
     """
 
     frame: Literal["NED", "ENU", "east-north"] = "NED"
@@ -67,6 +68,7 @@ class Corrections(BaseModel):
     scale: dict[str, Number] = {}
     bias: dict[str, Number] = {}
     delay: dict[str, Number] = {}
+    held: list[Literal["x", "y", "psi"]] = []
 
 
 def check_names(corrections: Corrections, runs: dict[str, dict[str, Any]], where: str) -> None:
@@ -115,10 +117,12 @@ def to_ned(table: pd.DataFrame, corrections: Corrections) -> None:
         table["psi"] = 0.5 * np.pi - table["psi"]
 
 
-def correct_run(frame: pd.DataFrame, corrections: Corrections, own: RunCorrections, dt: float, where: str, unwrap: bool = True) -> list[pd.DataFrame]:
+def correct_run(
+    frame: pd.DataFrame, corrections: Corrections, own: RunCorrections, dt: float, where: str, turn: float = 2.0 * np.pi
+) -> list[pd.DataFrame]:
     """One run's rows, corrected, in as many pieces as cuts and gaps make of it (samples may still be faulty: the caller refuses them).
 
-    unwrap: make the heading continuous (not where it may not be in rad yet).
+    turn: a whole turn of the heading, which is made continuous: 360 where it may not be in rad yet.
 
     Raises:
         InputError: a fill has no samples to stand on, velocities through water lack their current, or a kind of wind its columns.
@@ -126,13 +130,16 @@ def correct_run(frame: pd.DataFrame, corrections: Corrections, own: RunCorrectio
     frame = frame.reset_index(drop=True).copy()
     t = frame["t"].to_numpy()
     psi = frame["psi"].to_numpy(copy=True)
-    known = np.isfinite(psi)
-    if unwrap and (np.abs(np.diff(psi[known])) > np.pi).any():  # a continuous heading keeps its bits
-        psi[known] = np.unwrap(psi[known])
+    known = np.isfinite(psi) & ~_inside(t, own.fill.get("psi", []))
+    if (np.abs(np.diff(psi[known])) > 0.5 * turn).any():  # a continuous heading keeps its bits
+        psi[known] = np.unwrap(psi[known], period=turn)
         frame["psi"] = psi
     for signal, intervals in own.fill.items():
         if signal in frame:
             _fill(frame, signal, t, intervals, where)
+    for signal in corrections.held:
+        known = np.isfinite(frame[signal].to_numpy())
+        frame.loc[known, signal] = between_fixes(frame[signal].to_numpy()[known])
     for signal, bias in {**corrections.bias, **own.bias}.items():
         if signal in frame:
             frame[signal] -= bias
@@ -177,6 +184,22 @@ def _fill(frame: pd.DataFrame, signal: str, t: np.ndarray, intervals: list[tuple
         raise InputError(f"{where}: fill of {signal} covers the whole run; leave the run out instead.")
     values[bad] = np.interp(t[bad], t[good], values[good])
     frame[signal] = values
+
+
+def between_fixes(values: np.ndarray) -> np.ndarray:
+    """Straight lines from fix to fix of a record (samples,) that holds each value until the next; one held for long did not change."""
+    if len(values) < 2:
+        return values
+    new = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1])
+    every = max(1, round(float(np.median(np.diff(new))))) if len(new) > 1 else 1
+    still = new[1:][np.diff(new) > 1.5 * every] - every  # the last fix before the value changes again
+    at = np.unique(np.concatenate([new, still]))
+    rest = np.arange(len(values))
+    bridged = np.interp(rest, at, values[at])
+    if len(at) > 1 and len(values) - 1 - at[-1] < every:  # after the last fix it goes on as before
+        slope = (values[at[-1]] - values[at[-2]]) / (at[-1] - at[-2])
+        bridged[at[-1] :] = values[at[-1]] + slope * (rest[at[-1] :] - at[-1])
+    return np.asarray(bridged)
 
 
 def _to_body_over_ground(frame: pd.DataFrame, corrections: Corrections, own: RunCorrections, where: str) -> None:

@@ -6,7 +6,7 @@ import fnmatch
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from .channels import all_channels, read_blocks
 from .clock import is_absolute
 from .fixes import fixes_only
 from .mapping import Mapping, Source
+from .north import without_interpolated
 from .ordering import in_order
 from .recordings import onward, parts, read_recordings
 from .runs import Piece, on_grid, outliers, shortest_run, windows, without_standing
@@ -222,7 +223,9 @@ def _runs(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator
             summary.cut("shorter than dt", stretch.end - stretch.start)
             continue
         _check_step(mapping, stretches.steps)
-        samples = on_grid(stretch, mapping, ship)
+        series, made_up = without_interpolated(stretch.series)
+        summary.interpolated += made_up
+        samples = on_grid(replace(stretch, series=series), mapping, ship)
         for moving in _told(without_standing(samples, mapping), len(samples.t), mapping, summary):
             for piece in windows(moving, mapping):
                 length = (len(piece.t) - 1) * dt

@@ -36,6 +36,7 @@ class Summary:
         self.scatter: dict[str, list[float]] = {}
         self.met = Counts()
         self.doubtful: Counter[str] = Counter()
+        self.interpolated = 0
         self.part_length: float | None = None
         self._before: list[str] = []  # runs of the last stretch before the clock was set back
         self._last: list[str] = []
@@ -154,6 +155,8 @@ class Summary:
             f'{name} reaches {most:.4g} deg: taken as counted on over north. If it is in steps of 0.01 deg: unit = "cdeg"'
             for name, most in self.met.reach.items()
         ]
+        if self.interpolated:
+            lines.append(f"{self.interpolated} headings were interpolated linearly across 360/0 (359, 240, 120, 1): left out")
         lines += self.met.notes
         if self.part_length is not None:
             lines.append(f"densely sampled: parts of at most {self.part_length:g} s, to keep memory small")
