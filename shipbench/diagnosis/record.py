@@ -92,8 +92,8 @@ def refuse_contradictions(dataset: Dataset) -> None:
             one, other = (float(np.median(np.abs(values[against]))) for values in (made, said))
             raise InputError(
                 f"data set '{dataset.name}' contradicts itself, so nothing is fitted. In {np.sum(against)} of {np.sum(moving)} pieces {what} by "
-                f"{one:.3g} {unit} where {by} {other:.3g} {unit}, or another way. Accepted: 0.3 to 3.4 times as much, the same way. Correct the unit, "
-                f"sign or column of {channels}, or the unit of t, in dataset.toml. Look with: shipbench data check FOLDER."
+                f"{one:.3g} {unit} where {by} {other:.3g} {unit}, or another way. Accepted: 0.3 to 3.4 times as much, the same way. "
+                f"Correct the unit, sign or column of {channels}, or the unit of t, in dataset.toml. Look with: shipbench data check FOLDER."
             )
 
 
