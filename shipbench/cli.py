@@ -90,6 +90,7 @@ def run(
     scheduler: Annotated[str | None, typer.Option(help="Address of the Dask scheduler, such as tcp://host:8786.")] = None,
     time_limit: Annotated[float | None, typer.Option(help="Most seconds for one cell (fit and prediction); beyond, it fails.")] = None,
     memory_limit: Annotated[float | None, typer.Option(help="Most GB of memory for one cell; beyond, it fails.")] = None,
+    wait: Annotated[float | None, typer.Option(help="Most seconds without Dask workers; then the study stops (default: it waits).")] = None,
     device: Device = None,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -107,7 +108,7 @@ def run(
         "models": model or None, "datasets": dataset or None, "folds": folds, "split": split, "seeds": parse_seeds(seeds),
         "horizon_s": horizon, "history_s": history, "stride_s": stride, "max_runs": max_runs,
     }  # fmt: skip
-    execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit), device)
+    execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit), device, wait)
     tasks = load_tasks(config, overrides)
     folder = out or Path("runs") / (Path(config).stem if config else file_name(Path(tasks[0].dataset).name))
     outcome = run_tasks(tasks, folder, resume=resume, execution=execution, progress=make_progress(quiet), command=str(ctx.obj))

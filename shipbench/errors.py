@@ -21,6 +21,14 @@ class WorkError(ShipbenchError):
     """The work itself failed on valid input (exit code 1, or a `failed` row in a study)."""
 
 
+def unknown_parameter(owner: str, name: str, names: Iterable[str]) -> InputError:
+    """Return the error for a parameter that `owner` does not have, with the nearest match and all that it has."""
+    known = sorted(names)
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    return InputError(f"{owner} has no parameter '{name}'.{hint} Accepted: {', '.join(known) or 'none'}.")
+
+
 def unknown_name(kind: str, name: str, names: Iterable[str]) -> InputError:
     """Return the error for a name that is not registered, with the nearest match and the full list."""
     known = sorted(names)

@@ -11,7 +11,10 @@ from typing import Any
 
 from .errors import InputError
 
-_PARAMS = r"\[[^\[\]]*\]"
+_PARAMS = r"\[(?:[^\[\]]|\[[^\[\]]*\])*\]"
+"""A bracket, which may hold lists: [hidden_layer_sizes=[20,20],max_iter=30]."""
+_ITEM = re.compile(r"(?:[^,\[\]()]|\[[^\[\]]*\]|\([^()]*\))+")
+"""What stands between two commas of a bracket; a list in brackets or parentheses holds commas of its own."""
 _TAIL = rf"(?P<tail>(\+[^\[\]+]+({_PARAMS})?)*)"
 _FILE = re.compile(rf"(?P<base>[^\[\]]+\.py:\w+)(?P<params>{_PARAMS})?{_TAIL}")
 _NAME = re.compile(rf"(?P<base>[^\[\]+]+)(?P<params>{_PARAMS})?{_TAIL}")
@@ -39,24 +42,30 @@ class Spec:
     @property
     def seeds(self) -> list[int] | None:
         """The seed that the spec itself fixes, if any."""
-        return [int(self.params["seed"])] if "seed" in self.params else None
+        return [self.params["seed"]] if "seed" in self.params else None
 
 
 def _value(text: str) -> Any:
+    """A number, true, false, null, a list of them such as [20,20] or (20,20), or else the text itself."""
+    if text.startswith("(") and text.endswith(")"):
+        return [_value(item.strip()) for item in text[1:-1].split(",") if item.strip()]
     try:
         return json.loads(text)
-    except json.JSONDecodeError:
+    except (ValueError, RecursionError):
         return text
 
 
 def _params(text: str, bracket: str | None) -> dict[str, Any]:
     """What stands in a bracket, `[key=value,key=value]`."""
     params: dict[str, Any] = {}
-    for item in filter(None, (bracket or "[]")[1:-1].split(",")):
+    for item in _ITEM.findall((bracket or "[]")[1:-1]):
         key, sep, value = item.partition("=")
         if not sep or not key.strip():
             raise InputError(f"model spec '{text}': parameter '{item}' has no value; write name[key=value,key=value].")
         params[key.strip()] = _value(value.strip())
+    seed = params.get("seed", 0)
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**32:
+        raise InputError(f"model spec '{text}': seed = {seed}; accepted: a whole number from 0 to {2**32 - 1}.")
     return params
 
 

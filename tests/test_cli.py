@@ -191,7 +191,7 @@ def test_validate_prints_every_row_and_fails_when_one_is_outside(cli, monkeypatc
     ("arguments", "message"),
     [
         (["run", "-m", "hld", "-d", "toyset"], r"unknown predictor 'hld'. Did you mean 'hold'?"),
-        (["run", "-m", "hold[size=2]", "-d", "toyset"], r"unknown parameter of 'hold' 'size'"),
+        (["run", "-m", "hold[size=2]", "-d", "toyset"], r"'hold' has no parameter 'size'"),
         (["run", "-m", "hold", "-d", "harbor90"], r"'harbor90'. Did you mean 'harbour90'?"),
         (["run", "-m", "hold", "-d", "toyset", "--horizon", "500"], "the longest run 'r00' has 41. Shorten the horizon"),
         (["run", "-m", "hold", "-d", "toyset", "--horizon", "20", "--folds", "7"], "has 6 runs; give at most 6 folds"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import ctypes
 import logging
+import math
 import pickle
 import platform
 import sys
@@ -27,6 +28,7 @@ NAMES = ("local", "processes", "dask")
 CONNECT_S = 5.0
 """A scheduler that does not answer within this time [s] is not there."""
 
+_MOST_WORKERS = 4096
 _GO_ON = "What is finished is kept; run the same command again with --resume."
 
 
@@ -42,6 +44,8 @@ class Execution:
         limits: of each cell.
         device: where networks train and predict ("cpu", "cuda", "cuda:1"); None: where their specs say, else on the CPU.
 
+        wait_s: give up when the Dask cluster has had no workers for so long [s]; None: wait for them.
+
     Raises:
         InputError: an unknown executor, an option that it lacks or does not take, or a device that is not here (with Dask, each worker looks itself).
     """
@@ -51,6 +55,7 @@ class Execution:
     scheduler: str | None = None
     limits: Limits = field(default_factory=Limits)
     device: str | None = None
+    wait_s: float | None = None
 
     def __post_init__(self) -> None:
         if self.executor not in NAMES:
@@ -58,17 +63,20 @@ class Execution:
         if self.workers is not None and self.executor != "processes":
             hint = "its workers are those of the cluster" if self.executor == "dask" else "give --executor processes"
             raise InputError(f"--workers {self.workers} does not belong to --executor {self.executor}: {hint}.")
-        if self.workers is not None and self.workers < 1:
-            raise InputError(f"--workers {self.workers}; accepted: 1 or more.")
+        if self.workers is not None and not 1 <= self.workers <= _MOST_WORKERS:
+            raise InputError(f"--workers {self.workers}; accepted: 1 or more, at most {_MOST_WORKERS}.")
         if self.executor == "dask" and not self.scheduler:
             raise InputError("--executor dask needs --scheduler, the address of a running Dask scheduler, such as --scheduler tcp://host:8786.")
         if self.executor != "dask" and self.scheduler:
             raise InputError(f"--scheduler {self.scheduler} belongs to --executor dask, not to --executor {self.executor}.")
         if self.device is not None:
             check_device(self.device, here=self.executor != "dask")
-        for option, value in (("--time-limit", self.limits.seconds), ("--memory-limit", self.limits.memory_gb)):
-            if value is not None and not value > 0:
-                raise InputError(f"{option} {value:g}; accepted: more than 0.")
+        if self.wait_s is not None and self.executor != "dask":
+            raise InputError(f"--wait {self.wait_s:g} belongs to --executor dask, not to --executor {self.executor}.")
+        options = (("--time-limit", self.limits.seconds), ("--memory-limit", self.limits.memory_gb), ("--wait", self.wait_s))
+        for option, value in options:
+            if value is not None and not 0 < value < math.inf:
+                raise InputError(f"{option} {value:g}; accepted: more than 0, and finite.")
 
 
 class Workers(ABC):
@@ -79,6 +87,10 @@ class Workers(ABC):
 
     def __init__(self, executor: Executor, room: int | None, about: str = "") -> None:
         self.executor, self.room, self.about, self.sends_files = executor, room, about, False
+
+    def missing(self) -> str:
+        """What must come before a job can go on, "" where nothing is missing."""
+        return ""
 
     @abstractmethod
     def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
@@ -140,6 +152,13 @@ class _Dask(Workers):
     def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
         data = [self._shared(fold) for fold in folds]
         return self.executor.submit(_on_dask, job, self.limits, thread_settings(), *data)
+
+    def missing(self) -> str:
+        """Workers, where the cluster has none."""
+        if self.client.scheduler_info(n_workers=-1)["workers"]:
+            return ""
+        address = self.client.scheduler.address
+        return f"no workers at {address}; start one with `dask worker {address}`"
 
     def _shared(self, fold: FoldData) -> Any:
         """As a task of the cluster, not as data scattered to it: the scheduler gives it to another worker where one is lost."""

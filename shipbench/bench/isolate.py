@@ -73,10 +73,15 @@ def call_isolated(
     with tempfile.TemporaryDirectory(prefix="shipbench-") as scratch:
         environment = {name: value for name, value in os.environ.items() if name not in THREADS}
         environment |= {**threads, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "TMPDIR": scratch}
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-c", f"from {supervise.__name__} import main; main({alive})"],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=[alive], start_new_session=True, env=environment,
-        )  # fmt: skip
+        try:
+            process = subprocess.Popen(
+                [sys.executable, "-P", "-c", f"from {supervise.__name__} import main; main({alive})"],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=[alive], start_new_session=True, env=environment,
+            )  # fmt: skip
+        except OSError as error:
+            os.close(alive)
+            os.close(held)
+            return None, f"no process of its own can be started: {error.strerror}"
         _running.add(process)
         try:
             question = b"".join(pickle.dumps(part) for part in ((function, len(parts)), *parts))

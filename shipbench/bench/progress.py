@@ -10,25 +10,30 @@ from ..names import shown
 
 
 class Progress(Protocol):
-    """What the runner tells: `total` cells; which model is being worked on; each cell as it ends."""
+    """What the runner tells: `total` cells; which model is being worked on; each cell as it ends; what is wrong meanwhile."""
 
     def start(self, total: int) -> None: ...
 
     def working(self, label: str) -> None: ...
 
     def done(self, label: str, outcome: str) -> None: ...
+
+    def warn(self, text: str) -> None: ...
 
     def finish(self) -> None: ...
 
 
 class Silent:
-    """Says nothing."""
+    """Says nothing but warnings."""
 
     def start(self, total: int) -> None: ...
 
     def working(self, label: str) -> None: ...
 
     def done(self, label: str, outcome: str) -> None: ...
+
+    def warn(self, text: str) -> None:
+        print(f"warning: {text}", file=sys.stderr, flush=True)
 
     def finish(self) -> None: ...
 
@@ -60,6 +65,9 @@ class Lines:
         after = f"; about {duration(left)} left" if self.count < self.total else ""
         print(shown(f"{f'[{self.count}/{self.total}]':>8s} {label}: {outcome}{after}"), file=self.stream, flush=True)
 
+    def warn(self, text: str) -> None:
+        print(f"warning: {text}", file=self.stream, flush=True)
+
     def finish(self) -> None:
         how = "finished in" if self.count == self.total else "stopped after"
         print(f"        {how} {duration(time.monotonic() - self.began)}", file=self.stream, flush=True)
@@ -89,6 +97,9 @@ class Bar:
         self.progress.advance(self.bar)
         if not outcome.startswith("ok"):
             self.progress.console.print(shown(f"{label}: {outcome}"), highlight=False, markup=False)
+
+    def warn(self, text: str) -> None:
+        self.progress.console.print(f"warning: {text}", highlight=False, markup=False)
 
     def finish(self) -> None:
         self.progress.update(self.bar, description="")

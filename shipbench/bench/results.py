@@ -140,6 +140,10 @@ def _arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     return found
 
 
+_CELL_FILES = ("rows.parquet", "summary.json", "predictions.npz", "equations.txt", "model")
+"""What a study writes into the folder of a cell."""
+
+
 def write_cell(out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, files: Mapping[str, bytes]) -> None:
     """Write a finished cell in one step (an older one is replaced); `files` are further ones, by relative name (saved model, equations)."""
     final = out / cell.folder
@@ -155,6 +159,9 @@ def write_cell(out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: n
         write_json(part / "summary.json", summary | {"files": _digests(part)})
         if final.exists():  # moved away whole: who is killed in between leaves no cell, never half of one
             os.replace(final, old)
+    for extra in (p for p in old.glob("*") if p.name not in _CELL_FILES):  # somebody's own notes stay
+        if not (final / extra.name).exists():
+            os.replace(extra, final / extra.name)
     shutil.rmtree(old, ignore_errors=True)
 
 

@@ -33,6 +33,8 @@ def predict_runs(model: str, dataset: Dataset, horizon_s: float | None = None, d
         raise InputError(f"'{model}' is not a saved model; give a folder that holds model.json (cells/<dataset>/<model>/fold0-seed0/model).")
     predictor = make_predictor(spec, device)
     check_origin(model, getattr(predictor, "origin", None), dataset)
+    if horizon_s is not None and not 0.0 < horizon_s < np.inf:
+        raise InputError(f"--horizon {horizon_s:g}; accepted: a positive number of seconds.")
     rollouts = []
     for run in dataset.runs:
         steps = len(run) - 1 if horizon_s is None else round(horizon_s / dataset.dt)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import Future
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +19,7 @@ from ..specs import Spec, parse_spec
 from .executors import Execution, Workers, answers_of, open_workers
 from .folds import make_folds, select_runs
 from .models import facts_of
+from .patience import Patience
 from .plan import Part, Study
 from .progress import Progress, Silent
 from .provenance import code_version, machine
@@ -81,7 +82,7 @@ def run_tasks(
         finished: set[Cell] = set()
         try:
             todo = [part for part in parts if not (resume and _kept(part, out, progress, finished))]
-            for part, answers in _answers(todo, workers, progress, execution.device):
+            for part, answers in _answers(todo, workers, progress, execution):
                 for cell, key, answer in zip(part.cells, part.keys, answers, strict=True):
                     record = _score(part.study, part.spec, cell, answer)
                     summary = record.summary | about | _identity(part, key, answer)
@@ -132,18 +133,18 @@ def _kept(part: Part, out: Path, progress: Progress, finished: set[Cell]) -> boo
     return True
 
 
-def _answers(parts: Sequence[Part], workers: Workers, progress: Progress, device: str | None) -> Iterator[tuple[Part, list[Answer]]]:
+def _answers(parts: Sequence[Part], workers: Workers, progress: Progress, how: Execution) -> Iterator[tuple[Part, list[Answer]]]:
     """Each part with the answers for its cells, as they come."""
     if workers.room is None and parts:
         progress.working(f"{len(parts)} jobs sent to {workers.about}")
-    waiting, running = deque(parts), dict[Future[list[Answer]], Part]()
+    waiting, running, patience = deque(parts), dict[Future[list[Answer]], Part](), Patience(workers, progress, how.wait_s)
     while waiting or running:
         while waiting and (workers.room is None or len(running) < workers.room):
             part = waiting.popleft()
             if workers.room is not None:
                 progress.working(part.label)
-            running[workers.submit(part.job(workers.sends_files, device), part.fold_data)] = part
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            running[workers.submit(part.job(workers.sends_files, how.device), part.fold_data)] = part
+        for future in patience.first_done(running):
             part = running.pop(future)
             answers = answers_of(future, len(part.cells))
             yield part, answers

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +12,10 @@ from pathlib import Path
 
 from ..errors import InputError, WorkError
 
-_LEFTOVERS = (".*.tmp", "truth/*/.*.tmp", "cells/*/*/.*.tmp")
+_LEFTOVERS = {
+    "": r"(writable|study\.json|rows\.parquet|summary\.json|windows\.parquet)", "truth/*": r"fold\d+\.npz", "cells/*/*": r"fold\d+-seed\d+",
+}  # fmt: skip
+"""What a killed study leaves half-written, by folder: `.NAME.PID.tmp` of these names. Everything else is not ours to remove."""
 
 
 @contextmanager
@@ -32,8 +36,7 @@ def claimed(out: Path) -> Iterator[None]:
         raise InputError(f"cannot write to {out}: {error.strerror}. Give another folder with --out.") from None
     try:
         _lock(handle, out)
-        for leftover in (path for pattern in _LEFTOVERS for path in out.glob(pattern)):
-            shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink()
+        _take_away_leftovers(out)
         yield
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
@@ -43,6 +46,16 @@ def claimed(out: Path) -> Iterator[None]:
         ) from error
     finally:
         os.close(handle)  # and with it the lock, which the system also takes from a killed process
+
+
+def _take_away_leftovers(out: Path) -> None:
+    for pattern, name in _LEFTOVERS.items():
+        for folder in [out] if not pattern else out.glob(pattern):
+            if any(part.is_symlink() for part in (folder, *folder.parents) if part != out and part.is_relative_to(out)):
+                continue  # it leads out of the study
+            for path in folder.glob(".*.tmp"):
+                if re.fullmatch(rf"\.{name}\.\d+(\.old)?\.tmp", path.name):
+                    shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
 
 
 def _lock(handle: int, out: Path) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..cache import cache_folder, make_private, stranger
-from ..errors import InputError, ShipbenchError, unknown_name
+from ..errors import InputError, ShipbenchError, unknown_name, unknown_parameter
 from ..records import Dataset
 from ..registry import Registry
 from ..regular_files import read_text
@@ -99,7 +99,7 @@ def _check_params(part: DatasetPart, params: dict[str, Any]) -> None:
     accepted = inspect.signature(part.make).parameters
     if not any(p.kind is p.VAR_KEYWORD for p in accepted.values()):
         for key in params.keys() - accepted.keys():
-            raise unknown_name(f"parameter of data set '{part.name}'", key, accepted)
+            raise unknown_parameter(f"data set '{part.name}'", key, accepted)
 
 
 def _make(part: DatasetPart, params: dict[str, Any]) -> Dataset:

@@ -14,7 +14,7 @@ from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, unknown_parameter
 from ..ops import Array, cos, sin
 from ..physics.actuators import Gear
 from ..physics.modifiers import Flow, Modifiers
@@ -144,7 +144,7 @@ class Effect:
         known = list(self.units())
         for key in values:
             if key not in known:
-                raise unknown_name(f"parameter of effect '{self.name}'", key, known)
+                raise unknown_parameter(f"effect '{self.name}'", key, known)
         if self.vector is not None:
             size, towards = values.get(self.vector[0]), values.get(self.vector[1], 0.0)
             if size is None:

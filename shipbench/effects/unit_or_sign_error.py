@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, unknown_parameter
 from ..ops import Array
 from ..ship import Particulars
 from ..signals import STATES
@@ -57,7 +57,7 @@ class UnitOrSignError(Effect):
         """
         for key in values:
             if key not in ("factor", "channel"):
-                raise unknown_name(f"parameter of effect '{self.name}'", key, ("factor", "channel"))
+                raise unknown_parameter(f"effect '{self.name}'", key, ("factor", "channel"))
         if "factor" not in values or "channel" not in values:
             raise InputError(f"effect '{self.name}': got {', '.join(values) or 'nothing'}; both factor and channel are needed.")
         channel = values["channel"]

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..effects.base import EFFECTS, Effect, Parameter, flow_first
-from ..errors import InputError, unknown_name
+from ..errors import InputError, unknown_parameter
 from ..integrate import kinematics, rk4_step
 from ..ops import Array
 from ..physics import eq2
@@ -201,7 +201,7 @@ def _given(effect: Effect, params: dict[str, Any]) -> tuple[float | None, ...]:
     known = list(effect.units())
     for key, value in params.items():
         if key not in known:
-            raise unknown_name(f"parameter of effect '{effect.name}'", key, known)
+            raise unknown_parameter(f"effect '{effect.name}'", key, known)
         if not _is_number(value):
             raise InputError(f"effect '{effect.name}': {key} = {value}; accepted: a number [{effect.units()[key]}].")
     if effect.vector is None:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, unknown_parameter
 from ..records import Dataset
 from ..signals import COMMANDS, STATES
 from ..specs import Spec, parse_spec
@@ -214,7 +214,7 @@ def _made(spec: Spec) -> Any:
     if is_dataclass(cls):
         for key in params:
             if key not in {f.name for f in fields(cls)}:
-                raise unknown_name(f"parameter of '{spec.name}'", key, [f.name for f in fields(cls)] + ["seed"])
+                raise unknown_parameter(f"'{spec.name}'", key, [f.name for f in fields(cls)] + ["seed"])
     try:
         model = cls(**params)
         return model.extend(spec.effects) if spec.effects else model

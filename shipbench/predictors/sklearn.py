@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import torch
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, unknown_name, unknown_parameter
 from ..records import Dataset
 from ._one_step import NUM_CHANNELS, check_target, one_step_rollout, transitions
 from ._saved import check_shapes, sample_time
@@ -86,7 +86,7 @@ class SklearnOneStep(PredictorFamily):
         accepted = cls._get_param_names()
         for key in self.params:
             if key not in accepted:
-                raise unknown_name(f"parameter of 'sklearn:{self.regressor}'", key, [*accepted, *_OWN, "seed"])
+                raise unknown_parameter(f"'sklearn:{self.regressor}'", key, [*accepted, *_OWN, "seed"])
         try:
             made = cls(**self.params)
         except TypeError as error:

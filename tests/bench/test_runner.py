@@ -242,7 +242,7 @@ def test_fitted_models_are_saved_and_run_again_as_a_spec(study):
     ("models", "message"),
     [
         (["hld"], r"unknown predictor 'hld'. Did you mean 'hold'\?"),
-        (["hold[size=3]"], r"unknown parameter of 'hold' 'size'"),
+        (["hold[size=3]"], r"'hold' has no parameter 'size'"),
         (["hold[size]"], r"parameter 'size' has no value"),
         (["none.py:Model"], r"none.py does not exist"),
     ],

@@ -127,7 +127,7 @@ def test_json_is_one_document_and_nothing_else(stranger):
 @pytest.mark.parametrize(
     ("spec", "says"),
     [
-        ("lstn", "Did you mean 'lstm'"), ("nowhere.py:Model", "does not exist"), ("hold[x=1]", "unknown parameter"), ("mlp[", "cannot be read"),
+        ("lstn", "Did you mean 'lstm'"), ("nowhere.py:Model", "does not exist"), ("hold[x=1]", "has no parameter"), ("mlp[", "cannot be read"),
         ("{file}:Nobody", "unknown class"), ("{spoiled}:Model", "cannot be made: SyntaxError"), ("{file}:Path", "has no method fit"),
         ("mlp:Ridge", "'mlp' takes no ':Ridge'"), ("sklearn", "names no regressor"), ("sklearn:Rigde", "Did you mean 'Ridge'"),
         ("sklearn:Ridge[alhpa=1]", "Did you mean 'alpha'"), ("sklearn:StackingRegressor", "needs no other estimator"),

@@ -309,7 +309,7 @@ def test_reported_values_lead_back_to_the_size(name: str):
     effect = get(name)
     q = tuple(0.7 * v for v in typical(effect)) if name != "unit_or_sign_error" else (-2.0, 5.0)
     assert effect.internal(effect.public(q)) == pytest.approx(q, rel=1e-12)
-    with pytest.raises(InputError, match=f"unknown parameter of effect '{name}' 'sise'"):
+    with pytest.raises(InputError, match=f"effect '{name}' has no parameter 'sise'"):
         effect.internal({"sise": 1.0})
 
 

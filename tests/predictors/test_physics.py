@@ -147,6 +147,7 @@ def test_it_fits_a_small_model_ship_whose_actuators_are_commands(harbour):
             "displacement": 9402 * s**3,
             "xG": -1.92 * s,
             "propeller": None,
+            "wind": None,
             "rudder": None,
             "thrusters": None,
         }

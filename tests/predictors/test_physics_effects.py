@@ -202,7 +202,7 @@ def test_the_start_behind_a_sensor_is_the_one_that_it_shows(name):
     ("hold+current", "effects extend 'physics' and 'neural_ode'"),
     ("physics+currant", "unknown effect 'currant'.*Did you mean 'current'"),
     ("physics+current+current", "named 2 times"),
-    ("physics+current[sped=0.3]", "unknown parameter of effect 'current' 'sped'.*speed"),
+    ("physics+current[sped=0.3]", "effect 'current' has no parameter 'sped'.*speed"),
     ("physics+current[speed=0.3]", "give both speed and to"),
     ("physics+rudder_offset[offset=two]", "accepted: a number"),
     ("physics+unit_or_sign_error", "dataset.toml"),
