@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from .results import Frame
-from .statistics import Bootstrap, Matched, interval
+from .statistics import Bootstrap, Matched, Pair, interval
 
 STATISTICS = ("mean", "median", "std", "iqr")
 CEILING = "oracle"
@@ -162,6 +162,11 @@ class Scores:
             errors[:, j] = mean.reindex(list(zip(keys["fold"], keys["run"], strict=True))).to_numpy(float)
         weights = 1.0 / keys.groupby("fold")["run"].transform("size").to_numpy(float)
         return Matched(self.models, errors, weights, self.boot.codes(keys["cluster"].tolist()), self.boot)
+
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """Every two ranked models that are complete, on the same windows."""
+        return self.matched.pairs(self.ranked)
 
     def values(self, column: str, model: str) -> dict[str, Any]:
         """Mean of `column` of each seed of a model, as the ranking counts it."""

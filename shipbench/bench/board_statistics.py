@@ -28,7 +28,7 @@ def comparison_table(scores: Scores) -> Table:
     """ED, skill against the baseline, win rate, and whether each model is told apart from the next better one."""
     matched, baseline = scores.matched, scores.baseline
     ranked = scores.ranked
-    holm = {frozenset((p.first, p.second)): p.p_holm for p in matched.pairs(ranked)}
+    holm = {frozenset((p.first, p.second)): p.p_holm for p in scores.pairs}
     errors = scores.figures("ed")
     several_seeds = scores.rows.groupby("model")["seed"].nunique().max() > 1
     lines = []
@@ -70,7 +70,7 @@ def pair_table(scores: Scores) -> Table:
     """Every two ranked models on the same runs."""
     matched = scores.matched
     lines: list[dict[str, Any]] = []
-    for pair in matched.pairs(scores.ranked):
+    for pair in scores.pairs:
         share = f"{pair.better}/{pair.windows}"
         line = {"first": pair.first, "second": pair.second, "difference": pair.difference, "better": share, "p": pair.p, "p_holm": pair.p_holm}
         lines.append(line | {"difference_low": pair.low, "difference_high": pair.high})

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from ..metrics.trial_indices import COLUMNS as TRIAL_COLUMNS
 from .board_scores import CEILING, STATISTICS, Scores
 from .results import STATUSES
@@ -127,16 +129,18 @@ def kind_table(scores: Scores) -> Table:
 def group_lines(scores: Scores, column: str, members: dict[str, Any]) -> list[dict[str, Any]]:
     """By model the mean of `column` over the rows of each group (name -> mask of the rows), with intervals over runs."""
     lines = []
+    models, scored = scores.rows["model"].to_numpy(), (scores.rows["status"] == "ok").to_numpy()
+    values, codes = scores.rows[column].to_numpy(float), scores.boot.codes(scores.rows["cluster"].tolist())
     for model in scores.models:
         line: dict[str, Any] = {"model": model}
+        own = scored & (models == model)
         for name, chosen in members.items():
-            part = scores.rows[chosen & (scores.rows["model"] == model) & (scores.rows["status"] == "ok")]
-            if part.empty:
+            at = np.flatnonzero(own & np.asarray(chosen))
+            if not len(at):
                 continue
-            values = part[column].to_numpy(float)
-            drawn = scores.boot.means(scores.boot.codes(part["cluster"].tolist()), values[:, None], values[:, None] * 0 + 1.0)[:, 0]
-            low, high = interval(drawn, part["cluster"].nunique())
-            line |= {name: float(part[column].mean()), f"{name}_low": low, f"{name}_high": high}
+            drawn = scores.boot.means(codes[at], values[at, None], values[at, None] * 0 + 1.0)[:, 0]
+            low, high = interval(drawn, len(np.unique(codes[at])))
+            line |= {name: float(np.nanmean(values[at])), f"{name}_low": low, f"{name}_high": high}
         lines.append(line)
     return lines
 

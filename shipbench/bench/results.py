@@ -244,7 +244,7 @@ def read_frame(path: Path) -> Frame:
             table = pyarrow.parquet.ParquetFile(file)
             rows = table.metadata.num_rows
             if rows <= _MOST_ROWS:
-                return table.read().to_pandas(ignore_metadata=True)
+                return table.read().replace_schema_metadata().to_pandas()
         except (pyarrow.ArrowException, OSError, ValueError, KeyError, TypeError, MemoryError) as error:
             raise InputError(f"{path} cannot be read ({' '.join(str(error).split())[:160]}). {_WHOLE}") from None
     raise InputError(f"{path} declares {rows} rows; accepted: at most {_MOST_ROWS}. {_WHOLE}")

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -143,9 +143,13 @@ class Matched:
 
     def of(self, model: str) -> np.ndarray:
         """Errors of one model (windows,)."""
-        return self.errors[:, self.models.index(model)]
+        return self.errors[:, self._places[model]]
 
-    @property
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {model: i for i, model in enumerate(self.models)}
+
+    @cached_property
     def complete(self) -> list[str]:
         """Models with a score in every window: leaving out the windows where a model fails would favour it."""
         return [m for m in self.models if np.isfinite(self.of(m)).all()]
@@ -175,11 +179,8 @@ class Matched:
     def wins(self, model: str, others: Sequence[str]) -> np.ndarray:
         """Share of `others` that `model` beats in each window (windows,); a tie counts half, a window without a score is lost."""
         own = np.nan_to_num(self.of(model), nan=np.inf)
-        shares = []
-        for other in others:
-            theirs = np.nan_to_num(self.of(other), nan=np.inf)
-            shares.append(np.where(own < theirs, 1.0, np.where(own == theirs, 0.5, 0.0)))
-        return np.mean(shares, axis=0)
+        theirs = np.nan_to_num(np.stack([self.of(other) for other in others]), nan=np.inf)
+        return np.mean(np.where(own < theirs, 1.0, np.where(own == theirs, 0.5, 0.0)), axis=0)
 
     def win_rate(self, model: str, others: Sequence[str]) -> tuple[float, float, float]:
         """Mean of `wins` with its interval."""

@@ -13,6 +13,7 @@ from shipbench.bench.board_tables import PAPER
 from shipbench.bench.leaderboard import build_board, write_boards
 from shipbench.bench.regimes import COLUMNS as REGIME_COLUMNS
 from shipbench.bench.results import PROTOCOL, Results
+from shipbench.bench.statistics import Matched
 from shipbench.bench.tables import Table, TableColumn, number, significant
 from shipbench.errors import InputError
 from shipbench.metrics.trial_indices import NAMES as TRIAL_NAMES
@@ -184,6 +185,15 @@ def test_a_model_with_unscored_runs_is_not_tested_and_its_missing_runs_are_lost(
     assert [(r["first"], r["second"]) for r in table.rows] in ([("a", "b")], [("b", "a")])
     assert any(note.startswith("Not tested: `lucky`") for note in table.notes)
     assert next(r for r in by_title(board, "Ranking").rows if r["model"] == "lucky")["wins"] == pytest.approx(100 * 29 / 30, abs=0.2)
+
+
+def test_pairs_are_tested_once_for_all_tables(monkeypatch):
+    """They grow with the square of the number of models: most of the time of a page of 200."""
+    calls, pairs = [], Matched.pairs
+    monkeypatch.setattr(Matched, "pairs", lambda self, models: calls.append(len(models)) or pairs(self, models))
+    board = build_board(results({f"m{i}": many(i) for i in range(5)}), "toy")
+    assert len(by_title(board, "Paired").rows) == 10
+    assert calls == [5]
 
 
 def test_the_ceiling_is_in_no_pair():

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from shipbench.bench.report.beside import _numbers
+from shipbench.bench.report.beside import _numbers, check_given, diagnoses
 from shipbench.bench.report.page import _table, write_report
 from shipbench.bench.report.pictures import track
 from shipbench.bench.report.series import Track, gather
@@ -222,9 +222,38 @@ def test_a_diagnosis_that_cannot_be_read_is_refused_where_given_and_told_where_f
         write_report(results, tmp_path / "page.html", "c", given=[diagnosis(tmp_path / "d", "f", "other")])
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"causes": 5}, "causes = 5; accepted: a valid list"), ({"causes": [5]}, "causes.0 = 5"),
+        ({"causes": [{"parameters": [1]}]}, "causes.0.parameters = [1]"), ({"causes": [{"gain": 1}]}, "causes.0.gain = 1"),
+        ({"causes": [{"parameters": {"speed": {"value": "3"}}}]}, "causes.0.parameters.speed.value"),
+        ({"causes": [{"gain": {"relative": 10**400}}]}, "causes.0.gain.relative"), ({"extended_model": 1}, "extended_model = 1"),
+        ({"fingerprint": None}, "fingerprint = None"), ({"verdict": ["found"]}, "verdict = "), ({"dataset": 3}, "dataset = 3"),
+    ],
+)  # fmt: skip
+def test_a_diagnosis_with_an_entry_of_another_type_is_refused_where_given_and_told_where_found(study, tmp_path, change, message):
+    folder = diagnosis(tmp_path / "copy/diagnosis", "f")
+    shutil.copytree(study, tmp_path / "copy", dirs_exist_ok=True)
+    document = json.loads((folder / "diagnosis.json").read_text())
+    (folder / "diagnosis.json").write_text(json.dumps(document | change))
+    with pytest.raises(InputError, match=re.escape(f"{folder}/diagnosis.json: {message}")):
+        check_given([folder], ["toy"])
+    found = diagnoses(read_results([tmp_path / "copy"]), "toy", [], tmp_path / "page.html")
+    assert [message in d.warning for d in found] == [True]
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "5", "[1]", "\ud800", ""])
+def test_a_diagnosis_that_is_no_object_is_refused(tmp_path, text):
+    (tmp_path / "diagnosis.json").write_text(text, errors="surrogatepass")
+    with pytest.raises(InputError, match="diagnosis"):
+        check_given([tmp_path], ["toy"])
+
+
 def test_fitted_numbers_are_compared_over_the_fits(study, tmp_path):
     text = page_of(study, tmp_path).path.read_text()
     assert "1/s [1, 3] some &lt;b&gt;gain&lt;/b&gt;" in text
+    assert _numbers(["  p = 1.2.3 m x\n  q = 1e999 m x"]) == [("q", np.inf, np.inf, np.inf, "m x")]
     found = _numbers(["a\n  p1 = 2 N s/m [1, 3] x\n  p1 = 7 1 y", "  p1 = 4e1 N s/m z\n  p1 = 7 1 y", "  p1 = -1 N s/m z"])
     assert found == [("p1", 2.0, -1.0, 40.0, "N s/m [1, 3] x"), ("p1", 7.0, 7.0, 7.0, "1 y")]
 

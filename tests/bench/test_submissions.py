@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 from toy_ship import write_toy_folder
 from typer.testing import CliRunner
@@ -62,6 +64,10 @@ def edit_summary(folder: Path, change) -> None:
 
 def edit_rows(folder: Path, change) -> None:
     change(pd.read_parquet(folder / "rows.parquet")).to_parquet(folder / "rows.parquet", index=False)
+
+
+def edit_windows(folder: Path, change) -> None:
+    change(pd.read_parquet(folder / "windows.parquet")).to_parquet(folder / "windows.parquet", index=False)
 
 
 def test_rows_tell_which_runs_belong_together(two):
@@ -194,6 +200,50 @@ def test_verify_counts_a_diverged_run_that_is_called_ok(cli, two):
         (lambda f: edit_rows(f, lambda r: r.assign(status="fine")), "unknown status 'fine'; accepted: ok, diverged, failed, skipped"),
         (lambda f: edit_rows(f, lambda r: r.assign(ed=np.nan)), "status 'ok' with ED = nan"),
         (lambda f: edit_rows(f, lambda r: r.assign(status="failed")), "status 'failed' with ED = "),
+        (lambda f: edit_rows(f, lambda r: r.assign(ed=-1.0)), "status 'ok' with ED = -1.0"),
+        (lambda f: edit_rows(f, lambda r: r.assign(ed=np.inf)), "status 'ok' with ED = inf"),
+        (lambda f: edit_rows(f, lambda r: r.assign(ed=1e6)), "status 'ok' with ED = 1000000.0"),
+        (lambda f: edit_rows(f, lambda r: r.assign(edh=np.nan)), "status 'ok' with edh = nan"),
+        (lambda f: edit_rows(f, lambda r: r.assign(rmse_psi=-0.1)), "status 'ok' with rmse_psi = -0.1"),
+        (lambda f: edit_rows(f, lambda r: r.assign(advance_error=-np.inf)), "status 'ok' with advance_error = -inf"),
+        (lambda f: edit_rows(f, lambda r: r.assign(ed="x")), "column 'ed' is of type str; accepted: numbers"),
+        (lambda f: edit_rows(f, lambda r: r.assign(fold=r["fold"].astype(str))), "column 'fold' is of type str; accepted: whole numbers"),
+        (lambda f: edit_rows(f, lambda r: r.assign(kind=None)), "column 'kind' is of type object; accepted: text in every row"),
+        (lambda f: edit_rows(f, lambda r: r.assign(kind="\x1b[2J")), "kind = '\\x1b[2J' holds control characters"),
+        (lambda f: edit_rows(f, lambda r: r.assign(fit_s=-1.0)), "fit_s = -1.0; accepted: seconds, at least 0"),
+        (lambda f: edit_rows(f, lambda r: r.assign(predict_s=1e-9)), "predict_s is 1e-09 in the rows and"),
+        (lambda f: edit_summary(f, lambda s: s.update(fit_s=float("nan"))), "fit_s = nan; accepted: a finite number"),
+        (lambda f: edit_summary(f, lambda s: s.update(ship_L=0)), "ship_L = 0; accepted: greater than 0"),
+        (lambda f: edit_summary(f, lambda s: s.update(dt=0.0)), "dt = 0.0; accepted: greater than 0"),
+        (lambda f: edit_summary(f, lambda s: s.update(dt=1e-300)), "dt = 1e-300 s for a horizon of 20 s"),
+        (lambda f: edit_summary(f, lambda s: s.update(dt="1")), "dt = '1'; accepted: a valid number"),
+        (lambda f: edit_summary(f, lambda s: s.update(notes="x")), "notes = 'x'; accepted: a valid list"),
+        (lambda f: edit_summary(f, lambda s: s.pop("notes")), "an entry of summary.json lacks notes"),
+        (lambda f: edit_summary(f, lambda s: s["code"].pop("git")), "an entry of summary.json lacks code.git"),
+        (lambda f: edit_summary(f, lambda s: s.update(columns=[1, 2])), "columns.0 = 1; accepted: a valid dictionary"),
+        (lambda f: edit_summary(f, lambda s: s["columns"].pop()), "columns are not those of task.metrics"),
+        (lambda f: edit_summary(f, lambda s: s["columns"][0].update(label="EDH")), "columns are not those of task.metrics"),
+        (lambda f: edit_summary(f, lambda s: s["task"].update(metrics=["ed"])), "columns are not those of task.metrics: ed, ed_at_10s"),
+        (lambda f: edit_summary(f, lambda s: s["task"].update(horizon_s="20")), "this version does not know the task (task: horizon_s"),
+        (lambda f: edit_summary(f, lambda s: s["task"].pop("history_s")), "task lacks history_s"),
+        (lambda f: edit_summary(f, lambda s: s.update(run_status=["ok"])), "1 statuses in run_status for 8 scored runs"),
+        (lambda f: edit_summary(f, lambda s: s.update(status="diverged")), "status is 'diverged' in summary.json; its rows make it 'ok'"),
+        (lambda f: edit_summary(f, lambda s: s.update(parameters=-5)), "parameters = -5; accepted: greater than or equal to 0"),
+        (lambda f: edit_summary(f, lambda s: s.update(dataset="../../x")), "dataset = '../../x' is no name"),
+        (lambda f: edit_summary(f, lambda s: s.update(model="\x9b2J")), "model = '\\x9b2J' holds control characters"),
+        (lambda f: edit_summary(f, lambda s: s.update(ship_B=2.0 + s["fold"])), "ship_B of 'toyset' is 2.0; another entry"),
+        (lambda f: (f / "summary.json").write_text("5"), "summary.json is no list of entries"),
+        (lambda f: (f / "summary.json").write_text("[5]"), "summary.json: an entry = 5; accepted:"),
+        (lambda f: (f / "summary.json").write_text("[" * 100_000), "summary.json is not valid JSON: it is nested too deeply"),
+        (lambda f: [(f / "summary.json").unlink(), os.mkfifo(f / "summary.json")], "summary.json: it is a named pipe"),
+        (lambda f: edit_windows(f, lambda w: w.assign(speed="fast")), "windows.parquet column 'speed' is of type str; accepted: numbers"),
+        (lambda f: edit_windows(f, lambda w: w.assign(speed=np.nan)), "windows.parquet holds values that no window has"),
+        (lambda f: edit_windows(f, lambda w: w.drop(columns="drift")), "windows.parquet lacks the columns drift"),
+        (
+            lambda f: edit_windows(f, lambda w: pd.concat([w, w.iloc[:1].assign(run="r99")])),
+            "windows.parquet holds a window that was not scored: run r99",
+        ),
+        (lambda f: edit_windows(f, lambda w: pd.concat([w, w])), "windows.parquet holds a window twice"),
         (lambda f: (f / "rows.parquet").write_bytes(b"PAR1"), "holds no results"),
         (lambda f: (f / "windows.parquet").write_bytes(b"PAR1"), "windows.parquet cannot be read"),
     ],
@@ -223,6 +273,106 @@ def test_what_cannot_be_done_is_one_message(cli, two, arguments, message):
     assert result.exit_code == 2, result.output
     assert message in result.stderr
     assert "Traceback" not in result.output
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda f: edit_rows(f, lambda r: r.assign(parent="one", kind="turn")), "parent is 'one' in the rows, 'r0"),
+        (lambda f: edit_rows(f, lambda r: r.assign(group="one")), "group is 'one' in the rows, 'r0"),
+        (lambda f: edit_windows(f, lambda w: w.assign(speed=w["speed"] + 1.0)), "in windows.parquet, "),
+        (lambda f: edit_summary(f, lambda s: s.update(ship_L=60.0)), "ship_L of 'toyset' is 60.0 in summary.json, 50.0 in the data set."),
+        (lambda f: edit_summary(f, lambda s: s.update(ship="queen")), "ship of 'toyset' is queen in summary.json, toy in the data set."),
+        (lambda f: edit_summary(f, lambda s: s["runs"].update(train=s["runs"]["train"] + s["runs"]["test"])), "runs.train of 'toyset', fold 0, is"),
+        (lambda f: edit_summary(f, lambda s: s.update(parameters=3)), "parameters is 3 in summary.json, 0 in the saved model."),
+    ],
+)
+def test_verify_computes_again_what_is_no_score(cli, two, spoil, message):
+    spoil(two / "anna")
+    result = cli("leaderboard", two / "anna", "--verify", "--no-plots", "--out", "none")
+    assert result.exit_code == 1, result.output
+    assert message in result.stderr
+    assert not Path("none").exists()
+
+
+def test_verify_computes_the_reason_of_a_diverged_run_again(cli, two):
+    [file] = (two / "ben/cells").glob("toyset/*/fold0-seed0/predictions.npz")
+    S = np.load(file)["S"]
+    S[2, 5:, 0] = np.nan
+    np.savez_compressed(file, S=S)
+    lost = (pd.read_parquet(two / "ben/rows.parquet")["fold"] == 0).to_numpy() & (np.arange(16) == 2)
+    numbers = list(pd.read_parquet(two / "ben/rows.parquet").columns)
+    scores = numbers[numbers.index("ed") : numbers.index("fit_s")]
+
+    def diverged(rows):
+        rows.loc[lost, ["status", "reason"]] = ["diverged", "it was the weather"]
+        rows.loc[lost, scores] = np.nan
+        return rows
+
+    edit_rows(two / "ben", diverged)
+    edit_summary(two / "ben", lambda s: s["fold"] or s.update(status="diverged", run_status=["ok", "ok", "diverged"] + ["ok"] * 5))
+    result = cli("leaderboard", two / "ben", "--verify", "--no-plots")
+    assert result.exit_code == 1
+    assert "the reason is 'it was the weather' in the rows, 'x is nan at t = 6 s after the start' from the predictions." in result.stderr
+
+
+def test_a_failed_model_with_predictions_is_noticed(cli, two):
+    rows = pd.read_parquet(two / "ben/rows.parquet")
+    scores = list(rows.columns)[list(rows.columns).index("ed") : list(rows.columns).index("fit_s")]
+    edit_rows(two / "ben", lambda r: r.assign(status="failed", reason="no", **dict.fromkeys(scores, np.nan)))
+    edit_summary(two / "ben", lambda s: s.update(status="failed", run_status=["failed"] * 8))
+    result = cli("leaderboard", two / "ben", "--verify", "--no-plots")
+    assert result.exit_code == 1
+    assert "toyset mine.py:Still fold 0 seed 0: status is 'failed' in the rows, and there are predictions." in result.stderr
+
+
+def test_a_page_of_a_submission_says_in_one_line_that_there_are_no_plots(cli, two, tmp_path):
+    assert cli("leaderboard", two / "anna", two / "ben", "--no-plots", "-q", "--submission", "sub").exit_code == 0
+    result = cli("leaderboard", "sub", "--out", "pages")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.count("no plots: no saved predictions.") == 1
+    assert [p.name for p in (tmp_path / "pages").iterdir()] == ["toyset.md"]
+    part = cli("leaderboard", two / "anna", "sub", "--out", "pages")
+    assert part.exit_code == 2  # the same cells twice
+    shutil.rmtree(two / "ben/cells")
+    half = cli("leaderboard", two / "anna", two / "ben", "--out", "pages")
+    assert half.exit_code == 0, half.output
+    assert "toyset: plots without mine.py:Still: no saved predictions." in half.stdout
+    assert len(list((tmp_path / "pages/toyset").iterdir())) == 3
+
+
+def test_a_submission_never_replaces_a_study(cli, two):
+    before = {p: p.read_bytes() for p in two.rglob("*") if p.is_file()}
+    for target in (two / "anna", two / "ben/../anna", two / "ben"):
+        result = cli("leaderboard", two / "anna", "--no-plots", "--submission", target, "--out", "none")
+        assert result.exit_code == 2
+        assert "which it would replace. Give another folder." in result.stderr
+    assert {p: p.read_bytes() for p in two.rglob("*") if p.is_file()} == before
+    assert not Path("none").exists()
+
+
+def test_what_pandas_wrote_of_itself_into_a_table_decides_nothing(cli, two):
+    table = pq.read_table(two / "ben/rows.parquet")
+    pq.write_table(table.replace_schema_metadata({"pandas": "{" * 100_000}), two / "ben/rows.parquet")
+    assert cli("leaderboard", two / "ben", "--no-plots", "-q").exit_code == 0
+
+
+def test_a_column_that_no_entry_names_reaches_no_page(cli, two):
+    """A metric of one model's rows must not ride on another model's entry."""
+
+    def only_ed(summary):
+        summary["task"]["metrics"] = ["ed"]
+        summary["columns"] = [c for c in summary["columns"] if c["name"] == "ed" or c["name"].startswith("ed_at")]
+
+    edit_summary(two / "anna", only_ed)
+    assert "edh" not in read_results([two / "anna"]).rows
+    both = pd.concat([pd.read_parquet(two / name / "rows.parquet") for name in ("anna", "ben")])
+    entries = [s for name in ("anna", "ben") for s in json.loads((two / name / "summary.json").read_text())]
+    both.to_parquet(two / "ben/rows.parquet", index=False)
+    (two / "ben/summary.json").write_text(json.dumps(entries))
+    result = cli("leaderboard", two / "ben", "--no-plots")
+    assert result.exit_code == 2
+    assert "the rows hold edh, which is not among its columns in summary.json" in result.stderr
 
 
 def test_verify_without_predictions_says_what_it_needs(cli, two):

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
+from pydantic import BaseModel, ConfigDict, ValidationError
+
 from ...errors import InputError
-from ...names import file_name
+from ...names import file_name, shown
+from ...regular_files import read_bytes, read_json
 from ..results import Cell, Results
 
-_PARAMETER = re.compile(r"^\s+(\w+)\s+=\s+([-+]?\d[\d.]*(?:e[-+]?\d+)?)\s+(\S.*)$", re.IGNORECASE)
+_PARAMETER = re.compile(r"^\s+(\w+)\s+=\s+([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)\s+(\S.*)$", re.IGNORECASE)
 _LONGEST = 20_000
 """Characters of one model's own description that the page takes."""
 
@@ -37,8 +38,8 @@ def fitted(results: Results, dataset: str, models: Sequence[str]) -> list[Fits]:
             continue
         path = source / Cell(dataset, summary["model"], summary["fold"], summary["seed"]).folder / "equations.txt"
         try:
-            text = path.read_text(encoding="utf-8", errors="replace")
-        except OSError:
+            text = read_bytes(path).decode("utf-8", errors="replace")
+        except InputError:
             continue  # most models have no equations
         cut = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}\n... cut here; the whole text is in {path.name} of the result folder"
         found.setdefault(summary["model"], []).append((f"fold {summary['fold']}, seed {summary['seed']}", cut))
@@ -83,7 +84,7 @@ def diagnoses(results: Results, dataset: str, given: Sequence[Path], page: Path)
     for folder in dict.fromkeys(results.sources):
         up = folder.resolve().parent
         for near in (folder, folder / "diagnosis", *(root / "diagnoses" / file_name(Path(dataset).name) for root in (up, up.parent))):
-            if (near / "diagnosis.json").is_file():
+            if (near / "diagnosis.json").exists():
                 try:
                     found[near.resolve()] = _told(near, _read(near), fingerprint, page)
                 except InputError as error:  # it was not asked for: said on the page, and no reason to write none
@@ -100,48 +101,81 @@ def check_given(given: Sequence[Path], datasets: Sequence[str]) -> None:
         InputError: see above, or the folder holds no diagnosis.
     """
     for folder in given:
-        if (name := _read(folder)["dataset"]) not in datasets:
-            raise InputError(f"--diagnosis {folder} is of data set '{name}'; these results are of {', '.join(datasets)}. Leave it out.")
+        if (name := _read(folder).dataset) not in datasets:
+            raise InputError(f"--diagnosis {folder} is of data set '{shown(name)[:80]}'; these results are of {', '.join(datasets)}. Leave it out.")
 
 
-def _read(folder: Path) -> dict[str, Any]:
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True, extra="ignore", frozen=True)
+
+
+class _Size(_Part):
+    value: float | None = None
+    unit: str = ""
+    ci95: list[float | None] | None = None
+
+
+class _Gain(_Part):
+    metric: str = "error"
+    relative: float | None = None
+
+
+class _Cause(_Part):
+    effect: str = ""
+    parameters: dict[str, _Size] | None = None
+    gain: _Gain | None = None
+
+
+class _Document(_Part):
+    """What the page takes of diagnosis.json."""
+
+    dataset: str
+    verdict: str
+    causes: list[_Cause]
+    extended_model: str | None
+    fingerprint: str
+
+
+def _read(folder: Path) -> _Document:
+    path, give = folder / "diagnosis.json", "Give a folder that `shipbench diagnose --out` wrote."
     try:
-        document = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
-        missing = [key for key in ("dataset", "verdict", "causes", "extended_model", "fingerprint") if key not in document]
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError(f"{folder} holds no diagnosis that can be read: {error}. Give a folder that `shipbench diagnose --out` wrote.") from None
-    if missing:
-        raise InputError(f"{folder / 'diagnosis.json'} lacks {', '.join(missing)}. Give a folder that `shipbench diagnose --out` wrote.")
-    return document
+        return _Document.model_validate(read_json(path))
+    except InputError as error:
+        raise InputError(f"{folder} holds no diagnosis that can be read: {error}") from None
+    except ValidationError as error:
+        if missing := [".".join(map(str, e["loc"])) for e in error.errors() if e["type"] == "missing"]:
+            raise InputError(f"{path} lacks {', '.join(missing)}. {give}") from None
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"])) or "the document"
+        accepted = first["msg"].removeprefix("Input should be ")
+        raise InputError(f"{path}: {key} = {shown(repr(first['input']))[:60]}; accepted: {accepted}. {give}") from None
 
 
 _VERDICTS = {"found": "Causes are named.", "none": "No cause is named: nothing is missing that these runs could show.",
              "unknown": "The model lacks something that is not in the library."}  # fmt: skip
 
 
-def _told(place: Path, document: dict[str, Any], fingerprint: str, page: Path) -> Diagnosed:
+def _told(place: Path, document: _Document, fingerprint: str, page: Path) -> Diagnosed:
     pages = [name for name in ("report.html", "diagnosis.html") if (place / name).is_file()]
     link = quote(Path(os.path.relpath(place / pages[0], page.resolve().parent)).as_posix()) if pages else ""
-    same = document["fingerprint"] == fingerprint
-    warning = "" if same else f"It is of other data than these scores (fingerprint {document['fingerprint']}, here {fingerprint})."
-    causes = [(str(c.get("effect", "")), _sizes(c.get("parameters") or {}), _gain(c.get("gain"))) for c in document["causes"]]
-    verdict = _VERDICTS.get(document["verdict"], str(document["verdict"]))
-    return Diagnosed(document["dataset"], verdict, causes, str(document["extended_model"] or ""), f"./{link}" if link else "", warning)
+    same = document.fingerprint == fingerprint
+    warning = "" if same else f"It is of other data than these scores (fingerprint {document.fingerprint}, here {fingerprint})."
+    causes = [(c.effect, _sizes(c.parameters or {}), _gain(c.gain)) for c in document.causes]
+    verdict = _VERDICTS.get(document.verdict, document.verdict)
+    return Diagnosed(document.dataset, verdict, causes, document.extended_model or "", f"./{link}" if link else "", warning)
 
 
-def _sizes(parameters: dict[str, Any]) -> str:
-    return "; ".join(f"{name} {_figure(p.get('value'))} {p.get('unit', '')} {_interval(p.get('ci95'))}".strip() for name, p in parameters.items())
+def _sizes(parameters: dict[str, _Size]) -> str:
+    return "; ".join(f"{name} {_figure(p.value)} {p.unit} {_interval(p.ci95)}".strip() for name, p in parameters.items())
 
 
-def _interval(ends: Any) -> str:
-    return f"[{_figure(ends[0])}, {_figure(ends[1])}]" if isinstance(ends, list) and len(ends) == 2 else ""
+def _interval(ends: list[float | None] | None) -> str:
+    return f"[{_figure(ends[0])}, {_figure(ends[1])}]" if ends is not None and len(ends) == 2 else ""
 
 
-def _gain(gain: dict[str, Any] | None) -> str:
-    if not gain or not isinstance(gain.get("relative"), int | float):
-        return "not measured"
-    return f"{gain.get('metric', 'error')} {-100 * gain['relative']:+.0f} % on held-out runs"
+def _gain(gain: _Gain | None) -> str:
+    return "not measured" if gain is None or gain.relative is None else f"{gain.metric} {-100 * gain.relative:+.0f} % on held-out runs"
 
 
-def _figure(value: Any) -> str:
-    return f"{value:.3g}" if isinstance(value, int | float) else "-"
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
