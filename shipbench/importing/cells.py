@@ -74,12 +74,12 @@ class Cells:
         except UnreadError as error:
             raise self.unread(column, error.row, error.hint) from None
 
-    def unread(self, column: str, row: int, hint: str = "") -> InputError:
-        """The error for a cell (rows of the batch from 0) that is no number."""
+    def unread(self, column: str, row: int, hint: str = "", what: str = "not a number") -> InputError:
+        """The error for a cell (rows of the batch from 0) that is no number, or in words what else it is not."""
         cell = str(self._array(column)[row].as_py()).strip()
         if not hint and self.first_row == self.top and row == 0 and not any(c.isdigit() for c in cell):
             hint = " If the rows under the header are units or remarks, set [file] skip."
-        return no_number(f"{self.path}, row {self.first_row + row}", column, cell, hint)
+        return no_number(f"{self.path}, row {self.first_row + row}", column, cell, hint, what)
 
     def is_text(self, column: str) -> bool:
         """Whether the column holds texts, of numbers or others."""

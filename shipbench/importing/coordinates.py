@@ -19,8 +19,8 @@ SIDES = {"lat": {"N": 1.0, "S": -1.0}, "lon": {"E": 1.0, "W": -1.0}}
 _WORDS = {"NORTH": "N", "SOUTH": "S", "EAST": "E", "WEST": "W"}
 _LETTERED = r"^(?P<before>[NSEWnsew]?)\s*(?P<number>[^NSEWnsew]*?)\s*(?P<after>[NSEWnsew]?)$"
 _SEXAGESIMAL = (
-    r"^(?P<minus>[-\x{2212}]?)(?P<d>\d{1,3})\s*[\x{00b0}\x{00ba}]\s*(?P<m>\d{1,2}(?:[.,]\d*)?)\s*['\x{2032}\x{2019}]?"
-    r"\s*(?:(?P<s>\d{1,2}(?:[.,]\d*)?)\s*(?:[\"\x{2033}\x{201d}]|'')?)?$"
+    r"^(?P<minus>[-\x{2212}]?)(?P<d>\d{1,3})\s*[\x{00b0}\x{00ba}]\s*(?P<m>\d{1,2}(?:[.,]\d*)?)"
+    r"(?:\s*['\x{2032}\x{2019}]?|(?:\s*['\x{2032}\x{2019}]\s*|\s+)(?P<s>\d{1,2}(?:[.,]\d*)?)\s*(?:[\"\x{2033}\x{201d}]|'')?)$"
 )
 
 
@@ -28,7 +28,7 @@ def coordinates(cells: Cells, name: str, channel: Channel, missing: Sequence[str
     """(n,) readings of a lat or lon, north and east positive, in the channel's unit; of `ddmm.mmmm` in degrees.
 
     Raises:
-        InputError: a cell is no number, its letters belong to the other axis or contradict its sign, or its minutes are 60 or more.
+        InputError: a cell is no number, its letters belong to the other axis or contradict its sign, or its minutes are above 60.
     """
     (column,) = channel.columns
     if not cells.is_text(column):
@@ -41,18 +41,20 @@ def coordinates(cells: Cells, name: str, channel: Channel, missing: Sequence[str
             text = _part(cells, column, text, channel.part)
         text, sides = _letters(text)
         values = _numbers(cells, column, text, channel, missing)
-    if channel.unit == MINUTES[1] and (sides is None or any(s is None for s in sides[np.isfinite(values)])):
-        row = 0 if sides is None else int(np.flatnonzero(np.isfinite(values) & (sides == None))[0])  # noqa: E711
-        raise cells.unread(column, row, f' Unit "{MINUTES[1]}" needs a letter, such as 3347.63S. Without letters: unit = "{MINUTES[0]}".')
+    lettered = np.zeros(len(values), bool) if sides is None else np.array([side is not None for side in sides])
+    bare = np.isfinite(values) & ~lettered
+    if channel.unit == MINUTES[1] and bare.any():
+        hint = f' Unit "{MINUTES[1]}" needs a letter, such as 3347.63S. Without letters: unit = "{MINUTES[0]}".'
+        raise cells.unread(column, int(np.argmax(bare)), hint, "without a letter")
     if channel.hemisphere is not None:
-        if sides is not None and any(s is not None for s in sides):
+        if lettered.any():
             raise InputError(f"{cells.path}: '{column}' has letters of the hemisphere in its cells; accepted: one of them. Remove hemisphere.")
         sides = _sides_of(cells, channel.hemisphere)
         nameless = np.isfinite(values) & np.array([s is None for s in sides])
         cells.met.what[f"readings of {name} without a letter in '{channel.hemisphere}', left out"] += int(nameless.sum())
         values = np.where(nameless, np.nan, values)
     if channel.unit in MINUTES:
-        values = _degrees(cells, column, values)
+        values = _degrees(cells, column, channel, values)
     return values if sides is None else _signed(cells, name, channel, values, sides)
 
 
@@ -66,7 +68,8 @@ def unread_hemispheres(table: Table, source: Source) -> Counter[str]:
         return told
     batch = next(table.batches([*free, *dict.fromkeys(c.columns[0] for c in found.values())]), None)
     for column, array in zip(free, batch.columns if batch is not None else (), strict=False):
-        letters = {str(v).strip().upper() for v in pc.unique(array).to_pylist() if v not in (None, "")} if is_text(array) else set()
+        words = {str(v).strip().upper() for v in pc.unique(array).to_pylist() if v not in (None, "")} if is_text(array) else set()
+        letters = {_WORDS.get(word, word) for word in words}
         for name, channel in found.items():
             if letters <= set(SIDES[name]) and letters & {"S", "W"} and (count := _without_sign(batch.column(channel.columns[0]))):
                 entry = f'{name} = {{ column = "{channel.columns[0]}", unit = "{channel.unit}", hemisphere = "{column}" }}'
@@ -82,13 +85,15 @@ def _without_sign(array: pa.Array) -> int:
 
 def _part(cells: Cells, column: str, text: pa.Array, part: int) -> pa.Array:
     """The first or second of the two numbers in each cell."""
-    text = pc.utf8_trim(text, "()[]{} ")
+    text = pc.utf8_trim(pc.replace_substring_regex(text, r"(?i)^\s*POINT\b", ""), "()[]{} ")  # as in WKT, where the longitude is first
     gap = r"\s*[;/]\s*|\s+" if cells.source.file.decimal == "," else r"\s*[,;/]\s*|\s+"
-    text = pc.replace_substring_regex(text, r"\s*([NSEWnsew])\b", r"\1")
+    before = pc.replace_substring_regex(text, r"([NSEWnsew])\s+", r"\1")
+    after = pc.replace_substring_regex(text, r"\s+([NSEWnsew])\b", r"\1")
+    text = pc.if_else(pc.match_substring_regex(text, "^[NSEWnsew]"), before, after)
     halves = pc.split_pattern_regex(text, gap)
     odd = pc.fill_null(pc.not_equal(pc.list_value_length(halves), 2), False).to_numpy(zero_copy_only=False)
     if odd.any():
-        raise cells.unread(column, int(np.argmax(odd)), f" With part = {part}, cells with two numbers are accepted, such as 52.0, 4.0.")
+        raise cells.unread(column, int(np.argmax(odd)), f" With part = {part}, cells with two numbers are accepted, such as 52.0, 4.0.", "not a pair")
     return pc.list_element(halves, part - 1)
 
 
@@ -100,6 +105,7 @@ def _letters(text: pa.Array) -> tuple[pa.Array, np.ndarray | None]:
     there = pc.fill_null(pc.not_equal(letter, ""), False)
     if not pc.any(there).as_py():
         return text, None
+    number = pc.replace_substring_regex(number, r"^(\d{1,3})[\s-]+(\d)", "\\1\u00b0 \\2")  # 33 47.63 S
     return pc.if_else(there, number, text), pc.if_else(there, pc.utf8_upper(letter), None).to_numpy(zero_copy_only=False)
 
 
@@ -122,20 +128,20 @@ def _numbers(cells: Cells, column: str, text: pa.Array, channel: Channel, missin
         pc.fill_null(pc.replace_substring(pc.if_else(pc.equal(part, ""), "0", part), ",", ".").cast(pa.float64()), 0.0).to_numpy()
         for part in (pc.struct_field(found, k) for k in (1, 2, 3))
     )
-    high = (minutes >= 60.0) | (seconds >= 60.0)
+    high = (minutes > 60.0) | (seconds > 60.0)  # 59.9999 is rounded to 60
     if high.any():
-        raise cells.unread(column, int(np.argmax(high)), " Minutes and seconds are accepted below 60.")
+        raise cells.unread(column, int(np.argmax(high)), " Minutes and seconds are accepted up to 60.", "no position")
     size = degrees + minutes / 60.0 + seconds / 3600.0
     return np.where(marked.to_numpy(zero_copy_only=False), np.where(minus, -size, size), plain)
 
 
-def _degrees(cells: Cells, column: str, values: np.ndarray) -> np.ndarray:
+def _degrees(cells: Cells, column: str, channel: Channel, values: np.ndarray) -> np.ndarray:
     """Degrees of ddmm.mmmm."""
     whole, minutes = np.divmod(np.abs(values), 100.0)
-    high = minutes >= 60.0
+    high = minutes > 60.0
     if high.any():
-        hint = ' Its last two whole digits are minutes, accepted below 60. Is it in degrees? Then unit = "deg".'
-        raise cells.unread(column, int(np.argmax(high)), hint)
+        hint = ' Its last two whole digits are minutes, accepted up to 60. Is it in degrees? Then unit = "deg".'
+        raise cells.unread(column, int(np.argmax(high)), hint, f"not in {channel.unit}")
     return np.copysign(whole + minutes / 60.0, values)
 
 
@@ -165,5 +171,6 @@ def _signed(cells: Cells, name: str, channel: Channel, values: np.ndarray, sides
     signs = np.array([accepted.get(s, 1.0) for s in sides])
     against = there & (values < 0.0) & (signs > 0.0)
     if against.any():
-        raise cells.unread(channel.columns[0], int(np.argmax(against)), f" Its minus contradicts the letter {sides[np.argmax(against)]}.")
+        row = int(np.argmax(against))
+        raise cells.unread(channel.columns[0], row, f" Its minus contradicts the letter {sides[row]}.", "no position")
     return signs * np.abs(values)

@@ -157,9 +157,9 @@ def _reads(text: str) -> bool:
     return True
 
 
-def no_number(where: str, column: str, cell: str, hint: str) -> InputError:
+def no_number(where: str, column: str, cell: str, hint: str, what: str) -> InputError:
     """The error for a cell that is no number. Only a text without digits is offered as one that stands for a missing value."""
     accepted = "decimal numbers and empty cells"
     if not any(c.isdigit() for c in cell):
         accepted += f', and what [missing] lists: missing = ["{cell[:20]}"] takes it as missing'
-    return InputError(f"{where}: '{column}' is '{cell[:60]}', not a number.{hint} Accepted: {accepted}.")
+    return InputError(f"{where}: '{column}' is '{cell[:60]}', {what}.{hint} Accepted: {accepted}.")

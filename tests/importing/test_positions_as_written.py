@@ -25,6 +25,12 @@ def nmea(degrees: np.ndarray, digits: int) -> list[str]:
     return [f"{int(d):0{digits}d}{60.0 * (d % 1.0):08.5f}" for d in size]
 
 
+def seconds(degrees: float) -> str:
+    """Degrees, minutes and seconds; 59.9999 seconds become 60.000."""
+    whole, minutes = divmod(abs(degrees) * 60.0, 60.0)
+    return f"{whole:.0f}°{int(minutes)}'{minutes % 1.0 * 60.0:.3f}"
+
+
 def log(**extra) -> pd.DataFrame:
     return logged(T).assign(**extra)
 
@@ -49,6 +55,8 @@ COLUMN = '{{ column = "{}", unit = "{}"{} }}'
         (lambda a: [f"{v + 'S'}" for v in nmea(a, 2)], lambda o: [f"{v}W" for v in nmea(o, 3)], "ddmm.mmmmN"),
         (lambda a: [f"-{v}" for v in nmea(a, 2)], lambda o: [f"-{v}" for v in nmea(o, 3)], "ddmm.mmmm"),
         (lambda a: [f"{int(-v)}°{(-v % 1) * 60:.6f}'S" for v in a], lambda o: [f"{int(-v)}° {(-v % 1) * 60:.6f}' W" for v in o], "deg"),
+        (lambda a: [f"S {int(-v)} {(-v % 1) * 60:.6f}" for v in a], lambda o: [f"{int(-v)} {(-v % 1) * 60:.6f} W" for v in o], "deg"),
+        (lambda a: [seconds(v) + '"S' for v in a], lambda o: [seconds(v) + "W" for v in o], "deg"),
         (lambda a: np.round(a * 1e7).astype(int), lambda o: np.round(o * 1e7).astype(int), "1e-7 deg"),
         (lambda a: [f"{v:.8f}S" for v in a], lambda o: [f"{v:.8f}W" for v in o], "deg"),  # minus and letter say the same
     ],
@@ -77,10 +85,13 @@ def test_letters_that_are_not_read_are_reported_with_the_line_that_reads_them(tr
     assert "DOUBTFUL" not in trial_import(signed, plan(COLUMN.format("lat", "deg", ""), COLUMN.format("lon", "deg", "")), "--force").stdout
 
 
-@pytest.mark.parametrize(("form", "tables"), [("{:.8f} {:.8f}", ""), ("({:.8f}, {:.8f})", ""), ("{:.8f};{:.8f}", "")])
-def test_both_in_one_cell(trial_import, form, tables):
-    table = log(GPS=[form.format(*pair) for pair in zip(*track(), strict=True)])
-    told = plan(COLUMN.format("GPS", "deg", ", part = 1"), COLUMN.format("GPS", "deg", ", part = 2"), tables)
+@pytest.mark.parametrize(
+    "form", ["{:.8f} {:.8f}", "({:.8f}, {:.8f})", "{:.8f};{:.8f}", "POINT ({1:.8f} {0:.8f})", "S {2:.8f} W {3:.8f}", "{2:.8f} S, {3:.8f} W"]
+)
+def test_both_in_one_cell(trial_import, form):
+    table = log(GPS=[form.format(a, o, -a, -o) for a, o in zip(*track(), strict=True)])
+    lat, lon = (2, 1) if form.startswith("POINT") else (1, 2)
+    told = plan(COLUMN.format("GPS", "deg", f", part = {lat}"), COLUMN.format("GPS", "deg", f", part = {lon}"))
     np.testing.assert_allclose(end_of_track(trial_import(table, told)), TRUTH, atol=0.5)
 
 
@@ -94,7 +105,8 @@ def test_both_in_one_cell_without_part_says_part(trial_import):
 @pytest.mark.parametrize(
     ("lat", "entry", "told"),
     [
-        ("5275.50", COLUMN.format("lat", "ddmm.mmmm", ""), "minutes, accepted below 60"),
+        ("52°4737.8", COLUMN.format("lat", "deg", ""), "not a number"),
+        ("5275.50", COLUMN.format("lat", "ddmm.mmmm", ""), "minutes, accepted up to 60"),
         ("5215.50", COLUMN.format("lat", "deg", ""), 'unit = "ddmm.mmmm"'),
         (520_000_000, COLUMN.format("lat", "deg", ""), 'unit = "1e-7 deg"'),
         ("52.0E", COLUMN.format("lat", "deg", ""), "accepted for lat: N and S"),
