@@ -255,3 +255,15 @@ def test_columns_without_heads_are_not_guessed_where_the_ship_does_not_turn(prop
     assert not plan["channels"]
     assert "MISSING" in done.stdout
     assert 'column "3": first values' in text
+
+
+def test_words_of_a_log_cannot_write_into_the_draft(propose, tmp_path):
+    """A line break or an escape code in a head or a cell stays inside of its comment."""
+    table = logged(T).rename(columns={"HDG": "heading\nlicence = 'theirs'\x1b[2J"}).assign(**{"note\n[split]\ngap = 9": "calm\n[antenna]\nx = 1"})
+    table.to_parquet(tmp_path / "log.parquet")
+    done, text, plan = propose("log.parquet")
+    assert plan["channels"]["psi"]["column"] == "heading\nlicence = 'theirs'\x1b[2J"
+    assert not {"licence", "antenna"} & set(plan)
+    assert plan["split"]["gap"] == 3.0
+    assert "\x1b" not in text + done.stdout
+    assert len(imported("log.parquet")) == 1

@@ -268,6 +268,7 @@ CSV |= {
     "ddmm.mmmm with letters": lambda: placed(lat=[m + "S" for m in minutes(LATS, 2)], lon=[m + "W" for m in minutes(LONS, 3)]),
     "degrees and minutes with their marks": lambda: placed(lat=sexagesimal(LATS, "S"), lon=sexagesimal(LONS, "W")),
     "longitude before latitude in one cell": lambda: placed(**{"lon/lat": [f"{b:.7f} {a:.7f}" for a, b in zip(LATS, LONS, strict=True)]}),
+    "points of WKT": lambda: placed(geom=[f"POINT ({b:.7f} {a:.7f})" for a, b in zip(LATS, LONS, strict=True)]),
     "coordinates in radians, without a word": lambda: placed(lat=np.deg2rad(LATS).round(10), lon=np.deg2rad(LONS).round(10)),
     "the integers of ArduPilot": ardupilot,
     "quaternion from east": east_north_up,

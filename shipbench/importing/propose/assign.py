@@ -16,8 +16,7 @@ _TO_PORT = rf"\b{_PORT} ?(is|=)? ?(\+|{_PLUS}\b)|(\+|\b{_PLUS}) ?(is|=|to|nach|a
 _SIDED = ("v", "r", "delta", "delta_c", "F_b", "F_b_c", "F_s", "F_s_c")
 _SIDES = ({"+port", "+starboard"}, {"+first", "+second"})
 _PAIRS = (("lat", "lon"), ("x", "y"), ("sog", "cog"), ("wind_speed", "wind_from"), ("apparent_wind_speed", "apparent_wind_from"))
-_LATLON = re.compile(r"[(\[{ ]*[NSEW]?([-+]?\d+[.,]\d+)[ °]*[NSEW]?[\s,;/]+[NSEW]?([-+]?\d+[.,]\d+)[ °]*[NSEW]?[)\]} ]*")
-_POINT = re.compile(r"(?i)\s*POINT\s*\(.*\)\s*")
+_LATLON = re.compile(r"(?:(?i:POINT) ?)?[(\[{ ]*[NSEW]?([-+]?\d+[.,]\d+)[ °]*[NSEW]?[\s,;/]+[NSEW]?([-+]?\d+[.,]\d+)[ °]*[NSEW]?[)\]} ]*")
 
 _LETTERED = re.compile(r"[NSEWOnsewo]?\s*[-+]?\d[\d.,°'\"\u2032\u2033 ]*\s*[NSEWOnsewo]?")
 """A coordinate with the letter of its hemisphere before or after it."""
@@ -68,9 +67,9 @@ def assign(columns: Sequence[Column], kept: dict[str, Any], run: str | None = No
     for column in free:
         if column.head.meaning in ("heading or course", "speed", "psi magnetic", "stw", "north velocity", "east velocity"):
             found.candidates.setdefault(column.head.meaning, column)
-    for channel in dict.fromkeys(c.head.channel for c in free):
-        if channel is not None and channel not in found.entries:
-            _take(channel, [c for c in free if c.head.channel == channel and c.head.fits and c.name not in found.used() and _holds(c, found)], found)
+    for named in dict.fromkeys(c.head.channel for c in free):
+        if named is not None and named not in found.entries:
+            _take(named, [c for c in free if c.head.channel == named and c.head.fits and c.name not in found.used() and _holds(c, found)], found)
     _ambiguous(found)
     _complete_pairs(found, kept)
     return found
@@ -119,8 +118,6 @@ def _positions(columns: Sequence[Column], found: Assigned) -> None:
             if column.head.meaning in ("latlon", "lat", None) and not len(column.known) and cells and all(_LATLON.fullmatch(t) for t in cells):
                 _both_in_one(column, cells, found)
                 break
-            if cells and not len(column.known) and all(_POINT.fullmatch(t) for t in cells):
-                found.notes.append(f"'{column.name}' holds positions such as '{cells[0]}', which are not read. Write them as latitude and longitude.")
     north, east = ({c.name: c for c in columns}.get(name) for name in ("N", "E"))
     if north and east and "x" not in found.entries and not any(c.head.channel == "x" for c in columns):
         for channel, column in (("x", north), ("y", east)):
@@ -129,12 +126,12 @@ def _positions(columns: Sequence[Column], found: Assigned) -> None:
 
 def _both_in_one(column: Column, cells: list[str], found: Assigned) -> None:
     first, second = (max(abs(float(m[k].replace(",", "."))) for t in cells if (m := _LATLON.fullmatch(t))) for k in (1, 2))
-    lat_first = first <= 90 and not re.search(r"(?i)lon\w*\W+lat", column.name)
+    lat_first = first <= 90 and not re.search(r"(?i)lon\w*\W+lat", column.name) and not cells[0].upper().startswith("POINT")
     for channel, part in (("lat", 1 if lat_first else 2), ("lon", 2 if lat_first else 1)):
         found.entries[channel] = Entry(
             channel, {"column": column.name, "part": part, "unit": "deg"}, (column,), [f"number {part} of cells such as '{cells[0]}'"]
         )
-    if first <= 90 and second <= 90 and not re.search(r"[NSEW]", cells[0]):
+    if first <= 90 and second <= 90 and not re.search(r"[NSEW]|POINT", cells[0].upper()):
         found.notes.append(f"NOT SURE: '{column.name}': the {'first' if lat_first else 'second'} number is taken as the latitude ('{cells[0]}').")
 
 

@@ -79,7 +79,10 @@ def examine(sample: Sample, time: Time, found: Assigned, extra: dict[str, Any]) 
 
 def _series(sample: Sample, source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Times and values of each channel in our units, by the import's own reader; of a log with several runs the first."""
-    first, t, values, rows = None, [], [], 0
+    first: str | None = None
+    t: list[np.ndarray] = []
+    values: list[np.ndarray] = []
+    rows = 0
     for name, block in read_blocks(sample.path, source, Counts()):
         first = name if not t else first
         if name == first:

@@ -90,16 +90,14 @@ def _form(
     units = max(between, key=lambda k: sum(bool(units_of(cell.strip("[]() "))) for cell in rows[k]), default=None)
     texts = tuple(cell.strip("[]() ") for cell in rows[units]) if units is not None else ()
     heads = tuple(cell.strip() for cell in rows[head]) if head is not None else ()
-    by_number = head is None or (delimiter == BLANKS and " ".join(heads).split() != list(heads)) or len(heads) < width - 1
-    if by_number:
-        found |= {"header": 0, "skip": data}
-        heads = heads[-width:]
-    else:
-        found |= {"header": head + 1} if head else {}
-        found |= {"skip": data - head - 1} if data > head + 1 else {}
-    if delimiter is not None and (head is None or by_number or max(DELIMITERS[:-1], key=lines[head].count) != delimiter):
+    if head is None or (delimiter == BLANKS and " ".join(heads).split() != list(heads)) or len(heads) < width - 1:
+        found |= {"header": 0, "skip": data} | ({"delimiter": delimiter} if delimiter else {})
+        return Form(Layout(**found), heads[-width:], texts, notes, found)
+    found |= {"header": head + 1} if head else {}
+    found |= {"skip": data - head - 1} if data > head + 1 else {}
+    if delimiter is not None and max(DELIMITERS[:-1], key=lines[head].count) != delimiter:
         found["delimiter"] = delimiter
-    return Form(Layout(**found), heads if by_number else (), texts, notes, found)
+    return Form(Layout(**found), (), texts, notes, found)
 
 
 def _split(line: str, delimiter: str) -> list[str]:

@@ -16,7 +16,7 @@ from ..writer import run_name
 from .columns import read_samples
 from .groups import group
 from .source import SLOW, SourceDraft, channel_gaps, clocks_apart, draft_source, missing_channels
-from .text import draft_text
+from .text import draft_text, one_line
 from .trial import try_draft
 
 
@@ -63,7 +63,7 @@ def write_proposal(
     finally:
         fresh.unlink(missing_ok=True)
     command = f"shipbench data import LOG --map {shlex.quote(str(path))} --ship ship.toml --out FOLDER"
-    return [*notes, f"Draft: {path}. Check every line marked GUESS, then: {command}"]
+    return [*map(one_line, notes), f"Draft: {path}. Check every line marked GUESS, then: {command}"]
 
 
 def _left_notes(source: SourceDraft) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...names import shown
 from ..entries import CHANNELS
 from .assign import Entry
 from .source import SourceDraft
@@ -35,7 +36,7 @@ def draft_text(top: dict[str, Any], split: dict[str, Any], kept: set[str], sourc
     lines += [f"# {line}" for key, line in _IDLE.items() if key not in split]
     for source in sources:
         lines += ["", *_source(source, "" if single else f"sources.{source.name}.")]
-    return "\n".join([*lines, "", *(f"# {note}" for note in notes)]) + "\n"
+    return "\n".join([*lines, "", *(f"# {one_line(note)}" for note in notes)]) + "\n"
 
 
 _DT = "  # GUESS: sample time of the data set [s]"
@@ -66,7 +67,7 @@ def _source(source: SourceDraft, prefix: str) -> list[str]:
     lines += _not_taken(source)
     if prefix and not entries:  # nothing in it was recognised: for the reader to complete
         lines = [f"# {line}".rstrip() for line in lines]
-    return [f"# {source.sample.path.name}: {source.sample.form}", *lines]
+    return [one_line(f"# {source.sample.path.name}: {source.sample.form}"), *lines]
 
 
 _GUESS = "  # GUESS"
@@ -80,23 +81,27 @@ def _time(source: SourceDraft) -> list[str]:
     form = spec.get("format")
     if form is not None:
         given = "format" in source.kept.get("time", {})
-        lines.append(f"format = {value(form)}" + ("" if given else f"  # GUESS: {source.time_why}; accepted: {_FORMATS}"))
+        lines.append(f"format = {value(form)}" + ("" if given else f"  # GUESS: {one_line(source.time_why)}; accepted: {_FORMATS}"))
         if ("%" in form or form == "iso") and "zone" not in spec:
             lines.append('# zone = "UTC"  # where the stamps have none')
     return lines
 
 
+def one_line(text: str) -> str:
+    """A comment or a note that has words of a log in it: in one line, without unseen characters."""
+    return shown(" ".join(text.splitlines()))
+
+
 def _channel(entry: Entry) -> str:
     spec = {k: v for k, v in entry.spec.items() if v is not None}
-    shown = "; ".join(entry.why)
-    evidence = "; ".join(dict.fromkeys(c.evidence() for c in entry.columns))
+    evidence = one_line("; ".join(dict.fromkeys(c.evidence() for c in entry.columns)))
     if entry.missing:
         body = ", ".join([*(f"{k} = {value(v)}" for k, v in spec.items()), *(f"{k} = ?" for k, v in entry.spec.items() if v is None)])
-        return f"# {entry.channel} = {{ {body} }}  # MISSING: {entry.missing}; {evidence}"
+        return f"# {entry.channel} = {{ {body} }}  # MISSING: {one_line(entry.missing)}; {evidence}"
     body = ", ".join(f"{k} = {value(v)}" for k, v in spec.items())
     heads = [c.head.name for c in entry.columns if c.head.name and c.head.name != c.name]
-    named = f"'{', '.join(heads)}'; " if heads else ""
-    mark = "as given" if entry.why == ["as given"] else f"GUESS: {named}{shown}"
+    why = "; ".join([*(f"'{head}'" for head in heads), *entry.why])
+    mark = "as given" if entry.why == ["as given"] else f"GUESS: {one_line(why)}"
     return f"{entry.channel} = {{ {body} }}  # {mark}; {evidence}"
 
 
@@ -106,7 +111,7 @@ def _not_taken(source: SourceDraft) -> list[str]:
         return []
     if source.sample.layout.header == 0:
         return ["# Columns not taken; who knows them writes psi, x, y and the rest with these numbers:"] + [
-            f'#   column "{c.name}"{f" ({c.head.name})" if c.head.name else ""}: {c.evidence()}' for c in left[:_SHOWN]
+            one_line(f'#   column "{c.name}"{f" ({c.head.name})" if c.head.name else ""}: {c.evidence()}') for c in left[:_SHOWN]
         ]
     return [f"# not taken: {', '.join(value(c.name) for c in left[:_SHOWN])}{' and more' if len(left) > _SHOWN else ''}"]
 
@@ -119,4 +124,4 @@ def value(entry: Any) -> str:
         return "[" + ", ".join(value(v) for v in entry) + "]"
     if isinstance(entry, float | np.floating):
         return ("inf" if entry > 0 else "-inf") if math.isinf(entry) else "nan" if math.isnan(entry) else repr(float(f"{entry:.12g}"))
-    return json.dumps(entry, ensure_ascii=False)
+    return json.dumps(entry, ensure_ascii=False).replace("\x7f", "\\u007f")
