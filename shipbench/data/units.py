@@ -36,7 +36,7 @@ def unit_factor(signal: str, unit: str) -> float:
     table = _BY_OURS[UNITS[signal]]
     steps = _PARTS.fullmatch(unit)
     size, name = (float(steps[1]), steps[2]) if steps else (1.0, unit)
-    if name not in table or not 0.0 < size < math.inf:
+    if name not in table or not 1e-12 <= size <= 1e12:
         raise unknown_name(f"unit of '{signal}'", unit, table)
     return size * table[name]
 

@@ -29,6 +29,10 @@ _SIGN_WORDS = {"lat": ("north", "south"), "lon": ("east", "west"), "cog": ("cloc
 _UNITS_LIKE = {"lat": "psi", "lon": "psi", "sog": "u", "cog": "psi", "apparent_wind_speed": "u", "apparent_wind_from": "psi"}
 
 
+MOST = 1e12
+"""Largest factor and offset; no unit of a log is further from ours."""
+
+
 class Part(BaseModel):
     """An unknown key is an error, never ignored."""
 
@@ -52,13 +56,13 @@ class Channel(Part):
     quaternion: tuple[str, str, str, str] | None = None
     unit: str
     sign: str | None = None
-    offset: float = Field(0.0, allow_inf_nan=False)
-    factor: float = Field(1.0, allow_inf_nan=False)
+    offset: float = Field(0.0, ge=-MOST, le=MOST)
+    factor: float = Field(1.0, ge=-MOST, le=MOST)
     gap: float | None = Field(None, gt=0)
     missing: list[str | float] | None = None
     hemisphere: str | None = None
     part: Literal[1, 2] | None = None
-    full: float | None = Field(None, allow_inf_nan=False)
+    full: float | None = Field(None, ge=-MOST, le=MOST)
     full_unit: str | None = None
 
     @model_validator(mode="before")
@@ -140,8 +144,8 @@ def check_channel(name: str, channel: Channel, path: str | Path) -> None:
         channel_factor(name, channel)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    if channel.factor == 0.0 or channel.full == 0.0:
-        raise InputError(f"{where}: factor or full is 0; accepted: any other number (it multiplies the reading).")
+    if any(abs(size) < 1.0 / MOST for size in (channel.factor, channel.full) if size is not None):
+        raise InputError(f"{where}: factor or full is 0 or next to it; accepted: any other number (it multiplies the reading).")
     if channel.unit not in _OF_FULL and (channel.full is not None or channel.full_unit is not None):
         raise InputError(f'{where}: full belongs to unit = "%" or "pwm", not to "{channel.unit}". Remove full and full_unit.')
     as_written = [k for k in ("hemisphere", "part") if getattr(channel, k) is not None] + [channel.unit] * (channel.unit in MINUTES)

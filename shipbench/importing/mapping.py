@@ -31,7 +31,7 @@ class Clock(Part):
     columns: tuple[str, str] | None = None
     format: str = "s"
     zone: str | None = None
-    rate: float | None = Field(None, gt=0, allow_inf_nan=False)
+    rate: float | None = Field(None, ge=1e-4, le=1e6)
     shift: float = Field(0.0, ge=-LATEST, le=LATEST)
     repeated: Literal["first", "spread"] = "first"
     backwards: Literal["error", "drop", "sort", "split"] = "error"
@@ -57,10 +57,10 @@ class Layout(Part):
 
 
 class Point(Part):
-    """A place on board [m]: x forward of midship, y to starboard of the centre line."""
+    """A place on board [m]: x forward of midship, y to starboard of the centre line; the longest ships have 460 m."""
 
-    x: float = Field(allow_inf_nan=False)
-    y: float = Field(0.0, allow_inf_nan=False)
+    x: float = Field(ge=-500.0, le=500.0)
+    y: float = Field(0.0, ge=-500.0, le=500.0)
 
 
 class Origin(Part):
@@ -141,6 +141,11 @@ def load_mapping(path: str | Path, **overrides: Any) -> Mapping:
         raise _explained(error, path, single) from None
     check_name(mapping.name, f"{path}: name")
     for source in mapping.sources.values():
+        mark = source.file.delimiter
+        if mark is not None and (mark.isalnum() or not mark.isascii() or mark in '"\r\n\0.+-'):
+            raise InputError(
+                f"{path}: [file] delimiter = {mark!r}; accepted: a mark between columns, such as ',', ';', '|', '\\t', or ' ' for blanks."
+            )
         if source.file.thousands == source.file.decimal:
             raise InputError(f"{path}: [file] decimal and thousands are both '{source.file.decimal}'; accepted: two marks. Correct one.")
         for name, channel in source.channels.items():

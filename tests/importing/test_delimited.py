@@ -101,3 +101,17 @@ def test_times_that_are_too_far_away_are_refused(trial_import):
     refused = trial_import(TEXT, mapping(time='column = "time"\nshift = 1e300'))
     assert refused.exit_code == 2
     assert "time.shift" in refused.stderr
+
+
+@pytest.mark.parametrize("mark", [r"\n", "a", "5", r"\"", "é", "."])
+def test_what_cannot_stand_between_columns_is_no_delimiter(trial_import, mark):
+    refused = trial_import(TEXT, mapping(tables=f'[file]\ndelimiter = "{mark}"\n'))
+    assert refused.exit_code == 2
+    assert "accepted: a mark between columns" in refused.stderr
+
+
+@pytest.mark.parametrize("line", ["rate = 1e-300", "rate = 1e300"])
+def test_rates_that_no_log_has_are_refused(trial_import, line):
+    refused = trial_import(TEXT, mapping(time=line))
+    assert refused.exit_code == 2
+    assert "time.rate" in refused.stderr
