@@ -11,10 +11,13 @@ from .cells import Counts
 from .clock import shown
 from .mapping import Source
 from .ordering import CONTEXT
-from .track import jumps, positions, usual, velocities
+from .track import Jumps, jumps, positions, usual, velocities
 
 _LEAST = 0.5
 """A pause is looked at where it is longer than the usual step by this or more, and a step of the clock is one of this or more [s]."""
+
+_PLAIN = 300
+"""Joints without a pause that show how certain the track is."""
 
 
 def steps_marked(blocks: Iterable[Block], source: Source, gap: float, met: Counts) -> Iterator[Block]:
@@ -49,11 +52,15 @@ def _steps(block: Block, track: np.ndarray, stated: np.ndarray | None, gap: floa
     if not len(joints):
         return []
     bounds = np.r_[0, anew, len(rows)]
-    low = bounds[np.searchsorted(bounds, joints, side="right") - 1]
-    high = bounds[np.searchsorted(bounds, joints, side="right")]
-    found = jumps(t, track[rows], None if stated is None else stated[rows], joints, low, high)
+
+    def at(joints: np.ndarray) -> Jumps:
+        place = np.searchsorted(bounds, joints, side="right")
+        return jumps(t, track[rows], None if stated is None else stated[rows], joints, bounds[place - 1], bounds[place])
+
+    plain = np.setdiff1d(np.flatnonzero(pauses < usual(pauses) + _LEAST) + 1, anew)
+    found = at(joints)
     steps = []
-    for k in np.flatnonzero(found.certain(_LEAST)):
+    for k in np.flatnonzero(found.certain(_LEAST, at(plain[:: len(plain) // _PLAIN + 1]))):
         a, b = rows[joints[k] - 1], rows[joints[k]]
         steps.append((int(a + 1 + np.argmax(np.diff(block.t[a : b + 1]))), float(found.seconds[k])))
     return steps

@@ -66,11 +66,22 @@ class Jumps:
     turning: np.ndarray
     across: np.ndarray
 
-    def certain(self, least: float) -> np.ndarray:
-        """Joints that only a clock explains: by `least` [s] or more, by five standard errors, along the course."""
-        size = np.abs(self.seconds)
-        with np.errstate(invalid="ignore"):
-            return (size >= least) & (size > 5.0 * self.error) & (size > self.turning) & (self.across < np.maximum(0.5 * size, 3.0 * self.error))
+    def certain(self, least: float, plain: Jumps) -> np.ndarray:
+        """Joints that only a clock explains: by `least` [s] or more, along the course, and far outside of what joints without a pause show.
+
+        Outside means five standard errors, more where `plain` joints scatter by more than theirs (errors that last for seconds), and twice the
+        95 % quantile of `plain`.
+        """
+        with np.errstate(invalid="ignore", divide="ignore"):
+            spread = max(1.0, 0.5 * _quantile(np.abs(plain.seconds) / plain.error))
+            size, error = np.abs(self.seconds), spread * self.error
+            far = (size > 5.0 * error) & (size > 2.0 * _quantile(np.abs(plain.seconds)))
+            return (size >= least) & far & (size > self.turning) & (self.across < np.maximum(0.5 * size, 3.0 * error))
+
+
+def _quantile(values: np.ndarray) -> float:
+    values = values[np.isfinite(values)]
+    return float(np.quantile(values, 0.95)) if len(values) else 0.0
 
 
 def jumps(t: np.ndarray, p: np.ndarray, v: np.ndarray | None, joints: np.ndarray, low: np.ndarray, high: np.ndarray) -> Jumps:
@@ -118,7 +129,7 @@ def _jumps(
         speed = np.hypot(*velocity.T)
         seconds = -np.sum(leap * velocity, axis=1) / speed**2
         across = np.abs(leap[:, 0] * velocity[:, 1] - leap[:, 1] * velocity[:, 0]) / speed**2
-        turning = 0.5 * np.hypot(*change.T) * np.abs(t[joints] - t[joints - 1]) / speed
+        turning = 0.25 * np.hypot(*change.T) * np.abs(t[joints] - t[joints - 1]) / speed
         return Jumps(seconds, np.sqrt(var0 + var1) / speed, turning, across)
 
 

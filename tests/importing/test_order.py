@@ -12,6 +12,10 @@ from trial import channels, logged, mapping, motion, write
 
 from shipbench import load_dataset
 from shipbench.importing import ordering, recordings
+from shipbench.importing.blocks import Block
+from shipbench.importing.cells import Counts
+from shipbench.importing.mapping import Source
+from shipbench.importing.steps import steps_marked
 
 T = np.arange(0.0, 180.5, 0.5)
 SECONDS = np.arange(0.0, 181.0)
@@ -80,7 +84,7 @@ def test_late_rows_are_no_clock_that_was_set_back(trial_import, how, kind, noise
     np.testing.assert_allclose(run.states[:, 0], motion(run.t)["x"], atol=0.2 + 3 * noise)
     if how == "sort":
         assert run.t[-1] == 180.0
-        assert ("rows sorted by time" in result.stdout) == (kind != "sorted")
+        assert "rows sorted by time" in result.stdout
 
 
 def test_rows_of_instruments_one_after_another_are_sorted(trial_import):
@@ -150,6 +154,27 @@ def test_a_plain_pause_stays_one(trial_import, pause, at, rate, noise):
     result = trial_import(table, mapping(tables="[split]\ngap = 30.0", body=channels("u", "v")))
     assert len(load_dataset("out").runs) == 1, result.stdout
     assert "clock" not in result.stdout
+
+
+@pytest.mark.parametrize("speeds", [True, False])
+@pytest.mark.parametrize("correlation", [0.0, 20.0])
+@pytest.mark.parametrize("kind", ["lost rows", "reports"])
+def test_thousands_of_plain_pauses_are_no_steps(kind, correlation, speeds):
+    """Positions with errors of 2 m, white or lasting for 20 s, at rows that are lost by chance, or at intervals as of AIS reports."""
+    rng = np.random.default_rng(0)
+    t = np.arange(4000.0)
+    t = t[rng.uniform(size=len(t)) > 0.3] if kind == "lost rows" else np.cumsum(rng.choice([2.0, 3.0, 6.0, 10.0], 800))
+    s, error = motion(t), rng.normal(size=(len(t), 2)) * 2.0
+    for k in range(1, len(t)) if correlation else ():
+        keep = np.exp(-(t[k] - t[k - 1]) / correlation)
+        error[k] = keep * error[k - 1] + np.sqrt(1.0 - keep**2) * error[k]
+    names = ("x", "y", "psi", *(("u", "v") if speeds else ()))
+    values = np.column_stack([s["x"] + error[:, 0], s["y"] + error[:, 1], *(s[name] for name in names[2:])])
+    channels_of = {name: {"column": name, "unit": {"psi": "rad", "u": "m/s", "v": "m/s"}.get(name, "m")} for name in names}
+    source = Source.model_validate({"time": {"column": "t"}, "channels": channels_of})
+    met = Counts()
+    assert sum(len(b.t) for b in steps_marked([Block(t, values)], source, 60.0, met)) == len(t)
+    assert met.clock == []
 
 
 def test_a_leap_of_the_position_in_a_pause_is_no_clock(trial_import):
