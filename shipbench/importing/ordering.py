@@ -177,7 +177,7 @@ def _sorted(blocks: Iterable[Block], source: Source, where: str, met: Counts) ->
         return
     whole = joined(everything)
     parts, begin, high = [], 0, -np.inf
-    for k in np.flatnonzero(np.diff(whole.t, prepend=-np.inf) < 0.0):
+    for k in np.flatnonzero(np.diff(whole.t, prepend=-np.inf) < 0.0).tolist():
         high = float(whole.t[begin:k].max())
         if whole.t[k] < high and _seen(whole, k, begin, high, source):
             parts.append(slice(begin, k))
