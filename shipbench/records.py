@@ -235,8 +235,11 @@ class Dataset:
         A run of exactly `history + steps + 1` samples gives one window; a run that gives one window only keeps its name.
 
         Raises:
-            InputError: no run is long enough.
+            InputError: no run is long enough, or a number is not one of samples.
         """
+        for what, value, least in (("steps", steps, 1), ("stride", 1 if stride is None else stride, 1), ("history", history, 0)):
+            if not isinstance(value, (int, np.integer)) or value < least:
+                raise InputError(f"{what} = {value}; accepted: a whole number of samples, {least} or more.")
         need = history + steps + 1
         windows = []
         for run in self.runs:
@@ -254,11 +257,13 @@ class Dataset:
         """Stack runs of equal length; the first `history` samples before s0 become the history.
 
         Raises:
-            InputError: the runs differ in length (cut them with `windows` first).
+            InputError: the runs differ in length (cut them with `windows` first), or leave no step after the history.
         """
         lengths = {len(r) for r in self.runs}
         if len(lengths) > 1:
             raise InputError(f"data set '{self.name}': runs have {min(lengths)} to {max(lengths)} samples; cut them with windows().")
+        if not isinstance(history, (int, np.integer)) or not 0 <= history < len(self.runs[0]):
+            raise InputError(f"history = {history}; accepted: 0 to {len(self.runs[0]) - 1} samples, since the runs have {len(self.runs[0])}.")
         S = np.stack([r.states for r in self.runs])
         U = np.stack([r.inputs for r in self.runs])
         past = (S[:, :history], U[:, :history]) if history else None

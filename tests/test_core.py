@@ -58,6 +58,18 @@ def test_a_batch_gives_s0_then_the_samples_after_it():
     np.testing.assert_array_equal(batch.history[0][0, :, 0], [0.0, 1.0, 2.0])
 
 
+@pytest.mark.parametrize(("steps", "stride", "history"), [(0, None, 0), (-5, None, 0), (2.5, None, 0), (2, 0, 0), (2, -3, 0), (2, None, -1)])
+def test_windows_of_no_whole_number_of_samples_are_refused(harbour, steps, stride, history):
+    with pytest.raises(InputError, match=r"accepted: a whole number of samples"):
+        harbour.windows(steps, stride, history)
+
+
+@pytest.mark.parametrize("history", [-3, 1_000_000, 1.5])
+def test_a_history_that_the_runs_do_not_have_is_refused(harbour, history):
+    with pytest.raises(InputError, match=rf"history = {history}; accepted: 0 to 40 samples"):
+        harbour.batch(history)
+
+
 def test_a_sample_that_is_not_finite_is_named():
     states = np.zeros((5, 10))
     states[3, 4] = np.inf

@@ -12,6 +12,8 @@ from ..records import Batch
 from ..signals import COMMANDS, STATES
 
 _N, _N_C = STATES.index("n"), COMMANDS.index("n_c")
+_NOTHING = 1e-6
+"""A position error [m] that is rounding."""
 _RESISTANCE = frozenset({"p1", "p2", "p3"})
 """Linear, quadratic and cubic resistance: one of them at zero leaves its share to the others."""
 
@@ -39,6 +41,8 @@ class FitReport:
         """Whether it follows its own runs: it is better than `hold`, and where it still keeps more than a third of that error, no coefficient of the
         propeller or the rudder, nor the whole resistance, is at a bound."""
         telling = set(self.at_bounds) - _RESISTANCE or set(self.at_bounds) >= _RESISTANCE
+        if self.error < _NOTHING:  # the ship keeps its velocities: there is nothing to be better at
+            return True
         return self.error < self.hold and not (telling and self.error > self.hold / 3.0)
 
     @property

@@ -248,7 +248,8 @@ def intervals(q: np.ndarray, e: np.ndarray, J: np.ndarray, low: np.ndarray, high
         return interval
     bread = np.linalg.pinv(np.einsum("bksp,bksq->pq", J, J)[np.ix_(free, free)])
     scores = np.einsum("bksp,bks->bp", J, e)[:, free]
-    spread = np.sqrt(np.diag(bread @ (scores.T @ scores * runs / (runs - 1)) @ bread))
+    with np.errstate(invalid="ignore"):  # a variance that rounds below zero has no interval
+        spread = np.sqrt(np.diag(bread @ (scores.T @ scores * runs / (runs - 1)) @ bread))
     half = float(stdtrit(runs - 1, 0.975)) * spread
     interval[free] = np.stack([q[free] - half, q[free] + half], axis=1)
     return interval

@@ -38,6 +38,10 @@ def test_good_runs_get_no_note_and_the_figures_stand_with_the_equations(harbour,
     assert make_predictor(parse_spec(str(tmp_path / "m"))).report == model.report
 
 
+def test_a_ship_that_keeps_its_velocities_is_no_bad_fit():
+    assert FitReport((), 11, 6.5e-42, hold=0.0).note == ""
+
+
 def test_thrust_of_the_wrong_sign_is_told_with_the_evidence(harbour):
     model = Physics().fit(_reversed_shaft(harbour))
     right = Physics().fit(harbour).report.error
