@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import gzip
+import importlib
 import io
 import json
 import os
@@ -235,6 +236,11 @@ HOLD = ["run", "-m", "hold", "-d", "ds", "--horizon", "5", "--folds", "2", "--ou
 IMPORT = ["data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ds/ship.toml", "--out", "out/d"]
 REPORT = ["report", "res", "--out", "out/r.html", "-q"]
 EXPORT = ["data", "export", "ds", "--format", "csv", "--out", "out/d"]
+LOADED = (
+    "matplotlib.pyplot", "pyarrow.parquet", "scipy.io", "shipbench.cli", "shipbench.bench.runner", "shipbench.bench.leaderboard",
+    "shipbench.bench.report.page", "shipbench.checking", "shipbench.importing.importer", "shipbench.importing.propose", "shipbench.data.files",
+    "shipbench.predictors.physics",
+)  # fmt: skip
 KINDS: dict[str, tuple[list[str], list[list[str]]]] = {
     "data set": (
         ["ds/dataset.toml", "ds/trajectories.csv", "dz/trajectories.csv.gz", "dp/trajectories.parquet"],
@@ -422,17 +428,10 @@ def one(base: Path, case: Path, kind: str, rng: Rng, mutate: Callable[[Path, Rng
 
 def fuzz(each: int, seed: int, folder: Path, kinds: list[str] | None = None, tell: Callable[[str], None] = print) -> dict[str, Counter[str]]:
     """Counts per kind; `folder` is empty, and keeps the cases that are at fault, of which `tell` gets a line each."""
-    import pyarrow.parquet  # noqa: F401 - loaded before the processes fork
-    import scipy.io  # noqa: F401
-
-    import shipbench.bench.runner
-    import shipbench.cli
-    import shipbench.data.files  # noqa: F401
-
     # What commands keep for the user, and must be able to write, lies apart from the cases.
     os.environ |= {"SHIPBENCH_CACHE": str(folder / "cache"), "MPLCONFIGDIR": str(folder / "matplotlib"), "SHIPBENCH_COMPILER": "none"}
-    import matplotlib.pyplot  # noqa: F401
-
+    for library in LOADED:  # before the processes fork
+        importlib.import_module(library)
     home = {name: os.environ.get(name) for name in ("HOME", "TMPDIR")}
     base, cases = folder / "base", folder / "cases"
     base.mkdir()
