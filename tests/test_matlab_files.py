@@ -13,6 +13,8 @@ from scipy.io import savemat
 from shipbench import matlab_files
 from shipbench.data.mat import read_mat
 from shipbench.errors import InputError
+from shipbench.importing.mapping import Layout
+from shipbench.importing.tables import open_table
 from shipbench.matlab_files import check_matlab
 
 HEAD = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
@@ -86,3 +88,13 @@ def test_ordinary_files_pass_and_are_left_at_their_beginning(compressed):
     assert file.tell() == 0
     for content in (b"", HEAD[:50], HEAD):
         check_matlab(io.BytesIO(content))
+
+
+@pytest.mark.parametrize("length", [0, 2, 50, 127, 140, 300])
+def test_a_file_cut_short_is_one_message_of_either_reader(tmp_path, length):
+    file = io.BytesIO()
+    savemat(file, {"runs": np.arange(100.0)})
+    (tmp_path / "a.mat").write_bytes(file.getvalue()[:length])
+    for read in (read_mat, lambda path: open_table(path, Layout())):
+        with pytest.raises(InputError, match=r"cannot be read|empty"):
+            read(tmp_path / "a.mat")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -47,7 +46,7 @@ def open_matlab(path: Path) -> Table:
             content = loadmat(path, squeeze_me=True, struct_as_record=False)
     except NotImplementedError:
         raise InputError(f"{path} is of a MATLAB version that is not read. In MATLAB: save('log.mat', ..., '-v7').") from None
-    except (TypeError, KeyError, IndexError, struct.error, AttributeError, OverflowError, RuntimeError) as error:
+    except Exception as error:  # scipy raises whatever a damaged file leads it to
         raise ValueError(f"damaged MATLAB file ({type(error).__name__}: {error})") from None  # tables.reading makes the message
     vectors: dict[str, Any] = {}
     for name, value in content.items():

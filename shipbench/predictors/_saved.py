@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..records import Dataset
+from ..regular_files import MOST_ARRAYS, read_bytes, read_json, read_npz
 
 _log = logging.getLogger(__name__)
 _LARGEST_JSON = 16_000_000
@@ -117,16 +118,13 @@ def read_meta(folder: Path) -> dict[str, Any]:
         InputError: it is missing, damaged, or not what `write_saved` writes.
     """
     try:
-        path = folder / "model.json"
-        if path.stat().st_size > _LARGEST_JSON:
-            raise ValueError(f"model.json has {path.stat().st_size} bytes, more than {_LARGEST_JSON}")
-        meta = json.loads(path.read_text(encoding="utf-8"))
+        meta = read_json(folder / "model.json", most=_LARGEST_JSON)
         for key, kind in (("predictor", str), ("params", dict), ("inputs", list), ("meta", dict)):
             if not isinstance(meta, dict) or not isinstance(meta.get(key), kind):
                 raise ValueError(f"model.json has no '{key}' that is a {kind.__name__}")
         if not all(isinstance(name, str) for name in meta["inputs"]):
             raise ValueError("model.json: the inputs are not names")
-    except (OSError, ValueError, RecursionError) as error:
+    except (InputError, ValueError) as error:
         raise damaged(folder, error) from None
     return meta
 
@@ -139,13 +137,12 @@ def read_arrays(folder: Path, meta: dict[str, Any]) -> dict[str, np.ndarray]:
     """
     path = folder / "arrays.npz"
     try:
+        arrays = read_npz(path)
         with zipfile.ZipFile(path) as archive:
             if (broken := archive.testzip()) is not None:
                 raise ValueError(f"arrays.npz is damaged at {broken}")
-        if "digest" in meta and meta["digest"] != _digest({k: v for k, v in meta.items() if k != "digest"}, path.read_bytes()):
+        if "digest" in meta and meta["digest"] != _digest({k: v for k, v in meta.items() if k != "digest"}, read_bytes(path, most=MOST_ARRAYS)):
             raise ValueError("its files were changed after it was saved, or are damaged")
-        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
         for name, array in arrays.items():
             if array.dtype.kind not in "fiub":
                 raise ValueError(f"array '{name}' holds no numbers")
