@@ -132,13 +132,7 @@ def load_mapping(path: str | Path, **overrides: Any) -> Mapping:
     for key, value in overrides.items():
         if value is not None:
             (data.setdefault("split", {}) if key in Split.model_fields else data)[key] = value
-    single = "sources" not in data
-    if single:  # one kind of file: its keys stand at the top
-        data = {k: v for k, v in data.items() if k not in SOURCE_KEYS} | {"sources": {"log": {k: data[k] for k in SOURCE_KEYS if k in data}}}
-    try:
-        mapping = Mapping.model_validate(data)
-    except ValidationError as error:
-        raise _explained(error, path, single) from None
+    mapping = validated(data, path)
     check_name(mapping.name, f"{path}: name")
     for source in mapping.sources.values():
         mark = source.file.delimiter
@@ -153,6 +147,21 @@ def load_mapping(path: str | Path, **overrides: Any) -> Mapping:
         _check_clock(source.time, path)
     _check_together(mapping, path)
     return mapping
+
+
+def validated(data: dict[str, Any], path: str | Path) -> Mapping:
+    """The keys and kinds of a mapping's entries, checked one by one; of one kind of file, its keys stand at the top.
+
+    Raises:
+        InputError: a missing or unknown key, or a value of another kind.
+    """
+    single = "sources" not in data
+    if single:
+        data = {k: v for k, v in data.items() if k not in SOURCE_KEYS} | {"sources": {"log": {k: data[k] for k in SOURCE_KEYS if k in data}}}
+    try:
+        return Mapping.model_validate(data)
+    except ValidationError as error:
+        raise _explained(error, path, single) from None
 
 
 def _explained(error: ValidationError, path: str | Path, single: bool) -> InputError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 
 import numpy as np
@@ -267,3 +268,51 @@ def test_words_of_a_log_cannot_write_into_the_draft(propose, tmp_path):
     assert plan["split"]["gap"] == 3.0
     assert "\x1b" not in text + done.stdout
     assert len(imported("log.parquet")) == 1
+
+
+def test_sources_of_a_partial_mapping_keep_their_names_and_patterns(propose, tmp_path):
+    table = logged(T)
+    gps = write(tmp_path, "gps_1.csv", table[["time", "north", "east"]])
+    bridge = write(tmp_path, "bridge.csv", table[["time", "HDG", "rpm", "rudder"]].rename(columns={"rudder": "A4"}))
+    write(tmp_path, "part.toml", '[sources.gnss]\nfiles = "gps*"\n[sources.other]\nfiles = "bridge*"\n[sources.other.channels]\n'
+          'delta = { column = "A4", unit = "deg", sign = "port" }\n')  # fmt: skip
+    _, _, plan = propose(gps, bridge, options=["--map", "part.toml"])
+    assert {name: source["files"] for name, source in plan["sources"].items()} == {"gnss": "gps*", "other": "bridge*"}
+    assert set(plan["sources"]["gnss"]["channels"]) == {"x", "y"}
+    assert plan["sources"]["other"]["channels"]["delta"]["sign"] == "port"
+    assert set(plan["sources"]["other"]["channels"]) == {"psi", "n", "delta"}
+    np.testing.assert_allclose(imported(gps, bridge).runs[0].states[:, 7], -0.2 * np.sin(T / 20.0), atol=0.01)
+
+
+def test_a_time_of_a_partial_mapping_that_does_not_fit_is_one_message(propose, tmp_path):
+    log = write(tmp_path, "log.csv", logged(T))
+    for clock in ('column = "gone"', 'column = "time"\nformat = "%H:%M"', 'column = "time"\nformat = "nonsense"'):
+        write(tmp_path, "part.toml", f"[time]\n{clock}\n")
+        done, _, _ = propose(log, options=["--map", "part.toml"])
+        assert done.exit_code == 2, clock
+        assert "[time] of the partial mapping does not fit" in done.stderr
+
+
+def test_json_is_one_document(propose, tmp_path):
+    done, _, _ = propose(write(tmp_path, "log.csv", logged(T)), options=["--json"])
+    document = json.loads(done.stdout)
+    assert document["mapping"] == "draft.toml"
+    assert any("Tried with the import" in line for line in document["remarks"])
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ("channels = 3", "channels"), ("[channels]\npsi = 3", "psi"), ("file = 3", "file"), ("sources = 3", "sources"), ("time = 3", "time"),
+        ("split = 3", "split"), ("name = 3", "name"), ("dt = 'x'", "dt"), ("[file]\nheader = 'x'", "header"), ("[time]\ncolum = 't'", "'column'"),
+        ("[channels]\npsy = { column = 'HDG', unit = 'deg' }", "psy"), ("[channels]\npsi = { column = 'HDG', unit = 'grad' }", "grad"),
+        ("x = ", "part.toml"),
+    ],
+)  # fmt: skip
+def test_a_partial_mapping_of_wrong_keys_or_kinds_is_one_message(propose, tmp_path, body, told):
+    log = write(tmp_path, "log.csv", logged(T))
+    write(tmp_path, "part.toml", f"{body}\n")
+    done, _, _ = propose(log, options=["--map", "part.toml"])
+    assert done.exit_code == 2
+    assert told in done.stderr
+    assert not (tmp_path / "draft.toml").exists()

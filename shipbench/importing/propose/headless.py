@@ -53,6 +53,7 @@ def identify(columns: Sequence[Column], t: np.ndarray, found: Assigned) -> None:
         found.entries[channel] = Entry(channel, {"column": column.name, "unit": units[channel]}, (column,), ["no head; identified by the motion"])
     told = ", ".join(f"{channel} '{free[place].name}' [{units[channel]}]" for channel, place in places.items())
     found.notes.append(f"NOT SURE: the columns have no heads; taken as {told}: only so heading, yaw rate, track and speeds agree.")
+    found.notes.append("NOT SURE: x is taken as north. A log with x east and angles counter-clockwise would look the same.")
 
 
 def _motion(values: np.ndarray, t: np.ndarray) -> _Motion | None:

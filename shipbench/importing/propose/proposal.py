@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
-from ...toml_files import read_toml
 from ..mapping import SOURCE_KEYS
 from ..writer import run_name
 from .columns import read_samples
 from .groups import group
+from .partial import read_partial
 from .source import SLOW, SourceDraft, channel_gaps, clocks_apart, draft_source, missing_channels
 from .text import draft_text, one_line
 from .trial import try_draft
@@ -39,7 +39,7 @@ def write_proposal(
         raise InputError(f"{path} is there already. Give --propose another name, or --force to replace it.")
     if partial is not None and path.exists() and partial.resolve() == path.resolve():
         raise InputError(f"--propose and --map are both {path}; accepted: two files. Give --propose another name.")
-    known = read_toml(partial) if partial is not None else {}
+    known = read_partial(partial) if partial is not None else {}
     sources, notes = _sources(logs, known, file or {})
     top, split = _top(sources, known, logs[0])
     for source in sources:
