@@ -7,11 +7,11 @@ import numpy as np
 from ..signals import COMMANDS, DELTA, N
 from .finding import Curve, Finding, Picture, labelled, toml_line
 from .recording import Recording
+from .statistics import FEWEST
 
 _NAMES = ("n", "delta", "F_b", "F_s")
 _LARGE, _SWEEP = 0.2, 3.0
 """A large step, as a share of the range; s at 130 m for the whole range that no gear reaches (rules ask for 28 s from 35 to -30 deg)."""
-_FEWEST = 5
 
 
 def check(recording: Recording) -> list[Finding]:
@@ -28,10 +28,10 @@ def check(recording: Recording) -> list[Finding]:
         if name not in recording.recorded:
             continue
         share, changes = _exact(recording, i) if COMMANDS[i] in recording.recorded else (0.0, 0)
-        if changes >= _FEWEST and share > 0.98:
+        if changes >= FEWEST and share > 0.98:
             exact[name] = f"{name} equals its command at {share:.1%} of {changes} changes"
         jumps, greatest = _sudden(recording, N + i)
-        if jumps >= _FEWEST:
+        if jumps >= FEWEST:
             sudden[name] = f"{name} changes {jumps} times within one sample of {recording.dt:g} s, by up to {greatest:.4g} {_unit(name)}"
         figures |= {f"{name}_exact": share, f"{name}_jumps": jumps, f"{name}_greatest": greatest}
     if "delta" not in sudden and "n" in sudden and figures.get("delta_jumps") and _held(recording) > 0.5:  # few leaps, beside those of the shaft

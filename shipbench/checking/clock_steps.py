@@ -15,8 +15,6 @@ from ..signals import PSI, R, U, V, X, Y
 from .finding import Finding, toml_line
 from .recording import Recording
 
-_EDGE = 4
-"""Samples on each side from which the motion is taken."""
 _LEAST, _ALIKE = 1.0, 0.25
 """Seconds that a clock is set by at least, and share of the leap within which the motion explains it."""
 
@@ -30,7 +28,7 @@ def _motion(before: np.ndarray, after: np.ndarray) -> tuple[complex, float, floa
 
 def set_back(run: Run, k: int, leap: complex, turned: float) -> float | None:
     """Seconds by which the clock was set back between samples k and k + 1, where position and heading both leap along the motion; else None."""
-    way, rate, _ = _motion(run.states[max(0, k - _EDGE + 1) : k + 1], run.states[k + 1 : k + 1 + _EDGE])
+    way, rate, _ = _motion(run.states[max(0, k - 3) : k + 1], run.states[k + 1 : k + 5])
     seconds = float(np.real(leap * np.conj(way)) / max(abs(way) ** 2, 1e-12))
     explained = abs(leap - seconds * way) < _ALIKE * abs(leap) and abs(turned - seconds * rate) < _ALIKE * abs(turned)
     return seconds if explained and abs(seconds) >= _LEAST else None
@@ -85,7 +83,7 @@ def _ahead(before: np.ndarray, after: np.ndarray, gap: float, recording: Recordi
     """Seconds by which the stamps of a gap are longer than the ship's way across it; None where the motion tells no such thing."""
     if gap < 1.5 * recording.dt:
         return None
-    way, rate, change = _motion(before[-_EDGE:], after[:_EDGE])
+    way, rate, change = _motion(before[-4:], after[:4])
     moved = complex(*(after[0, [X, Y]] - before[-1, [X, Y]]))
     seconds = float(np.real(moved * np.conj(way)) / max(abs(way) ** 2, 1e-12))
     turned = float(np.remainder(after[0, PSI] - before[-1, PSI] + np.pi, 2.0 * np.pi) - np.pi)

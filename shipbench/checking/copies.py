@@ -21,8 +21,6 @@ _DIGITS = 1e-5
 """Rounding, as a share of the channel's spread."""
 _REST = 1e-3
 """Froude number of a ship at rest."""
-_SAME = 0.98
-"""Share of a run's samples that makes it a copy, or a piece, of another."""
 _FEWEST = 20
 """Equal samples without a break, each other than the one before, that make two runs copies."""
 
@@ -133,7 +131,8 @@ def _lines(family: tuple[str, ...]) -> str:
 
 def _kind(recording: Recording, pair: tuple[int, int], part: tuple[int, int]) -> str:
     longest, shortest = sorted((len(recording.runs[i]) for i in pair), reverse=True)
-    return "duplicate run" if part[0] >= _SAME * longest else "piece of a run" if part[0] >= _SAME * shortest else "overlapping runs"
+    whole = part[0] / 0.98  # the ends of a copy may differ
+    return "duplicate run" if whole >= longest else "piece of a run" if whole >= shortest else "overlapping runs"
 
 
 def _copy(recording: Recording, pair: tuple[int, int], part: tuple[int, int], families: dict[str, tuple[str, ...]]) -> Finding:

@@ -18,10 +18,9 @@ from ..signals import PSI, U, V, X, Y
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
 from .track import WINDOW
-from .units import BETTER, UnitFinding, check_units, corrected
+from .units import BETTER, POOR, UnitFinding, check_units, corrected
 from .wind_reading import mend_wind
 
-_POOR = 0.15
 _HEMISPHERES = "Did the import leave N/S or E/W of latitude and longitude unread? Then import again with `hemisphere` in the mapping."
 _FLIPPED = {
     "x": ("south", "north"), "y": ("west", "east"), "psi": ("counterclockwise", "clockwise"), "u": ("astern", "ahead"), "v": ("port", "starboard"),
@@ -148,7 +147,7 @@ def _best_reading(recording: Recording, plain: _Misfit, units: list[UnitFinding]
     for reading in READINGS:
         dataset = _mended(recording.dataset, reading.mend)
         left = _misfit(recording, dataset)
-        if left is None or BETTER * left.track**2 > plain.track**2 or left.track > _POOR:
+        if left is None or BETTER * left.track**2 > plain.track**2 or left.track > POOR:
             continue
         further = check_units(dataset)
         options.append((1 + len(_errors(further)), left.track, reading, dataset, left))

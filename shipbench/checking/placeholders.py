@@ -9,13 +9,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..importing.north import LEAP
 from ..signals import PSI, STATES, R, U, V, X, Y
 from .finding import Curve, Finding, Picture, labelled, toml_line
 from .recording import Recording
 from .statistics import stretches, times
-
-_LEAP = 10.0
-"""Times the usual change from sample to sample."""
 
 
 def _blocks(z: np.ndarray, limit: float) -> list[tuple[int, int]]:
@@ -38,7 +36,7 @@ def _channel(recording: Recording, channels: Sequence[int]) -> dict[str, list[tu
     if not np.any(steps > 0.0):
         return {}
     usual = float(np.median(steps[steps > 0.0]))
-    found = {name: _blocks(values, _LEAP * usual) for name, values in z.items()}
+    found = {name: _blocks(values, LEAP * usual) for name, values in z.items()}
     return {name: blocks for name, blocks in found.items() if blocks}
 
 

@@ -9,14 +9,14 @@ import numpy as np
 
 from ..records import Dataset, Run
 from ..signals import DELTA, F_B, F_S, N, R, U
-from .statistics import stretches
+from .statistics import FEWEST, stretches
 
 _WINDOW = 6.0
 """Seconds after the rudder at 130 m, Froude-scaled."""
 _TURN, _TURN_WINDOW, _TURN_LAG = np.deg2rad(10.0), 30.0, 5.0
 """Least turn that shows the side of the rudder, within so many seconds at 130 m, which begin so long after those of the rudder."""
-_FEWEST_TURNS, _ALIKE_TURNS, _SURE = 5, 0.6, 5.0
-"""Turns (windows overlap by half), cosine of their angles and their rudder that makes a side, and deviations of the slope just after the rudder."""
+_ALIKE_TURNS, _SURE = 0.6, 5.0
+"""Cosine of their angles and their rudder that makes a side, and deviations of the slope just after the rudder."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
             turns.append(np.stack([(turned[at + width] - turned[at]) * dataset.dt, (helm[at + width - lag] - helm[at - lag]) / width], axis=-1))
     turn, helm = np.concatenate(turns).T if turns else np.zeros((2, 0))
     turn, helm = turn[np.abs(turn) > _TURN * unit], helm[np.abs(turn) > _TURN * unit]
-    if len(turn) < _FEWEST_TURNS or not np.any(helm):
+    if len(turn) < FEWEST or not np.any(helm):
         return Side()
     likeness = float(turn @ helm / np.sqrt((turn @ turn) * (helm @ helm)))
     slope, sd = _slopes(np.concatenate(rows))

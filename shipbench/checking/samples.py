@@ -10,12 +10,12 @@ from ..records import Run
 from ..signals import DELTA, PSI, STATES, N, R, U, V, X, Y
 from .finding import Curve, Finding, Picture, labelled, toml_line
 from .recording import Recording
-from .statistics import spread, stretches, times
+from .statistics import FEWEST, spread, stretches, times
 
 _REPEATED = 0.005
 """Share of repeated samples that is reported."""
-_FEWEST, _FROZEN = 5, 3.0
-"""Samples, and s at 130 m, for which a channel must stand still to be frozen."""
+_FROZEN = 3.0
+"""Seconds at 130 m for which a channel must stand still to be frozen."""
 _HIDES, _SURE = 2.0, 5.0
 """Steps of a record within which a channel may move unseen; deviations of the noise of position or heading beyond them."""
 _RARE = 1e-6
@@ -66,7 +66,7 @@ def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[F
     steps = sum(int(m.sum()) for m in moving)
     if not steps:
         return []
-    needed = max(_FEWEST, round(_FROZEN * recording.froude / recording.dt))
+    needed = max(FEWEST, round(_FROZEN * recording.froude / recording.dt))
     still = [_standstills(r, m, needed) for r, m in zip(repeats, moving, strict=True)]
     single, shares = 0, {}
     for run, r, m, stops in zip(recording.runs, repeats, moving, still, strict=True):
@@ -161,7 +161,7 @@ def _stuck(recording: Recording, channel: int) -> list[Finding]:
     """An actuator that stays at one value while its command is far from it, or while noise would move its record."""
     values = np.concatenate([run.states[:, channel] for run in recording.runs])
     reach = float(np.ptp(values))
-    needed = max(_FEWEST, round(10.0 * recording.froude / recording.dt))
+    needed = max(FEWEST, round(10.0 * recording.froude / recording.dt))
     noisy = _noisy(recording, channel)
     stops: dict[str, list[tuple[int, int]]] = {}
     for run in recording.runs if reach > 0.0 else ():

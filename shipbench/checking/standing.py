@@ -13,7 +13,7 @@ from ..records import Dataset
 from ..signals import DELTA, F_B, F_S, N, R, U
 from .finding import Finding
 from .recording import Recording
-from .statistics import stretches
+from .statistics import FEWEST, stretches
 
 _STILL, _MIDSHIPS = np.deg2rad(0.5), np.deg2rad(5.0)
 """Range of a rudder that never moves, and the angle beyond which it may well be held to turn."""
@@ -24,8 +24,8 @@ _TURN = np.deg2rad(5.0)
 _STOPPING, _LOSS = 25.0, 0.3
 """Lengths in which a ship without thrust loses a factor e of her speed at most (2 m / (rho S C_T) of full ships at C_T = 0.004 gives 14 to 19), and
 share of that loss below which she is driven."""
-_FEWEST, _SHARE = 5, 0.2
-"""Windows that show it, and their share."""
+_SHARE = 0.2
+"""Of the windows that show it."""
 _Shown = tuple[str, dict[str, float]]
 
 
@@ -41,7 +41,7 @@ def _turned(dataset: Dataset) -> _Shown | None:
         return None
     turns = np.array([np.sum(part[:-1, R]) * dataset.dt for part in _windows(dataset)])
     hard, angle = turns[np.abs(turns) > _TURN], float(np.median(delta))
-    if len(hard) < max(_FEWEST, _SHARE * len(turns)) or (abs(angle) > _MIDSHIPS and abs(np.sum(np.sign(hard))) == len(hard)):
+    if len(hard) < max(FEWEST, _SHARE * len(turns)) or (abs(angle) > _MIDSHIPS and abs(np.sum(np.sign(hard))) == len(hard)):
         return None
     text = (
         f"The rudder is recorded at {np.rad2deg(angle):.3g} degrees throughout, and the ship turns by more than {np.rad2deg(_TURN):.0f} degrees in "
@@ -58,7 +58,7 @@ def _driven(dataset: Dataset) -> _Shown | None:
     way = ends[:, 0] * seconds
     lost, expected = ends[:, 0] - ends[:, 1], ends[:, 0] * way / (way + _STOPPING * dataset.ship.L)
     driven = lost < _LOSS * expected
-    if np.sum(driven) < max(_FEWEST, _SHARE * len(ends)):
+    if np.sum(driven) < max(FEWEST, _SHARE * len(ends)):
         return None
     speed, loss, least = float(np.mean(ends[driven, 0])), float(np.mean(lost[driven])), float(np.mean(expected[driven]))
     text = (

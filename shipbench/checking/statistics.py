@@ -11,6 +11,10 @@ CHANCE = 1e-4
 """Probability of a finding by chance that is allowed per test; a data set is tested some dozens of times."""
 
 
+FEWEST = 5
+"""Times that something must be seen to be no accident: steps, turns, standstills."""
+
+
 @dataclass(frozen=True)
 class Fit:
     """value, sd (P,): coefficients and their standard errors; p (P,): two-sided probabilities; squares: what is left; rows: number of equations."""

@@ -19,6 +19,7 @@ from ..effects.unit_or_sign_error import FACTORS
 from ..records import Dataset, Run
 from ..signals import COMMANDS, DELTA, F_B, F_S, PSI, STATES, N, R, U, V, X, Y
 from .rudder_side import Side, rudder_side
+from .statistics import FEWEST
 
 BETTER = 4.0
 """How much larger the plain reading's sum of squares must be than that of the reading believed."""
@@ -32,9 +33,9 @@ _LAGS = (0.0, 2.0, 5.0, 10.0)
 _LEAST_PUSH = 0.05
 """Of the greatest force, which a thruster that is used reaches."""
 _MOST_WINDOWS, _FEWEST_WINDOWS = 1500, 12
-_POOR = 0.15
-_KEEPING, _KEPT, _FEWEST_KEPT, _MORE_KEPT = 30.0, 0.99, 5, 3
-"""Seconds (Froude-scaled, 130 m) over which a ship keeps her speed, share of it that she keeps, and number of such stretches, at least, and for each
+POOR = 0.15
+_KEEPING, _KEPT, _MORE_KEPT = 30.0, 0.99, 3
+"""Seconds (Froude-scaled, 130 m) over which a ship keeps her speed, share of it that she keeps, and number of such stretches, at least, for each
 with the revolutions. (A ship that stops by her engine does not keep it, unless a current carries her.)"""
 _SWAPPED = "exchanged with y"
 _REVERSED = "x and y reversed"
@@ -158,16 +159,16 @@ class _Motion:
         """Readings of the track that suit."""
         sane = {k: s for k, s in self.track.items() if k.v in (1.0, k.u) or _SWAY_BETTER * s < self.track[replace(k, v=np.inf)]}
         best, as_read = min(sane.values()), self.track[plain]
-        if as_read > BETTER * best and best < _POOR:
+        if as_read > BETTER * best and best < POOR:
             return [k for k, s in sane.items() if s <= _ALIKE * best]
         sway = min((k for k in sane if k == replace(plain, v=k.v)), key=lambda k: sane[k])
         better = as_read / sane[sway]
-        return [sway] if better > _SWAY_BETTER and 2.0 * self.windows * np.log(better) > _LOG_ODDS and sane[sway] < _POOR else [plain]
+        return [sway] if better > _SWAY_BETTER and 2.0 * self.windows * np.log(better) > _LOG_ODDS and sane[sway] < POOR else [plain]
 
     def _headings(self) -> list[float]:
         """Readings of psi that suit, without a track."""
         best = min(self.yaw.values(), default=np.inf)
-        if best > _POOR or self.yaw[1.0, 1.0] <= BETTER * best:
+        if best > POOR or self.yaw[1.0, 1.0] <= BETTER * best:
             return [1.0]
         return sorted({psi for (psi, _), s in self.yaw.items() if s <= BETTER * best})
 
@@ -177,7 +178,7 @@ class _Motion:
             return [1.0]
         here = {r: s for (p, r), s in self.yaw.items() if p == psi}
         best = min(here.values())
-        if here[1.0] <= BETTER * best or best > _POOR:
+        if here[1.0] <= BETTER * best or best > POOR:
             return [1.0]
         return [r for r, s in here.items() if s <= _ALIKE * best]
 
@@ -321,7 +322,7 @@ def _shaft_sign(runs: Sequence[Run], dt: float, froude: float, ahead: float) -> 
     keeps = (np.abs(u[:, -1]) > _KEPT * np.abs(u[:, 0])) & (np.abs(u[:, 0]) > 0.2 * np.max(np.abs(u))) & (u[:, -1] * u[:, 0] > 0.0)
     along = np.sign(u[:, :1] * n * ahead)[keeps & np.all(np.abs(n) > 0.3 * np.max(np.abs(n)), axis=1)]
     with_it, against = (int(np.sum(np.all(along == side, axis=1))) for side in (1.0, -1.0))
-    if against < _FEWEST_KEPT or against < _MORE_KEPT * with_it:
+    if against < FEWEST or against < _MORE_KEPT * with_it:
         return []
     text = f"In {against} stretches of {width * dt:.3g} s the ship keeps her speed against her revolutions as recorded, in {with_it} with them."
     return [_finding("n", -1.0, text)]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-_LEAP = 10.0
+LEAP = 10.0
 """Times the steps beside it, and the usual step, that a step of such a heading has at least: no ship turns so, then not, within a sample."""
 _Series = dict[str, tuple[np.ndarray, np.ndarray]]
 
@@ -18,7 +18,7 @@ def interpolated(psi: np.ndarray, turn: float = 2.0 * np.pi) -> list[tuple[int, 
         return []
     size = np.abs(np.remainder(np.diff(psi) + 0.5 * turn, turn) - 0.5 * turn)
     usual = float(np.median(size[size > 0.0])) if np.any(size > 0.0) else np.inf
-    leaps = np.concatenate([[0], (size > _LEAP * usual).astype(int), [0]])
+    leaps = np.concatenate([[0], (size > LEAP * usual).astype(int), [0]])
     found: set[tuple[int, int]] = set()
     for begin in (0.0, 0.5 * turn):
         number = np.remainder(psi + begin, turn)  # as it was recorded
@@ -26,8 +26,8 @@ def interpolated(psi: np.ndarray, turn: float = 2.0 * np.pi) -> list[tuple[int, 
             edges = np.diff(leaps * np.concatenate([[0], way * np.diff(number) > 0.0, [0]]))
             for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
                 step = abs(float(number[b] - number[a])) / (b - a)
-                beside = max([usual, *(s for s in (*size[max(a - 1, 0) : a], *size[b : b + 1]) if s <= _LEAP * usual)])  # not a way back
-                if b - a >= 2 and abs(step - turn / (b - a)) < step / _LEAP and step > _LEAP * beside:
+                beside = max([usual, *(s for s in (*size[max(a - 1, 0) : a], *size[b : b + 1]) if s <= LEAP * usual)])  # not a way back
+                if b - a >= 2 and abs(step - turn / (b - a)) < step / LEAP and step > LEAP * beside:
                     found.add((int(a) + 1, int(b) - 1))
     return sorted(found)
 
