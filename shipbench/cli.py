@@ -123,7 +123,7 @@ def run(
         if equations := sorted(folder.glob("cells/*/*/*/equations.txt")):
             say(f"Fitted equations of {len(equations)} models beside their predictions, e.g. {equations[0]}")
     for (name, model_name), note in fit_notes(outcome.summaries).items():
-        typer.echo(f"warning: {name}, {model_name}: {note}", err=True)
+        say(f"warning: {name}, {model_name}: {note}", err=True)
     exit_if_failed(outcome.failed, f"{len(outcome.failed)} of {len(outcome.summaries)} fits")
 
 

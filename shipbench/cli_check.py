@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .cli_common import DatasetArgument, Json, Quiet, console_for_tables, print_json
+from .cli_common import DatasetArgument, Json, Quiet, console_for_tables, print_json, say
 from .errors import InputError
 
 if TYPE_CHECKING:
@@ -47,9 +47,9 @@ def data_check(
         _show(facts, findings, check_tables(findings))
         _show_lines(lines, apply)
         if before is not None:
-            typer.echo(f"Written: {Path(dataset, 'dataset.toml')} (the old file: {before.name}). Next: shipbench data check {dataset}")
+            say(f"Written: {Path(dataset, 'dataset.toml')} (the old file: {before.name}). Next: shipbench data check {dataset}")
         if written:
-            typer.echo(f"Written: {out} ({len(written)} files)")
+            say(f"Written: {out} ({len(written)} files)")
     if any(f.severity == "error" for f in findings):
         raise typer.Exit(1)
 
@@ -57,13 +57,13 @@ def data_check(
 def _show(facts: dict[str, Any], findings: list[Finding], tables: list[Any]) -> None:
     for key, value in facts.items():
         for line in value if isinstance(value, list) else [value]:
-            typer.echo(f"{key + ':':<13s}{line}")
+            say(f"{key + ':':<13s}{line}")
     console = console_for_tables()
     for table in tables:
         table.show(console)
     counts = {severity: sum(f.severity == severity for f in findings) for severity in ("error", "warning", "note")}
     said = [f"{number} {severity}{'s' * (number != 1)}" for severity, number in counts.items()]
-    typer.echo(f"Findings: {', '.join(said)}.")
+    say(f"Findings: {', '.join(said)}.")
 
 
 def _show_lines(lines: Laid, applied: bool) -> None:
@@ -72,15 +72,15 @@ def _show_lines(lines: Laid, applied: bool) -> None:
 
     if lines.changed:
         text = toml_line(lines.changed).split("\n")
-        typer.echo("\nIn dataset.toml now:" if applied else "\nFor dataset.toml, after you have looked at each finding:")
+        say("\nIn dataset.toml now:" if applied else "\nFor dataset.toml, after you have looked at each finding:")
         for row in text[:40]:
-            typer.echo(f"  {row if len(row) <= 140 else row[:137] + '...'}")
+            say(f"  {row if len(row) <= 140 else row[:137] + '...'}")
         if len(text) > 40 or any(len(row) > 140 for row in text):
-            typer.echo("  (shortened: --out FOLDER writes them all into dataset_lines.toml)")
+            say("  (shortened: --out FOLDER writes them all into dataset_lines.toml)")
     for line in lines.refused:
-        typer.echo(f"Left out: {line}. Look at these findings and write the right line yourself.")
+        say(f"Left out: {line}. Look at these findings and write the right line yourself.")
     if applied and not lines.changed:
-        typer.echo("Nothing to write into dataset.toml.")
+        say("Nothing to write into dataset.toml.")
 
 
 def suite_check(
@@ -99,7 +99,7 @@ def suite_check(
     if not quiet:
         for table in tables:
             table.show(console_for_tables())
-    typer.echo(f"Written: {page}")
+    say(f"Written: {page}")
 
 
 def register(data_app: typer.Typer, suite_app: typer.Typer) -> None:

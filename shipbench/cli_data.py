@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, print_json
+from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, print_json, say
 from .errors import InputError
 
 data_app = typer.Typer(help="Data sets: list, get, make, check, describe, export, import.", **SETTINGS)
@@ -24,7 +24,7 @@ def data_list(as_json: Json = False) -> None:
         print_json([{"name": p.name, "summary": p.summary, "licence": p.licence} for p in parts])
         return
     for part in parts:
-        typer.echo(f"{part.name:<18s} {part.summary} ({part.licence})")
+        say(f"{part.name:<18s} {part.summary} ({part.licence})")
 
 
 @data_app.command("get")
@@ -42,17 +42,17 @@ def data_get(
         raise InputError(f"data set '{name}' is not downloaded; it is made: shipbench data make {name}.")
     folder = public_folder(name)
     if not public.missing(folder) and not public.changed(folder):
-        typer.echo(f"{name}: all {len(public.checksums)} files are in {folder} already, with the published checksums")
+        say(f"{name}: all {len(public.checksums)} files are in {folder} already, with the published checksums")
         return
-    typer.echo(public.notice(), err=True)
+    say(public.notice(), err=True)
     if not accept:
         if not sys.stdin.isatty():
             raise InputError("the licence above is not accepted, and there is no terminal to ask on; nothing was fetched. Add --accept-licence.")
         if not typer.confirm("Do you accept the licence?", err=True):
             raise InputError("the licence is not accepted; nothing was fetched.")
-    fetched = public.fetch(folder, source, (lambda text: None) if quiet else lambda text: typer.echo(text, err=True))
+    fetched = public.fetch(folder, source, (lambda text: None) if quiet else lambda text: say(text, err=True))
     if not quiet:
-        typer.echo(f"{name}: {len(fetched)} files fetched into {folder}, every checksum is right. Use it: shipbench data describe {name}")
+        say(f"{name}: {len(fetched)} files fetched into {folder}, every checksum is right. Use it: shipbench data describe {name}")
 
 
 @data_app.command("make")
@@ -70,7 +70,7 @@ def data_make(
     if out is not None:
         write_dataset(dataset, out)
     if not quiet:
-        typer.echo(f"{dataset.name}: {len(dataset)} runs, fingerprint {dataset.fingerprint}, in {out or cache_folder()}")
+        say(f"{dataset.name}: {len(dataset)} runs, fingerprint {dataset.fingerprint}, in {out or cache_folder()}")
 
 
 @data_app.command("describe")
@@ -92,7 +92,7 @@ def data_describe(
     for table in card.tables.values():
         table.show(console_for_tables())
     if written:
-        typer.echo(f"Written: {', '.join(map(str, written))}")
+        say(f"Written: {', '.join(map(str, written))}")
 
 
 @data_app.command("export")
@@ -110,7 +110,7 @@ def data_export(
     form = check_format(format, out, what)
     written = export_predictions(Path(what), out, form) if is_results(Path(what)) else export_dataset(load_dataset(what), out, form)
     if not quiet:
-        typer.echo(f"Written: {', '.join(map(str, written))}")
+        say(f"Written: {', '.join(map(str, written))}")
 
 
 def register(app: typer.Typer) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_common import DatasetArgument, Json, Quiet, print_json
+from .cli_common import DatasetArgument, Json, Quiet, print_json, say
 from .names import file_name
 
 
@@ -40,8 +40,8 @@ def diagnose(
         return
     if not quiet:
         for line in summary_lines(found):
-            typer.echo(line)
-    typer.echo(f"Written: {', '.join(str(p) for p in written)}")
+            say(line)
+    say(f"Written: {', '.join(str(p) for p in written)}")
 
 
 def effects(as_json: Json = False) -> None:
@@ -53,10 +53,10 @@ def effects(as_json: Json = False) -> None:
         print_json(parts)
         return
     for part in parts:
-        typer.echo(f"{part['name']:<26s}{part['family']:<13s}{part['summary']}")
+        say(f"{part['name']:<26s}{part['family']:<13s}{part['summary']}")
         for p in part["parameters"]:
-            typer.echo(" " * 26 + f"{p['name']} [{p['unit']}], typical {p['typical']:.3g}, {p['low']:.3g} to {p['high']:.3g}")
-    typer.echo("\nSizes are for a ship of 130 m and go with the length by Froude's law. Add one to the physics: --model physics+current.")
+            say(" " * 26 + f"{p['name']} [{p['unit']}], typical {p['typical']:.3g}, {p['low']:.3g} to {p['high']:.3g}")
+    say("\nSizes are for a ship of 130 m and go with the length by Froude's law. Add one to the physics: --model physics+current.")
 
 
 suite_app = typer.Typer(help="Test suites of the framework itself.", no_args_is_help=True)
@@ -84,7 +84,7 @@ def suite_diagnosis(
         diagnose=run, seed=seed, per_effect=per_effect, kinds=kinds, development=development, out=out, resume=resume, workers=workers,
         gain=gain, command=str(ctx.obj),
     )  # fmt: skip
-    typer.echo(f"Written: {page} ({len(rows)} sets)")
+    say(f"Written: {page} ({len(rows)} sets)")
 
 
 def register(app: typer.Typer) -> None:

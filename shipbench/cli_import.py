@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from .cli_common import Json, Quiet, print_json
+from .cli_common import Json, Quiet, print_json, say
 from .errors import InputError
+from .names import file_name
 
 
 def data_import(
@@ -48,7 +49,7 @@ def data_import(
             print_json({"mapping": str(propose), "remarks": lines})
             return
         for line in lines[-1:] if quiet else lines:
-            typer.echo(line)
+            say(line)
         return
     if only := [f"--{name}" for name, given in (("encoding", encoding), ("sheet", sheet), ("header", header)) if given is not None]:
         raise InputError(f"{only[0]} serves --propose; an import takes it from the mapping. Write it there: [file] {only[0][2:]} = ...")
@@ -59,18 +60,17 @@ def data_import(
         )
     from .importing.importer import import_logs
     from .importing.mapping import load_mapping
-    from .importing.writer import run_name
     from .ship import Ship
 
     plan = load_mapping(mapping, name=name, dt=dt, window=window, shortest=shortest, still_speed=still)
-    folder = out or Path(run_name(plan.name))  # a name is no path
-    summary = import_logs(logs, plan, Ship.load(ship), folder, force=force, tell=lambda line: None if quiet else typer.echo(line, err=True))
+    folder = out or Path(file_name(plan.name))  # a name is no path
+    summary = import_logs(logs, plan, Ship.load(ship), folder, force=force, tell=lambda line: None if quiet else say(line, err=True))
     if as_json:
         print_json(summary.document())
     elif not quiet:
         for line in summary.lines():
-            typer.echo(line)
-        typer.echo(f"Written: {folder} ({summary.table.name}, dataset.toml, ship.toml). Next: shipbench data check {shlex.quote(str(folder))}")
+            say(line)
+        say(f"Written: {folder} ({summary.table.name}, dataset.toml, ship.toml). Next: shipbench data check {shlex.quote(str(folder))}")
 
 
 def register(data_app: typer.Typer) -> None:

@@ -21,7 +21,10 @@ from .task import make_task
 Refuse = Callable[[str], InputError]
 """Makes the error from what is wrong; it adds the folder."""
 Status = Literal["ok", "diverged", "failed", "skipped"]
-Seconds = Annotated[float, Field(ge=0)]
+LARGEST = 1e100
+"""Of any number: the squares of larger ones, and their sums, are not finite any more."""
+Seconds = Annotated[float, Field(ge=0, le=LARGEST)]
+Size = Annotated[float, Field(gt=0, le=LARGEST)]
 
 TEXTS = ("dataset", "fingerprint", "task", "model", "run", "parent", "kind", "status", "reason")
 WHOLE = ("protocol", "fold", "seed", "fit_shared_by")
@@ -74,9 +77,9 @@ class Entry(_Part):
     fold: int = Field(ge=0)
     seed: int
     ship: str
-    ship_L: float = Field(gt=0)
-    ship_B: float = Field(gt=0)
-    dt: float = Field(gt=0)
+    ship_L: Size
+    ship_B: Size
+    dt: Size
     inputs: list[str]
     columns: list[_Column]
     notes: list[str]
@@ -201,7 +204,7 @@ def check_scores(rows: Frame, metrics: Iterable[str], scores: Iterable[str], ref
     for name in scores:
         values = rows[name].to_numpy(float, na_value=np.nan)
         label, known = "ED" if name == "ed" else name, np.isfinite(values)
-        bad = np.isinf(values) | (~scored & ~np.isnan(values))
+        bad = (np.abs(values) > LARGEST) | (~scored & ~np.isnan(values))
         if name in own and name not in _SIGNED:
             bad |= scored & (values < 0)
         if name in own and name not in _UNDEFINED:
@@ -217,8 +220,9 @@ def check_scores(rows: Frame, metrics: Iterable[str], scores: Iterable[str], ref
             )
     for name in TIMES:
         values = rows[name].to_numpy(float, na_value=np.nan)
-        if len(values) and not (np.isfinite(values) & (values >= 0)).all():
-            raise refuse(f"rows.parquet: {name} = {values[int(np.argmin(np.isfinite(values) & (values >= 0)))]}; accepted: seconds, at least 0")
+        good = (values >= 0) & (values <= LARGEST)
+        if not good.all():
+            raise refuse(f"rows.parquet: {name} = {values[int(np.argmin(good))]}; accepted: seconds, at least 0")
 
 
 def check_windows(windows: Frame, refuse: Refuse) -> None:
@@ -228,6 +232,6 @@ def check_windows(windows: Frame, refuse: Refuse) -> None:
         InputError: see above.
     """
     check_columns(windows, refuse, ("dataset", "fingerprint", "task", "run"), ("fold",), FEATURES)
-    regimes = windows[list(FEATURES[:5])].to_numpy(float, na_value=np.nan)
-    if not (np.isfinite(regimes) & (regimes >= 0)).all() or np.isinf(windows[list(FEATURES)].to_numpy(float, na_value=np.nan)).any():
+    values = windows[list(FEATURES)].to_numpy(float, na_value=np.nan)
+    if not (values[:, :5] >= 0).all() or (np.abs(values) > LARGEST).any():
         raise refuse("holds values that no window has; accepted: finite numbers, at least 0 for speed, drift, rudder, astern and thrusters")

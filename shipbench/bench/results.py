@@ -174,7 +174,7 @@ def _digests(folder: Path) -> dict[str, str]:
 def read_summary(out: Path, cell: Cell) -> dict[str, Any] | None:
     """The summary of a finished cell, or None if it is not there."""
     path = out / cell.folder / "summary.json"
-    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    return read_json(path) if path.exists() else None
 
 
 def scored_before(out: Path, cell: Cell, key: str) -> str:
@@ -183,7 +183,7 @@ def scored_before(out: Path, cell: Cell, key: str) -> str:
         summary = read_summary(out, cell) or {}
         whole = summary.get("key") == key and summary["files"] == _digests(out / cell.folder)
         return summary["status"] if whole and summary["status"] in ("ok", "diverged") else ""
-    except (OSError, ValueError, KeyError, AttributeError):  # a damaged summary may hold anything
+    except (InputError, OSError, KeyError, TypeError, AttributeError):  # a damaged summary may hold anything
         return ""
 
 

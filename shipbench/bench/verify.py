@@ -150,7 +150,9 @@ class _Found:
                 continue  # said above
             for name, value in (("parent", str(run.meta.get("parent", run.id))), ("kind", run.kind), ("group", run.group)):
                 said = own[name].get(run.id) if name in own else None
-                if isinstance(said, str) and said != value:
+                if not isinstance(said, str):  # rows without a group are counted by their parent
+                    said = own["parent"].get(run.id)
+                if said != value:
                     self.differences.append(f"{cell.label}, run {run.id}: {name} is '{said}' in the rows, '{value}' in the data set.")
 
     def truth(self, summary: dict[str, Any], cell: Cell, source: Path, batch: Batch, windows: Frame | None) -> bool:

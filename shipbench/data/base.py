@@ -17,6 +17,7 @@ from typing import Any
 
 from ..cache import cache_folder, make_private, stranger
 from ..errors import InputError, ShipbenchError, unknown_name, unknown_parameter
+from ..names import file_name
 from ..records import Dataset
 from ..registry import Registry
 from ..regular_files import read_text
@@ -51,7 +52,7 @@ class DatasetPart:
 
 def public_folder(name: str) -> Path:
     """Where the files of a public data set are kept once they are downloaded."""
-    return cache_folder() / "public" / name
+    return cache_folder() / "public" / file_name(name)
 
 
 def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
@@ -117,7 +118,7 @@ def _cache_key(part: DatasetPart, params: dict[str, Any]) -> str:
     text = json.dumps(params, sort_keys=True, default=str)
     plugin = DATASETS.digest(part.name)
     digest = [hashlib.sha256(text.encode()).hexdigest()[:12]] if params else []
-    return "-".join((part.name, f"v{part.version}", *([plugin] if plugin else []), *digest))
+    return "-".join((file_name(part.name), f"v{part.version}", *([plugin] if plugin else []), *digest))
 
 
 def _from_cache(folder: Path) -> Dataset | None:

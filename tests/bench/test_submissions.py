@@ -280,6 +280,7 @@ def test_what_cannot_be_done_is_one_message(cli, two, arguments, message):
     [
         (lambda f: edit_rows(f, lambda r: r.assign(parent="one", kind="turn")), "parent is 'one' in the rows, 'r0"),
         (lambda f: edit_rows(f, lambda r: r.assign(group="one")), "group is 'one' in the rows, 'r0"),
+        (lambda f: edit_rows(f, lambda r: r.assign(edh=1e90)), "edh is 1e+90 in the rows"),
         (lambda f: edit_windows(f, lambda w: w.assign(speed=w["speed"] + 1.0)), "in windows.parquet, "),
         (lambda f: edit_summary(f, lambda s: s.update(ship_L=60.0)), "ship_L of 'toyset' is 60.0 in summary.json, 50.0 in the data set."),
         (lambda f: edit_summary(f, lambda s: s.update(ship="queen")), "ship of 'toyset' is queen in summary.json, toy in the data set."),
