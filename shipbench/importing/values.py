@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InputError
 from .cells import Cells
 from .coordinates import coordinates
-from .entries import ANGLES, ARCS, Channel, channel_factor
+from .entries import ANGLES, ARCS, MINUTES, Channel, channel_factor
 from .sentinels import CODES, beyond_a_turn, not_available
 
 _LIMITS = {"lat": np.pi / 2, "lon": 2 * np.pi}
@@ -112,8 +112,17 @@ def _check_range(cells: Cells, name: str, channel: Channel, values: np.ndarray) 
     where = f"{cells.path}, rows from {cells.first_row}: '{name}' reaches {worst:g} deg"
     hint = "Check unit and format of its column."
     if channel.unit == "deg":
-        if worst <= np.rad2deg(limit) * 1e7 and worst >= 1e5:
+        degrees = np.abs(np.rad2deg(values[np.isfinite(values)]))
+        if 1e5 <= worst <= np.rad2deg(limit) * 1e7:
             hint = f'Is it counted in 1e-7 deg? Then write unit = "1e-7 deg" (or factor = 1e-7) in {name}.'
-        elif worst <= np.rad2deg(limit) * 100.0 and (np.abs(np.rad2deg(values[np.isfinite(values)])) % 100.0 < 60.0).all():
+        elif worst <= np.rad2deg(limit) * 100.0 and (degrees % 100.0 <= 60.0).all() and _lat_in_minutes(cells):
             hint = f'Are the last two whole digits minutes? Then write unit = "ddmm.mmmm" in {name}, and hemisphere = "COLUMN" for N/S or E/W.'
     raise InputError(f"{where}; accepted: up to {np.rad2deg(limit):g}. {hint}")
+
+
+def _lat_in_minutes(cells: Cells) -> bool:
+    """Whether the latitude is, or may be, in ddmm.mmmm: what is advised for one of the two fits the other."""
+    lat = cells.source.channels.get("lat")
+    if lat is None or lat.kinds != ("column",) or lat.unit in MINUTES:
+        return True
+    return bool((np.abs(coordinates(cells, "lat", lat, _missing(cells, "lat", lat))) > 90.0).any())

@@ -162,11 +162,15 @@ def test_the_same_log_twice_is_refused(trial_import, tmp_path):
 
 def test_a_name_is_no_path_and_a_link_is_followed(trial_import, tmp_path):
     write(tmp_path, "log.csv", TEXT)
-    write(tmp_path, "mapping.toml", mapping().replace('"trial"', '"../../trial"'))
     write(tmp_path, "ship.toml", SHIP)
     command = ["data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ship.toml"]
     (tmp_path / "inner").mkdir()
     (tmp_path / "trial").symlink_to(tmp_path / "inner")
+    write(tmp_path, "mapping.toml", mapping().replace('"trial"', '"../../trial"'))
+    refused = CliRunner().invoke(app, command)
+    assert refused.exit_code == 2
+    assert "name = '../../trial' is no name" in refused.stderr
+    write(tmp_path, "mapping.toml", mapping())
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 0, result.output
     assert sorted(p.name for p in (tmp_path / "inner").iterdir()) == ["dataset.toml", "ship.toml", "trajectories.csv"]

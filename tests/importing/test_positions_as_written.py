@@ -132,3 +132,11 @@ def test_readings_without_a_letter_are_left_out_and_reported(trial_import):
     result = trial_import(log(lat=-a, ns=ns, lon=o), told.replace("[time]", "[split]\ngap = 9.0\n[time]"))
     assert "3 readings of lat without a letter in 'ns', left out" in result.stdout
     np.testing.assert_allclose(end_of_track(result), TRUTH, atol=0.5)
+
+
+@pytest.mark.parametrize(("lat", "advised"), [("52.0", False), ("5200.0", True)])
+def test_minutes_are_advised_for_the_longitude_where_the_latitude_has_them(trial_import, lat, advised):
+    body = channels("x", "y", lon=COLUMN.format("lon", "deg", ""), lat=COLUMN.format("lat", "deg", ""))
+    told = trial_import(log(lon="407.6", lat=lat), mapping(body=body)).stderr
+    assert "'lon' reaches 407.6 deg" in told
+    assert ("ddmm.mmmm" in told) == advised
