@@ -70,7 +70,7 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
     from .mat import read_mat
 
     folder = Path(spec)
-    exported = folder.suffix == ".mat" and folder.is_file()
+    exported = folder.suffix == ".mat" and os.path.lexists(folder) and not folder.is_dir()
     if exported or os.path.lexists(folder / "dataset.toml"):
         if options:
             raise InputError(f"{folder} is read from files and takes no parameters; given: {', '.join(options)}.")

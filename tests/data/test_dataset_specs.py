@@ -175,6 +175,14 @@ def test_a_folder_takes_no_parameters(tmp_path):
     assert load_dataset(str(tmp_path)).fingerprint == make().fingerprint
 
 
+def test_a_mat_file_that_is_no_file_is_named_as_what_it_is(tmp_path):
+    os.mkfifo(tmp_path / "a.mat")
+    (tmp_path / "b.mat").symlink_to("nowhere")
+    for name, message in (("a.mat", "a named pipe"), ("b.mat", "does not exist")):
+        with pytest.raises(InputError, match=message):
+            load_dataset(str(tmp_path / name))
+
+
 def test_the_plain_difference_makes_no_allowance_for_rounding():
     still = Dataset("still", TOY_SHIP, 1.0, (Run("a", np.arange(9.0), np.zeros((9, 10)), np.zeros((9, 4))),))
     table = compare_with_paper(still).set_index(["signal", "statistic"])
