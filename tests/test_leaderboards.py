@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -105,8 +106,8 @@ def test_pages_name_the_command_that_made_them(results):
         assert "shipbench run --config configs/" in (FOLDER / f"{dataset}.md").read_text()
 
 
-def readme_table(results_folder: Path, dataset: str) -> list[str]:
-    """Lines of the README's short table of a data set."""
+def short_table(results_folder: Path, dataset: str) -> list[str]:
+    """Lines of the short table of a data set in leaderboards/README.md."""
     board = build_board(read_results([results_folder]), dataset)
     rows = {row["model"]: row for row in board.tables[0].rows if not row.get("_reference")}
     rest = {row["model"]: row for row in next(t for t in board.tables if t.title == "Error against horizon").rows}
@@ -119,6 +120,17 @@ def readme_table(results_folder: Path, dataset: str) -> list[str]:
 
 
 @pytest.mark.parametrize(("study", "dataset"), [("paper", "harbour90"), ("paper", "harbour90_noisy"), ("esso_osaka", "esso_osaka")])
-def test_the_readmes_tables_are_the_committed_rows(study, dataset):
-    readme = (FOLDER.parent / "README.md").read_text()
-    assert "\n".join(readme_table(FOLDER / "results" / study, dataset)) in readme
+def test_the_short_tables_are_the_committed_rows(study, dataset):
+    assert "\n".join(short_table(FOLDER / "results" / study, dataset)) in (FOLDER / "README.md").read_text()
+
+
+@pytest.mark.parametrize(("column", "study", "dataset"), [(2, "paper", "harbour90_noisy"), (3, "esso_osaka", "esso_osaka")])
+def test_the_readmes_figures_are_the_committed_rows(column, study, dataset):
+    lines = [line.split("|") for line in (FOLDER.parent / "README.md").read_text().splitlines() if line.startswith("| `")]
+    said = {re.match(r" `([^`]+)`", cells[1])[1]: cells[column].strip() for cells in lines}
+    board = build_board(read_results([FOLDER / "results" / study]), dataset)
+    ranking = {row["model"]: row for row in next(t for t in board.tables if t.title.startswith("Ranking")).rows}
+    for model, figure in said.items():
+        if figure:
+            row = ranking[model]
+            assert figure == f"{row['ed_mean']:.2f} ({row['ed_mean_low']:.2f} to {row['ed_mean_high']:.2f})", model

@@ -65,14 +65,14 @@ def test_tables_hold_every_prediction_and_give_ed_again(cli, study, format):
     assert json.loads(Path("o/summary.json").read_text()) == json.loads((study / "summary.json").read_text())
 
 
-def test_the_mat_file_gives_ed_again_in_the_way_of_the_readme(cli, study):
+def test_the_mat_file_gives_ed_again_in_the_way_of_the_docs(cli, study):
     result = cli("data", "export", study, "--out", "p.mat")
     assert result.exit_code == 0, result.output
     cells = loadmat("p.mat")["predictions"][0]
     rows = pd.read_parquet(study / "rows.parquet")
     assert [(str(c["model"][0]), int(c["fold"][0, 0])) for c in cells] == [(m, f) for m in ("hold", "mine.py:Wild", "mine.py:Broken") for f in (0, 1)]
     for c in cells:
-        ed = np.mean(np.hypot(c["S"][:, :, 0] - c["truth"][:, :, 0], c["S"][:, :, 1] - c["truth"][:, :, 1]), axis=1)  # as in the README
+        ed = np.mean(np.hypot(c["S"][:, :, 0] - c["truth"][:, :, 0], c["S"][:, :, 1] - c["truth"][:, :, 1]), axis=1)  # as in docs/matlab.md
         ok = np.array([str(s[0][0]) == "ok" for s in c["run_status"]])
         np.testing.assert_allclose(ed[ok], c["ED"][ok, 0], rtol=1e-12)
         own = rows[(rows.model == str(c["model"][0])) & (rows.fold == int(c["fold"][0, 0]))]
@@ -81,8 +81,8 @@ def test_the_mat_file_gives_ed_again_in_the_way_of_the_readme(cli, study):
         assert np.isnan(c["ED"][~ok]).all()
     assert {str(c["status"][0]) for c in cells} == {"ok", "diverged", "failed"}
     assert json.loads(str(cells[0]["summary"][0])) == json.loads((study / "summary.json").read_text())[0]
-    readme = (Path(__file__).parents[2] / "README.md").read_text()
-    assert "mean(hypot(c.S(:,:,1) - c.truth(:,:,1), c.S(:,:,2) - c.truth(:,:,2)), 2)" in readme
+    page = (Path(__file__).parents[2] / "docs/matlab.md").read_text()
+    assert "mean(hypot(c.S(:,:,1) - c.truth(:,:,1), c.S(:,:,2) - c.truth(:,:,2)), 2)" in page
 
 
 @pytest.mark.parametrize("damage", ["truth gone", "truth cut", "predictions cut", "rows only"])

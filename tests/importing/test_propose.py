@@ -166,10 +166,10 @@ def test_names_with_quotes_and_escapes_stay_valid_toml(propose, tmp_path):
     assert columns((tmp_path / "draft.toml").read_text())["psi"][0] == 'heading "true" \\ [deg]'
 
 
-def test_the_mapping_in_the_readme_imports_a_log(tmp_path, monkeypatch):
+def test_the_mapping_in_the_docs_imports_a_log(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    readme = (Path(__file__).parents[2] / "README.md").read_text()
-    (plan,) = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
+    page = (Path(__file__).parents[2] / "docs/import-a-log.md").read_text()
+    (plan,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     write(tmp_path, "mapping.toml", plan)
     write(tmp_path, "ship.toml", SHIP)
     t = np.arange(0.0, 700.0)

@@ -161,7 +161,7 @@ def test_measured_speeds_come_back(trial_import, tmp_path, simulated):
 
 
 def test_the_readmes_mapping_is_accepted(tmp_path):
-    block = re.search(r"## Import your own log.*?```toml\n(.*?)```", (Path(__file__).parents[2] / "README.md").read_text(), re.DOTALL)
+    block = re.search(r"```toml\n(.*?)```", (Path(__file__).parents[2] / "docs/import-a-log.md").read_text(), re.DOTALL)
     assert block is not None
     plan = load_mapping(write(tmp_path, "mapping.toml", block[1]))
     assert (plan.name, plan.dt, plan.split.window) == ("my_trial", 1.0, 300.0)
