@@ -38,7 +38,8 @@ def tracks_and_errors(folder: Path, style: dict[str, Any]) -> Figure:
         low, middle, high = np.quantile(errors[name], [0.25, 0.5, 0.75], axis=0)
         right.plot(time, middle, color=colour, linewidth=1.8, label=name)
         right.fill_between(time, low, high, color=colour, alpha=0.2, linewidth=0)
-    left.set(xlabel="east [m]", ylabel="north [m]", title=f"60 s predicted from the orders ({run.split('@')[0]})", aspect="equal", adjustable="datalim")
+    title = f"60 s predicted from the orders ({run.split('@')[0]})"
+    left.set(xlabel="east [m]", ylabel="north [m]", title=title, aspect="equal", adjustable="datalim")
     right.set(xlabel="time predicted [s]", ylabel="position error [m]", title="median and quartiles of 12 held-out runs")
     left.legend(frameon=False)
     return figure
