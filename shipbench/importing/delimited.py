@@ -105,7 +105,8 @@ class _OddRows:
         return "error" if len(self.rows) > _MOST_ODD else "skip"
 
     def refuse(self) -> None:
-        """
+        """The message for a file whose reading ended early.
+
         Raises:
             InputError: reading ended since too many rows do not fit.
         """

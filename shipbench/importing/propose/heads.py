@@ -54,7 +54,7 @@ class Head:
 
     @property
     def fits(self) -> bool:
-        """Whether the unit, where there is one, can be one of the channel."""
+        """Whether the unit, where there is one, can be one of the channel; some controllers steer the rudder by a pulse width."""
         if not self.units or self.channel is None:
             return True
         return bool({QUANTITIES[unit_of(self.channel)], "percent"} & set(self.units)) or (
