@@ -67,7 +67,9 @@ def unread_hemispheres(table: Table, source: Source) -> Counter[str]:
     if table.form == "MATLAB" or not free or not found:  # vectors of several lengths may stand in one MATLAB file
         return told
     batch = next(table.batches([*free, *dict.fromkeys(c.columns[0] for c in found.values())]), None)
-    for column, array in zip(free, batch.columns if batch is not None else (), strict=False):
+    if batch is None:
+        return told
+    for column, array in zip(free, batch.columns, strict=False):
         words = {str(v).strip().upper() for v in pc.unique(array).to_pylist() if v not in (None, "")} if is_text(array) else set()
         letters = {_WORDS.get(word, word) for word in words}
         for name, channel in found.items():

@@ -133,6 +133,11 @@ def _full_of(name: str) -> str:
 
 
 def check_channel(name: str, channel: Channel, path: str | Path) -> None:
+    """The entry names one channel, one expression, a unit and a sign, and its keys fit each other.
+
+    Raises:
+        InputError: it does not; `path` is the mapping.
+    """
     if name not in CHANNELS:
         raise unknown_name(f"channel in [channels] of {path}:", name, CHANNELS)
     if len(channel.kinds) != 1:

@@ -36,15 +36,16 @@ _CONVERTED = np.unique((np.r_[_NINES, 0.01 * _WHOLE[:3]][:, None] * np.array([_D
 """Fill values that somebody converted to our unit from degrees, knots, km/h, feet or rev/s."""
 
 
-def not_available(name: str, readings: np.ndarray, factor: float) -> tuple[dict[str, np.ndarray], np.ndarray]:
+def not_available(name: str, readings: np.ndarray, factor: float, neutral: float = 0.0) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """(masks (n,) of readings that are none, by what they are; mask of readings that look like fill values, but may be readings).
 
     Args:
         name: the channel.
         readings: (n,) as in the log, NaN where there is none.
         factor: of a reading to our unit; its sign does not matter.
+        neutral: reading that stands for zero.
     """
-    values = abs(factor) * readings
+    values = abs(factor) * (readings - neutral)
     known = {words: np.isclose(values, code * unit, rtol=1e-4, atol=0.0) for code, unit, words in CODES.get(name, ())}
     beyond = np.abs(values) > _LARGEST.get(name, np.inf) * (1.0 + 1e-6)
     if name == "depth":

@@ -28,7 +28,7 @@ def channel_values(cells: Cells, name: str, channel: Channel) -> np.ndarray:
     else:
         columns = [cells.numbers(column, missing) for column in channel.columns]
     if channel.kinds[0] not in ARCS and channel.missing != []:
-        columns = [_available(cells, name, readings, factor) for readings in columns]
+        columns = [_available(cells, name, channel, readings) for readings in columns]
         if name in ANGLES:
             _tell_turns(cells, name, abs(factor) * np.concatenate(columns))
     circular = channel.kinds == ("mean",) and name in ANGLES
@@ -55,9 +55,13 @@ def _missing(cells: Cells, name: str, channel: Channel) -> list[str | float]:
     return [*kept, *(channel.missing or [])]
 
 
-def _available(cells: Cells, name: str, readings: np.ndarray, factor: float) -> np.ndarray:
+def _available(cells: Cells, name: str, channel: Channel, readings: np.ndarray) -> np.ndarray:
     """Readings without those that stand for "not available"; what is taken out or looks like it is counted for the summary."""
-    masks, doubtful = not_available(name, readings, factor)
+    if channel.unit == "pwm":
+        none = (readings <= 0.0) | (readings == 65_535.0)
+        cells.met.what[f"readings of {name} that are 0 or 65535 us (no pulse), taken as missing"] += int(none.sum())
+        readings = np.where(none, np.nan, readings)
+    masks, doubtful = not_available(name, readings, channel_factor(name, channel), channel.neutral)
     for words, mask in masks.items():
         cells.met.what[f"readings of {name} that are {words}, taken as missing"] += int(mask.sum())
     for value in np.unique(readings[doubtful]):

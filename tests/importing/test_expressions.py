@@ -69,6 +69,16 @@ def test_rudder_in_percent_of_35_degrees_and_pulses(trial_import):
     assert 'unit "%" without full; accepted: the value at full deflection, such as full = 35.0, full_unit = "deg"' in told
 
 
+def test_no_pulse_is_no_reading_and_a_short_pulse_is_one(trial_import):
+    pulse = np.round(1500.0 + 450.0 * np.sin(T / 6.0))
+    pulse[20:22] = 0.0
+    pulse[40] = 999.0
+    entry = '{ column = "rudder", unit = "pwm", full = 60.0, full_unit = "deg" }'
+    delta = np.rad2deg(imported(trial_import, logged(T).assign(rudder=pulse), delta=entry)[:, 7])
+    assert np.abs(delta).max() < 60.5  # 0 us would be -180 deg
+    assert delta[40] == pytest.approx(-501.0 / 500.0 * 60.0, abs=0.1)
+
+
 def test_centidegrees_and_steps_of_a_unit(trial_import):
     table = logged(T)
     expected = imported(trial_import, table)
