@@ -80,7 +80,7 @@ def check_origin(name: str, origin: Origin | None, data: Dataset) -> list[str]:
     if abs(origin.dt - data.dt) > 1e-3 * origin.dt:
         raise InputError(
             f"the saved model {name} steps {origin.dt:g} s; data set '{data.name}' is sampled at {data.dt:g} s. Accepted: data at {origin.dt:g} s. "
-            f"Import the log with --dt {origin.dt:g}, or fit the model on these data."
+            f"Import the log again with dt = {origin.dt:g} in its mapping, or fit the model on these data."
         )
     if origin.inputs != data.inputs:
         raise InputError(
