@@ -111,7 +111,8 @@ def draw_all(results: Results, dataset: str, ranking: Sequence[str], folder: Pat
     `tell` gets one line."""
     rows = results.rows[results.rows["dataset"] == dataset]
     scored = set(rows.loc[rows["status"] == "ok", "model"])
-    models, without = [], []
+    models: list[str] = []
+    without: list[str] = []
     for model in (m for m in ranking if m in scored):
         (models if _readable(results, dataset, model) else without).append(model)
     if without:

@@ -86,7 +86,7 @@ def _compare_scores(summary: dict[str, Any], cell: Cell, own: Frame, batch: Batc
             found.append(f"{cell.label}, run {run}: the reason is '{shown(own['reason'].iloc[i])}' in the rows, '{reasons[i]}' from the predictions.")
     for name, values in again.items():
         said = own[name].to_numpy(float)
-        for i in np.flatnonzero(~np.isclose(said, values, rtol=TOLERANCE, atol=1e-12, equal_nan=True)):
+        for i in np.flatnonzero(~np.isclose(said, values, rtol=TOLERANCE, atol=1e-12, equal_nan=True)).tolist():
             if own["status"].iloc[i] == ("ok" if ok[i] else "diverged"):
                 found.append(f"{cell.label}, run {batch.ids[i]}: {name} is {said[i]:.10g} in the rows, {values[i]:.10g} from the predictions.")
     return found
