@@ -181,7 +181,7 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
         return []
     start = Beginning.of(now, origin, [s.term for s in scores])
     seen = {s.term: s.score for s in glance(start.seen)}
-    found, best, least = [], threshold, -np.inf
+    found, best, least = list[tuple[Fit, float]](), threshold, -np.inf
     for score in sorted(scores, key=lambda s: -seen[s.term]):
         if found and is_spent():
             break
