@@ -88,7 +88,7 @@ def test_a_fit_that_goes_on_near_rest_takes_no_free_steps(null, monkeypatch):
 
 
 def test_beside_a_cause_in_the_model_the_others_begin_with_it(null):
-    origin, scores = Origin.of(null.plant, null.scales), {s.term.label: s for s in screen(null)}
+    origin, scores = Origin.of(null.plant, null.scales), {s.term.label: s for s in reversed(screen(null))}
     first = Beginning.of(null, origin, [scores["heading_bias"].term]).refit(scores["heading_bias"])
     assert 2.0 * (first.evidence - null.evidence) > 20.0
     now = looking_at(first, null.candidates)
