@@ -67,13 +67,17 @@ def limited(budget: Budget) -> Iterator[Budget]:
         _NOW.reset(token)
 
 
-def count() -> bool:
-    """Count one iteration of a fit; whether the fit has to end here."""
+def count() -> None:
+    """Count one iteration of a fit."""
     budget = _NOW.get()
-    if budget is None:
-        return False
-    budget.used += 1
-    return budget.is_overrun
+    if budget is not None:
+        budget.used += 1
+
+
+def is_overrun() -> bool:
+    """Whether fits end where they stand."""
+    budget = _NOW.get()
+    return budget is not None and budget.is_overrun
 
 
 def is_spent() -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .budget import count
+from .budget import count, is_overrun
 from .gram import Hyper
 from .model import NUM_BASE, Linearisation, Point, Scales
 from .plant import Plant
@@ -71,7 +71,8 @@ def fit(
         promised = -np.inf if free else max(promised, found.promise)
         if best is None or worth > best[0]:
             best = worth, found, lin
-        if count() or stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
+        count()
+        if is_overrun() or stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
             break
         before = found.evidence
         after, seen = _step(lin, found, number + 1 < free_steps, 0.5**stale) if number < iterations - 1 else (None, None)
@@ -79,8 +80,8 @@ def fit(
             break
         lin = after
     assert best is not None
-    found, lin = _followed(*best[1:])
-    if free_steps and found.excess > _LOST:
+    found, lin = best[1:] if is_overrun() else _followed(*best[1:])
+    if free_steps and found.excess > _LOST and not is_overrun():
         again = fit(
             plant, scales, model, point, *began, iterations=iterations, candidates=candidates, guess=guess, hope=hope, far=far, begun=begun,
             free_steps=0,

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .budget import is_spent
 from .fit import fit
 from .gram import Reduced, solve
 from .model import NUM_BASE, PLACES
@@ -62,7 +63,7 @@ def widened(found: Fit) -> Fit:
     runs whose size and coefficients make up for each other)."""
     for _ in range(_FITS):
         widths = widths_of(found)
-        if np.max(np.abs(widths / np.asarray(found.model.widths or 1.0) - 1.0)) < _SAME:
+        if is_spent() or np.max(np.abs(widths / np.asarray(found.model.widths or 1.0) - 1.0)) < _SAME:
             break
         model = replace(found.model, widths=tuple(widths))
         wider = fit(found.plant, found.scales, model, found.point, found.hyper, found.log_tau2, candidates=found.candidates, guess=found.motion)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .budget import is_spent
 from .colour import Colour
 from .fit import Origin, fit
 from .gram import Hyper
@@ -79,7 +80,7 @@ def _begun(plant: Plant, scales: Scales) -> Fit:
     where it began, and kept if it rests then.
     """
     found = _without_strange(_first(plant, scales))
-    if found.excess > _CREEPS:
+    if found.excess > _CREEPS and not is_spent():
         calm = _without_strange(_first(plant, scales, weak=True))
         if calm.excess > _CREEPS and len(pieces := strange_pieces(_first(plant, scales, iterations=1))):
             calm = _without_strange(_first(plant.without(pieces), scales))
@@ -110,7 +111,7 @@ def _without_strange(found: Fit) -> Fit:
     """Fitted again without the strangest pieces, which hide the next ones."""
     for _ in range(_SEARCHES):
         pieces = strange_pieces(found)
-        if not len(pieces):
+        if not len(pieces) or is_spent():
             break
         plant, candidates = found.plant.without(pieces), found.candidates
         found = fit(plant, found.scales, found.model, found.point, found.hyper, candidates=candidates, guess=found.motion)
@@ -121,6 +122,8 @@ def _with_gear(found: Fit, name: str, field: str) -> Fit:
     """`found` behind a gear whose time constant or rate is that of an ordinary one times the factor that suits the motion (servos of models are
     quicker than Froude's law makes an ordinary gear; what remains of a gear that is a little off passes for a delay)."""
     first = found
+    if is_spent():
+        return found
     for factors in _GEAR_FACTORS:
         for factor in factors:
             tried = _behind(found, name, field, getattr(first.plant.ordinary[name], field) * factor)
