@@ -14,6 +14,7 @@ from ..records import Run
 from ..signals import PSI, R, U, V, X, Y
 from .finding import Finding, toml_line
 from .recording import Recording
+from .statistics import times
 
 _LEAST, _ALIKE = 1.0, 0.25
 """Seconds that a clock is set by at least, and share of the leap within which the motion explains it."""
@@ -44,7 +45,7 @@ def clock_finding(recording: Recording, steps: dict[tuple[str, int], float]) -> 
         cuts.setdefault(recording.name_of(runs[other]), {"cut": []})["cut"].append([t, t])
     run = runs[name]
     text = (
-        f"the clock is set {'back' if seconds > 0.0 else 'ahead'} in {len(cuts)} run(s): from {run.t[k]:g} s to {run.t[k + 1]:g} s of "
+        f"the clock is set {'back' if seconds > 0.0 else 'ahead'} {times(len(steps), len(cuts))}: from {run.t[k]:g} s to {run.t[k + 1]:g} s of "
         f"'{recording.name_of(run)}' position and heading move on as in {seconds + recording.dt:.3g} s."
     )
     todo = "The cut splits the run there. What follows is a recording of its own."
@@ -69,8 +70,8 @@ def check(recording: Recording) -> list[Finding]:
     worst = max(found, key=lambda name: found[name][1])
     gap, seconds, at = found[worst]
     text = (
-        f"the clock is set ahead in {len(found)} run(s): from {at:g} s to {at + gap:g} s of '{worst}' the ship moves on as in {gap - seconds:.3g} s. "
-        "The runs are split there."
+        f"the clock is set ahead {times(len(found), len(found))}: from {at:g} s to {at + gap:g} s of '{worst}' "
+        f"the ship moves on as in {gap - seconds:.3g} s. The runs are split there."
     )
     return [
         Finding(

@@ -18,7 +18,8 @@ def mend_north(recording: Recording) -> tuple[Recording, list[Finding]]:
     found = {run.id: places for run in recording.runs if (places := interpolated(run.states[:, PSI], recording.turn))}
     if not found:
         return recording, []
-    runs, fills = [], {}
+    runs = []
+    fills: dict[str, dict[str, dict[str, list[list[float]]]]] = {}
     for run in recording.runs:
         if run.id in found:
             bad = np.zeros(len(run), dtype=bool)
