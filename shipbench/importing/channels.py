@@ -13,7 +13,7 @@ from ..errors import InputError
 from .blocks import Block
 from .cells import EMPTY, Cells, Counts, is_text
 from .clock import check_format, to_seconds
-from .coordinates import unread_hemispheres
+from .coordinates import check_hemispheres
 from .entries import Channel
 from .mapping import Mapping, Source
 from .tables import Table, open_table, reading
@@ -46,7 +46,6 @@ def read_named(path: Path, source: Source, met: Counts) -> Iterator[tuple[np.nda
     clock, channels = source.time, list(source.channels.values())
     check_format(clock, str(path))
     columns = [*clock.names, *(n for c in channels for n in c.every_column), *([source.run] if source.run else [])]
-    met.doubtful.update(unread_hemispheres(table, source))
     done = 0
     for batch in _without_footer(table, columns, source):
         where = f"{path}, rows from {table.first_row + done}"
@@ -58,6 +57,8 @@ def read_named(path: Path, source: Source, met: Counts) -> Iterator[tuple[np.nda
             else:
                 t = to_seconds(clock, [batch.column(n) for n in clock.names], cells.numbers, where, met.clock)
             names = cells.names(source.run) if source.run else np.full(len(t), None)
+        if done == 0:
+            check_hemispheres(table, source)  # after faults of single cells, which say more
         done += batch.num_rows
         met.rows += batch.num_rows
         keep = np.isfinite(t)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -58,25 +57,31 @@ def coordinates(cells: Cells, name: str, channel: Channel, missing: Sequence[str
     return values if sides is None else _signed(cells, name, channel, values, sides)
 
 
-def unread_hemispheres(table: Table, source: Source) -> Counter[str]:
-    """Readings of lat and lon beside a column with S or W that the mapping does not name, by what to do."""
-    told: Counter[str] = Counter()
+def check_hemispheres(table: Table, source: Source) -> None:
+    """Refuse positive readings of lat and lon beside a column with S or W that the mapping does not name.
+
+    Raises:
+        InputError: there is such a column, with the line that reads it.
+    """
     found = {n: c for n in SIDES if (c := source.channels.get(n)) and c.kinds == ("column",) and not (c.hemisphere or c.sign)}
     used = {n for c in source.channels.values() for n in c.every_column} | {*source.time.names, source.run}
     free = [n for n in table.columns if n and n not in used and table.columns.count(n) == 1]
     if table.form == "MATLAB" or not free or not found:  # vectors of several lengths may stand in one MATLAB file
-        return told
+        return
     batch = next(table.batches([*free, *dict.fromkeys(c.columns[0] for c in found.values())]), None)
     if batch is None:
-        return told
+        return
     for column, array in zip(free, batch.columns, strict=False):
         words = {str(v).strip().upper() for v in pc.unique(array).to_pylist() if v not in (None, "")} if is_text(array) else set()
         letters = {_WORDS.get(word, word) for word in words}
         for name, channel in found.items():
             if letters <= set(SIDES[name]) and letters & {"S", "W"} and (count := _without_sign(batch.column(channel.columns[0]))):
                 entry = f'{name} = {{ column = "{channel.columns[0]}", unit = "{channel.unit}", hemisphere = "{column}" }}'
-                told[f"or more readings of {name} go without the {' or '.join(sorted(letters))} of column '{column}'. Write {entry}"] += count
-    return told
+                side = {"lat": "north", "lon": "east"}[name]
+                raise InputError(
+                    f"{table.path}: column '{column}' says {' or '.join(sorted(letters & {'S', 'W'}))}, and the mapping of '{name}' does not read "
+                    f'it ({count} positive readings). Write {entry}. If the column means something else, write sign = "{side}" instead.'
+                )
 
 
 def _without_sign(array: pa.Array) -> int:

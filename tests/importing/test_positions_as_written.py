@@ -75,14 +75,17 @@ def test_letters_in_columns_of_their_own(trial_import, letters):
     np.testing.assert_allclose(end_of_track(trial_import(table, told)), TRUTH, atol=0.5)
 
 
-def test_letters_that_are_not_read_are_reported_with_the_line_that_reads_them(trial_import):
+def test_letters_that_are_not_read_are_refused_with_the_line_that_reads_them(trial_import):
     a, o = track()
     table = log(lat=-a, lon=-o, **{"N/S": "S", "E/W": "W"})
-    told = trial_import(table, plan(COLUMN.format("lat", "deg", ""), COLUMN.format("lon", "deg", ""))).stdout
-    assert "DOUBTFUL: 60 or more readings of lat go without the S of column 'N/S'" in told
-    assert 'lon = { column = "lon", unit = "deg", hemisphere = "E/W" }' in told
+    refused = trial_import(table, plan(COLUMN.format("lat", "deg", ""), COLUMN.format("lon", "deg", "")))
+    assert refused.exit_code == 2
+    assert "column 'N/S' says S" in refused.stderr
+    assert 'lat = { column = "lat", unit = "deg", hemisphere = "N/S" }' in refused.stderr
+    kept = trial_import(table, plan(COLUMN.format("lat", "deg", ', sign = "north"'), COLUMN.format("lon", "deg", ', sign = "east"')))
+    assert kept.exit_code == 0, kept.output
     signed = log(lat=a, lon=o, **{"N/S": "S", "E/W": "W"})
-    assert "DOUBTFUL" not in trial_import(signed, plan(COLUMN.format("lat", "deg", ""), COLUMN.format("lon", "deg", "")), "--force").stdout
+    assert trial_import(signed, plan(COLUMN.format("lat", "deg", ""), COLUMN.format("lon", "deg", "")), "--force").exit_code == 0
 
 
 @pytest.mark.parametrize(
