@@ -12,7 +12,9 @@ _MOST_PARTS = 5_000_000
 """Arrays in cells and structs; each takes some 200 bytes of memory, however small it is."""
 _DEEPEST = 32
 _MATRIX, _COMPRESSED = 14, 15
-_CELL, _STRUCT, _OBJECT, _FUNCTION, _OPAQUE = 1, 2, 3, 16, 17
+_KNOWN = frozenset((1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 14, 15, 16, 17, 18))
+"""Kinds of elements inside an array."""
+_CELL, _STRUCT, _OBJECT = 1, 2, 3
 
 
 def check_matlab(file: IO[bytes]) -> None:
@@ -55,6 +57,8 @@ def _check_parts(data: memoryview, order: str) -> int:
             raise ValueError(f"cells and structs are nested in more than {_DEEPEST} levels; accepted: up to that")
         while at + 8 <= end:
             kind, size = struct.unpack_from(f"{order}II", data, at)
+            if depth and kind & 0xFFFF not in _KNOWN:  # scipy follows a null pointer there
+                raise ValueError(f"it is damaged: an element is of the unknown kind {kind & 0xFFFF}")
             if kind >> 16:  # up to four bytes, which stand in the tag itself
                 at += 8
                 continue
@@ -62,26 +66,20 @@ def _check_parts(data: memoryview, order: str) -> int:
                 raise ValueError("an element is packed twice")
             if kind == _MATRIX:
                 found += 1
-                inside = _contents(data, at + 8, min(at + 8 + size, end), order)
-                if inside is not None:
-                    todo.append((inside, min(at + 8 + size, end), depth + 1))
+                inner = min(at + 8 + size, end)
+                _check_count(data, at + 8, inner, order)
+                todo.append((at + 8, inner, depth + 1))
             at += 8 + size + -size % 8
     return found
 
 
-def _contents(data: memoryview, at: int, end: int, order: str) -> int | None:
-    """Where the arrays inside a cell or struct begin; None for any other array."""
-    if at + 24 > end:
-        return None
-    kind = data[at + 8 if order == "<" else at + 11]
-    if kind == _OPAQUE:
-        return at + 16
-    if kind not in (_CELL, _STRUCT, _OBJECT, _FUNCTION):
-        return None
+def _check_count(data: memoryview, at: int, end: int, order: str) -> None:
+    """Refuse a cell or struct, between `at` and `end`, that declares more elements than it can hold."""
+    if at + 24 > end or data[at + 8 if order == "<" else at + 11] not in (_CELL, _STRUCT, _OBJECT):
+        return
     size = struct.unpack_from(f"{order}I", data, at + 20)[0]
     number, at = 1, at + 24
     for k in range(min(size, end - at) // 4):
         number *= struct.unpack_from(f"{order}i", data, at + 4 * k)[0]
     if not 0 <= 8 * number <= end - at:
         raise ValueError(f"a cell or struct declares {number} elements and holds fewer")
-    return at + size + -size % 8

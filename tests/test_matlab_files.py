@@ -49,6 +49,7 @@ HOSTILE = {
     "many cells": (matrix(1, (2**30, 1), b"", b"runs"), "declares 1073741824 elements"),
     "many structs": (matrix(2, (2**28, 1), element(5, struct.pack("<i", 8)) + element(1, b"a".ljust(8, b"\0")), b"runs"), "declares"),
     "less than none": (matrix(1, (-1, 5), b"", b"runs"), "declares -5 elements"),
+    "unknown kind": (matrix(4, (1, 1), element(152, b"a"), b"runs"), "unknown kind 152"),
     "packed twice": (packed(packed(nested(1))), "packed twice"),
 }
 
