@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .budget import is_spent
 from .gram import Gram, Prior, Reduced, accelerated, background, shared_alone, solve, update_force
 from .inverse import log_determinant
 from .settle import Fit
@@ -105,7 +106,7 @@ def screen(fit: Fit) -> list[Score]:
         if _wrong_way(term, scores[i].estimate):
             scores[i] = replace(scores[i], score=min(scores[i].score, 0.0))
             continue
-        if scores[i].score < -_HOPELESS_PER_RUN * term.per_run:
+        if scores[i].score < -_HOPELESS_PER_RUN * term.per_run or is_spent():
             continue
         own = term.size if term.per_run else 0
         prior = with_columns(renumbered, len(base) + np.arange(term.size), term, max(scores[i].log_tau2, _LEAST_START))
