@@ -15,6 +15,8 @@ LONGEST = 80
 """Characters of a name."""
 LONGEST_LABEL = 1000
 """Characters of a model's label, which may hold the path of a file and many parameters."""
+LONGEST_REPR = 1000
+"""Characters that an object shows of itself in a notebook."""
 _FILE_BYTES = 200
 """Bytes of a file name; file systems take 255, and a temporary file's name is longer than that of the file that it becomes."""
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
@@ -34,6 +36,12 @@ def shown(text: object, keep: str = "") -> str:
     if not unseen(text):
         return text
     return "".join(c if c in keep or unicodedata.category(c) not in _UNSEEN else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
+
+
+def brief(text: str, longest: int = LONGEST_REPR) -> str:
+    """Text of at most `longest` characters without unseen ones, for a `repr`; what is cut off is marked."""
+    text = shown(text, keep="\n")
+    return text if len(text) <= longest else f"{text[: longest - 4]} ..."
 
 
 def check_label(text: object, key: str, longest: int = LONGEST) -> str:

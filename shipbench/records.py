@@ -3,39 +3,32 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from .errors import InputError
-from .names import check_name, check_run
+from .arrays import numbers
+from .errors import InputError, unknown_name
+from .names import brief, check_name, check_run
+from .notebook import dataset_html, dataset_text, run_text
 from .ship import Ship
 from .signals import COMMANDS, STATES
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 LARGEST = 1e12
 """Of any signal in our unit: beyond every sensor, and squares of it are still numbers."""
+_SHOWN_NAMES = 20
+"""Most names of runs in a message."""
 _UNEVEN = 2e-3
 """Of a sample time: the farthest that two steps of one run lie apart."""
-
-
-def _numbers(given: Any, what: str) -> np.ndarray:
-    """An array of float64; values that are masked become not-a-number.
-
-    Raises:
-        InputError: they are no real numbers, or rows differ in length.
-    """
-    try:
-        array = np.ma.filled(given.astype(float), np.nan) if isinstance(given, np.ma.MaskedArray) else np.asarray(given)
-    except (ValueError, TypeError) as error:
-        raise InputError(f"{what} is no array: {error}. Accepted: an array of real numbers.") from None
-    if array.dtype.kind not in "fiu":
-        raise InputError(f"{what} holds {array.dtype}; accepted: an array of real numbers, such as float64.")
-    return array.astype(float, copy=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +56,7 @@ class Run:
         for key, label in (("group", self.group), ("manoeuvre", self.kind)):
             check_run(label, f"run '{self.id}': {key}")
         for part in ("t", "states", "inputs"):
-            object.__setattr__(self, part, _numbers(getattr(self, part), f"run '{self.id}': {part}"))
+            object.__setattr__(self, part, numbers(getattr(self, part), f"run '{self.id}': {part}"))
         object.__setattr__(self, "inputs_names", tuple(self.inputs_names))
         names = self.inputs_names
         if names[: len(COMMANDS)] != COMMANDS or len(set(names)) != len(names):
@@ -103,6 +96,14 @@ class Run:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def __repr__(self) -> str:
+        return brief(run_text(self))
+
+    @property
+    def commands(self) -> np.ndarray:
+        """The four commands (samples, 4), order and units of `signals.COMMANDS`."""
+        return self.inputs[:, : len(COMMANDS)]
 
     @property
     def dt(self) -> float:
@@ -150,10 +151,16 @@ class Batch:
     truth: np.ndarray
     history: tuple[np.ndarray, np.ndarray] | None = None
 
+    def __repr__(self) -> str:
+        past = f", history of {self.history[0].shape[1]} samples" if self.history else ""
+        return brief(f"<Batch of {len(self.ids)} runs: s0 {self.s0.shape}, U {self.U.shape}, truth {self.truth.shape}{past}>")
+
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """Runs of one ship with one sample time and one list of inputs.
+    """Runs of one ship with one sample time and one list of inputs: a sequence of runs, `data["run07"]`, `data[3]`, `for run in data`.
+
+    A slice, `data[:5]`, is a data set of those runs.
 
     Args:
         name: registered name, or the `name` of dataset.toml (see `names.check_name`).
@@ -199,8 +206,72 @@ class Dataset:
             if len(run) > 1 and abs(run.dt - self.dt) > 1e-3 * self.dt:
                 raise InputError(f"run '{run.id}' is sampled at {run.dt:g} s, the data set at {self.dt:g} s; resample one of them.")
 
+    @classmethod
+    def from_frame(
+        cls, frame: pd.DataFrame, ship: Ship | str | Path, dt: float | None = None, *, name: str = "trial", actuators: str = "measured",
+        meta: Mapping[str, dict[str, Any]] | None = None, **about: Any,
+    ) -> Dataset:  # fmt: skip
+        """The data set of a long table, one row per sample, in SI units and our signs.
+
+        Args:
+            frame: columns trajectory, t [s], the ten states, the four commands, then wind_speed, wind_from, depth where they are measured; others
+                are ignored. Missing actuators are filled in as for a file; `notes` say how.
+            ship: the vessel's particulars, or the path of a ship.toml.
+            dt: sample time [s]; None: that of t.
+            name, actuators: as of a data set.
+            meta: what is known of each run, by its name.
+            about: source, licence, simulation, notes or derived of the data set.
+
+        Raises:
+            InputError: a column is missing, a value is no number, time is not uniform, or the ship's file cannot be read.
+        """
+        from .frames import samples_of
+
+        found, inputs, filled = samples_of(frame)
+        known = dict(meta or {})
+        if unknown := [run for run in known if run not in found]:
+            raise unknown_name("run in meta", str(unknown[0]), [*found][:_SHOWN_NAMES])
+        runs = tuple(Run(run, *arrays, inputs, dict(known.get(run, {}))) for run, arrays in found.items())
+        longest = max(runs, key=len)
+        step = dt if dt is not None else float(f"{longest.dt:.9g}") if len(longest) > 1 else 1.0
+        about["notes"] = tuple(dict.fromkeys((*about.get("notes", ()), *filled)))
+        return cls(name, ship if isinstance(ship, Ship) else Ship.load(ship), step, runs, actuators, **about)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The long table, one row per sample: trajectory, t, the states, the inputs. `from_frame` gives back the same samples, bit for bit."""
+        from .frames import long_table
+
+        return long_table(self.runs)
+
     def __len__(self) -> int:
         return len(self.runs)
+
+    def __iter__(self) -> Iterator[Run]:
+        return iter(self.runs)
+
+    def __contains__(self, run: object) -> bool:
+        return any(own is run or own.id == run for own in self.runs)
+
+    @overload
+    def __getitem__(self, key: str | int) -> Run: ...
+
+    @overload
+    def __getitem__(self, key: slice) -> Dataset: ...
+
+    def __getitem__(self, key: str | int | slice) -> Run | Dataset:
+        if isinstance(key, slice):
+            return self.with_runs(self.runs[key])
+        if not isinstance(key, str):
+            return self.runs[key]
+        if found := [run for run in self.runs if run.id == key]:
+            return found[0]
+        raise unknown_name("run", key, [run.id for run in self.runs[:_SHOWN_NAMES]])
+
+    def __repr__(self) -> str:
+        return brief(dataset_text(self))
+
+    def _repr_html_(self) -> str:
+        return dataset_html(self)
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -9,8 +9,9 @@ import pandas as pd
 
 from ..data.base import load_dataset
 from ..data.corrections import SIGNALS, correct_run, split_meta
-from ..data.files import Description, complete_columns, convert_table, read_description, read_table, ship_file
+from ..data.files import Description, convert_table, read_description, read_table, ship_file
 from ..errors import InputError
+from ..frames import complete_columns
 from ..records import Dataset, Run
 from ..ship import Ship
 from ..signals import STATES

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal
 
@@ -14,10 +13,11 @@ import tomli_w
 from pydantic import ConfigDict, Field, ValidationError
 
 from ..errors import InputError, unknown_name
+from ..frames import KNOWN, MOTION_STATES, SIGNALS, check_columns, complete_columns, long_table, samples
 from ..names import check_name
 from ..records import Dataset, Run
 from ..ship import Ship
-from ..signals import ACTUATORS, COMMANDS, ENVIRONMENT, STATES, wrap_angle
+from ..signals import COMMANDS, STATES, wrap_angle
 from ..toml_files import Number, fault, read_toml
 from .corrections import Corrections, check_names, correct_run, split_meta, to_ned
 from .trajectories import read_trajectories
@@ -26,10 +26,6 @@ from .units import sign_factor, unit_factor
 TABLES = ("trajectories.parquet", "trajectories.csv.gz", "trajectories.csv")
 BEFORE_CHECK = "dataset.toml.before-check"
 """Beginning of the names under which `data check --apply` keeps the old dataset.toml."""
-_ACTUATORS = STATES[ACTUATORS]
-_MOTION = STATES[: ACTUATORS.start]
-_SIGNALS = (*STATES, *COMMANDS, *ENVIRONMENT)
-_KNOWN = ("trajectory", "t", *_SIGNALS)
 _SHOWN = 60
 """Most columns that a message lists."""
 
@@ -142,62 +138,19 @@ def _needed(names: list[str], columns: dict[str, str], where: Path) -> list[str]
     for theirs, ours in columns.items():
         if theirs not in names:
             raise unknown_name(f"column of {where.name} in [columns] of dataset.toml:", theirs, names)
-        if ours not in _KNOWN:
-            raise unknown_name(f"signal for '{theirs}' in [columns] of dataset.toml:", ours, _KNOWN)
+        if ours not in KNOWN:
+            raise unknown_name(f"signal for '{theirs}' in [columns] of dataset.toml:", ours, KNOWN)
     renamed = [columns.get(name, name) for name in names]
-    for name in _KNOWN:
+    for name in KNOWN:
         if renamed.count(name) > 1 or (name in renamed and f"{name}.1" in renamed):  # pandas calls a header's second "x" "x.1"
             raise InputError(f"{where}: two columns are '{name}'; accepted: one. Remove one, or correct [columns] in dataset.toml.")
-    for column in ("trajectory", "t", *_MOTION):
+    for column in ("trajectory", "t", *MOTION_STATES):
         if column not in renamed:
             near = difflib.get_close_matches(column.lower(), renamed, n=1, cutoff=0.5)
             hint = f" Did you mean '{near[0]}'? Then write [columns] {near[0]} = \"{column}\" in dataset.toml." if near else ""
             shown = renamed if len(renamed) <= _SHOWN else [*renamed[:_SHOWN], f"and {len(renamed) - _SHOWN} more"]
             raise InputError(f"{where}: column '{column}' is missing.{hint} Found: {', '.join(shown)}.")
-    return [name for name, signal in zip(names, renamed, strict=True) if signal in _KNOWN]
-
-
-def check_columns(table: pd.DataFrame, where: Path) -> None:
-    """Run names are whole blocks of rows, and every signal is numeric (then float)."""
-    nameless = (table["trajectory"].isna() | (table["trajectory"].astype(str).str.strip() == "")).to_numpy()
-    if nameless.any():
-        row = int(np.argmax(nameless)) + 2
-        raise InputError(f"{where}: row {row} has no run name in 'trajectory' ({nameless.sum()} such rows); every row needs one.")
-    table["trajectory"] = table["trajectory"].astype(str)
-    block = (table["trajectory"] != table["trajectory"].shift()).cumsum()
-    starts = table["trajectory"].groupby(block).first()
-    twice = starts[starts.duplicated()].tolist()
-    if twice:
-        name = twice[0]
-        raise InputError(
-            f"{where}: the rows of run '{name}' are in {int((starts == name).sum())} places; accepted: each run's rows together, in order of t. "
-            "Sort the rows by trajectory and t, or give the second run its own name."
-        )
-    for column in ("t", *(c for c in _SIGNALS if c in table)):
-        if not pd.api.types.is_numeric_dtype(table[column]):
-            unread = ~np.isfinite(np.asarray(pd.to_numeric(table[column], errors="coerce"), dtype=float))
-            row = int(np.argmax(unread & table[column].notna().to_numpy()))
-            value = str(table[column].iloc[row])[:80]
-            raise InputError(f"{where}, row {row + 2}: {column} is '{value}', not a number. Accepted: decimal numbers with a point.")
-        table[column] = table[column].astype(float)
-
-
-def complete_columns(table: pd.DataFrame, notes: list[str]) -> tuple[str, ...]:
-    """Add what may be missing (with a note), and return the names of the inputs."""
-    for actuator, command in zip(_ACTUATORS, COMMANDS, strict=True):
-        if actuator not in table and command not in table:
-            table[actuator] = table[command] = 0.0
-            notes.append(f"{actuator} and {command} are not recorded: taken as zero")
-        if actuator not in table:
-            table[actuator] = table.groupby("trajectory")[command].shift(1).fillna(table[command])
-            notes.append(f"{actuator} is not recorded: taken as the command of the sample before")
-        if command not in table:
-            table[command] = table[actuator]
-            notes.append(f"{command} is not recorded: taken as {actuator}")
-    wind = [c for c in ("wind_speed", "wind_from") if c in table]
-    if len(wind) == 1:
-        notes.append(f"{wind[0]} is recorded alone: no wind is used without both wind_speed and wind_from")
-    return (*COMMANDS, *(c for c in ENVIRONMENT if c in table))
+    return [name for name, signal in zip(names, renamed, strict=True) if signal in KNOWN]
 
 
 def convert_table(table: pd.DataFrame, description: Description) -> None:
@@ -210,8 +163,8 @@ def convert_table(table: pd.DataFrame, description: Description) -> None:
     signs = {signal: word for signal, word in description.signs.items() if not (signal == "wind_from" and from_is_to)}
     for entries, factor in ((description.units, unit_factor), (signs, sign_factor)):
         for signal, word in entries.items():
-            if signal not in _SIGNALS:
-                raise unknown_name("signal in [units] or [signs]", signal, _SIGNALS)
+            if signal not in SIGNALS:
+                raise unknown_name("signal in [units] or [signs]", signal, SIGNALS)
             command = signal + "_c"
             targets = [signal, *([command] if command in COMMANDS and command not in entries else [])]
             for target in targets:
@@ -246,12 +199,7 @@ def _run(name: str, group: pd.DataFrame, inputs: tuple[str, ...], description: D
             f"{where}: run '{name}': t goes from {t[k]:g} s to {t[k + 1]:g} s, dt in dataset.toml is {description.dt:g} s ({len(wrong)} such steps). "
             'Time must be uniform inside a run and its rows in order: resample, or write gaps = "split" into dataset.toml.'
         )
-    return Run(name, t.copy(), _samples(group, STATES), _samples(group, inputs), inputs, dict(meta))
-
-
-def _samples(group: pd.DataFrame, names: Sequence[str]) -> np.ndarray:
-    """Columns as an array (samples, names), column by column in memory; pandas takes ten times as long to select several of a short run."""
-    return np.array([group[name].to_numpy() for name in names]).T
+    return Run(name, t.copy(), samples(group, STATES), samples(group, inputs), inputs, dict(meta))
 
 
 def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz", "csv", "parquet"] = "csv.gz") -> None:
@@ -263,12 +211,7 @@ def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz"
     if (name := f"trajectories.{format}") not in TABLES:
         raise InputError(f"format = '{format}'; accepted: csv.gz, csv or parquet.")
     folder = Path(folder)
-    frames = []
-    for run in dataset.runs:
-        frame = pd.DataFrame(np.column_stack([run.t, run.states, run.inputs]), columns=["t", *STATES, *dataset.inputs])
-        frame.insert(0, "trajectory", run.id)
-        frames.append(frame)
-    table = pd.concat(frames, ignore_index=True)
+    table = long_table(dataset.runs)
     description = {
         "name": dataset.name, "ship": "ship.toml", "dt": dataset.dt, "actuators": dataset.actuators, "source": dataset.source,
         "licence": dataset.licence, **({"simulation": dataset.simulation} if dataset.simulation else {}), "notes": list(dataset.notes),
