@@ -11,10 +11,31 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from . import cli_check, cli_contract, cli_data, cli_demo, cli_diagnosis, cli_import, cli_leaderboard, cli_report
-from .cli_common import SETTINGS, DatasetArgument, Device, Json, Quiet, console_for_tables, exit_if_failed, parse_seeds, print_json, say, show_boards
+from . import cli_check, cli_contract, cli_data, cli_demo, cli_diagnosis, cli_import, cli_leaderboard, cli_parts, cli_report
+from .cli_common import (
+    SETTINGS,
+    DatasetArgument,
+    Device,
+    Full,
+    Json,
+    Quiet,
+    exit_if_failed,
+    parse_seeds,
+    print_json,
+    say,
+    show_boards,
+    show_table,
+)
 from .errors import InputError, ShipbenchError
 from .names import file_name
+
+_GROUPS = {
+    "Your data": ("demo", "data", "diagnose"),
+    "Models": ("models", "effects", "check", "predict"),
+    "Results": ("run", "leaderboard", "learning-curve", "report"),
+    "For developers": ("validate", "suite"),
+}
+"""Commands in the order of `shipbench --help`."""
 
 
 class _Group(TyperGroup):
@@ -25,6 +46,17 @@ class _Group(TyperGroup):
         context = super().make_context(info_name, args, parent, **extra)
         context.obj = context.obj or command
         return context
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """The commands in the groups of `_GROUPS`; a command that is in none of them comes last."""
+        left = dict.fromkeys(self.list_commands(ctx))
+        for title, names in [*_GROUPS.items(), ("More", tuple(left))]:
+            rows = [(name, self.commands[name].get_short_help_str(200)) for name in names if name in left]
+            for name in names:
+                left.pop(name, None)
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -42,7 +74,7 @@ class _Group(TyperGroup):
 
 
 app = typer.Typer(
-    name="shipbench", cls=_Group, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, **SETTINGS,
+    name="shipbench", cls=_Group, pretty_exceptions_enable=False, rich_markup_mode=None, **SETTINGS,
     help="Benchmark of ship-motion prediction: every model on the same runs, folds, rollouts and metrics.",
 )  # fmt: skip
 cli_demo.register(app)
@@ -53,6 +85,7 @@ cli_contract.register(app)
 cli_check.register(cli_data.data_app, cli_diagnosis.suite_app)
 cli_leaderboard.register(app)
 cli_report.register(app)
+cli_parts.register(app)
 
 
 def _show_version(wanted: bool) -> None:
@@ -88,10 +121,11 @@ def run(
     executor: Annotated[str, typer.Option(help="Where the cells run: local, processes or dask; the numbers are the same.")] = "local",
     workers: Annotated[int | None, typer.Option(help="Number of processes at a time (default: one for each CPU).")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of the Dask scheduler, such as tcp://host:8786.")] = None,
-    time_limit: Annotated[float | None, typer.Option(help="Most seconds for one cell (fit and prediction); beyond, it fails.")] = None,
-    memory_limit: Annotated[float | None, typer.Option(help="Most GB of memory for one cell; beyond, it fails.")] = None,
-    wait: Annotated[float | None, typer.Option(help="Most seconds without Dask workers; then the study stops (default: it waits).")] = None,
+    time_limit: Annotated[float | None, typer.Option(help="Time limit per fit and prediction in seconds; one that exceeds it is stopped.")] = None,
+    memory_limit: Annotated[float | None, typer.Option(help="Memory limit per fit in GB; a fit that exceeds it is stopped.")] = None,
+    wait: Annotated[float | None, typer.Option(help="Seconds to wait for Dask workers before the study stops (default: no limit).")] = None,
     device: Device = None,
+    full: Full = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -111,39 +145,20 @@ def run(
     execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit), device, wait)
     tasks = load_tasks(config, overrides)
     folder = out or Path("runs") / (Path(config).stem if config else file_name(Path(tasks[0].dataset).name))
-    outcome = run_tasks(tasks, folder, resume=resume, execution=execution, progress=make_progress(quiet), command=str(ctx.obj))
+    outcome = run_tasks(tasks, folder, resume=resume, execution=execution, progress=make_progress(quiet or as_json), command=str(ctx.obj))
     tell = say if not quiet and not as_json else lambda line: None
     written = write_boards(outcome.results, folder, str(ctx.obj), tell=tell)
     if as_json:
         boards = {board.dataset: board.as_json() for board, _ in written}
         print_json({"out": str(folder), "leaderboards": boards, "failed": outcome.failed})
-    elif not quiet:
-        show_boards([board for board, _ in written])
-        say(f"Results in {folder}; leaderboard: {', '.join(str(path) for _, path in written)}")
-        if equations := sorted(folder.glob("cells/*/*/*/equations.txt")):
-            say(f"Fitted equations of {len(equations)} models beside their predictions, e.g. {equations[0]}")
+    else:
+        show_boards(written, full)
+        say(f"Results: {folder}\nLeaderboard: {', '.join(str(path) for _, path in written)}")
+        if not quiet and (equations := sorted(folder.glob("cells/*/*/*/equations.txt"))):
+            say(f"Fitted equations of {len(equations)} models: for example {equations[0]}")
     for (name, model_name), note in fit_notes(outcome.summaries).items():
         say(f"warning: {name}, {model_name}: {note}", err=True)
     exit_if_failed(outcome.failed, f"{len(outcome.failed)} of {len(outcome.summaries)} fits")
-
-
-@app.command()
-def models(as_json: Json = False) -> None:
-    """List the models with their parameters."""
-    from .bench.listing import describe_parts
-    from .predictors.registered import PREDICTORS
-
-    parts = describe_parts(PREDICTORS)
-    if as_json:
-        print_json(parts)
-        return
-    for part in parts:
-        typer.echo(f"{part['name']:<12s} {part['summary']}" + ("" if part["from"] == "shipbench" else f"  [{part['from']}]"))
-        if part["parameters"]:
-            typer.echo(" " * 13 + ", ".join(f"{k}={v}" if v else k for k, v in part["parameters"].items()))
-        if part["unusable"]:
-            typer.echo(" " * 13 + f"NOT USABLE HERE: {part['unusable']}")
-    typer.echo("\nA spec sets parameters in brackets, such as 'mlp[hidden=64,seed=3]'; your own class: path/to/model.py:ClassName.")
 
 
 @app.command()
@@ -153,17 +168,21 @@ def validate(as_json: Json = False) -> None:
     from .simulate.validation import table
 
     rows = table()
+    judged = [row for row in rows if row["passed"] is not None]
+    failed = [row for row in judged if not row["passed"]]
     if as_json:
         print_json(rows)
     else:
-        said = {True: "passed", False: "FAILED", None: ""}
+        words = {True: "passed", False: "FAILED", None: "not judged"}
         columns = [
             TableColumn("ship", "ship"), TableColumn("quantity", "quantity"), TableColumn("computed", "computed", significant(4)),
             TableColumn("published", "published", significant(4)), TableColumn("unit", "unit"), TableColumn("tolerance", "tolerance"),
-            TableColumn("", "said"), TableColumn("source", "source"),
+            TableColumn("result", "result"), TableColumn("source", "source"),
         ]  # fmt: skip
-        Table("Simulator against published figures", columns, [row | {"said": said[row["passed"]]} for row in rows]).show(console_for_tables())
-    if any(row["passed"] is False for row in rows):
+        within = f"{len(judged) - len(failed)} of {len(judged)} figures with a tolerance are within it."
+        say_wrapped(f"{within} {len(rows) - len(judged)} figures are not judged.\n")
+        show_table(Table("Simulator against published figures", columns, [row | {"result": words[row["passed"]]} for row in rows]))
+    if failed:
         raise typer.Exit(1)  # a figure is outside its tolerance
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .cli_common import DatasetArgument, Json, Quiet, console_for_tables, print_json, say
+from .cli_common import DatasetArgument, Full, Json, Quiet, print_json, say, say_wrapped, screen_width, show_table
 from .errors import InputError
 
 if TYPE_CHECKING:
@@ -21,13 +21,15 @@ def data_check(
     apply: Annotated[
         bool, typer.Option("--apply", help="Write the proposed lines into dataset.toml; the old file stays beside it as dataset.toml.before-check.")
     ] = False,
+    full: Full = False,
+    quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Find faults of a data set from the data themselves: units, signs, frames, clocks, samples, copies.
 
     Exit code 0: no error among the findings (warnings and notes may be there); 1: at least one error; 2: the input cannot be read.
     """
-    from .bench.check_report import check_document, check_tables, write_findings
+    from .bench.check_report import check_document, write_findings
     from .bench.dataset_facts import dataset_facts
     from .checking.applying import laid, write_lines
     from .checking.base import check_path
@@ -44,7 +46,7 @@ def data_check(
     if as_json:
         print_json(document | ({"before": str(before) if before else None} if apply else {}))
     else:
-        _show(facts, findings, check_tables(findings))
+        _show(facts, findings, full)
         _show_lines(lines, apply)
         if before is not None:
             say(f"Written: {Path(dataset, 'dataset.toml')} (the old file: {before.name}). Next: shipbench data check {dataset}")
@@ -54,16 +56,46 @@ def data_check(
         raise typer.Exit(1)
 
 
-def _show(facts: dict[str, Any], findings: list[Finding], tables: list[Any]) -> None:
-    for key, value in facts.items():
-        for line in value if isinstance(value, list) else [value]:
-            say(f"{key + ':':<13s}{line}")
-    console = console_for_tables()
-    for table in tables:
-        table.show(console)
+_BRIEF = ("name", "ship", "runs")
+"""Facts that are printed without --full."""
+
+
+def _show(facts: dict[str, Any], findings: list[Finding], full: bool) -> None:
+    """The number of findings in a sentence, facts of the data set, then each finding with what to do; notes with --full only."""
     counts = {severity: sum(f.severity == severity for f in findings) for severity in ("error", "warning", "note")}
-    said = [f"{number} {severity}{'s' * (number != 1)}" for severity, number in counts.items()]
-    say(f"Findings: {', '.join(said)}.")
+    numbers = [f"{number} {severity}{'s' * (number != 1)}" for severity, number in counts.items()]
+    say(f"Findings: {', '.join(numbers)}.\n")
+    for key, value in facts.items():
+        if full or key in _BRIEF:
+            for line in value if isinstance(value, list) else [value]:
+                say_wrapped(f"{key + ':':<13s}{line}", hanging=" " * 13)
+    for f in findings:
+        if f.severity != "note" or full:
+            _show_finding(f)
+    if counts["note"] and not full:
+        say(f"\n{numbers[-1]} more: --full")
+
+
+def _show_finding(finding: Finding) -> None:
+    channels = f" of {', '.join(finding.channels)}" if finding.channels else ""
+    say("")
+    say_wrapped(f"{finding.severity.upper()}: {finding.kind}{channels}", hanging="  ")
+    say_wrapped(finding.text, "  ")
+    lines = finding.line.split("\n") if finding.line else []
+    for line in lines[:_LINES]:
+        say(f"    {_cut(line, screen_width() - 4)}")
+    if len(lines) > _LINES:
+        say(f"    ... and {len(lines) - _LINES} more lines")
+    if finding.todo:
+        say_wrapped(finding.todo, "  ")
+
+
+_LINES = 6
+"""Lines for dataset.toml that are printed with a finding; all stand together below, and in the folder of --out."""
+
+
+def _cut(line: str, width: int) -> str:
+    return line if len(line) <= width else f"{line[: width - 3]}..."
 
 
 def _show_lines(lines: Laid, applied: bool) -> None:
@@ -73,12 +105,13 @@ def _show_lines(lines: Laid, applied: bool) -> None:
     if lines.changed:
         text = toml_line(lines.changed).split("\n")
         say("\nIn dataset.toml now:" if applied else "\nFor dataset.toml, after you have looked at each finding:")
+        width = screen_width() - 2
         for row in text[:40]:
-            say(f"  {row if len(row) <= 140 else row[:137] + '...'}")
-        if len(text) > 40 or any(len(row) > 140 for row in text):
+            say(f"  {_cut(row, width)}")
+        if len(text) > 40 or any(len(row) > width for row in text):
             say("  (shortened: --out FOLDER writes them all into dataset_lines.toml)")
     for line in lines.refused:
-        say(f"Left out: {line}. Look at these findings and write the right line yourself.")
+        say_wrapped(f"Left out: {line}. Look at these findings and write the right line yourself.")
     if applied and not lines.changed:
         say("Nothing to write into dataset.toml.")
 
@@ -96,9 +129,8 @@ def suite_check(
     from .bench.progress import make_progress
 
     page, tables = suite_command(seeds=seeds, first=seed, development=development, out=out, progress=make_progress(quiet), command=str(ctx.obj))
-    if not quiet:
-        for table in tables:
-            table.show(console_for_tables())
+    for table in tables:
+        show_table(table)
     say(f"Written: {page}")
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,14 +14,18 @@ from .errors import InputError
 from .names import shown
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.console import Console
 
     from .bench.leaderboard import Board
+    from .bench.tables import Table
 
 SETTINGS: dict[str, Any] = {"context_settings": {"help_option_names": ["-h", "--help"]}, "no_args_is_help": True}
 """Of every group of commands."""
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document to stdout and nothing else.")]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No progress.")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no notes; the result and what was written are still printed.")]
+Full = Annotated[bool, typer.Option("--full", help="Print all tables, as on the written page.")]
 Device = Annotated[str | None, typer.Option(help="Where networks compute: cpu, cuda or cuda:1 (default cpu); physics stays on the CPU.")]
 DatasetArgument = Annotated[str, typer.Argument(metavar="DATASET", help="Registered name or folder.")]
 
@@ -35,11 +41,29 @@ def print_json(data: Any) -> None:
 
 
 def console_for_tables() -> Console:
-    """A console for tables; wide enough for Table III where the output is a file or a pipe."""
+    """A console for tables, as wide as the terminal; 80 columns in a file, a pipe or a notebook, or as COLUMNS says."""
     from rich.console import Console
 
-    console = Console(highlight=False, soft_wrap=False)
-    return console if console.is_terminal else Console(highlight=False, width=160)
+    return Console(highlight=False)
+
+
+def show_table(table: Table) -> None:
+    """Print one table."""
+    table.show(console_for_tables())
+
+
+def say_wrapped(text: str, indent: str = "", hanging: str = "") -> None:
+    """Print text in lines of the terminal's width. In a pipe without COLUMNS lines stay whole: they can be searched."""
+    from .bench.terminal import paragraph
+
+    width = screen_width() if sys.stdout.isatty() or "COLUMNS" in os.environ else 10**6
+    for line in text.split("\n"):
+        say("\n".join(paragraph(shown(line), width, indent, hanging)))
+
+
+def screen_width() -> int:
+    """Columns of the terminal, as `console_for_tables` has them."""
+    return console_for_tables().width
 
 
 def parse_numbers(option: str, text: str) -> tuple[int, ...]:
@@ -68,10 +92,13 @@ def exit_if_failed(failed: Sequence[str], what: str) -> None:
         raise typer.Exit(1)
 
 
-def show_boards(boards: Sequence[Board]) -> None:
-    """Print leaderboards on a terminal."""
-    console = console_for_tables()
-    for board in boards:
-        console.print(f"\n{shown(board.title)}", style="bold", markup=False)
-        for table in board.tables:
-            table.show(console)
+def show_boards(boards: Sequence[tuple[Board, Path]], full: bool) -> None:
+    """Print leaderboards on a terminal: a sentence, then a short table, or all tables."""
+    for board, page in boards:
+        say("")
+        say_wrapped(f"{board.title}\n{board.lead}\n")
+        short = None if full else board.short
+        for table in [short] if short else board.tables:
+            show_table(table)
+        if short:
+            say_wrapped(f"All {len(board.tables)} tables: --full, or {page}")

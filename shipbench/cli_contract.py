@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_common import Device, Json, console_for_tables, print_json
+from .cli_common import Device, Json, print_json, say_wrapped, show_table
 
 
 def check(
@@ -42,9 +42,10 @@ def check(
             TableColumn("evidence, or why not applicable", "evidence"),
         ]
         rows = [vars(v) | {"status": shown[v.status]} for v in report.verdicts]
-        Table(f"{report.model} on {report.data}", columns, rows).show(console_for_tables())
-        counts = (len(report.of(status)) for status in (PASSED, BROKEN, NOT_APPLICABLE))
-        typer.echo("{} passed, {} broken, {} not applicable; {:.1f} s.".format(*counts, report.seconds))
+        counts = [len(report.of(status)) for status in (PASSED, BROKEN, NOT_APPLICABLE)]
+        verdict = "breaks the contract" if counts[1] else "keeps the contract"
+        say_wrapped(f"'{report.model}' {verdict}: {{}} rules passed, {{}} broken, {{}} not applicable; {report.seconds:.1f} s.\n".format(*counts))
+        show_table(Table(f"{report.model} on {report.data}", columns, rows))
     if report.of(BROKEN):
         raise typer.Exit(1)
 

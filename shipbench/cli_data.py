@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_common import SETTINGS, DatasetArgument, Json, Quiet, console_for_tables, print_json, say
+from .cli_common import SETTINGS, DatasetArgument, Full, Json, Quiet, print_json, say, say_wrapped, show_table
 from .errors import InputError
 
 data_app = typer.Typer(help="Data sets: list, get, make, check, describe, export, import.", **SETTINGS)
@@ -24,7 +24,7 @@ def data_list(as_json: Json = False) -> None:
         print_json([{"name": p.name, "summary": p.summary, "licence": p.licence} for p in parts])
         return
     for part in parts:
-        say(f"{part.name:<18s} {part.summary} ({part.licence})")
+        say_wrapped(f"{part.name:<18s} {part.summary} ({part.licence})", hanging=" " * 19)
 
 
 @data_app.command("get")
@@ -51,8 +51,7 @@ def data_get(
         if not typer.confirm("Do you accept the licence?", err=True):
             raise InputError("the licence is not accepted; nothing was fetched.")
     fetched = public.fetch(folder, source, (lambda text: None) if quiet else lambda text: say(text, err=True))
-    if not quiet:
-        say(f"{name}: {len(fetched)} files fetched into {folder}, every checksum is right. Use it: shipbench data describe {name}")
+    say(f"{name}: {len(fetched)} files fetched into {folder}, every checksum is right. Use it: shipbench data describe {name}")
 
 
 @data_app.command("make")
@@ -69,14 +68,15 @@ def data_make(
     dataset = load_dataset(name, remake=force)
     if out is not None:
         write_dataset(dataset, out)
-    if not quiet:
-        say(f"{dataset.name}: {len(dataset)} runs, fingerprint {dataset.fingerprint}, in {out or cache_folder()}")
+    say(f"{dataset.name}: {len(dataset)} runs, fingerprint {dataset.fingerprint}, in {out or cache_folder()}")
 
 
 @data_app.command("describe")
 def data_describe(
     dataset: DatasetArgument,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Write a data card there: card.md and card.html, with plots.")] = None,
+    full: Full = False,
+    quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Print a data card: statistics (beside the paper's Table II), durations, noise, what the data cannot identify."""
@@ -89,8 +89,12 @@ def data_describe(
     if as_json:
         print_json(card.document())
         return
-    for table in card.tables.values():
-        table.show(console_for_tables())
+    say_wrapped(f"{card.lead()}\n")
+    for key, table in card.tables.items():
+        if full or key in card.BRIEF:
+            show_table(table)
+    if not full:
+        say("All tables: --full" + ("" if written else ", or --out FOLDER for a page with plots"))
     if written:
         say(f"Written: {', '.join(map(str, written))}")
 
@@ -107,10 +111,10 @@ def data_export(
     from .data.base import load_dataset
     from .data.export import check_format, export_dataset
 
+    dataset = None if is_results(Path(what)) else load_dataset(what)
     form = check_format(format, out, what)
-    written = export_predictions(Path(what), out, form) if is_results(Path(what)) else export_dataset(load_dataset(what), out, form)
-    if not quiet:
-        say(f"Written: {', '.join(map(str, written))}")
+    written = export_predictions(Path(what), out, form) if dataset is None else export_dataset(dataset, out, form)
+    say(f"Written: {', '.join(map(str, written))}")
 
 
 def register(app: typer.Typer) -> None:

@@ -1,4 +1,4 @@
-"""The commands of the diagnosis: `diagnose`, `effects`, `suite`."""
+"""The commands of the diagnosis: `diagnose`, `suite`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_common import DatasetArgument, Json, Quiet, print_json, say
+from .cli_common import DatasetArgument, Full, Json, Quiet, print_json, say, screen_width
 from .names import file_name
 
 
@@ -22,6 +22,7 @@ def diagnose(
     workers: Annotated[int, typer.Option(help="Processes for the folds.")] = 2,
     thorough: Annotated[bool, typer.Option("--thorough", help="Use up to twice as much of a long record (twice the time or more).")] = False,
     cpu_limit: Annotated[float, typer.Option(min=1.0, max=86_400.0, help="CPU seconds after which no other search begins; it is said.")] = 900.0,
+    full: Full = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -38,25 +39,9 @@ def diagnose(
     if as_json:
         print_json(found.document())
         return
-    if not quiet:
-        for line in summary_lines(found):
-            say(line)
+    for line in summary_lines(found, screen_width(), full):
+        say(line)
     say(f"Written: {', '.join(str(p) for p in written)}")
-
-
-def effects(as_json: Json = False) -> None:
-    """List the effects that a diagnosis can name and a model spec can add (physics+current)."""
-    from .bench.listing import describe_effects
-
-    parts = describe_effects()
-    if as_json:
-        print_json(parts)
-        return
-    for part in parts:
-        say(f"{part['name']:<26s}{part['family']:<13s}{part['summary']}")
-        for p in part["parameters"]:
-            say(" " * 26 + f"{p['name']} [{p['unit']}], typical {p['typical']:.3g}, {p['low']:.3g} to {p['high']:.3g}")
-    say("\nSizes are for a ship of 130 m and go with the length by Froude's law. Add one to the physics: --model physics+current.")
 
 
 suite_app = typer.Typer(help="Test suites of the framework itself.", no_args_is_help=True)
@@ -90,5 +75,4 @@ def suite_diagnosis(
 def register(app: typer.Typer) -> None:
     """Add these commands to the command line."""
     app.command()(diagnose)
-    app.command()(effects)
     app.add_typer(suite_app, name="suite")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_common import Json, Quiet, print_json, say
+from .cli_common import Json, Quiet, print_json, say, say_wrapped
 from .errors import InputError
 from .names import file_name
 
@@ -49,7 +49,7 @@ def data_import(
             print_json({"mapping": str(propose), "remarks": lines})
             return
         for line in lines[-1:] if quiet else lines:
-            say(line)
+            say_wrapped(line, hanging=_hanging(line))
         return
     if only := [f"--{name}" for name, given in (("encoding", encoding), ("sheet", sheet), ("header", header)) if given is not None]:
         raise InputError(f"{only[0]} serves --propose; an import takes it from the mapping. Write it there: [file] {only[0][2:]} = ...")
@@ -67,10 +67,16 @@ def data_import(
     summary = import_logs(logs, plan, Ship.load(ship), folder, force=force, tell=lambda line: None if quiet else say(line, err=True))
     if as_json:
         print_json(summary.document())
-    elif not quiet:
-        for line in summary.lines():
-            say(line)
-        say(f"Written: {folder} ({summary.table.name}, dataset.toml, ship.toml). Next: shipbench data check {shlex.quote(str(folder))}")
+    else:
+        for line in summary.lines()[: 1 if quiet else None]:
+            say_wrapped(line, hanging=_hanging(line))
+        say(f"Written: {folder} ({summary.table.name}, dataset.toml, ship.toml)")
+        say(f"Next: shipbench data check {shlex.quote(str(folder))}")
+
+
+def _hanging(line: str) -> str:
+    """Indent of what follows when a line is wrapped."""
+    return " " * (len(line) - len(line.lstrip()) + 4)
 
 
 def register(data_app: typer.Typer) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .cli_common import Device, Json, Quiet, exit_if_failed, parse_numbers, parse_seeds, print_json, say, show_boards
+from .cli_common import Device, Full, Json, Quiet, exit_if_failed, parse_numbers, parse_seeds, print_json, say, show_boards
 from .errors import InputError
 from .names import file_name
 
@@ -32,6 +32,7 @@ def leaderboard(
     verify: Annotated[bool, typer.Option("--verify", help="First compute everything shown again from the saved predictions.")] = False,
     submission: Annotated[Path | None, typer.Option(help="Also write rows, summary and windows there: the one folder to hand in.")] = None,
     plots: Annotated[bool, typer.Option(help="Draw the plots.")] = True,
+    full: Full = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -51,8 +52,8 @@ def leaderboard(
         write_submission(found, submission)
     if as_json:
         print_json({board.dataset: board.as_json() for board, _ in written})
-    elif not quiet:
-        show_boards([board for board, _ in written])
+    else:
+        show_boards(written, full)
         say(f"Written: {', '.join(str(path) for _, path in written)}")
         if submission is not None:
             say(f"Submission: {submission}")
@@ -111,10 +112,12 @@ def learning_curve(
     task = load_tasks(config, overrides)[0]
     folder = out or Path("runs") / f"curve-{file_name(Path(task.dataset).name)}"
     numbers = parse_numbers("--sizes", sizes)
-    curve = run_curve(task, numbers, folder, resume=resume, execution=Execution(device=device), progress=make_progress(quiet), command=str(ctx.obj))
+    curve = run_curve(
+        task, numbers, folder, resume=resume, execution=Execution(device=device), progress=make_progress(quiet or as_json), command=str(ctx.obj)
+    )
     if as_json:
         print_json({"out": str(folder), "page": str(curve.page), "curve": curve.board.as_json(), "failed": curve.failed})
-    elif not quiet:
-        show_boards([curve.board])
-        say(f"Results in {folder}; page: {curve.page}")
+    else:
+        show_boards([(curve.board, curve.page)], full=True)
+        say(f"Results: {folder}\nPage: {curve.page}")
     exit_if_failed(curve.failed, f"{len(curve.failed)} fits")

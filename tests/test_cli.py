@@ -92,8 +92,11 @@ def test_json_is_one_document_and_nothing_else(cli, toy_folder):
     assert document["failed"] == []
 
 
-def test_quiet_prints_nothing(cli, toy_folder):
-    assert cli("run", "-m", "hold", "-d", toy_folder(), *QUICK, "-q").output == ""
+def test_quiet_keeps_the_result_and_what_was_written(cli, toy_folder):
+    result = cli("run", "-m", "hold", "-d", toy_folder(), *QUICK, "-q")
+    assert result.stderr == ""
+    assert "ED μ" in result.stdout
+    assert "Leaderboard: runs/toyset/toyset.md" in result.stdout
 
 
 def test_resume_keeps_what_is_finished(cli, toy_folder):

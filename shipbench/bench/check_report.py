@@ -14,24 +14,8 @@ from ..checking.recording import Recording
 from ..errors import InputError
 from ..names import file_name
 from .dataset_facts import dataset_facts
-from .tables import Table, TableColumn
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-
-
-def check_tables(findings: Sequence[Finding]) -> list[Table]:
-    """The findings, errors first, and what to do."""
-    if not findings:
-        return []
-    columns = [TableColumn("", "severity"), TableColumn("finding", "kind"), TableColumn("channels", "channels"), TableColumn("evidence", "text"),
-               TableColumn("dataset.toml, or what to do", "do")]  # fmt: skip
-    rows = []
-    for f in findings:
-        lines = f.line.split("\n") if f.line else []
-        short = [line if len(line) <= 60 else f"{line[:57]}..." for line in lines[:6]] + (["..."] if len(lines) > 6 else [])
-        do = "\n".join([*short, *([f.todo] if f.todo else [])])
-        rows.append({"severity": f.severity, "kind": f.kind, "channels": ", ".join(f.channels), "text": f.text, "do": do})
-    return [Table("Findings", columns, rows)]
 
 
 def check_document(recording: Recording, findings: Sequence[Finding]) -> dict[str, Any]:

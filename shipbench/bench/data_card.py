@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -46,6 +46,15 @@ class Card:
     name: str
     facts: dict[str, Any]
     tables: dict[str, Table]
+
+    BRIEF: ClassVar[tuple[str, ...]] = ("durations", _GAPS)
+    """Tables that a terminal shows unless all are asked for."""
+
+    def lead(self) -> str:
+        """What the data set holds, and how much of it cannot be identified, in two sentences."""
+        subjects = [str(row["subject"]) for row in self.tables[_GAPS].rows]
+        missing = f"{len(subjects)} things cannot be identified: {'; '.join(subjects[:3])}{'; ...' if len(subjects) > 3 else ''}."
+        return f"{self.name}: {self.facts['runs']}. {missing if subjects else 'Nothing of what is looked for is missing.'}"
 
     def page(self) -> list[Table]:
         """The tables in the order of a page."""

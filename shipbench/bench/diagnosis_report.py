@@ -79,7 +79,7 @@ def page(d: Diagnosis) -> str:
     sections: list[tuple[str, str]] = [("Causes and evidence", _causes(d))]
     sections += pictures.sections(d)
     sections += [
-        ("Gain per run, held out", _gains(d)), ("All candidates", _ranking(d)), ("Smallest size that would have been named", _smallest(d)),
+        ("Gain per run, held out", _gains(d)), ("All candidates", _ranking(d)), ("Detection limits", _smallest(d)),
         ("What these data cannot tell apart", _confused(d)), ("What remains", _remains(d)), ("Next", _next(d)), ("How this was computed", _method(d)),
     ]  # fmt: skip
     sections = [(title, body) for title, body in sections if body]
@@ -178,9 +178,9 @@ def _smallest(d: Diagnosis) -> str:
     rows = [[c.effect, c.family, detectable(c)] for c in sorted(d.candidates, key=lambda c: (c.family, c.effect)) if c.detectable]
     note = (
         "At this size the expected score reaches the threshold, beside the plain model of these runs. A larger one would probably have been named; "
-        "of a smaller one nothing can be said. -: not at any size that is possible. Effects that are not listed are looked for in another way."
+        "of a smaller one nothing can be said. -: cannot be detected. Effects that are not listed are looked for in another way."
     )
-    body = table(["effect", "family", "smallest size"], rows) + paragraph(note, small=True)
+    body = table(["effect", "family", "detection limit"], rows) + paragraph(note, small=True)
     return body if d.verdict == "none" else f"<details><summary>Table of {len(rows)} effects</summary>{body}</details>" if rows else ""
 
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import shlex
-import textwrap
 
 from ..diagnosis.outcome import Candidate, Cause, Diagnosis, Estimate, Gain, what_it_is
 from .tables import display_unit
+from .terminal import command_lines, paragraph
 
 _SHOWN = 10
-WIDTH = 118
+WIDTH = 80
+"""Columns of summary.txt."""
+DETECTION_LIMIT = 'Detection limit: the smallest effect these runs could have shown ("-": cannot be detected)'
 _NO_MODEL = ("unit_or_sign_error", "change_point")
 
 
@@ -71,8 +73,11 @@ def headline(d: Diagnosis) -> str:
             f"much)."
         )
     if d.warnings:
-        return "Nothing is named, with the warnings below. See what would have been seen, and how the candidates rank."
-    return "Nothing found: no effect of the library, and no unexplained dependence, is worth naming. See below what would have been seen."
+        return "Nothing is named. The warnings below say why. The detection limits say what these runs could have shown."
+    return (
+        "Nothing found: no effect of the library, and no unexplained dependence, is worth naming. "
+        "The detection limits say what these runs could have shown."
+    )
 
 
 def _named(c: Cause) -> str:
@@ -110,7 +115,7 @@ def strength(c: Cause) -> str:
     return f"score {c.score:.0f}, p {c.p_value:.2g}" if math.isfinite(c.score) else "in the record itself"
 
 
-def cause_lines(c: Cause) -> list[str]:
+def cause_lines(c: Cause, width: int = WIDTH) -> list[str]:
     """A cause with sizes, evidence and confusions."""
     lines = [f"  {c.rank}. {c.effect} ({strength(c)})"]
     lines += [f"       {estimate(k, e)}" for k, e in c.parameters.items()]
@@ -119,11 +124,11 @@ def cause_lines(c: Cause) -> list[str]:
         texts.append(f"Cannot be told from {', '.join(c.confused_with)} with these data.")
         texts += [f"To separate them: {c.separating_manoeuvre}"] if c.separating_manoeuvre else []
     for text in texts:
-        lines += textwrap.wrap(text, WIDTH, initial_indent=" " * 7, subsequent_indent=" " * 7)
+        lines += paragraph(text, width, " " * 7)
     return lines
 
 
-def _candidate_lines(d: Diagnosis) -> list[str]:
+def _candidate_lines(d: Diagnosis, width: int) -> list[str]:
     shown = d.candidates[:_SHOWN]
     if not shown:
         return []
@@ -131,11 +136,11 @@ def _candidate_lines(d: Diagnosis) -> list[str]:
     lines = [f"Candidates (best {len(shown)} of {len(d.candidates)}):", f"  {'effect':<{wide}s}     score  why it was or was not named"]
     for c in shown:
         score = f"{c.score:8.1f}" if math.isfinite(c.score) else "       -"
-        lines += textwrap.wrap(f"{c.effect:<{wide}s}  {score}  {c.rejected_because}", WIDTH, initial_indent="  ", subsequent_indent=" " * (wide + 14))
+        lines += paragraph(f"{c.effect:<{wide}s}  {score}  {c.rejected_because}", width, "  ", " " * (wide + 14))
     return [*lines, ""]
 
 
-def _detectable_lines(d: Diagnosis) -> list[str]:
+def _detectable_lines(d: Diagnosis, width: int) -> list[str]:
     """Everything where nothing was found; else the best candidates that were not named."""
     kept = (
         sorted(d.candidates, key=lambda c: c.effect) if d.verdict == "none" else [c for c in d.candidates[:_SHOWN] if c.rejected_because != "named"]
@@ -144,36 +149,48 @@ def _detectable_lines(d: Diagnosis) -> list[str]:
     if not kept:
         return []
     wide = max(len(c.effect) for c in kept)
-    lines = ["Smallest size of each effect that would have been named (-: none that is possible):"]
+    lines = paragraph(DETECTION_LIMIT + ":", width)
     for c in kept:
-        lines += textwrap.wrap(f"{c.effect:<{wide}s}  {detectable(c)}", WIDTH, initial_indent="  ", subsequent_indent=" " * (wide + 4))
+        lines += paragraph(f"{c.effect:<{wide}s}  {detectable(c)}", width, "  ", " " * (wide + 4))
     return [*lines, ""]
 
 
-def summary_lines(d: Diagnosis) -> list[str]:
-    """The whole diagnosis as plain lines of at most `WIDTH` columns (a long name or command may stand out)."""
-    lines = [f"Diagnosis of {d.dataset} ({d.seconds:.0f} s)", "", *textwrap.wrap(headline(d), WIDTH), ""]
+def _wrong_lines(d: Diagnosis, width: int) -> list[str]:
+    """What the plain model gets wrong in each channel, and what is taken as noise."""
+    lines = ["What the plain physics model gets wrong:"] if d.what_is_wrong else []
+    for w in d.what_is_wrong:
+        none = "its missing force shows no dependence on motion, actuators or time alone"
+        when = w.when if w.depends_on else f"{w.when}; {none}".removeprefix("; ")
+        lines += paragraph(f"{w.channel}, {100 * w.share_of_error:.0f} % of the error: {when}", width, "  ", "      ")
+    lines += [""] if lines else []
+    if noise := d.unexplained_after.get("taken_as_noise"):
+        lines.append("Taken as noise, no cause:")
+        for channel, words in noise.items():
+            lines += paragraph(f"{channel}: {words}", width, "  ", "      ")
+        lines.append("")
+    return lines
+
+
+def summary_lines(d: Diagnosis, width: int = WIDTH, full: bool = True) -> list[str]:
+    """A diagnosis as plain lines of at most `width` columns.
+
+    Args:
+        full: with what the plain model gets wrong, the candidates and the detection limits; else the verdict, its causes and the next command.
+    """
+    lines = [*paragraph(f"Diagnosis of {d.dataset} ({d.seconds:.0f} s)", width), "", *paragraph(headline(d), width), ""]
     for warning in d.warnings:
-        lines += textwrap.wrap(f"WARNING: {warning}", WIDTH, subsequent_indent="         ")
+        lines += paragraph(f"WARNING: {warning}", width, "", " " * 9)
     if d.warnings:
         lines.append("")
     if d.causes:
         lines.append("Causes:")
         for c in d.causes:
-            lines += cause_lines(c)
+            lines += cause_lines(c, width)
         lines.append("")
-    if d.what_is_wrong:
-        lines.append("What the plain physics model gets wrong:")
-        for w in d.what_is_wrong:
-            when = w.when if w.depends_on else f"{w.when}; its missing force follows nothing in motion, actuators or time alone".removeprefix("; ")
-            lines += textwrap.wrap(f"{w.channel}, {100 * w.share_of_error:.0f} % of the error: {when}", WIDTH, initial_indent="  ",
-                                   subsequent_indent="      ")  # fmt: skip
-        lines.append("")
-    if noise := d.unexplained_after.get("taken_as_noise"):
-        lines.append("Taken as noise, no cause:")
-        lines += [f"  {channel}: {words}" for channel, words in noise.items()]
-        lines.append("")
-    lines += _candidate_lines(d) + _detectable_lines(d)
+    if full:
+        lines += _wrong_lines(d, width) + _candidate_lines(d, width) + _detectable_lines(d, width)
     if command := next_command(d):
-        lines += [f"Extended model: {d.extended_model}", f"  {command}"]
+        lines += [*paragraph(f"Extended model: {d.extended_model}", width), *command_lines(command, width)]
+    if not full:
+        lines += ["", "All tables (errors by channel, candidates, detection limits): --full"]
     return lines

@@ -16,6 +16,7 @@ from .cost import parameters_by_model
 from .escaping import markdown_text
 from .fit_notes import MARK, fit_notes
 from .formats import check_formats, render
+from .lead import lead, short_table
 from .results import PROTOCOL, Frame, Results
 from .tables import Table, TableColumn
 
@@ -36,6 +37,10 @@ class Board:
     head: list[str]
     """Lines on where the figures come from."""
     heading: str = "Leaderboard"
+    lead: str = ""
+    """Who is first, by how much, how sure."""
+    short: Table | None = None
+    """What a terminal shows of the tables."""
 
     @property
     def title(self) -> str:
@@ -90,7 +95,8 @@ def _board(scores: Scores, summaries: list[dict[str, Any]]) -> Board:
         tables.append(board_tables.kind_table(scores))
     tables += [board_statistics.slice_table(scores), board_statistics.trial_table(scores)]
     tables.append(board_tables.status_table(scores, parameters_by_model(summaries)))
-    return Board(scores.dataset, scores.models, [t for t in tables if t is not None], _head(scores.rows, summaries))
+    known = [t for t in tables if t is not None]
+    return Board(scores.dataset, scores.models, known, _head(scores.rows, summaries), lead=lead(scores), short=short_table(known[0]))
 
 
 def _marked(table: Table, dataset: str, summaries: list[dict[str, Any]]) -> Table:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import re
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +16,38 @@ from ..registry import Registry
 def describe_parts(registry: Registry) -> list[dict[str, Any]]:
     """For each registered part its name, one line on it, its parameters with their defaults as written, where it comes from, and why it
     cannot be used here ("" where it can): an optional package is missing, or a plug-in (only these are imported) fails to import."""
-    folder = Path(__file__).resolve().parent.parent / registry.folder
-    built_in, plugins = set(registry.built_in()), registry.plugins()
     parts = []
     for name in registry.names():
-        entry = None if name in built_in else plugins[name][0].value
-        path = folder / f"{name}.py" if entry is None else _source(entry)
+        path, entry = _place(registry, name)
         summary, parameters, needs = read_part(path, registry.attribute, entry) if path else ("", {}, ())
         unusable = (not_installed(name, needs) or "") if entry is None else _problem(registry, name)
         parts.append({"name": name, "summary": summary, "parameters": parameters, "from": entry or "shipbench", "unusable": unusable})
     return parts
+
+
+def _place(registry: Registry, name: str) -> tuple[Path | None, str | None]:
+    """The file of a part (None where it cannot be found), and the entry point of a plug-in."""
+    if name in registry.built_in():
+        return Path(__file__).resolve().parent.parent / registry.folder / f"{name}.py", None
+    entry = registry.plugins()[name][0].value
+    return _source(entry), entry
+
+
+def explain_part(registry: Registry, name: str) -> tuple[list[str], dict[str, str]]:
+    """Paragraphs of the docstrings of a part's module and class, without the first line; what is said of each parameter."""
+    path, entry = _place(registry, name)
+    try:
+        tree = ast.parse(path.read_text(encoding="utf-8")) if path else ast.parse("")
+    except (OSError, SyntaxError, UnicodeDecodeError):
+        return [], {}
+    bound = entry.partition(":")[2] if entry else next((_bound_name(n) for n in tree.body if _binds(n, registry.attribute)), "")
+    own = next((ast.get_docstring(n) or "" for n in tree.body if isinstance(n, ast.ClassDef) and n.name == bound), "")
+    words, _, arguments = own.partition("Args:\n")
+    meanings: dict[str, str] = {}
+    for keys, text in re.findall(r"^    (\w[\w, ]*): (.*(?:\n {5,}.*)*)", arguments.split("\n\n")[0], re.MULTILINE):
+        meanings |= {key: " ".join(text.split()) for key in keys.replace(" ", "").split(",")}
+    paragraphs = [*(ast.get_docstring(tree) or "").split("\n\n")[1:], *words.split("\n\n")]
+    return [" ".join(text.split()) for text in paragraphs if text.strip()], meanings
 
 
 def _problem(registry: Registry, name: str) -> str:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from ..names import shown
 from .escaping import markdown_text
 
 if TYPE_CHECKING:
@@ -74,10 +73,6 @@ class TableColumn:
         return f"{self.format(low)} to {self.format(high)}"
 
 
-MOST_INTERVALS = 8
-"""More columns with intervals than that do not fit on a terminal: figures alone are shown there, intervals on the page."""
-
-
 def _html_cell(column: TableColumn, row: dict[str, Any]) -> str:
     between = column.interval_text(row)
     return escape(column.text(row)) + (f"<br><small>{escape(between)}</small>" if between else "")
@@ -122,24 +117,9 @@ class Table:
 
     def show(self, console: Console) -> None:
         """Print on a terminal."""
-        from rich import box
-        from rich.table import Table as RichTable
-        from rich.text import Text
+        from .terminal import show_table
 
-        def cell(column: TableColumn, row: dict[str, Any]) -> Text:
-            text, between = Text(shown(column.text(row), keep="\n")), column.interval_text(row) if narrow else ""
-            return text.append(f"\n{between}", style="dim") if between else text
-
-        narrow = sum(c.interval for c in self.columns) <= MOST_INTERVALS
-        table = RichTable(title=Text(shown(self.title)), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-        for column in self.columns:
-            numeric = column.format is not None
-            table.add_column(Text(shown(column.header)), justify="right" if numeric else "left", no_wrap=numeric, overflow="fold")
-        for row in self.rows:
-            table.add_row(*[cell(c, row) for c in self.columns], style="italic dim" if row.get("_reference") else None)
-        console.print(table)
-        for note in self.notes:
-            console.print(Text(shown(note), style="dim"))
+        show_table(self, console)
 
     def as_json(self) -> dict[str, Any]:
         """Title, rows with raw values (NaN as null), notes."""

@@ -7,6 +7,7 @@ import inspect
 import json
 import logging
 import os
+import shlex
 import shutil
 import tempfile
 import time
@@ -29,6 +30,8 @@ _HELPERS = frozenset({
 })  # fmt: skip
 DATASETS = Registry("data set", "data", "DATASET", helpers=_HELPERS, group="datasets")
 
+LOG_SUFFIXES = (".csv", ".csv.gz", ".parquet", ".mat", ".xlsx", ".txt", ".tsv", ".dat", ".log")
+"""Of files that `data import` may read."""
 _LEFT_S = 3600.0
 """Age [s] beyond which nobody is writing a data set any more: the largest takes a minute."""
 _log = logging.getLogger(__name__)
@@ -67,17 +70,19 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
         InputError: neither a known name nor a data set's folder, an unknown parameter, or faulty files.
     """
     from .files import read_dataset  # pandas is loaded for reading and writing, not for the list
-    from .mat import read_mat
+    from .mat import is_export, read_mat
 
     folder = Path(spec)
     exported = folder.suffix == ".mat" and os.path.lexists(folder) and not folder.is_dir()
+    if folder.is_file() and not (exported and is_export(folder)):
+        raise _no_data_set(spec, folder)
     if exported or os.path.lexists(folder / "dataset.toml"):
         if options:
             raise InputError(f"{folder} is read from files and takes no parameters; given: {', '.join(options)}.")
         return read_mat(folder) if exported else read_dataset(folder)
     if folder.is_dir():
         files = "trajectories.csv (or .csv.gz, .parquet), dataset.toml and ship.toml"
-        raise InputError(f"folder {folder} holds no dataset.toml; a data set has {files}.")
+        raise InputError(f"folder {folder} holds no dataset.toml; a data set has {files}.{_logs_within(folder)}")
     parsed = parse_spec(spec)
     if parsed.name not in DATASETS:
         raise unknown_name("folder or data set", parsed.name, DATASETS.names())
@@ -94,6 +99,26 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
     dataset = _make(part, params)
     _to_cache(dataset, folder)
     return dataset
+
+
+def import_command(*logs: Path) -> str:
+    """The command that makes a data set of logs."""
+    return f"shipbench data import {' '.join(shlex.quote(str(log)) for log in logs)} --propose mapping.toml"
+
+
+def _no_data_set(spec: str, file: Path) -> InputError:
+    """What to give or to do instead of a file."""
+    if os.path.lexists(file.parent / "dataset.toml"):
+        return InputError(f"'{spec}' is one file of a data set; accepted: its folder. Give {shlex.quote(str(file.parent))}.")
+    if file.name.lower().endswith(LOG_SUFFIXES):
+        return InputError(f"'{spec}' is a log, not a data set yet. Start with: {import_command(file)}")
+    return InputError(f"'{spec}' is a file; accepted: a registered name, or a folder with dataset.toml. A log: {import_command(file)}")
+
+
+def _logs_within(folder: Path) -> str:
+    """A hint where a folder holds logs."""
+    log = next((p for p in sorted(folder.iterdir()) if p.is_file() and p.name.lower().endswith(LOG_SUFFIXES)), None)
+    return "" if log is None else f" To make one of a log: {import_command(log)}"
 
 
 def _check_params(part: DatasetPart, params: dict[str, Any]) -> None:

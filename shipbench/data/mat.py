@@ -91,6 +91,20 @@ def write_mat(dataset: Dataset, path: str | Path) -> None:
     save_mat(Path(path), {"dataset": about, "runs": struct_array(runs)})
 
 
+def is_export(path: str | Path) -> bool:
+    """Whether a .mat file holds the variables of `write_mat`; also where it cannot be read, which `read_mat` explains."""
+    from scipy.io import whosmat
+
+    try:
+        with open_regular(path, ".mat file") as file:
+            check_matlab(file)
+            return {"dataset", "runs"} <= {name for name, _, _ in whosmat(file)}
+    except NotImplementedError:  # version 7.3, which scipy does not read, and `data import` does
+        return False
+    except Exception:  # the reader raises whatever a damaged file leads it to
+        return True
+
+
 def read_mat(path: str | Path) -> Dataset:
     """Read a file that `write_mat` wrote (or MATLAB in the same form, saved with -v7).
 

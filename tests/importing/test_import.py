@@ -389,7 +389,10 @@ def test_json_is_one_document_and_quiet_is_quiet(trial_import):
     assert result.stderr == ""
     assert document["runs"][0] == {"id": "log", "seconds": 120.0, "samples": 121, "file": "log.csv", "from": 0.0, "to": 120.0}
     assert document["table"] == "trajectories.csv"
-    assert trial_import(logged(T), None, "-q", "--force").output == ""
+    quiet = trial_import(logged(T), None, "-q", "--force")
+    assert quiet.stderr == ""
+    assert quiet.stdout.count("\n") == 3  # the data set, what was written, what to type next
+    assert "Written: out" in quiet.stdout
 
 
 def test_large_data_are_parquet(trial_import, monkeypatch):
