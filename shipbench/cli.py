@@ -23,6 +23,7 @@ from .cli_common import (
     parse_seeds,
     print_json,
     say,
+    say_wrapped,
     show_boards,
     show_table,
 )
