@@ -117,7 +117,7 @@ def _shares(first: Chosen, chosen: Chosen) -> str:
     return f"the heading departs from the integral of r by {plain:.1%} of its change as recorded, by {left:.1%} with it"
 
 
-def _lag(recording: Recording, made: tuple, first: Chosen, chosen: Chosen, lag: float, sd: float) -> list[Finding]:
+def _lag(recording: Recording, made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Chosen, lag: float, sd: float) -> list[Finding]:
     plain = _windows(recording, 0.0) or made
     if not least_lag(recording) <= abs(lag) <= 0.5 * made[2] or chosen.out > UNEXPLAINED * _explain(*plain, lag=False).out:
         return []
@@ -129,7 +129,7 @@ def _lag(recording: Recording, made: tuple, first: Chosen, chosen: Chosen, lag: 
     )]  # fmt: skip
 
 
-def _scale(made: tuple, first: Chosen, chosen: Chosen) -> list[Finding]:
+def _scale(made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Chosen) -> list[Finding]:
     if chosen.held.get("scale", 1.0) > UNEXPLAINED:
         return []
     factor, sd = 1.0 / (1.0 + float(chosen.value["scale"][0])), float(chosen.sd["scale"][0])
@@ -141,7 +141,7 @@ def _scale(made: tuple, first: Chosen, chosen: Chosen) -> list[Finding]:
     return [Finding("yaw", severity, "scale", text, line, channels=("r",), evidence={"factor": factor, "sd": sd}, picture=_picture(made, "scale"))]
 
 
-def _biases(recording: Recording, made: tuple, first: Chosen, chosen: Chosen) -> list[Finding]:
+def _biases(recording: Recording, made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Chosen) -> list[Finding]:
     """One bias for all runs where they agree, else those of the runs that stand out."""
     run, rows, span = made[0][::2], made[1][::2], made[2]  # drifts add up over windows that do not overlap
     known = sum((rows[:, 1 + i] * float(chosen.value[n][0]) for i, n in enumerate(("scale", "lag")) if n in chosen.names), np.zeros(len(run)))
