@@ -29,6 +29,7 @@ from .cli_common import (
 )
 from .errors import InputError, ShipbenchError
 from .names import file_name
+from .regular_files import check_output
 
 _GROUPS = {
     "Your data": ("demo", "data", "diagnose"),
@@ -199,6 +200,7 @@ def predict(
     from .bench.rollout import predict_runs, write_csv
     from .data.base import load_dataset
 
+    check_output(out, [model, dataset])
     predicted = predict_runs(model, load_dataset(dataset), horizon, device)
     write_csv(predicted, out)
     say(f"Written: {out} ({len(predicted)} runs)")

@@ -10,6 +10,7 @@ import typer
 
 from .cli_common import DatasetArgument, Full, Json, Quiet, print_json, say, screen_width
 from .names import file_name
+from .regular_files import make_folder
 
 
 def diagnose(
@@ -34,8 +35,10 @@ def diagnose(
     from .diagnosis.diagnose import diagnose as run
 
     data = load_dataset(dataset)
+    folder = out or Path("diagnoses") / file_name(Path(data.name).name)
+    make_folder(folder)
     found = replace(run(data, gain=gain, seed=seed, workers=workers, thorough=thorough, budget=Budget(seconds=cpu_limit)), spec=dataset)
-    written = write_diagnosis(found, out or Path("diagnoses") / file_name(Path(data.name).name))
+    written = write_diagnosis(found, folder)
     if as_json:
         print_json(found.document())
         return

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from .cli_common import Json, Quiet, print_json, say
+from .regular_files import check_output
 
 
 def report(
@@ -22,6 +23,8 @@ def report(
     from .bench.report.page import write_report
     from .bench.results import read_results
 
+    if out is not None:
+        check_output(out, [] if out.suffix == ".html" else results)
     written = write_report(read_results(results), out or results[0] / "report.html", str(ctx.obj), given=diagnosis or [])
     if as_json:
         print_json({"out": str(written.path), "bytes": written.size, "left_out": written.left_out})

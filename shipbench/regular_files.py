@@ -2,7 +2,7 @@
 
 A named pipe would wait for ever, a device such as /dev/zero never ends, and opening a device may set it in motion. Every reader of shipbench opens
 its files here: `open_regular` for readers that take an open file, `check_regular` for those that insist on a path, `read_text`, `read_json` and
-`read_npz` for files that are read whole.
+`read_npz` for files that are read whole. `check_output` keeps what is written from what is read.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import struct
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import IO, Any
 
@@ -149,6 +149,36 @@ def _check_array(packed: zipfile.ZipFile, part: zipfile.ZipInfo) -> None:
         raise ValueError(f"'{part.filename}' holds Python objects, which are not read")
     if any(n < 0 for n in shape) or int(np.prod(shape, dtype=object)) * dtype.itemsize > held:
         raise ValueError(f"'{part.filename}' declares the shape {shape}, which takes more than its {held} bytes")
+
+
+def check_output(path: Path, inputs: Iterable[str | Path] = (), option: str = "--out") -> None:
+    """Refuse to write a file over what the same command reads, or in the place of a device, a named pipe or a folder.
+
+    `inputs` are files, and folders whose files are not replaced; a link counts as what it leads to. A path where nothing is yet is accepted.
+
+    Raises:
+        InputError: as said.
+    """
+    if not path.exists():
+        return
+    if not path.is_file():
+        kind = next((name for name, is_it in _KINDS.items() if is_it(path.stat().st_mode)), "of another kind")
+        raise InputError(f"{option} {path} is {kind}; accepted: a new name, or a file to replace. Give another {option}.")
+    if any(path.resolve().is_relative_to(Path(given).resolve()) for given in inputs):
+        raise InputError(f"{option} {path} is there already, among the inputs of this command; it would be overwritten. Give another {option}.")
+
+
+def make_folder(path: Path, option: str = "--out") -> None:
+    """Make the folder of results and its parents, unless they are there.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = "it is a file" if path.is_file() else error.strerror
+        raise InputError(f"{option} {path} cannot be made: {reason}; accepted: a folder. Give another {option}.") from None
 
 
 def _size(found: os.stat_result, path: str | Path, what: str) -> int:

@@ -153,6 +153,29 @@ def test_predict_writes_the_states_of_a_saved_model(cli, toy_folder, tmp_path):
     assert table.query("trajectory == 'r03' and t == 0").iloc[0]["psi"] == pytest.approx(start["psi"], rel=1e-6)
 
 
+def test_no_command_writes_its_file_over_what_it_reads(cli, toy_folder, tmp_path):
+    folder = toy_folder()
+    cli("run", "-m", "hold", "-d", folder, *QUICK, "-q", "--out", "r")
+    model, log = Path("r/cells/toyset/hold/fold0-seed0/model"), folder / "trajectories.csv"
+    for command, read in (
+        (["predict", model, folder, "--out", log], log),
+        (["predict", model, folder, "--out", model / "model.json"], tmp_path / model / "model.json"),
+        (["report", "r", "--out", "r/rows.parquet"], tmp_path / "r/rows.parquet"),
+        (["data", "import", log, "--propose", log, "--force"], log),
+    ):
+        before = read.read_bytes()
+        result = cli(*command)
+        assert result.exit_code == 2 and "it would be overwritten" in result.stderr, command
+        assert read.read_bytes() == before
+
+
+def test_a_diagnosis_that_cannot_be_written_is_told_before_anything_is_fitted(cli, toy_folder, tmp_path, monkeypatch):
+    monkeypatch.setattr("shipbench.diagnosis.diagnose.diagnose", lambda *_, **__: pytest.fail("fitted"))
+    (tmp_path / "f").write_text("mine")
+    result = cli("diagnose", toy_folder(), "--out", "f")
+    assert result.exit_code == 2 and "--out f cannot be made: it is a file; accepted: a folder." in result.stderr
+
+
 def test_models_lists_names_and_parameters(cli):
     parts = {p["name"]: p for p in json.loads(cli("models", "--json").stdout)}
     assert {"hold", "physics", "mlp", "lstm", "oracle"} <= set(parts)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shipbench.errors import InputError
-from shipbench.regular_files import check_regular, open_regular, read_bytes, read_json, read_npz, read_text
+from shipbench.regular_files import check_output, check_regular, make_folder, open_regular, read_bytes, read_json, read_npz, read_text
 
 
 def special(kind: str, folder: Path) -> Path:
@@ -146,3 +146,32 @@ def test_arrays_beyond_the_limit_and_objects_are_refused(tmp_path):
     (tmp_path / "z.npz").write_bytes(path.read_bytes()[:200])
     with pytest.raises(InputError, match="cannot be read"):
         read_npz(tmp_path / "z.npz")
+
+
+def test_what_is_written_never_replaces_what_is_read(tmp_path):
+    (tmp_path / "set").mkdir()
+    for name in ("log.csv", "old.csv", "set/trajectories.csv"):
+        (tmp_path / name).write_text("precious")
+    (tmp_path / "link.csv").symlink_to("log.csv")
+    inputs = [tmp_path / "log.csv", tmp_path / "set"]
+    for accepted in ("new.csv", "old.csv", "set/new.csv", "nowhere/new.csv"):
+        check_output(tmp_path / accepted, inputs)
+    for name in ("log.csv", "link.csv", "set/trajectories.csv", "set/../log.csv"):
+        with pytest.raises(InputError, match=r"among the inputs of this command; it would be overwritten\. Give another --out\."):
+            check_output(tmp_path / name, inputs)
+
+
+def test_a_device_pipe_or_folder_is_not_replaced_by_a_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path, kind in ((tmp_path / "pipe", "a named pipe"), (Path("/dev/null"), "a device"), (tmp_path, "a folder")):
+        with pytest.raises(InputError, match=f"is {kind}; accepted: a new name, or a file to replace"):
+            check_output(path)
+
+
+def test_a_folder_is_made_or_the_reason_said(tmp_path):
+    make_folder(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b").is_dir()
+    (tmp_path / "f").write_text("precious")
+    for name in ("f", "f/g"):
+        with pytest.raises(InputError, match="cannot be made: .*; accepted: a folder"):
+            make_folder(tmp_path / name)

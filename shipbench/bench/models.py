@@ -50,7 +50,7 @@ def facts_of(spec: Spec) -> ModelFacts:
     packages = sorted({package for registry, name in taken if (package := registry.package(name))})
     foreign = bool(packages) or spec.class_name is not None
     if foreign:
-        made, unanswered = call_isolated(_made, (spec,))
+        made, unanswered = call_isolated(_made_alone, (spec,))
         if unanswered:
             raise InputError(f"model '{spec.text}' cannot be made: {unanswered}. Correct its file.")
     else:
@@ -70,6 +70,14 @@ def _kind(spec: Spec) -> str:
     if spec.path is None:
         return spec.name.partition(":")[0]
     return str(read_meta(spec.path)["predictor"])
+
+
+def _made_alone(spec: Spec) -> tuple[bool, bool, dict[str, bytes], Origin | None] | ShipbenchError:
+    """`_made` in a process of its own, where nobody presses Ctrl-C: whatever is raised is the model's."""
+    try:
+        return _made(spec)
+    except BaseException as error:
+        return InputError(f"model '{spec.text}' cannot be made: {reason(error)}. Correct its file.")
 
 
 def _made(spec: Spec) -> tuple[bool, bool, dict[str, bytes], Origin | None] | ShipbenchError:

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 from ..errors import InputError
 from ..records import Dataset
+from ..regular_files import check_output
 from .files import write_dataset
 from .mat import write_mat
 
@@ -29,7 +30,9 @@ def check_format(format: str | None, out: Path, source: str) -> Format:
         if chosen == known:
             if is_mat_file and known != "mat":
                 raise InputError(f"--out {out} is a .mat file, --format is {known}; accepted: a folder for csv and parquet, or --format mat.")
-            if out.resolve() == Path(source).resolve() and Path(source).exists():
+            if is_mat_file:
+                check_output(out, [source])
+            elif out.resolve() == Path(source).resolve() and Path(source).exists():
                 raise InputError(f"--out {out} is what is exported; it would be overwritten. Give another place.")
             return known
     raise InputError(f"--format {chosen}; accepted: {accepted}.")

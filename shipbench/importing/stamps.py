@@ -73,7 +73,7 @@ def parsed(texts: pa.Array, clock: Clock, accepted: tuple[str, ...], where: str,
             stamps = pd.to_datetime(values, format="ISO8601", utc=zoned) if iso else _by_pattern(values, clock.format, zoned)
     except (ValueError, OverflowError) as error:
         first = next((v for v in values if isinstance(v, str)), "")
-        reason = " ".join(str(error).split())[:140]
+        reason = re.split(r"\. You might|, at position|\n", str(error))[0][:140]  # pandas goes on with advice on its own options
         raise InputError(
             f"{where}: a time stamp is not of the format '{clock.format}' (the first is '{first[:60]}'): {reason}. Accepted: {', '.join(accepted)}."
         ) from None

@@ -57,7 +57,8 @@ def on_import_path(file: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        sys.path.remove(folder)
+        if folder in sys.path:  # the model may have changed it
+            sys.path.remove(folder)
 
 
 def code_of(path: Path) -> dict[str, bytes]:

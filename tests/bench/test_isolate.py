@@ -179,6 +179,23 @@ def test_code_that_the_key_does_not_cover_is_told_and_run_again(helped):
     assert not np.allclose(run(resume=True).rows["ed"], outcome.rows["ed"])
 
 
+@pytest.mark.parametrize("raised", ["KeyboardInterrupt", "GeneratorExit", "SystemExit(0)"])
+def test_a_model_that_cannot_be_made_is_one_message_whatever_it_raises(study, raised, capfd):
+    Path("models.py").write_text(f"class Plain:\n    def __init__(self):\n        raise {raised}\n")
+    with pytest.raises(InputError, match=rf"models.py:Plain' cannot be made: {raised.partition('(')[0]}: ?\d?\. Correct its file"):
+        study("Plain")
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_a_model_that_empties_the_import_path_or_raises_in_del_keeps_its_rows(study, capfd):
+    Path("models.py").write_text(
+        MODELS + "class Empties(Plain):\n    def fit(self, *a, **k):\n        sys.path.clear()\n        return self\n"
+        "    def __del__(self):\n        raise BaseException('mine')\n"
+    )
+    assert set(study("Empties").rows["status"]) == {"ok"}
+    assert "Traceback" not in capfd.readouterr().err
+
+
 def test_a_process_that_cannot_answer_is_one_message(study):
     Path("models.py").write_text("import os; os._exit(3)")
     with pytest.raises(InputError, match=r"models.py:Plain' cannot be made: its process ended with exit code 3"):

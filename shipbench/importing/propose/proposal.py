@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
+from ...regular_files import check_output
 from ..mapping import SOURCE_KEYS
 from ..writer import run_name
 from .columns import read_samples
@@ -33,12 +34,13 @@ def write_proposal(
         partial: a mapping that says a part; what it says is kept.
 
     Raises:
-        InputError: a log cannot be read, or `path` is there already and `force` is not set.
+        InputError: a log cannot be read, or `path` is there already and `force` is not set, or is one of the logs.
     """
     if path.exists() and not force:
         raise InputError(f"{path} is there already. Give --propose another name, or --force to replace it.")
     if partial is not None and path.exists() and partial.resolve() == path.resolve():
         raise InputError(f"--propose and --map are both {path}; accepted: two files. Give --propose another name.")
+    check_output(path, logs, "--propose")
     known = read_partial(partial) if partial is not None else {}
     sources, notes = _sources(logs, known, file or {})
     top, split = _top(sources, known, logs[0])
