@@ -165,7 +165,8 @@ def test_no_command_writes_its_file_over_what_it_reads(cli, toy_folder, tmp_path
     ):
         before = read.read_bytes()
         result = cli(*command)
-        assert result.exit_code == 2 and "it would be overwritten" in result.stderr, command
+        assert result.exit_code == 2, command
+        assert "it would be overwritten" in result.stderr
         assert read.read_bytes() == before
 
 
@@ -173,7 +174,8 @@ def test_a_diagnosis_that_cannot_be_written_is_told_before_anything_is_fitted(cl
     monkeypatch.setattr("shipbench.diagnosis.diagnose.diagnose", lambda *_, **__: pytest.fail("fitted"))
     (tmp_path / "f").write_text("mine")
     result = cli("diagnose", toy_folder(), "--out", "f")
-    assert result.exit_code == 2 and "--out f cannot be made: it is a file; accepted: a folder." in result.stderr
+    assert result.exit_code == 2
+    assert "--out f cannot be made: it is a file; accepted: a folder." in result.stderr
 
 
 def test_models_lists_names_and_parameters(cli):

@@ -173,5 +173,5 @@ def test_a_folder_is_made_or_the_reason_said(tmp_path):
     assert (tmp_path / "a" / "b").is_dir()
     (tmp_path / "f").write_text("precious")
     for name in ("f", "f/g"):
-        with pytest.raises(InputError, match="cannot be made: .*; accepted: a folder"):
+        with pytest.raises(InputError, match=r"cannot be made: .*; accepted: a folder"):
             make_folder(tmp_path / name)
