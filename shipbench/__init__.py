@@ -6,6 +6,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .api import benchmark, check_data, diagnose, import_log, propose_mapping, report
     from .bench.leaderboard import build_board, write_boards
     from .bench.results import read_results
     from .bench.runner import run_tasks
@@ -16,12 +17,14 @@ if TYPE_CHECKING:
     from .metrics.base import METRICS
     from .predictors.base import PREDICTORS, Predictor, PredictorBase, make_predictor
     from .records import Batch, Dataset, Run
+    from .scores import Scores
     from .ship import Ship
     from .specs import parse_spec
 
     __version__: str
 
 _HOME = {
+    "benchmark": "api", "check_data": "api", "diagnose": "api", "import_log": "api", "propose_mapping": "api", "report": "api", "Scores": "scores",
     "build_board": "bench.leaderboard", "write_boards": "bench.leaderboard", "read_results": "bench.results",
     "run_tasks": "bench.runner", "Task": "bench.task", "load_tasks": "bench.task", "check_model": "contract.check",
     "DATASETS": "data.base", "load_dataset": "data.base",
@@ -32,9 +35,9 @@ _HOME = {
 }  # fmt: skip
 
 __all__ = [
-    "DATASETS", "METRICS", "PREDICTORS", "Batch", "Dataset", "InputError", "Predictor", "PredictorBase", "Run", "Ship", "ShipbenchError",
-    "Task", "WorkError", "__version__", "build_board", "check_model", "load_dataset", "load_tasks", "make_predictor", "parse_spec", "read_results",
-    "run_tasks", "write_boards",
+    "DATASETS", "METRICS", "PREDICTORS", "Batch", "Dataset", "InputError", "Predictor", "PredictorBase", "Run", "Scores", "Ship",
+    "ShipbenchError", "Task", "WorkError", "__version__", "benchmark", "build_board", "check_data", "check_model", "diagnose", "import_log",
+    "load_dataset", "load_tasks", "make_predictor", "parse_spec", "propose_mapping", "read_results", "report", "run_tasks", "write_boards",
 ]  # fmt: skip
 
 

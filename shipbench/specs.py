@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ _PARAMS = r"\[(?:[^\[\]]|\[[^\[\]]*\])*\]"
 """A bracket, which may hold lists: [hidden_layer_sizes=[20,20],max_iter=30]."""
 _ITEM = re.compile(r"(?:[^,\[\]()]|\[[^\[\]]*\]|\([^()]*\))+")
 """What stands between two commas of a bracket; a list in brackets or parentheses holds commas of its own."""
+_LONGEST_TOLD = 200
+"""Characters of the values in the label of a model in memory."""
 _TAIL = rf"(?P<tail>(\+[^\[\]+]+({_PARAMS})?)*)"
 _FILE = re.compile(rf"(?P<base>[^\[\]]+\.py:\w+)(?P<params>{_PARAMS})?{_TAIL}")
 _NAME = re.compile(rf"(?P<base>[^\[\]+]+)(?P<params>{_PARAMS})?{_TAIL}")
@@ -30,7 +33,10 @@ class EffectSpec:
 
 @dataclass(frozen=True)
 class Spec:
-    """A model spec taken apart: `physics+current[..]` -> name "physics", effects (EffectSpec("current", {..}),)."""
+    """A model spec taken apart: `physics+current[..]` -> name "physics", effects (EffectSpec("current", {..}),).
+
+    given: the class or object of a model in memory, which `name` and `text` only label.
+    """
 
     text: str
     name: str
@@ -38,6 +44,7 @@ class Spec:
     effects: tuple[EffectSpec, ...] = ()
     path: Path | None = None
     class_name: str | None = None
+    given: Any = None
 
     @property
     def seeds(self) -> list[int] | None:
@@ -93,3 +100,40 @@ def parse_spec(text: str) -> Spec:
     if Path(base, "model.json").is_file():
         return Spec(text, base, params, effects, path=Path(base))
     return Spec(text, base.strip(), params, effects)
+
+
+def spec_of(model: Any, label: str = "") -> Spec:
+    """The spec of a model: text as `parse_spec` takes it, a path, a Spec, or a class or object in memory with `fit` and `predict`.
+
+    Args:
+        label: name of a model in memory; default its class with what differs from its defaults, `MyNet[hidden=64]`.
+
+    Raises:
+        InputError: it is none of these.
+    """
+    if isinstance(model, Spec):
+        return model
+    if isinstance(model, str | os.PathLike):
+        return parse_spec(os.fspath(model))
+    if lacking := [method for method in ("fit", "predict") if not callable(getattr(model, method, None))]:
+        raise InputError(
+            f"the model {_class_name(model)} has no method {' and no '.join(lacking)}. Accepted: a spec such as 'physics', or a class or object with "
+            "fit(train, valid=None, *, seed=0) and predict(s0, U, history=None)."
+        )
+    text = label or _label(model)
+    return Spec(text, text, {}, given=model)
+
+
+def _class_name(model: Any) -> str:
+    return (model if isinstance(model, type) else type(model)).__name__
+
+
+def _label(model: Any) -> str:
+    """Class of a model, and those fields of a dataclass that differ from their defaults."""
+    name = _class_name(model)
+    if isinstance(model, type) or not is_dataclass(model):
+        return name
+    changed = [(f.name, getattr(model, f.name, f.default)) for f in fields(model) if f.init and f.repr]
+    defaults = {f.name: f.default for f in fields(model)}
+    told = [f"{key}={value}" for key, value in changed if isinstance(value, bool | int | float | str) and value != defaults[key]]
+    return name + (f"[{','.join(told)}]" if told and len(",".join(told)) <= _LONGEST_TOLD else "")

@@ -1,9 +1,12 @@
-"""The Python interface: data sets as sequences, in frames and in notebooks."""
+"""The Python interface: data sets as sequences, in frames and in notebooks; models in memory; scores."""
 
 from __future__ import annotations
 
+import gc
 import re
-from dataclasses import replace
+import subprocess
+import sys
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +16,40 @@ import shipbench as sb
 from shipbench.errors import InputError
 
 ROOT = Path(__file__).parent.parent
+OPTIONS = {"horizon": 40, "folds": 2, "quiet": True}
+
+
+@dataclass
+class Drift:
+    """Keeps its velocity, scaled; counts how often it was fitted."""
+
+    scale: float = 1.0
+    fits: int = 0
+
+    def fit(self, train, valid=None, *, seed=0):
+        self.fits += 1
+        if self.fits > 1:
+            raise RuntimeError("fitted twice")
+        self.dt = train.dt
+        return self
+
+    def predict(self, s0, U, history=None):
+        S = np.repeat(s0[:, None], U.shape[1], axis=1)
+        psi, u, v = s0[:, 2, None], s0[:, 3, None] * self.scale, s0[:, 4, None] * self.scale
+        t = self.dt * np.arange(1, U.shape[1] + 1)
+        S[:, :, 0] += t * (u * np.cos(psi) - v * np.sin(psi))
+        S[:, :, 1] += t * (u * np.sin(psi) + v * np.cos(psi))
+        return S
+
+
+class Broken(Drift):
+    def fit(self, train, valid=None, *, seed=0):
+        raise ValueError("out of luck")
+
+
+@pytest.fixture(scope="module")
+def scores(harbour) -> sb.Scores:
+    return sb.benchmark([Drift(0.5), Drift, "hold", Broken], harbour, **OPTIONS)
 
 
 def test_a_data_set_is_a_sequence_of_runs(harbour):
@@ -93,3 +130,120 @@ def test_a_data_set_shows_a_paragraph_and_a_picture(harbour):
 
 def test_the_package_says_that_it_is_typed():
     assert (ROOT / "shipbench/py.typed").is_file()
+
+
+def test_models_in_memory_stand_in_the_table_beside_others(scores):
+    table = scores.table().set_index("model")
+    assert set(table.index) == {"Drift[scale=0.5]", "Drift", "hold", "Broken"}
+    assert table.index[-1] == "Broken"
+    assert table.loc["Drift", "scored"] == "16/16"
+    assert table.loc["Broken", "scored"] == "0/16"
+    assert table.loc["Drift", "ED"] < table.loc["Drift[scale=0.5]", "ED"]
+    assert (table["ED low"] < table["ED"])[:3].all()
+    assert (table["ED"] < table["ED high"])[:3].all()
+    rows = scores.results.rows
+    assert table.loc["hold", "ED"] == pytest.approx(rows[rows["model"] == "hold"].groupby("fold")["ed"].mean().mean())
+    assert scores.table().attrs["units"]["ED"] == "m"
+    assert list(scores.table("rmse_r").columns) == ["model", "scored", "RMSE r", "RMSE r low", "RMSE r high"]
+    with pytest.raises(InputError, match="unknown metric 'eed'"):
+        scores.table(["eed"])
+
+
+def test_scores_tell_of_fits_that_failed(scores):
+    assert len(scores.failed) == 2
+    for text in (repr(scores), scores._repr_html_()):
+        assert "fit: ValueError: out of luck" in text
+    assert repr(scores).splitlines()[1].startswith("  hold: ")
+
+
+def test_scores_draw_and_write_a_page(scores, tmp_path):
+    axes = scores.plot_tracks("run7").axes
+    assert [axis.get_title() for axis in axes] == ["run7"]
+    assert len(scores.plot_tracks().axes) == 3
+    for figure in (scores.plot_errors(), scores.plot_growth()):
+        assert figure._repr_png_().startswith(b"\x89PNG")
+    page = scores.report(tmp_path / "page.html")
+    assert "Drift[scale=0.5]" in page.read_text()
+    with pytest.raises(InputError, match="unknown run 'run77'"):
+        scores.plot_tracks("run77")
+    with pytest.raises(InputError, match="unknown data set 'other'"):
+        scores.plot_errors("other")
+
+
+def test_results_are_kept_where_out_says_and_else_as_long_as_the_scores(harbour, tmp_path):
+    kept = sb.benchmark(Drift, [harbour], out=tmp_path / "mine", **OPTIONS)
+    assert repr(sb.Scores(sb.read_results(str(tmp_path / "mine")))) == repr(kept)
+    assert sb.report(tmp_path / "mine", tmp_path / "page.html").stat().st_size > 10_000
+    passing = sb.benchmark({"mine": Drift()}, harbour, **OPTIONS)
+    assert passing.table()["model"].tolist() == ["mine"]
+    [folder] = set(passing.results.sources)
+    assert folder.is_dir()
+    del passing
+    gc.collect()
+    assert not folder.exists()
+
+
+def test_cells_of_a_model_in_memory_are_never_taken_for_finished(harbour, tmp_path):
+    found = sb.benchmark(Drift, harbour, out=tmp_path, **OPTIONS)
+    assert {summary["key"] for summary in found.results.summaries} == {""}
+
+
+def test_a_data_set_by_folder_and_several_at_once(harbour, tmp_path):
+    from shipbench.data.files import write_dataset
+
+    write_dataset(replace(harbour, name="other"), tmp_path / "other")
+    found = sb.benchmark("hold", (harbour, tmp_path / "other"), **OPTIONS)
+    assert found.datasets == ["small_harbour", "other"]
+    table = found.table()
+    assert table["dataset"].tolist() == ["small_harbour", "other"]
+    assert table["ED"].iloc[0] == table["ED"].iloc[1]
+
+
+class NeedsSize(Drift):
+    def __init__(self, size):
+        self.size = size
+
+
+@pytest.mark.parametrize(
+    ("models", "options", "message"),
+    [
+        (Drift, {"executor": "processes"}, "runs in this process only; executor 'processes' needs a class that can be imported"),
+        (np.eye(3), {}, "the model ndarray has no method fit and no predict"),
+        (NeedsSize, {}, "Give an object, such as MyNet(hidden=64)"),
+        ("hodl", {}, "Did you mean 'hold'"),
+        ({"mine": "hold"}, {}, "'mine' names a spec, which is its own name"),
+        ([], {}, "no model is given"),
+        ("hold", {"hurry": True}, "unknown key 'hurry'"),
+        ("hold", {"horizon": 400}, "Shorten the horizon"),
+    ],
+)
+def test_what_cannot_be_scored_is_refused(harbour, models, options, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        sb.benchmark(models, harbour, **OPTIONS | options)
+
+
+def test_a_predictor_is_made_of_text_a_class_or_an_object(harbour):
+    assert sb.make_predictor("physics+current").name == "physics"
+    assert isinstance(sb.make_predictor(Drift), Drift)
+    mine = Drift(0.5)
+    copied = sb.make_predictor(mine).fit(harbour)
+    assert (copied.scale, mine.fits) == (0.5, 0)
+
+
+def test_a_script_without_a_guard_may_use_processes(tmp_path):
+    script = tmp_path / "script.py"
+    lines = [
+        "from shipbench.processes import process_pool",
+        "print('begun')",
+        "with process_pool(2) as pool:",
+        "    print(pool.submit(abs, -7).result())",
+    ]
+    script.write_text("\n".join(lines))
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.returncode) == ("begun\n7\n", 0), done.stderr
+
+
+def test_a_folder_of_results_does_not_hide_the_data_set_of_its_name(tmp_path, monkeypatch):
+    (tmp_path / "demo").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert sb.load_dataset("demo").name == "demo"

@@ -5,10 +5,9 @@ from __future__ import annotations
 import inspect
 import json
 import math
-import multiprocessing
 import traceback
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +18,7 @@ from threadpoolctl import threadpool_limits
 from ..diagnosis.cases import KINDS, Case, count, draw_case
 from ..diagnosis.outcome import Diagnosis
 from ..errors import InputError, ShipbenchError, WorkError, unknown_name
+from ..processes import process_pool
 from ..records import Dataset
 from ..simulate.trials import Trials
 from .progress import Progress, Silent
@@ -160,7 +160,7 @@ def run_suite(
 
 def _in_processes(jobs: Sequence[Job], workers: int, keep: Callable[[Job, dict[str, Any]], None]) -> None:
     try:
-        with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        with process_pool(workers) as pool:
             waiting = {pool.submit(run_case, job): job for job in jobs}
             try:
                 for future in as_completed(waiting):

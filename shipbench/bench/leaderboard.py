@@ -65,20 +65,23 @@ def build_board(results: Results, dataset: str, baseline: str | None = None) -> 
     Raises:
         InputError: the rows are of different protocols, data (fingerprints) or tasks, which are never ranked together; or there is no such baseline.
     """
-    summaries = [s for s in results.summaries if s["dataset"] == dataset]
-    rows = results.rows[results.rows["dataset"] == dataset]
-    _refuse_mixtures(rows, summaries, dataset)
-    return _board(scores_of(results, dataset, baseline), summaries)
+    return _board(scores_of(results, dataset, baseline), [s for s in results.summaries if s["dataset"] == dataset])
 
 
 def scores_of(results: Results, dataset: str, baseline: str | None = None) -> Scores:
-    """The rows of `dataset` with what its tables are made from."""
+    """The rows of `dataset` with what its tables are made from.
+
+    Raises:
+        InputError: as `build_board`.
+    """
     rows = results.rows[results.rows["dataset"] == dataset]
-    columns = {c["name"]: c for s in results.summaries if s["dataset"] == dataset for c in s["columns"]}
+    summaries = [s for s in results.summaries if s["dataset"] == dataset]
+    _refuse_mixtures(rows, summaries, dataset)
+    columns = {c["name"]: c for s in summaries for c in s["columns"]}
     windows = results.windows
     if windows is not None:
         windows = windows[(windows["dataset"] == dataset) & windows["fingerprint"].isin(rows["fingerprint"]) & windows["task"].isin(rows["task"])]
-    tasks = [s["task"] for s in results.summaries if s["dataset"] == dataset]
+    tasks = [s["task"] for s in summaries]
     beside_paper = dataset == board_tables.PAPER_DATASET and all(t["split"] == "folds" and not t.get("train_runs") for t in tasks)
     return Scores(dataset, rows.assign(cluster=cluster_of(rows)), columns, windows, baseline, beside_paper)
 

@@ -64,8 +64,8 @@ def facts_of(spec: Spec) -> ModelFacts:
 
 
 def _kind(spec: Spec) -> str:
-    """The registered predictor behind a spec, "" for a model file."""
-    if spec.class_name is not None:
+    """The registered predictor behind a spec, "" for a model file and for a model in memory."""
+    if spec.class_name is not None or spec.given is not None:
         return ""
     if spec.path is None:
         return spec.name.partition(":")[0]

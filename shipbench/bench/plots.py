@@ -106,15 +106,22 @@ def save(figure: Figure, path: Path) -> Path:
     return path
 
 
-def draw_all(results: Results, dataset: str, ranking: Sequence[str], folder: Path, tell: Callable[[str], None] = lambda line: None) -> list[Path]:
-    """Draw every plot of a data set into `folder`. Models without a single scored run are left out, and those without saved predictions, of which
-    `tell` gets one line."""
+def drawable(results: Results, dataset: str, ranking: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Models with a scored run: those with saved predictions, and those without."""
     rows = results.rows[results.rows["dataset"] == dataset]
     scored = set(rows.loc[rows["status"] == "ok", "model"])
     models: list[str] = []
     without: list[str] = []
     for model in (m for m in ranking if m in scored):
         (models if _readable(results, dataset, model) else without).append(model)
+    return models, without
+
+
+def draw_all(results: Results, dataset: str, ranking: Sequence[str], folder: Path, tell: Callable[[str], None] = lambda line: None) -> list[Path]:
+    """Draw every plot of a data set into `folder`. Models without a single scored run are left out, and those without saved predictions, of which
+    `tell` gets one line."""
+    rows = results.rows[results.rows["dataset"] == dataset]
+    models, without = drawable(results, dataset, ranking)
     if without:
         what = f"plots without {', '.join(without[:5])}{' and others' if len(without) > 5 else ''}" if models else "no plots"
         tell(f"{what}: no saved predictions. Give the folder that `shipbench run` wrote, whole, or --no-plots.")
@@ -144,12 +151,12 @@ def outline(x: float, y: float, psi: float, L: float, B: float) -> np.ndarray:
     return np.stack([y + ahead * np.sin(psi) + starboard * np.cos(psi), x + ahead * np.cos(psi) - starboard * np.sin(psi)], axis=1)
 
 
-def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[str, Any]) -> Figure:
-    """Tracks of a good, a median and a bad run; the true ship every quarter of the horizon, the predicted ones at its end."""
+def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[str, Any], runs: Sequence[str] = ()) -> Figure:
+    """Tracks of `runs`, or of a good, a median and a bad one; the true ship every quarter of the horizon, the predicted ones at its end."""
     rows = results.rows[results.rows["dataset"] == dataset]
-    chosen = choose_runs(rows, models)
-    figure = new_figure(15.0, 6.2)
-    axes = figure.subplots(1, 3)
+    chosen = {plain(run): run for run in runs} or {f"{name} run: {plain(run)}": run for name, run in choose_runs(rows, models).items()}
+    figure = new_figure(5.0 * len(chosen), 6.2)
+    axes = np.atleast_1d(figure.subplots(1, len(chosen)))
     styles = style(models)
     for model in reversed(models):  # the best on top
         for cell in _predictions(results, dataset, model):
@@ -158,9 +165,9 @@ def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[
                     i = cell.ids.index(run)
                     _track(axis, cell.s0[i], cell.truth[i], summary, label="true", color="black", linestyle="-", fill=True)
                     _track(axis, cell.s0[i], cell.S[i], summary, label=model, **styles[model])
-    for axis, (name, run) in zip(axes, chosen.items(), strict=True):
+    for axis, (title, run) in zip(axes, chosen.items(), strict=True):
         error = rows[(rows["run"] == run) & (rows["status"] == "ok")].groupby("model")["ed"].mean()
-        axis.set_title(f"{name} run: {plain(run)}", fontsize=11)
+        axis.set_title(title, fontsize=11)
         axis.set_xlabel("east y [m]")
         axis.set_ylabel("north x [m]")
         axis.set_aspect("equal", adjustable="datalim")
@@ -171,9 +178,8 @@ def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[
         order = ["true", *[m for m in models if m in handles]]
         texts = ["true", *[f"{short_name(m)} (ED {error[m]:.3g} m)" for m in order[1:]]]
         axis.legend([handles[m] for m in order], texts, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
-    figure.suptitle(
-        f"{plain(dataset)}: tracks over {summary['task']['horizon_s']:g} s; the true ship every quarter, the predicted ones at the end", fontsize=12
-    )
+    about = f"{plain(dataset)}: tracks over {summary['task']['horizon_s']:g} s"
+    figure.suptitle(f"{about}; the true ship every quarter, the predicted ones at the end" if len(chosen) > 1 else about, fontsize=12)
     return figure
 
 

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..names import file_name
+from ..names import brief, file_name
 from ..records import Batch
 from ..regular_files import open_regular, read_json, read_npz
 from ..signals import COMMANDS, STATES
@@ -258,6 +258,10 @@ class Results:
     summaries: list[dict[str, Any]]
     sources: list[Path]
 
+    def __repr__(self) -> str:
+        models, sets = ({s[key]: None for s in self.summaries} for key in ("model", "dataset"))
+        return brief(f"<Results: {len(self.rows)} rows, {len(self.summaries)} fits of {', '.join(models)} on {', '.join(sets)}>")
+
     @cached_property
     def windows(self) -> Frame | None:
         """What the true ship does in every scored window, from all folders that tell; None where none does."""
@@ -269,8 +273,8 @@ class Results:
         return pd.concat(found, ignore_index=True).drop_duplicates(keys, ignore_index=True) if found else None
 
 
-def read_results(folders: Sequence[str | Path]) -> Results:
-    """Read the result folders of `shipbench run`.
+def read_results(folders: str | Path | Sequence[str | Path]) -> Results:
+    """Read one or several result folders of `shipbench run`.
 
     Raises:
         InputError: a folder holds no results, they contradict themselves or one another (see `submissions`), or the same cell stands in two of
@@ -281,6 +285,7 @@ def read_results(folders: Sequence[str | Path]) -> Results:
     from .submissions import check_submission, check_together
 
     frames, summaries, sources = [], [], []
+    folders = [folders] if isinstance(folders, str | Path) else folders
     for folder in map(Path, folders):
         if missing := [name for name in ("rows.parquet", "summary.json") if not (folder / name).exists()]:
             raise InputError(f"{folder} holds no results: it has no {' and no '.join(missing)}. Give a folder that `shipbench run --out` wrote.")

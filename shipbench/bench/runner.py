@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 from ..data.base import load_dataset
 from ..errors import InputError
 from ..predictors._saved import check_origin
+from ..records import Dataset
 from ..specs import Spec, parse_spec
 from .executors import Execution, Workers, answers_of, open_workers
 from .folds import make_folds, select_runs
@@ -28,6 +29,14 @@ from .scoring import columns, divergence, measure
 from .study_folder import claimed
 from .task import Task
 from .work import Answer, digests
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Data sets and models in memory, by the names that tasks give them."""
+
+    data: Mapping[str, Dataset] = field(default_factory=dict)
+    models: Mapping[str, Spec] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +62,7 @@ def run_tasks(
     execution: Execution | None = None,
     progress: Progress | None = None,
     command: str = "",
+    memory: Memory | None = None,
 ) -> Outcome:
     """Run every task and write the results below `out` (see `results`).
 
@@ -63,13 +73,15 @@ def run_tasks(
         execution: where the cells run and what each may use; it changes no number (a GPU rounds otherwise than a CPU).
         progress: told of every cell.
         command: the command line, kept in the results.
+        memory: data sets and models that are no files, by the names that the tasks give them.
 
     Raises:
         InputError: a task, data set, model, folder or executor cannot be used. Nothing has been fitted then.
         WorkError: the study had to stop (disk full, workers lost). What is finished is kept.
     """
     out, progress, execution = Path(out), progress or Silent(), execution or Execution()
-    studies = [_prepare(task) for task in tasks]
+    studies = [_prepare(task, memory or Memory()) for task in tasks]
+    _refuse_elsewhere(studies, execution)
     _refuse_same_names([study.data.name for study in studies])
     parts = [part for study in studies for part in study.parts()]
     began = datetime.now(UTC)
@@ -102,18 +114,29 @@ def run_tasks(
 
 def check_task(task: Task) -> None:
     """Raise what `run_tasks` would raise before it fits anything."""
-    _prepare(task)
+    _prepare(task, Memory())
 
 
-def _prepare(task: Task) -> Study:
-    specs = [parse_spec(text) for text in task.models]
+def _prepare(task: Task, memory: Memory) -> Study:
+    specs = [memory.models[text] if text in memory.models else parse_spec(text) for text in task.models]
     facts = [facts_of(spec) for spec in specs]  # an unknown model or parameter is told before anything is loaded or fitted
-    data, notes = select_runs(load_dataset(task.dataset), task)
+    data, notes = select_runs(memory.data.get(task.dataset) or load_dataset(task.dataset), task)
     notes += tuple(note for spec, known in zip(specs, facts, strict=True) for note in check_origin(spec.text, known.origin, data))
     folds = make_folds(data, task)
     batches = [fold.test.batch(task.history(data.dt)) for fold in folds]
     found = [asdict(c) for c in columns(task.metrics, task.horizon_s, data.dt)]
     return Study(task, data, folds, batches, specs, facts, (*data.notes, *notes), found)
+
+
+def _refuse_elsewhere(studies: Sequence[Study], execution: Execution) -> None:
+    """Models in memory are here and nowhere else."""
+    here = [spec.text for study in studies for spec in study.specs if spec.given is not None]
+    if here and (execution.executor != "local" or execution.limits):
+        how = f"executor '{execution.executor}'" if execution.executor != "local" else "a limit of time or memory"
+        raise InputError(
+            f"model '{here[0]}' is an object in memory and runs in this process only; {how} needs a class that can be imported. "
+            "Save it in a file and give 'my_model.py:MyNet'."
+        )
 
 
 def _refuse_same_names(names: list[str]) -> None:
@@ -153,6 +176,8 @@ def _answers(parts: Sequence[Part], workers: Workers, progress: Progress, how: E
 def _identity(part: Part, key: str, answer: Answer) -> dict[str, Any]:
     """The cell's key and the digests of the user's code behind it; no key where the model loaded code that the key does not cover."""
     identity: dict[str, Any] = {"key": key, "model_code": {name: digest[:16] for name, digest in digests(part.facts.files).items()}}
+    if part.spec.given is not None:
+        return identity | {"key": "", "key_note": "the model was an object in memory; --resume runs this cell again"}
     if unknown := part.uncovered(answer):
         more = f"the model loaded {', '.join(unknown[:3])} while it ran; --resume cannot tell whether that changes, and runs this cell again"
         identity |= {"key": "", "key_note": more}

@@ -58,7 +58,7 @@ def public_folder(name: str) -> Path:
     return cache_folder() / "public" / file_name(name)
 
 
-def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
+def load_dataset(spec: str | os.PathLike[str], *, remake: bool = False, **options: Any) -> Dataset:
     """A data set by registered name, `name[key=value]`, or the path of a folder in the contract's format (or of a .mat file that was exported).
 
     Args:
@@ -72,6 +72,7 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
     from .files import read_dataset  # pandas is loaded for reading and writing, not for the list
     from .mat import is_export, read_mat
 
+    spec = os.fspath(spec)
     folder = Path(spec)
     exported = folder.suffix == ".mat" and os.path.lexists(folder) and not folder.is_dir()
     if folder.is_file() and not (exported and is_export(folder)):
@@ -80,7 +81,7 @@ def load_dataset(spec: str, *, remake: bool = False, **options: Any) -> Dataset:
         if options:
             raise InputError(f"{folder} is read from files and takes no parameters; given: {', '.join(options)}.")
         return read_mat(folder) if exported else read_dataset(folder)
-    if folder.is_dir():
+    if folder.is_dir() and spec not in DATASETS:  # `shipbench demo` makes a folder of results with the name of a data set
         files = "trajectories.csv (or .csv.gz, .parquet), dataset.toml and ship.toml"
         raise InputError(f"folder {folder} holds no dataset.toml; a data set has {files}.{_logs_within(folder)}")
     parsed = parse_spec(spec)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import Executor, Future
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
-from multiprocessing import get_context
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -18,6 +17,7 @@ from ..checking.standing import standing
 from ..checking.units import UnitFinding, corrected
 from ..effects.base import EFFECTS
 from ..errors import InputError
+from ..processes import process_pool
 from ..records import Dataset
 from . import misread
 from .analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
@@ -59,7 +59,7 @@ def diagnose(
             the regressions is named only where fitting it pays on runs that were not fitted.
         seed: of the bootstrap and of the folds.
         only: effects to consider (an oracle that knows what is hidden); default all.
-        workers: processes for the folds; from two on, a script that calls this needs `if __name__ == "__main__":`.
+        workers: processes for the folds; 1: everything runs in this one.
         thorough: use up to twice as much of a long record (the folds use a quarter); 90 runs of 120 s are used whole either way.
         budget: how much work the fits of the whole may take; default that of `Budget`. A warning says where it has acted.
 
@@ -92,7 +92,7 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
         warnings.append("all runs are one group (pieces of one log, say): no gain can be measured on runs that are held out.")
     wanted = gain and apart and not cautious
     work = partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) if wanted and workers > 1 else nullcontext() as pool:
+    with process_pool(workers) if wanted and workers > 1 else nullcontext() as pool:
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
         null = plain_model(Plant.of(dataset, steps), only, settled)

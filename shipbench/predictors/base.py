@@ -6,6 +6,7 @@ A part is one file of this folder whose class is bound to `PREDICTOR`. Its datac
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
 from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 from ..errors import InputError, unknown_parameter
 from ..records import Dataset
 from ..signals import COMMANDS, STATES
-from ..specs import Spec, parse_spec
+from ..specs import Spec, parse_spec, spec_of
 from ._saved import Origin, damaged, described, origin_of, read_arrays, read_meta, remembers_origin, remembers_origins, write_saved
 from ._user_file import class_from_file
 from .device import check_device
@@ -185,19 +186,35 @@ def _no_effects(spec: Spec) -> InputError:
     return InputError(f"model spec '{spec.text}': effects extend 'physics' and 'neural_ode', '{spec.name}' takes none. Write physics+{added}.")
 
 
-def make_predictor(spec: Spec, device: str | None = None) -> Any:
+def make_predictor(model: Any, device: str | None = None) -> Any:
     """The unfitted predictor of a spec (or the fitted one, for a saved folder), to compute on `device` if it has one and the spec names none.
+
+    Args:
+        model: "physics+current", "mlp[hidden=64]", "my_model.py:MyNet", the folder of a saved model, a `Spec`, a class, or an object (then a copy).
+        device: "cpu", "cuda" or "cuda:1".
 
     Raises:
         InputError: unknown name or parameter, a value that the class refuses, or a device that is not here.
     """
+    spec = spec_of(model)
     model = _made(spec)
     if device is not None and check_device(device) and hasattr(model, "device") and "device" not in spec.params:
         model.device = device
     return model
 
 
+def _given(spec: Spec) -> Any:
+    """A new object of a class in memory, or a copy of an object."""
+    try:
+        return spec.given() if isinstance(spec.given, type) else copy.deepcopy(spec.given)
+    except (TypeError, ValueError) as error:
+        made, instead = ("made", "an object, such as MyNet(hidden=64)") if isinstance(spec.given, type) else ("copied", "its class")
+        raise InputError(f"model '{spec.text}' cannot be {made}: {error}. Give {instead}.") from error
+
+
 def _made(spec: Spec) -> Any:
+    if spec.given is not None:
+        return _given(spec)
     if spec.path is not None and spec.class_name is None:
         if spec.effects:
             raise _no_effects(spec)

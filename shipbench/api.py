@@ -1,0 +1,255 @@
+"""shipbench from Python, in a notebook or a script: the commands as functions that take names, paths and objects alike."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import weakref
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .bench.results import Results, read_results
+from .checking.finding import SEVERITIES, Finding
+from .data.base import load_dataset
+from .errors import InputError
+from .names import brief
+from .records import Dataset
+from .scores import Scores
+from .specs import Spec, spec_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .diagnosis.outcome import Diagnosis
+    from .importing.mapping import Mapping as LogMapping
+    from .importing.summary import Summary
+    from .ship import Ship
+
+Place = str | os.PathLike[str]
+Data = Dataset | Place
+
+
+def benchmark(
+    models: Any,
+    data: Data | Sequence[Data],
+    *,
+    horizon: float = 120.0,
+    folds: int = 5,
+    seeds: int | Sequence[int] = 0,
+    out: Place | None = None,
+    executor: str = "local",
+    workers: int | None = None,
+    device: str | None = None,
+    quiet: bool = False,
+    **options: Any,
+) -> Scores:
+    """Fit, roll out and score models on held-out runs, as `shipbench run` does.
+
+    A class in memory is made anew for every fold. An object is copied for every fold before `fit`, so give it unfitted. Both run in this process.
+
+    Args:
+        models: one or several: "physics+current", "my_model.py:MyNet", a folder of a saved model, a class or an object with `fit` and `predict`.
+            A mapping names them: {"my net": MyNet(), "physics": "physics"}.
+        data: one or several data sets: objects, registered names or folders.
+        horizon: time to predict [s].
+        folds: number of folds by run, from 2.
+        seeds: seed or seeds of the models' random draws.
+        out: folder for the results; None: they are kept until the scores are no longer used.
+        executor: "local", "processes" or "dask"; only "local" takes models in memory.
+        workers: number of processes of the executor "processes".
+        device: where networks compute: "cpu", "cuda" or "cuda:1".
+        quiet: show no progress.
+        options: other keys of a `Task`, such as history_s=10, split="kind", stride_s=30, max_runs=20, metrics=["ed"].
+
+    Raises:
+        InputError: a model, data set or option cannot be used; nothing has been fitted then.
+        WorkError: the study had to stop.
+    """
+    from .bench.executors import Execution
+    from .bench.progress import make_progress
+    from .bench.runner import Memory, run_tasks
+    from .bench.task import make_task
+
+    specs = _named(models)
+    named = {d.name if isinstance(d, Dataset) else os.fspath(d): d for d in _several(data)}
+    if len(named) < len(_several(data)):
+        raise InputError(f"data: two data sets have one name ({', '.join(named)}). Accepted: different names. Rename one, or score them apart.")
+    seeds = (seeds,) if isinstance(seeds, int) else tuple(seeds)
+    common = {"models": tuple(specs), "horizon_s": horizon, "folds": folds, "seeds": seeds, **options}
+    tasks = [make_task({**common, "dataset": name}, "benchmark") for name in named]
+    memory = Memory({name: d for name, d in named.items() if isinstance(d, Dataset)}, {text: s for text, s in specs.items() if s.given is not None})
+    folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="shipbench-"))
+    try:
+        outcome = run_tasks(
+            tasks, folder, execution=Execution(executor, workers, device=device), progress=make_progress(quiet), command=_COMMAND, memory=memory
+        )
+    except BaseException:
+        if out is None:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    scores = Scores(outcome.results)
+    if out is None:
+        weakref.finalize(scores, shutil.rmtree, folder, ignore_errors=True)
+    return scores
+
+
+_COMMAND = "shipbench.benchmark(...) in Python"
+
+
+def _several(given: Any) -> list[Any]:
+    """A list of one where one is given."""
+    return list(given) if isinstance(given, list | tuple) else [given]
+
+
+def _named(models: Any) -> dict[str, Spec]:
+    """Specs by the label that stands in tables; of objects with one label the later ones are numbered."""
+    if isinstance(models, Mapping):
+        found = [(str(label), spec_of(model, str(label))) for label, model in models.items()]
+        if strange := [label for label, spec in found if spec.given is None and label != spec.text]:
+            raise InputError(f"models: '{strange[0]}' names a spec, which is its own name. Accepted: names of classes and objects.")
+    else:
+        found = [(spec.text, spec) for spec in map(spec_of, _several(models))]
+    specs: dict[str, Spec] = {}
+    for label, spec in sorted(found, key=lambda pair: pair[1].given is not None):  # a spec in text keeps its name
+        free = next(name for name in (label, *(f"{label}-{k}" for k in range(2, len(found) + 2))) if name not in specs or spec.given is None)
+        specs[free] = replace(spec, text=free, name=free) if spec.given is not None else spec
+    return specs
+
+
+def diagnose(data: Data, *, gain: bool = True, seed: int = 0, workers: int = 2, thorough: bool = False) -> Diagnosis:
+    """Show what the physics model gets wrong on measured runs and name the causes, as `shipbench diagnose` does.
+
+    Args:
+        data: a data set, its registered name or its folder.
+        gain: measure on held-out runs what naming the causes is worth, which takes most of the time.
+        seed: of folds and bootstrap.
+        workers: number of processes; 1: everything runs in this one.
+        thorough: use up to twice as much of a long record.
+
+    Raises:
+        InputError: the data set cannot be read, or the record is too short or contradicts itself.
+    """
+    from .diagnosis.diagnose import diagnose as run
+
+    found = run(_loaded(data), gain=gain, seed=seed, workers=workers, thorough=thorough)
+    return found if isinstance(data, Dataset) else replace(found, spec=os.fspath(data))
+
+
+def _loaded(data: Data) -> Dataset:
+    return data if isinstance(data, Dataset) else load_dataset(data)
+
+
+class Findings(tuple[Finding, ...]):
+    """Findings of a data check, errors first."""
+
+    def table(self) -> pd.DataFrame:
+        """A row for each finding: severity, kind, channels, runs, text and what to do."""
+        import pandas as pd
+
+        columns = ["severity", "kind", "channels", "runs", "text", "todo"]
+        rows = [(f.severity, f.kind, ", ".join(f.channels), ", ".join(f.runs), f.text, f.todo) for f in self]
+        return pd.DataFrame(rows, columns=columns)
+
+    def __repr__(self) -> str:
+        counts = {severity: sum(f.severity == severity for f in self) for severity in SEVERITIES}
+        head = ", ".join(f"{n} {severity}{'s' * (n > 1)}" for severity, n in counts.items() if n) or "No findings"
+        return brief("\n".join([head, *(f"  {f.severity}: {f.text}" for f in self)]))
+
+    def _repr_html_(self) -> str:
+        return str(self.table().to_html(index=False, max_rows=40)) if self else repr(self)
+
+
+def check_data(data: Data) -> Findings:
+    """Find faults of a data set from the data themselves, as `shipbench data check` does: units, signs, frames, clocks, samples, copies.
+
+    Raises:
+        InputError: neither a known name nor a folder, or nothing in it can be read.
+    """
+    from .checking.base import check_dataset, check_path
+
+    return Findings(check_dataset(data) if isinstance(data, Dataset) else check_path(os.fspath(data))[1])
+
+
+def import_log(
+    logs: Place | Sequence[Place], mapping: Place | LogMapping, ship: Place | Ship, out: Place, *, force: bool = False, **overrides: Any
+) -> Summary:  # fmt: skip
+    """Make a data set of logs of a trial, as `shipbench data import` does; load it with `load_dataset(out)`.
+
+    Args:
+        logs: one or several files.
+        mapping: mapping.toml, which says what the columns are.
+        ship: ship.toml, or the ship's particulars.
+        out: folder of the data set.
+        force: replace a data set that is there.
+        overrides: name, dt [s], window [s], shortest [s] or still_speed [m/s] instead of the mapping's.
+
+    Returns:
+        What was read, converted, derived and left out.
+
+    Raises:
+        InputError: a log, the mapping or the folder cannot be used; nothing is written then.
+    """
+    from .importing.importer import import_logs
+    from .importing.mapping import load_mapping
+    from .ship import Ship as Particulars
+
+    plan = load_mapping(Path(mapping), **overrides) if isinstance(mapping, str | os.PathLike) else mapping
+    vessel = Particulars.load(Path(ship)) if isinstance(ship, str | os.PathLike) else ship
+    return import_logs([Path(log) for log in _several(logs)], plan, vessel, Path(out), force=force)
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A draft of mapping.toml and remarks on it: what is guessed, what is not sure, what is missing."""
+
+    text: str
+    remarks: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return brief("\n".join(["Draft of a mapping, in .text. Check every line marked GUESS.", *(f"  {remark}" for remark in self.remarks)]))
+
+
+def propose_mapping(
+    logs: Place | Sequence[Place], out: Place | None = None, *, force: bool = False, partial: Place | None = None, **file: Any
+) -> Proposal:  # fmt: skip
+    """Draft the mapping of logs, as `shipbench data import --propose` does.
+
+    Args:
+        logs: one or several files.
+        out: file to write, such as "mapping.toml"; None: only the text is returned.
+        force: replace a file that is there.
+        partial: a mapping that says a part; what it says is kept.
+        file: keys of [file] that are known: encoding, sheet or header.
+
+    Raises:
+        InputError: a log cannot be read, or `out` is there already.
+    """
+    from .importing.propose import write_proposal
+
+    with tempfile.TemporaryDirectory(prefix="shipbench-") as scratch:
+        path = Path(out) if out is not None else Path(scratch, "mapping.toml")
+        remarks = write_proposal(
+            [Path(log) for log in _several(logs)], path, force, file=file, partial=Path(partial) if partial is not None else None
+        )
+        return Proposal(path.read_text(encoding="utf-8"), tuple(remarks if out is not None else remarks[:-1]))
+
+
+def report(results: Results | Scores | Place | Sequence[Place], out: Place = "report.html", *, diagnosis: Place | Sequence[Place] = ()) -> Path:
+    """Write the page of results, as `shipbench report` does, and return its path.
+
+    Args:
+        results: what `benchmark` or `read_results` returned, or result folders.
+        out: HTML file to write.
+        diagnosis: folders of diagnoses to link.
+
+    Raises:
+        InputError: results of different kinds, or `out` cannot be written.
+    """
+    if isinstance(results, Results | Scores):
+        scores = Scores(results) if isinstance(results, Results) else results
+    else:
+        scores = Scores(read_results([Path(folder) for folder in _several(results)]))
+    return scores.report(out, diagnosis=[Path(folder) for folder in _several(diagnosis)])
