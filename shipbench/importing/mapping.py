@@ -130,8 +130,9 @@ def load_mapping(path: str | Path, **overrides: Any) -> Mapping:
     """
     data = read_toml(path)
     for key, value in overrides.items():
-        if value is not None:
-            (data.setdefault("split", {}) if key in Split.model_fields else data)[key] = value
+        table = data.setdefault("split", {}) if key in Split.model_fields else data
+        if value is not None and isinstance(table, dict):  # a split that is no table is refused below
+            table[key] = value
     mapping = validated(data, path)
     check_name(mapping.name, f"{path}: name")
     for source in mapping.sources.values():

@@ -7,7 +7,9 @@ import pytest
 from scipy.interpolate import CubicSpline
 from trial import motion
 
+from shipbench.errors import InputError
 from shipbench.importing.channels import Block
+from shipbench.importing.mapping import load_mapping
 from shipbench.importing.position import to_body, to_midship, to_plane, velocity_at_midship
 from shipbench.importing.resample import interval_means, interval_values, sample
 from shipbench.importing.speeds import derivative
@@ -168,3 +170,11 @@ def test_a_dense_stream_comes_in_parts_that_fit_into_memory(monkeypatch):
     t = np.arange(0.0, 50.0, 0.01)
     found = Stretches([Feed(stream(t, [t], 500), ("x",))], {"x": 3.0}, frozenset(), 3600.0, 1.0, 0.5)
     assert max(s.end - s.start for s in found) <= 10.0
+
+
+@pytest.mark.parametrize("split", ["3", "[1]", '"x"'])
+def test_a_split_that_is_no_table_is_refused_also_with_a_window_of_the_command(tmp_path, split):
+    path = tmp_path / "mapping.toml"
+    path.write_text(f'name = "t"\ndt = 1.0\nsplit = {split}\ntime = {{ column = "t" }}\nchannels.psi = {{ column = "psi", unit = "rad" }}\n')
+    with pytest.raises(InputError, match="split"):
+        load_mapping(path, window=30.0)
