@@ -7,13 +7,14 @@ import shutil
 import tempfile
 import weakref
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .bench.results import Results, read_results
 from .checking.finding import SEVERITIES, Finding
 from .data.base import load_dataset
+from .diagnosis.outcome import Diagnosis
 from .errors import InputError
 from .names import brief
 from .records import Dataset
@@ -23,7 +24,6 @@ from .specs import Spec, spec_of
 if TYPE_CHECKING:
     import pandas as pd
 
-    from .diagnosis.outcome import Diagnosis
     from .importing.mapping import Mapping as LogMapping
     from .importing.summary import Summary
     from .ship import Ship
@@ -119,7 +119,17 @@ def _named(models: Any) -> dict[str, Spec]:
     return specs
 
 
-def diagnose(data: Data, *, gain: bool = True, seed: int = 0, workers: int = 2, thorough: bool = False) -> Diagnosis:
+class Verdict(Diagnosis):
+    """A diagnosis that shows its verdict in words; `verdict`, `causes`, `extended_model` and `gain` are the main fields."""
+
+    def __repr__(self) -> str:
+        from .bench.diagnosis_text import headline, next_command
+
+        compare = f"Compare: {command}" if (command := next_command(self)) else ""
+        return brief("\n".join(filter(None, [f"Diagnosis of {self.dataset}", headline(self), f"Extended model: {self.extended_model}", compare])))
+
+
+def diagnose(data: Data, *, gain: bool = True, seed: int = 0, workers: int = 2, thorough: bool = False) -> Verdict:
     """Show what the physics model gets wrong on measured runs and name the causes, as `shipbench diagnose` does.
 
     Args:
@@ -135,7 +145,8 @@ def diagnose(data: Data, *, gain: bool = True, seed: int = 0, workers: int = 2, 
     from .diagnosis.diagnose import diagnose as run
 
     found = run(_loaded(data), gain=gain, seed=seed, workers=workers, thorough=thorough)
-    return found if isinstance(data, Dataset) else replace(found, spec=os.fspath(data))
+    spec = "" if isinstance(data, Dataset) else os.fspath(data)
+    return Verdict(**{f.name: getattr(found, f.name) for f in fields(found)} | {"spec": spec})
 
 
 def _loaded(data: Data) -> Dataset:

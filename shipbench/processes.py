@@ -6,7 +6,7 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing.context import SpawnContext, SpawnProcess
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 
 class _Process(SpawnProcess):
@@ -22,7 +22,7 @@ class _Process(SpawnProcess):
 
 
 class _Context(SpawnContext):
-    Process: Any = _Process
+    Process: ClassVar[Any] = _Process
 
 
 def process_pool(workers: int) -> ProcessPoolExecutor:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from .bench.board_tables import TABLE_III
 from .bench.fit_notes import fit_notes
+from .bench.lead import lead
 from .bench.leaderboard import scores_of
 from .bench.results import Results
 from .errors import InputError, unknown_name
@@ -159,6 +160,7 @@ class Scores:
             summary = next(s for s in self.results.summaries if s["dataset"] == dataset)
             windows = len(board.rows[["fold", "run"]].drop_duplicates())
             yield f"Scores on {dataset}: {windows} held-out predictions of {summary['task']['horizon_s']:g} s; mean position error ED (95 % interval)"
+            yield lead(board)
             figures = board.figures("ed")
             for model in board.models:
                 scored, expected = board.shares[model]
@@ -175,7 +177,8 @@ class Scores:
         table = self.table().to_html(index=False, float_format="{:.3g}".format, na_rep="-", max_rows=60)
         told = [*(f"failed: {line}" for line in self.failed[:10]), *(f"note: {line}" for line in self.notes[:10])]
         units = ", ".join(f"{label} in {unit}" for label, unit in self.table().attrs["units"].items())
-        return f"{table}<p>{escape(units)}; low and high: 95 % interval</p>" + "".join(f"<p>{escape(shown(line))}</p>" for line in told)
+        first = "".join(f"<p>{escape(shown(lead(board)))}</p>" for board in self._boards.values())
+        return f"{first}{table}<p>{escape(units)}; low and high: 95 % interval</p>" + "".join(f"<p>{escape(shown(line))}</p>" for line in told)
 
 
 def _shown_in_notebooks(figure: Figure) -> Figure:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError
+from .names import brief
 
 _PARAMS = r"\[(?:[^\[\]]|\[[^\[\]]*\])*\]"
 """A bracket, which may hold lists: [hidden_layer_sizes=[20,20],max_iter=30]."""
@@ -45,6 +46,9 @@ class Spec:
     path: Path | None = None
     class_name: str | None = None
     given: Any = None
+
+    def __repr__(self) -> str:
+        return brief(f"<Spec {self.text}>")
 
     @property
     def seeds(self) -> list[int] | None:
@@ -83,7 +87,7 @@ def parse_spec(text: str) -> Spec:
         InputError: the text has none of the accepted forms.
     """
     wanted = text.strip()
-    if Path(wanted, "model.json").is_file():
+    if os.path.isfile(os.path.join(wanted, "model.json")):
         return Spec(text, wanted, {}, path=Path(wanted))
     match = _FILE.fullmatch(wanted) or _NAME.fullmatch(wanted)
     if match is None:
@@ -97,7 +101,7 @@ def parse_spec(text: str) -> Spec:
     if match.re is _FILE:
         file, _, class_name = base.rpartition(":")
         return Spec(text, class_name, params, effects, path=Path(file), class_name=class_name)
-    if Path(base, "model.json").is_file():
+    if os.path.isfile(os.path.join(base, "model.json")):
         return Spec(text, base, params, effects, path=Path(base))
     return Spec(text, base.strip(), params, effects)
 

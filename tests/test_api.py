@@ -247,3 +247,84 @@ def test_a_folder_of_results_does_not_hide_the_data_set_of_its_name(tmp_path, mo
     (tmp_path / "demo").mkdir()
     monkeypatch.chdir(tmp_path)
     assert sb.load_dataset("demo").name == "demo"
+
+
+def test_a_check_of_data_shows_its_findings(harbour):
+    assert repr(sb.check_data(harbour)) == "No findings"
+    port = harbour.with_runs([replace(r, states=np.where(np.arange(10) == 7, -r.states, r.states)) for r in harbour])
+    found = sb.check_data(port)
+    assert found
+    assert repr(found).startswith(f"{sum(f.severity == 'error' for f in found)} error")
+    assert found.table()["severity"].tolist() == [f.severity for f in found]
+    assert found[0].kind in found._repr_html_()
+
+
+def _log(folder: Path, harbour: sb.Dataset) -> Path:
+    frame = harbour["run0"].states
+    columns = dict(zip(["x", "y", "psi", "u", "v", "r"], frame[:, :6].T, strict=True))
+    lines = [",".join(["t", *columns]), *(",".join(f"{v:.6f}" for v in (t, *row)) for t, row in zip(harbour["run0"].t, frame[:, :6], strict=True))]
+    (folder / "bridge.csv").write_text("\n".join(lines))
+    (folder / "ship.toml").write_text(harbour.ship.to_toml())
+    return folder / "bridge.csv"
+
+
+MAPPING = """
+name = "bridge"
+dt = 1.0
+[time]
+column = "t"
+format = "s"
+[channels]
+x = {column = "x", unit = "m"}
+y = {column = "y", unit = "m"}
+psi = {column = "psi", unit = "rad"}
+u = {column = "u", unit = "m/s"}
+v = {column = "v", unit = "m/s"}
+r = {column = "r", unit = "rad/s"}
+"""
+
+
+def test_a_log_becomes_a_data_set(harbour, tmp_path):
+    log = _log(tmp_path, harbour)
+    draft = sb.propose_mapping(log)
+    assert "[channels]" in draft.text
+    assert "mapping.toml" not in " ".join(draft.remarks)  # nothing was written
+    written = sb.propose_mapping([log], tmp_path / "draft.toml")
+    assert (tmp_path / "draft.toml").read_text() == written.text == draft.text
+    (tmp_path / "mapping.toml").write_text(MAPPING)
+    summary = sb.import_log(log, tmp_path / "mapping.toml", tmp_path / "ship.toml", tmp_path / "trial", name="mine")
+    assert "1 run" in repr(summary)
+    data = sb.load_dataset(tmp_path / "trial")
+    assert data.name == "mine"
+    assert data[0].states[:, 0] == pytest.approx(harbour["run0"].states[:, 0], abs=1e-5)
+
+
+@pytest.fixture(scope="module")
+def shown(harbour, scores) -> dict[str, object]:
+    """One object of each public kind, with long names and many parts."""
+    from shipbench.api import Verdict
+    from shipbench.bench.runner import Outcome
+    from shipbench.diagnosis.outcome import Candidate, Cause, Estimate
+    from shipbench.specs import parse_spec
+
+    long = harbour.with_runs([replace(run, id=f"{run.id} {'long ' * 14}", meta={"manoeuvre": f"{run.id} turn"}) for run in harbour])
+    cause = Cause("current", 1, 30.0, 0.001, {f"size{i}": Estimate(0.3, "m/s", (0.2, 0.4)) for i in range(60)}, evidence="evidence " * 300)
+    candidate = Candidate("wind", 1.0, 0.5, "because " * 300)
+    verdict = Verdict("demo", "found", (cause,) * 20, (candidate,) * 40, (), {}, "physics+current", "0" * 16, 1.0, ("a warning " * 20,) * 20)
+    board = sb.build_board(scores.results, "small_harbour")
+    task = sb.load_tasks(overrides={"models": [f"mlp[hidden={i}]" for i in range(200)]})[0]
+    objects = [long, long[0], harbour.batch(10), harbour.ship, scores, scores.results, board, Outcome(Path("x" * 2000), None, [], []), task, cause]
+    objects += [candidate, verdict, sb.check_data(harbour), parse_spec(f"mlp[hidden=8]{'+current' * 300}"), sb.make_predictor("physics+current")]
+    objects += [sb.make_predictor(name) for name in ("hold", "mlp", "lstm", "neural_ode", "sklearn:Ridge")]
+    return {f"{type(thing).__name__}{k}": thing for k, thing in enumerate(objects)}
+
+
+def test_no_object_floods_a_notebook(shown):
+    lengths = {name: len(repr(thing)) for name, thing in shown.items()}
+    assert max(lengths.values()) <= 1000, lengths
+
+
+def test_a_diagnosis_shows_its_verdict_in_words(shown):
+    text = repr(next(thing for name, thing in shown.items() if name.startswith("Verdict")))
+    assert "Diagnosis of demo" in text
+    assert "current" in text

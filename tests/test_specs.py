@@ -42,3 +42,7 @@ def test_numbers_of_a_model_have_bounds(value):
 def test_a_mistyped_parameter_gets_the_nearest():
     with pytest.raises(InputError, match=r"^'mlp' has no parameter 'epoch'. Did you mean 'epochs'\? Accepted: batch, device"):
         make_predictor(parse_spec("mlp[epoch=3]"))
+
+
+def test_a_spec_may_be_longer_than_a_file_name():
+    assert len(parse_spec("physics" + "+current" * 40).effects) == 40

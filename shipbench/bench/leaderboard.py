@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..names import file_name
+from ..names import brief, file_name
 from . import board_statistics, board_tables
 from .board_scores import Scores, cluster_of
 from .cost import parameters_by_model
@@ -41,6 +41,9 @@ class Board:
     """Who is first, by how much, how sure."""
     short: Table | None = None
     """What a terminal shows of the tables."""
+
+    def __repr__(self) -> str:
+        return brief(f"<Board {self.title}: {len(self.tables)} tables; {', '.join(self.ranking)}>")
 
     @property
     def title(self) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..data.base import load_dataset
 from ..errors import InputError
+from ..names import brief
 from ..predictors._saved import check_origin
 from ..records import Dataset
 from ..specs import Spec, parse_spec
@@ -47,6 +48,9 @@ class Outcome:
     rows: Frame
     summaries: list[dict[str, Any]]
     failed: list[str]
+
+    def __repr__(self) -> str:
+        return brief(f"<Outcome in {self.out}: {len(self.summaries)} fits, {len(self.failed)} failed>")
 
     @property
     def results(self) -> Results:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from ..errors import InputError, unknown_name
 from ..metrics.base import METRICS
-from ..names import LONGEST_LABEL, check_label
+from ..names import LONGEST_LABEL, brief, check_label
 from ..toml_files import Number, Whole, fault, read_toml
 
 DEFAULT_METRICS = ("ed", "edh", "cvdm", "final_displacement", "heading_error", "position_rmse", "signal_rmse", "trial_indices")
@@ -66,6 +66,9 @@ class Task(BaseModel):
         if "ed" not in value:
             raise ValueError("'ed' must be among the metrics: models are ranked by it")
         return value
+
+    def __repr__(self) -> str:
+        return brief(super().__repr__())
 
     def steps(self, dt: float) -> int:
         """Knots of the horizon at sample time `dt` [s]."""

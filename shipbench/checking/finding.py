@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..names import brief
 from ..signals import UNITS
 
 Severity = Literal["error", "warning", "note"]
@@ -20,7 +21,7 @@ def labelled(*channels: str) -> str:
     return f"{', '.join(channels)} [{UNITS[channels[0].removesuffix('_c')]}]"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Curve:
     """One line or cloud of a picture: x, y of equal length; style is matplotlib's ("-", ".")."""
 
@@ -65,6 +66,9 @@ class Finding:
     runs: tuple[str, ...] = ()
     evidence: dict[str, Any] = field(default_factory=dict)
     picture: Picture | None = None
+
+    def __repr__(self) -> str:
+        return brief(f"<{self.severity}, {self.kind}: {self.text}>")
 
     def as_json(self) -> dict[str, Any]:
         """Everything but the picture, with plain numbers."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import InputError
+from ..names import brief
 from ..predictors.base import make_predictor
 from ..records import Dataset
 from ..registry import reason
@@ -26,6 +27,11 @@ class Report:
     data: str
     seconds: float
     verdicts: tuple[Verdict, ...]
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{len(self.of(status))} {status}" for status in (PASSED, BROKEN, NOT_APPLICABLE))
+        broken = (f"  {v.rule}: {v.evidence}" for v in self.of(BROKEN))
+        return brief("\n".join([f"Check of {self.model} on {self.data}: {counts}", *broken]))
 
     def of(self, status: str) -> list[Verdict]:
         """The verdicts with that status."""

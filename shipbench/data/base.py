@@ -74,14 +74,14 @@ def load_dataset(spec: str | os.PathLike[str], *, remake: bool = False, **option
 
     spec = os.fspath(spec)
     folder = Path(spec)
-    exported = folder.suffix == ".mat" and os.path.lexists(folder) and not folder.is_dir()
+    exported = folder.suffix == ".mat" and os.path.lexists(folder) and not os.path.isdir(folder)
     if folder.is_file() and not (exported and is_export(folder)):
         raise _no_data_set(spec, folder)
     if exported or os.path.lexists(folder / "dataset.toml"):
         if options:
             raise InputError(f"{folder} is read from files and takes no parameters; given: {', '.join(options)}.")
         return read_mat(folder) if exported else read_dataset(folder)
-    if folder.is_dir() and spec not in DATASETS:  # `shipbench demo` makes a folder of results with the name of a data set
+    if os.path.isdir(folder) and spec not in DATASETS:  # `shipbench demo` makes a folder of results with the name of a data set
         files = "trajectories.csv (or .csv.gz, .parquet), dataset.toml and ship.toml"
         raise InputError(f"folder {folder} holds no dataset.toml; a data set has {files}.{_logs_within(folder)}")
     parsed = parse_spec(spec)

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..names import brief
+
 SCHEMA = 1
 
 
@@ -49,6 +51,10 @@ class Cause:
     gain: Gain | None = None
     evidence: str = ""
 
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{name} {e.value:.3g} {e.unit}" for name, e in self.parameters.items())
+        return brief(f"<Cause {self.rank}: {self.effect}; {sizes}>")
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -63,6 +69,9 @@ class Candidate:
     units: dict[str, str] = field(default_factory=dict)
     family: str = ""
 
+    def __repr__(self) -> str:
+        return brief(f"<Candidate {self.effect}: {self.rejected_because}>")
+
 
 @dataclass(frozen=True)
 class Wrong:
@@ -74,7 +83,7 @@ class Wrong:
     when: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trace:
     """What the plots are drawn from, per segment of a run (padded with NaN).
 
@@ -132,6 +141,9 @@ class Diagnosis:
     gain_per_run: tuple[tuple[str, float, float], ...] = ()
     trace: Trace | None = None
     spec: str = ""
+
+    def __repr__(self) -> str:
+        return brief(f"<Diagnosis of {self.dataset}: {self.verdict}, {self.extended_model}>")
 
     def document(self) -> dict[str, Any]:
         """The contract's JSON, plus `warnings`, the gain of all causes together, and `unknown` (channel and variable) where that is the verdict."""

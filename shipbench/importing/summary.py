@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..names import brief
 from ..signals import COMMANDS, STATES
 from .cells import Counts
 from .channels import all_channels
@@ -195,6 +196,9 @@ class Summary:
             "forms": self.met.forms, "columns": list(self.columns), "channels": self.converted(), "derived": self.derived(),
             "left_out": self.left_out(), "notes": self.notes(),
         }  # fmt: skip
+
+    def __repr__(self) -> str:
+        return brief("\n".join(self.lines()) if self.table.name else f"<Summary of {self.mapping.name}, not complete>")
 
     def lines(self) -> list[str]:
         """For the terminal."""
