@@ -207,7 +207,10 @@ def write_boards(
 def _draw(results: Results, board: Board, out: Path, tell: Callable[[str], None]) -> list[Path]:
     from .plots import draw_all
 
-    return draw_all(results, board.dataset, board.ranking, out / file_name(board.dataset), lambda line: tell(f"{board.dataset}: {line}"))
+    folder = out / file_name(board.dataset)
+    if folder.is_symlink():
+        raise InputError(f"{folder} is a link; accepted: a folder, so that pictures land below {out}. Remove the link, or give another --out.")
+    return draw_all(results, board.dataset, board.ranking, folder, lambda line: tell(f"{board.dataset}: {line}"))
 
 
 def _write(board: Board, form: str, command: str, images: Sequence[Path], out: Path) -> Path:

@@ -102,7 +102,7 @@ class Part:
         return Job(self.spec, self.cells[0].seed, facts.code, facts.files if send_files else None, device, facts.foreign)
 
     def uncovered(self, answer: Answer) -> list[str]:
-        """Code that the model loaded while it was fitted or asked, and that the keys do not cover.
+        """Code that the model loaded, and files that it read, while it was fitted or asked, and that the keys do not cover.
 
         Raises:
             WorkError: a file of its code is no longer the one that the keys were made of.

@@ -178,12 +178,12 @@ def _answers(parts: Sequence[Part], workers: Workers, progress: Progress, how: E
 
 
 def _identity(part: Part, key: str, answer: Answer) -> dict[str, Any]:
-    """The cell's key and the digests of the user's code behind it; no key where the model loaded code that the key does not cover."""
+    """The cell's key and the digests of the user's code behind it; no key where the model loaded code or read files that the key does not cover."""
     identity: dict[str, Any] = {"key": key, "model_code": {name: digest[:16] for name, digest in digests(part.facts.files).items()}}
     if part.spec.given is not None:
         return identity | {"key": "", "key_note": "the model was an object in memory; --resume runs this cell again"}
     if unknown := part.uncovered(answer):
-        more = f"the model loaded {', '.join(unknown[:3])} while it ran; --resume cannot tell whether that changes, and runs this cell again"
+        more = f"the model loaded or read {', '.join(unknown[:3])} while it ran; --resume cannot tell whether that changes, and runs this cell again"
         identity |= {"key": "", "key_note": more}
     return identity
 

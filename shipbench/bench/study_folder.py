@@ -23,7 +23,7 @@ def claimed(out: Path) -> Iterator[None]:
     """Make `out`, see that it can be written and that no other study writes there now, and take away what killed studies left half-written.
 
     Raises:
-        InputError: the folder cannot be made or written, or another study is at work in it.
+        InputError: the folder cannot be made or written, or holds links in the place of its folders, or another study is at work in it.
         WorkError: writing failed later (disk full, a folder that has gone).
     """
     try:
@@ -36,6 +36,7 @@ def claimed(out: Path) -> Iterator[None]:
         raise InputError(f"cannot write to {out}: {error.strerror}. Give another folder with --out.") from None
     try:
         _lock(handle, out)
+        _refuse_links(out)
         _take_away_leftovers(out)
         yield
     except OSError as error:
@@ -46,6 +47,13 @@ def claimed(out: Path) -> Iterator[None]:
         ) from error
     finally:
         os.close(handle)  # and with it the lock, which the system also takes from a killed process
+
+
+def _refuse_links(out: Path) -> None:
+    """A folder of another's may hold links: what is written through one lands outside `out`."""
+    for pattern in ("cells", "truth", "cells/*", "cells/*/*"):
+        if link := next((path for path in out.glob(pattern) if path.is_symlink()), None):
+            raise InputError(f"{link} is a link; accepted: folders, so that a study writes only below {out}. Remove the link, or give another --out.")
 
 
 def _take_away_leftovers(out: Path) -> None:

@@ -23,7 +23,7 @@ import numpy as np
 
 from ..errors import ShipbenchError
 from ..predictors._fit_report import FitReport
-from ..predictors._user_file import code_of, on_import_path
+from ..predictors._user_file import code_of, files_read, on_import_path
 from ..predictors.base import History, make_predictor
 from ..records import Dataset
 from ..specs import Spec
@@ -76,7 +76,8 @@ class Answer:
         files: saved model and fitted equations, content by relative name.
         notes: why the model could not be saved or described, and how it follows its own training runs (`fit_report`).
         machine: where it was computed.
-        code: digests by relative name of the user's code that was loaded in the end; empty for other models.
+        code: digests by relative name of the user's code that was loaded in the end, and of the files that the model read; empty for other
+            models.
     """
 
     status: str = ""
@@ -99,9 +100,9 @@ def work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
         with _at_hand(job) as spec:
             if spec.path is None or spec.class_name is None:
                 return _work(replace(job, spec=spec), folds)
-            with on_import_path(spec.path):  # a model may import a module as late as in `predict`
+            with on_import_path(spec.path), files_read(spec.path.parent.absolute(), Path.cwd()) as read:  # a model may import as late as in `predict`
                 answers = _work(replace(job, spec=spec), folds)
-            code = digests(code_of(spec.path))
+            code = {name: file_digest(file) for name, file in read.items()} | digests(code_of(spec.path))
             return [replace(answer, code=code) for answer in answers]
     except _RAISED as error:
         _let_stop_through(error)
@@ -111,6 +112,12 @@ def work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
 def digests(files: Mapping[str, bytes]) -> dict[str, str]:
     """SHA-256 of each file."""
     return {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+
+
+def file_digest(file: Path) -> str:
+    """SHA-256 of a file of any size."""
+    with file.open("rb") as content:
+        return hashlib.file_digest(content, "sha256").hexdigest()
 
 
 def _let_stop_through(error: BaseException) -> None:

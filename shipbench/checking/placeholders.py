@@ -10,10 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..importing.north import LEAP
-from ..signals import PSI, STATES, R, U, V, X, Y
+from ..signals import DELTA, PSI, STATES, R, U, V, X, Y
 from .finding import Curve, Finding, Picture, labelled, toml_line
 from .recording import Recording
 from .statistics import stretches, times
+
+RUDDER_MOST = 1.3
+"""Angle [rad] beyond every rudder's."""
 
 
 def _blocks(z: np.ndarray, limit: float) -> list[tuple[int, int]]:
@@ -40,11 +43,25 @@ def _channel(recording: Recording, channels: Sequence[int]) -> dict[str, list[tu
     return {name: blocks for name, blocks in found.items() if blocks}
 
 
+def _impossible(recording: Recording, found: dict[str, list[tuple[int, int]]]) -> dict[str, list[tuple[int, int]]]:
+    """Those blocks of rudder angles that no rudder reaches, unless it goes there otherwise too: then the unit is another one."""
+    kept = {}
+    for run in recording.runs:
+        beyond, explained = np.abs(run.states[:, DELTA]) > RUDDER_MOST, np.zeros(len(run), dtype=bool)
+        blocks = [(a, b) for a, b in found.get(run.id, []) if beyond[a : b + 1].any()]
+        for a, b in blocks:
+            explained[a : b + 1] = True
+        if np.any(beyond & ~explained):
+            return {}
+        kept[run.id] = blocks
+    return {name: blocks for name, blocks in kept.items() if blocks}
+
+
 def mend_placeholders(recording: Recording) -> tuple[Recording, list[Finding]]:
     """The recording without such samples, and one finding for each channel."""
     findings, bad = [], {run.id: np.zeros(len(run), dtype=bool) for run in recording.runs}
-    for channels in ((X, Y), (PSI,), (U,), (V,), (R,)):
-        found = _channel(recording, channels)
+    for channels in ((X, Y), (PSI,), (U,), (V,), (R,), (DELTA,)):
+        found = _impossible(recording, _channel(recording, channels)) if channels == (DELTA,) else _channel(recording, channels)
         if found:
             findings.append(_finding(recording, channels, found))
         for name, blocks in found.items():

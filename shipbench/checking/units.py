@@ -18,6 +18,7 @@ import numpy as np
 from ..effects.unit_or_sign_error import FACTORS
 from ..records import Dataset, Run
 from ..signals import COMMANDS, DELTA, F_B, F_S, PSI, STATES, N, R, U, V, X, Y
+from .placeholders import RUDDER_MOST
 from .rudder_side import Side, rudder_side
 from .statistics import FEWEST
 
@@ -282,7 +283,7 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
     S, ship = np.concatenate([run.states for run in runs]), dataset.ship
     found = []
     rudder = float(np.quantile(np.abs(S[:, DELTA]), 0.99))
-    if 1.3 < rudder < 75.0:
+    if RUDDER_MOST < rudder < 75.0:
         found.append(_finding("delta", FACTORS["delta"]["degrees"], f"The rudder goes to {rudder:.3g}, which no rudder does in rad."))
     turning = S[np.abs(S[:, N]) > 0.7 * np.max(np.abs(S[:, N]))]
     diameter = ship.propeller.diameter if ship.propeller else 0.6 * ship.T

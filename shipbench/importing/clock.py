@@ -213,12 +213,21 @@ def _date_and_time(columns: list[pa.Array], clock: Clock, where: str) -> np.ndar
     return _seconds(days + nanoseconds, clock, where)
 
 
+def _twice_or_never(error: str) -> str:
+    """The stamp in the message of pandas, and what is wrong with it; that message goes on with advice on its own options."""
+    found = re.search(r"\d{4}-\d\d-\d\d \d\d:\d\d:[\d.]*\d", error)
+    return f"{found[0] if found else 'one'} {'does not occur' if 'nonexistent' in error else 'occurs twice'}, as the clocks change"
+
+
 def _seconds(stamps: pd.Series, clock: Clock, where: str) -> np.ndarray:
     """Stamps without a zone are taken in `clock.zone`, or UTC."""
     try:
         aware = stamps.dt.tz_convert("UTC") if stamps.dt.tz is not None else stamps.dt.tz_localize(clock.zone or "UTC").dt.tz_convert("UTC")
     except ValueError as error:  # the hour that a change of clocks repeats or leaves out
-        raise InputError(f"{where}: a time stamp has no one meaning in the zone '{clock.zone}': {error}. Log in UTC, or give the offset.") from None
+        raise InputError(
+            f"{where}: a time stamp has no one meaning in the zone '{clock.zone}': {_twice_or_never(str(error))}. "
+            "Accepted: stamps that occur once. Log in UTC, or give the offset."
+        ) from None
     values = aware.dt.tz_localize(None).to_numpy(dtype="datetime64[us]")  # in ns, years far off would wrap around
     seconds = values.astype(np.int64) / 1e6
     return np.where(np.isnat(values), np.nan, seconds)

@@ -88,7 +88,7 @@ def _forwards(blocks: Iterable[Block], source: Source, where: str, met: Counts) 
             if block.new[at] or repeated[at - begin] or _begins_anew(block, at, state, source, where):
                 new[at - begin] = True
                 met.clock.append(
-                    f"the clock was set back from {shown(source.time, state.high)} to {shown(source.time, block.t[at])}; nothing is joined there"
+                    f"the clock was set back: after {shown(source.time, state.high)} comes {shown(source.time, block.t[at])}; nothing is joined there"
                 )
                 state.high, state.rows, at = block.t[at], 1, at + 1
             else:

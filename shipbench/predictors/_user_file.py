@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import os
 import site
 import sys
 import sysconfig
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -16,6 +18,7 @@ from typing import Any
 
 from ..errors import InputError, unknown_name
 
+_listens: list[bool] = []
 _brought: set[str] = set()
 """Modules of users that earlier model files imported: the next file imports its own, changed or of another folder."""
 
@@ -59,6 +62,37 @@ def on_import_path(file: Path) -> Iterator[None]:
     finally:
         if folder in sys.path:  # the model may have changed it
             sys.path.remove(folder)
+
+
+_watched: list[set[str]] = []
+"""Where the paths of files that are opened for reading go, while `files_read` listens."""
+
+
+def _watch(event: str, args: tuple[Any, ...]) -> None:
+    if event == "open" and _watched and isinstance(args[0], str | bytes | os.PathLike) and not set(str(args[1] or "r")) & set("wax+"):
+        for paths in list(_watched):
+            paths.add(os.path.abspath(os.fsdecode(args[0])))
+
+
+@contextmanager
+def files_read(*below: Path) -> Iterator[dict[str, Path]]:
+    """Files that are opened in Python while the context lasts, by name relative to the first folder of `below` that holds them, filled at its end.
+
+    Code is left out (`code_of`), and so is what was written meanwhile. A library that opens files in machine code of its own is not seen.
+    """
+    if not _listens:
+        sys.addaudithook(_watch)  # there is no way to take it away again
+        _listens.append(True)
+    found, paths, began = dict[str, Path](), set[str](), time.time_ns()
+    _watched.append(paths)
+    try:
+        yield found
+    finally:
+        _watched.remove(paths)
+        for file in map(Path, sorted(paths)):
+            root = next((root for root in below if file.is_relative_to(root)), None)
+            if root is not None and file.suffix not in (".py", ".pyc") and file.is_file() and file.stat().st_mtime_ns < began and _outside(file):
+                found[file.relative_to(root).as_posix()] = file
 
 
 def code_of(path: Path) -> dict[str, bytes]:

@@ -179,6 +179,21 @@ def test_code_that_the_key_does_not_cover_is_told_and_run_again(helped):
     assert not np.allclose(run(resume=True).rows["ed"], outcome.rows["ed"])
 
 
+@pytest.mark.parametrize("when", ["import", "predict"])
+def test_a_data_file_that_a_model_reads_is_told_and_its_change_is_seen(helped, when):
+    run, folder = helped
+    read = "(Path(__file__).parent / 'gain.txt').read_text()"
+    text = HELPED.replace("from late import SHIFT", f"SHIFT = float({'TEXT' if when == 'import' else read})")
+    (folder / "model.py").write_text(f"from pathlib import Path\nTEXT = {read}\n{text}")
+    (folder / "gain.txt").write_text("0.0")
+    outcome = run()
+    summary = read_summary(outcome.out, Cell(*(outcome.summaries[0][k] for k in ("dataset", "model", "fold", "seed"))))
+    assert summary["key"] == ""
+    assert "gain.txt" in summary["key_note"]
+    (folder / "gain.txt").write_text("7.0")
+    assert not np.allclose(run(resume=True).rows["ed"], outcome.rows["ed"])
+
+
 @pytest.mark.parametrize("raised", ["KeyboardInterrupt", "GeneratorExit", "SystemExit(0)"])
 def test_a_model_that_cannot_be_made_is_one_message_whatever_it_raises(study, raised, capfd):
     Path("models.py").write_text(f"class Plain:\n    def __init__(self):\n        raise {raised}\n")

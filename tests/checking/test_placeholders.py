@@ -11,7 +11,7 @@ import pytest
 from shipbench.bench.check_sets import base_set
 from shipbench.checking.base import check_dataset
 from shipbench.records import Dataset
-from shipbench.signals import PSI, STATES, R, U, X, Y
+from shipbench.signals import DELTA, PSI, STATES, R, U, X, Y
 
 
 def with_block(data: Dataset, channels: list[int], value: float, first: int, last: int) -> Dataset:
@@ -21,7 +21,8 @@ def with_block(data: Dataset, channels: list[int], value: float, first: int, las
 
 
 @pytest.mark.parametrize(
-    ("channels", "value"), [([PSI], np.deg2rad(511.0)), ([U], 102.3 * 0.5144), ([U], -999.0), ([R], 9999.0), ([X, Y], 0.0), ([X, Y], 1e7)]
+    ("channels", "value"),
+    [([PSI], np.deg2rad(511.0)), ([U], 102.3 * 0.5144), ([U], -999.0), ([R], 9999.0), ([DELTA], np.deg2rad(-128.0)), ([X, Y], 0.0), ([X, Y], 1e7)],
 )
 def test_the_cut_covers_the_whole_block(channels, value):
     data = base_set("container130", 311)
@@ -45,3 +46,10 @@ def test_a_channel_that_freezes_at_its_last_value_is_no_placeholder():
     data = base_set("container130", 311)
     frozen = with_block(data, [U], float(data.runs[2].states[40, U]), 40, 60)
     assert "placeholder" not in {f.kind for f in check_dataset(frozen)}
+
+
+def test_a_rudder_in_degrees_held_hard_over_is_a_unit_and_no_placeholder():
+    data = base_set("container130", 311)
+    runs = [replace(run, states=np.where(np.arange(run.states.shape[1]) == DELTA, np.rad2deg(run.states), run.states)) for run in data.runs]
+    kinds = {(f.kind, f.channels) for f in check_dataset(data.with_runs(runs)) if "delta" in f.channels}
+    assert kinds == {("unit", ("delta",))}
