@@ -22,7 +22,7 @@ def diagnose(
     seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
     workers: Annotated[int, typer.Option(help="Processes for the folds.")] = 2,
     thorough: Annotated[bool, typer.Option("--thorough", help="Use up to twice as much of a long record (twice the time or more).")] = False,
-    cpu_limit: Annotated[float, typer.Option(min=1.0, max=86_400.0, help="CPU seconds after which no other search begins; it is said.")] = 900.0,
+    cpu_limit: Annotated[float, typer.Option(min=1.0, max=86_400.0, help="CPU seconds after which it ends with what stands; it is said.")] = 900.0,
     full: Full = False,
     quiet: Quiet = False,
     as_json: Json = False,

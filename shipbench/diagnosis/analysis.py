@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..physics.actuators import Gear
+from .budget import is_spent, refuse_large
 from .gain import Extension
 from .gear_kinds import GearFinding
 from .gears import find_in_gears
 from .generic import NO_FORM, Dependence, Search, dependences
 from .misread import judged
-from .model import Scales
+from .model import NUM_BASE, Scales
 from .ordinary import NOTICEABLE
 from .plain import null_fit
 from .plant import Plant
@@ -115,8 +116,13 @@ def plain_model(plant: Plant, only: Sequence[str] | None = None, settled: Sequen
     Args:
         only: restrict the candidates to these effects (for an oracle that knows the truth).
         settled: effects of which the data are free already.
+
+    Raises:
+        InputError: it would take more memory than the budget allows.
     """
-    return null_fit(plant, Scales(plant), candidates_for(plant, only, settled))
+    candidates = candidates_for(plant, only, settled)
+    refuse_large(len(plant.seg.run), plant.steps + 1, 7 + 3 * plant.knots + NUM_BASE + sum(t.size for t in candidates))
+    return null_fit(plant, Scales(plant), candidates)
 
 
 def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, cautious: bool = False, misread: Sequence[RecordError] = ()) -> Analysis:
@@ -126,6 +132,8 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
         only: name none but these effects.
         cautious: name nothing (too little data), but rank everything.
         misread: errors of actuators' records that were taken out before.
+
+    Once the budget is spent, no dependences are told: they are compared with each other.
     """
     draws = null_maxima(null, seed)
     threshold = max(THRESHOLD, float(np.quantile(draws, 0.95))) if only is None else 0.0
@@ -133,9 +141,12 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
     null = selection.null
     findings, plain, errors = find_in_gears(null.plant)
     gears = [] if cautious else _named_gears(findings, threshold, only)
-    hull = 0.0 if only is not None and "hull_derivatives" not in only else hull_evidence(selection.final)
+    hull = 0.0 if is_spent() or (only is not None and "hull_derivatives" not in only) else hull_evidence(selection.final)
+    known = Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, ())
+    if is_spent():
+        return known
     if only is not None or cautious:
-        return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, tuple(dependences(selection.final)))
+        return replace(known, generic=tuple(dependences(selection.final)))
     estimated = any(null.plant.ship.lacks(part) for part in ("rudder", "propeller"))
     search = Search(selection.small or selection.null, (*(_HULL_ALONE if hull > HULL_THRESHOLD else ()), *(_ESTIMATED if estimated else ())))
     unknown, rival = _unknown(selection, gears, search)
@@ -145,11 +156,13 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
         left = next((d for d in generic if d.score > asked(d, selection.off_form) and (d.of_sensor or d.variable in NO_FORM)), None)
         left = None if left is None or left.has_name else left
     errors = [*misread, *judged(null, [e for e in errors if e.actuator not in {m.actuator for m in misread}])]
+    if is_spent():
+        return known
     if unknown is None and errors and not selection.final.model.terms and not gears:
         most = max(errors, key=lambda e: e.score)
         unknown = Dependence(most.variable, most.axis, most.form, most.score, np.nan, most.size, 0.0)
     left = None if unknown else left
-    return Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, generic, unknown, rival, left, tuple(errors))
+    return replace(known, generic=generic, unknown=unknown, rival=rival, left=left, misread=tuple(errors))
 
 
 def asked(d: Dependence, off_form: float) -> float:
@@ -170,7 +183,7 @@ def _unknown(selection: Selection, gears: Sequence[GearFinding], search: Search)
     named = bool(selection.final.model.terms) or bool(gears)
     worth = max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) if named else 0.0
     found = [d for d in search.found if d.score > max(asked(d, selection.off_form), _CONTENDS * worth)]
-    contenders = [search.settled(d) for d in found[:_CONTENDERS]] if named else found[:1]
+    contenders = [d if is_spent() else search.settled(d) for d in found[:_CONTENDERS]] if named else found[:1]
     best = max(contenders, key=lambda d: d.score, default=None)
     if best is None or best.has_name:
         return None, None

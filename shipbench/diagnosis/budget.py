@@ -1,5 +1,5 @@
-"""How much work one diagnosis may take. It is counted where fits iterate, and asked for where another search would begin: what was found stands, what
-was not looked for is said."""
+"""How much work and memory one diagnosis may take. Work is counted where fits iterate. Every loop over fits, candidates or forms asks `is_spent`;
+then fits end where they stand, and what rests on them is not told: what was found before stands, what was not looked for is said."""
 
 from __future__ import annotations
 
@@ -9,51 +9,69 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 
+from ..errors import InputError
+
 
 @dataclass
 class Budget:
     """Limits of one diagnosis, or of one of its training parts, and what it has used.
 
     iterations: linearisations of all fits together (24 runs of 120 s take 50 to 500); seconds: CPU time of this process, which other work beside it
-    does not change. From `overrun` times the limit on every fit ends where it stands, and nothing is named. stopped: iterations and seconds when the
-    limit acted first.
+    does not change; gigabytes: of the arrays of one linearisation. stopped: iterations and seconds when the limit acted first.
     """
 
     iterations: int = 2000
     seconds: float = 900.0
-    overrun: float = 2.0
+    gigabytes: float = 8.0
     used: int = 0
     stopped: tuple[int, float] | None = None
     began: float = field(default_factory=time.process_time)
 
     @property
-    def share(self) -> float:
-        """Of the limits, that which is used up first."""
-        return max(self.used / self.iterations, (time.process_time() - self.began) / self.seconds)
-
-    @property
-    def is_overrun(self) -> bool:
-        """Whether fits end where they stand."""
-        return self.share >= self.overrun
-
-    def refuses(self) -> bool:
-        """Whether no other search may begin; remembered."""
-        if self.stopped is None and self.share >= 1.0:
-            self.stopped = self.used, time.process_time() - self.began
+    def is_spent(self) -> bool:
+        """Whether a limit is reached; remembered."""
+        seconds = time.process_time() - self.began
+        if self.stopped is None and (self.used >= self.iterations or seconds >= self.seconds):
+            self.stopped = self.used, seconds
         return self.stopped is not None
 
-    def said(self, overrun: bool) -> list[str]:
-        """A line for the reader where the limit has acted; overrun: so far that nothing is named."""
+    def part(self, parts: int) -> Budget:
+        """That of one of so many parts which share the seconds that are left."""
+        left = self.seconds - (time.process_time() - self.began)
+        return Budget(self.iterations, max(left, 0.0) / parts, self.gigabytes)
+
+    def said(self, nothing: bool) -> list[str]:
+        """A line for the reader where the limit has acted; nothing: so early that nothing is named."""
         if self.stopped is None:
             return []
         iterations, seconds = self.stopped
-        stands = "Nothing is named." if overrun else "What is named so far stands; what could have followed was not looked for."
+        stands = (
+            "The plain model did not come to rest, so no cause is named." if nothing
+            else "What is named so far stands; what could have followed was not looked for."
+        )  # fmt: skip
         return [
             f"stopped after {iterations} iterations of fits in {seconds:.0f} s of CPU time; the limits are {self.iterations} iterations and "
             f"{self.seconds:g} s. {stands} Diagnose fewer or shorter runs, or raise the limit with --cpu-limit SECONDS."
         ]
 
+    def refuse_large(self, pieces: int, samples: int, columns: int) -> None:
+        """Refuse a linearisation of `columns` at so many samples of each piece, before it is made.
 
+        Raises:
+            InputError: it would take more than the `gigabytes`.
+        """
+        products, sensitivities = _COPIES * 6 * columns**2, _COPIES * 6 * samples * columns
+        needed = 8e-9 * pieces * (products + sensitivities)
+        if needed > self.gigabytes:
+            raise InputError(
+                f"the record: {pieces} pieces of {samples} samples with {columns} columns would take {needed:.3g} GB of memory. "
+                f"Accepted: up to {self.gigabytes:g} GB, here {int(pieces * self.gigabytes / needed)} pieces, one or more for each run. "
+                "Diagnose fewer runs."
+            )
+
+
+_COPIES = 3
+"""Arrays of columns, or of their products, of all six channels, that exist at once."""
 _NOW: ContextVar[Budget | None] = ContextVar("budget", default=None)
 
 
@@ -74,13 +92,12 @@ def count() -> None:
         budget.used += 1
 
 
-def is_overrun() -> bool:
-    """Whether fits end where they stand."""
-    budget = _NOW.get()
-    return budget is not None and budget.is_overrun
-
-
 def is_spent() -> bool:
-    """Whether no other search may begin."""
+    """Whether the diagnosis in progress is to end."""
     budget = _NOW.get()
-    return budget is not None and budget.refuses()
+    return budget is not None and budget.is_spent
+
+
+def refuse_large(pieces: int, samples: int, columns: int) -> None:
+    """As `Budget.refuse_large`, of the diagnosis in progress."""
+    (_NOW.get() or Budget()).refuse_large(pieces, samples, columns)

@@ -61,10 +61,11 @@ def diagnose(
         only: effects to consider (an oracle that knows what is hidden); default all.
         workers: processes for the folds; 1: everything runs in this one.
         thorough: use up to twice as much of a long record (the folds use a quarter); 90 runs of 120 s are used whole either way.
-        budget: how much work the fits of the whole may take; default that of `Budget`. A warning says where it has acted.
+        budget: how much work and memory the whole may take; default that of `Budget`. A warning says where it has acted.
 
     Raises:
-        InputError: the ship never moves, there are too few samples for any fit, the record contradicts itself, or `workers` is less than one.
+        InputError: the ship never moves, there are too few samples for any fit, the record contradicts itself, `workers` is less than one, or it
+            would take too much memory.
     """
     if workers < 1:
         raise InputError(f"workers: {workers}; accepted: whole numbers from 1.")
@@ -91,25 +92,26 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
     if not apart and len(dataset) > 1:
         warnings.append("all runs are one group (pieces of one log, say): no gain can be measured on runs that are held out.")
     wanted = gain and apart and not cautious
-    work = partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled)
+    work = partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled, budget=used.part(FOLDS))
     with process_pool(workers) if wanted and workers > 1 else nullcontext() as pool:
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
         null = plain_model(Plant.of(dataset, steps), only, settled)
-        if only is not None or cautious or is_spent():
-            found = analyse(null, only=only, seed=seed, cautious=cautious or is_spent())
+        rests = not is_spent()
+        if only is not None or cautious or not rests:
+            found = analyse(null, only=only, seed=seed, cautious=cautious or not rests)
         else:
             as_recorded = dataset
             found, dataset, turned, no_cause = _as_it_must_be_read(dataset, null, steps, settled, seed)
             units = joined([*units, *turned])
             if dataset is not as_recorded or no_cause != settled:
                 ahead, work = None, partial(work, dataset=dataset, settled=no_cause)
-        doubts = doubts_of(found) if only is None else []
-        overrun = used.is_overrun
-        if overrun:  # its last fits do not rest
-            found = analyse(null, only=only, seed=seed, cautious=True)
-        worth = _cross_validated(dataset, found, seed, work, pool, ahead) if wanted and not doubts and not is_spent() else Worth()
-    lines = record.told + warnings + used.said(overrun) + list(worth.told)
+        doubts = doubts_of(found) if only is None and rests else []
+        share = used.part(FOLDS)
+        worth = (
+            _cross_validated(dataset, found, seed, partial(work, budget=share), pool, ahead) if wanted and not doubts and not is_spent() else Worth()
+        )
+    lines = record.told + warnings + used.said(nothing=not rests) + list(worth.told)
     lines += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + mended + said(dataset) + doubts
     lines += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
@@ -192,14 +194,15 @@ def _as_it_must_be_read(
         return plain_model(Plant.of(read, steps), settled=settled)
 
     turned = turned_actuators(dataset, null)
+    turned = [] if is_spent() else turned  # fits that were stopped are not to be compared
     read = corrected(dataset, turned)
     found = analyse(plain(read) if turned else null, seed=seed)
-    if turned and doubts_of(found):
+    if turned and not is_spent() and doubts_of(found):
         turned, read, found = [], dataset, analyse(null, seed=seed)
     if wrong := [e for e in found.misread if e.contradicted]:
         read = misread.read_rightly(read, wrong)
         found = analyse(plain(read), seed=seed, misread=wrong)
-    if late := ruled_out(read, found.final):
+    if not is_spent() and (late := ruled_out(read, found.final)):
         settled = (*settled, *late)
         found = analyse(plain(read), seed=seed, misread=wrong)
     return found, read, turned, settled
@@ -231,15 +234,15 @@ def _in_time(dataset: Dataset) -> Dataset:
 
 @threadpool_limits.wrap(limits=1)  # a process of its own
 def _one_fold(
-    fold: int, threshold: float, hull: bool, *, dataset: Dataset, seed: int, only: Sequence[str] | None, settled: Sequence[str]
+    fold: int, threshold: float, hull: bool, *, dataset: Dataset, seed: int, only: Sequence[str] | None, settled: Sequence[str], budget: Budget
 ) -> FoldGain:
-    """Selection and fits on the training part of one fold."""
+    """Selection and fits on the training part of one fold, within a part of the budget of the whole."""
     test = _folds(dataset, seed)[fold]
     train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
     plant = Plant.of(dataset.with_runs(train), FOLD_STEPS)
-    with limited(Budget()) as used:
+    with limited(Budget(budget.iterations, budget.seconds, budget.gigabytes)) as used:
         extension, plain = causes_of(plant, threshold, only, settled)
-    return replace(fold_gain(dataset, test, extension, plain, hull), stopped=used.stopped is not None)
+        return replace(fold_gain(dataset, test, extension, plain, hull), stopped=used.is_spent)
 
 
 def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
@@ -286,6 +289,8 @@ def _cross_validated(
     rest = range(len(ready), len(_folds(dataset, seed)))
     parts = list((pool.map if pool else map)(partial(work, threshold=found.threshold, hull=hull), rest))
     parts += [part.result() for part in ready]
+    if stopped := sum(part.stopped for part in parts):
+        return Worth(told=(f"no gain is measured: {stopped} of {len(parts)} training parts were stopped by the limit on work.",))
     before, after, with_hull = (np.zeros(len(dataset)) for _ in range(3))
     for part in parts:
         before[part.test], after[part.test], with_hull[part.test] = part.before, part.after, part.with_hull
@@ -294,6 +299,4 @@ def _cross_validated(
     if name_hull:
         after = with_hull
     rows = tuple((run.id, float(b), float(a)) for run, b, a in zip(dataset.runs, before, after, strict=True))
-    stopped = sum(part.stopped for part in parts)
-    told = (f"of the selections on training parts {stopped} of {len(parts)} were stopped by the limit on work: the gain may be too small.",)
-    return Worth(summarise(before, after, seed, groups), rows, name_hull, told if stopped else ())
+    return Worth(summarise(before, after, seed, groups), rows, name_hull)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .budget import count, is_overrun
+from .budget import count, is_spent
 from .gram import Hyper
 from .model import NUM_BASE, Linearisation, Point, Scales
 from .plant import Plant
@@ -40,7 +40,7 @@ def fit(
     begun: tuple[Linearisation, Fit] | None = None, free_steps: int = _FREE_STEPS,
 ) -> Fit:  # fmt: skip
     """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), until it rests or promises
-    less log evidence than `hope`, when it is not worth its time.
+    less log evidence than `hope`, when it is not worth its time; or, once the budget is spent, where it stands.
 
     A step is at first halved only where the cost explodes: the cost of a step that is right for the parameters rises until the latent force has
     followed, and the path would else end where parameters compensate each other. The best point of the path is kept, by its evidence once the force
@@ -72,7 +72,7 @@ def fit(
         if best is None or worth > best[0]:
             best = worth, found, lin
         count()
-        if is_overrun() or stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
+        if is_spent() or stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
             break
         before = found.evidence
         after, seen = _step(lin, found, number + 1 < free_steps, 0.5**stale) if number < iterations - 1 else (None, None)
@@ -80,8 +80,8 @@ def fit(
             break
         lin = after
     assert best is not None
-    found, lin = best[1:] if is_overrun() else _followed(*best[1:])
-    if free_steps and found.excess > _LOST and not is_overrun():
+    found, lin = _followed(*best[1:])
+    if free_steps and found.excess > _LOST and not is_spent():
         again = fit(
             plant, scales, model, point, *began, iterations=iterations, candidates=candidates, guess=guess, hope=hope, far=far, begun=begun,
             free_steps=0,
@@ -95,7 +95,7 @@ def looking_at(found: Fit, candidates: Sequence[Term]) -> Fit:
     """`found` with columns of `candidates`, fitted on if it does not rest on the linearisation with which fits begin."""
     plant, scales, model, hyper, log_tau2 = found.plant, found.scales, found.model, found.hyper, found.log_tau2
     again = settle(Linearisation(plant, scales, found.point, found.motion), model, hyper, log_tau2, candidates, leap=0.0)
-    if again.excess < _AT_REST:
+    if again.excess < _AT_REST or is_spent():
         return again
     return fit(plant, scales, model, found.point, hyper, log_tau2, candidates=candidates, guess=found.motion)
 
@@ -110,7 +110,7 @@ def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Lin
     plant, scales, model, may_rise = lin.plant, lin.scales, found.model, _MAY_RISE if free else 1.0
     target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
     at, followed, share = objective(lin, model, found.hyper, found.log_tau2, found.gram), at_point(found, lin.point), share
-    while True:
+    while not is_spent():
         part = between(lin.point, target, share)
         trial = Linearisation(plant, scales, part, lin.towards(part), coarse=free)
         cost = objective(trial, model, found.hyper, found.log_tau2, found.gram)
@@ -123,13 +123,14 @@ def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Lin
         if share < _LEAST_SHARE and free and cost < _MAY_FOLLOW * at:
             return trial, seen
         if share < (_LEAST_OF_ALL if free else _LEAST_SHARE):
-            return None, None
+            break
+    return None, None
 
 
 def _followed(found: Fit, lin: Linearisation) -> tuple[Fit, Linearisation]:
     """Initial states and latent force where they suit the parameters of the point best; the step of a segment is halved while its cost rises."""
     for _ in range(_FOLLOWING):
-        if found.excess < _AT_REST:
+        if found.excess < _AT_REST or is_spent():
             break
         here, (eta, w), before = lin.point, suiting(found, lin.point), by_segment(lin, found.hyper, found.gram)
         share = np.ones(len(before))

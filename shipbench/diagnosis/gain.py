@@ -12,6 +12,7 @@ from ..physics.actuators import Gear
 from ..records import Dataset
 from ..ship import complete
 from .averaging import averaged
+from .budget import is_spent
 from .model import FREE, NUM_BASE, Linearisation, Point, Scales
 from .outcome import Gain
 from .plant import NUM_HULL, Plant, cut
@@ -59,7 +60,8 @@ def plain_base() -> np.ndarray:
 def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
     """Least squares of whole rollouts over p, the named effects (and the hull where it is named), weakly held by their priors.
 
-    Channels are weighed by the root mean square of the error before the fit, positions as one: the spread that the model must explain.
+    Channels are weighed by the root mean square of the error before the fit, positions as one: the spread that the model must explain. Once the
+    budget is spent, it ends where it stands.
     """
     free = list(range(len(FREE) + (NUM_HULL if extension.hull else 0)))
     terms = tuple(t for t in extension.terms if not t.per_run)  # a run that was not seen has no value of its own
@@ -67,6 +69,8 @@ def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
     lin = _lin(plant, scales, Rollout(plain_base(), terms, start))
     weights = _weights(lin)
     for _ in range(_STEPS):
+        if is_spent():
+            break
         base, own = lin.parameter_columns(free)
         J = np.concatenate([base, *own], axis=-1) * weights[None, :, None]
         J = J * np.repeat(plant.seg.mask, 6, axis=1)[..., None]

@@ -8,6 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
+from .budget import is_spent
 from .columns import Bend, Columns
 from .fit import fit
 from .forms import Feature, of_forces, of_sensors
@@ -92,7 +93,8 @@ class Search:
     """Every variable on every axis and channel, best first (`found`); judged beside the model of a fit, and beside forces that follow the variables
     `beside`, as on a ship that is the same to port and to starboard.
 
-    The forces are there at every step of the trajectory: between the knots of the latent force, rudder and propeller change.
+    The forces are there at every step of the trajectory: between the knots of the latent force, rudder and propeller change. Once the budget is
+    spent, what is found is not all, and not to be used.
     """
 
     def __init__(self, fit: Fit, beside: Collection[str] = ()) -> None:
@@ -121,7 +123,7 @@ class Search:
         constant = {d.axis: t for d, t in alone if d.variable == "nothing" and d.axis in AXES}
         doubtful = [d for d in self._parts if d.variable in _BY_RUN and not d.of_sensor and d.score > 0.0]
         own = {d: self._parts[d] if d.variable == "waves" else [constant[axis] for axis in d.axis.split(" and ")] for d in doubtful}
-        lost = [d for d in doubtful if self._of_runs(own[d]) > d.score]
+        lost = [d for d in doubtful if not is_spent() and self._of_runs(own[d]) > d.score]
         told = {d: replace(d, variable="time") if d.variable == "waves" else d for d in self._parts if d not in lost}
         self._parts = {named: self._parts[d] for d, named in told.items()}
         self.found = sorted(self._parts, key=lambda d: -d.score)
@@ -158,7 +160,7 @@ class Search:
 
     def _best(self, tried: Sequence[_Tried]) -> list[tuple[Dependence, _Tried]]:
         """The best form of every variable and axis."""
-        if not tried:
+        if not tried or is_spent():
             return []
         gram = self._gram(tried)
         reduced = gram.reduce(self.usual)
@@ -168,7 +170,7 @@ class Search:
         for _, group in groupby(zip(tried, places, strict=True), key=lambda pair: (pair[0].axis, pair[0].variable)):
             solution, best, at = max(((solve(reduced, _with(self.prior, at)), t, at) for t, at in group), key=lambda way: way[0].log_evidence)
             gain, log_force = solution.log_evidence - null, self.usual
-            if gain - best.cost > _WORTH_MORE:
+            if gain - best.cost > _WORTH_MORE and not is_spent():
                 after, log_force = self._evidence(gram, at)
                 gain = after - self.before
             size, share, taken = float(np.linalg.norm(solution.mean[-best.size :])), np.nan, 0.0
@@ -182,7 +184,7 @@ class Search:
     def _together(self, of: Sequence[tuple[Dependence, _Tried]]) -> tuple[Dependence, *tuple[_Tried, ...]] | None:
         """The best forms of a variable on all axes where they are worth something, the strongest first; None where that is one axis alone."""
         parts = sorted((pair for pair in of if pair[0].score > 2.0 * _WORTH_MORE), key=lambda pair: -pair[0].score)
-        if len(parts) < 2:
+        if len(parts) < 2 or is_spent():
             return None
         gram, size = self._gram([t for _, t in parts]), sum(t.size for _, t in parts)
         after, _ = self._evidence(gram, self.first + np.arange(size))

@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 
 from ..signals import R, U, V
+from .budget import is_spent
 from .colour import Colour
 from .settle import Fit, evidence_with
 from .wrong import CHANNEL_UNITS, RESIDUALS
@@ -30,11 +31,13 @@ _RISES, _LONGEST, _LIKELY = 0.2, 30, 4.0
 
 def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colour:
     """Correlation of the noise of each channel that suits the residuals by far better than none; found: of this share of the pieces. waves_alone:
-    look for motion with the waves, and for nothing that lasts."""
+    look for motion with the waves, and for nothing that lasts. Channels that are not reached before the budget is spent keep white noise."""
     worth = WORTH * share
     colour = Colour.white(found.plant.steps + 1)
     best = evidence_with(found, colour)
     for channel in np.flatnonzero(found.plant.seg.seen).tolist():
+        if is_spent():
+            break
         grids = _swinging(found, colour, channel) + ([] if waves_alone else _lasting(found, colour, channel, best + worth))
         reached, way = max((_climbed(found, grid) for grid in grids), key=lambda c: c[0], default=(best, colour))
         if reached > best + worth:
@@ -50,7 +53,7 @@ def _climbed(found: Fit, grid: np.ndarray) -> tuple[float, Colour]:
         steps = [(axis, step) for axis in range(grid.ndim) for step in (-1, 1) if 0 <= at[axis] + step < grid.shape[axis]]
         for axis, step in steps:
             beside = (*at[:axis], at[axis] + step, *at[axis + 1 :])
-            if beside not in known:
+            if beside not in known and not is_spent():
                 known[beside] = evidence_with(found, grid[beside])
         summit = max(known, key=lambda place: known[place])
         if summit == at:
@@ -64,7 +67,7 @@ def _tuned(found: Fit, colour: Colour, channel: int, best: float) -> tuple[float
     share, time, period = (float(x[channel]) for x in (colour.share, colour.time, colour.period))
     for factor in (_FURTHER, 1.0 / _FURTHER):
         stretch = factor
-        while 2.0 < period * stretch < found.plant.steps:
+        while 2.0 < period * stretch < found.plant.steps and not is_spent():
             way = colour.with_channel(channel, share, time * stretch, period * stretch)
             worth = evidence_with(found, way)
             if worth <= best:

@@ -52,12 +52,12 @@ def _best(null: Fit, factors: Sequence[float]) -> tuple[float, float]:
     own = null if few is null.plant else null_fit(few, Scales(few))
     best, most = 1.0, 0.0
     for plant, factor in ((few.resized(factor), factor) for factor in factors):
-        if first_evidence(plant, own) - own.evidence < _WORTH_A_FIT:
+        if is_spent() or first_evidence(plant, own) - own.evidence < _WORTH_A_FIT:
             continue
         gain = null_fit(plant, Scales(plant)).evidence - own.evidence
         if gain > most:
             best, most = factor, gain
-    return best, most
+    return (1.0, 0.0) if is_spent() else (best, most)  # fits that were stopped are not to be compared
 
 
 def _times(null: Fit) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .budget import is_spent
 from .colour import Colour
-from .fit import Origin, fit
+from .fit import Origin, fit, looking_at
 from .gram import Hyper
 from .model import Scales
 from .noise import WORTH, colour_of, swinging_force
@@ -34,7 +34,8 @@ REFIT_ITERATIONS = 16
 
 def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
     """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion; where sensors err
-    for longer than a sample, with such noise; without the few pieces that no ship's motion explains."""
+    for longer than a sample, with such noise; without the few pieces that no ship's motion explains. Once the budget is spent, that of some pieces
+    alone, where it stands."""
     few = plant.thinned(FEW_PIECES)
     found, share = _begun(few, scales), len(few.seg.run) / len(plant.seg.run)
     if plant.seg.commanded:
@@ -43,6 +44,8 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
             if np.ptp(plant.seg.commands[..., i]) > 0.0:
                 found = _with_gear(found, name, field)
     found, scales, colour = _beside_waves(found, scales, share)
+    if is_spent():
+        return looking_at(found, candidates)
     if few is not plant:
         found = _begun(plant.driven(found.plant.ordinary), scales)
     scales = found.scales.coloured(colour)
@@ -53,7 +56,7 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
 def beside_noise_of(named: Fit, null: Fit) -> Fit | None:
     """The plain model `null` fitted again beside the noise that suits the causes of `named`; None where its own does about as well, or is white. What
     a late or a turned sensor errs by lasts, as noise may, and beside such noise it is worth less, or is taken for something else."""
-    if not null.scales.colour.share.any():
+    if is_spent() or not null.scales.colour.share.any():
         return None
     colour = colour_of(named)
     if evidence_with(named, colour) < evidence_with(named, named.scales.colour) + WORTH:
@@ -94,7 +97,7 @@ def _beside_waves(found: Fit, scales: Scales, share: float, waves_alone: bool = 
     follows them is large, hides what is slow, and leaves residuals that swing too fast."""
     colour = colour_of(found, share, waves_alone)
     waves = swinging_force(found, colour)
-    if np.isfinite(waves.period).any():
+    if np.isfinite(waves.period).any() and not is_spent():
         scales = scales.coloured(waves)
         found = _begun(found.plant, scales)
         colour = colour_of(found, share, waves_alone)
@@ -127,19 +130,19 @@ def _with_gear(found: Fit, name: str, field: str) -> Fit:
     for factors in _GEAR_FACTORS:
         for factor in factors:
             tried = _behind(found, name, field, getattr(first.plant.ordinary[name], field) * factor)
-            if 2.0 * (tried.evidence - found.evidence) < _WORTH_A_GEAR:
+            if is_spent() or 2.0 * (tried.evidence - found.evidence) < _WORTH_A_GEAR:
                 break
             found = tried
-        if found is not first:
+        if found is not first or is_spent():
             break
     for factor in (_FINER, 1.0 / _FINER):
         before = found
         for _ in range(_FINER_STEPS):
             tried = _behind(found, name, field, getattr(found.plant.ordinary[name], field) * factor)
-            if tried.evidence <= found.evidence:
+            if is_spent() or tried.evidence <= found.evidence:
                 break
             found = tried
-        if found is not before:
+        if found is not before or is_spent():
             break
     return found
 

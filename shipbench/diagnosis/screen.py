@@ -99,6 +99,8 @@ def screen(fit: Fit) -> list[Score]:
     """Scores of the candidates that `fit` was given, best first; for those that are not hopeless the variances are re-estimated: the force of the
     plain model has absorbed part of whatever is missing."""
     gram, candidates, columns, scores = fit.gram, fit.candidates, _columns(fit), glance(fit)
+    if is_spent():
+        return sorted(scores, key=lambda s: -s.score)
     base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
     renumbered = replace(fit.prior, shared=np.arange(len(fit.prior.shared)), random=np.arange(len(fit.prior.shared), len(base)))
     before, log_force, _ = evidence(gram.only(base), renumbered, fit.hyper.log_force)

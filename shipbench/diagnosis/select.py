@@ -183,7 +183,7 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
     seen = {s.term: s.score for s in glance(start.seen)}
     found, best, least = list[tuple[Fit, float]](), threshold, -np.inf
     for score in sorted(scores, key=lambda s: -seen[s.term]):
-        if found and is_spent():
+        if is_spent():
             break
         tried = start.refit(score, least)
         if threshold - _NEAR < 2.0 * (tried.evidence - now.evidence) < threshold:
@@ -208,8 +208,8 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     """
     plain, grown = null, _grown(null, threshold, most)
     if grown.again is not None:
-        null = grown.again
-        grown = _grown(null, threshold, most, again=True)
+        again = _grown(grown.again, threshold, most, again=True)
+        null, grown = (null, grown) if is_spent() else (grown.again, again)
     now, scores, careful = grown.now, grown.scores, threshold > 0.0
     pruned = needed_only(now, threshold, grown.besides, spare_last=False)
     pruned, unsure = wanted_only(pruned, lambda f, i: stands(f, i) and not bends(f, i, null)) if careful else (pruned, ())
@@ -258,16 +258,17 @@ class _Grown:
 def _grown(null: Fit, threshold: float, most: int, again: bool = False) -> _Grown:
     """Forward selection; again: do not ask for other noise once more."""
     first, careful = screen(null), threshold > 0.0  # who is told the names needs no such care
-    state = _Grown(null, first, first, [], set(), _OFF_FORM * max(hull_evidence(null), 0.0) if careful else 0.0, careful)
+    state = _Grown(null, first, first, [], set(), _OFF_FORM * max(hull_evidence(null), 0.0) if careful and not is_spent() else 0.0, careful)
     origin = Origin.of(null.plant, null.scales)
     for round_ in takewhile(lambda _: not is_spent(), range(most)):
         now = state.now
         tried = refits(now, worth_a_refit(state.scores, now, threshold), origin, threshold)
-        if all(2.0 * (f.evidence - now.evidence) < threshold for f, _ in tried):
+        if not is_spent() and all(2.0 * (f.evidence - now.evidence) < threshold for f, _ in tried):
             tried += refits(now, absorbed([f for f, _ in tried], now, threshold, origin), origin, threshold)
         state.steps.extend(Step.of(round_, f, now, score) for f, score in tried)
         state.tiny.update(f.model.terms[-1].label for f, score in tried if score > threshold and not matters(f, -1))
-        best = _or_change(now, max((f for f, _ in tried), key=state.gain, default=None), origin)
+        # of a round that is cut short the best is not known
+        best = None if is_spent() else _or_change(now, max((f for f, _ in tried), key=state.gain, default=None), origin)
         imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
         # what a fit that does not rest could still gain by itself is no gain of the next cause
         if best is None or state.gain(best) < threshold + imprecise + now.excess:
@@ -277,7 +278,7 @@ def _grown(null: Fit, threshold: float, most: int, again: bool = False) -> _Grow
         now = widened(looking_at(needed_only(best, threshold, state.besides), null.candidates))
         if round_ == 0 and not again and (other := beside_noise_of(now, null)) is not None:
             return replace(state, now=now, again=other)
-        state = replace(state, now=now, scores=screen(now))
+        state = state if is_spent() else replace(state, now=now, scores=screen(now))
     return state
 
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import pytest
 
+from shipbench.diagnosis import analysis, noise
+from shipbench.diagnosis import diagnose as whole
 from shipbench.diagnosis import select as selection
 from shipbench.diagnosis.analysis import THRESHOLD, plain_model
-from shipbench.diagnosis.budget import Budget, count, is_overrun, is_spent, limited
+from shipbench.diagnosis.budget import Budget, count, is_spent, limited
 from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.fit import Origin, fit
+from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.settle import Fit, Model
 from shipbench.effects.base import EFFECTS
+from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
 from shipbench.simulate.hidden import Hidden
@@ -24,22 +30,30 @@ def turned() -> Dataset:
 
 def test_work_is_counted_inside_and_a_limit_is_remembered():
     assert not is_spent()  # without a budget there is no limit
-    with limited(Budget(iterations=3, overrun=2.0)) as budget:
+    with limited(Budget(iterations=3)) as budget:
         count()
         count()
         assert not is_spent()
-        assert budget.said(overrun=False) == []
+        assert budget.said(nothing=False) == []
         count()
         assert is_spent()
-        assert not is_overrun()
-        for _ in range(3):
-            count()
-        assert is_overrun()
+        count()
         assert budget.stopped[0] == 3
     assert not is_spent()
-    (line,) = budget.said(overrun=True)
+    (line,) = budget.said(nothing=True)
     assert "stopped after 3 iterations" in line
-    assert "Nothing is named" in line
+    assert "no cause is named" in line
+
+
+def test_parts_share_the_seconds_that_are_left():
+    assert 1.9 < Budget(seconds=10.0).part(5).seconds <= 2.0
+    assert Budget(seconds=1e-9).part(5).seconds == 0.0
+
+
+def test_what_takes_too_much_memory_is_refused_before_it_is_made(turned, monkeypatch):
+    monkeypatch.setattr(analysis, "null_fit", None)
+    with pytest.raises(InputError, match=r"8 pieces of 61 samples .* GB of memory. Accepted: up to 0.001 GB"):
+        diagnose(turned, gain=False, budget=Budget(gigabytes=1e-3))
 
 
 def test_seconds_are_those_of_the_processor():
@@ -63,7 +77,41 @@ def test_a_small_budget_ends_the_diagnosis_with_what_stands_and_says_so(turned):
     assert (found.verdict, found.causes, found.gain) == ("none", (), None)
     (line,) = [w for w in found.warnings if w.startswith("stopped after")]
     assert "--cpu-limit" in line
+    assert "no cause is named" in line
     assert {c.effect for c in found.candidates} >= {"heading_bias", "current"}
+
+
+def test_a_diagnosis_begins_little_after_its_limit(turned):
+    budget = Budget(iterations=3)
+    diagnose(turned, gain=False, budget=budget)
+    assert budget.used <= 3 + 2  # fits that others need, of one iteration each
+
+
+def test_a_round_that_is_cut_short_names_nothing(turned, monkeypatch):
+    """Of the causes that were not tried one may be better."""
+    budget = Budget()
+
+    def plain_then_one_more(*args: object, **kwargs: object) -> Fit:
+        null = plain_model(*args, **kwargs)
+        budget.iterations = budget.used + 1
+        return null
+
+    monkeypatch.setattr(whole, "plain_model", plain_then_one_more)
+    found = diagnose(turned, gain=False, budget=budget)
+    assert (found.verdict, found.causes) == ("none", ())
+    (line,) = [w for w in found.warnings if w.startswith("stopped after")]
+    assert "What is named so far stands" in line
+    assert budget.used <= budget.iterations + 2
+
+
+def test_noise_is_not_looked_for_after_the_limit(turned, monkeypatch):
+    plant, asked = Plant.of(turned), []
+    origin = Origin.of(plant, Scales(plant))
+    null = fit(plant, Scales(plant), Model(), origin.point, origin.hyper, iterations=1, guess=origin.motion, far=True)
+    monkeypatch.setattr(noise, "evidence_with", lambda found, colour: asked.append(colour) or 0.0)
+    with limited(Budget(iterations=0)):
+        assert not noise.colour_of(null).share.any()
+    assert len(asked) == 1
 
 
 @pytest.mark.long

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from shipbench.diagnosis.budget import Budget
 from shipbench.diagnosis.diagnose import _folds, _one_fold, diagnose
 from shipbench.diagnosis.gain import summarise
 from shipbench.effects.base import EFFECTS
@@ -63,6 +64,6 @@ def test_a_part_in_a_process_of_its_own_takes_one_thread(monkeypatch):
 
     monkeypatch.setattr("shipbench.diagnosis.diagnose.causes_of", counted)
     with threadpool_limits(limits=2), pytest.raises(InterruptedError):
-        _one_fold(0, 10.0, False, dataset=grouped("-" * 6), seed=0, only=None, settled=())
+        _one_fold(0, 10.0, False, dataset=grouped("-" * 6), seed=0, only=None, settled=(), budget=Budget())
     assert threads
     assert set(threads) == {1}
