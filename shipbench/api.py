@@ -123,10 +123,10 @@ class Verdict(Diagnosis):
     """A diagnosis that shows its verdict in words; `verdict`, `causes`, `extended_model` and `gain` are the main fields."""
 
     def __repr__(self) -> str:
-        from .bench.diagnosis_text import headline, next_command
+        from .bench.diagnosis_text import headline
 
-        compare = f"Compare: {command}" if (command := next_command(self)) else ""
-        return brief("\n".join(filter(None, [f"Diagnosis of {self.dataset}", headline(self), f"Extended model: {self.extended_model}", compare])))
+        compare = f'Compare: shipbench.benchmark(["physics", "{self.extended_model}"], data)' if self.extended_model != "physics" else ""
+        return brief("\n".join([f"Diagnosis of {self.dataset}", headline(self), compare]).rstrip())
 
 
 def diagnose(data: Data, *, gain: bool = True, seed: int = 0, workers: int = 2, thorough: bool = False) -> Verdict:
