@@ -84,7 +84,7 @@ def test_headings_far_beyond_a_turn_are_told_from_headings_that_are_counted_on(t
 def test_a_heading_that_is_counted_on_is_read_and_its_reach_reported(trial_import):
     table = logged(T)
     table["HDG"] += 1080.0
-    told = trial_import(table).stdout
+    told = " ".join(trial_import(table).stdout.split())
     assert 'psi reaches 1298 deg: taken as counted on over north. If it is in steps of 0.01 deg: unit = "cdeg"' in told
     assert "DOUBTFUL" not in told
 
