@@ -110,4 +110,8 @@ def make_progress(quiet: bool = False) -> Progress:
     """The reporter that fits the place: silent, bar or lines."""
     if quiet:
         return Silent()
+    from .notebook_bar import NotebookBar, in_notebook
+
+    if in_notebook():
+        return NotebookBar()
     return Bar() if sys.stderr.isatty() else Lines()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import sys
+import types
 
 import pytest
 
@@ -53,3 +55,37 @@ def test_the_bar_prints_a_line_only_for_what_went_wrong(monkeypatch):
     bar.finish()
     assert printed == ["b: failed, 2 of 2 runs: no"]
     assert bar.progress.finished
+
+
+class _Page:
+    """What a notebook's kernel offers to show things."""
+
+    def __init__(self):
+        self.shown = []
+
+    def update(self, html):
+        self.shown.append(html)
+
+
+def test_a_notebook_gets_one_bar_that_is_redrawn(monkeypatch):
+    page = _Page()
+    shell = type("ZMQInteractiveShell", (), {})()
+    package = types.ModuleType("IPython")
+    package.get_ipython = lambda: shell
+    package.display = types.ModuleType("IPython.display")
+    package.display.HTML, package.display.display = str, lambda html, display_id: page
+    monkeypatch.setitem(sys.modules, "IPython", package)
+    monkeypatch.setitem(sys.modules, "IPython.display", package.display)
+    bar = make_progress()
+    bar.start(2)
+    bar.working("physics")
+    bar.done("physics", "ok")
+    assert 'value="1" max="2"' in page.shown[-1]
+    assert "left" in page.shown[-1]
+    bar.done("mine", "failed: <b>")
+    bar.warn("late")
+    bar.finish()
+    assert "finished in" in page.shown[-1]
+    assert page.shown[-1].endswith("<br>mine: failed: &lt;b&gt;<br>warning: late</div>")
+    package.get_ipython = lambda: None
+    assert isinstance(make_progress(), Lines)
