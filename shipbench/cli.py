@@ -157,9 +157,9 @@ def run(
         show_boards(written, full)
         say(f"Results: {folder}\nLeaderboard: {', '.join(str(path) for _, path in written)}")
         if not quiet and (equations := sorted(folder.glob("cells/*/*/*/equations.txt"))):
-            say(f"Fitted equations of {len(equations)} models: for example {equations[0]}")
+            say(f"Fitted equations of {len(equations)} models, for example:\n  {equations[0]}")
     for (name, model_name), note in fit_notes(outcome.summaries).items():
-        say(f"warning: {name}, {model_name}: {note}", err=True)
+        say_wrapped(f"warning: {name}, {model_name}: {note}", err=True)
     exit_if_failed(outcome.failed, f"{len(outcome.failed)} of {len(outcome.summaries)} fits")
 
 

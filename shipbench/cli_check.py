@@ -31,6 +31,7 @@ def data_check(
     """
     from .bench.check_report import check_document, write_findings
     from .bench.dataset_facts import dataset_facts
+    from .bench.progress import steps_shown
     from .checking.applying import laid, write_lines
     from .checking.base import check_path
 
@@ -38,7 +39,8 @@ def data_check(
         raise InputError(
             f"'{dataset}' has no dataset.toml to apply lines to; accepted: a folder with one. Make it: shipbench data export {dataset} --out FOLDER"
         )
-    recording, findings = check_path(dataset)
+    with steps_shown(quiet or as_json):
+        recording, findings = check_path(dataset)
     facts, document = dataset_facts(recording.dataset), check_document(recording, findings)
     proposed = [f for f in findings if f.severity != "note"]
     written = write_findings(recording, findings, out) if out is not None else []

@@ -52,13 +52,13 @@ def show_table(table: Table) -> None:
     table.show(console_for_tables())
 
 
-def say_wrapped(text: str, indent: str = "", hanging: str = "") -> None:
+def say_wrapped(text: str, indent: str = "", hanging: str = "", err: bool = False) -> None:
     """Print text in lines of the terminal's width. In a pipe without COLUMNS lines stay whole: they can be searched."""
     from .bench.terminal import paragraph
 
-    width = screen_width() if sys.stdout.isatty() or "COLUMNS" in os.environ else 10**6
+    width = screen_width() if (sys.stderr if err else sys.stdout).isatty() or "COLUMNS" in os.environ else 10**6
     for line in text.split("\n"):
-        say("\n".join(paragraph(shown(line), width, indent, hanging)))
+        say("\n".join(paragraph(shown(line), width, indent, hanging)), err=err)
 
 
 def screen_width() -> int:

@@ -81,18 +81,19 @@ def data_describe(
 ) -> None:
     """Print a data card: statistics (beside the paper's Table II), durations, noise, what the data cannot identify."""
     from .bench.data_card import make_card, write_card
+    from .bench.progress import steps_shown
     from .data.base import load_dataset
 
-    data = load_dataset(dataset)
-    card = make_card(data)
+    with steps_shown(quiet or as_json):
+        data = load_dataset(dataset)
+        card = make_card(data)
     written = write_card(card, data, out) if out is not None else []
     if as_json:
         print_json(card.document())
         return
     say_wrapped(f"{card.lead()}\n")
-    for key, table in card.tables.items():
-        if full or key in card.BRIEF:
-            show_table(table)
+    for table in card.tables.values() if full else card.brief():
+        show_table(table)
     if not full:
         say("All tables: --full" + ("" if written else ", or --out FOLDER for a page with plots"))
     if written:

@@ -30,6 +30,7 @@ def diagnose(
     """Show what the physics model gets wrong on a data set, name the cause, and measure what naming it is worth."""
     from .bench.diagnosis_report import write_diagnosis
     from .bench.diagnosis_text import summary_lines
+    from .bench.progress import steps_shown
     from .data.base import load_dataset
     from .diagnosis.budget import Budget
     from .diagnosis.diagnose import diagnose as run
@@ -37,7 +38,9 @@ def diagnose(
     data = load_dataset(dataset)
     folder = out or Path("diagnoses") / file_name(Path(data.name).name)
     make_folder(folder)
-    found = replace(run(data, gain=gain, seed=seed, workers=workers, thorough=thorough, budget=Budget(seconds=cpu_limit)), spec=dataset)
+    with steps_shown(quiet or as_json):
+        found = run(data, gain=gain, seed=seed, workers=workers, thorough=thorough, budget=Budget(seconds=cpu_limit))
+    found = replace(found, spec=dataset)
     written = write_diagnosis(found, folder)
     if as_json:
         print_json(found.document())

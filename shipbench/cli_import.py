@@ -58,13 +58,15 @@ def data_import(
             f"{'--map' if mapping is None else '--ship'} is missing; needed: --map mapping.toml and --ship ship.toml. "
             "`shipbench data import LOG --propose mapping.toml` writes a draft of the mapping."
         )
+    from .bench.progress import steps_shown
     from .importing.importer import import_logs
     from .importing.mapping import load_mapping
     from .ship import Ship
 
     plan = load_mapping(mapping, name=name, dt=dt, window=window, shortest=shortest, still_speed=still)
     folder = out or Path(file_name(plan.name))  # a name is no path
-    summary = import_logs(logs, plan, Ship.load(ship), folder, force=force, tell=lambda line: None if quiet else say(line, err=True))
+    with steps_shown(quiet or as_json):
+        summary = import_logs(logs, plan, Ship.load(ship), folder, force=force, tell=lambda line: None if quiet else say(line, err=True))
     if as_json:
         print_json(summary.document())
     else:

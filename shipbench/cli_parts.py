@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .cli_common import Json, print_json, say, say_wrapped, show_table
+from .cli_common import Json, print_json, say, say_wrapped, screen_width, show_table
 from .errors import unknown_name
 
 _Name = Annotated[str | None, typer.Argument(metavar="[NAME]", help="Explain this one (default: list all).")]
@@ -103,6 +103,7 @@ def _sizes(part: dict[str, Any]) -> list[str]:
 def _effect(part: dict[str, Any], as_json: bool) -> None:
     """What an effect is, its sizes with units, its source, the trial that separates it, and a command that uses it."""
     from .bench.tables import Table, TableColumn, display_unit, significant
+    from .bench.terminal import command_lines
     from .effects.base import EFFECTS
 
     effect = EFFECTS.get(part["name"])
@@ -131,7 +132,8 @@ def _effect(part: dict[str, Any], as_json: bool) -> None:
     if part["name"] in ("unit_or_sign_error", "change_point"):
         say("  shipbench diagnose demo")
     else:
-        say(f"  shipbench run --model physics --model physics+{part['name']} --dataset demo --horizon 60")
+        command = f"shipbench run --model physics --model physics+{part['name']} --dataset demo --horizon 60"
+        say("\n".join(command_lines(command, screen_width())))
 
 
 def register(app: typer.Typer) -> None:

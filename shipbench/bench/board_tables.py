@@ -41,7 +41,7 @@ def table_iii(scores: Scores) -> Table:
         line: dict[str, Any] = {"rank": "" if model == CEILING else str(place), "model": model, "runs": f"{scored}/{expected}"}
         lines.append(line | {key: value for m in metrics for key, value in figures[m][model].items()})
     notes = [
-        f"{', '.join(columns[m]['label'] + ' in ' + columns[m]['unit'] for m in metrics)}: per run the mean over the predicted knots; "
+        f"{', '.join(columns[m]['label'] + ' in ' + columns[m]['unit'] for m in metrics)}: averaged over the predicted time steps of each run; "
         f"{MU} mean, m median, {SIGMA} standard deviation (n - 1), IQR interquartile range over the runs of a fold; "
         "then the mean over folds (and seeds). Intervals: 95 %, bootstrap over runs."
     ]

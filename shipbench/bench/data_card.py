@@ -7,10 +7,10 @@ import os
 import shutil
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ..data.sensitivity import IMITATED, UNFELT, Telling, tellings
 from ..errors import InputError
 from ..records import Dataset
 from ..signals import UNITS
+from ..steps import step
 from .data_card_plots import Picture, pictures
 from .dataset_facts import dataset_facts, describe_tables
 from .escaping import content_policy, markdown_text
@@ -47,14 +48,19 @@ class Card:
     facts: dict[str, Any]
     tables: dict[str, Table]
 
-    BRIEF: ClassVar[tuple[str, ...]] = ("durations", _GAPS)
-    """Tables that a terminal shows unless all are asked for."""
-
     def lead(self) -> str:
         """What the data set holds, and how much of it cannot be identified, in two sentences."""
-        subjects = [str(row["subject"]) for row in self.tables[_GAPS].rows]
-        missing = f"{len(subjects)} things cannot be identified: {'; '.join(subjects[:3])}{'; ...' if len(subjects) > 3 else ''}."
-        return f"{self.name}: {self.facts['runs']}. {missing if subjects else 'Nothing of what is looked for is missing.'}"
+        missing = len(self.tables[_GAPS].rows)
+        what = (
+            f"{missing} of the causes that are looked for cannot be identified with it." if missing else "No cause is known that it cannot identify."
+        )
+        return f"{self.name}: {self.facts['runs']}. {what}"
+
+    def brief(self) -> list[Table]:
+        """What a terminal shows unless all tables are asked for: durations, and the trials that would add what is missing."""
+        gaps = self.tables[_GAPS]
+        kept = [column for column in gaps.columns if column.key != "because"]
+        return [self.tables["durations"], *([replace(gaps, columns=kept, notes=())] if gaps.rows else [])]
 
     def page(self) -> list[Table]:
         """The tables in the order of a page."""
@@ -67,8 +73,11 @@ class Card:
 
 def make_card(dataset: Dataset) -> Card:
     """Statistics, durations, noise, gaps and sensitivities of a data set."""
+    step("statistics", 0.0, 0.1)
     statistics = dict(zip(("statistics", "table_ii", "against_the_paper"), describe_tables(dataset), strict=False))
+    step("what the runs tell apart", 0.1, 0.9)
     told, how = tellings(dataset)
+    step("noise and coverage", 0.9, 1.0)
     tables = {
         **statistics, "durations": _durations(dataset), "noise": _noise(dataset), "told_apart": _told_apart(told, how),
         _GAPS: _gap_table(gaps(dataset) + _alike(told), dataset),

@@ -33,6 +33,8 @@ def _certainty(scores: Scores, first: str, second: str) -> str:
         return "They are not compared, since one of them lacks a score on some runs."
     if not np.isfinite(pair.p_holm):
         return f"How sure that is cannot be told from {_runs(scores)}."
+    if pair.difference == 0.0:
+        return f"They do not differ on {_runs(scores)}."
     sure = "The difference is significant" if pair.p_holm < _CERTAIN else "The difference is not significant"
     return f"{sure}: {_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, p {_p(pair.p_holm)}, {_runs(scores)}."
 

@@ -1,20 +1,25 @@
-"""Progress of a study: a bar with remaining time on a terminal, plain lines elsewhere, nothing when quiet. All on stderr."""
+"""Progress of a study and of other long work: a bar with remaining time on a terminal, plain lines elsewhere, nothing when quiet. All on stderr."""
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Protocol, TextIO
 
 from ..names import shown
+from ..steps import listening
 
 
 class Progress(Protocol):
-    """What the runner tells: `total` cells; which model is being worked on; each cell as it ends; what is wrong meanwhile."""
+    """What the runner tells: `total` cells; which model is worked on; at which step its fit is; each cell as it ends; what is wrong meanwhile."""
 
     def start(self, total: int) -> None: ...
 
     def working(self, label: str) -> None: ...
+
+    def step(self, what: str, share: float) -> None: ...
 
     def done(self, label: str, outcome: str) -> None: ...
 
@@ -29,6 +34,8 @@ class Silent:
     def start(self, total: int) -> None: ...
 
     def working(self, label: str) -> None: ...
+
+    def step(self, what: str, share: float) -> None: ...
 
     def done(self, label: str, outcome: str) -> None: ...
 
@@ -46,18 +53,83 @@ def duration(seconds: float) -> str:
     return f"{whole // 60} min {whole % 60:02d} s" if whole < 3600 else f"{whole // 3600} h {whole % 3600 // 60:02d} min"
 
 
+EVERY_S = 10.0
+"""Seconds between two plain lines on one piece of work."""
+
+
+class StepLines:
+    """A plain line on the steps of one piece of work each 10 s, with the time that is left at the mean pace so far."""
+
+    def __init__(self, stream: TextIO | None = None, before: str = "") -> None:
+        self.stream, self.before = stream or sys.stderr, before
+        self.began = self.told = time.monotonic()
+
+    def __call__(self, what: str, share: float) -> None:
+        now = time.monotonic()
+        if now - self.told < EVERY_S:
+            return
+        self.told = now
+        left = f"; about {duration((now - self.began) * (1.0 - share) / share)} left" if share > 0.0 else ""
+        print(shown(f"        {self.before}{what}, {100.0 * share:.0f} %{left}"), file=self.stream, flush=True)
+
+    def finish(self) -> None:
+        """Nothing: what was printed stays."""
+
+
+class StepBar:
+    """A rich bar for the steps of one piece of work: share done, elapsed and remaining time, the step."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        self.progress = Progress(
+            SpinnerColumn(), BarColumn(bar_width=16), TaskProgressColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(),
+            TextColumn("{task.description}", markup=False), console=Console(stderr=True), speed_estimate_period=3600, transient=True,
+        )  # fmt: skip
+        self.bar = self.progress.add_task("", total=1.0)
+        self.progress.start()
+
+    def __call__(self, what: str, share: float) -> None:
+        self.progress.update(self.bar, description=shown(what), completed=share)
+
+    def finish(self) -> None:
+        """Take the bar away."""
+        self.progress.stop()
+
+
+@contextmanager
+def steps_shown(quiet: bool) -> Iterator[None]:
+    """Show the steps (`shipbench.steps`) of the work inside."""
+    if quiet:
+        yield
+        return
+    shown_by = StepBar() if sys.stderr.isatty() else StepLines()
+    try:
+        with listening(shown_by):
+            yield
+    finally:
+        shown_by.finish()
+
+
 class Lines:
     """One line per finished cell, with the time that is left at the mean pace so far."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self.stream = stream or sys.stderr
         self.total, self.count, self.began = 0, 0, time.monotonic()
+        self.steps: StepLines | None = None
 
     def start(self, total: int) -> None:
         self.total, self.count, self.began = total, 0, time.monotonic()
 
     def working(self, label: str) -> None:
+        self.steps = StepLines(self.stream, f"{label}: ")
         print(shown(f"        {label} ..."), file=self.stream, flush=True)
+
+    def step(self, what: str, share: float) -> None:
+        if self.steps is not None:
+            self.steps(what, share)
 
     def done(self, label: str, outcome: str) -> None:
         self.count += 1
@@ -85,13 +157,18 @@ class Bar:
             TimeRemainingColumn(), TextColumn("{task.description}", markup=False), console=Console(stderr=True), speed_estimate_period=3600,
         )  # fmt: skip
         self.bar: Any = None
+        self.label = ""
 
     def start(self, total: int) -> None:
         self.bar = self.progress.add_task("", total=total)
         self.progress.start()
 
     def working(self, label: str) -> None:
+        self.label = label
         self.progress.update(self.bar, description=shown(label))
+
+    def step(self, what: str, share: float) -> None:
+        self.progress.update(self.bar, description=shown(f"{self.label}: {what}"))
 
     def done(self, label: str, outcome: str) -> None:
         self.progress.advance(self.bar)

@@ -18,6 +18,7 @@ from ..names import brief
 from ..predictors._saved import check_origin
 from ..records import Dataset
 from ..specs import Spec, parse_spec
+from ..steps import listening
 from .executors import Execution, Workers, answers_of, open_workers
 from .folds import make_folds, select_runs
 from .models import facts_of
@@ -90,7 +91,7 @@ def run_tasks(
     parts = [part for study in studies for part in study.parts()]
     began = datetime.now(UTC)
     about = {"command": command, "code": code_version(), "began": began.isoformat(timespec="seconds")}
-    with open_workers(execution) as workers, claimed(out):
+    with open_workers(execution) as workers, listening(progress.step), claimed(out):
         for study in studies:
             for fold, batch in zip(study.folds, study.batches, strict=True):
                 write_truth(out, study.data.name, fold.index, batch)

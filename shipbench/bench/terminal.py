@@ -10,6 +10,8 @@ import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from rich.text import Text
+
 from ..names import shown
 
 if TYPE_CHECKING:
@@ -50,102 +52,123 @@ def command_lines(command: str, width: int, indent: str = "  ") -> list[str]:
 
 
 def show_table(table: Table, console: Console) -> None:
-    """Print a table, in several parts where its columns do not fit side by side."""
-    from rich.text import Text
+    """Print a table.
 
+    Columns that do not fit stand in a further part, beside the names of the rows again. Names that take half of the screen stand on a line of their
+    own above their figures. A table of words alone that does not fit becomes a list.
+    """
+    screen = _Screen(table, console.width)
+    lines = [Text(shown(line), style="bold") for line in paragraph(table.title, console.width)]
     if table.columns:
-        names, parts = _parts(table, console.width)
-        for i, part in enumerate(parts):
-            _show_part(table, {**names, **part}, console, first=i == 0)
+        lines += screen.listed() if screen.is_prose else screen.folded()
     for note in table.notes:
-        console.print(Text(shown(note), style="dim"))
+        lines += [Text(shown(line), style="dim") for line in paragraph(note, console.width)]
+    for line in [*lines, *([Text("")] if table.notes else [])]:
+        console.print(line, no_wrap=True, overflow="ignore", crop=False)
 
 
-def _parts(table: Table, width: int) -> tuple[dict[int, int], list[dict[int, int]]]:
-    """Place -> width on the screen of the columns that name a row, and of the others in each part; one part at least."""
-    needed = [_width(table, column) for column in table.columns]
-    leading = next((i for i, column in enumerate(table.columns) if column.format is not None), len(needed))
-    count = leading if 0 < leading < len(needed) else 1  # a table of words alone is named by its first column
-    rest = range(count, len(needed))
-    least = {i: needed[i] if table.columns[i].format is not None else min(needed[i], _prose_width(table, i)) for i in rest}
-    room = width - max((least[i] + _GAP for i in rest), default=0)
-    names = _fitted(table, {i: needed[i] for i in range(count)}, room)
-    left = width - sum(w + _GAP for w in names.values())
-    parts: list[dict[int, int]] = [{}]
-    for i in rest:
-        if parts[-1] and sum(w + _GAP for w in parts[-1].values()) + least[i] > left:
-            parts.append({})
-        parts[-1][i] = least[i]
-    return names, [_widened(part, needed, left) for part in parts]
+class _Screen:
+    """A table on a screen of `width` columns."""
 
+    def __init__(self, table: Table, width: int) -> None:
+        self.table, self.width = table, width
+        self.between = sum(c.interval for c in table.columns) <= MOST_INTERVALS
+        self.needed = [self._needed(column) for column in table.columns]
+        self.least = [w if c.format or w <= _PROSE else _NARROW for w, c in zip(self.needed, table.columns, strict=True)]
 
-def _fitted(table: Table, names: dict[int, int], room: int) -> dict[int, int]:
-    """The names' columns within `room`: the widest is wrapped where they are wider."""
-    names = dict(names)
-    while (over := sum(w + _GAP for w in names.values()) - room) > 0:
-        widest = max(names, key=lambda i: names[i])
-        narrower = max(names[widest] - over, 8)
-        if narrower == names[widest]:
-            break
-        names[widest] = narrower
-    return names
+    @property
+    def is_prose(self) -> bool:
+        """Whether there are words alone, too many for columns side by side."""
+        return not any(c.format for c in self.table.columns) and sum(self.needed) + _GAP * (len(self.needed) - 1) > self.width
 
+    def _cell(self, column: TableColumn, row: dict[str, Any]) -> list[tuple[str, str]]:
+        """Lines of a cell, each with its style."""
+        style = "italic dim" if row.get("_reference") else ""
+        lines = [(shown(line), style) for line in column.text(row).split("\n")]
+        interval = column.interval_text(row) if self.between else ""
+        return [*lines, (interval, "dim")] if interval else lines
 
-def _widened(part: dict[int, int], needed: Sequence[int], left: int) -> dict[int, int]:
-    """Columns of prose share what room is left."""
-    spare = left - sum(w + _GAP for w in part.values()) + _GAP
-    prose = [i for i in part if part[i] < needed[i]]
-    while spare > 0 and prose:
-        for i in prose:
-            more = min(needed[i] - part[i], max(1, spare // len(prose)), spare)
-            part[i] += more
+    def _needed(self, column: TableColumn) -> int:
+        """Room that no line of the column is wrapped in, and no word of its header is broken in."""
+        cells = [len(line) for row in self.table.rows for line, _ in self._cell(column, row)]
+        return max([1, *cells, *map(len, shown(column.header).split())])
+
+    def _names(self) -> list[int]:
+        """Places of the columns that name a row, which every part repeats: one before the first figure whose cells differ, else all of these."""
+        columns = self.table.columns
+        leading = range(max(next((i for i, c in enumerate(columns) if c.format is not None), 1), 1))
+        for i in leading:
+            cells = [columns[i].text(row) for row in self.table.rows]
+            if len(set(cells)) == len(cells) and all(cells) and not any(cell.isdigit() for cell in cells):
+                return [i]
+        return list(leading)
+
+    def folded(self) -> list[Text]:
+        """The table in parts."""
+        names = self._names()
+        apart = sum(self.needed[i] + _GAP for i in names) > self.width // 2
+        repeated = [] if apart else names
+        room = self.width - sum(self.needed[i] + _GAP for i in repeated)
+        parts: list[list[int]] = [[]]
+        for i in (i for i in range(len(self.needed)) if i not in names):
+            if parts[-1] and sum(self.least[j] + _GAP for j in [*parts[-1], i]) - _GAP > room:
+                parts.append([])
+            parts[-1].append(i)
+        lines: list[Text] = []
+        for number, part in enumerate(parts):
+            shown_here = sorted([*repeated, *part]) if number == 0 else [*repeated, *part]
+            lines += self._part(shown_here, names if apart else [])
+        return lines
+
+    def _widths(self, part: Sequence[int]) -> dict[int, int]:
+        """Widths in one part: columns of prose share what is left."""
+        widths = {i: min(self.least[i], self.width) for i in part}
+        spare = self.width - sum(w + _GAP for w in widths.values()) + _GAP
+        for i in part:
+            more = max(0, min(self.needed[i] - widths[i], spare))
+            widths[i] += more
             spare -= more
-        prose = [i for i in prose if part[i] < needed[i]]
-    return part
+        return widths
+
+    def _part(self, part: Sequence[int], apart: Sequence[int]) -> list[Text]:
+        """Header, rule and rows of the columns `part`; `apart`: columns whose cells stand on a line above."""
+        widths = self._widths(part)
+        heads = {i: [(line, "bold") for line in textwrap.wrap(shown(self.table.columns[i].header), widths[i])] for i in part}
+        deepest = max(map(len, heads.values()), default=0)
+        heads = {i: [("", "")] * (deepest - len(lines)) + lines for i, lines in heads.items()}
+        above = "  ".join(shown(self.table.columns[i].header) for i in apart)
+        lines = [Text(line, style="bold") for line in paragraph(above, self.width)] + self._side_by_side(heads, widths)
+        lines.append(Text("─" * min(self.width, max(len(line) for line in lines))))
+        for row in self.table.rows:
+            name = "  ".join(self.table.columns[i].text(row) for i in apart)
+            lines += [Text(shown(line)) for line in paragraph(name, self.width)]
+            lines += self._side_by_side({i: self._cell(self.table.columns[i], row) for i in part}, widths)
+        return [*lines, Text("")]
+
+    def _side_by_side(self, cells: dict[int, list[tuple[str, str]]], widths: dict[int, int]) -> list[Text]:
+        wrapped = {i: [(part, style) for line, style in lines for part in _broken(line, widths[i])] for i, lines in cells.items()}
+        found = []
+        for k in range(max(map(len, wrapped.values()), default=0)):
+            line = Text()
+            for i, lines in wrapped.items():
+                text, style = lines[k] if k < len(lines) else ("", "")
+                line.append(text.rjust(widths[i]) if self.table.columns[i].format else text.ljust(widths[i]), style=style).append(" " * _GAP)
+            line.rstrip()
+            found.append(line)
+        return found
+
+    def listed(self) -> list[Text]:
+        """One paragraph a row: its first cell, then the others with their headers."""
+        first, *rest = self.table.columns
+        lines: list[Text] = []
+        for row in self.table.rows:
+            lines += [Text(line, style="bold") for line in paragraph(shown(first.text(row)), self.width)]
+            for column in rest:
+                text = " ".join(shown(column.text(row), keep="\n").split())
+                header = f"{shown(column.header)}: " if column.header else ""
+                lines += [Text(line) for line in paragraph(f"{header}{text}", self.width, "  ", "    ")] if text else []
+        return [*lines, Text("")]
 
 
-def _lines(table: Table, column: TableColumn) -> list[str]:
-    """Every line that stands in a column, without its header."""
-    return [shown(line) for row in table.rows for text in (column.text(row), _between(table, column, row)) for line in text.split("\n")]
-
-
-def _between(table: Table, column: TableColumn, row: dict[str, Any]) -> str:
-    return column.interval_text(row) if sum(c.interval for c in table.columns) <= MOST_INTERVALS else ""
-
-
-def _width(table: Table, column: TableColumn) -> int:
-    """Room that a column needs: its longest line, and no word of its header broken."""
-    header = shown(column.header)
-    words = max(map(len, header.split()), default=1)
-    cells = max(map(len, _lines(table, column)), default=1)
-    whole = len(header) if len(header) <= 12 else words
-    return max(whole, cells, 1)
-
-
-def _prose_width(table: Table, place: int) -> int:
-    """Least room of a column of words: all of it where it is short, else its longest word within bounds."""
-    needed = _width(table, table.columns[place])
-    if needed <= _PROSE:
-        return needed
-    words = max((len(word) for line in _lines(table, table.columns[place]) for word in line.split()), default=1)
-    return max(_NARROW, min(words, 2 * _NARROW), len(table.columns[place].header) if len(table.columns[place].header) <= _PROSE else 0)
-
-
-def _show_part(table: Table, widths: dict[int, int], console: Console, first: bool) -> None:
-    from rich import box
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
-    title = Text(shown(table.title), style="bold") if first else None
-    rich = RichTable(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, _GAP, 0, 0), pad_edge=False, show_edge=False)
-    columns = [(table.columns[i], width) for i, width in widths.items()]
-    for column, width in columns:
-        rich.add_column(Text(shown(column.header)), justify="right" if column.format else "left", width=width, overflow="fold")
-    for row in table.rows:
-        cells = []
-        for column, _ in columns:
-            text, between = Text(shown(column.text(row), keep="\n")), _between(table, column, row)
-            cells.append(text.append(f"\n{between}", style="dim") if between else text)
-        rich.add_row(*cells, style="italic dim" if row.get("_reference") else None)
-    console.print(rich)
-    console.print()
+def _broken(line: str, width: int) -> list[str]:
+    return textwrap.wrap(line, width, break_on_hyphens=False) or [""] if len(line) > width else [line]

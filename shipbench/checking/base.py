@@ -8,6 +8,7 @@ from functools import lru_cache
 from ..records import Dataset
 from ..registry import Registry
 from ..signals import STATES
+from ..steps import step
 from .finding import SEVERITIES, Finding
 from .gross import mend as mend_gross
 from .held import mend_held
@@ -32,10 +33,15 @@ def check_recording(recording: Recording) -> list[Finding]:
     """Findings of the gross checks, then those of every other on the data with the gross errors taken out; errors first. None is about a channel
     that import made of others: it is as good as these."""
     mended, found = recording, []
-    for mend in (mend_placeholders, mend_north, mend_held, mend_gross):
+    mends = (mend_placeholders, mend_north, mend_held, mend_gross)
+    checks = _checks()
+    total = len(mends) + len(checks)
+    for number, mend in enumerate(mends):
+        step("look for gross errors", number / total, (number + 1) / total)
         mended, more = mend(mended)
         found += more
-    for check in _checks():
+    for number, check in enumerate(checks, len(mends)):
+        step(f"check {number - len(mends) + 1} of {len(checks)}", number / total, (number + 1) / total)
         found += check(mended)
     found = [f for f in found if not f.channels or not set(f.channels) <= set(recording.dataset.derived)]
     found = _without_consequences(found)

@@ -10,6 +10,10 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 
 from ..errors import InputError
+from ..steps import tick
+
+USUAL = 60
+"""Iterations of one step of a diagnosis, for the progress alone."""
 
 
 @dataclass
@@ -86,7 +90,8 @@ def limited(budget: Budget) -> Iterator[Budget]:
 
 
 def count() -> None:
-    """Count one iteration of a fit."""
+    """Count one iteration of a fit, also for the progress."""
+    tick(USUAL)
     budget = _NOW.get()
     if budget is not None:
         budget.used += 1

@@ -19,6 +19,7 @@ from ..effects.base import EFFECTS
 from ..errors import InputError
 from ..processes import process_pool
 from ..records import Dataset
+from ..steps import step, within
 from . import misread
 from .analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .budget import Budget, is_spent, limited
@@ -43,6 +44,8 @@ from .wrong import what_is_wrong
 
 FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
+_WHOLE = 0.2
+"""Share of the time that the plain model of all runs takes, and the search beside it, where the gain is measured."""
 NOT_A_MODEL = ("unit_or_sign_error", "change_point")
 """They describe the data, not the ship: correct the data, or fit the runs before and after the change apart."""
 
@@ -75,6 +78,7 @@ def diagnose(
 
 def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | None, workers: int, steps: int, used: Budget) -> Diagnosis:
     """As `diagnose`, within a budget that is counted."""
+    step("read the record", 0.0, 0.02)
     began, fingerprint = time.perf_counter(), dataset.fingerprint
     dataset, told = in_parts(dataset, FEW_RUNS)
     warnings = told + _check(dataset)
@@ -92,11 +96,14 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
     if not apart and len(dataset) > 1:
         warnings.append("all runs are one group (pieces of one log, say): no gain can be measured on runs that are held out.")
     wanted = gain and apart and not cautious
+    whole = _WHOLE if wanted else 0.48
     work = partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled, budget=used.part(FOLDS))
     with process_pool(workers) if wanted and workers > 1 else nullcontext() as pool:
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
+        step("fit the plain model", 0.02, whole)
         null = plain_model(Plant.of(dataset, steps), only, settled)
+        step("look for causes", whole, 2.0 * whole)
         rests = not is_spent()
         if only is not None or cautious or not rests:
             found = analyse(null, only=only, seed=seed, cautious=cautious or not rests)
@@ -120,6 +127,7 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
     lines += [f"{name}: {text}" for name, text in behind.items()]
     lines += what_is_left(found) if causes and not doubts else []
     lines += odd_for(found, [c.effect for c in causes]) if only is None and not doubts else []
+    step("predict every run", 0.96, 1.0)
     trace = trace_of(dataset, found, worth.hull)
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
     verdict = "unknown" if unknown else "found" if causes else "none"
@@ -287,7 +295,11 @@ def _cross_validated(
         return Worth()
     ready = [ahead] if ahead is not None and found.threshold == THRESHOLD else []
     rest = range(len(ready), len(_folds(dataset, seed)))
-    parts = list((pool.map if pool else map)(partial(work, threshold=found.threshold, hull=hull), rest))
+    parts: list[FoldGain] = []
+    step(f"fit {FOLDS} training parts, score the runs left out", 2.0 * _WHOLE, 0.96)
+    for part in (pool.map if pool else map)(partial(work, threshold=found.threshold, hull=hull), rest):
+        parts.append(part)
+        within(len(parts) / (len(rest) + len(ready)))
     parts += [part.result() for part in ready]
     if stopped := sum(part.stopped for part in parts):
         return Worth(told=(f"no gain is measured: {stopped} of {len(parts)} training parts were stopped by the limit on work.",))

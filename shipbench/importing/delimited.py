@@ -76,7 +76,7 @@ def open_text(path: Path, layout: Layout) -> Table:
                 raise _explained(path, error) from None
         notes.extend(note for note in odd.left_out() if note not in notes)
 
-    return Table(path, columns, stream, first_row, form, notes)
+    return Table(path, columns, stream, first_row, form, notes, path.stat().st_size / TEXT_BLOCK)
 
 
 def _explained(path: Path, error: pa.ArrowInvalid) -> Exception:

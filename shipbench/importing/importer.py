@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..ship import Ship
 from ..signals import COMMANDS
+from ..steps import step
 from .blocks import Block
 from .cells import Counts
 from .channels import all_channels, read_blocks
@@ -139,10 +140,11 @@ def _free(name: str, taken: Counter[str]) -> str:
 def _recordings(logs: Sequence[Path], mapping: Mapping, met: Counts) -> Iterator[_Log]:
     if len(mapping.sources) == 1:
         ((source_name, source),) = mapping.sources.items()
-        for path in logs:
+        for number, path in enumerate(logs):
+            step(f"read {path.name}", number / len(logs), (number + 1) / len(logs))
             for name, blocks in read_recordings(path, source, met):
-                for number, part in enumerate(parts(_clean(blocks, source, mapping, str(path), met))):
-                    yield _Log(run_name(name if name is not None else _stem(path)), path.name, {source_name: part}, number > 0)
+                for place, part in enumerate(parts(_clean(blocks, source, mapping, str(path), met))):
+                    yield _Log(run_name(name if name is not None else _stem(path)), path.name, {source_name: part}, place > 0)
         return
     kinds = {is_absolute(s.time) for s in mapping.sources.values()}
     if len(kinds) > 1:
@@ -166,6 +168,7 @@ def _clean(blocks: Iterable[Block], source: Source, mapping: Mapping, where: str
 def _chained(paths: list[Path], source: Source, met: Counts) -> Iterator[Block]:
     """The blocks of one file after another."""
     for path in paths:
+        step(f"read {path.name}", 0.0, 1.0)
         for _, block in read_blocks(path, source, met):
             yield block
 

@@ -19,6 +19,7 @@ import pyarrow.parquet
 
 from ..errors import InputError, unknown_name
 from ..regular_files import open_regular
+from ..steps import within
 from .mapping import Layout
 
 BLANKS = " "
@@ -38,7 +39,8 @@ KINDS = "CSV or other delimited text (.csv, .txt, .dat, .tsv, also .gz, .bz2, .x
 class Table:
     """A log that was opened: its columns, what was found of its form, and a function that streams some columns as Arrow batches.
 
-    `first_row` is the number of the first data row in the file, for messages. `notes` says how the file was read; the stream adds to it.
+    `first_row` is the number of the first data row in the file, for messages. `notes` says how the file was read; the stream adds to it. `blocks`:
+    about how many batches the stream gives, for the progress.
     """
 
     path: Path
@@ -47,6 +49,7 @@ class Table:
     first_row: int = 1
     form: str = ""
     notes: list[str] = field(default_factory=list)
+    blocks: float = 1.0
 
     def batches(self, columns: Sequence[str]) -> Iterator[pa.RecordBatch]:
         """The columns, block by block, in their order in the argument.
@@ -56,7 +59,9 @@ class Table:
         """
         check_columns(self, columns)
         with reading(self.path):
-            yield from self.stream(list(dict.fromkeys(columns)))
+            for number, batch in enumerate(self.stream(list(dict.fromkeys(columns)))):
+                within(number / max(self.blocks, number + 1.0))
+                yield batch
 
 
 def open_table(path: Path, layout: Layout) -> Table:
@@ -165,7 +170,7 @@ def _open_parquet(path: Path) -> Table:
                 yield batch.select(list(wanted))
 
     check_number(path, len(columns))
-    return Table(path, columns, stream, 1, "Parquet")
+    return Table(path, columns, stream, 1, "Parquet", blocks=rows / _ROWS)
 
 
 def check_number(path: Path, columns: int) -> None:

@@ -136,7 +136,7 @@ class MLP(PredictorBase):
         trained, stopped = zip(*pairs, strict=True)
         task = _OneStep(lead, transitions(StackedRuns.of(trained), features), transitions(StackedRuns.of(stopped), features), seeds)
         # Matrices this small gain nothing from a second thread, and on a busy machine two that wait for one another cost tenfold.
-        watch = train(task, Recipe(lr=lead.lr, patience=lead.patience, min_delta=lead.min_delta, device=lead.device, threads=1))
+        watch = train(task, Recipe(lr=lead.lr, patience=lead.patience, min_delta=lead.min_delta, device=lead.device, threads=1, epochs=lead.epochs))
         state = {k: v.detach().cpu().numpy() for k, v in task.state_dict().items()}
         for m, model in enumerate(models):
             model.inputs, model._dt = names, trains[m].dt

@@ -24,6 +24,7 @@ import torch
 from torch import Tensor, nn
 
 from ..errors import WorkError
+from ..steps import within
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,7 @@ class Recipe:
         weight_decay: decoupled (AdamW), 0 for plain Adam.
         device: "cpu", "cuda" or "cuda:1".
         threads: of torch while it trains; None leaves them.
+        epochs: of every member at most, for the progress, where chunks are no epochs.
     """
 
     lr: float = 1e-3
@@ -79,6 +81,7 @@ class Recipe:
     lr_end: float = 1.0
     device: str = "cpu"
     threads: int | None = None
+    epochs: int | None = None
 
 
 class BestWeights:
@@ -165,6 +168,10 @@ class _Training(lightning.LightningModule):
         if watch is None:
             raise WorkError("training: validation before the fit has begun; call train().")
         watch.update(self.task, self.task.scores(), ended)
+        total = self.recipe.epochs or self.recipe.chunks
+        if total:
+            epoch = self.done if self.recipe.epochs is None else int(watch.validations.max())
+            within(epoch / total, f"epoch {epoch} of {total}")
         if watch.stopped.all():
             self.trainer.should_stop = True
 
