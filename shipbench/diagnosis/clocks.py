@@ -17,6 +17,7 @@ from ..checking.yaw import late_yaw_rate
 from ..data.corrections import undelayed
 from ..records import Dataset, Run
 from ..signals import PSI, STATES, U, V
+from .budget import is_spent
 from .derived import has_speeds
 from .fit import Origin, fit
 from .gram import by_run
@@ -55,6 +56,8 @@ def check_clocks(dataset: Dataset) -> LateVelocities | None:
         "position": put_back(dataset, {"x": -delay, "y": -delay}, delay), "as recorded": put_back(dataset, {}, delay),
     }  # fmt: skip
     shares = {name: _evidence(runs, noise_gain if name == "filtered" else 1.0) for name, runs in ways.items()}
+    if is_spent():  # fits that were stopped are not to be compared
+        return None
     best = max(("filtered", "late"), key=lambda name: np.sum(shares[name]))
     over, over_position = (shares[best] - shares[other] for other in ("as recorded", "position"))
     # a position cannot be early, only all else late: that is believed where the runs agree

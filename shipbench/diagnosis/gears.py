@@ -12,6 +12,7 @@ import numpy as np
 
 from ..ops import where
 from ..physics.actuators import Gear, gear_path, gear_step
+from .budget import is_spent
 from .gear_kinds import DELAY, ORDINARY, GearFinding, Kind, kinds_of, least_rate
 from .plant import Plant, Segments, ordinary_gears
 from .record_error import CHANNELS, FORMS, RecordError, readings
@@ -40,6 +41,8 @@ def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear], lis
     found: list[GearFinding] = []
     errors: list[RecordError] = []
     for name, channels in CHANNELS.items():
+        if is_spent():
+            break
         rows = range(len(seg.run))
         picked = [(b, c) for c in channels for b in rows if np.ptp(seg.commands[b, seg.mask[b], c]) > 0]
         if len({seg.run[b] for b, _ in picked}) > 1:

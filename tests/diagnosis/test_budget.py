@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
-from shipbench.diagnosis import analysis, noise
+from shipbench.diagnosis import analysis, clocks, noise
 from shipbench.diagnosis import diagnose as whole
 from shipbench.diagnosis import select as selection
 from shipbench.diagnosis.analysis import THRESHOLD, plain_model
 from shipbench.diagnosis.budget import Budget, count, is_spent, limited
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.fit import Origin, fit
+from shipbench.diagnosis.gain import FoldGain
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.plant import Plant
 from shipbench.diagnosis.settle import Fit, Model
@@ -112,6 +116,25 @@ def test_noise_is_not_looked_for_after_the_limit(turned, monkeypatch):
     with limited(Budget(iterations=0)):
         assert not noise.colour_of(null).share.any()
     assert len(asked) == 1
+
+
+def test_no_gain_is_measured_with_a_training_part_that_was_stopped(turned):
+    def work(fold: int, threshold: float, hull: bool) -> FoldGain:
+        test = whole._folds(turned, 0)[fold]
+        return FoldGain(test, np.ones(len(test)), np.zeros(len(test)), np.zeros(len(test)), ("heading_bias",), stopped=fold == 1)
+
+    found = SimpleNamespace(hull=0.0, final=SimpleNamespace(model=SimpleNamespace(terms=("heading_bias",))), gears=(), unknown=None, threshold=10.0)
+    worth = whole._cross_validated(turned, found, 0, work, None, None)
+    assert (worth.gain, worth.per_run) == (None, ())
+    assert "1 of 5 training parts were stopped" in worth.told[0]
+
+
+def test_clocks_are_not_judged_by_fits_that_were_stopped(turned, monkeypatch):
+    monkeypatch.setattr(clocks, "late_velocities", lambda _: (1.0, 0.1))
+    monkeypatch.setattr(clocks, "_evidence", lambda data, _: np.zeros(len(data)))
+    assert clocks.check_clocks(turned) is not None
+    with limited(Budget(iterations=0)):
+        assert clocks.check_clocks(turned) is None
 
 
 @pytest.mark.long
