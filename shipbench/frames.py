@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ SIGNALS = (*STATES, *COMMANDS, *ENVIRONMENT)
 KNOWN = ("trajectory", "t", *SIGNALS)
 ACTUATOR_STATES = STATES[ACTUATORS]
 MOTION_STATES = STATES[: ACTUATORS.start]
+Columns = dict[str, np.ndarray]
+"""Rows of a table: by name the values (rows,) of a column."""
 
 
 def long_table(runs: Iterable[Any]) -> pd.DataFrame:
@@ -78,9 +81,18 @@ def complete_columns(table: pd.DataFrame, notes: list[str]) -> tuple[str, ...]:
     return (*COMMANDS, *(c for c in ENVIRONMENT if c in table))
 
 
-def samples(group: pd.DataFrame, names: Sequence[str]) -> np.ndarray:
-    """Columns as an array (samples, names), column by column in memory; pandas takes ten times as long to select several of a short run."""
-    return np.array([group[name].to_numpy() for name in names]).T
+def blocks(table: pd.DataFrame) -> Iterator[tuple[str, Columns]]:
+    """Of each run of a checked table its name and its rows; pandas takes ten times as long to select short runs."""
+    names = table["trajectory"].to_numpy(dtype=object)
+    columns = {str(name): table[name].to_numpy() for name in table if name != "trajectory"}
+    starts = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1), len(names)]
+    for start, stop in itertools.pairwise(starts):
+        yield str(names[start]), {name: values[start:stop] for name, values in columns.items()}
+
+
+def samples(rows: Columns, names: Sequence[str]) -> np.ndarray:
+    """Columns as an array (samples, names), column by column in memory."""
+    return np.array([rows[name] for name in names]).T
 
 
 def samples_of(frame: Any) -> tuple[dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]], tuple[str, ...], list[str]]:
@@ -102,5 +114,4 @@ def samples_of(frame: Any) -> tuple[dict[str, tuple[np.ndarray, np.ndarray, np.n
     table, notes = frame[names].reset_index(drop=True).infer_objects(), list[str]()
     check_columns(table, "frame", first_row=0)
     inputs = complete_columns(table, notes)
-    blocks = table.groupby("trajectory", sort=False)
-    return {str(name): (rows["t"].to_numpy(copy=True), samples(rows, STATES), samples(rows, inputs)) for name, rows in blocks}, inputs, notes
+    return {name: (rows["t"].copy(), samples(rows, STATES), samples(rows, inputs)) for name, rows in blocks(table)}, inputs, notes

@@ -137,6 +137,11 @@ class Run:
             {"parent": self.meta.get("parent", self.id), **self.meta},
         )  # fmt: skip
 
+    def windows(self, samples: int, stride: int) -> list[Run]:
+        """Every window of that many samples, `stride` apart; a single one keeps the run's name."""
+        starts = range(0, len(self) - samples + 1, stride)
+        return [self.slice(s, s + samples, f"@{self.t[s]:g}s" if len(starts) > 1 else "") for s in starts]
+
 
 @dataclass(frozen=True, eq=False)
 class Batch:
@@ -312,10 +317,7 @@ class Dataset:
             if not isinstance(value, (int, np.integer)) or value < least:
                 raise InputError(f"{what} = {value}; accepted: a whole number of samples, {least} or more.")
         need = history + steps + 1
-        windows = []
-        for run in self.runs:
-            starts = list(range(0, len(run) - need + 1, stride or steps))
-            windows += [run.slice(s, s + need, f"@{run.t[s]:g}s" if len(starts) > 1 else "") for s in starts]
+        windows = [window for run in self.runs for window in run.windows(need, stride or steps)]
         if not windows:
             longest = max(self.runs, key=len)
             raise InputError(

@@ -17,7 +17,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 SCRIPTS = {
     "rollouts_shipmmg": ("shipmmg",), "fit_scipy": (), "diagnosis_refits": (), "startup": (), "paper_study": (), "mlp_training": (),
-    "neural_ode_training": (),
+    "neural_ode_training": (), "many_runs": (),
 }  # fmt: skip
 LONG = ("fit_scipy", "paper_study", "mlp_training", "neural_ode_training")
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import ctypes
 import logging
 import math
 import pickle
 import platform
-import sys
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
@@ -21,6 +19,7 @@ from ..errors import InputError, WorkError
 from ..predictors.device import check_device
 from ..registry import package_digest
 from .isolate import Limits, stop_all, thread_settings, work_isolated
+from .memory import give_back_memory
 from .provenance import machine
 from .work import Answer, FoldData, Job, one_line, work
 
@@ -118,15 +117,8 @@ class _Local(Workers):
             return self.executor.submit(work_isolated, job, folds, Limits(), thread_settings())
         # Copies, as a child process gets them, each fold's apart: what a model writes into them stays its own.
         answer = self.executor.submit(work, job, [pickle.loads(pickle.dumps(fold)) for fold in folds])
-        _give_back_memory()
+        give_back_memory()
         return answer
-
-
-def _give_back_memory() -> None:
-    """What a job has freed goes back to the system, where the C library can do that: the next job's memory would else come on top of it."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
-    if trim is not None:
-        trim(0)
 
 
 class _Processes(Workers):

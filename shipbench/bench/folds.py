@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -208,16 +209,14 @@ def make_folds(dataset: Dataset, task: Task) -> list[Fold]:
         InputError: more folds than groups, too many training or validation runs, or no published split, or no kinds to tell apart.
     """
     steps, history, stride = task.steps(dataset.dt), task.history(dataset.dt), task.stride(dataset.dt)
+    cut = cache(lambda run, every: run.windows(history + steps + 1, every))  # the folds share the windows of a run
+
+    def windows(runs: Sequence[Run], every: int = steps) -> Dataset:
+        return dataset.with_runs(window for run in runs for window in cut(run, every))
+
     folds = []
     for index, (rest, test) in enumerate(_pairs(dataset, task)):
         rest, valid_runs = _fewer(rest, task, index)
         train, valid = _carve_valid(rest, valid_runs, np.random.default_rng([task.fold_seed, index, 1]))
-        folds.append(
-            Fold(
-                index,
-                dataset.with_runs(train).windows(steps, history=history),
-                dataset.with_runs(valid).windows(steps, history=history) if valid else None,
-                dataset.with_runs(test).windows(steps, stride, history=history),
-            )
-        )
+        folds.append(Fold(index, windows(train), windows(valid) if valid else None, windows(test, stride or steps)))
     return folds

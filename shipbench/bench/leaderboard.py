@@ -17,6 +17,7 @@ from .escaping import markdown_text
 from .fit_notes import MARK, fit_notes
 from .formats import check_formats, render
 from .lead import lead, short_table
+from .memory import give_back_memory
 from .results import PROTOCOL, Frame, Results
 from .tables import Table, TableColumn
 
@@ -184,6 +185,7 @@ def write_boards(
     from .overall import over_data_sets
 
     check_formats(formats)
+    give_back_memory()  # the data of the study that was run
     out = Path(out)
     names = list(dict.fromkeys(s["dataset"] for s in results.summaries))
     boards = [build_board(results, name, baseline) for name in names]

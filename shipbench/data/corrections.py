@@ -70,6 +70,11 @@ class Corrections(BaseModel):
     delay: dict[str, Number] = {}
     held: list[Literal["x", "y", "psi"]] = []
 
+    @property
+    def changes_samples(self) -> bool:
+        """Whether `correct_run` changes more than jumps of the heading (`frame` is the table's, see `to_ned`)."""
+        return any(getattr(self, key) != field.default for key, field in Corrections.model_fields.items() if key != "frame")
+
 
 def check_names(corrections: Corrections, runs: dict[str, dict[str, Any]], where: str) -> None:
     """Every name is a signal and every number is possible.
@@ -129,11 +134,7 @@ def correct_run(
     """
     frame = frame.reset_index(drop=True).copy()
     t = frame["t"].to_numpy()
-    psi = frame["psi"].to_numpy(copy=True)
-    known = np.isfinite(psi) & ~_inside(t, own.fill.get("psi", []))
-    if (np.abs(np.diff(psi[known])) > 0.5 * turn).any():  # a continuous heading keeps its bits
-        psi[known] = np.unwrap(psi[known], period=turn)
-        frame["psi"] = psi
+    frame["psi"] = continuous(frame["psi"].to_numpy(), ~_inside(t, own.fill.get("psi", [])), turn)
     for signal, intervals in own.fill.items():
         if signal in frame:
             _fill(frame, signal, t, intervals, where)
@@ -149,6 +150,16 @@ def correct_run(
     _to_body_over_ground(frame, corrections, own, where)
     parts = [undelayed(part, corrections.delay, dt) for part in _pieces(frame, corrections, own, dt)]  # nothing is interpolated over a gap or a cut
     return [_at_midship(_with_true_wind(part, corrections.wind, where), corrections.antenna) for part in parts if len(part) >= _SPLIT_FEWEST]
+
+
+def continuous(psi: np.ndarray, good: np.ndarray | bool = True, turn: float = 2.0 * np.pi) -> np.ndarray:
+    """The heading (samples,) without jumps of a whole turn between its `good` finite samples; where it has none, it keeps its bits."""
+    known = np.isfinite(psi) & good
+    if not (np.abs(np.diff(psi[known])) > 0.5 * turn).any():
+        return psi
+    psi = psi.copy()
+    psi[known] = np.unwrap(psi[known], period=turn)
+    return psi
 
 
 def _with_true_wind(frame: pd.DataFrame, kind: str, where: str) -> pd.DataFrame:

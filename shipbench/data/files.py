@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+from collections.abc import Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal
 
@@ -13,13 +14,13 @@ import tomli_w
 from pydantic import ConfigDict, Field, ValidationError
 
 from ..errors import InputError, unknown_name
-from ..frames import KNOWN, MOTION_STATES, SIGNALS, check_columns, complete_columns, long_table, samples
+from ..frames import KNOWN, MOTION_STATES, SIGNALS, Columns, blocks, check_columns, complete_columns, long_table, samples
 from ..names import check_name
 from ..records import Dataset, Run
 from ..ship import Ship
 from ..signals import COMMANDS, STATES, wrap_angle
 from ..toml_files import Number, fault, read_toml
-from .corrections import Corrections, check_names, correct_run, split_meta, to_ned
+from .corrections import Corrections, check_names, continuous, correct_run, split_meta, to_ned
 from .trajectories import read_trajectories
 from .units import sign_factor, unit_factor
 
@@ -66,10 +67,11 @@ def read_dataset(folder: str | Path) -> Dataset:
     check_columns(table, where)
     convert_table(table, description)  # before columns are filled in: what is copied from another column is in our units already
     inputs = complete_columns(table, notes)
-    unknown = set(description.runs) - set(table["trajectory"])
+    names = table["trajectory"].unique()
+    unknown = set(description.runs) - set(names)
     if unknown:
-        raise unknown_name(f"run in [runs] of {folder / 'dataset.toml'}", sorted(unknown)[0], table["trajectory"].unique())
-    runs = tuple(run for name, rows in table.groupby("trajectory", sort=False) for run in _runs(str(name), rows, inputs, description, where))
+        raise unknown_name(f"run in [runs] of {folder / 'dataset.toml'}", sorted(unknown)[0], names)
+    runs = tuple(run for name, rows in blocks(table) for run in _runs(name, rows, inputs, description, where))
     return Dataset(
         name=description.name, ship=ship, dt=description.dt, runs=runs, actuators=description.actuators, source=description.source,
         licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)), derived=tuple(description.derived),
@@ -175,12 +177,17 @@ def convert_table(table: pd.DataFrame, description: Description) -> None:
     to_ned(table, description)
 
 
-def _runs(name: str, rows: pd.DataFrame, inputs: tuple[str, ...], description: Description, where: Path) -> list[Run]:
+def _runs(name: str, rows: Columns, inputs: tuple[str, ...], description: Description, where: Path) -> list[Run]:
     """The run, or the pieces that its cuts and gaps leave: these share a group, so that no fold parts them."""
-    if len(rows) < 2:
-        raise InputError(f"{where}: run '{name}' has {len(rows)} sample; at least 2 are needed.")
+    if len(rows["t"]) < 2:
+        raise InputError(f"{where}: run '{name}' has {len(rows['t'])} sample; at least 2 are needed.")
     own, meta = split_meta(name, description.runs.get(name, {}), str(where))
-    parts = correct_run(rows, description, own, description.dt, f"{where}: run '{name}'")
+    parts: Sequence[Columns]
+    if description.changes_samples or own.model_fields_set:
+        corrected = correct_run(pd.DataFrame(rows), description, own, description.dt, f"{where}: run '{name}'")
+        parts = [{str(column): part[column].to_numpy() for column in part} for part in corrected]
+    else:
+        parts = [rows | {"psi": continuous(rows["psi"])}]
     if not parts:
         raise InputError(f"{where}: run '{name}': its cuts, gaps and delays leave no two samples. Remove the run.")
     if len(parts) == 1:
@@ -189,8 +196,8 @@ def _runs(name: str, rows: pd.DataFrame, inputs: tuple[str, ...], description: D
     return [_run(f"{name}#{i}", part, inputs, description, where, shared) for i, part in enumerate(parts, 1)]
 
 
-def _run(name: str, group: pd.DataFrame, inputs: tuple[str, ...], description: Description, where: Path, meta: dict[str, Any]) -> Run:
-    t = group["t"].to_numpy()
+def _run(name: str, rows: Columns, inputs: tuple[str, ...], description: Description, where: Path, meta: dict[str, Any]) -> Run:
+    t = rows["t"]
     steps = np.diff(t)
     wrong = np.flatnonzero(~(np.abs(steps - description.dt) <= 1e-3 * description.dt))
     if len(wrong):
@@ -199,7 +206,7 @@ def _run(name: str, group: pd.DataFrame, inputs: tuple[str, ...], description: D
             f"{where}: run '{name}': t goes from {t[k]:g} s to {t[k + 1]:g} s, dt in dataset.toml is {description.dt:g} s ({len(wrong)} such steps). "
             'Time must be uniform inside a run and its rows in order: resample, or write gaps = "split" into dataset.toml.'
         )
-    return Run(name, t.copy(), samples(group, STATES), samples(group, inputs), inputs, dict(meta))
+    return Run(name, t.copy(), samples(rows, STATES), samples(rows, inputs), inputs, dict(meta))
 
 
 def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz", "csv", "parquet"] = "csv.gz") -> None:

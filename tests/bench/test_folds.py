@@ -68,6 +68,12 @@ def test_windows_are_cut_after_the_split_and_share_no_sample_across_it(toy):
         assert not seen & scored
 
 
+def test_folds_share_the_windows_of_a_run(toy):
+    folds = make_folds(toy(8, steps=65), task(folds=4))
+    windows = [window for fold in folds for part in (fold.train, fold.valid, fold.test) for window in part.runs]
+    assert len({id(window) for window in windows}) == len({window.id for window in windows}) < len(windows)
+
+
 def test_scored_windows_follow_the_stride_and_training_windows_do_not_overlap(toy):
     [fold, *_] = make_folds(toy(4, steps=60), task(folds=2, stride_s=10, valid_runs=0))
     assert [r.id for r in fold.test.runs][:5] == [f"{sorted(parents(fold.test))[0]}@{t}s" for t in (0, 10, 20, 30, 40)]

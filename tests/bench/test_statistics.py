@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shipbench.bench import statistics
 from shipbench.bench.statistics import Bootstrap, Matched, interval
 
 
@@ -25,6 +26,17 @@ def test_spread_of_a_resample_is_numpys_on_the_drawn_runs_written_out():
         assert median == pytest.approx(np.median(drawn))
         assert std == pytest.approx(np.std(drawn, ddof=1), abs=1e-6)
         assert iqr == pytest.approx(np.subtract(*np.quantile(drawn, [0.75, 0.25])))
+
+
+def test_blocks_of_resamples_are_the_whole(monkeypatch):
+    names, values = [f"{i:03d}" for i in range(60)], np.random.default_rng(0).gamma(1.0, 10.0, 60)
+    whole = Bootstrap(names, 99)
+    spread = whole.spread(np.arange(60), values)
+    monkeypatch.setattr(statistics, "_CELLS", 60 * 8)
+    blocks = Bootstrap(names, 99)
+    assert np.array_equal(blocks.counts, np.random.default_rng(statistics.DRAW_SEED).multinomial(60, np.full(60, 1 / 60), size=99))
+    assert np.array_equal(blocks.counts, whole.counts)
+    np.testing.assert_allclose(blocks.spread(np.arange(60), values), spread, rtol=1e-13)
 
 
 def test_mean_of_a_resample_weighs_windows_and_leaves_out_what_has_no_score():

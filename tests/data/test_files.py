@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipbench.data import files
 from shipbench.data.files import read_dataset, write_dataset
 from shipbench.errors import InputError
 from shipbench.records import Dataset
@@ -40,6 +41,27 @@ def test_what_is_written_is_read_back_bit_for_bit(tmp_path, harbour, format):
     assert again.fingerprint == harbour.fingerprint
     assert again.simulation == "container130"
     assert [r.meta for r in again.runs] == [r.meta for r in harbour.runs]
+
+
+def test_a_correction_of_nothing_changes_no_bit(folder):
+    """Runs without corrections are read on a shorter way."""
+
+    def wrap(table):
+        table["psi"] = (table["psi"] + 3.0) % (2 * np.pi)
+
+    _change(folder, wrap)
+    plain = read_dataset(folder)
+    assert all(np.abs(np.diff(r.states[:, 2])).max() < 1.0 for r in plain.runs)
+    with (folder / "dataset.toml").open("a") as file:
+        file.write("\n[bias]\nr = 0.0\n")
+    corrected = read_dataset(folder)
+    assert corrected.fingerprint == plain.fingerprint
+    assert [r.states.flags.f_contiguous for r in corrected.runs] == [r.states.flags.f_contiguous for r in plain.runs]
+
+
+def test_runs_without_corrections_make_no_table_of_their_own(folder, monkeypatch):
+    monkeypatch.setattr(files, "correct_run", None)
+    assert len(read_dataset(folder)) == 2
 
 
 def test_units_and_signs_are_converted_to_ours(folder, harbour):
