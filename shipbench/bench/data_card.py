@@ -91,7 +91,7 @@ def _gap_table(found: Sequence[Gap], dataset: Dataset) -> Table:
     unit = unit_time(dataset.ship.L)
     notes = [
         f"Times are judged in ship lengths: one takes {unit:.3g} s at a Froude number of 0.1 (10 sqrt(L/g)), {NEEDED:g} of them are needed.",
-        "What is not listed can still be weakly determined: fits print intervals, and `shipbench diagnose` the smallest size that would be seen.",
+        "What is not listed can still be weakly determined: fits print intervals, and `shipbench diagnose` prints detection limits.",
     ]
     return Table("What these data cannot identify", columns, rows, notes if rows else ["Nothing of what is looked for is missing.", *notes])
 

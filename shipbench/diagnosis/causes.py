@@ -62,7 +62,7 @@ def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs
     fit, effect = found.final, term.effect
     score, supporters, beside = found.score(index)
     rivals = rivals_of(found, term)
-    evidence = f"adds {0.5 * score:.0f} to the log evidence {beside}; {supporters} of {fit.plant.seg.runs} runs support it"
+    evidence = f"log Bayes factor {0.5 * score:.0f} {beside}; {supporters} of {fit.plant.seg.runs} runs support it"
     more = goes_with(fit, of_runs(fit, index)) if term.per_run else ""
     evidence += "".join(f"; {words}" for words in (effect.way, more) if words)
     if term.since is not None:

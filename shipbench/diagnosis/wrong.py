@@ -162,8 +162,8 @@ def _error_words(tables: ErrorTables, channel: str, variable: str) -> list[str]:
     growth = tables.by_channel[(channel, "horizon")]
     if len(growth) > 1 and growth[-1].rms > _WORTH_SAYING * growth[0].rms > 0.0:
         text.append(
-            f"grows {growth[-1].rms / growth[0].rms:.2g} times from the first {growth[0].high:.0f} s to {growth[-1].low:.0f} to "
-            f"{growth[-1].high:.0f} s of prediction"
+            f"the {channel} error is {growth[-1].rms / growth[0].rms:.2g} times larger after {growth[-1].low:.0f} to {growth[-1].high:.0f} s "
+            f"than in the first {growth[0].high:.0f} s"
         )
     rows = tables.by_channel.get((channel, variable), [])
     if len(rows) > 1 and variable != "run":
