@@ -133,6 +133,17 @@ def test_leaderboard_renders_from_saved_results_only(cli, toy_folder, tmp_path):
     assert (tmp_path / "leaderboards/toyset/tracks.png").is_file()
 
 
+def test_a_leaderboard_draws_through_no_link(cli, toy_folder, tmp_path):
+    cli("run", "-m", "hold", "-d", toy_folder(), *QUICK, "-q", "--out", "runs/a")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "pages").mkdir()
+    (tmp_path / "pages/toyset").symlink_to(tmp_path / "elsewhere")
+    result = cli("leaderboard", "runs/a", "--out", "pages")
+    assert result.exit_code == 2
+    assert "pages/toyset is a link; accepted: a folder" in result.stderr
+    assert not list((tmp_path / "elsewhere").iterdir())
+
+
 def test_rows_of_different_data_are_refused_on_the_command_line(cli, toy_folder):
     cli("run", "-m", "hold", "-d", toy_folder(), *QUICK, "-q", "--out", "runs/a")
     cli("run", "-m", "hold[seed=1]", "-d", "toyset", *QUICK, "-q", "--out", "runs/b", "--max-runs", "4")

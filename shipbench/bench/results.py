@@ -90,7 +90,10 @@ def write_rows(path: Path, rows: Frame) -> None:
 
 def write_truth(out: Path, dataset: str, fold: int, batch: Batch) -> None:
     """Save what every model of this fold is scored against."""
-    with _in_one_step(truth_path(out, dataset, fold)) as part, part.open("wb") as file:
+    path = truth_path(out, dataset, fold)
+    if path.parent.is_symlink():
+        raise InputError(f"{path.parent} is a link; accepted: a folder, so that a study writes only below {out}. Remove the link.")
+    with _in_one_step(path) as part, part.open("wb") as file:
         np.savez_compressed(file, ids=np.array(batch.ids), s0=batch.s0, U=batch.U, truth=batch.truth)
 
 

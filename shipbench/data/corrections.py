@@ -31,6 +31,9 @@ def _in_order(interval: tuple[float, float]) -> tuple[float, float]:
 Interval = Annotated[tuple[Number, Number], AfterValidator(_in_order)]
 """[from, to] in s, both included."""
 
+_MOST = 1e9
+"""Largest correction in SI units, and ratio of two units (nano to one)."""
+
 
 class RunCorrections(BaseModel):
     """Keys of `[runs.<id>]` that change the samples; all others are metadata.
@@ -93,8 +96,9 @@ def check_names(corrections: Corrections, runs: dict[str, dict[str, Any]], where
         for signal, value in entries.items():
             if signal not in known:
                 raise unknown_name(f"signal in [{table}] of {where}", signal, known)
-            if not np.isfinite(value) or (table == "scale" and value == 0.0):
-                raise InputError(f"{where}: [{table}] {signal} = {value}; accepted: a finite number{' other than 0' * (table == 'scale')}.")
+            if not abs(value) <= _MOST or (table == "scale" and abs(value) < 1.0 / _MOST):
+                accepted = f"a finite number{' other than 0' * (table == 'scale')}, its size within {1 / _MOST * (table == 'scale'):g} to {_MOST:g}"
+                raise InputError(f"{where}: [{table}] {signal} = {value}; accepted: {accepted}. Correct that line.")
     if corrections.velocities != "water" and any(c is not None for c in currents):
         raise InputError(f'{where}: a current is given, but velocities = "{corrections.velocities}". It belongs to velocities = "water".')
 

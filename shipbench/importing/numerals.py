@@ -81,7 +81,7 @@ def _has(text: pa.Array, pattern: str) -> pa.Array:
 
 def _grouped(text: pa.Array, mark: str) -> pa.Array:
     """Whether a cell may be digits in groups of three."""
-    return _has(text, _GROUPED.format(mark=_MARKS[mark], decimal=_MARKS["." if mark == "," else ","]))
+    return _has(text, _GROUPED.format(mark=_MARKS[mark], decimal={",": r"\.", ".": ","}.get(mark, "[.,]")))
 
 
 def _decimal(text: pa.Array, mark: str) -> pa.Array:

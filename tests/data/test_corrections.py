@@ -127,7 +127,8 @@ def test_a_set_written_again_is_not_corrected_twice(load, tmp_path):
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
-        ("bias.speed = 1.0", "signal in [bias]"), ("scale.u = 0.0", "other than 0"), ("delay.r = inf", "finite"), ('frame = "up"', "frame"),
+        ("bias.speed = 1.0", "signal in [bias]"), ("scale.u = 0.0", "other than 0"), ("scale.u = 1e300", "within 1e-09 to 1e+09"),
+        ("bias.x = -1e300", "within 0 to 1e+09"), ("delay.r = inf", "finite"), ('frame = "up"', "frame"),
         ('velocities = "water"', "current"), ("current = [1.0, 0.0]", 'velocities = "body"'), ("runs.r00.cut = [1.0, 2.0]", "[runs.r00] cut"),
         ("runs.r00.fill.r = [[-1.0, 1e9]]", "covers the whole run"), ("runs.r00.cut = [[-1.0, 1e9]]", "delays leave no two samples"),
         ('gaps = "ignore"', "gaps"), ("antenna = [1.0]", "antenna"), ("antenna = [inf, 0.0]", "finite"),

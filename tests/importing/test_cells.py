@@ -45,6 +45,7 @@ def test_numbers_are_read_as_they_are_meant(cells, layout, numbers):
         (["990", "1.090"], COMMAS, {"decimal": ","}, 1, 'thousands = "."'),
         (["1.090", "1.090"], COMMAS, {"decimal": ","}, 0, 'thousands = "."'),
         (["990", "1,090"], POINTS, {}, 1, 'thousands = ","'),
+        (["990.5", "1'090.5"], POINTS, {}, 1, 'thousands = "\'"'),
         (["1,090"], POINTS, {"decimal": ","}, 0, 'decimal = "." and thousands = ","'),
         (["990", "1.090", "999"], pa.array(["12"]), {}, 1, 'thousands = "."'),
         (["4,13"], COMMAS, {}, 0, 'decimal = ","'),
