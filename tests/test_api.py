@@ -230,6 +230,22 @@ def test_a_predictor_is_made_of_text_a_class_or_an_object(harbour):
     assert (copied.scale, mine.fits) == (0.5, 0)
 
 
+class Again(Drift):
+    """May be fitted more than once."""
+
+    def fit(self, train, valid=None, *, seed=0):
+        self.fits = 0
+        return super().fit(train, valid, seed=seed)
+
+
+def test_the_contract_is_put_to_a_class_in_memory():
+    found = sb.check_model(Again)
+    assert found.model == "Again"
+    assert not [v for v in found.of("broken") if v.rule in ("fit", "parameters", "causality", "shapes")], found
+    assert {v.rule for v in found.of("not applicable")} >= {"parameters"}
+    assert repr(found).startswith("Check of Again")
+
+
 def test_a_script_without_a_guard_may_use_processes(tmp_path):
     script = tmp_path / "script.py"
     lines = [

@@ -12,7 +12,7 @@ from ..predictors.base import make_predictor
 from ..records import Dataset
 from ..registry import reason
 from ..signals import COMMANDS
-from ..specs import parse_spec
+from ..specs import spec_of
 from .base import BROKEN, NOT_APPLICABLE, PASSED, Rule, Verdict
 from .rules import RULES
 from .small import few_windows, small_harbour
@@ -46,11 +46,11 @@ class Report:
         }  # fmt: skip
 
 
-def check_model(text: str, data: Dataset | None = None, device: str | None = None) -> Report:
-    """Check the model of a spec (name, name[key=value], path.py:Class, saved folder) against the contract.
+def check_model(model: Any, data: Dataset | None = None, device: str | None = None) -> Report:
+    """Check a model against the contract.
 
     Args:
-        text: the model spec.
+        model: a spec (name, name[key=value], path.py:Class, saved folder), or a class or object in memory.
         data: where to check it (a few windows are used); small simulated port manoeuvres by default.
         device: where the model computes, if it has a device and the spec names none (see `check_device`).
 
@@ -59,7 +59,8 @@ def check_model(text: str, data: Dataset | None = None, device: str | None = Non
             device is here.
     """
     began = time.perf_counter()
-    spec = parse_spec(text)
+    spec = spec_of(model)
+    text = spec.text
     try:
         model = make_predictor(spec, device)
     except InputError:

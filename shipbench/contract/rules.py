@@ -37,6 +37,8 @@ def parameters(c: Subject) -> str:
     """The spec's values reach the model, before and after `fit`; a misspelled one is refused."""
     if c.saved:
         raise NotApplicable("a saved model takes no parameters")
+    if c.spec.given is not None:
+        raise NotApplicable("a class or object in memory takes no parameters from a spec")
     given = {k: v for k, v in c.spec.params.items() if k != "seed"}
     held, said = given, []
     for model, when in ((make_predictor(c.spec), "when it is made"), (c.model, "after fit")):

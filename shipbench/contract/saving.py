@@ -44,7 +44,7 @@ def same_after_loading(c: Subject) -> str:
 
 def _load(c: Subject, folder: Path) -> tuple[Any, str]:
     """As a study would: by its folder where the class is registered under a name, else by the class's own `load`."""
-    if c.saved or (c.spec.path is None and PREDICTORS.get(c.spec.name.partition(":")[0]) is type(c.model)):
+    if c.saved or (c.spec.path is None and c.spec.given is None and PREDICTORS.get(c.spec.name.partition(":")[0]) is type(c.model)):
         return make_predictor(parse_spec(str(folder)), c.device), "its folder's name"
     return type(c.model).load(folder), "the class's load(path)"
 
