@@ -129,7 +129,7 @@ class Verdict(Diagnosis):
         return brief("\n".join([f"Diagnosis of {self.dataset}", headline(self), compare]).rstrip())
 
 
-def diagnose(data: Data, *, gain: bool = True, seed: int = 0, workers: int = 2, thorough: bool = False) -> Verdict:
+def diagnose(data: Data, *, gain: bool = True, seed: int = 0, workers: int = 2, thorough: bool = False, quiet: bool = False) -> Verdict:
     """Show what the physics model gets wrong on measured runs and name the causes, as `shipbench diagnose` does.
 
     Args:
@@ -138,13 +138,16 @@ def diagnose(data: Data, *, gain: bool = True, seed: int = 0, workers: int = 2, 
         seed: of folds and bootstrap.
         workers: number of processes; 1: everything runs in this one.
         thorough: use up to twice as much of a long record.
+        quiet: show no progress.
 
     Raises:
         InputError: the data set cannot be read, or the record is too short or contradicts itself.
     """
+    from .bench.progress import steps_shown
     from .diagnosis.diagnose import diagnose as run
 
-    found = run(_loaded(data), gain=gain, seed=seed, workers=workers, thorough=thorough)
+    with steps_shown(quiet):
+        found = run(_loaded(data), gain=gain, seed=seed, workers=workers, thorough=thorough)
     spec = "" if isinstance(data, Dataset) else os.fspath(data)
     return Verdict(**{f.name: getattr(found, f.name) for f in fields(found)} | {"spec": spec})
 

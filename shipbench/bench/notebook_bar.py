@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
 from html import escape
 
 from ..names import shown
@@ -16,13 +17,52 @@ def in_notebook() -> bool:
     return type(shell).__name__ == "ZMQInteractiveShell"
 
 
-class NotebookBar:
-    """A bar with the finished part, the remaining time and the work at hand; lines below it on what did not go well."""
+_EVERY_S = 0.2
+"""Seconds between two drawings of steps, of which there may be thousands."""
+
+
+class _Place:
+    """A place of the page that is drawn anew."""
 
     def __init__(self) -> None:
         from IPython.display import HTML, display
 
         self.html, self.handle = HTML, display(HTML(""), display_id=True)
+        self.drawn = 0.0
+
+    @property
+    def due(self) -> bool:
+        """Whether the last drawing is old enough."""
+        return time.monotonic() - self.drawn >= _EVERY_S
+
+    def draw(self, part: float, whole: float, text: str, below: Sequence[str] = ()) -> None:
+        """A bar with text behind it and lines below."""
+        bar = f'<progress value="{part:g}" max="{whole:g}"></progress> {escape(shown(text))}'
+        self.handle.update(self.html(f"<div>{bar}{''.join(f'<br>{escape(shown(line))}' for line in below)}</div>"))
+        self.drawn = time.monotonic()
+
+
+class NotebookSteps:
+    """A bar for the steps of one piece of work, with the time that is left at the mean pace so far."""
+
+    def __init__(self) -> None:
+        self.place, self.began = _Place(), time.monotonic()
+
+    def __call__(self, what: str, share: float) -> None:
+        if self.place.due:
+            spent = time.monotonic() - self.began
+            left = f", about {duration(spent / share * (1.0 - share))} left" if share > 0.02 else ""
+            self.place.draw(share, 1.0, f"{what}{left}")
+
+    def finish(self) -> None:
+        self.place.draw(1.0, 1.0, f"ended after {duration(time.monotonic() - self.began)}")
+
+
+class NotebookBar:
+    """A bar with the finished part, the remaining time and the work at hand; lines below it on what did not go well."""
+
+    def __init__(self) -> None:
+        self.place = _Place()
         self.total, self.count, self.began, self.label = 0, 0, time.monotonic(), ""
         self.lines: list[str] = []
 
@@ -35,7 +75,8 @@ class NotebookBar:
         self._draw(label)
 
     def step(self, what: str, share: float) -> None:
-        self._draw(f"{self.label}: {what}" if self.label else what)
+        if self.place.due:
+            self._draw(f"{self.label}: {what}")
 
     def done(self, label: str, outcome: str) -> None:
         self.count += 1
@@ -55,6 +96,4 @@ class NotebookBar:
         if self.count and not ended:
             left = (time.monotonic() - self.began) / self.count * (self.total - self.count)
             text = f"about {duration(left)} left {text}"
-        bar = f'<progress value="{self.count}" max="{max(self.total, 1)}"></progress> {self.count}/{self.total} {escape(shown(text))}'
-        below = "".join(f"<br>{escape(shown(line))}" for line in self.lines[-10:])
-        self.handle.update(self.html(f"<div>{bar}{below}</div>"))
+        self.place.draw(self.count, max(self.total, 1), f"{self.count}/{self.total} {text}", self.lines[-10:])

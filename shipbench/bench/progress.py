@@ -104,7 +104,9 @@ def steps_shown(quiet: bool) -> Iterator[None]:
     if quiet:
         yield
         return
-    shown_by = StepBar() if sys.stderr.isatty() else StepLines()
+    from .notebook_bar import NotebookSteps, in_notebook
+
+    shown_by = NotebookSteps() if in_notebook() else StepBar() if sys.stderr.isatty() else StepLines()
     try:
         with listening(shown_by):
             yield

@@ -8,7 +8,8 @@ import types
 
 import pytest
 
-from shipbench.bench.progress import Bar, Lines, Silent, duration, make_progress
+from shipbench.bench.progress import Bar, Lines, Silent, duration, make_progress, steps_shown
+from shipbench.steps import step
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(0.4, "0 s"), (59.2, "59 s"), (185, "3 min 05 s"), (4330, "1 h 12 min")])
@@ -87,5 +88,9 @@ def test_a_notebook_gets_one_bar_that_is_redrawn(monkeypatch):
     bar.finish()
     assert "finished in" in page.shown[-1]
     assert page.shown[-1].endswith("<br>mine: failed: &lt;b&gt;<br>warning: late</div>")
+    with steps_shown(quiet=False):
+        step("fit", 0.0, 1.0)
+    assert 'value="0" max="1"></progress> fit' in page.shown[-2]
+    assert "ended after" in page.shown[-1]
     package.get_ipython = lambda: None
     assert isinstance(make_progress(), Lines)
