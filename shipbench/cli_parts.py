@@ -96,7 +96,7 @@ def _sizes(part: dict[str, Any]) -> list[str]:
     for p in part["parameters"]:
         unit, factor = display_unit(p["unit"])
         typical, low, high = (figure(factor * p[key]) for key in ("typical", "low", "high"))
-        lines.append(f"{p['name']} [{unit}]: typical {typical}, from {low} to {high}")
+        lines.append(f"{p['name']} [{unit}], typical {typical}, from {low} to {high}")
     return lines
 
 
