@@ -153,7 +153,9 @@ def test_scores_tell_of_fits_that_failed(scores):
     assert len(scores.failed) == 2
     for text in (repr(scores), scores._repr_html_()):
         assert "fit: ValueError: out of luck" in text
-    assert repr(scores).splitlines()[1].startswith("  hold: ")
+    lines = repr(scores).splitlines()
+    assert lines[1].startswith("'hold' is first")
+    assert lines[2].startswith("  hold: ")
 
 
 def test_scores_draw_and_write_a_page(scores, tmp_path):
