@@ -160,6 +160,9 @@ def test_predict_writes_the_states_of_a_saved_model(cli, toy_folder, tmp_path):
     table = pd.read_csv(tmp_path / "p.csv")
     assert list(table.columns[:4]) == ["trajectory", "t", "x", "y"]
     assert len(table) == 6 * 31
+    result = cli("predict", "r/cells/toyset/hold/fold0-seed0/model", folder, "--out", "p.csv", "--horizon", "30.4")
+    assert result.exit_code == 2
+    assert "--horizon = 30.4 s is not a whole number of samples of" in result.stderr
     start = pd.read_csv(folder / "trajectories.csv").query("trajectory == 'r03' and t == 0").iloc[0]
     assert table.query("trajectory == 'r03' and t == 0").iloc[0]["psi"] == pytest.approx(start["psi"], rel=1e-6)
 

@@ -15,6 +15,7 @@ from ..records import Dataset
 from ..signals import STATES
 from ..specs import parse_spec
 from .escaping import csv_text
+from .task import samples
 
 Rollout = tuple[str, np.ndarray, np.ndarray]
 """Run id, t (K + 1,) [s] and states (K + 1, 10), the first being the recorded start."""
@@ -35,9 +36,10 @@ def predict_runs(model: str, dataset: Dataset, horizon_s: float | None = None, d
     check_origin(model, getattr(predictor, "origin", None), dataset)
     if horizon_s is not None and not 0.0 < horizon_s < np.inf:
         raise InputError(f"--horizon {horizon_s:g}; accepted: a positive number of seconds.")
+    asked = None if horizon_s is None else samples(horizon_s, dataset.dt, "--horizon")
     rollouts = []
     for run in dataset.runs:
-        steps = len(run) - 1 if horizon_s is None else round(horizon_s / dataset.dt)
+        steps = asked or len(run) - 1
         if not 0 < steps < len(run):
             raise InputError(
                 f"run '{run.id}' lasts {(len(run) - 1) * dataset.dt:g} s, the horizon is {steps * dataset.dt:g} s; give a positive --horizon "

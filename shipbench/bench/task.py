@@ -72,15 +72,15 @@ class Task(BaseModel):
 
     def steps(self, dt: float) -> int:
         """Knots of the horizon at sample time `dt` [s]."""
-        return _samples(self.horizon_s, dt, "horizon_s")
+        return samples(self.horizon_s, dt, "horizon_s")
 
     def history(self, dt: float) -> int:
         """Samples of the history at sample time `dt` [s]."""
-        return _samples(self.history_s, dt, "history_s") if self.history_s else 0
+        return samples(self.history_s, dt, "history_s") if self.history_s else 0
 
     def stride(self, dt: float) -> int | None:
         """Distance of scored windows in samples, or None for windows that do not overlap."""
-        return _samples(self.stride_s, dt, "stride_s") if self.stride_s else None
+        return samples(self.stride_s, dt, "stride_s") if self.stride_s else None
 
     def key(self, fingerprint: str) -> str:
         """Digest of all that decides what is scored on which data; rows are ranked together only where it agrees."""
@@ -91,7 +91,8 @@ class Task(BaseModel):
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:12]
 
 
-def _samples(seconds: float, dt: float, name: str) -> int:
+def samples(seconds: float, dt: float, name: str) -> int:
+    """Number of samples of a time [s]; raises InputError where it is no whole number of them. `name` is that of the setting."""
     count = round(min(seconds / dt, 1e18))  # the quotient of a huge number may be infinite
     if count < 1 or abs(count * dt - seconds) > 1e-3 * dt:
         raise InputError(f"{name} = {seconds:g} s is not a whole number of samples of {dt:g} s; give a multiple of {dt:g} s.")
