@@ -17,11 +17,12 @@ import zipfile
 import zlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import IO, Any
-
-import numpy as np
+from typing import IO, TYPE_CHECKING, Any
 
 from .errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
 
 MOST_TEXT = 64_000_000
 """Bytes of a text that is read whole (JSON, Python); those that shipbench writes for 10,000 runs have some 5 MB."""
@@ -119,6 +120,8 @@ def read_npz(path: str | Path, what: str = "file of arrays (.npz)", most: int = 
     Raises:
         InputError: as `open_regular`, the file is damaged or holds other things than arrays of numbers or text, or more than `most` bytes.
     """
+    import numpy as np
+
     with open_regular(path, what) as file:
         try:
             with zipfile.ZipFile(file) as packed:
@@ -138,6 +141,8 @@ def read_npz(path: str | Path, what: str = "file of arrays (.npz)", most: int = 
 
 def _check_array(packed: zipfile.ZipFile, part: zipfile.ZipInfo) -> None:
     """Refuse a member whose header declares more numbers than it holds, before they are allocated."""
+    import numpy as np
+
     with packed.open(part) as member:
         version = np.lib.format.read_magic(member)
         header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}.get(version)

@@ -242,7 +242,7 @@ def test_validate_prints_every_row_and_fails_when_one_is_outside(cli, monkeypatc
         (["run", "-d", "toyset"], "no model is given; name at least one (--model physics)"),
         (["run", "-m", "hold", "--config", "none.toml"], "cannot read none.toml: No such file or directory"),
         (["run", "-m", "hold", "--config", "wrong.toml"], "unknown key 'fold'. Did you mean 'folds'?"),
-        (["run", "-m", "hold", "--config", "binary.toml"], "binary.toml is not valid TOML"),
+        (["run", "-m", "hold", "--config", "binary.toml"], "binary.toml is not UTF-8 text"),
         (["run", "-m", "hold", "-d", "toyset", "--horizon", "20", "--out", "wrong.toml/x"], "cannot write to wrong.toml/x: Not a directory"),
         (["leaderboard"], "no results below runs/"),
         (["leaderboard", "toyset"], "toyset holds no results"),

@@ -6,7 +6,7 @@ from typing import Any
 
 WIDTH, LAYERS, ROUNDS = (1, 10_000), (1, 100), (1, 1_000_000)
 """Neurons of a layer, layers, and epochs, minibatches or patience."""
-RATE, WEIGHT = (0.0, 10.0), (0.0, 1e6)
+RATE, WEIGHT = (0.0, 100.0), (0.0, 1e6)
 """Step sizes of an optimiser, and weights of a term of the loss."""
 
 

@@ -153,7 +153,7 @@ def read_arrays(folder: Path, meta: dict[str, Any]) -> dict[str, np.ndarray]:
 
 def damaged(folder: Path, error: Exception) -> InputError:
     """The message on a folder that holds no saved model, or a damaged one."""
-    why = str(error) or type(error).__name__
+    why = (str(error) or type(error).__name__).rstrip(".")
     return InputError(f"{folder} is not a saved model, or it is damaged: {why}. Give a folder that save() wrote, whole, or fit the model again.")
 
 

@@ -116,7 +116,7 @@ def test_apply_on_a_registered_set_exits_2():
 
 
 def test_lines_name_runs_with_any_character(table, folder):
-    odd = 'a "b" ]=\n[x] é'
+    odd = 'a "b" ]= [x] é'
     names = table["trajectory"].where(table["trajectory"] != "run03", odd)
     jumped = table.assign(trajectory=names)
     at = jumped.index[names == odd]
