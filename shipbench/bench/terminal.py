@@ -158,15 +158,15 @@ class _Screen:
         return found
 
     def listed(self) -> list[Text]:
-        """One paragraph a row: its first cell, then the others with their headers."""
-        first, *rest = self.table.columns
+        """One paragraph a row: its first cell and those without a header, then the others with their headers."""
+        heads = [c for i, c in enumerate(self.table.columns) if i == 0 or not c.header]
         lines: list[Text] = []
         for row in self.table.rows:
-            lines += [Text(line, style="bold") for line in paragraph(shown(first.text(row)), self.width)]
-            for column in rest:
+            head = "  ".join(text for c in heads if (text := shown(c.text(row))))
+            lines += [Text(line, style="bold") for line in paragraph(head, self.width)]
+            for column in (c for c in self.table.columns if c not in heads):
                 text = " ".join(shown(column.text(row), keep="\n").split())
-                header = f"{shown(column.header)}: " if column.header else ""
-                lines += [Text(line) for line in paragraph(f"{header}{text}", self.width, "  ", "    ")] if text else []
+                lines += [Text(line) for line in paragraph(f"{shown(column.header)}: {text}", self.width, "  ", "    ")] if text else []
         return [*lines, Text("")]
 
 
