@@ -85,9 +85,11 @@ def _rows(path: Path, layout: Layout) -> Iterator[tuple[Any, ...]]:
 
     try:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-    except (InvalidFileException, KeyError, SyntaxError, zipfile.BadZipFile, TypeError, AttributeError) as error:
+    except (InvalidFileException, LookupError, SyntaxError, zipfile.BadZipFile, TypeError, AttributeError) as error:
         raise ValueError(f"damaged workbook ({type(error).__name__}: {error})") from None  # tables.reading makes the message
     try:
+        if not book.sheetnames:
+            raise InputError(f"{path} has no sheet, or is damaged. Save it anew as .xlsx, or as CSV.")
         if layout.sheet is None and len(book.sheetnames) > 1:
             raise InputError(
                 f'{path} has the sheets {", ".join(book.sheetnames)}. Name one: [file] sheet = "..." in the mapping, or --sheet with --propose.'
@@ -95,7 +97,7 @@ def _rows(path: Path, layout: Layout) -> Iterator[tuple[Any, ...]]:
         if layout.sheet is not None and layout.sheet not in book.sheetnames:
             raise InputError(f"{path} has no sheet '{layout.sheet}'; it has {', '.join(book.sheetnames)}.")
         yield from book[layout.sheet or book.sheetnames[0]].iter_rows(values_only=True)
-    except (KeyError, SyntaxError, zipfile.BadZipFile, TypeError, AttributeError) as error:
+    except (LookupError, SyntaxError, zipfile.BadZipFile, TypeError, AttributeError) as error:
         raise ValueError(f"damaged workbook ({type(error).__name__}: {error})") from None
     finally:
         book.close()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
+import zipfile
 
 import numpy as np
 import pandas as pd
@@ -316,3 +318,17 @@ def test_a_partial_mapping_of_wrong_keys_or_kinds_is_one_message(propose, tmp_pa
     assert done.exit_code == 2
     assert told in done.stderr
     assert not (tmp_path / "draft.toml").exists()
+
+
+def test_a_workbook_without_a_sheet_is_one_message(propose, tmp_path):
+    path = tmp_path / "log.xlsx"
+    pd.DataFrame({"t": [0.0, 1.0]}).to_excel(path, index=False)
+    with zipfile.ZipFile(path) as packed:
+        parts = {name: packed.read(name) for name in packed.namelist()}
+    parts["xl/workbook.xml"] = re.sub(rb"<sheets>.*</sheets>", b"<sheets></sheets>", parts["xl/workbook.xml"])
+    with zipfile.ZipFile(path, "w") as packed:
+        for name, text in parts.items():
+            packed.writestr(name, text)
+    done, _, _ = propose(path)
+    assert done.exit_code == 2
+    assert "has no sheet" in done.stderr
