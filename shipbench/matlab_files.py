@@ -62,6 +62,8 @@ def _check_parts(data: memoryview, order: str) -> int:
             if kind >> 16:  # up to four bytes, which stand in the tag itself
                 at += 8
                 continue
+            if depth and at + 8 + size > end:  # scipy would take the memory before it reads
+                raise ValueError(f"it is damaged or cut short: an element declares {size} bytes and holds {end - at - 8}")
             if kind == _COMPRESSED:
                 raise ValueError("an element is packed twice")
             if kind == _MATRIX:

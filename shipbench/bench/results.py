@@ -111,8 +111,8 @@ def read_truth(out: Path, dataset: str, fold: int) -> Batch:
     path = truth_path(out, dataset, fold)
     found = _arrays(path, ("ids", "s0", "U", "truth"))
     ids, s0, U, truth = (found[name] for name in ("ids", "s0", "U", "truth"))
-    steps = (len(ids), truth.shape[1]) if ids.ndim == 1 and truth.ndim == 3 else (0, 0)
-    shapes = s0.shape == (len(ids), len(STATES)) and truth.shape == (*steps, len(STATES)) and U.shape[:2] == steps and U.ndim == 3
+    steps = (ids.size, truth.shape[1]) if ids.ndim == 1 and truth.ndim == 3 else (0, 0)
+    shapes = s0.shape == (ids.size, len(STATES)) and truth.shape == (*steps, len(STATES)) and U.shape[:2] == steps and U.ndim == 3
     if not shapes or 0 in steps or U.shape[2] < len(COMMANDS) or ids.dtype.kind != "U" or any(a.dtype.kind != "f" for a in (s0, U, truth)):
         raise InputError(f"{path}: ids {ids.shape}, s0 {s0.shape}, U {U.shape}, truth {truth.shape} are no truth of windows. {_WHOLE}")
     if not all(np.isfinite(a).all() for a in (s0, U, truth)):

@@ -11,10 +11,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from shipbench.bench.results import Cell, read_results
+from shipbench.bench.results import Cell, read_results, read_truth, truth_path
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
 from shipbench.errors import InputError, WorkError
@@ -242,3 +243,11 @@ def test_a_study_writes_through_no_link_in_its_folder(study, link):
     with pytest.raises(InputError, match=f"out/{link} is a link; accepted: (folders|a folder), so that a study writes only below .*out"):
         study()
     assert not list(elsewhere.iterdir())
+
+
+def test_a_truth_of_a_single_id_is_no_truth(tmp_path):
+    path = truth_path(tmp_path, "toyset", 0)
+    path.parent.mkdir(parents=True)
+    np.savez(path, ids=np.array("r00"), s0=np.zeros((1, 10)), U=np.zeros((1, 5, 4)), truth=np.zeros((1, 5, 10)))
+    with pytest.raises(InputError, match="are no truth of windows"):
+        read_truth(tmp_path, "toyset", 0)
