@@ -143,7 +143,7 @@ def _cause(c: Cause) -> str:
     text += table(["size", "value [95 % interval]"], rows) if rows else ""
     text += paragraph(c.evidence[:1].upper() + c.evidence[1:].rstrip(".") + ".") if c.evidence else ""
     if c.confused_with:
-        text += f'<p class="warning">Cannot be told from {escape(", ".join(c.confused_with))} with these data.</p>'
+        text += f'<p class="warning">These data cannot separate it from {escape(", ".join(c.confused_with))}.</p>'
     return text
 
 

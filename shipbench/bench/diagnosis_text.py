@@ -6,6 +6,7 @@ import math
 import shlex
 
 from ..diagnosis.outcome import Candidate, Cause, Diagnosis, Estimate, Gain, what_it_is
+from ..effects.base import EFFECTS, Effect
 from .tables import display_unit
 from .terminal import command_lines, paragraph
 
@@ -34,17 +35,38 @@ def quantity(value: float | None, unit: str) -> str:
 
 
 def interval(e: Estimate) -> str:
-    """Such as `0.31 m/s [0.28, 0.34]`; without interval where there is none."""
+    """Such as `0.31 m/s (95 %: 0.28 to 0.34)`; without interval where there is none."""
     factor = display_unit(e.unit)[1]
     known = all(v is not None and math.isfinite(v) for v in e.ci95)
     if not known and e.unit == "1" and e.value is not None and e.value == round(e.value):
         return f"{e.value:.0f}"  # a choice: the number of a run, a side
-    return quantity(e.value, e.unit) + (f" [{figure(factor * e.ci95[0])}, {figure(factor * e.ci95[1])}]" if known else "")
+    return quantity(e.value, e.unit) + (f" (95 %: {figure(factor * e.ci95[0])} to {figure(factor * e.ci95[1])})" if known else "")
 
 
-def estimate(name: str, e: Estimate) -> str:
-    """Such as `speed 0.31 m/s [0.28, 0.34]`."""
-    return f"{name} {interval(e)}"
+def estimate(effect: str, name: str, e: Estimate) -> str:
+    """A parameter of an effect in words: a direction as three digits, a relative change in percent, else its value with unit."""
+    part = _effect(effect)
+    if e.value is None or not math.isfinite(e.value) or part is None:
+        return f"{name} {interval(e)}"
+    known = all(v is not None and math.isfinite(v) for v in e.ci95)
+    if part.vector is not None and name == part.vector[1]:
+        return f"{name} {_bearing(e.value)}" + (f" (95 %: {_bearing(e.ci95[0])} to {_bearing(e.ci95[1])})" if known else "")
+    parameter = next((p for p in part.parameters if p.name == name), None)
+    label = f"{parameter.title} {name}" if parameter is not None and parameter.title else name
+    if parameter is not None and parameter.relative:
+        doubt = f" (95 %: {100 * e.ci95[0]:+.0f} to {100 * e.ci95[1]:+.0f} %)" if known else ""
+        return f"{label} {100 * abs(e.value):.0f} % {'smaller' if e.value < 0 else 'larger'}{doubt}"
+    return f"{label} {interval(e)}"
+
+
+def _effect(name: str) -> Effect | None:
+    """The effect of this name; None for one that is not installed here."""
+    return EFFECTS.get(name) if name in EFFECTS else None
+
+
+def _bearing(angle: float) -> str:
+    """An angle [rad] as a bearing of three digits."""
+    return f"{round(math.degrees(angle)) % 360:03d}°"
 
 
 def _change(relative: float) -> str:
@@ -69,20 +91,20 @@ def headline(d: Diagnosis) -> str:
         return f"Found: {', '.join(_named(c) for c in d.causes)}. {gain_words(d.gain)}"
     if d.verdict == "unknown" and d.unknown:
         return (
-            f"Something is missing that is not in the library: {what_it_is(d.unknown)} (score {d.unknown['score']:.0f}; no named effect explains as "
-            f"much)."
+            f"The model lacks something that is not in the library: {what_it_is(d.unknown)}. "
+            f"The log Bayes factor is {0.5 * d.unknown['score']:.0f}. No effect of the library explains as much."
         )
     if d.warnings:
-        return "Nothing is named. The warnings below say why. The detection limits say what these runs could have shown."
+        return "No cause is identified. The warnings below say why. The detection limits say what these runs could have shown."
     return (
-        "Nothing found: no effect of the library, and no unexplained dependence, is worth naming. "
+        "Nothing found: neither an effect of the library nor an unexplained dependence is detected. "
         "The detection limits say what these runs could have shown."
     )
 
 
 def _named(c: Cause) -> str:
     """A cause with its first two sizes."""
-    sizes = [estimate(k, e) for k, e in c.parameters.items()]
+    sizes = [estimate(c.effect, k, e) for k, e in c.parameters.items()]
     return c.effect + (f" ({'; '.join(sizes[:2])}{'; ...' if len(sizes) > 2 else ''})" if sizes else "")
 
 
@@ -94,7 +116,7 @@ def next_command(d: Diagnosis) -> str:
 
 
 def detectable(c: Candidate) -> str:
-    """Smallest size that would have been named, per amplitude, the unit once where it is the same; "-" where no possible size would."""
+    """Detection limit per amplitude, the unit once where it is the same; "-" where no possible size would."""
     known = [(name, v, _unit(c, name)) for name, v in c.detectable.items() if v is not None and math.isfinite(v)]
     parts = []
     for i, (name, v, unit) in enumerate(known):
@@ -111,17 +133,24 @@ def _unit(c: Candidate, name: str) -> str:
 
 
 def strength(c: Cause) -> str:
-    """Score and p."""
-    return f"score {c.score:.0f}, p {c.p_value:.2g}" if math.isfinite(c.score) else "in the record itself"
+    """Evidence in words, with log Bayes factor and p; the words are those of Kass and Raftery (1995), Bayes factors, section 3.2."""
+    if not math.isfinite(c.score):
+        return "an error of the record itself"
+    factor = 0.5 * c.score
+    word = "very strong" if factor > 5.0 else "strong" if factor > 3.0 else "positive" if factor > 1.0 else "weak"
+    return f"{word} evidence, log Bayes factor {factor:.0f}, p {c.p_value:.2g}"
 
 
 def cause_lines(c: Cause, width: int = WIDTH) -> list[str]:
     """A cause with sizes, evidence and confusions."""
-    lines = [f"  {c.rank}. {c.effect} ({strength(c)})"]
-    lines += [f"       {estimate(k, e)}" for k, e in c.parameters.items()]
+    part = _effect(c.effect)
+    lines = paragraph(f"{c.rank}. {c.effect}" + (f": {part.summary}" if part else ""), width, "  ", " " * 5)
+    lines += paragraph(f"({strength(c)})", width, " " * 5)
+    for name, e in c.parameters.items():
+        lines += paragraph(estimate(c.effect, name, e), width, " " * 7, " " * 9)
     texts = [c.evidence.rstrip(".") + "."] if c.evidence else []
     if c.confused_with:
-        texts.append(f"Cannot be told from {', '.join(c.confused_with)} with these data.")
+        texts.append(f"These data cannot separate it from {', '.join(c.confused_with)}.")
         texts += [f"To separate them: {c.separating_manoeuvre}"] if c.separating_manoeuvre else []
     for text in texts:
         lines += paragraph(text, width, " " * 7)
@@ -133,7 +162,7 @@ def _candidate_lines(d: Diagnosis, width: int) -> list[str]:
     if not shown:
         return []
     wide = max(len(c.effect) for c in shown)
-    lines = [f"Candidates (best {len(shown)} of {len(d.candidates)}):", f"  {'effect':<{wide}s}     score  why it was or was not named"]
+    lines = [f"Candidates (best {len(shown)} of {len(d.candidates)}):", f"  {'effect':<{wide}s}     score  result"]
     for c in shown:
         score = f"{c.score:8.1f}" if math.isfinite(c.score) else "       -"
         lines += paragraph(f"{c.effect:<{wide}s}  {score}  {c.rejected_because}", width, "  ", " " * (wide + 14))
@@ -164,7 +193,7 @@ def _wrong_lines(d: Diagnosis, width: int) -> list[str]:
         lines += paragraph(f"{w.channel}, {100 * w.share_of_error:.0f} % of the error: {when}", width, "  ", "      ")
     lines += [""] if lines else []
     if noise := d.unexplained_after.get("taken_as_noise"):
-        lines.append("Taken as noise, no cause:")
+        lines.append("Treated as noise:")
         for channel, words in noise.items():
             lines += paragraph(f"{channel}: {words}", width, "  ", "      ")
         lines.append("")

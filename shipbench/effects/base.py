@@ -36,6 +36,7 @@ class Parameter:
     low and high; a size beyond them is not named (`Effect.plausible`).
     A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes are zero. An `other` one
     is the amplitude, or chooses, another form of the same cause, which a ship may have in its place: fitted, but not drawn for the suite.
+    `title` is the name in words, such as "sway damping"; a `relative` one is a change of a coefficient as a share, reported in percent.
     """
 
     name: str
@@ -46,6 +47,8 @@ class Parameter:
     scaling: str = "1"
     shape: bool = False
     other: bool = False
+    title: str = ""
+    relative: bool = False
 
     def for_length(self, L: float) -> Parameter:
         """The same parameter of a ship of length L [m]."""

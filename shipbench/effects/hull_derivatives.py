@@ -15,15 +15,15 @@ class HullDerivatives(Effect):
     summary = "hull derivatives off the regressions"
     source = "spread of the regressions: physics reference, section 5, H55"
     parameters = (
-        Parameter("Y_v", "1", 0.25, -0.9, 3.0),
-        Parameter("Y_r", "1", 0.25, -0.9, 3.0),
-        Parameter("N_v", "1", 0.25, -0.9, 3.0),
-        Parameter("N_r", "1", 0.25, -0.9, 3.0),
-        Parameter("Y_nonlinear", "1", 0.25, -0.9, 3.0),
-        Parameter("N_nonlinear", "1", 0.25, -0.9, 3.0),
-        Parameter("X_nonlinear", "1", 0.25, -0.9, 3.0),
-        Parameter("m_y", "1", 0.25, -0.9, 3.0),
-        Parameter("J_z", "1", 0.25, -0.9, 3.0),
+        Parameter("Y_v", "1", 0.25, -0.9, 3.0, title="sway damping", relative=True),
+        Parameter("Y_r", "1", 0.25, -0.9, 3.0, title="sway force due to yaw rate", relative=True),
+        Parameter("N_v", "1", 0.25, -0.9, 3.0, title="yaw moment due to sway", relative=True),
+        Parameter("N_r", "1", 0.25, -0.9, 3.0, title="yaw damping", relative=True),
+        Parameter("Y_nonlinear", "1", 0.25, -0.9, 3.0, title="nonlinear sway force", relative=True),
+        Parameter("N_nonlinear", "1", 0.25, -0.9, 3.0, title="nonlinear yaw moment", relative=True),
+        Parameter("X_nonlinear", "1", 0.25, -0.9, 3.0, title="nonlinear surge force", relative=True),
+        Parameter("m_y", "1", 0.25, -0.9, 3.0, title="added mass in sway", relative=True),
+        Parameter("J_z", "1", 0.25, -0.9, 3.0, title="added moment of inertia in yaw", relative=True),
     )
     separate = "steady turns and zig-zags at several rudder angles"
 

@@ -92,7 +92,7 @@ def test_the_summary_says_the_verdict_with_sizes_and_the_next_command():
     text = " ".join("\n".join(lines).split())  # whatever the lines are broken at
     assert max(map(len, lines)) <= WIDTH + 2
     assert "current" in text
-    assert "143 deg" in text
+    assert "to 143° (95 %: 138° to 149°)" in text
     assert "21.3 -> 9.80 m: 54 % less" in text
     assert "24/24 runs better" in text
     assert "shipbench run --model physics --model physics+current" in text
@@ -119,7 +119,7 @@ def test_a_size_without_interval_is_written_without_one():
     from shipbench.bench.diagnosis_text import interval
 
     assert interval(Estimate(1317.0, "m", (float("nan"), float("nan")))) == "1317 m"
-    assert interval(Estimate(0.31, "m/s", (0.28, 0.34))) == "0.310 m/s [0.280, 0.340]"
+    assert interval(Estimate(0.31, "m/s", (0.28, 0.34))) == "0.310 m/s (95 %: 0.280 to 0.340)"
 
 
 def test_none_comes_with_the_sizes_that_would_have_been_seen():
