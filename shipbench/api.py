@@ -248,7 +248,7 @@ def propose_mapping(
         remarks = write_proposal(
             [Path(log) for log in _several(logs)], path, force, file=file, partial=Path(partial) if partial is not None else None
         )
-        return Proposal(path.read_text(encoding="utf-8"), tuple(remarks if out is not None else remarks[:-1]))
+        return Proposal(path.read_text(encoding="utf-8"), tuple(remarks if out is not None else remarks[:-2]))
 
 
 def report(results: Results | Scores | Place | Sequence[Place], out: Place = "report.html", *, diagnosis: Place | Sequence[Place] = ()) -> Path:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_common import Json, Quiet, print_json, say, say_wrapped
+from .cli_common import Json, Quiet, print_json, say, say_wrapped, screen_width
 from .errors import InputError
 from .names import file_name
 
@@ -41,6 +41,7 @@ def data_import(
     `shipbench data import LOG --map mapping.toml --ship ship.toml --out FOLDER`.
     """
     if propose is not None:
+        from .bench.terminal import command_lines
         from .importing.propose import write_proposal
 
         known = {key: given for key, given in (("encoding", encoding), ("sheet", sheet), ("header", header)) if given is not None}
@@ -48,8 +49,10 @@ def data_import(
         if as_json:
             print_json({"mapping": str(propose), "remarks": lines})
             return
-        for line in lines[-1:] if quiet else lines:
+        *remarks, command = lines
+        for line in remarks[-1:] if quiet else remarks:
             say_wrapped(line, hanging=_hanging(line))
+        say("\n".join(command_lines(command, screen_width())))
         return
     if only := [f"--{name}" for name, given in (("encoding", encoding), ("sheet", sheet), ("header", header)) if given is not None]:
         raise InputError(f"{only[0]} serves --propose; an import takes it from the mapping. Write it there: [file] {only[0][2:]} = ...")

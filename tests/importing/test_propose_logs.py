@@ -332,3 +332,10 @@ def test_a_workbook_without_a_sheet_is_one_message(propose, tmp_path):
     done, _, _ = propose(path)
     assert done.exit_code == 2
     assert "has no sheet" in done.stderr
+
+
+def test_the_import_can_be_pasted_into_a_shell(propose, tmp_path):
+    done, _, _ = propose(write(tmp_path, "log.csv", logged(T)))
+    shown = done.stdout.split("then:", 1)[1]
+    assert " ".join(shown.replace("\\\n", " ").split()) == "shipbench data import LOG --map draft.toml --ship ship.toml --out FOLDER"
+    assert all(line.endswith("\\") for line in shown.strip().splitlines()[:-1])
