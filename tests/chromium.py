@@ -4,6 +4,10 @@
     ["open", file, width, "light" or "dark"]  load a local file in a window that wide; gives the messages of the console since the start
     ["js", code]                              the value of an expression in the page
     ["click", selector]                       a mouse click on the middle of the first such element, scrolled into view
+    ["hover", selector, x, y]                 the mouse on a point of that element, in parts of its width and height
+    ["drag", selector, x0, y0, x1, y1]        a drag from one such point to another
+    ["double", selector, x, y]                a double click on such a point
+    ["requests"]                              addresses that the pages asked for, but for the files opened
     ["key", selector, name]                   a key (Qt's name, such as "Down") with the focus on that element
     ["shot", path]                            a picture of the window
 """
@@ -28,6 +32,7 @@ def browse(steps: list[list[Any]], scheme: str = "light") -> list[Any]:
     env = os.environ | {"QT_QPA_PLATFORM": "offscreen", "QTWEBENGINE_DISABLE_SANDBOX": "1", "QTWEBENGINE_CHROMIUM_FLAGS": flags}
     done = subprocess.run([sys.executable, __file__, json.dumps(steps)], capture_output=True, text=True, env=env, timeout=120, check=False)
     if done.returncode == 77:
+        assert not os.environ.get("SHIPBENCH_NEEDS_BROWSER"), f"SHIPBENCH_NEEDS_BROWSER is set and no browser starts: {done.stdout.strip()}"
         pytest.skip(f"no browser: {done.stdout.strip()}")
     assert done.returncode == 0, done.stderr[-3000:]
     return json.loads(done.stdout)
@@ -37,7 +42,7 @@ def _main(steps: list[list[Any]]) -> int:
     try:
         from PyQt6.QtCore import QEventLoop, QPoint, Qt, QUrl
         from PyQt6.QtTest import QTest
-        from PyQt6.QtWebEngineCore import QWebEnginePage, QWebEngineProfile
+        from PyQt6.QtWebEngineCore import QWebEnginePage, QWebEngineProfile, QWebEngineUrlRequestInterceptor
         from PyQt6.QtWebEngineWidgets import QWebEngineView
         from PyQt6.QtWidgets import QApplication
     except ImportError as error:  # not installed, or a library of the system is missing
@@ -51,7 +56,16 @@ def _main(steps: list[list[Any]]) -> int:
         def javaScriptConsoleMessage(self, level, message, line, source):
             console.append(message)
 
+    asked: list[str] = []
+    opened: list[str] = []
+
+    class Requests(QWebEngineUrlRequestInterceptor):
+        def interceptRequest(self, info):
+            asked.append(info.requestUrl().toString())
+
+    interceptor = Requests()
     profile = QWebEngineProfile()  # off the record: nothing is kept on disk
+    profile.setUrlRequestInterceptor(interceptor)
     view = QWebEngineView()
     page = Page(profile, view)
     view.setPage(page)
@@ -67,7 +81,9 @@ def _main(steps: list[list[Any]]) -> int:
         view.resize(width, _HEIGHT)
         loop, went = QEventLoop(), []
         finished = page.loadFinished.connect(lambda ok: (went.append(ok), loop.quit()))
-        page.load(QUrl.fromLocalFile(str(Path(file).resolve())))
+        url = QUrl.fromLocalFile(str(Path(file).resolve()))
+        opened.append(url.toString())
+        page.load(url)
         loop.exec()
         page.loadFinished.disconnect(finished)
         assert went == [True], f"{file} does not load"
@@ -84,6 +100,40 @@ def _main(steps: list[list[Any]]) -> int:
         QTest.mouseClick(view.focusProxy(), Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(round(x), round(y)))
         QTest.qWait(100)
 
+    def point(selector: str, x: float, y: float) -> QPoint:
+        quoted = json.dumps(selector)
+        box = js(
+            f"(() => {{ const e = document.querySelector({quoted}); e.scrollIntoView({{block: 'center', behavior: 'instant'}}); "
+            "const b = e.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()"
+        )
+        QTest.qWait(60)
+        return QPoint(round(box[0] + x * box[2]), round(box[1] + y * box[3]))
+
+    def hover(selector: str, x: float, y: float) -> None:
+        at = point(selector, x, y)
+        for shift in (3, 0):  # a browser tells of a move only where the mouse was elsewhere
+            QTest.mouseMove(view.focusProxy(), at - QPoint(shift, 0))
+            QTest.qWait(120)
+
+    def drag(selector: str, x0: float, y0: float, x1: float, y1: float) -> None:
+        start, end = point(selector, x0, y0), point(selector, x1, y1)
+        left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+        QTest.mouseMove(view.focusProxy(), start)
+        QTest.mousePress(view.focusProxy(), left, none, start)
+        for part in (0.3, 0.7, 1.0):
+            QTest.mouseMove(view.focusProxy(), start + (end - start) * part)
+            QTest.qWait(60)
+        QTest.mouseRelease(view.focusProxy(), left, none, end)
+        QTest.qWait(300)
+
+    def double(selector: str, x: float, y: float) -> None:
+        at = point(selector, x, y)
+        left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+        QTest.mouseMove(view.focusProxy(), at)
+        QTest.mouseClick(view.focusProxy(), left, none, at)
+        QTest.mouseClick(view.focusProxy(), left, none, at, 30)
+        QTest.qWait(400)
+
     def key(selector: str, name: str) -> None:
         js(f"document.querySelector({json.dumps(selector)}).focus()")
         QTest.keyClick(view.focusProxy(), getattr(Qt.Key, f"Key_{name}"))
@@ -93,7 +143,12 @@ def _main(steps: list[list[Any]]) -> int:
         QTest.qWait(150)
         return view.grab().save(path)
 
-    actions = {"open": load, "js": js, "click": click, "key": key, "shot": shot}
+    def requests() -> list[str]:
+        return [url for url in asked if url not in opened]
+
+    actions = {
+        "open": load, "js": js, "click": click, "key": key, "shot": shot, "hover": hover, "drag": drag, "double": double, "requests": requests,
+    }  # fmt: skip
     results = [actions[name](*values) for name, *values in steps]
     print(json.dumps(results))
     sys.stdout.flush()

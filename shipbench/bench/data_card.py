@@ -19,11 +19,12 @@ from ..data.noise import channel_noise
 from ..data.sensitivity import IMITATED, UNFELT, Telling, tellings
 from ..errors import InputError
 from ..records import Dataset
+from ..render.html import content_policy
 from ..signals import UNITS
 from ..steps import step
 from .data_card_plots import Picture, pictures
 from .dataset_facts import dataset_facts, describe_tables
-from .escaping import content_policy, markdown_text
+from .escaping import markdown_text
 from .tables import Table, TableColumn, display_unit, number, significant
 
 _NOISE = (

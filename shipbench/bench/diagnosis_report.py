@@ -11,8 +11,8 @@ from html import escape
 from pathlib import Path
 
 from ..diagnosis.outcome import Cause, Diagnosis, what_it_is
+from ..render.html import content_policy
 from .diagnosis_text import detectable, figure, gain_words, headline, interval, next_command, strength, summary_lines
-from .escaping import content_policy
 
 _STYLE = """
 :root { color-scheme: light dark; --ink: #1c2733; --paper: #fff; --soft: #f1f4f6; --line: #d5dde3; --accent: #00707f; --warn: #9a5200;

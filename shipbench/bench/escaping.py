@@ -1,11 +1,8 @@
-"""Names and words of others as text of a page, one function for each format, and the pages' policy. HTML: `html.escape`; terminals: `names.shown`."""
+"""Names and words of others as text of a page, one function for each format. HTML: `html.escape`; terminals: `names.shown`."""
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import re
-from collections.abc import Sequence
 
 from ..names import shown
 
@@ -48,26 +45,3 @@ def csv_text(text: str) -> str:
     except ValueError:
         return f"'{text}"
     return text
-
-
-def content_policy(style: str, script: str = "", *, images: bool = False, style_attributes: bool = False) -> str:
-    """The content security policy of a page: it fetches nothing and runs nothing but this style and script.
-
-    Args:
-        style, script: the content of the page's style and script elements, each by its digest.
-        images: whether it holds pictures (`data:`).
-        style_attributes: whether its drawings have attributes `style`, which cannot fetch anything.
-    """
-    rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'"]
-    if style_attributes:
-        rules += [f"style-src-elem {_digests([style])}", "style-src-attr 'unsafe-inline'"]
-    else:
-        rules.append(f"style-src {_digests([style])}")
-    rules += [f"script-src {_digests([script])}"] if script else []
-    rules += ["img-src data:"] if images else []
-    return "; ".join(rules)
-
-
-def _digests(contents: Sequence[str]) -> str:
-    """Digests by which a browser knows what it may use, whatever a name in the page may hold."""
-    return " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()}'" for content in contents)

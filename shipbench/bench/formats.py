@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, unknown_name
 from ..names import shown
-from .escaping import content_policy, csv_text, latex_text, one_line
+from ..render.html import content_policy
+from .escaping import csv_text, latex_text, one_line
 from .tables import Table
 
 if TYPE_CHECKING:

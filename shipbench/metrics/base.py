@@ -83,3 +83,16 @@ def state_error(true: np.ndarray, pred: np.ndarray) -> np.ndarray:
     error = pred - true
     error[..., PSI] = wrap_angle(error[..., PSI])
     return error
+
+
+def fit_percent(*, true: np.ndarray, pred: np.ndarray) -> np.ndarray:
+    """100 (1 - |pred - true| / |true - mean(true)|) of each signal [%], (K, 10) to (10,): the NRMSE fit of MATLAB's `compare`.
+
+    100 is exact, 0 no better than the mean; NaN where the true signal is constant. Source: Ljung, System Identification (2nd ed., 1999), sec. 16.4.
+    """
+    with np.errstate(all="ignore"):
+        error = np.linalg.norm(state_error(true, pred), axis=0)
+        centred = true - true.mean(axis=0)
+        spread = np.linalg.norm(centred, axis=0)
+        constant = np.max(np.abs(centred), axis=0) <= 1e-9 * np.maximum(1.0, np.max(np.abs(true), axis=0))
+        return np.where(constant, np.nan, 100.0 * (1.0 - error / np.where(constant, 1.0, spread)))

@@ -13,9 +13,9 @@ import pytest
 from typer.testing import CliRunner
 
 from shipbench.bench.report.beside import _numbers, check_given, diagnoses
+from shipbench.bench.report.histories import _near
 from shipbench.bench.report.page import _table, write_report
-from shipbench.bench.report.pictures import track
-from shipbench.bench.report.series import Track, gather
+from shipbench.bench.report.series import gather
 from shipbench.bench.report.slicing import regime_errors
 from shipbench.bench.report.svg import Axes, limits, path, ticks
 from shipbench.bench.results import read_results
@@ -24,6 +24,7 @@ from shipbench.bench.tables import Table, TableColumn, number
 from shipbench.bench.task import make_task
 from shipbench.cli import app
 from shipbench.errors import InputError
+from shipbench.metrics.base import fit_percent
 
 HOSTILE = "<img src=x onerror=alert(1)>&\"'</script><script>alert(2)</script>"
 MODELS = """
@@ -89,7 +90,9 @@ def test_the_page_holds_all_parts_and_fetches_nothing(study, tmp_path):
     for part in ("board", "tracks", "growth", "regimes", "fits", "diagnoses", "status", "about"):
         assert f'id="d0-{part}"' in text
         assert f'href="#d0-{part}"' in text
-    assert re.search(r"default-src 'none'; .*style-src 'sha256-[\w+/=]+'; script-src 'sha256-[\w+/=]+'\">", text)
+    assert re.search(
+        r"default-src 'none'; .*style-src-elem( 'sha256-[\w+/=]+'){2}; style-src-attr 'unsafe-inline'; script-src( 'sha256-[\w+/=]+'){3}\">", text
+    )
     for tag, attributes in Elements(text).tags:
         assert "src" not in attributes, tag
         assert attributes.get("href", "#").startswith("#")  # no diagnosis here, so no link out of the page
@@ -99,11 +102,10 @@ def test_no_name_breaks_out_of_its_text(study, tmp_path):
     text = page_of(study, tmp_path).path.read_text()
     tags = Elements(text).tags
     assert "r4 &lt;img" in text
-    assert [a.get("type") for tag, a in tags if tag == "script"] == ["application/json", None]
+    assert [a.get("type") for tag, a in tags if tag == "script"] == ["application/json", None, None, None]
     assert "img" not in dict(tags)
     assert not [name for _, attributes in tags for name in attributes if name.startswith("on")]
-    assert {run["run"] for run in drawings(text)} == {f"r{i} {HOSTILE}" for i in range(9)}
-    assert not any("<img" in run["svg"] or "alert" in run["svg"] for run in drawings(text))
+    assert {run["name"] for run in drawings(text)["runs"]} == {f"r{i} {HOSTILE}" for i in range(9)}
 
 
 def test_failed_and_diverged_models_stand_with_their_reasons(study, tmp_path):
@@ -111,33 +113,64 @@ def test_failed_and_diverged_models_stand_with_their_reasons(study, tmp_path):
     status = text[text.index('id="d0-status"') :]
     assert "predict: ValueError: &lt;/script&gt;" in status
     assert "x is inf at t = 6 s" in status
-    assert "6 of them failed, diverged or were skipped" in text  # three folds each of Fails and Blows
+    assert "<dt>Failed, diverged or skipped</dt><dd>6<small>" in text  # three folds each of Fails and Blows
     assert "m.py:Fails" not in text[text.index("Models in the pictures") : text.index('id="d0-tracks"')]
 
 
 def test_any_run_can_be_drawn_with_the_error_of_each_model(study, tmp_path):
-    runs = drawings(page_of(study, tmp_path).path.read_text())
+    data = drawings(page_of(study, tmp_path).path.read_text())
     results = read_results([study])
-    assert len(runs) == 9
-    for run in runs:
-        rows = results.rows[results.rows["run"] == run["run"]].set_index("model")["ed"]
-        assert run["errors"][0].endswith(" m")
-        shown = sorted(float(e.split()[0]) for e in run["errors"] if re.fullmatch(r"[\d.e+-]+ m", e))
+    assert len(data["runs"]) == 9
+    for run in data["runs"]:
+        rows = results.rows[results.rows["run"] == run["name"]].set_index("model")["ed"]
+        errors = [cells[0] for cells in run["cells"]]
+        assert errors[0].endswith(" m")
+        shown = sorted(float(e.split()[0]) for e in errors if re.fullmatch(r"[\d.e+-]+ m", e))
         assert shown == sorted(float(f"{v:.3g}") for v in rows.dropna())
-        assert run["svg"].count("data-m=") == 3
+        assert len(run["values"]) == len(data["series"]) == 4  # measured and three models that were scored
+
+
+def test_the_plots_hold_what_was_measured_and_predicted_to_the_last_decimal(study, tmp_path):
+    results = read_results([study])
+    data = drawings(page_of(study, tmp_path).path.read_text())
+    whole = {track.run: track for track in gather(results, "toy", ["hold"]).tracks}
+    names = [c["name"] for c in data["columns"]]
+    hold = next(i for i, s in enumerate(data["series"]) if s["name"] == "hold")
+    for run in data["runs"]:
+        track = whole[run["name"]]
+        for line, S in ((0, track.truth), (hold, track.predicted["hold"])):
+            for name, factor, column in (("u", 1.0, 3), ("r", 180 / np.pi, 5), ("delta", 180 / np.pi, 7), ("east", 1.0, 1)):
+                c = names.index(name)
+                steps, decimals = run["values"][line][c], data["columns"][c]["decimals"]
+                got = np.cumsum([s for s in steps if s is not None]) / 10.0**decimals
+                np.testing.assert_allclose(got, factor * S[: len(got), column], atol=0.501 * 10.0**-decimals)
+        error = run["values"][hold][names.index("error")]
+        assert error[0] == 0
+        assert run["values"][0][names.index("error")] is None  # what was measured has no error
+
+
+def test_fit_is_that_of_matlabs_compare():
+    t = np.linspace(0.0, 6.0, 61)
+    true = np.zeros((61, 10))
+    true[:, 3], true[:, 4] = np.sin(t), 2.0
+    pred = true.copy()
+    pred[:, 3] = true[:, 3].mean()
+    assert fit_percent(true=true, pred=true)[3] == 100.0
+    assert fit_percent(true=true, pred=pred)[3] == pytest.approx(0.0)
+    assert np.isnan(fit_percent(true=true, pred=pred)[4])  # a constant has nothing to explain
 
 
 def test_tracks_are_thinned_and_left_out_within_the_budget_and_the_page_says_so(study):
     results, models = read_results([study]), ["hold"]
     whole = gather(results, "toy", models)
     assert (len(whole.tracks), len(whole.tracks[0].truth), whole.left_out) == (9, 31, [])
-    thinned = gather(results, "toy", models, points=9 * (2 * 26 + 200))
+    thinned = gather(results, "toy", models, points=9 * (2 * 26 + 50))
     assert (len(thinned.tracks), len(thinned.tracks[0].truth)) == (9, 26)
     np.testing.assert_array_equal(thinned.tracks[0].truth[[0, -1]], whole.tracks[0].truth[[0, -1]])
     assert any("26 of its points" in line for line in thinned.left_out)
-    few = gather(results, "toy", models, points=4 * (2 * 25 + 200))
+    few = gather(results, "toy", models, points=4 * (2 * 25 + 50))
     assert len(few.tracks) == 4
-    assert any("Tracks: 4 of 9 windows" in line for line in few.left_out)
+    assert any("Tracks and time histories: 4 of 9 windows" in line for line in few.left_out)
 
 
 def test_a_folder_without_predictions_still_gives_its_tables(study, tmp_path):
@@ -159,7 +192,7 @@ def test_damaged_predictions_are_named_and_the_others_drawn(study, tmp_path):
     (copy / "cells" / "toy" / "hold" / "fold1-seed0" / "predictions.npz").write_bytes(b"PK\x03\x04 no archive")
     written = write_report(read_results([copy]), tmp_path / "page.html", "c")
     assert [line[:40] for line in written.left_out["toy"]] == ["The predictions of `hold`, fold 1, are n"]
-    assert len(drawings(written.path.read_text())) == 9
+    assert len(drawings(written.path.read_text())["runs"]) == 9
 
 
 def test_the_growth_ends_at_the_median_error_of_the_rows(study):
@@ -258,15 +291,13 @@ def test_fitted_numbers_are_compared_over_the_fits(study, tmp_path):
     assert found == [("p1", 2.0, -1.0, 40.0, "N s/m [1, 3] x"), ("p1", 7.0, 7.0, 7.0, "1 y")]
 
 
-def test_a_track_that_leaves_the_picture_is_cut():
-    truth = np.column_stack([np.linspace(0, 100, 11), np.zeros(11), np.zeros(11)])
+def test_a_prediction_that_leaves_the_picture_is_cut():
+    truth = np.zeros((11, 10))
+    truth[:, 0] = np.linspace(0, 100, 11)
     away = truth.copy()
     away[5:, 1] = 1e7
     away[8, 0] = np.nan
-    svg = track(Track("r", truth, {"m": away}), ["m"], 50.0, 8.0)
-    assert svg.count("<text") > 4
-    rise = [float(v) for v in re.findall(r"-[\d.]+", re.search(r'class="true" d="([^"]*)"', svg)[1])]
-    assert sum(rise) < -100.0  # of 284 units: the true track, 100 m to the north, still fills the picture
+    assert np.isfinite(_near(away, truth)).all(axis=1).tolist() == [True] * 5 + [False] * 6
 
 
 def test_axes_put_points_where_they_belong():

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,14 +12,15 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ..escaping import content_policy
+from ...render.html import Tile, render_page, short_name
 from ..leaderboard import Board, build_board, scores_of
 from ..provenance import code_version
 from ..results import Frame, Results
 from ..tables import Table, TableColumn
 from . import pictures
 from .beside import check_given, diagnoses, fitted
-from .series import POINTS, Series, gather
+from .histories import study_plots
+from .series import POINTS, gather
 from .slicing import regime_errors
 
 _HERE = Path(__file__).resolve().parent
@@ -38,7 +37,7 @@ class Written:
 
 
 def write_report(results: Results, out: Path, command: str, *, given: Sequence[Path] = (), points: int = POINTS) -> Written:
-    """Write the page of `results` to `out`, in one step; `given` are folders of diagnoses; at most `points` points of tracks are drawn.
+    """Write the page of `results` to `out`, in one step; `given` are folders of diagnoses; at most `points` time steps are drawn.
 
     Raises:
         InputError: the rows cannot be ranked together (as `build_board`), a folder of `given` holds no diagnosis of these data, or `out` cannot be
@@ -63,25 +62,29 @@ def write_report(results: Results, out: Path, command: str, *, given: Sequence[P
 
 def render(sections: Sequence[dict[str, Any]], results: Results, command: str) -> str:
     """The HTML. Everything but the pictures and our own style and script is escaped by the template."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["ticks"] = _ticks
-    environment.filters["short"] = lambda model: Path(model).name if "/" in model else model
-    script = (_HERE / "report.js").read_text(encoding="utf-8")
-    style = (_HERE / "report.css").read_text(encoding="utf-8")
-    bad = sum(s["status"] != "ok" for s in results.summaries)
-    return environment.get_template("report.html.j2").render(
-        sections=sections, style=style, script=script, policy=content_policy(style, script), command=command,
-        code=code_version(), cells=len(results.summaries), bad=bad, title=", ".join(s["name"] for s in sections),
+    names = ", ".join(s["name"] for s in sections)
+    return render_page(
+        _HERE, "report.html.j2", title="Study of ship-motion prediction", dataset=names, command=command, tiles=_tiles(sections, results),
+        plots=any(s["tracks"]["runs"] for s in sections), sections=sections, code=code_version(),
     )  # fmt: skip
 
 
-def _ticks(text: Any) -> Any:
-    """Escaped text with `words in backticks` as code."""
-    from markupsafe import Markup, escape
-
-    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+def _tiles(sections: Sequence[dict[str, Any]], results: Results) -> list[Tile]:
+    """The best model of each data set, windows, fits, and what was not scored."""
+    best = []
+    for section in sections:
+        if section["models"]:
+            name = section["models"][0]["name"]
+            scored = results.rows[(results.rows["dataset"] == section["name"]) & (results.rows["status"] == "ok")]
+            mean = float(scored.loc[scored["model"] == name, "ed"].mean())
+            best.append(Tile(f"Best on {section['name']}", short_name(name), f"mean position error ED {mean:.3g} m over {section['horizon']:g} s"))
+    bad = sum(s["status"] != "ok" for s in results.summaries)
+    models, windows = results.rows["model"].nunique(), len(results.rows[["dataset", "run"]].drop_duplicates())
+    status = "the reasons are under Status" if bad else "every prediction was scored"
+    return [
+        *best, Tile("Windows", str(windows), f"{models} models"), Tile("Fits", str(len(results.summaries)), "data set, model, fold, seed"),
+        Tile("Failed, diverged or skipped", str(bad), status),
+    ]  # fmt: skip
 
 
 def _section(number: int, results: Results, board: Board, given: Sequence[Path], out: Path, points: int) -> dict[str, Any]:
@@ -93,7 +96,7 @@ def _section(number: int, results: Results, board: Board, given: Sequence[Path],
     found = regime_errors(rows, scores_of(results, board.dataset).windows, models)
     return {
         "id": f"d{number}", "name": board.dataset, "head": board.head, "models": [_model(i, m) for i, m in enumerate(models)],
-        "tables": [_table(t) for t in board.tables], "tracks": _tracks(series, rows, models, summary),
+        "tables": [_table(t) for t in board.tables], "tracks": study_plots(series, rows, models, summary["ship_L"], summary["ship_B"]),
         "growth": [
             ("Position error ED", pictures.growth(series, models, 0, "ED [m]")),
             ("Heading error", pictures.growth(series, models, 1, "|heading error| [deg]")),
@@ -146,38 +149,3 @@ def _failures(rows: Frame) -> dict[str, Any]:
         more = f" and {len(cells) - 6} more" if len(cells) > 6 else ""
         lines.append({"model": model, "status": status, "reason": reason, "windows": len(part), "first": part["run"].iloc[0], "where": where + more})
     return {"lines": lines[:_FAILURES], "more": max(0, len(lines) - _FAILURES)}
-
-
-def _tracks(series: Series, rows: Frame, models: Sequence[str], summary: dict[str, Any]) -> dict[str, Any]:
-    """Everything that the page needs to show any window: drawings, and the errors of the models in it."""
-    first = rows.sort_values(["seed", "fold"], kind="stable").drop_duplicates(["model", "run"])  # as the tracks: of several seeds the first
-    by_run = {run: part.set_index("model") for run, part in first.groupby("run")}
-    found = []
-    for track in series.tracks:
-        mine = by_run[track.run]
-        errors = [_error(mine, m) for m in models]
-        kind = str(mine["kind"].iloc[0])
-        svg = pictures.track(track, models, summary["ship_L"], summary["ship_B"])
-        found.append({"run": track.run, "kind": kind, "errors": errors, "svg": svg})
-    return {"runs": found, "json": _script_json(found), "start": _median_run(found)}
-
-
-def _error(mine: Frame, model: str) -> str:
-    if model not in mine.index:
-        return "not run"
-    row = mine.loc[model]
-    return f"{row['ed']:.3g} m" if row["status"] == "ok" else f"{row['status']}: {row['reason']}"
-
-
-def _median_run(found: Sequence[dict[str, Any]]) -> int:
-    """The window shown first: the one whose best model has the median error."""
-    sizes = [min([float(e.split()[0]) for e in f["errors"] if e.endswith(" m") and ":" not in e], default=np.inf) for f in found]
-    return int(np.argsort(sizes, kind="stable")[len(sizes) // 2]) if sizes else 0
-
-
-def _script_json(data: Any) -> Any:
-    """JSON that can stand inside a script element: nothing in it can end the element."""
-    from markupsafe import Markup
-
-    text = json.dumps(data, separators=(",", ":"), ensure_ascii=True)
-    return Markup(text.replace("<", "\\u003c"))

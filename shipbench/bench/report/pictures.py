@@ -1,4 +1,4 @@
-"""The pictures of a page: tracks of a window, growth of the error, errors in slices of the truth; each as the content of one SVG element.
+"""The still pictures of a page: growth of the error, errors in slices of the truth; each as the content of one SVG element.
 
 What belongs to model number i carries `data-m="i"`, by which the page shows and hides it. No name from the data enters a picture.
 """
@@ -9,10 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..plots import outline
-from .series import Series, Track
+from .series import Series
 from .slicing import Regime
-from .svg import Axes, limits, path
+from .svg import Axes, limits
 
 COLOURS = 8
 """Colours of the page's style; model i has colour i modulo this, and from there on other dashes."""
@@ -58,43 +57,3 @@ def slices(regime: Regime, models: Sequence[str]) -> str:
     unit = next((u for u in ("m/s", "deg") if all(label.endswith(f" {u}") for label in regime.labels)), "")
     names = [label.removesuffix(f" {unit}") for label in regime.labels]
     return axes.grid(regime.name + (f" [{unit}]" if unit else ""), "mean ED [m]", names) + "".join(parts)
-
-
-def track(found: Track, models: Sequence[str], L: float, B: float) -> str:
-    """True and predicted tracks, north up, one scale in both directions; the true ship every quarter, the predicted ones at the end."""
-    near = {m: _near(p, found.truth) for m, p in found.predicted.items()}
-    spread = np.concatenate([found.truth[:, :2], *(p[:, :2] for p in near.values())])
-    spread = spread[np.isfinite(spread).all(axis=1)]
-    axes = _equal(spread.min(axis=0) - 0.6 * L, spread.max(axis=0) + 0.6 * L)
-    quarters = np.linspace(0, len(found.truth) - 1, 5).round().astype(int)
-    parts = [f'<path class="hull" d="{_hull(axes, found.truth[k], L, B)}"/>' for k in quarters]
-    parts.append(f'<path class="true" d="{axes.line(found.truth[:, 1], found.truth[:, 0])}"/>')
-    for m in reversed(models):  # the best on top
-        if m in near:
-            i, p = models.index(m), near[m]
-            ship = f'<path class="ship c{i % COLOURS}" d="{_hull(axes, p[-1], L, B)}"/>' if np.isfinite(p[-1]).all() else ""
-            parts.append(f'<g data-m="{i}"><path {stroke(i)} d="{axes.line(p[:, 1], p[:, 0])}"/>{ship}</g>')
-    return axes.grid("east [m]", "north [m]") + "".join(parts)
-
-
-def _hull(axes: Axes, pose: np.ndarray, L: float, B: float) -> str:
-    corners = outline(float(pose[0]), float(pose[1]), float(pose[2]), L, B)
-    return path(np.column_stack([axes.px(corners[:, 0]), axes.py(corners[:, 1])])) + "z"
-
-
-def _near(predicted: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """A track (knots, 3) without what lies farther off than twice the true track's extent: a model that diverges must not hide the others."""
-    reach = 2.0 * max(float(np.max(np.ptp(truth[:, :2], axis=0))), 1e-3)
-    with np.errstate(all="ignore"):
-        far = ~(np.max(np.abs(predicted[:, :2] - truth[:, :2]), axis=1) <= reach) | ~np.isfinite(predicted).all(axis=1)
-    return np.where((np.cumsum(far) > 0)[:, None], np.nan, predicted)
-
-
-def _equal(low: np.ndarray, high: np.ndarray) -> Axes:
-    """Axes that hold the box from `low` to `high` (north, east) [m] with the same scale in both directions."""
-    plain = Axes((0.0, 1.0), (0.0, 1.0), _WIDTH, _HEIGHT)
-    wide, tall = float(plain.px(1.0) - plain.px(0.0)), float(plain.py(0.0) - plain.py(1.0))
-    metres = max((high[1] - low[1]) / wide, (high[0] - low[0]) / tall)
-    north, east = 0.5 * (low + high)
-    half_east, half_north = 0.5 * metres * wide, 0.5 * metres * tall
-    return Axes((east - half_east, east + half_east), (north - half_north, north + half_north), _WIDTH, _HEIGHT)

@@ -10,26 +10,32 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...metrics.base import fit_percent
 from ...metrics.ed import ed
 from ...records import Batch
-from ...signals import PSI, X, Y, wrap_angle
+from ...signals import PSI, wrap_angle
 from ..results import Cell, Results, read_predictions, read_truth
 
-POINTS = 250_000
-"""Points of all tracks of one page together; a point takes some ten characters, so that a page stays below 4 MB."""
+POINTS = 80_000
+"""Time steps of all models and runs of one page together; one takes some 25 characters (8 columns), so that a page stays below 4 MB."""
 _MOST, _LEAST = 121, 25
-"""Points of one track: no more than are seen, no fewer than a track can be followed by."""
-_WINDOW = 200
-"""What axes and ships of one window take, in points."""
+"""Time steps of one run: no more than are seen, no fewer than a track can be followed by."""
+_WINDOW = 50
+"""What ships and texts of one run take, in time steps."""
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One window: `truth` (knots, 3) and of each model that predicted it (knots, 3): x, y [m], psi [rad], the first at s0."""
+    """One window: `t` (steps,) [s], `truth` and each model's prediction (steps, 10), order and units of `signals.STATES`, the first row at s0.
+
+    `fits`: of each model the fit of every signal (10,) [%], over all time steps of the window.
+    """
 
     run: str
+    t: np.ndarray
     truth: np.ndarray
     predicted: dict[str, np.ndarray] = field(default_factory=dict)
+    fits: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +61,14 @@ def gather(results: Results, dataset: str, models: Sequence[str], points: int = 
     kept = max(1, points // (_LEAST * tracks + _WINDOW))
     chosen = set(order if len(order) <= kept else [order[i] for i in np.linspace(0, len(order) - 1, kept).round().astype(int)])
     if len(chosen) < len(order):
-        left_out.append(f"Tracks: {len(chosen)} of {len(order)} windows, evenly spread from the least error to the greatest.")
+        left_out.append(f"Tracks and time histories: {len(chosen)} of {len(order)} windows, evenly spread from the least error to the greatest.")
     reading = _Reading(chosen, int(np.clip((points // max(1, len(chosen)) - _WINDOW) // tracks, _LEAST, _MOST)))
     pairs = list(zip(results.summaries, results.sources, strict=True))
     for summary, source in pairs:
         if summary["dataset"] == dataset and summary["model"] in seeds and summary["seed"] == seeds[summary["model"]]:
             reading.take(summary, source)
     if reading.thinned:
-        left_out.append(f"Every track is drawn through {reading.thinned} of its points, evenly spread in time.")
+        left_out.append(f"Every track and time history is drawn through {reading.thinned} of its points, evenly spread in time.")
     return reading.series(order, [*left_out, *reading.missing])
 
 
@@ -101,7 +107,7 @@ class _Reading:
             return
         ok = np.array([status == "ok" for status in summary["run_status"]])
         self._errors(summary, batch.truth[ok], S[ok])
-        self._tracks(cell.model, batch, S)
+        self._tracks(cell.model, batch, S, summary["dt"])
 
     def _batch(self, cell: Cell, source: Path) -> Batch:
         if (source, cell.fold) not in self._truth:
@@ -114,16 +120,16 @@ class _Reading:
         turned = np.rad2deg(np.abs(wrap_angle(S[:, knots, PSI] - truth[:, knots, PSI])))
         self.errors.setdefault(summary["model"], []).append((ed(true=truth[:, knots], pred=S[:, knots]), turned))
 
-    def _tracks(self, model: str, batch: Batch, S: np.ndarray) -> None:
+    def _tracks(self, model: str, batch: Batch, S: np.ndarray, dt: float) -> None:
         knots = _thin(S.shape[1] + 1, self.most)
         if len(knots) <= S.shape[1]:
             self.thinned = len(knots)
-        pose = [X, Y, PSI]
         for i, run in enumerate(batch.ids):
             if run in self.chosen:
                 if run not in self.tracks:
-                    self.tracks[run] = Track(run, np.concatenate([batch.s0[i : i + 1], batch.truth[i]])[knots][:, pose])
-                self.tracks[run].predicted[model] = np.concatenate([batch.s0[i : i + 1], S[i]])[knots][:, pose]
+                    self.tracks[run] = Track(run, dt * knots, np.concatenate([batch.s0[i : i + 1], batch.truth[i]])[knots])
+                self.tracks[run].predicted[model] = np.concatenate([batch.s0[i : i + 1], S[i]])[knots]
+                self.tracks[run].fits[model] = fit_percent(true=batch.truth[i], pred=S[i])
 
     def series(self, order: Sequence[str], left_out: list[str]) -> Series:
         errors = {m: (np.concatenate([e for e, _ in parts]), np.concatenate([h for _, h in parts])) for m, parts in self.errors.items()}

@@ -1,0 +1,97 @@
+"""Data of linked plots: tracks and time histories of a run, drawn and tied together by `linked.js`.
+
+The contract, as JSON in the page (macro `linked` of `macros.html.j2`):
+
+    columns   one entry for each quantity: `name`, `label`, `unit`, `decimals`
+    series    one entry for each line: `name`, `role` ("measured", or the number of a model: its colour and its switch `data-toggle`)
+    track     names of the columns east and north [m], or null for a page without tracks
+    histories names of the columns that are drawn against time, from the top
+    runs      one entry for each run: `name`, `note`, `t`, `values[series][column]`, `outlines`, `cells[model]`
+    start     the number of the run shown first
+
+`t` [s, two decimals] and each `values[series][column]` are whole numbers in the last decimal: the first one, then the steps from the last finite
+value; null where nothing is drawn; a whole column that a series does not have is null. `outlines` are closed polygons [[east...], [north...]] [m].
+`cells` are texts for elements with `data-cell="model-number"`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+_LARGEST = 1e9
+"""Values beyond it are not drawn: a prediction that diverged."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A column: its name, what it is in words, the unit in which it is shown, and the decimals that are kept."""
+
+    name: str
+    label: str
+    unit: str
+    decimals: int
+
+
+@dataclass(frozen=True)
+class Line:
+    """A series: its name and its role, "measured" or the number of a model."""
+
+    name: str
+    role: str | int
+
+
+def packed(values: np.ndarray, decimals: int) -> list[int | None]:
+    """Values (n,) as whole numbers of the last decimal, each as the step from the finite one before it; None where not finite."""
+    found: list[int | None] = []
+    last = 0
+    for value in np.asarray(values, float).tolist():
+        if np.isfinite(value) and abs(value) <= _LARGEST:
+            now = round(value * 10**decimals)
+            found.append(now - last)
+            last = now
+        else:
+            found.append(None)
+    return found
+
+
+def linked_run(
+    name: str,
+    note: str,
+    t: np.ndarray,
+    columns: Sequence[Quantity],
+    lines: Sequence[Mapping[str, np.ndarray]],
+    outlines: Sequence[np.ndarray] = (),
+    cells: Sequence[Sequence[str]] = (),
+) -> dict[str, Any]:
+    """One run of the contract.
+
+    Args:
+        name, note: as the run selector shows them.
+        t: (n,) [s].
+        columns: as in `linked_plots`.
+        lines: for each series its columns (n,) by name, in the units of `columns`; one that is missing is not drawn.
+        outlines: closed polygons (points, 2), east and north [m].
+        cells: texts for each model.
+    """
+    values = [[packed(line[c.name], c.decimals) if c.name in line else None for c in columns] for line in lines]
+    rings = [np.round(ring.T, 1).tolist() for ring in outlines]
+    return {"name": name, "note": note, "t": packed(t, 2), "values": values, "outlines": rings, "cells": [list(row) for row in cells]}
+
+
+def linked_plots(
+    columns: Sequence[Quantity],
+    lines: Sequence[Line],
+    histories: Sequence[str],
+    runs: Sequence[dict[str, Any]],
+    track: tuple[str, str] | None = None,
+    start: int = 0,
+) -> dict[str, Any]:
+    """The whole of the contract; `runs` come from `linked_run`."""
+    return {
+        "columns": [asdict(c) for c in columns], "series": [asdict(s) for s in lines], "track": list(track) if track else None,
+        "histories": list(histories), "runs": list(runs), "start": start,
+    }  # fmt: skip
