@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError, unknown_name
+from .extras import needed_by
 
 _PACKAGE = __name__.rsplit(".", 1)[0]
 _log = logging.getLogger(__name__)
@@ -129,7 +130,7 @@ class Registry:
         """Import the one module behind `name` and return its part.
 
         Raises:
-            InputError: the name is not registered, claimed twice, or its plug-in cannot be used.
+            InputError: the name is not registered, claimed twice, needs a package that is not installed, or its plug-in cannot be used.
         """
         files, plugins = self._files(), self.plugins()
         if name not in files and name not in plugins:
@@ -138,7 +139,9 @@ class Registry:
         if clash := self._clash(name, points):
             raise InputError(clash)
         if name in files:
-            return getattr(importlib.import_module(files[name]), self.attribute)
+            with needed_by(f"'{name}'"):
+                module = importlib.import_module(files[name])
+            return getattr(module, self.attribute)
         part, problem = self._load(points[0])
         if problem:
             raise InputError(problem)

@@ -68,10 +68,8 @@ def to_records(data: Dataset, window: int = 1) -> list[Any]:
 
     `window`: number of first samples that a model may see; at least 1, since a rollout needs the state that it starts from.
     """
-    try:
+    with needed_by("to_records"):
         from nonlinear_benchmarks import Input_output_data
-    except ImportError:
-        raise InputError("nonlinear_benchmarks is not installed: pip install 'shipbench[nonlinear-benchmarks]'.") from None
     return [Input_output_data(run.inputs.copy(), run.states.copy(), data.dt, run.id, window) for run in data.runs]
 
 

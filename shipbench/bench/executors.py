@@ -208,11 +208,9 @@ def _connected(how: Execution) -> Iterator[Workers]:
 
 
 def _client(scheduler: str) -> Any:
-    try:
+    with needed_by("--executor dask"):
         from distributed import Client, Security
         from distributed.comm import connect
-    except ImportError:
-        raise InputError('--executor dask needs the package `distributed`; install it with pip install "shipbench[dask]".') from None
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is said once, by us
 

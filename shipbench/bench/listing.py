@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..predictors.registered import not_installed
+from ..extras import not_installed
 from ..registry import Registry
 
 
@@ -20,7 +20,7 @@ def describe_parts(registry: Registry) -> list[dict[str, Any]]:
     for name in registry.names():
         path, entry = _place(registry, name)
         summary, parameters, needs = read_part(path, registry.attribute, entry) if path else ("", {}, ())
-        unusable = (not_installed(name, needs) or "") if entry is None else _problem(registry, name)
+        unusable = not_installed(needs) if entry is None else _problem(registry, name)
         parts.append({"name": name, "summary": summary, "parameters": parameters, "from": entry or "shipbench", "unusable": unusable})
     return parts
 

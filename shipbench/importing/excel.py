@@ -59,12 +59,8 @@ def first_rows(path: Path, layout: Layout, count: int) -> list[list[Any]]:
 
 def _check_book(path: Path) -> None:
     """The library is there, and the file is a workbook of a size that can be read."""
-    try:
+    with needed_by(f"{path}: reading .xlsx", "Save the sheet as CSV"):
         import openpyxl  # noqa: F401
-    except ImportError:
-        raise InputError(
-            f"{path}: reading .xlsx needs openpyxl. Install it with `pip install 'shipbench[excel]'`, or save the sheet as CSV."
-        ) from None
     if not zipfile.is_zipfile(path):
         raise InputError(f"{path} is no Excel workbook or is cut short. Save it anew as .xlsx, or as CSV.")
     with zipfile.ZipFile(path) as packed:

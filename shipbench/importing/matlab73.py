@@ -108,13 +108,8 @@ def _check_stored(name: str, item: Any) -> None:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    try:
+    with needed_by(f"{path} is a MATLAB 7.3 file (HDF5). Reading it", "In MATLAB use save('log.mat', ..., '-v7') or writetable"):
         import h5py
-    except ImportError:
-        raise InputError(
-            f"{path} is a MATLAB 7.3 file (HDF5), which needs h5py. Install it with `pip install 'shipbench[matlab]'`; "
-            "or in MATLAB: save('log.mat', ..., '-v7'), or writetable to CSV."
-        ) from None
     try:
         with h5py.File(path, "r") as file:
             yield file

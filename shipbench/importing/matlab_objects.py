@@ -27,13 +27,8 @@ def object_vectors(path: Path, names: Sequence[str] | None = None) -> dict[str, 
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        try:
+        with needed_by(f"{path} holds objects such as a table. Reading them", how_to_save(names)):
             import matio
-        except ImportError:
-            raise InputError(
-                f"{path} holds objects such as a table, which need mat-io. Install it with `pip install 'shipbench[matlab]'`. "
-                f"Or: {how_to_save(names)}."
-            ) from None
         try:
             content = matio.load_from_mat(str(path), variable_names=None if names is None else list(names))
         except Exception:  # whatever a stranger's file does to a stranger's reader: it is not read

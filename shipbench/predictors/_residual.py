@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from torch import Tensor, nn
+from torchdiffeq import odeint
 
 from ..physics import eq2
 from ..physics.modifiers import Flow
@@ -15,7 +16,8 @@ from ..physics.wind import apparent_wind
 from ..records import Dataset
 from ..signals import PSI, R, U, V
 from ._physics_effects import Active, accelerations
-from ._stacked import CHANNELS, Scaler, StackedMLP
+from ._features import CHANNELS
+from ._stacked import Scaler, StackedMLP
 from .physics import Physics
 
 Air = tuple[Tensor, Tensor]
@@ -138,8 +140,6 @@ def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step
         path: (members, batch, steps, 2, 4); air: (members, batch, steps, 2) or None.
         step: [s].
     """
-    from torchdiffeq import odeint
-
     stages = path.permute(2, 3, 4, 0, 1).contiguous()  # time first: one step is then a contiguous block
     wind = None if air is None else air.permute(2, 3, 0, 1).contiguous()
 

@@ -18,10 +18,6 @@ from torch import Tensor, nn
 from ..records import Dataset
 from ..signals import PSI, R, U, X, Y
 
-CHANNELS = slice(U, None)
-"""The channels y = u, v, r, n, delta, F_b, F_s of a state that networks predict; the pose follows from them."""
-
-
 def generators(seeds: Sequence[int]) -> list[torch.Generator]:
     """One generator per member: what is drawn for a member does not depend on the others."""
     return [torch.Generator().manual_seed(int(seed)) for seed in seeds]
@@ -63,6 +59,10 @@ class StackedRuns:
             states.append(torch.as_tensor(np.concatenate([batch.s0[:, None], batch.truth], axis=1), dtype=dtype))
             held.append(torch.as_tensor(batch.U, dtype=dtype))
         return cls(torch.cat(states), torch.cat(held), tuple(len(s) for s in states))
+
+    def members(self) -> list[tuple[Tensor, Tensor]]:
+        """S and U of every member."""
+        return list(zip(self.S.split(self.counts), self.U.split(self.counts), strict=True))
 
     @property
     def steps(self) -> int:
@@ -151,49 +151,8 @@ class StackedMLP(nn.Module):
         return self.layers[-1](x)
 
 
-class InputFeatures:
-    """Inputs as a network sees them: wind as its components from ahead and from starboard, so that a turned frame changes nothing.
-
-    Args:
-        names: columns of U.
-    """
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self.wind = names.index("wind_from") if "wind_from" in names else None
-        self.speed = names.index("wind_speed") if "wind_speed" in names else None
-        special = {self.wind, self.speed} if self.wind is not None else set()
-        self.plain = [i for i in range(len(names)) if i not in special]
-        self.count = len(self.plain) + (0 if self.wind is None else 2)
-
-    def __call__(self, held: Tensor, psi: Tensor) -> Tensor:
-        """Features (..., count) of inputs (..., inputs) at heading psi (...)."""
-        if self.wind is None:
-            return held
-        speed = held[..., self.speed] if self.speed is not None else torch.ones_like(psi)
-        angle = held[..., self.wind] - psi
-        wind = torch.stack([speed * torch.cos(angle), speed * torch.sin(angle)], dim=-1)
-        return torch.cat([held[..., self.plain], wind], dim=-1)
-
-
-def dead_reckoning(s0: Tensor, y: Tensor, dt: float) -> Tensor:
-    """Pose (..., K, 3) from velocities at the ends of the steps.
-
-    Args:
-        s0: (..., 10) initial states; y: (..., K, 7) channels at t_1 .. t_K.
-
-    Source: paper, eq. (10) to (14): p_k+1 = p_k + dt [u' cos psi - v' sin psi, u' sin psi + v' cos psi, r'], u', v', r' at k + 1, psi at k.
-    """
-    u, v, r = y[..., 0], y[..., 1], y[..., 2]
-    psi = s0[..., None, PSI] + dt * torch.cumsum(r, dim=-1)
-    before = torch.cat([s0[..., None, PSI], psi[..., :-1]], dim=-1)
-    cos, sin = torch.cos(before), torch.sin(before)
-    x = s0[..., None, X] + dt * torch.cumsum(u * cos - v * sin, dim=-1)
-    east = s0[..., None, Y] + dt * torch.cumsum(u * sin + v * cos, dim=-1)
-    return torch.stack([x, east, psi], dim=-1)
-
-
 def trapezoid_pose(s0: Tensor, y: Tensor, dt: float) -> Tensor:
-    """Pose (..., K, 3) by the trapezoidal rule, second order in dt (eq. (10) is first order); arguments as `dead_reckoning`."""
+    """Pose (..., K, 3) by the trapezoidal rule, second order in dt (eq. (10) is first order); arguments as `_features.dead_reckoning`."""
     path = torch.cat([s0[..., None, U : R + 1], y[..., :3]], dim=-2)
     turned = 0.5 * dt * torch.cumsum(path[..., 1:, 2] + path[..., :-1, 2], dim=-1)
     psi = s0[..., None, PSI] + torch.cat([torch.zeros_like(turned[..., :1]), turned], dim=-1)

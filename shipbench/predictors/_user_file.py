@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import InputError, unknown_name
+from ..extras import needed_by
 
 _listens: list[bool] = []
 _brought: set[str] = set()
@@ -27,7 +28,7 @@ def class_from_file(path: Path, class_name: str) -> Any:
     """The class `class_name` of the Python file `path`.
 
     Raises:
-        InputError: there is no such file or class.
+        InputError: there is no such file or class, or it needs an extra of shipbench that is not installed.
     """
     if not path.is_file():
         raise InputError(f"model file {path} does not exist; give path/to/model.py:ClassName.")
@@ -41,7 +42,7 @@ def class_from_file(path: Path, class_name: str) -> Any:
     before = set(sys.modules)
     module = importlib.util.module_from_spec(found)
     sys.modules[name] = module
-    with on_import_path(path):
+    with on_import_path(path), needed_by(f"model file {path}"):
         try:
             found.loader.exec_module(module)
         finally:

@@ -21,10 +21,10 @@ from ..specs import Spec, parse_spec, spec_of
 from ._saved import Origin, damaged, described, origin_of, read_arrays, read_meta, remembers_origin, remembers_origins, write_saved
 from ._user_file import class_from_file
 from .device import check_device
-from .registered import PREDICTORS, not_installed
+from .registered import PREDICTORS
 
 History = tuple[np.ndarray, np.ndarray]
-__all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "make_predictor", "not_installed", "parse_spec"]
+__all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "make_predictor", "parse_spec"]
 
 
 @runtime_checkable
@@ -47,7 +47,7 @@ class PredictorBase(ABC):
 
     name: ClassVar[str]
     needs: ClassVar[tuple[str, ...]] = ()
-    """Optional packages, as they are imported, that a model of this class cannot do without; shipbench has an extra of the predictor's name."""
+    """Optional packages that its module imports, by their names in `extras.EXTRAS`; `shipbench models` reads them without importing the module."""
     inputs: tuple[str, ...] = COMMANDS
     """Names of the columns of U, known after `fit`."""
     origin: Origin | None = None
@@ -72,7 +72,7 @@ class PredictorBase(ABC):
 
     def skip(self, dataset: Dataset) -> str | None:
         """Why this model cannot take `dataset`, or None; a study then has rows with the status `skipped` and this reason."""
-        return not_installed(self.name, self.needs) if self.needs else None
+        return None
 
     @abstractmethod
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from ..errors import InputError
+from ..extras import needed_by
 
 _NAME = re.compile(r"cpu|cuda(:\d+)?")
 
@@ -22,7 +23,8 @@ def check_device(name: str, *, here: bool = True) -> str:
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError(f"device '{name}' is unknown. Accepted: cpu, cuda (the first GPU), cuda:1 (the second).")
     if name != "cpu" and here:
-        import torch
+        with needed_by(f"device '{name}'"):
+            import torch
 
         count = torch.cuda.device_count() if torch.cuda.is_available() else 0
         if int(name.partition(":")[2] or 0) >= count:

@@ -18,9 +18,8 @@ from ..records import Dataset
 from ..signals import COMMANDS, PSI
 from ._numbers import RATE, ROUNDS, WEIGHT, WIDTH, check_numbers
 from ._saved import check_shapes, sample_time
+from ._features import CHANNELS, InputFeatures
 from ._stacked import (
-    CHANNELS,
-    InputFeatures,
     Scaler,
     StackedLinear,
     StackedMLP,
@@ -181,6 +180,7 @@ class LSTM(PredictorBase):
     """
 
     name: ClassVar[str] = "lstm"
+    needs: ClassVar[tuple[str, ...]] = ("torch", "lightning")
     hidden: int = 48
     lr: float = 4e-3
     epochs: int = 140
@@ -222,7 +222,7 @@ class LSTM(PredictorBase):
         stride = -(-training.steps // _MOST_STEPS)
         training, validation = thinned(training, stride), thinned(validation, stride)
         features, draw = InputFeatures(names), generators(seeds)
-        parts = list(zip(training.S.split(training.counts), training.U.split(training.counts), strict=True))
+        parts = training.members()
         scalers = (
             Scaler.fit(S[..., CHANNELS] for S, _ in parts),
             Scaler.fit(features(held, S[:, :-1, PSI]) for S, held in parts),

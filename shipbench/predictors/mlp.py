@@ -16,10 +16,11 @@ import torch
 from torch import Tensor
 
 from ..records import Dataset
+from ._features import InputFeatures
 from ._numbers import LAYERS, RATE, ROUNDS, WEIGHT, WIDTH, check_numbers
 from ._one_step import NUM_CHANNELS, check_target, one_step_rollout, transitions
 from ._saved import check_shapes, sample_time
-from ._stacked import InputFeatures, Scaler, StackedMLP, StackedRuns, generators, padded, with_valid
+from ._stacked import Scaler, StackedMLP, StackedRuns, generators, padded, with_valid
 from .base import History, PredictorBase
 from .device import check_device
 from .training import Chunk, Recipe, StackedTask, epochs_of_samples, train
@@ -95,6 +96,7 @@ class MLP(PredictorBase):
     """
 
     name: ClassVar[str] = "mlp"
+    needs: ClassVar[tuple[str, ...]] = ("torch", "lightning")
     hidden: int = 100
     layers: int = 3
     epochs: int = 200
@@ -134,7 +136,7 @@ class MLP(PredictorBase):
         features = InputFeatures(names)
         # Not bound to names: the samples as they are would otherwise be kept beside the standardised ones.
         trained, stopped = zip(*pairs, strict=True)
-        task = _OneStep(lead, transitions(StackedRuns.of(trained), features), transitions(StackedRuns.of(stopped), features), seeds)
+        task = _OneStep(lead, _samples(trained, features), _samples(stopped, features), seeds)
         # Matrices this small gain nothing from a second thread, and on a busy machine two that wait for one another cost tenfold.
         watch = train(task, Recipe(lr=lead.lr, patience=lead.patience, min_delta=lead.min_delta, device=lead.device, threads=1, epochs=lead.epochs))
         state = {k: v.detach().cpu().numpy() for k, v in task.state_dict().items()}
@@ -143,6 +145,7 @@ class MLP(PredictorBase):
             model._weights = {k: v[m : m + 1].copy() for k, v in state.items()}
             model._epochs_run = int(watch.validations[m])
 
+    @torch.no_grad()
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
         w = {k: torch.as_tensor(v, dtype=torch.float64, device=self.device) for k, v in self._weights.items()}
         layers = [(w[f"net.layers.{i}.weight"][0], w[f"net.layers.{i}.bias"][0]) for i in range(self.layers + 1)]
@@ -153,8 +156,9 @@ class MLP(PredictorBase):
                 h = torch.relu(torch.addmm(bias, h, weight))
             return torch.addmm(layers[-1][1], h, layers[-1][0]) * w["scale_z.std"][0] + w["scale_z.mean"][0]
 
-        increment = self.target == "increment"
-        return one_step_rollout(step, s0, U, InputFeatures(self.inputs), self._dt, increment=increment, device=self.device)
+        start, held = (torch.as_tensor(known, device=self.device) for known in (s0, U))
+        S = one_step_rollout(step, start, held, InputFeatures(self.inputs), self._dt, increment=self.target == "increment")
+        return S.cpu().numpy()
 
     def _arrays(self) -> dict[str, np.ndarray]:
         return self._weights
@@ -169,6 +173,11 @@ class MLP(PredictorBase):
         shapes |= {f"scale_{k}.{what}": (1, 1, size) for k, size in (("x", sizes[0]), ("z", sizes[-1])) for what in ("mean", "std")}
         check_shapes(arrays, shapes)
         self._weights, self._dt, self._epochs_run = arrays, sample_time(meta), int(meta["epochs_run"])
+
+
+def _samples(datasets: Sequence[Dataset], features: InputFeatures) -> list[tuple[Tensor, Tensor, Tensor]]:
+    """The `transitions` of every member."""
+    return [transitions(S, U, features) for S, U in StackedRuns.of(datasets).members()]
 
 
 PREDICTOR = MLP

@@ -109,6 +109,7 @@ class NeuralODE(PredictorBase):
     """
 
     name: ClassVar[str] = "neural_ode"
+    needs: ClassVar[tuple[str, ...]] = ("torch", "lightning", "torchdiffeq")
     hidden: int = 32
     lr: float = 5e-3
     epochs: int = 40

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-import torch
+import pysindy
 
 from ..integrate import motion_rhs, rk4_step
 from ..physics.actuators import lag_with_rate_limit
 from ..records import Dataset
 from ..signals import ACTUATORS, COMMANDS, MOTION, PSI, STATES, VELOCITY
 from ._actuator_fit import fit_actuators
+from ._features import InputFeatures
 from ._numbers import WEIGHT, check_numbers
 from ._saved import check_shapes, sample_time
-from ._stacked import InputFeatures
 from .base import History, PredictorBase
 
 _BEYOND = 10.0
@@ -60,8 +60,6 @@ class PySINDy(PredictorBase):
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Find the equations from all runs of `train` and `valid` (nothing here stops early); the seed has no part in it."""
-        import pysindy
-
         data = train.merged(valid)
         self.inputs, self._dt = data.inputs, data.dt
         methods = {"finite_difference": pysindy.FiniteDifference, "smoothed": pysindy.SmoothedFiniteDifference}
@@ -90,8 +88,7 @@ class PySINDy(PredictorBase):
 
     def _environment(self, held: np.ndarray, psi: np.ndarray) -> np.ndarray:
         """What U holds beyond the four commands (..., extras), wind as components from ahead and from starboard."""
-        features = InputFeatures(self.inputs)(torch.as_tensor(held), torch.as_tensor(psi))
-        return features[..., len(COMMANDS) :].numpy()
+        return InputFeatures(self.inputs)(held, psi)[..., len(COMMANDS) :]
 
     def _accelerations(self, nu: np.ndarray, others: np.ndarray) -> np.ndarray:
         """(batch, 3) [m/s2, m/s2, rad/s2] at velocities (batch, 3), actuators and environment (batch, 4 + extras)."""

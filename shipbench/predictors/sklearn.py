@@ -10,14 +10,17 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 import numpy as np
-import torch
+import sklearn
+from sklearn.multioutput import MultiOutputRegressor
+from sklearn.utils import all_estimators
+from sklearn.utils._param_validation import InvalidParameterError
 
 from ..errors import InputError, unknown_name, unknown_parameter
 from ..records import Dataset
+from ._features import InputFeatures
 from ._one_step import NUM_CHANNELS, check_target, one_step_rollout, transitions
 from ._saved import check_shapes, sample_time
-from ._stacked import InputFeatures, StackedRuns
-from .base import History, PredictorFamily, not_installed
+from .base import History, PredictorFamily
 
 _OWN = ("target",)
 _TOO_LARGE = 1e30
@@ -26,8 +29,6 @@ _TOO_LARGE = 1e30
 
 def _regressors() -> dict[str, Any]:
     """Every regressor that scikit-learn itself knows, by class name."""
-    from sklearn.utils import all_estimators
-
     return dict(all_estimators(type_filter="regressor"))
 
 
@@ -57,8 +58,7 @@ class SklearnOneStep(PredictorFamily):
         self._z = np.empty((0, NUM_CHANNELS))
         self._dt, self._seed = 0.0, 0
         self._fitted: Any = None
-        if not_installed(self.name, self.needs) is None:
-            self._new(0)  # a wrong name or parameter is told before anything is fitted
+        self._new(0)  # a wrong name or parameter is told before anything is fitted
 
     @classmethod
     def member(cls, member: str, params: dict[str, Any]) -> Self:
@@ -77,8 +77,6 @@ class SklearnOneStep(PredictorFamily):
         Raises:
             InputError: scikit-learn has no regressor of that name, or it has no such parameter, or cannot be made without a further one.
         """
-        from sklearn.multioutput import MultiOutputRegressor
-
         known = _regressors()
         if self.regressor not in known:
             raise unknown_name("regressor of scikit-learn", self.regressor, known)
@@ -106,13 +104,12 @@ class SklearnOneStep(PredictorFamily):
         Raises:
             InputError: scikit-learn refuses a parameter's value.
         """
-        from sklearn.utils._param_validation import InvalidParameterError
-
         data = train.merged(valid)
         self.inputs, self._dt, self._seed = data.inputs, data.dt, seed
-        y, inputs, after = transitions(StackedRuns.of([data], torch.float64), InputFeatures(self.inputs))[0]
-        self._x = torch.cat([y, inputs], dim=-1).numpy()
-        self._z = (after - y if self.target == "increment" else after).numpy()
+        batch = data.batch()
+        y, inputs, after = transitions(np.concatenate([batch.s0[:, None], batch.truth], axis=1), batch.U, InputFeatures(self.inputs))
+        self._x = np.concatenate([y, inputs], axis=-1)
+        self._z = after - y if self.target == "increment" else after
         try:
             self._fit_regressor()
         except InvalidParameterError as error:
@@ -124,14 +121,14 @@ class SklearnOneStep(PredictorFamily):
         x, z = ((a - mean) / std for a, (mean, std) in ((self._x, self._scale_x), (self._z, self._scale_z)))
         self._fitted = self._new(self._seed).fit(x, z)
 
-    def _step(self, x: torch.Tensor) -> torch.Tensor:
+    def _step(self, x: np.ndarray) -> np.ndarray:
         """Next y, or its change; NaN for the runs whose state is no longer finite, which a regressor would refuse."""
-        scaled = (x.numpy() - self._scale_x[0]) / self._scale_x[1]
+        scaled = (x - self._scale_x[0]) / self._scale_x[1]
         good = (np.abs(scaled) < _TOO_LARGE).all(axis=1)  # False for NaN
         z = np.full((len(scaled), NUM_CHANNELS), np.nan)
         if good.any():
             z[good] = np.asarray(self._fitted.predict(scaled[good])).reshape(-1, NUM_CHANNELS) * self._scale_z[1] + self._scale_z[0]
-        return torch.from_numpy(z)
+        return z
 
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
         return one_step_rollout(self._step, s0, U, InputFeatures(self.inputs), self._dt, increment=self.target == "increment")
@@ -145,21 +142,15 @@ class SklearnOneStep(PredictorFamily):
 
     def _probe(self) -> np.ndarray:
         """What the fitted regressor says of a few training samples."""
-        return self._step(torch.from_numpy(self._x[:: max(1, len(self._x) // 20)])).numpy()
+        return self._step(self._x[:: max(1, len(self._x) // 20)])
 
     def _arrays(self) -> dict[str, np.ndarray]:
         return {"x": self._x, "z": self._z, "probe": self._probe()}
 
     def _meta(self) -> dict[str, Any]:
-        import sklearn
-
         return {"dt": self._dt, "seed": self._seed, "scikit-learn": sklearn.__version__}
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
-        if missing := not_installed(self.name, self.needs):
-            raise InputError(f"the saved model 'sklearn:{self.regressor}' cannot be loaded: {missing}.")
-        import sklearn
-
         self._x, self._z = arrays["x"], arrays["z"]
         check_shapes(arrays, {"x": (len(self._x), NUM_CHANNELS + InputFeatures(self.inputs).count), "z": (len(self._x), NUM_CHANNELS)})
         self._dt, self._seed = sample_time(meta), int(meta["seed"])
