@@ -25,8 +25,9 @@ from torch import Tensor, nn
 from torch.utils.data import DataLoader, TensorDataset
 
 from shipbench.data.base import load_dataset
+from shipbench.predictors._features import InputFeatures
 from shipbench.predictors._one_step import transitions
-from shipbench.predictors._stacked import InputFeatures, Scaler, StackedRuns
+from shipbench.predictors._stacked import Scaler, StackedRuns
 from shipbench.predictors.base import make_predictor, parse_spec
 from shipbench.records import Dataset
 
@@ -38,7 +39,7 @@ Samples = tuple[Tensor, Tensor, Tensor, Tensor]
 
 def samples(train: Dataset, valid: Dataset) -> Samples:
     """Standardised inputs and outputs of training and validation (x, z, x, z)."""
-    (part,), (held,) = (transitions(StackedRuns.of([side]), InputFeatures(side.inputs)) for side in (train, valid))
+    part, held = (transitions(*StackedRuns.of([side]).members()[0], InputFeatures(side.inputs)) for side in (train, valid))
     scale_x, scale_z = Scaler.fit([torch.cat(part[:2], dim=-1)]), Scaler.fit([part[2]])
     found = [scale(x[None])[0] for y, u, after in (part, held) for scale, x in ((scale_x, torch.cat([y, u], dim=-1)), (scale_z, after))]
     return found[0], found[1], found[2], found[3]

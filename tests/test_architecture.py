@@ -14,7 +14,7 @@ FILES = sorted(ROOT.rglob("*.py"))
 
 LAYERS = {
     "cache": 0, "kept_code": 0.5, "errors": 0, "ops": 0, "signals": 0, "matlab_files": 0, "steps": 0, "regular_files": 0.3,
-    "names": 0.5, "toml_files": 0.6,
+    "names": 0.5, "extras": 0.5, "toml_files": 0.6,
     "registry": 1, "specs": 1, "compiled": 1, "integrate": 1, "ship": 1,
     "arrays": 1, "frames": 1, "render": 1, "notebook": 1, "processes": 1,
     "records": 2, "physics": 2, "metrics": 2.5, "effects": 2.7, "simulate": 3, "predictors": 3.5, "data": 4, "importing": 4.3,
@@ -69,6 +69,19 @@ def test_listing_and_help_import_no_heavy_library(command: str):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+NETWORKS = {f"predictors/{name}.py" for name in ("mlp", "lstm", "neural_ode", "training", "_stacked", "_residual")}
+"""The modules that need the extra `networks`."""
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_only_networks_import_torch(path: Path):
+    if str(path.relative_to(ROOT)) in NETWORKS:
+        return
+    for node in ast.parse(path.read_text()).body:
+        names = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        assert not {name.split(".")[0] for name in names} & {"torch", "lightning", "torchdiffeq"}
 
 
 def test_no_two_test_files_share_a_name():

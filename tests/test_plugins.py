@@ -193,5 +193,5 @@ def test_a_changed_plug_in_is_another_data_set_for_the_cache(installed, tmp_path
 def test_a_model_whose_optional_package_is_missing_is_listed_as_not_installed(monkeypatch):
     monkeypatch.setitem(sys.modules, "pysindy", None)
     unusable = {part["name"]: part["unusable"] for part in describe_parts(PREDICTORS)}
-    assert unusable["pysindy"] == "pysindy is not installed: pip install 'shipbench[pysindy]'"
+    assert unusable["pysindy"] == "needs pysindy, which is not installed. Install it: pip install 'shipbench[pysindy]'"
     assert unusable["hold"] == ""

@@ -24,6 +24,7 @@ from ..bench.folds import make_folds, select_runs
 from ..bench.task import make_task
 from ..data.base import load_dataset
 from ..errors import InputError, unknown_name
+from ..extras import needed_by
 from ..predictors.base import make_predictor
 from ..records import Dataset, Run
 from ..ship import Ship

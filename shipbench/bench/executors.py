@@ -16,6 +16,7 @@ from functools import cache
 from typing import Any
 
 from ..errors import InputError, WorkError
+from ..extras import needed_by
 from ..predictors.device import check_device
 from ..registry import package_digest
 from .isolate import Limits, stop_all, thread_settings, work_isolated

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..extras import not_installed
 from .board_scores import FLOOR, Scores
 from .statistics import interval
 from .tables import Table, TableColumn, number
@@ -42,7 +42,7 @@ class Overall:
     @property
     def can_draw(self) -> bool:
         """Whether there are enough data sets for the diagram, and the library that draws it."""
-        return len(self.errors) >= data_sets_needed(len(self.models)) and find_spec("scikit_posthocs") is not None
+        return len(self.errors) >= data_sets_needed(len(self.models)) and not not_installed(["scikit_posthocs"])
 
     def draw(self, folder: Path) -> Path:
         """The critical-difference diagram: mean ranks; a bar joins models that Wilcoxon's test does not tell apart (p after Holm).
@@ -139,7 +139,7 @@ def _with_diagram(table: Table, overall: Overall) -> Table:
             f"two apart at 5 % (Wilcoxon, Holm); there are {count}. Within a data set the paired comparison over runs answers."
         )
     elif not overall.can_draw:
-        note = 'No critical-difference diagram: the package scikit-posthocs is not installed (pip install "shipbench[diagrams]").'
+        note = f"The critical-difference diagram {not_installed(['scikit_posthocs'])}."
     else:
         note = "Critical-difference diagram: Wilcoxon's signed-rank test over data sets, p after Holm."
     return Table(table.title, table.columns, table.rows, [*table.notes, note])

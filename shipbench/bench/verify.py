@@ -191,8 +191,8 @@ class _Found:
             if read_json(folder / "model.json").get("predictor") not in PREDICTORS.built_in():
                 raise InputError("another kind")
             number = count_parameters(make_predictor(parse_spec(str(folder))))
-        except (ShipbenchError, AttributeError):
-            self.notes[f"the number of parameters of '{cell.model}' cannot be computed again"] = None
+        except (ShipbenchError, AttributeError) as error:
+            self.notes[f"the number of parameters of '{cell.model}' cannot be computed again: {error}"] = None
             return
         if number != summary["parameters"]:
             self.differences.append(f"{cell.label}: parameters is {summary['parameters']} in summary.json, {number} in the saved model.")

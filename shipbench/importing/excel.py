@@ -12,6 +12,7 @@ from typing import Any
 import pyarrow as pa
 
 from ..errors import InputError
+from ..extras import needed_by
 from .mapping import Layout
 from .tables import MOST_COLUMNS, Table, as_batch
 

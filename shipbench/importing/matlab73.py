@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..extras import needed_by
 from .matlab_objects import how_to_save, not_read, object_vectors
 from .tables import MOST_COLUMNS, Table, as_batch
 

@@ -23,8 +23,13 @@ def check_target(target: str) -> None:
 
 
 def transitions(S: Array, U: Array, features: InputFeatures) -> tuple[Array, Array, Array]:
-    """y_k (samples, 7), input features at k (samples, features) and y_k+1 (samples, 7) of states S (runs, K + 1, 10) and inputs U (runs, K, inputs)."""
-    before, inputs, after = (part.reshape(-1, part.shape[-1]) for part in (S[:, :-1, CHANNELS], features(U, S[:, :-1, PSI]), S[:, 1:, CHANNELS]))
+    """Samples of one step: y_k (samples, 7), input features at k (samples, features) and y_k+1 (samples, 7).
+
+    Args:
+        S: states (runs, K + 1, 10); U: inputs (runs, K, inputs).
+    """
+    parts = S[:, :-1, CHANNELS], features(U, S[:, :-1, PSI]), S[:, 1:, CHANNELS]
+    before, inputs, after = (part.reshape(-1, part.shape[-1]) for part in parts)
     return before, inputs, after
 
 

@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
+import torchdiffeq
 from torch import Tensor, nn
-from torchdiffeq import odeint
 
 from ..physics import eq2
 from ..physics.modifiers import Flow
 from ..physics.wind import apparent_wind
 from ..records import Dataset
 from ..signals import PSI, R, U, V
-from ._physics_effects import Active, accelerations
 from ._features import CHANNELS
+from ._physics_effects import Active, accelerations
 from ._stacked import Scaler, StackedMLP
 from .physics import Physics
 
@@ -152,7 +152,7 @@ def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step
     turns = wind is not None or bool(model.effects)  # the heading matters
     first = start[..., [U, V, R, PSI] if turns else [U, V, R]].movedim(-1, 0)
     times = torch.arange(path.shape[2] + 1, dtype=start.dtype, device=start.device)
-    return odeint(rate, first, times, method="midpoint")[1:, :3].permute(2, 3, 0, 1)  # pyright: ignore[reportIndexIssue, reportCallIssue, reportArgumentType]
+    return torchdiffeq.odeint(rate, first, times, method="midpoint")[1:, :3].permute(2, 3, 0, 1)  # pyright: ignore[reportIndexIssue, reportCallIssue, reportArgumentType]
 
 
 def typical_accelerations(physics: Sequence[Physics], drive: Drive) -> Tensor:

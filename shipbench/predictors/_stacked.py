@@ -18,6 +18,7 @@ from torch import Tensor, nn
 from ..records import Dataset
 from ..signals import PSI, R, U, X, Y
 
+
 def generators(seeds: Sequence[int]) -> list[torch.Generator]:
     """One generator per member: what is drawn for a member does not depend on the others."""
     return [torch.Generator().manual_seed(int(seed)) for seed in seeds]

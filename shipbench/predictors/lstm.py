@@ -16,9 +16,9 @@ from torch import Tensor, nn
 
 from ..records import Dataset
 from ..signals import COMMANDS, PSI
+from ._features import CHANNELS, InputFeatures
 from ._numbers import RATE, ROUNDS, WEIGHT, WIDTH, check_numbers
 from ._saved import check_shapes, sample_time
-from ._features import CHANNELS, InputFeatures
 from ._stacked import (
     Scaler,
     StackedLinear,

@@ -163,7 +163,7 @@ def test_a_missing_package_is_told_with_what_to_install(monkeypatch):
     from shipbench.errors import InputError
 
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r'needs the package `distributed`; install it with pip install "shipbench\[dask\]"'):
+    with pytest.raises(InputError, match=r"needs distributed, which is not installed\. Install it: pip install 'shipbench\[dask\]'"):
         open_workers(Execution("dask", scheduler="tcp://127.0.0.1:1")).__enter__()
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -65,10 +67,10 @@ def test_enough_data_sets_get_a_diagram(tmp_path):
 
 
 def test_a_missing_library_is_a_reason_and_no_failure(monkeypatch):
-    monkeypatch.setattr("shipbench.bench.overall.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "scikit_posthocs", None)
     overall = over_data_sets(scores(several(8, a=0.0, b=0.5, hold=6.0)))
     assert not overall.can_draw
-    assert "scikit-posthocs is not installed" in overall.board.tables[0].notes[-1]
+    assert "needs scikit-posthocs, which is not installed" in overall.board.tables[0].notes[-1]
 
 
 def test_models_that_lack_a_data_set_are_named_and_left_out():

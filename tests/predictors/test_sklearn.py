@@ -92,18 +92,19 @@ def test_a_value_that_scikit_learn_refuses_is_one_message(harbour):
 
 
 @pytest.mark.parametrize(("spec", "package"), [("sklearn:Ridge", "sklearn"), ("pysindy", "pysindy")])
-def test_without_its_package_it_is_a_skipped_row_with_the_reason(toy, tmp_path, monkeypatch, spec, package):
+def test_without_its_package_a_study_stops_before_it_starts(toy, tmp_path, monkeypatch, spec, package):
     write_dataset(toy(runs=4), tmp_path / "toy")
     monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.delitem(sys.modules, f"shipbench.predictors.{package}", raising=False)
     task = make_task({"dataset": str(tmp_path / "toy"), "models": [spec, "hold"], "folds": 2, "horizon_s": 20.0})
-    outcome = run_tasks([task], tmp_path / "out")
-    assert outcome.failed == []
-    assert {s["model"]: s["status"] for s in outcome.summaries} == {spec: "skipped", "hold": "ok"}
-    assert {r for r in outcome.rows["reason"] if r} == {f"{package} is not installed: pip install 'shipbench[{package}]'"}
+    with pytest.raises(InputError, match=rf"which is not installed\. Install it: pip install 'shipbench\[{package}\]'"):
+        run_tasks([task], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_saved_model_without_its_package_is_refused_with_the_way_out(harbour, tmp_path, monkeypatch):
     fitted("sklearn:Ridge", harbour).save(tmp_path / "m")
     monkeypatch.setitem(sys.modules, "sklearn", None)
+    monkeypatch.delitem(sys.modules, "shipbench.predictors.sklearn")
     with pytest.raises(InputError, match=r"pip install 'shipbench\[sklearn\]'"):
         make_predictor(parse_spec(str(tmp_path / "m")))

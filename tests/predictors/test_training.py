@@ -9,12 +9,11 @@ import pytest
 import torch
 
 from shipbench.errors import WorkError
+from shipbench.predictors._features import InputFeatures, dead_reckoning
 from shipbench.predictors._stacked import (
-    InputFeatures,
     Scaler,
     StackedLinear,
     StackedMLP,
-    dead_reckoning,
     generators,
     hold_error,
     padded,
