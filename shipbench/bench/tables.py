@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .escaping import markdown_text
 
 if TYPE_CHECKING:
@@ -131,3 +133,31 @@ class Table:
         keys = [key for c in self.columns for key in (c.key, *((f"{c.key}_low", f"{c.key}_high") if c.interval else ()))]
         rows = [{key: plain(row.get(key)) for key in keys} for row in self.rows]
         return {"title": self.title, "columns": {c.key: c.header for c in self.columns}, "rows": rows, "notes": list(self.notes)}
+
+
+def table_cells(table: Table) -> dict[str, Any]:
+    """A table for the macro `table` of `render/macros.html.j2`: cells as text, beside the value that they are sorted by."""
+    lines = []
+    for row in table.rows:
+        cells = [
+            {"text": c.text(row), "between": _between(c, row), "by": _sort_key(row.get(c.key)), "number": c.format is not None} for c in table.columns
+        ]
+        lines.append({"cells": cells, "reference": bool(row.get("_reference"))})
+    head = [{"text": c.header, "number": c.format is not None, "model": c.key == "model"} for c in table.columns]
+    return {"title": table.title, "head": head, "rows": lines, "notes": list(table.notes)}
+
+
+def _between(column: TableColumn, row: dict[str, Any]) -> str:
+    """The interval of a cell, where its row holds one under `key_low` and `key_high`."""
+    low, high = row.get(f"{column.key}_low"), row.get(f"{column.key}_high")
+    if column.format is None or low is None or high is None or not high > low:
+        return ""
+    return f"{column.format(low)} to {column.format(high)}"
+
+
+def _sort_key(value: Any) -> str:
+    """A number as text that a browser reads back; "" for what has none and comes last."""
+    value = value.item() if isinstance(value, np.generic) else value
+    if isinstance(value, bool | int | float):
+        return repr(float(value)) if np.isfinite(value) else ""
+    return "" if value is None else str(value)

@@ -34,7 +34,7 @@ function linkedPlots(root) {
   const shown = (role) => (off.has(role) ? "legendonly" : true);
   const within = (t) => range === null || (t >= range[0] && t <= range[1]);
   const base = () => ({
-    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: css("--ink"), family: "system-ui, sans-serif", size: 12 },
+    paper_bgcolor: css("--paper"), plot_bgcolor: css("--paper"), font: { color: css("--ink"), family: "system-ui, sans-serif", size: 12 },
     hoverlabel: { bgcolor: css("--paper"), bordercolor: css("--line"), font: { color: css("--ink"), size: 12 }, namelength: 28 },
     modebar: { bgcolor: "rgba(0,0,0,0)", color: css("--dim"), activecolor: css("--accent") },
   });
@@ -59,8 +59,8 @@ function linkedPlots(root) {
     });
     traces.push({ x: [], y: [], mode: "markers", marker: { size: 10, line: { width: 1.5, color: css("--paper") }, color: [] }, meta: "cursor", hoverinfo: "skip", showlegend: false });
     const layout = {
-      ...base(), margin: { l: 60, r: 10, t: 28, b: 45 }, hovermode: "closest", dragmode: "zoom", showlegend: true,
-      legend: { orientation: "h", y: -0.16, yanchor: "top", font: { size: 12 } },
+      ...base(), margin: { l: 60, r: 10, t: 28, b: 75 }, hovermode: "closest", dragmode: "zoom", showlegend: true,
+      legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: 12 } },
       xaxis: { ...axis(), title: { text: `${east.label} [m]` } },
       yaxis: { ...axis(), title: { text: `${north.label} [m]` }, scaleanchor: "x", scaleratio: 1 },
     };

@@ -22,8 +22,17 @@ from typing import Any
 
 import numpy as np
 
+COLOURS = 8
+"""Colours of the style sheet (`--c0` to `--c7`); model i has colour i modulo this, and from there on other dashes. `linked.js` does the same."""
+_DASHES = ("", "7 3", "2 2", "8 2 2 2")
 _LARGEST = 1e9
 """Values beyond it are not drawn: a prediction that diverged."""
+
+
+def stroke(i: int) -> str:
+    """Attributes of a line of model number `i`."""
+    dash = _DASHES[(i + i // COLOURS) % len(_DASHES)]
+    return f'class="line c{i % COLOURS}"' + (f' stroke-dasharray="{dash}"' if dash else "")
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,13 @@ from typer.testing import CliRunner
 
 from shipbench.bench.report.beside import _numbers, check_given, diagnoses
 from shipbench.bench.report.histories import _near
-from shipbench.bench.report.page import _table, write_report
+from shipbench.bench.report.page import write_report
 from shipbench.bench.report.series import gather
 from shipbench.bench.report.slicing import regime_errors
 from shipbench.bench.report.svg import Axes, limits, path, ticks
 from shipbench.bench.results import read_results
 from shipbench.bench.runner import run_tasks
-from shipbench.bench.tables import Table, TableColumn, number
+from shipbench.bench.tables import Table, TableColumn, number, table_cells
 from shipbench.bench.task import make_task
 from shipbench.cli import app
 from shipbench.errors import InputError
@@ -329,5 +329,5 @@ def test_the_command_writes_the_page_and_says_what_it_left_out(study, tmp_path):
 
 def test_intervals_of_a_table_stand_under_their_figures():
     column = TableColumn("ED", "ed", number(2))
-    cells = _table(Table("T", [column], [{"ed": 1.0, "ed_low": 0.5, "ed_high": 2.0}, {"ed": 1.0}, {"ed": float("nan")}]))["rows"]
+    cells = table_cells(Table("T", [column], [{"ed": 1.0, "ed_low": 0.5, "ed_high": 2.0}, {"ed": 1.0}, {"ed": float("nan")}]))["rows"]
     assert [(row["cells"][0]["between"], row["cells"][0]["by"]) for row in cells] == [("0.50 to 2.00", "1.0"), ("", "1.0"), ("", "")]

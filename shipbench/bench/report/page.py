@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...errors import InputError
 from ...render.html import Tile, render_page, short_name
+from ...render.linked import stroke
 from ..leaderboard import Board, build_board, scores_of
 from ..provenance import code_version
 from ..results import Frame, Results
-from ..tables import Table, TableColumn
+from ..tables import table_cells
 from . import pictures
 from .beside import check_given, diagnoses, fitted
 from .histories import study_plots
@@ -96,7 +95,7 @@ def _section(number: int, results: Results, board: Board, given: Sequence[Path],
     found = regime_errors(rows, scores_of(results, board.dataset).windows, models)
     return {
         "id": f"d{number}", "name": board.dataset, "head": board.head, "models": [_model(i, m) for i, m in enumerate(models)],
-        "tables": [_table(t) for t in board.tables], "tracks": study_plots(series, rows, models, summary["ship_L"], summary["ship_B"]),
+        "tables": [table_cells(t) for t in board.tables], "tracks": study_plots(series, rows, models, summary["ship_L"], summary["ship_B"]),
         "growth": [
             ("Position error ED", pictures.growth(series, models, 0, "ED [m]")),
             ("Heading error", pictures.growth(series, models, 1, "|heading error| [deg]")),
@@ -108,35 +107,7 @@ def _section(number: int, results: Results, board: Board, given: Sequence[Path],
 
 
 def _model(i: int, name: str) -> dict[str, Any]:
-    return {"i": i, "name": name, "stroke": pictures.stroke(i)}
-
-
-def _table(table: Table) -> dict[str, Any]:
-    """Cells as text, beside the value that they are sorted by."""
-    lines = []
-    for row in table.rows:
-        cells = [
-            {"text": c.text(row), "between": _between(c, row), "by": _sort_key(row.get(c.key)), "number": c.format is not None} for c in table.columns
-        ]
-        lines.append({"cells": cells, "reference": bool(row.get("_reference"))})
-    head = [{"text": c.header, "number": c.format is not None, "model": c.key == "model"} for c in table.columns]
-    return {"title": table.title, "head": head, "rows": lines, "notes": list(table.notes)}
-
-
-def _between(column: TableColumn, row: dict[str, Any]) -> str:
-    """The interval of a cell, where its row holds one under `key_low` and `key_high`."""
-    low, high = row.get(f"{column.key}_low"), row.get(f"{column.key}_high")
-    if column.format is None or low is None or high is None or not high > low:
-        return ""
-    return f"{column.format(low)} to {column.format(high)}"
-
-
-def _sort_key(value: Any) -> str:
-    """A number as text that a browser reads back; "" for what has none and comes last."""
-    value = value.item() if isinstance(value, np.generic) else value
-    if isinstance(value, bool | int | float):
-        return repr(float(value)) if np.isfinite(value) else ""
-    return "" if value is None else str(value)
+    return {"i": i, "name": name, "stroke": stroke(i)}
 
 
 def _failures(rows: Frame) -> dict[str, Any]:

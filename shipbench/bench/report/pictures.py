@@ -9,20 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...render.linked import COLOURS, stroke
 from .series import Series
 from .slicing import Regime
 from .svg import Axes, limits
 
-COLOURS = 8
-"""Colours of the page's style; model i has colour i modulo this, and from there on other dashes."""
-_DASHES = ("", "7 3", "2 2", "8 2 2 2")
 _WIDTH, _HEIGHT = 400.0, 330.0
-
-
-def stroke(i: int) -> str:
-    """Attributes of a line of model number `i`."""
-    dash = _DASHES[(i + i // COLOURS) % len(_DASHES)]
-    return f'class="line c{i % COLOURS}"' + (f' stroke-dasharray="{dash}"' if dash else "")
 
 
 def growth(series: Series, models: Sequence[str], which: int, ylabel: str) -> str:
