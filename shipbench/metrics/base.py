@@ -88,7 +88,7 @@ def state_error(true: np.ndarray, pred: np.ndarray) -> np.ndarray:
 def fit_percent(*, true: np.ndarray, pred: np.ndarray) -> np.ndarray:
     """100 (1 - |pred - true| / |true - mean(true)|) of each signal [%], (K, 10) to (10,): the NRMSE fit of MATLAB's `compare`.
 
-    100 is exact, 0 no better than the mean; NaN where the true signal is constant. Source: Ljung, System Identification (2nd ed., 1999), sec. 16.4.
+    100 is exact, 0 no better than the mean; NaN where the true signal is constant. Source: MATLAB documentation of `compare`.
     """
     with np.errstate(all="ignore"):
         error = np.linalg.norm(state_error(true, pred), axis=0)
