@@ -1,4 +1,4 @@
-"""Where made data sets, downloads and compiled code are kept, and whether that place is the user's alone."""
+"""Folder of made data sets, downloads and compiled code, and the check that it is the user's alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all commands share: their common options and the two ways to print."""
+"""Common parts of all commands: their options and the two ways to print."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What shipbench raises: one family, one form of message.
+"""Exceptions of shipbench: one family, one form of message.
 
 Every message says what is wrong, the value received, what is accepted and what to do.
 """

@@ -82,7 +82,7 @@ def complete_columns(table: pd.DataFrame, notes: list[str]) -> tuple[str, ...]:
 
 
 def blocks(table: pd.DataFrame) -> Iterator[tuple[str, Columns]]:
-    """Of each run of a checked table its name and its rows; pandas takes ten times as long to select short runs."""
+    """Name and rows of each run of a checked table; pandas takes ten times as long to select short runs."""
     names = table["trajectory"].to_numpy(dtype=object)
     columns = {str(name): table[name].to_numpy() for name in table if name != "trajectory"}
     starts = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1), len(names)]

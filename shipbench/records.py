@@ -294,7 +294,7 @@ class Dataset:
         return digest.hexdigest()[:16]
 
     def with_runs(self, runs: Iterable[Run]) -> Dataset:
-        """The same data set with other runs."""
+        """Copy of the data set with other runs."""
         return replace(self, runs=tuple(runs))
 
     def subset(self, indices: Sequence[int]) -> Dataset:

@@ -52,7 +52,7 @@ class Scores:
 
     @property
     def notes(self) -> list[str]:
-        """What must be known of the fits: physics that does not follow its own training runs."""
+        """Warnings on the fits: physics that does not follow its own training runs."""
         return [f"{dataset}, {model}: {note}" for (dataset, model), note in fit_notes(self.results.summaries).items()]
 
     def table(self, metrics: Sequence[str] = TABLE_III) -> pd.DataFrame:

@@ -169,7 +169,7 @@ class Particulars(BaseModel):
         return self.model_copy(update={key: getattr(self, key) * factor**power for key, power in powers.items()})
 
     def lacks(self, key: str) -> bool:
-        """Whether the file did not give `key`, such as "xG" or "propeller.kt", which an estimate stands in for."""
+        """True where the file did not give `key`, such as "xG" or "propeller.kt", which an estimate stands in for."""
         return any(note.startswith(f"{key} not given: ") for note in self.notes)
 
 

@@ -48,7 +48,7 @@ class Board:
 
     @property
     def title(self) -> str:
-        """Of the page."""
+        """Title of the page."""
         return f"{self.heading}: {self.dataset}"
 
     def markdown(self, command: str, plots: Sequence[str] = ()) -> str:

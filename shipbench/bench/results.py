@@ -98,12 +98,12 @@ def write_truth(out: Path, dataset: str, fold: int, batch: Batch) -> None:
 
 
 def truth_path(out: Path, dataset: str, fold: int) -> Path:
-    """Where the truth of a fold is saved."""
+    """Path of the saved truth of a fold."""
     return out / "truth" / file_name(dataset) / f"fold{fold}.npz"
 
 
 def read_truth(out: Path, dataset: str, fold: int) -> Batch:
-    """What `write_truth` saved (without history).
+    """Truth of a fold as `write_truth` saved it, without history.
 
     Raises:
         InputError: it is not there, is damaged, or its arrays are of other shapes.
@@ -206,7 +206,7 @@ def assemble(out: Path, cells: Iterable[Cell]) -> tuple[Frame, list[dict[str, An
 
 
 def window_table(out: Path, summaries: Sequence[dict[str, Any]]) -> Frame:
-    """What the true ship does in every scored window of a study, from its saved truth: dataset, fingerprint, fold, run and `window_features`."""
+    """Motion of the true ship in every scored window of a study, from its saved truth: dataset, fingerprint, fold, run and `window_features`."""
     import pandas as pd
 
     frames = []
@@ -267,7 +267,7 @@ class Results:
 
     @cached_property
     def windows(self) -> Frame | None:
-        """What the true ship does in every scored window, from all folders that tell; None where none does."""
+        """Motion of the true ship in every scored window, from all folders that hold it; None where none does."""
         import pandas as pd
 
         folders = {source: [s for s, at in zip(self.summaries, self.sources, strict=True) if at == source] for source in dict.fromkeys(self.sources)}

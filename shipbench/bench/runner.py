@@ -43,7 +43,7 @@ class Memory:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a study left: its folder, the rows, the summaries of its cells, and the cells that failed with their reasons."""
+    """Result of a study: its folder, the rows, the summaries of its cells, and the cells that failed with their reasons."""
 
     out: Path
     rows: Frame

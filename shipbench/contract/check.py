@@ -21,7 +21,7 @@ from .subject import Broken, NotApplicable, Subject
 
 @dataclass(frozen=True)
 class Report:
-    """What came of a check."""
+    """Result of a check."""
 
     model: str
     data: str
@@ -38,7 +38,7 @@ class Report:
         return [v for v in self.verdicts if v.status == status]
 
     def document(self) -> dict[str, Any]:
-        """As one JSON document."""
+        """The report as one JSON document."""
         return {
             "model": self.model, "data": self.data, "seconds": round(self.seconds, 2),
             "passed": len(self.of(PASSED)), "broken": len(self.of(BROKEN)), "not_applicable": len(self.of(NOT_APPLICABLE)),

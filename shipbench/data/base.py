@@ -54,7 +54,7 @@ class DatasetPart:
 
 
 def public_folder(name: str) -> Path:
-    """Where the files of a public data set are kept once they are downloaded."""
+    """Folder of the downloaded files of a public data set."""
     return cache_folder() / "public" / file_name(name)
 
 

@@ -1,4 +1,4 @@
-"""What a diagnosis found, as plain data: the verdict of the contract (section 6) and what the report shows beside it."""
+"""Result of a diagnosis as plain data: the verdict of the contract (section 6) and what the report shows beside it."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Wrong:
 
 @dataclass(frozen=True, repr=False)
 class Trace:
-    """What the plots are drawn from, per segment of a run (padded with NaN).
+    """Time series of the plots, per segment of a run (padded with NaN).
 
     run (B,) index of the run, names: of the runs. start (B,) [s]. t (K + 1,) [s]. measured, before, after (B, K + 1, 6): x y psi u v r recorded,
     rolled out open-loop by the plain model, and by the extended one (held out where `held_out`; equal to `before` when nothing was named).

@@ -1,4 +1,4 @@
-"""What every effect is: one formula, used to hide a cause in simulated data, to test for it in measured data, and to extend a model.
+"""An effect: one formula, used to hide a cause in simulated data, to test for it in measured data, and to extend a model.
 
 A part is one file of this folder whose instance is bound to `EFFECT`; the file's name is the effect's name. It overrides one of three methods,
 which say where the cause enters: `force` (anything that acts on the hull), `gear` (between command and actuator) or `measure` (the sensors).
@@ -51,7 +51,7 @@ class Parameter:
     relative: bool = False
 
     def for_length(self, L: float) -> Parameter:
-        """The same parameter of a ship of length L [m]."""
+        """Parameter scaled to a ship of length L [m]."""
         factor = (L / _REFERENCE_LENGTH) ** _FROUDE[self.scaling]
         return replace(self, typical=self.typical * factor, low=self.low * factor, high=self.high * factor)
 
@@ -89,7 +89,7 @@ class Effect:
 
     @property
     def enters(self) -> str:
-        """Where it enters: "force", "gear" or "sensor"."""
+        """Place where it enters: "force", "gear" or "sensor"."""
         cls = type(self)
         return "gear" if cls.gear is not Effect.gear else "sensor" if cls.measure is not Effect.measure else "force"
 
@@ -99,7 +99,7 @@ class Effect:
         return _ACTS_THROUGH.get(self.family, ())
 
     def plausible(self, q: Sequence[float], ship: Particulars) -> bool:
-        """Whether a ship may have it of the size `q`, shapes left out or not: within the bounds of all parameters."""
+        """True where all sizes `q` lie within the bounds of their parameters, shapes left out or not."""
         return all(p.shape or p.low <= value <= p.high for p, value in zip(self.sized(ship.L), q, strict=False))
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
@@ -109,7 +109,7 @@ class Effect:
         """Change the gears of `n`, `delta` and `F` (both thrusters); `q` holds numbers or one value per run."""
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
-        """What the sensors say of the true states S (runs, samples, 10); `q` holds numbers or one value per run."""
+        """Measurement of the true states S (runs, samples, 10); `q` holds numbers or one value per run."""
         return S
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
@@ -117,7 +117,7 @@ class Effect:
         return [()]
 
     def fitted(self, L: float) -> tuple[Effect, ...]:
-        """The same effect with values in which it acts about linearly on a ship of length L [m] (`public` gives what they mean), once for each way in
+        """Effect with values in which it acts about linearly on a ship of length L [m] (`public` gives what they mean), once for each way in
         which it may act."""
         return (self,)
 

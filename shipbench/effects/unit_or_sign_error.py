@@ -74,7 +74,7 @@ class UnitOrSignError(Effect):
 
 
 def in_words(channel: str, factor: float) -> str:
-    """What a factor means: "in degrees", "with the other sign", "in knots, with the other sign", or the number."""
+    """Meaning of a factor: "in degrees", "with the other sign", "in knots, with the other sign", or the number."""
     parts = [] if abs(factor) == 1.0 else [_unit(channel, abs(factor))]
     if factor < 0.0:
         parts.append("with the other sign")

@@ -37,7 +37,7 @@ class Wind(Effect):
         return tuple(found)
 
     def sized(self, L: float) -> tuple[Parameter, ...]:
-        """Of the fitted components where it is fitted, with the bounds of a wind along one of them."""
+        """Parameters of the fitted components, with the bounds of a wind along one of them."""
         plain = super().sized(L)
         if self.stretch is None:
             return plain

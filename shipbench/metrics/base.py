@@ -1,4 +1,4 @@
-"""What a metric is: a function of the true and the predicted states, with its label and unit.
+"""A metric: a function of the true and the predicted states, with its label and unit.
 
 One file per metric; the file's name is the metric's name and the file binds a `Metric` to `METRIC`. The function takes keyword-only
 arguments, and only those of these that it needs:
@@ -50,7 +50,7 @@ class Metric:
     smaller_is_better: bool = True
 
     def values(self, *, true: np.ndarray, pred: np.ndarray, s0: np.ndarray, L: float, dt: float, U: np.ndarray | None = None) -> np.ndarray:
-        """What the function returns, (batch, K[, columns]) or (batch[, columns]).
+        """Values of the metric, (batch, K[, columns]) or (batch[, columns]).
 
         Raises:
             InputError: the shapes of truth and prediction differ, or the metric needs `U` and none is given.

@@ -1,4 +1,4 @@
-"""What every predictor is: fit, predict, save, load; and how a model spec becomes one.
+"""Base of all predictors: fit, predict, save, load; and the way from a model spec to a predictor.
 
 A part is one file of this folder whose class is bound to `PREDICTOR`. Its dataclass fields are the parameters that a spec sets
 (`mlp[hidden=64,seed=3]`); arrays that `fit` finds are returned by `_arrays` and taken back by `_restore`.
@@ -63,7 +63,7 @@ class PredictorBase(ABC):
 
     @property
     def fitted(self) -> bool:
-        """Whether it can predict."""
+        """True once it can predict."""
         return True
 
     def _refuse_unfitted(self, what: str) -> None:
