@@ -16,8 +16,11 @@ if TYPE_CHECKING:
 
 
 def data_check(
+    ctx: typer.Context,
     dataset: DatasetArgument,
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for findings.json and a picture of each finding.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for a page (check.html), findings.json and a picture of each finding.")
+    ] = None,
     apply: Annotated[
         bool, typer.Option("--apply", help="Write the proposed lines into dataset.toml; the old file stays beside it as dataset.toml.before-check.")
     ] = False,
@@ -43,7 +46,7 @@ def data_check(
         recording, findings = check_path(dataset)
     facts, document = dataset_facts(recording.dataset), check_document(recording, findings)
     proposed = [f for f in findings if f.severity != "note"]
-    written = write_findings(recording, findings, out) if out is not None else []
+    written = write_findings(recording, findings, out, str(ctx.obj)) if out is not None else []
     lines, before = write_lines(Path(dataset), proposed) if apply else (laid(recording.given, proposed), None)
     if as_json:
         print_json(document | ({"before": str(before) if before else None} if apply else {}))
@@ -53,7 +56,7 @@ def data_check(
         if before is not None:
             say(f"Written: {Path(dataset, 'dataset.toml')} (the old file: {before.name}). Next: shipbench data check {dataset}")
         if written:
-            say(f"Written: {out} ({len(written)} files)")
+            say(f"Written: {written[0]} and {len(written) - 1} files beside it")
     if any(f.severity == "error" for f in findings):
         raise typer.Exit(1)
 

@@ -1,4 +1,4 @@
-"""What `data check` writes: tables, one document, one picture per finding that has evidence to look at."""
+"""Files of `data check`: one page, one document, the lines for dataset.toml, one picture for each finding that has evidence to look at."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ..checking.finding import Finding, Picture, toml_line
 from ..checking.recording import Recording
 from ..errors import InputError
 from ..names import file_name
+from .check_html import check_page
 from .dataset_facts import dataset_facts
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -26,18 +27,21 @@ def check_document(recording: Recording, findings: Sequence[Finding]) -> dict[st
     }  # fmt: skip
 
 
-def write_findings(recording: Recording, findings: Sequence[Finding], folder: Path) -> list[Path]:
-    """findings.json, dataset_lines.toml and NN-kind.png; pictures of an earlier check are removed.
+def write_findings(recording: Recording, findings: Sequence[Finding], folder: Path, command: str) -> list[Path]:
+    """Write check.html, findings.json, dataset_lines.toml and NN-kind.png; pictures of an earlier check are removed.
+
+    `command` is what the page names as its origin. Returns the paths, the page first.
 
     Raises:
         InputError: the folder cannot be written.
     """
     document = check_document(recording, findings)
+    page = check_page(recording, findings, document, command)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for old in folder.glob("[0-9][0-9]-*.png"):
             old.unlink()
-        written = [_write(folder / "findings.json", json.dumps(document, indent=1, default=str) + "\n")]
+        written = [_write(folder / "check.html", page), _write(folder / "findings.json", json.dumps(document, indent=1, default=str) + "\n")]
         written.append(_write(folder / "dataset_lines.toml", document["lines"] + "\n"))
         for number, finding in enumerate(findings, 1):
             if finding.picture is not None:
@@ -49,7 +53,7 @@ def write_findings(recording: Recording, findings: Sequence[Finding], folder: Pa
 
 def _write(path: Path, text: str) -> Path:
     part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    part.write_text(text, encoding="utf-8")
+    part.write_text(text, encoding="utf-8", errors="replace")  # names from badly decoded files may hold lone surrogates
     os.replace(part, path)
     return path
 

@@ -39,6 +39,7 @@ def render_page(
     command: str,
     tiles: Sequence[Tile] = (),
     plots: bool = False,
+    images: bool = False,
     style: str = "",
     **context: Any,
 ) -> str:
@@ -51,6 +52,7 @@ def render_page(
         command: the command that made the page.
         tiles: figures at the top.
         plots: whether the page holds linked plots (see `render/linked.py`); adds Plotly, 1.2 MB.
+        images: whether it holds pictures as `data:`.
         style: rules of this page alone, behind those of the common style sheet.
         context: what else the template uses; `shipbench` (version) is set.
     """  # fmt: skip
@@ -63,10 +65,10 @@ def render_page(
     )
     environment.filters.update(ticks=_ticks, short=short_name, embedded=embedded)
     styles = _read("page.css") + style
-    scripts = [_read(_PLOTLY), _read("tables.js"), _read("linked.js")] if plots else [_read("tables.js")]
+    scripts = [*([_read(_PLOTLY)] if plots else []), _read("tables.js"), _read("copy.js"), *([_read("linked.js")] if plots else [])]
     return environment.get_template(template).render(
         title=title, dataset=dataset, command=command, tiles=tiles, style=styles, scripts=scripts, plots=plots,
-        policy=content_policy(styles, scripts, plots=plots), made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        policy=content_policy(styles, scripts, images=images, plots=plots), made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         shipbench=version("shipbench"), plotly=plotly_version() if plots else "", **context,
     )  # fmt: skip
 

@@ -48,10 +48,11 @@ function linkedPlots(root) {
     }));
     data.series.forEach((series, s) => {
       const line = run.values[s];
-      if (!line || !line[east.i]) return;
-      const keep = run.t.map((t, k) => k).filter((k) => within(run.t[k]));
+      if (!line || !line.some((values) => values)) return;
+      const onTrack = line[east.i] !== null; // a series of histories alone stands in the legend
+      const keep = onTrack ? run.t.map((t, k) => k).filter((k) => within(run.t[k])) : [];
       traces.push({
-        x: keep.map((k) => line[east.i][k]), y: keep.map((k) => line[north.i][k]), customdata: keep.map((k) => run.t[k]),
+        x: onTrack ? keep.map((k) => line[east.i][k]) : [null], y: onTrack ? keep.map((k) => line[north.i][k]) : [null], customdata: keep.map((k) => run.t[k]),
         name: escaped(short(series.name)), meta: series.role, mode: "lines", line: stroke(series.role), visible: shown(series.role),
         opacity: series.role === "measured" ? 0.5 : 1,
         hovertemplate: `%{customdata:.1f} s<br>${east.label} %{x:.1f} m<br>${north.label} %{y:.1f} m<extra>%{fullData.name}</extra>`,

@@ -91,7 +91,7 @@ def test_the_page_holds_all_parts_and_fetches_nothing(study, tmp_path):
         assert f'id="d0-{part}"' in text
         assert f'href="#d0-{part}"' in text
     assert re.search(
-        r"default-src 'none'; .*style-src-elem( 'sha256-[\w+/=]+'){2}; style-src-attr 'unsafe-inline'; script-src( 'sha256-[\w+/=]+'){3}\">", text
+        r"default-src 'none'; .*style-src-elem( 'sha256-[\w+/=]+'){2}; style-src-attr 'unsafe-inline'; script-src( 'sha256-[\w+/=]+'){4}\">", text
     )
     for tag, attributes in Elements(text).tags:
         assert "src" not in attributes, tag
@@ -102,7 +102,7 @@ def test_no_name_breaks_out_of_its_text(study, tmp_path):
     text = page_of(study, tmp_path).path.read_text()
     tags = Elements(text).tags
     assert "r4 &lt;img" in text
-    assert [a.get("type") for tag, a in tags if tag == "script"] == ["application/json", None, None, None]
+    assert [a.get("type") for tag, a in tags if tag == "script"] == ["application/json", None, None, None, None]
     assert "img" not in dict(tags)
     assert not [name for _, attributes in tags for name in attributes if name.startswith("on")]
     assert {run["name"] for run in drawings(text)["runs"]} == {f"r{i} {HOSTILE}" for i in range(9)}

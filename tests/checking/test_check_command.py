@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import base64
 import gzip
+import hashlib
+import html
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
@@ -15,6 +20,7 @@ from typer.testing import CliRunner, Result
 from shipbench.bench.check_faults import FAULTS
 from shipbench.bench.check_sets import base_set
 from shipbench.bench.check_suite import write_planted
+from shipbench.bench.recorded import RUNS, thinned
 from shipbench.cli import app
 
 SHIP, SEED = "kcs", 311
@@ -76,7 +82,7 @@ def test_json_is_one_document_and_out_holds_a_picture_of_each_finding(tmp_path):
     assert finding["kind"] == "outliers"
     assert finding["evidence"]["samples"] == 4
     assert tomllib.loads(document["lines"]) == tomllib.loads(finding["line"])
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"findings.json", "dataset_lines.toml", "01-outliers.png"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"check.html", "findings.json", "dataset_lines.toml", "01-outliers.png"}
     assert (tmp_path / "out" / "01-outliers.png").read_bytes()[:4] == b"\x89PNG"
     assert json.loads((tmp_path / "out" / "findings.json").read_text()) == document
 
@@ -194,3 +200,62 @@ def test_a_ship_that_never_moves_is_no_fault(table, folder):
 
 def test_a_channel_that_never_changes_is_compared_without_a_warning(table, folder):
     assert check(folder(table.assign(v=1.0, r=1.0))).exit_code in (0, 1)
+
+
+def page_of(folder: Path, out: Path) -> str:
+    result = check(folder, "--out", out)
+    assert f"Written: {out / 'check.html'} and" in result.stdout, result.output
+    return (out / "check.html").read_text()
+
+
+def plots_in(page: str) -> dict:
+    return json.loads(re.search(r'<script type="application/json">(.*?)</script>', page, re.DOTALL)[1])
+
+
+def test_the_page_says_the_verdict_the_line_and_begins_at_the_run_concerned(tmp_path):
+    folder = write_planted(base_set(SHIP, SEED), BY_NAME["outliers of x"], SEED, tmp_path / "set")
+    (finding,) = json.loads(check(folder, "--json").stdout)["findings"]
+    page = page_of(folder, tmp_path / "out")
+    assert "1 error, 0 warnings" in page or "0 errors, 1 warning" in page
+    assert finding["text"] in html.unescape(page)
+    assert html.unescape(page).count(f"<pre>{finding['line']}</pre>") == 2  # with the finding, and among all lines
+    data = plots_in(page)
+    assert [r["name"] for r in data["runs"]] == sorted(finding["runs"])
+    assert data["runs"][data["start"]]["name"] == finding["runs"][0]
+    assert data["runs"][data["start"]]["note"] == "outliers"
+    assert {s["name"] for s in data["series"]} == {"recorded", "command"}
+
+
+def test_a_page_of_many_runs_draws_some_and_says_how_many(clean, tmp_path):
+    page = page_of(clean, tmp_path / "out")
+    assert "No fault was found" in page
+    assert f"{RUNS} of " in page or len(plots_in(page)["runs"]) < RUNS
+    assert '<section id="lines"' not in page
+
+
+def test_names_on_the_page_stay_text(table, folder, tmp_path):
+    odd = "</script><script>alert(1)</script>"
+    names = table["trajectory"].where(table["trajectory"] != "run03", odd)
+    jumped = table.assign(trajectory=names)
+    jumped.loc[jumped.index[names == odd][60:], "psi"] += 0.3
+    path = folder(jumped.to_csv(index=False).encode())
+    toml = path / "dataset.toml"
+    toml.write_text("licence = '<script>alert(2)</script>'\n" + re.sub(r"^licence = .*$", "", toml.read_text(), flags=re.MULTILINE))
+    page = page_of(path, tmp_path / "out")
+    assert "<script>alert" not in page
+    assert "&lt;/script&gt;&lt;script&gt;alert(1)" in page
+    assert "&lt;script&gt;alert(2)" in page
+    assert plots_in(page)["runs"][0]["name"] == odd
+    policy = re.search(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', page)[1]
+    for script in re.findall(r"<script>(.*?)</script>", page, re.DOTALL):
+        assert base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() in policy
+    assert "unsafe-eval" not in policy
+
+
+def test_thinning_keeps_a_single_wrong_sample_and_the_breaks():
+    values = np.sin(np.linspace(0.0, 9.0, 50_000))
+    values[31_337], values[40_000] = 9.0, np.nan
+    kept = thinned(np.column_stack([values]), 1000)
+    assert len(kept) <= 1100
+    assert {0, 31_337, 40_000, 49_999} <= set(kept.tolist())
+    assert (np.diff(kept) > 0).all()

@@ -15,9 +15,9 @@ from ..results import Frame
 from .series import Series, Track
 
 _DEGREES = 180.0 / np.pi
-_EAST, _NORTH = Quantity("east", "east", "m", 1), Quantity("north", "north", "m", 1)
+EAST, NORTH = Quantity("east", "east", "m", 1), Quantity("north", "north", "m", 1)
 _ERROR = Quantity("error", "position error ED", "m", 1)
-_SIGNALS = (
+SIGNALS = (
     (U, 1.0, Quantity("u", "surge speed u", "m/s", 3)),
     (V, 1.0, Quantity("v", "sway speed v", "m/s", 3)),
     (R, _DEGREES, Quantity("r", "yaw rate r", "deg/s", 3)),
@@ -45,8 +45,8 @@ def study_plots(series: Series, rows: Frame, models: Sequence[str], L: float, B:
         return {"runs": [], "fits": []}
     first = rows.sort_values(["seed", "fold"], kind="stable").drop_duplicates(["model", "run"])  # as the tracks: of several seeds the first
     by_run = {run: part.set_index("model") for run, part in first.groupby("run")}
-    signals = [s for s in _SIGNALS if s[0] not in (F_B, F_S) or any(np.any(t.truth[:, s[0]] != 0.0) for t in series.tracks)]
-    columns = [_EAST, _NORTH, *(q for _, _, q in signals), _ERROR]
+    signals = [s for s in SIGNALS if s[0] not in (F_B, F_S) or any(np.any(t.truth[:, s[0]] != 0.0) for t in series.tracks)]
+    columns = [EAST, NORTH, *(q for _, _, q in signals), _ERROR]
     runs = []
     for track in series.tracks:
         mine = by_run[track.run]
