@@ -28,7 +28,7 @@ def diagnose(
     as_json: Json = False,
 ) -> None:
     """Show what the physics model gets wrong on a data set, name the cause, and measure what naming it is worth."""
-    from .bench.diagnosis_report import write_diagnosis
+    from .bench.diagnosis_report import document, write_diagnosis
     from .bench.diagnosis_text import summary_lines
     from .bench.progress import steps_shown
     from .data.base import load_dataset
@@ -43,7 +43,7 @@ def diagnose(
     found = replace(found, spec=dataset)
     written = write_diagnosis(found, folder)
     if as_json:
-        print_json(found.document())
+        print_json(document(found))
         return
     for line in summary_lines(found, screen_width(), full):
         say(line)

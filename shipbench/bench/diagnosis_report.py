@@ -9,10 +9,11 @@ import shlex
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
+from typing import Any
 
-from ..diagnosis.outcome import Cause, Diagnosis, what_it_is
+from ..diagnosis.outcome import Cause, Diagnosis, Gain, what_it_is
 from ..render.html import content_policy
-from .diagnosis_text import detectable, figure, gain_words, headline, interval, next_command, strength, summary_lines
+from .diagnosis_text import cause_texts, detectable, estimate, figure, gain_words, headline, in_words, next_command, summary_lines
 
 _STYLE = """
 :root { color-scheme: light dark; --ink: #1c2733; --paper: #fff; --soft: #f1f4f6; --line: #d5dde3; --accent: #00707f; --warn: #9a5200;
@@ -50,12 +51,20 @@ _AFTER_KEY = '<span><i style="background:var(--after)"></i>extended</span>'
 
 def write_diagnosis(d: Diagnosis, folder: Path) -> list[Path]:
     """Write diagnosis.json, summary.txt and report.html into `folder` (made if missing), each atomically; returns the paths."""
-    document = json.dumps(d.document(), indent=1, allow_nan=False)
+    content = json.dumps(document(d), indent=1, allow_nan=False)
     return [
-        _write(folder / "diagnosis.json", document + "\n"),
+        _write(folder / "diagnosis.json", content + "\n"),
         _write(folder / "summary.txt", "\n".join(summary_lines(d)) + "\n"),
         write_report(d, folder / "report.html"),
     ]
+
+
+def document(d: Diagnosis) -> dict[str, Any]:
+    """What diagnosis.json holds: `Diagnosis.document`, and every cause in words."""
+    content = d.document()
+    for c, cause in zip(d.causes, content["causes"], strict=True):
+        cause["in_words"] = in_words(c)
+    return content
 
 
 def write_report(d: Diagnosis, path: Path) -> Path:
@@ -131,20 +140,18 @@ def _causes(d: Diagnosis) -> str:
             taken = f" It takes {100 * share:.0f} % of the variance of the missing force, whose pictures are below."
         return paragraph(f"No effect of the library explains the runs as well as {what_it_is(d.unknown)}.{taken}")
     if not d.causes:
-        return paragraph("None is named.")
-    return "".join(_cause(c) for c in d.causes) + paragraph(
-        gain_words(d.gain) + (" All causes together." if d.gain is not None and len(d.causes) > 1 else "")
-    )
+        return paragraph("No cause is identified.")
+    alone = d.gain if len(d.causes) == 1 else None
+    return "".join(_cause(c, alone) for c in d.causes) + paragraph(gain_words(d.gain, len(d.causes)))
 
 
-def _cause(c: Cause) -> str:
-    rows = [[name, interval(e)] for name, e in c.parameters.items()]
-    text = f"<h3>{c.rank}. {escape(c.effect)} <small>({escape(strength(c))})</small></h3>"
-    text += table(["size", "value [95 % interval]"], rows) if rows else ""
-    text += paragraph(c.evidence[:1].upper() + c.evidence[1:].rstrip(".") + ".") if c.evidence else ""
-    if c.confused_with:
-        text += f'<p class="warning">These data cannot separate it from {escape(", ".join(c.confused_with))}.</p>'
-    return text
+def _cause(c: Cause, alone: Gain | None) -> str:
+    """A cause with its sizes and what is known of it; alone: the gain where it is the only cause."""
+    words = in_words(c)
+    name = "" if c.effect in words else f" <small>({escape(c.effect)})</small>"
+    text = f"<h3>{c.rank}. {escape(words[0].upper() + words[1:])}{name}</h3>"
+    text += "<ul>" + "".join(f"<li>{escape(estimate(c.effect, n, e))}</li>" for n, e in c.parameters.items()) + "</ul>" if c.parameters else ""
+    return text + "".join(map(paragraph, cause_texts(c, alone)))
 
 
 def _gains(d: Diagnosis) -> str:

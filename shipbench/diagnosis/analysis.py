@@ -81,9 +81,9 @@ class Analysis:
         score, term = self.final.worth(index), self.final.model.terms[index]
         added = max((s for s in self.selection.steps if s.term == term), key=lambda s: s.score, default=None)
         if added is not None and (score < self.threshold or score > added.score):
-            return added.score, added.supporters, "where it was added"
+            return added.score, added.supporters, "before and after it was added"
         supporters = int(np.sum(self.final.solution.per_run > self.final.solution_without(index).per_run))
-        return score, supporters, "beside the other causes" if len(self.final.model.terms) > 1 else "of the fit without it"
+        return score, supporters, "with and without it beside the other causes" if len(self.final.model.terms) > 1 else "with and without it"
 
     def extension(self, name_hull: bool) -> Extension:
         """What the diagnosis adds to the plain model."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from ..effects.base import EFFECTS, Effect
 from .analysis import HULL_THRESHOLD, Analysis
 from .by_place import goes_with, of_runs
 from .clocks import NAMES, LateVelocities
+from .forces import force_of_hull, force_of_term
 from .gear_kinds import GearFinding
 from .generic import Dependence
 from .model import FREE, hull_changes
@@ -45,8 +46,8 @@ def describe_causes(
     named = [c for c in felt if c.effect not in {s.effect for s in seen}] + [_with_motion(s, [c for c in felt if c.effect == s.effect]) for s in seen]
     named.sort(key=lambda c: -c.score)
     if named and found.rival is not None:
-        told = f"; {what_it_is(_described(found.rival))} would explain the runs about as well ({found.rival.score:.0f})"
-        named[0] = replace(named[0], evidence=named[0].evidence + told)
+        other = f"{what_it_is(_described(found.rival))} explains the runs about as well (log Bayes factor {0.5 * found.rival.score:.0f})"
+        named[0] = replace(named[0], evidence=_sentences([named[0].evidence, other]))
     if doubt:
         named = [c for c in named if whatever_the_ship(c.effect, found)]
     if hull and found.hull > HULL_THRESHOLD:
@@ -60,18 +61,25 @@ def _p(found: Analysis, score: float) -> float:
 
 def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs: Sequence[str]) -> Cause:
     fit, effect = found.final, term.effect
-    score, supporters, beside = found.score(index)
+    score, supporters, compared = found.score(index)
     rivals = rivals_of(found, term)
-    evidence = f"log Bayes factor {0.5 * score:.0f} {beside}; {supporters} of {fit.plant.seg.runs} runs support it"
-    more = goes_with(fit, of_runs(fit, index)) if term.per_run else ""
-    evidence += "".join(f"; {words}" for words in (effect.way, more) if words)
-    if term.since is not None:
-        evidence += f"; {effect.name} begins with run {runs[term.since]} (number {term.since}, the first is 0)"
+    notes = [f"The log Bayes factor compares the models {compared}", effect.way]
+    notes += [goes_with(fit, of_runs(fit, index))] if term.per_run else []
+    notes += [f"{effect.name} begins with run {runs[term.since]} (number {term.since}, the first is 0)"] if term.since is not None else []
     name = effect.name if term.since is None else "change_point"
     parameters = _parameters(fit, index, term)
     if term.since is not None:
         parameters = {"from_run": Estimate(float(term.since), "1", (np.nan, np.nan))} | parameters
-    return Cause(name, 0, score, _p(found, score), parameters, rivals, effect.separate if rivals else "", gain, evidence)
+    return Cause(
+        name, 0, score, _p(found, score), parameters, rivals, effect.separate if rivals else "", gain, _sentences(notes),
+        f"{supporters} of {fit.plant.seg.runs} runs", force_of_term(fit, index),
+        "" if term.per_run or term.since is not None else effect.correction({k: e.value for k, e in parameters.items()}),
+    )  # fmt: skip
+
+
+def _sentences(texts: Iterable[str]) -> str:
+    """Texts as sentences, those that are empty left out."""
+    return " ".join(f"{t[0].upper()}{t[1:].rstrip('.')}." if t.split()[0] not in EFFECTS else f"{t.rstrip('.')}." for t in texts if t)
 
 
 def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
@@ -131,16 +139,17 @@ def _gear_cause(found: Analysis, g: GearFinding, gain: Gain | None) -> Cause:
     return Cause(
         g.effect, 0, g.score, _p(found, g.score), {parameter.name: Estimate(g.value, parameter.unit, g.ci95)}, near, effect.separate if near else
         "", gain,
-        f"seen between command and record of the actuator, without the ship's motion; {runs} of {len(g.per_run)} runs support it",
+        "It is detected between command and record of the actuator. The ship's motion is not used.", f"{runs} of {len(g.per_run)} runs",
     )  # fmt: skip
 
 
 def _with_motion(gear: Cause, motion: Sequence[Cause]) -> Cause:
     """A cause of a gear's record with what the motion says of the same: a record that is late by as much as the motion is early is late alone."""
     for c in motion:
-        sizes = ", ".join(f"{n} {e.value:.2g} {e.unit} ({e.ci95[0]:.2g} to {e.ci95[1]:.2g})" for n, e in c.parameters.items())
-        late = " (negative: the record is late)" if any(e.value < 0.0 for e in c.parameters.values()) else ""
-        gear = replace(gear, evidence=f"{gear.evidence}; between record and motion {sizes}{late}, which {c.evidence}")
+        sizes = ", ".join(f"{n} {e.value:.2g} {e.unit} (95 %: {e.ci95[0]:.2g} to {e.ci95[1]:.2g})" for n, e in c.parameters.items())
+        late = "A negative value means that the record is late" if any(e.value < 0.0 for e in c.parameters.values()) else ""
+        seen = f"Between record and motion it is {sizes}, supported by {c.support}"
+        gear = replace(gear, evidence=_sentences([gear.evidence, seen, late, c.evidence]))
     return gear
 
 
@@ -154,8 +163,9 @@ def _hull_cause(found: Analysis, gain: Gain | None) -> Cause:
     mean, reach = fit.solution.mean[at], half * np.sqrt(np.diag(fit.solution.cov)[at]) * wider
     values = zip(HULL.parameters, *(hull_changes(z).tolist() for z in (mean, mean - reach, mean + reach)), strict=True)
     parameters = {p.name: Estimate(value, p.unit, (low, high)) for p, value, low, high in values}
-    evidence = "a hull within 30 % of the regressions explains the runs better than one within 3 %; values are relative changes of the derivatives"
-    return Cause("hull_derivatives", 0, found.hull, _p(found, found.hull), parameters, (), "", gain, evidence)
+    evidence = "A hull within 30 % of the regressions explains the runs better than one within 3 %."
+    score = found.hull
+    return Cause("hull_derivatives", 0, score, _p(found, score), parameters, (), "", gain, evidence, force=force_of_hull(fit))
 
 
 def _unit_cause(rank: int, u: UnitFinding) -> Cause:
@@ -168,17 +178,18 @@ def _late_cause(rank: int, found: Analysis, late: LateVelocities) -> Cause:
     parameters = {
         "delay": Estimate(late.delay, "s", (late.delay - half, late.delay + half)), "earth_axes": Estimate(1.0, "1", (np.nan, np.nan)),
     }  # fmt: skip
-    how = "behind a filter of first order" if late.filtered else "as they were"
+    how = " behind a first-order filter" if late.filtered else ""
     evidence = (
-        f"surge and sway velocity follow the track {late.delay:.2g} s late, {how}, as a vector in the earth's axes: seen by kinematics and taken out "
-        "before the fit. "
-        f"The plain model agrees: {0.5 * late.score:.0f} of log evidence over the runs as recorded, {0.5 * late.over_position:.0f} over a position "
-        "that is early"
+        f"The velocity vector in earth axes follows the track {late.delay:.2g} s late{how}. "
+        "The comparison of track and velocities shows it, and it is corrected before the fit. "
+        f"The plain model agrees: the log Bayes factor is {0.5 * late.score:.0f} against the runs as recorded. "
+        f"Against an early position it is {0.5 * late.over_position:.0f}."
     )
     if late.over_position < 0.0:
-        evidence += ", on which the runs do not agree"
+        evidence += " The runs do not agree on an early position."
     confused = ("position_delay",) if late.over_position < 0.0 else ()
-    return Cause("velocity_delay", rank, late.score, _p(found, late.score), parameters, confused, "", None, evidence)
+    line = EFFECTS.get("velocity_delay").correction({k: e.value for k, e in parameters.items()})
+    return Cause("velocity_delay", rank, late.score, _p(found, late.score), parameters, confused, "", None, evidence, correction=line)
 
 
 def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -> list[Candidate]:

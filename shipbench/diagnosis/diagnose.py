@@ -122,7 +122,7 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
     lines += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + mended + said(dataset) + doubts
     lines += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
-    lines += [f"change_point: {c.evidence}. Fit the runs before and from there apart." for c in causes if c.effect == "change_point"]
+    lines += [f"change_point: {c.evidence} Fit the runs before it and from it on separately." for c in causes if c.effect == "change_point"]
     behind = _behind_its_record(found, causes)
     lines += [f"{name}: {text}" for name, text in behind.items()]
     lines += what_is_left(found) if causes and not doubts else []

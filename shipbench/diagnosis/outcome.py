@@ -39,7 +39,11 @@ class Gain:
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause. score: twice the gain in log evidence; p_value: of the greatest score of all candidates under the null."""
+    """A named cause. score: twice the log Bayes factor; p_value: of the greatest score of all candidates under the null.
+
+    support: such as "12 of 12 runs". force: 99th percentile of its magnitude on the runs in "surge", "sway" [N] and "yaw" [N m], where noticeable.
+    correction: the line of dataset.toml that corrects the record for it, where there is one.
+    """
 
     effect: str
     rank: int
@@ -50,6 +54,9 @@ class Cause:
     separating_manoeuvre: str = ""
     gain: Gain | None = None
     evidence: str = ""
+    support: str = ""
+    force: dict[str, float] = field(default_factory=dict)
+    correction: str = ""
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{name} {e.value:.3g} {e.unit}" for name, e in self.parameters.items())

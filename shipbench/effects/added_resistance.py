@@ -13,9 +13,10 @@ from .base import Effect, Parameter
 class AddedResistance(Effect):
     family = "propulsion"
     summary = "resistance of the hull"
+    phrase = "a hull resistance that is {share}"
     source = "physics reference, section 5, P39"
     acts_through = ()  # a towed ship has it, too
-    parameters = (Parameter("share", "1", 0.3, -0.6, 3.0),)
+    parameters = (Parameter("share", "1", 0.3, -0.6, 3.0, title="hull resistance", relative=True),)
     separate = "coast down with the shaft stopped, from two speeds"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

@@ -6,7 +6,7 @@ It stands on the ship or near her: within three quarters of the length from mids
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from .base import Effect, Parameter, per_run
 class AntennaOffset(Effect):
     family = "sensor"
     summary = "lever arm of the position sensor, its velocities midship's or its own"
+    phrase = "a position antenna {forward} forward and {starboard} to starboard of midship"
     source = "physics reference, section 5, S61"
     parameters = (
         Parameter("forward", "m", 12.0, -80.0, 80.0, scaling="length"),
@@ -42,6 +43,10 @@ class AntennaOffset(Effect):
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
         return [(0.0,), (1.0,)]
+
+    def correction(self, values: Mapping[str, float]) -> str:
+        """The antenna's place, where the velocities are midship's."""
+        return "" if values.get("own_velocities") else f"antenna = [{values['forward']:.3g}, {values['starboard']:.3g}]"
 
 
 EFFECT = AntennaOffset()

@@ -21,6 +21,7 @@ from .base import Effect, Parameter
 class BankSuction(Effect):
     family = "environment"
     summary = "a bank along the channel"
+    phrase = "suction towards a bank"
     source = "form of Norrbin (1974) as in physics reference, section 5, E10"
     parameters = (
         Parameter("strength", "1", 0.3, -2.0, 2.0),

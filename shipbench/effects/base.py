@@ -36,7 +36,8 @@ class Parameter:
     low and high; a size beyond them is not named (`Effect.plausible`).
     A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes are zero. An `other` one
     is the amplitude, or chooses, another form of the same cause, which a ship may have in its place: fitted, but not drawn for the suite.
-    `title` is the name in words, such as "sway damping"; a `relative` one is a change of a coefficient as a share, reported in percent.
+    `title` is the name in words, such as "sway damping"; a `relative` one is a change of a coefficient as a share, reported in percent;
+    one with `share_of` is a share of that quantity, reported in percent too.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Parameter:
     other: bool = False
     title: str = ""
     relative: bool = False
+    share_of: str = ""
 
     def for_length(self, L: float) -> Parameter:
         """Parameter scaled to a ship of length L [m]."""
@@ -59,7 +61,8 @@ class Parameter:
 class Effect:
     """Base of all effects; see the module's docstring.
 
-    Class attributes: `family` (environment, rudder, propulsion, thruster, hull, sensor, time), `summary`, `source`, `parameters`, `per_run` (every
+    Class attributes: `family` (environment, rudder, propulsion, thruster, hull, sensor, time), `summary`, `phrase` (a noun phrase for the verdict
+    with the names of values in braces, such as "a current of {speed} towards {to}"), `source`, `parameters`, `per_run` (every
     run has its own values), `vector` (names of size and direction that two earth-fixed components are reported as), `separate` (the manoeuvre that
     tells it from its look-alikes), `channels` (measured inputs without which it means nothing), `known_with` (measured inputs with which the model
     has it already), `scales` (channels that it records (1 + q) times too large), `breaks_symmetry` (a force that knows port from
@@ -71,6 +74,7 @@ class Effect:
     name: str = ""
     family: ClassVar[str]
     summary: ClassVar[str]
+    phrase: ClassVar[str] = ""
     source: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]]
     per_run: ClassVar[bool] = False
@@ -131,6 +135,10 @@ class Effect:
             return {p.name: float(v) for p, v in zip(self.parameters, q, strict=True)}
         north, east = (float(v) for v in q)
         return {self.vector[0]: math.hypot(north, east), self.vector[1]: math.atan2(east, north) % (2.0 * math.pi)}
+
+    def correction(self, values: Mapping[str, float]) -> str:
+        """The line of dataset.toml that corrects the record for it, from values under the reported names; empty where there is none."""
+        return ""
 
     def units(self) -> dict[str, str]:
         """Units under the names of `public`."""

@@ -14,6 +14,7 @@ from .base import Effect, Parameter
 class CenterOfGravityShift(Effect):
     family = "hull"
     summary = "longitudinal centre of gravity"
+    phrase = "a centre of gravity shifted forward by {shift}"
     source = "physics reference, section 5, H50"
     parameters = (Parameter("shift", "m", 4.0, -15.0, 15.0, scaling="length"),)
     separate = "rudder reversals and thruster pushes at two positions"

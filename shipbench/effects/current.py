@@ -15,6 +15,7 @@ from .base import Effect, Parameter, body_axes
 class Current(Effect):
     family = "environment"
     summary = "uniform current, the same in all runs"
+    phrase = "a current of {speed} towards {to}"
     source = "Fossen (2021), section 10.3; added masses act on the velocity through the water"
     parameters = (Parameter("north", "m/s", 0.3, -6.0, 6.0, scaling="speed"), Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"))
     breaks_symmetry = True

@@ -13,6 +13,7 @@ from .base import Effect, Parameter, body_axes
 class CurrentPerRun(Effect):
     family = "environment"
     summary = "uniform current, another one in each run"
+    phrase = "a current that differs from run to run"
     source = "Fossen (2021), section 10.3"
     parameters = (Parameter("north", "m/s", 0.3, -6.0, 6.0, scaling="speed"), Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"))
     breaks_symmetry = True

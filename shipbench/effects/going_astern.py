@@ -18,6 +18,7 @@ from .base import Effect, Parameter
 class GoingAstern(Effect):
     family = "hull"
     summary = "hull, thrust and rudder while going astern"
+    phrase = "forces astern that differ from the model"
     source = "v u and r u in place of v U and r U: Yoshimura, Nakao & Ishibashi (2009); flow at the rudder: Kitagawa et al. (physics reference 2.6)"
     parameters = (
         Parameter("N_v", "1", 0.5, -0.5, 2.0),

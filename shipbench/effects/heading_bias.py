@@ -5,7 +5,7 @@ and the heading, so that only the forces tell: they act along the ship."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from .base import Effect, Parameter, per_run
 class HeadingBias(Effect):
     family = "sensor"
     summary = "compass error, the velocities turned by it or not"
+    phrase = "a heading error of {bias}"
     source = "physics reference, section 5, S58"
     parameters = (
         Parameter("bias", "rad", math.radians(2.0), -0.3, 0.3),
@@ -37,6 +38,10 @@ class HeadingBias(Effect):
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
         return [(0.0,), (1.0,)]
+
+    def correction(self, values: Mapping[str, float]) -> str:
+        """The bias of psi, where the velocities are not turned with it."""
+        return "" if values.get("turned_velocities") else f"[bias] psi = {values['bias']:.3g}"
 
 
 EFFECT = HeadingBias()

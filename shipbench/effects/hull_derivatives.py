@@ -12,7 +12,8 @@ from .base import Effect, Parameter
 
 class HullDerivatives(Effect):
     family = "hull"
-    summary = "hull derivatives off the regressions"
+    summary = "hull derivatives that differ from the regressions"
+    phrase = "hull coefficients that differ from the regressions"
     source = "spread of the regressions: physics reference, section 5, H55"
     parameters = (
         Parameter("Y_v", "1", 0.25, -0.9, 3.0, title="sway damping", relative=True),

@@ -18,10 +18,11 @@ from .base import Effect, Parameter
 class List(Effect):
     family = "hull"
     summary = "heel angle"
+    phrase = "a list of {heel}"
     source = "N'_phi of physics reference, section 5, H51"
     parameters = (Parameter("heel", "rad", math.radians(4.0), -0.35, 0.35), Parameter("side_force", "1", 6e-4, -0.01, 0.01, other=True))
     breaks_symmetry = True
-    separate = "vary the revolutions at one speed: a list acts with the ship's speed alone"
+    separate = "vary the shaft speed at one speed: a list acts with the ship's speed alone"
 
     def plausible(self, q: Sequence[float], ship: Particulars) -> bool:
         return super().plausible(q, ship) and abs(q[0]) <= math.radians(10.0)

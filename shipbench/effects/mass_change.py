@@ -13,8 +13,9 @@ from .base import Effect, Parameter
 class MassChange(Effect):
     family = "hull"
     summary = "mass of the ship"
+    phrase = "a mass that is {share}"
     source = "physics reference, section 5, H47"
-    parameters = (Parameter("share", "1", 0.15, -0.5, 1.0),)
+    parameters = (Parameter("share", "1", 0.15, -0.5, 1.0, title="mass", relative=True),)
     separate = "pushes of a force of known size: thrusters, a bollard"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

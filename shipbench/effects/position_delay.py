@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,12 +15,16 @@ class PositionDelay(Effect):
     family = "sensor"
     late = True
     summary = "latency of the position"
+    phrase = "positions that are {delay} late"
     source = "physics reference, section 5, S64"
     parameters = (Parameter("delay", "s", 2.0, -10.0, 10.0, scaling="time"),)
     separate = "changes of speed and course"
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
         return delayed(S, (X, Y), q[0], dt)
+
+    def correction(self, values: Mapping[str, float]) -> str:
+        return f"[delay] x = {values['delay']:.3g} and y = {values['delay']:.3g}"
 
 
 EFFECT = PositionDelay()

@@ -16,10 +16,11 @@ from .base import Effect, Parameter
 class PropellerWalk(Effect):
     family = "propulsion"
     summary = "side force of the propeller ahead"
+    phrase = "a side force of the propeller ahead of {share}"
     source = "physics reference, section 5, P36; the form of p0 in eq. (6)"
-    parameters = (Parameter("share", "1", 0.05, -0.3, 0.3),)
+    parameters = (Parameter("share", "1", 0.05, -0.3, 0.3, title="side force", share_of="thrust"),)
     breaks_symmetry = True
-    separate = "straight runs at one speed with the revolutions up and down"
+    separate = "straight runs at one speed with the shaft speed up and down"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         V_A = (1.0 - ship.w_P0) * maximum(s.u - e.u_c, 0.0)

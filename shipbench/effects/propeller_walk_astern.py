@@ -17,10 +17,14 @@ from .base import Effect, Parameter
 class PropellerWalkAstern(Effect):
     family = "propulsion"
     summary = "side force of the propeller astern"
+    phrase = "a side force of the propeller astern"
     source = "Hachii form, Esso Osaka values (physics reference, section 5, P36)"
-    parameters = (Parameter("size", "1", 1.0, -4.0, 4.0), Parameter("share", "1", 0.1, -0.5, 0.5, other=True))
+    parameters = (
+        Parameter("size", "1", 1.0, -4.0, 4.0),
+        Parameter("share", "1", 0.1, -0.5, 0.5, other=True, title="side force", share_of="thrust at rest"),
+    )
     breaks_symmetry = True
-    separate = "astern revolutions at rest"
+    separate = "a propeller that turns astern while the ship is at rest"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         Y, N = side_force_astern(s.n / 60.0, s.u - e.u_c, ship.D_P, ship.L, ship.T, ship.rho)

@@ -13,9 +13,10 @@ from .base import Effect, Parameter
 class RaceGain(Effect):
     family = "rudder"
     summary = "speed of the propeller race at the rudder"
+    phrase = "a propeller race that is {gain} at the rudder"
     source = "physics reference, section 5, R16"
-    parameters = (Parameter("gain", "1", 0.3, -0.9, 1.5),)
-    separate = "turns at low and high revolutions from one speed"
+    parameters = (Parameter("gain", "1", 0.3, -0.9, 1.5, title="race speed", relative=True),)
+    separate = "turns at low and high shaft speed from one speed"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.race = e.race * (1.0 + q[0])

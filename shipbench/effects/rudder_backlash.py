@@ -14,6 +14,7 @@ from .base import Effect, Parameter
 class RudderBacklash(Effect):
     family = "rudder"
     summary = "play of the steering gear"
+    phrase = "a play of {play} in the steering gear"
     source = "physics reference, section 5, A24"
     parameters = (Parameter("play", "rad", math.radians(2.0), 0.0, 0.15),)
     unrecorded = True

@@ -14,6 +14,7 @@ from .base import Effect, Parameter
 class RudderDeadband(Effect):
     family = "rudder"
     summary = "deadband of the steering gear, or play before it"
+    phrase = "a rudder deadband of {band}"
     source = "physics reference, section 5, A23"
     parameters = (Parameter("band", "rad", math.radians(1.5), 0.0, 0.12),)
     separate = "rudder steps smaller than the suspected band"

@@ -13,6 +13,7 @@ from .base import Effect, Parameter
 class RudderDelay(Effect):
     family = "rudder"
     summary = "transport delay of the steering gear or of its record"
+    phrase = "a rudder delay of {delay}"
     source = "physics reference, section 5, A26"
     parameters = (Parameter("delay", "s", 1.5, -10.0, 10.0, scaling="time"),)
     unrecorded = True

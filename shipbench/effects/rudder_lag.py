@@ -13,6 +13,7 @@ from .base import Effect, Parameter
 class RudderLag(Effect):
     family = "rudder"
     summary = "slow first-order steering gear"
+    phrase = "an additional rudder lag of {lag}"
     source = "physics reference, section 5, A22"
     parameters = (Parameter("lag", "s", 3.0, 0.0, 30.0, scaling="time"),)
     unrecorded = True

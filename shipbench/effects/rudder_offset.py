@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
@@ -14,13 +14,17 @@ from .base import Effect, Parameter
 class RudderOffset(Effect):
     family = "rudder"
     summary = "zero error of the rudder angle"
+    phrase = "a rudder offset of {offset}"
     source = "physics reference, section 5, R15"
     parameters = (Parameter("offset", "rad", math.radians(2.0), -0.15, 0.15),)
     breaks_symmetry = True
-    separate = "vary the revolutions at one speed: the offset acts with the race, propeller walk with the thrust, wind with neither"
+    separate = "vary the shaft speed at one speed: the offset acts with the race, propeller walk with the thrust, wind with neither"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.delta = e.delta + q[0]
+
+    def correction(self, values: Mapping[str, float]) -> str:
+        return f"[bias] delta = {-values['offset']:.3g}"
 
 
 EFFECT = RudderOffset()

@@ -15,8 +15,12 @@ from .base import Effect, Parameter
 class RudderStall(Effect):
     family = "rudder"
     summary = "stall of the rudder at large angles"
+    phrase = "a rudder that loses {lost_share} at large angles"
     source = "physics reference, section 5, R18"
-    parameters = (Parameter("lost_share", "1", 0.5, 0.0, 0.95), Parameter("angle", "rad", 0.3, 0.1, 0.7, shape=True))
+    parameters = (
+        Parameter("lost_share", "1", 0.5, 0.0, 0.95, title="lift loss", share_of="lift"),
+        Parameter("angle", "rad", 0.3, 0.1, 0.7, shape=True),
+    )
     separate = "turns at 10, 20, 30 and 35 deg of rudder"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

@@ -13,10 +13,11 @@ from .base import Effect, Parameter
 class ShaftLag(Effect):
     family = "propulsion"
     summary = "slow first-order shaft"
+    phrase = "an additional shaft lag of {lag}"
     source = "physics reference, section 5, P31"
     parameters = (Parameter("lag", "s", 10.0, 0.0, 120.0, scaling="time"),)
     unrecorded = True
-    separate = "small and large steps of the revolutions"
+    separate = "small and large steps of the shaft speed"
 
     def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
         gears["n"] = replace(gears["n"], T=gears["n"].T + q[0])

@@ -13,9 +13,10 @@ from .base import Effect, Parameter
 class ShaftRateLimit(Effect):
     family = "propulsion"
     summary = "slow shaft: rate limit"
+    phrase = "a shaft rate limit of {rate}"
     source = "physics reference, section 5, P32"
     parameters = (Parameter("rate", "rpm/s", 1.0, 0.02, 60.0, scaling="rpm rate"),)
-    separate = "small and large steps of the revolutions"
+    separate = "small and large steps of the shaft speed"
 
     def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
         gears["n"] = replace(gears["n"], rate=where(q[0] > 0.0, minimum(gears["n"].rate, q[0]), gears["n"].rate))

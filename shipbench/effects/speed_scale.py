@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from typing import Self
 
@@ -16,8 +16,9 @@ from .base import Effect, Parameter, per_run
 class SpeedScale(Effect):
     family = "sensor"
     summary = "scale of the speed log"
+    phrase = "recorded speeds that are {scale}"
     source = "physics reference, section 5, S62"
-    parameters = (Parameter("scale", "1", 0.05, -0.5, 0.5),)
+    parameters = (Parameter("scale", "1", 0.05, -0.5, 0.5, title="recorded speed", relative=True),)
     scales = ("u", "v")
     separate = "straight runs on reciprocal courses"
     sway = 1.0
@@ -33,6 +34,10 @@ class SpeedScale(Effect):
         out[..., U] *= 1.0 + per_run(q[0])
         out[..., V] *= 1.0 + self.sway * per_run(q[0])
         return out
+
+    def correction(self, values: Mapping[str, float]) -> str:
+        recorded = f"{1.0 + values['scale']:.4g}"
+        return f"[scale] u = {recorded}" + (f" and v = {recorded}" if self.sway else "")
 
 
 EFFECT = SpeedScale()

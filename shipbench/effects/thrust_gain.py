@@ -13,8 +13,9 @@ from .base import Effect, Parameter
 class ThrustGain(Effect):
     family = "propulsion"
     summary = "thrust of the propeller"
+    phrase = "a propeller thrust that is {gain}"
     source = "physics reference, section 5, P33"
-    parameters = (Parameter("gain", "1", 0.15, -0.6, 1.0),)
+    parameters = (Parameter("gain", "1", 0.15, -0.6, 1.0, title="propeller thrust", relative=True),)
     separate = "acceleration from rest, or a bollard pull"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

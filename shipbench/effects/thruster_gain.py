@@ -13,8 +13,9 @@ from .base import Effect, Parameter
 class ThrusterGain(Effect):
     family = "thruster"
     summary = "force of the thrusters"
+    phrase = "thruster forces that are {gain}"
     source = "physics reference, section 5, T41"
-    parameters = (Parameter("gain", "1", -0.4, -1.0, 1.0),)
+    parameters = (Parameter("gain", "1", -0.4, -1.0, 1.0, title="thruster force", relative=True),)
     separate = "thruster pushes at rest"
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:

@@ -13,6 +13,7 @@ from .base import Effect, Parameter
 class ThrusterLag(Effect):
     family = "thruster"
     summary = "slow thrusters"
+    phrase = "an additional thruster lag of {lag}"
     source = "physics reference, section 5, T43"
     parameters = (Parameter("lag", "s", 6.0, 0.0, 60.0, scaling="time"),)
     separate = "steps of the thruster order"

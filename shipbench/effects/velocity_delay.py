@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -16,6 +16,7 @@ class VelocityDelay(Effect):
     family = "sensor"
     late = True
     summary = "latency of the velocities"
+    phrase = "velocities that are {delay} late"
     source = "physics reference, section 5, S64"
     parameters = (Parameter("delay", "s", 2.0, -10.0, 10.0, scaling="time"), Parameter("earth_axes", "1", 0.0, 0.0, 1.0, shape=True))
     separate = "changes of speed and quick turns"
@@ -34,6 +35,10 @@ class VelocityDelay(Effect):
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
         return [(0.0,), (1.0,)]
+
+    def correction(self, values: Mapping[str, float]) -> str:
+        late = f"{values['delay']:.3g}"
+        return f"[delay] velocity = {late}" if values.get("earth_axes") else f"[delay] u = {late} and v = {late}"
 
 
 EFFECT = VelocityDelay()

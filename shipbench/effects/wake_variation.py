@@ -15,6 +15,7 @@ from .base import Effect, Parameter
 class WakeVariation(Effect):
     family = "propulsion"
     summary = "wake fraction in turns"
+    phrase = "a wake fraction that changes in turns"
     source = "Yasukawa & Yoshimura (2015), eq. 24"
     parameters = (Parameter("size", "1", 0.6, -1.0, 2.0),)
     separate = "the same turn with the shaft stopped"

@@ -18,6 +18,7 @@ from .base import Effect, Parameter, body_axes
 class WaveDrift(Effect):
     family = "environment"
     summary = "mean drift force of waves"
+    phrase = "a wave drift force towards {to}"
     source = "short-wave limit after Faltinsen et al. (1980), as simplified in physics reference, section 5, E05"
     parameters = (Parameter("north", "m^2", 0.12, -8.0, 8.0, scaling="area"), Parameter("east", "m^2", 0.12, -8.0, 8.0, scaling="area"))
     breaks_symmetry = True

@@ -16,6 +16,7 @@ from .base import Effect, Parameter, body_axes
 class Wind(Effect):
     family = "environment"
     summary = "mean wind, the same in all runs"
+    phrase = "a wind of {speed} from {from}"
     source = "Blendermann (1994) in the simulator, lowest harmonics in the fitted model (physics reference, section 5, E03)"
     parameters = (Parameter("north", "m/s", 7.0, -60.0, 60.0, scaling="speed"), Parameter("east", "m/s", 7.0, -60.0, 60.0, scaling="speed"))
     breaks_symmetry = True

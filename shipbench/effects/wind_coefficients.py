@@ -12,12 +12,13 @@ from .base import Effect, Parameter
 
 class WindCoefficients(Effect):
     family = "environment"
-    summary = "wind forces off the formula"
+    summary = "wind forces that differ from the formula"
+    phrase = "wind forces that differ from the formula"
     source = "spread between types of ship: Blendermann (1994), Isherwood (1972) (physics reference, section 5, E03); s_L, centre of the lateral area"
     parameters = (
-        Parameter("X", "1", 0.5, -1.5, 3.0),
-        Parameter("Y", "1", 0.3, -1.0, 2.0),
-        Parameter("N", "1", 0.8, -3.0, 4.0),
+        Parameter("X", "1", 0.5, -1.5, 3.0, title="wind surge force", relative=True),
+        Parameter("Y", "1", 0.3, -1.0, 2.0, title="wind side force", relative=True),
+        Parameter("N", "1", 0.8, -3.0, 4.0, title="wind yaw moment", relative=True),
         Parameter("lever", "m", 13.0, -40.0, 40.0, scaling="length"),
     )
     separate = "drifting in wind from all sides, with an anemometer"

@@ -13,8 +13,9 @@ from .base import Effect, Parameter
 class WindDrift(Effect):
     family = "environment"
     summary = "water that drifts with the wind"
+    phrase = "a water drift of {share}"
     source = "Wu (1975), J. Fluid Mech. 68, 49-70: some 3 % of the wind at the surface, less over the draught"
-    parameters = (Parameter("share", "1", 0.01, -0.1, 0.1),)
+    parameters = (Parameter("share", "1", 0.01, -0.1, 0.1, title="water drift", share_of="wind speed"),)
     separate = "drifting with the shaft stopped, in wind of several strengths"
     channels = ("wind_speed", "wind_from")
 

@@ -7,6 +7,7 @@ from .wind import Wind
 
 class WindPerRun(Wind):
     summary = "mean wind, another one in each run"
+    phrase = "a wind that differs from run to run"
     source = "as wind"
     per_run = True
     separate = "an anemometer, or reciprocal courses within one run"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from .base import Effect, Parameter, per_run
 class YawRateBias(Effect):
     family = "sensor"
     summary = "offset of the rate gyro"
+    phrase = "a rate gyro offset of {bias}"
     source = "physics reference, section 5, S60"
     parameters = (Parameter("bias", "rad/s", math.radians(0.1), -0.1, 0.1, scaling="rate"),)
     separate = "any straight run: heading and integrated yaw rate part"
@@ -23,6 +24,9 @@ class YawRateBias(Effect):
         out = S.copy()
         out[..., R] += per_run(q[0])
         return out
+
+    def correction(self, values: Mapping[str, float]) -> str:
+        return f"[bias] r = {values['bias']:.3g}"
 
 
 EFFECT = YawRateBias()

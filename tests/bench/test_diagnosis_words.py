@@ -4,27 +4,80 @@ import re
 
 import pytest
 
-from shipbench.bench.diagnosis_text import cause_lines
+from shipbench.bench.diagnosis_text import cause_lines, estimate, force_words, in_words
 from shipbench.diagnosis.outcome import Cause, Estimate
 from shipbench.effects.base import EFFECTS
 
-BANNED = re.compile(r"\b(told|knots?|felt|heals?|misread)\b", re.IGNORECASE)
+BANNED = re.compile(r"\b(told|said|felt|knots?|heals?|mends?|misread|plant|revolutions|off the regressions|off the formula)\b", re.IGNORECASE)
+LONGEST = 30
 
 
-@pytest.mark.parametrize("name", EFFECTS.built_in())
-def test_a_cause_is_reported_in_short_sentences_with_its_typed_name(name):
+def make_cause(name: str) -> Cause:
+    """A cause of typical size."""
     effect = EFFECTS.get(name)
     sizes = {p.name: Estimate(p.typical, p.unit, (0.8 * p.typical, 1.2 * p.typical)) for p in effect.parameters}
     if effect.vector:
         sizes = {effect.vector[0]: Estimate(0.36, "m/s", (0.34, 0.37)), effect.vector[1]: Estimate(1.03, "rad", (1.0, 1.05))}
-    lines = cause_lines(Cause(name, 1, 400.0, 0.001, sizes, ("wind",), "a full turn", None, "12 of 12 runs support it"), 80)
+    if name == "change_point":
+        sizes = {"from_run": Estimate(6.0, "1", (float("nan"), float("nan")))}
+    line = effect.correction({k: e.value for k, e in sizes.items()})
+    return Cause(name, 1, 400.0, 0.001, sizes, ("wind",), effect.separate, None, "", "12 of 12 runs", {"sway": 38e3}, line)
+
+
+@pytest.mark.parametrize("name", EFFECTS.built_in())
+def test_a_cause_is_reported_in_short_sentences_with_its_typed_name(name):
+    effect, cause = EFFECTS.get(name), make_cause(name)
+    lines = cause_lines(cause, 80)
     text = " ".join(" ".join(lines).split())
     assert max(map(len, lines)) <= 80
     assert f"1. {name}: {effect.summary}" in text
-    assert "very strong evidence, log Bayes factor 200" in text
-    assert not BANNED.search(text)
+    assert "Very strong evidence (log Bayes factor 200), supported by 12 of 12 runs." in text
+    assert "Its force is up to 38 kN sideways on these runs." in text
+    assert not BANNED.search(text), text
+    assert max(len(sentence.split()) for sentence in re.split(r"(?<=[.:;])\s", text)) <= LONGEST
     if effect.vector:
         assert f"{effect.vector[1]} 059° (95 %: 057° to 060°)" in text
     for p in effect.parameters:
         if p.relative:
-            assert f"{p.title} {p.name} {100 * p.typical:.0f} % larger" in text
+            assert f"{p.title} {p.name} {100 * abs(p.typical):.0f} % {'larger' if p.typical > 0 else 'smaller'}" in text
+        if p.share_of:
+            assert f"{p.title} {p.name} {100 * p.typical:.0f} % of {p.share_of} (95 %: " in text
+
+
+@pytest.mark.parametrize("name", EFFECTS.built_in())
+def test_a_cause_is_a_noun_phrase_that_holds_its_typed_name(name):
+    words = in_words(make_cause(name))
+    assert "{" not in words
+    assert len(words.split()) <= 16
+    assert not BANNED.search(words)
+    assert name in words or all(part in words for part in name.split("_"))
+
+
+@pytest.mark.parametrize(
+    ("value", "ci95", "shown"),
+    [
+        (-0.57, (-0.79, -0.24), "57 % smaller (95 %: 24 to 79 % smaller)"),
+        (-0.07, (-0.65, 0.52), "7 % smaller (95 %: 65 % smaller to 52 % larger)"),
+        (0.35, (0.05, 0.65), "35 % larger (95 %: 5 to 65 % larger)"),
+        (0.35, (float("nan"), float("nan")), "35 % larger"),
+    ],
+)
+def test_a_relative_change_is_reported_in_percent_with_its_direction(value, ci95, shown):
+    assert estimate("hull_derivatives", "Y_v", Estimate(value, "1", ci95)) == f"sway damping Y_v {shown}"
+
+
+def test_forces_have_the_unit_that_suits_their_size():
+    assert (
+        force_words({"surge": 940.0, "sway": 38_100.0, "yaw": 1.21e6}) == "up to 940 N lengthwise, 38 kN sideways and 1.2 MN m in yaw on these runs"
+    )
+    assert force_words({"yaw": 999_999.0}) == "up to 1.0 MN m in yaw on these runs"
+    assert force_words({}) == ""
+
+
+def test_a_sensor_error_comes_with_the_line_that_corrects_it():
+    assert "To correct the record, write in dataset.toml: [bias] psi = 0.0349" in " ".join(cause_lines(make_cause("heading_bias"), 200))
+    assert EFFECTS.get("heading_bias").correction({"bias": 0.1, "turned_velocities": 1.0}) == ""
+    alone = EFFECTS.get("speed_scale").fitted(130.0)[1]
+    assert alone.correction({"scale": 0.05}) == "[scale] u = 1.05"
+    assert EFFECTS.get("speed_scale").correction({"scale": 0.05}) == "[scale] u = 1.05 and v = 1.05"
+    assert EFFECTS.get("rudder_offset").correction({"offset": 0.02}) == "[bias] delta = -0.02"

@@ -135,7 +135,7 @@ def test_a_strong_wind_in_every_run_is_found_on_a_ship_far_from_the_regressions(
     """Her fit is far from linear in it: the variance of its values vanished, and no run seemed to support it."""
     cause = diagnose(draw_case("published", 60, 0).dataset(), gain=False).causes[0]
     assert cause.effect == "wind_per_run"
-    assert "24 of 24 runs support it" in cause.evidence
+    assert cause.support == "24 of 24 runs"
 
 
 def test_a_hidden_current_is_sized_and_pays_on_runs_that_were_not_fitted(drifting):

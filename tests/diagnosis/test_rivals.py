@@ -42,7 +42,7 @@ def test_wind_and_waves_are_told_as_confused_where_their_formulas_decide(named: 
     assert rivals_of(found, cause) == ((other,) if told else ())
 
 
-@pytest.mark.parametrize(("names", "told"), [(("wind",), "of the fit without it"), (("wind", "list"), "beside the other causes")])
+@pytest.mark.parametrize(("names", "told"), [(("wind",), "with and without it"), (("wind", "list"), "with and without it beside the other causes")])
 def test_a_cause_alone_is_not_told_to_be_beside_others(names: tuple[str, ...], told: str):
     model, with_it, without = SimpleNamespace(terms=names), SimpleNamespace(per_run=np.ones(3)), SimpleNamespace(per_run=np.zeros(3))
     final = SimpleNamespace(worth=lambda index: 179.0, model=model, solution=with_it, solution_without=lambda index: without)
