@@ -23,7 +23,8 @@ from ..steps import step, within
 from . import misread
 from .analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .budget import Budget, is_spent, limited
-from .causes import describe_candidates, describe_causes, remaining, unknown_part, what_is_left
+from .candidates import describe_candidates
+from .causes import describe_causes, remaining, unknown_part, what_is_left
 from .clocks import check_clocks, not_asked, ruled_out, with_prompt_yaw_rate
 from .derived import faults, has_speeds, marked, said
 from .felt_wind import with_true_wind

@@ -75,5 +75,8 @@ def test_what_is_certain_but_tiny_is_not_named(typical: float, named: bool):
     verdict = diagnose(trials(Hidden(bias, (typical * bias.parameters[0].typical,)), runs=8, noise=0, gusts=0), gain=False)
     (line,) = (c for c in verdict.candidates if c.effect == "heading_bias")
     assert line.score > 30.0
-    assert ("too small to matter" in line.rejected_because, [c.effect for c in verdict.causes]) == (not named, ["heading_bias"] if named else [])
+    assert ("not practically significant" in line.rejected_because, [c.effect for c in verdict.causes]) == (
+        not named,
+        ["heading_bias"] if named else [],
+    )
     assert line.detectable["bias"] >= 0.05 * bias.parameters[0].typical

@@ -285,7 +285,7 @@ def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):
     assert verdict.causes[0].parameters["earth_axes"].value == 1.0
     assert len(verdict.causes) == 1
     position = next(c for c in verdict.candidates if c.effect == "position_delay")
-    assert "put right before the fit" in position.rejected_because
+    assert "corrected before the fit" in position.rejected_because
 
 
 DELAYS = [
