@@ -72,7 +72,7 @@ _TABLES: dict[str, type[_Part]] = {"propeller": Propeller, "rudder": Rudder, "th
 
 
 class Ship(_Part):
-    """Main dimensions [m], displacement [m^3] or mass [kg], and the optional rest of `ship.toml` (contract, section 3)."""
+    """Main dimensions [m], displacement [m^3] or mass [kg], and the optional rest of `ship.toml` (docs/formats.md)."""
 
     name: str
     L: Number = Field(ge=_LENGTHS[0], le=_LENGTHS[1])
@@ -210,7 +210,7 @@ def complete(ship: Ship) -> Particulars:
         notes.append(f"propeller not given: diameter {prop.diameter:.4g} m from 0.6 T")
     pitch = prop.pitch_ratio or 0.8
     # Line through K_T(0) and the zero-thrust point J ~ 1.05 P/D of the Wageningen B series (Oosterveld & van Oossanen 1975),
-    # curvature from the B4-70 fit in the physics reference, section 2.5.
+    # curvature from the B4-70 fit of Roddy, Hess & Faller (2006).
     k0, k2 = 0.44 * pitch, -0.135
     kt = prop.kt
     if kt is None:

@@ -1,4 +1,4 @@
-"""Names, units and signs of every signal (section 1 of the contract; Table I of the source paper).
+"""Names, units and signs of every signal (Table I of the source paper; docs/formats.md).
 
 Heading `psi` is clockwise from north, `x` north, `y` east, `u` forward, `v` to starboard at midship, `r` bow to starboard;
 a positive rudder angle `delta` turns the ship to starboard; a positive thruster force pushes the hull to starboard.

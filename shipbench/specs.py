@@ -1,5 +1,4 @@
-"""Specs: one string names a part and sets its parameters, `mlp[hidden=64,seed=3]`, `physics+current[speed=0.3,to=1.0]`, `path.py:Class`
-(contract, section 2)."""
+"""Specs: one string names a part and sets its parameters, `mlp[hidden=64,seed=3]`, `physics+current[speed=0.3,to=1.0]`, `path.py:Class`."""
 
 from __future__ import annotations
 
@@ -81,7 +80,7 @@ def _params(text: str, bracket: str | None) -> dict[str, Any]:
 
 
 def parse_spec(text: str) -> Spec:
-    """Take a model spec apart (contract, section 2); a folder that holds a saved model is taken as it is, whatever its name.
+    """Take a model spec apart; a folder that holds a saved model is taken as it is, whatever its name.
 
     Raises:
         InputError: the text has none of the accepted forms.

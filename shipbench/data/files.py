@@ -1,4 +1,4 @@
-"""A data set on disk: trajectories, dataset.toml and ship.toml in one folder (contract, section 3)."""
+"""A data set on disk: trajectories, dataset.toml and ship.toml in one folder (docs/formats.md)."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def expected_ratio(null: Fit, effect: Effect, values: Sequence[np.ndarray]) -> f
     """Expected log likelihood ratio, doubled, of the plain model against the one that holds `effect` with `values` (per parameter one number or one
     per run): the non-centrality lambda = c' V c of the test, with the ship's ordinary differences projected out.
 
-    Source: diagnosis methods, section B (oracle bound); for gears, whose effects are seen in the record of the actuator, what their own test found.
+    Source: docs/theory.md#evidence-of-a-cause; for gears, whose effects are seen in the record of the actuator, what their own test found.
     """
     plant = null.plant
     if effect.enters == "gear" and not plant.seg.commanded:

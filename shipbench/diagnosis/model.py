@@ -25,12 +25,11 @@ FREE = (1, 2, 5, 7, 8, 10)
 CENTRE = np.array([0.2, 1.0, 1.0, -0.8, 0.3, 1.0])
 SPREAD = np.array([3.0, 1.5, 0.5, 0.8, 1.0, 1.0])
 """Mean and standard deviation of the free parameters before any data, in units of `parameter_scale`; drag of the rudder at zero angle is that of
-friction, 2.5 C_F (physics reference 2.6): with more of it, thrust would seem to be missing on every ship. Resistance that grows with speed
-itself is small on ships and large in the models of control engineers (12 of these units in the supply vessel of
-Fossen, Sagatun & Sorensen, Control Eng. Practice 4 (1996) 369)."""
+friction, 2.5 C_F (Brix 1993). Resistance that grows with speed itself is small on ships and large in the models of control engineers (12 of these
+units in the supply vessel of Fossen, Sagatun & Sorensen, Control Eng. Practice 4 (1996) 369)."""
 _HULL_SPREAD, _PLAIN, _ONE_SIGN = 0.3, 0.5, np.array([p.name in ("Y_v", "N_v", "N_r") for p in HULL.parameters])
-"""Standard deviation of the relative error of the regressions (10 to 50 % in comparisons; physics reference, section 3.3). What has one sign
-on every hull nears zero from so far down on: else a large tanker that did not feel the water explained her runs as well as 24 currents did."""
+"""Standard deviation of the relative error of the regressions: 10 to 50 % (docs/theory.md#coefficients-of-the-left-side). What has one sign on
+every hull nears zero from so far down on: else a large tanker that did not feel the water explained her runs as well as 24 currents did."""
 NUM_BASE = len(FREE) + NUM_HULL + len(STRUCTURE.parameters)
 PLACES = {p.name: len(FREE) + NUM_HULL + i for i, p in enumerate(STRUCTURE.parameters)}
 """Of the parameters of the structure among all NUM_BASE."""

@@ -1,4 +1,4 @@
-"""Result of a diagnosis as plain data: the verdict of the contract (section 6) and what the report shows beside it."""
+"""Result of a diagnosis as plain data: the verdict and what the report shows beside it."""
 
 from __future__ import annotations
 

@@ -142,7 +142,7 @@ def _score(fit: Fit, term: Term, at: np.ndarray, null: float, null_runs: np.ndar
 def overlap(fit: Fit, term: Term, value: np.ndarray) -> dict[str, float]:
     """How much of the evidence for a candidate of size `value` each other candidate could take over: 1 - gap/total, the best of its settings.
 
-    gap is the expected log likelihood ratio left between the two (diagnosis methods, A6); base parameters are projected out of both.
+    gap is the expected log likelihood ratio left between the two (docs/theory.md#evidence-of-a-cause); base parameters are projected out of both.
     """
     by_run, base, places = _of_all_runs(fit)
     columns, S = dict(zip(fit.candidates, places, strict=True)), by_run.sum(axis=0)

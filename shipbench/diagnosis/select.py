@@ -64,7 +64,7 @@ decide. (Drift in waves by another formula: wind 706, waves 681.)"""
 _CHANGES, _CHANGE_MARGIN, _OWN_MARGIN = 2, 14.0, 4.0
 """A beginning is chosen among all effects: it must beat the best cause without one by this; the second where that is the same effect."""
 _INSEPARABLE = ({"wind", "wind_per_run", "wave_drift"},)
-"""Beside one of these the others are not named: wind and short waves come together and push alike, whatever their formulas (reference, E05)."""
+"""Beside one of these the others are not named: wind and short waves come together and push alike (docs/theory.md#environment)."""
 _LASTING = (
     "cross_flow_drag", "wake_variation", "race_gain", "rudder_stall", "rudder_asymmetry", "propeller_walk", "propeller_walk_astern", "bank_suction",
 )  # fmt: skip

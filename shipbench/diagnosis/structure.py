@@ -26,14 +26,14 @@ from ..ship import Particulars
 class Structure(Effect):
     """What differs between one ordinary ship and another beyond hull and rudder lift: race at the rudder, wake in turns, thrusters at speed.
 
-    Without it every ship's own race or thruster tunnel would be reported as missing physics. Centres and spreads: kappa 0.3 to 0.8 (physics
-    reference, R16), C_2 - 1 of the wake 0 to 0.6, by side (Yasukawa & Yoshimura 2015), loss of the thrusters' moment up to 50 % (T41), cross-flow
-    drag of a hull whose regressions lack it (H52), side force of a propeller going astern (P37), gamma_R 0.4 to 0.64, by side, l'_R -0.7 to -1
+    Without it every ship's own race or thruster tunnel would be reported as missing physics. Centres and spreads: kappa 0.3 to 0.8,
+    C_2 - 1 of the wake 0 to 0.6, by side (Yasukawa & Yoshimura 2015), loss of the thrusters' moment up to 50 % (docs/theory.md#thrusters), cross-flow
+    drag of a hull whose regressions lack it, side force of a propeller going astern, gamma_R 0.4 to 0.64, by side, l'_R -0.7 to -1
     (Yasukawa & Yoshimura 2015, table 3), X'_vv and X'_rr that eq. (2) lacks (same table: -0.040, 0.011); added mass between sway and yaw, which
-    regressions hardly know and the MMG form leaves out (of m L); flow at the rudder that a reversed propeller stops, from none to all (Kitagawa
-    et al., physics reference 2.6); thrust astern, of which eq. (2) knows one level (0.65 of ahead at rest; four-quadrant curves 0.5 to 0.8); wind on
-    superstructures of all kinds (Blendermann 1994, physics reference E03); added mass in surge, for which charts (Zhou et al. 1983) and ships of the
-    literature have 0.4 to 0.75 of Soeding's value (physics reference 3.2: 0.036 and 0.071 of the mass); N_v and Y_r of a ship that goes astern,
+    regressions hardly know and the MMG form leaves out (of m L); flow at the rudder that a reversed propeller stops, from none to all (Miyauchi
+    et al. 2022); thrust astern, of which eq. (2) knows one level (0.65 of ahead at rest; four-quadrant curves 0.5 to 0.8); wind on
+    superstructures of all kinds (Blendermann 1994); added mass in surge, for which charts (Zhou et al. 1983) and ships of the
+    literature have 0.4 to 0.75 of Soeding's value (0.036 and 0.071 of the mass); N_v and Y_r of a ship that goes astern,
     which eq. (2) takes for those ahead (from there, as in cubic polynomials, to the change of sign of theory: Yoshimura, Nakao & Ishibashi 2009),
     and her rudder, which then works from its trailing edge; thrust of a propeller that the ship file leaves open (log of the factor): K_T goes with
     the pitch, 0.6 to 1.1 of the diameter, and thrust with the fourth power of the diameter, for which 0.6 T is 20 % too much or too little (KVLCC2,
@@ -42,11 +42,11 @@ class Structure(Effect):
     k_1, of a propeller that turns astern, and of one that turns ahead on a ship which goes astern (B4-70 against eq. 2: 0.8 to -0.2, and -0.3 to
     -1.5; Roddy, Hess & Faller 2006). The first and the last but one are narrow: in a stop they pass for mass or thrust, and where a ship needs more
     she gets a wider spread (`ordinary.widened`). Last, other forms of what is above: force that thrusters lose for good as the ship gathers way, bow
-    and stern (reference 2.7), side force of a propeller going astern as a share of its thrust at rest, of a few per cent, and a wake that falls with
-    the square of the angle at the propeller, as w_P0 exp(-4 beta_P^2) (reference 2.5: 0.2 to 0.5 of 1 - w_P0 for w_P0 of 0.18 to 0.33), or of S175
+    and stern, side force of a propeller going astern as a share of its thrust at rest, of a few per cent, and a wake that falls with
+    the square of the angle at the propeller, as w_P0 exp(-4 beta_P^2) (0.2 to 0.5 of 1 - w_P0 for w_P0 of 0.18 to 0.33), or of S175
     without end (Son & Nomoto 1982): thrust that she loses in long hard turns passed for mass. Of two tunnels with the same record each gives its own
     force, by where it stands in the hull (0.8 to 1.0 of its thrust): what one has more than the other passed for its lever. late_stall: share of the
-    lift that the rudder loses from 26 to 37 deg, since every rudder stalls at 30 to 40 deg (physics reference, R18), sharper than a cubic lift does.
+    lift that the rudder loses from 26 to 37 deg, since every rudder stalls at 30 to 40 deg (Brix 1993), sharper than a cubic lift does.
     wave_resistance: of X'_uu 0.015 at a Froude number of 0.25, growing with its fourth power (p1 and p2 end at the square of the speed; without it
     a fast ship needed thrust, mass and a propeller of her own). drag_forward: cross-flow drag of sections, 2 q xi beside C_D, larger forward or aft
     (Hooft, Ocean Eng. 21 (1994) 329; without it a ship pushed sideways at rest had another lever of her bow thruster).

@@ -14,7 +14,7 @@ class AddedResistance(Effect):
     family = "propulsion"
     summary = "resistance of the hull"
     phrase = "a hull resistance that is {share}"
-    source = "physics reference, section 5, P39"
+    source = "Townsin (2003), The ship hull fouling penalty, Biofouling 19, 9-15; docs/theory.md#propulsion"
     acts_through = ()  # a towed ship has it, too
     parameters = (Parameter("share", "1", 0.3, -0.6, 3.0, title="hull resistance", relative=True),)
     separate = "coast down with the shaft stopped, from two speeds"

@@ -20,7 +20,7 @@ class AntennaOffset(Effect):
     family = "sensor"
     summary = "lever arm of the position sensor, its velocities midship's or its own"
     phrase = "a position antenna {forward} forward and {starboard} to starboard of midship"
-    source = "physics reference, section 5, S61"
+    source = "docs/theory.md#sensors"
     parameters = (
         Parameter("forward", "m", 12.0, -80.0, 80.0, scaling="length"),
         Parameter("starboard", "m", 12.0, -40.0, 40.0, scaling="length"),

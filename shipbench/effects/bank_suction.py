@@ -22,7 +22,7 @@ class BankSuction(Effect):
     family = "environment"
     summary = "a bank along the channel"
     phrase = "suction towards a bank"
-    source = "form of Norrbin (1974) as in physics reference, section 5, E10"
+    source = "Norrbin (1974), 10th Symp. Naval Hydrodynamics; docs/theory.md#environment"
     parameters = (
         Parameter("strength", "1", 0.3, -2.0, 2.0),
         Parameter("moment", "1", 0.06, -0.4, 0.4, other=True),

@@ -15,7 +15,7 @@ class CenterOfGravityShift(Effect):
     family = "hull"
     summary = "longitudinal centre of gravity"
     phrase = "a centre of gravity shifted forward by {shift}"
-    source = "physics reference, section 5, H50"
+    source = "Fossen (2021), chapter 3; docs/theory.md#hull-and-loading"
     parameters = (Parameter("shift", "m", 4.0, -15.0, 15.0, scaling="length"),)
     separate = "rudder reversals and thruster pushes at two positions"
 

@@ -22,7 +22,7 @@ class ChangePoint(Effect):
     family = "time"
     summary = "an effect that begins at a run or at a time"
     phrase = "a change that begins at run number {from_run}"
-    source = "single change of a mean, from a run or time on (Page 1955); the effects are those of this folder"
+    source = "Page (1955), Biometrika 42, 523-527: change of a mean from a run or time on"
     parameters = ()
     separate = "repeat the first run's manoeuvre at the end of the trials"
 

@@ -15,7 +15,7 @@ class CrossFlowDrag(Effect):
     family = "hull"
     summary = "cross-flow drag at large drift and yaw rate"
     phrase = "a cross-flow drag coefficient that differs by {coefficient}"
-    source = "cross-flow principle (Faltinsen 1990; physics reference, section 5, H52)"
+    source = "Faltinsen (1990), Sea Loads on Ships and Offshore Structures; docs/theory.md#hull-and-loading"
     parameters = (Parameter("coefficient", "1", 0.5, -0.6, 2.0),)
     separate = "thruster pushes sideways at rest, and hard turns"
 

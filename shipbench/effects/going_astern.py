@@ -19,7 +19,7 @@ class GoingAstern(Effect):
     family = "hull"
     summary = "hull, thrust and rudder while going astern"
     phrase = "forces astern that differ from the model"
-    source = "v u and r u in place of v U and r U: Yoshimura, Nakao & Ishibashi (2009); flow at the rudder: Kitagawa et al. (physics reference 2.6)"
+    source = "Yoshimura, Nakao & Ishibashi (2009): v u and r u in place of v U and r U; Miyauchi et al. (2022): flow at the rudder"
     parameters = (
         Parameter("N_v", "1", 0.5, -0.5, 2.0),
         Parameter("Y_r", "1", 0.5, -2.0, 4.0),

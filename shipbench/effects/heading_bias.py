@@ -19,7 +19,7 @@ class HeadingBias(Effect):
     family = "sensor"
     summary = "compass error, the velocities turned by it or not"
     phrase = "a heading error of {bias}"
-    source = "physics reference, section 5, S58"
+    source = "docs/theory.md#sensors"
     parameters = (
         Parameter("bias", "rad", math.radians(2.0), -0.3, 0.3),
         Parameter("turned_velocities", "1", 0.0, 0.0, 1.0, shape=True, other=True),

@@ -14,7 +14,7 @@ class HullDerivatives(Effect):
     family = "hull"
     summary = "hull derivatives that differ from the regressions"
     phrase = "hull coefficients that differ from the regressions"
-    source = "spread of the regressions: physics reference, section 5, H55"
+    source = "Clarke, Gedling & Hine (1983): scatter of measured derivatives about the regressions; docs/theory.md#coefficients-of-the-left-side"
     parameters = (
         Parameter("Y_v", "1", 0.25, -0.9, 3.0, title="sway damping", relative=True),
         Parameter("Y_r", "1", 0.25, -0.9, 3.0, title="sway force due to yaw rate", relative=True),

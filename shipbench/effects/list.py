@@ -19,7 +19,7 @@ class List(Effect):
     family = "hull"
     summary = "heel angle"
     phrase = "a list of {heel}"
-    source = "N'_phi of physics reference, section 5, H51"
+    source = "docs/theory.md#hull-and-loading; IMO (2008), Intact Stability Code, part A, 3.1"
     parameters = (Parameter("heel", "rad", math.radians(4.0), -0.35, 0.35), Parameter("side_force", "1", 6e-4, -0.01, 0.01, other=True))
     breaks_symmetry = True
     separate = "vary the shaft speed at one speed: a list acts with the ship's speed alone"

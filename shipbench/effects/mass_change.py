@@ -14,7 +14,7 @@ class MassChange(Effect):
     family = "hull"
     summary = "mass of the ship"
     phrase = "a mass that is {share}"
-    source = "physics reference, section 5, H47"
+    source = "docs/theory.md#equations-of-motion"
     parameters = (Parameter("share", "1", 0.15, -0.5, 1.0, title="mass", relative=True),)
     separate = "pushes of a force of known size: thrusters, a bollard"
 

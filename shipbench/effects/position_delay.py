@@ -16,7 +16,7 @@ class PositionDelay(Effect):
     late = True
     summary = "latency of the position"
     phrase = "positions that are {delay} late"
-    source = "physics reference, section 5, S64"
+    source = "docs/theory.md#sensors"
     parameters = (Parameter("delay", "s", 2.0, -10.0, 10.0, scaling="time"),)
     separate = "changes of speed and course"
 

@@ -17,7 +17,7 @@ class PropellerWalk(Effect):
     family = "propulsion"
     summary = "side force of the propeller ahead"
     phrase = "a side force of the propeller ahead of {share}"
-    source = "physics reference, section 5, P36; the form of p0 in eq. (6)"
+    source = "p0 in eq. (6) of the source paper; docs/theory.md#propulsion"
     parameters = (Parameter("share", "1", 0.05, -0.3, 0.3, title="side force", share_of="thrust"),)
     breaks_symmetry = True
     separate = "straight runs at one speed with the shaft speed up and down"

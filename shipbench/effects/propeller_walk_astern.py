@@ -18,7 +18,7 @@ class PropellerWalkAstern(Effect):
     family = "propulsion"
     summary = "side force of the propeller astern"
     phrase = "a side force of the propeller astern"
-    source = "Hachii form, Esso Osaka values (physics reference, section 5, P36)"
+    source = "Miyauchi et al. (2022), doi 10.1007/s00773-022-00889-3: form of Hachii, values of the Esso Osaka"
     parameters = (
         Parameter("size", "1", 1.0, -4.0, 4.0),
         Parameter("share", "1", 0.1, -0.5, 0.5, other=True, title="side force", share_of="thrust at rest"),

@@ -14,7 +14,7 @@ class RaceGain(Effect):
     family = "rudder"
     summary = "speed of the propeller race at the rudder"
     phrase = "a propeller race that is {gain} at the rudder"
-    source = "physics reference, section 5, R16"
+    source = "kappa of Yasukawa & Yoshimura (2015), eq. 38"
     parameters = (Parameter("gain", "1", 0.3, -0.9, 1.5, title="race speed", relative=True),)
     separate = "turns at low and high shaft speed from one speed"
 

@@ -14,7 +14,7 @@ class RudderAsymmetry(Effect):
     family = "rudder"
     summary = "unequal lift to port and starboard"
     phrase = "a rudder lift to starboard that is {asymmetry}"
-    source = "physics reference, section 5, R19"
+    source = "gamma_R of Yasukawa & Yoshimura (2015), eq. 33"
     parameters = (Parameter("asymmetry", "1", 0.2, -0.8, 0.8, title="lift to starboard", relative=True),)
     breaks_symmetry = True
     separate = "turns of equal amplitude to both sides, small and large: an offset matters most at small angles"

@@ -15,7 +15,7 @@ class RudderBacklash(Effect):
     family = "rudder"
     summary = "play of the steering gear"
     phrase = "a play of {play} in the steering gear"
-    source = "physics reference, section 5, A24"
+    source = "docs/theory.md#rudder"
     parameters = (Parameter("play", "rad", math.radians(2.0), 0.0, 0.15),)
     unrecorded = True
     separate = "slow rudder reversals: play leaves a constant difference, a lag none"

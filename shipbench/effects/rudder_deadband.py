@@ -15,7 +15,7 @@ class RudderDeadband(Effect):
     family = "rudder"
     summary = "deadband of the steering gear, or play before it"
     phrase = "a rudder deadband of {band}"
-    source = "physics reference, section 5, A23"
+    source = "docs/theory.md#rudder"
     parameters = (Parameter("band", "rad", math.radians(1.5), 0.0, 0.12),)
     separate = "rudder steps smaller than the suspected band"
 

@@ -14,7 +14,7 @@ class RudderDelay(Effect):
     family = "rudder"
     summary = "transport delay of the steering gear or of its record"
     phrase = "a rudder delay of {delay}"
-    source = "physics reference, section 5, A26"
+    source = "docs/theory.md#rudder"
     parameters = (Parameter("delay", "s", 1.5, -10.0, 10.0, scaling="time"),)
     unrecorded = True
     separate = "quick rudder reversals, sampled faster"

@@ -14,7 +14,7 @@ class RudderGain(Effect):
     family = "rudder"
     summary = "lift of the rudder"
     phrase = "a rudder lift that is {gain}"
-    source = "physics reference, section 5, R14"
+    source = "docs/theory.md#rudder"
     parameters = (Parameter("gain", "1", 0.25, -0.7, 1.0, title="rudder lift", relative=True),)
     separate = "kick ahead at zero speed with the rudder over: it isolates the rudder from the hull"
 

@@ -14,7 +14,7 @@ class RudderLag(Effect):
     family = "rudder"
     summary = "slow first-order steering gear"
     phrase = "an additional rudder lag of {lag}"
-    source = "physics reference, section 5, A22"
+    source = "docs/theory.md#actuators"
     parameters = (Parameter("lag", "s", 3.0, 0.0, 30.0, scaling="time"),)
     unrecorded = True
     separate = "small and large rudder steps: a lag takes the same time for both"

@@ -15,7 +15,7 @@ class RudderOffset(Effect):
     family = "rudder"
     summary = "zero error of the rudder angle"
     phrase = "a rudder offset of {offset}"
-    source = "physics reference, section 5, R15"
+    source = "docs/theory.md#rudder"
     parameters = (Parameter("offset", "rad", math.radians(2.0), -0.15, 0.15),)
     breaks_symmetry = True
     separate = "vary the shaft speed at one speed: the offset acts with the race, propeller walk with the thrust, wind with neither"

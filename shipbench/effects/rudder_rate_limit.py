@@ -15,7 +15,7 @@ class RudderRateLimit(Effect):
     family = "rudder"
     summary = "slow steering gear: rate limit"
     phrase = "a rudder rate limit of {rate}"
-    source = "physics reference, section 5, A21; SOLAS II-1 reg. 29 (65 deg in 28 s)"
+    source = "docs/theory.md#actuators; SOLAS II-1, regulation 29 (65 deg in 28 s)"
     parameters = (Parameter("rate", "rad/s", math.radians(1.2), 0.0017, 0.2, scaling="rate"),)
     separate = "small and large rudder steps: a rate limit takes longer for the large one"
 

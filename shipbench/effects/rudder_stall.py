@@ -16,7 +16,7 @@ class RudderStall(Effect):
     family = "rudder"
     summary = "stall of the rudder at large angles"
     phrase = "a rudder that loses {lost_share} at large angles"
-    source = "physics reference, section 5, R18"
+    source = "Brix (1993), Manoeuvring Technical Manual; docs/theory.md#rudder"
     parameters = (
         Parameter("lost_share", "1", 0.5, 0.0, 0.95, title="lift loss", share_of="lift"),
         Parameter("angle", "rad", 0.3, 0.1, 0.7, shape=True),

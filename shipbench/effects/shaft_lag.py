@@ -14,7 +14,7 @@ class ShaftLag(Effect):
     family = "propulsion"
     summary = "slow first-order shaft"
     phrase = "an additional shaft lag of {lag}"
-    source = "physics reference, section 5, P31"
+    source = "docs/theory.md#actuators"
     parameters = (Parameter("lag", "s", 10.0, 0.0, 120.0, scaling="time"),)
     unrecorded = True
     separate = "small and large steps of the shaft speed"

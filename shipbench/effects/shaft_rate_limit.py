@@ -14,7 +14,7 @@ class ShaftRateLimit(Effect):
     family = "propulsion"
     summary = "slow shaft: rate limit"
     phrase = "a shaft rate limit of {rate}"
-    source = "physics reference, section 5, P32"
+    source = "docs/theory.md#actuators"
     parameters = (Parameter("rate", "rpm/s", 1.0, 0.02, 60.0, scaling="rpm rate"),)
     separate = "small and large steps of the shaft speed"
 

@@ -15,7 +15,7 @@ class ShallowWater(Effect):
     family = "environment"
     summary = "finite water depth"
     phrase = "shallow water, where the draught is {draught_to_depth}"
-    source = "Kijima, Tang, Ankudinov and Furukawa as collected in physics reference, section 5, E07"
+    source = "Taimuri et al. (2020), Ocean Eng. 218, 108103: formulas of Kijima, Ankudinov and others; docs/theory.md#environment"
     parameters = (Parameter("draught_to_depth", "1", 0.6, 0.0, 0.85, title="draught", share_of="depth"),)
     known_with = ("depth",)
     separate = "the same steady turn at two depths: drift over yaw rate changes with depth and not with rudder force"

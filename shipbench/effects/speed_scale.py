@@ -17,7 +17,7 @@ class SpeedScale(Effect):
     family = "sensor"
     summary = "scale of the speed log"
     phrase = "recorded speeds that are {scale}"
-    source = "physics reference, section 5, S62"
+    source = "docs/theory.md#sensors"
     parameters = (Parameter("scale", "1", 0.05, -0.5, 0.5, title="recorded speed", relative=True),)
     scales = ("u", "v")
     separate = "straight runs on reciprocal courses"

@@ -14,7 +14,7 @@ class ThrustGain(Effect):
     family = "propulsion"
     summary = "thrust of the propeller"
     phrase = "a propeller thrust that is {gain}"
-    source = "physics reference, section 5, P33"
+    source = "docs/theory.md#propulsion"
     parameters = (Parameter("gain", "1", 0.15, -0.6, 1.0, title="propeller thrust", relative=True),)
     separate = "acceleration from rest, or a bollard pull"
 

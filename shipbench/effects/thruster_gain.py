@@ -14,7 +14,7 @@ class ThrusterGain(Effect):
     family = "thruster"
     summary = "force of the thrusters"
     phrase = "thruster forces that are {gain}"
-    source = "physics reference, section 5, T41"
+    source = "docs/theory.md#thrusters"
     parameters = (Parameter("gain", "1", -0.4, -1.0, 1.0, title="thruster force", relative=True),)
     separate = "thruster pushes at rest"
 

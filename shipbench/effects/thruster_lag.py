@@ -14,7 +14,7 @@ class ThrusterLag(Effect):
     family = "thruster"
     summary = "slow thrusters"
     phrase = "an additional thruster lag of {lag}"
-    source = "physics reference, section 5, T43"
+    source = "docs/theory.md#thrusters"
     parameters = (Parameter("lag", "s", 6.0, 0.0, 60.0, scaling="time"),)
     separate = "steps of the thruster order"
 

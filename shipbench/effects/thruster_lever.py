@@ -15,7 +15,7 @@ class ThrusterLever(Effect):
     family = "thruster"
     summary = "lever of the bow thruster"
     phrase = "a bow thruster shifted forward by {shift}"
-    source = "physics reference, section 5, T44"
+    source = "docs/theory.md#thrusters"
     parameters = (Parameter("shift", "m", -20.0, -60.0, 60.0, scaling="length"),)
     separate = "bow and stern thruster alone, at rest"
 

@@ -18,7 +18,7 @@ class ThrusterSpeedLoss(Effect):
     family = "thruster"
     summary = "loss of thruster force at speed"
     phrase = "thrusters that lose force at speed"
-    source = "shapes after Int. Shipbuild. Progress 1967 and k = exp(-|u|/u_0) (physics reference, 2.7 and section 5, T41)"
+    source = "Int. Shipbuilding Progress (1967), doi 10.3233/ISP-1967-1415601, and k = exp(-|u|/u_0); docs/theory.md#thrusters"
     parameters = (Parameter("loss", "1", 0.5, -0.5, 1.2), Parameter("fading", "1", 0.5, -0.2, 1.2, other=True))
     separate = "thruster pushes at 0, 1 and 2 m/s"
 

@@ -35,7 +35,7 @@ class UnitOrSignError(Effect):
     family = "sensor"
     summary = "a channel recorded in another unit or with the other sign"
     phrase = "a channel with another unit or sign"
-    source = "physics reference, section 5, S74"
+    source = "docs/theory.md#sensors"
     parameters = (Parameter("factor", "1", -2.0, -4000.0, 4000.0), Parameter("channel", "1", float(STATES.index("r")), 0.0, 9.0, shape=True))
     separate = "none needed: heading against yaw rate, track against speeds, rudder against turning show it in any record"
 

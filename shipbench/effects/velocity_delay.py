@@ -17,7 +17,7 @@ class VelocityDelay(Effect):
     late = True
     summary = "latency of the velocities"
     phrase = "velocities that are {delay} late"
-    source = "physics reference, section 5, S64"
+    source = "docs/theory.md#sensors"
     parameters = (Parameter("delay", "s", 2.0, -10.0, 10.0, scaling="time"), Parameter("earth_axes", "1", 0.0, 0.0, 1.0, shape=True))
     separate = "changes of speed and quick turns"
 

@@ -19,7 +19,7 @@ class WaveDrift(Effect):
     family = "environment"
     summary = "mean drift force of waves"
     phrase = "a wave drift force towards {to}"
-    source = "short-wave limit after Faltinsen et al. (1980), as simplified in physics reference, section 5, E05"
+    source = "Faltinsen et al. (1980), 13th Symp. Naval Hydrodynamics: limit of short waves, simplified as in docs/theory.md#environment"
     parameters = (Parameter("north", "m^2", 0.12, -8.0, 8.0, scaling="area"), Parameter("east", "m^2", 0.12, -8.0, 8.0, scaling="area"))
     breaks_symmetry = True
     vector = ("amplitude_squared", "to")

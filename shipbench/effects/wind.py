@@ -17,7 +17,7 @@ class Wind(Effect):
     family = "environment"
     summary = "mean wind, the same in all runs"
     phrase = "a wind of {speed} from {from}"
-    source = "Blendermann (1994) in the simulator, lowest harmonics in the fitted model (physics reference, section 5, E03)"
+    source = "Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51: lowest harmonics in the fitted model; docs/theory.md#environment"
     parameters = (Parameter("north", "m/s", 7.0, -60.0, 60.0, scaling="speed"), Parameter("east", "m/s", 7.0, -60.0, 60.0, scaling="speed"))
     breaks_symmetry = True
     vector = ("speed", "from")
@@ -29,7 +29,7 @@ class Wind(Effect):
     def fitted(self, L: float) -> tuple[Self, ...]:
         """Components a = W (W + W_0)/(W_t + W_0) of a wind W, W_t the typical one, W_0 a ship's ordinary speed: its forces grow with them, while the
         square of a weak wind has no slope that a fit could follow. Once for each of three moments: that of an unknown superstructure may be a
-        fraction of the formula's or twice as large (the spread between types of ship: physics reference, E03)."""
+        fraction of the formula's or twice as large (the spread between types of ship: Blendermann 1994)."""
         found = []
         for moment in (0.3, 1.0, 2.0):
             effect = copy(self)

@@ -14,7 +14,7 @@ class WindCoefficients(Effect):
     family = "environment"
     summary = "wind forces that differ from the formula"
     phrase = "wind forces that differ from the formula"
-    source = "spread between types of ship: Blendermann (1994), Isherwood (1972) (physics reference, section 5, E03); s_L, centre of the lateral area"
+    source = "Blendermann (1994), Isherwood (1972): spread between types of ship; s_L is the centre of the lateral area"
     parameters = (
         Parameter("X", "1", 0.5, -1.5, 3.0, title="wind surge force", relative=True),
         Parameter("Y", "1", 0.3, -1.0, 2.0, title="wind side force", relative=True),

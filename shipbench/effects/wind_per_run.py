@@ -8,7 +8,7 @@ from .wind import Wind
 class WindPerRun(Wind):
     summary = "mean wind, another one in each run"
     phrase = "a wind that differs from run to run"
-    source = "as wind"
+    source = "Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51: as wind, one for each run"
     per_run = True
     separate = "an anemometer, or reciprocal courses within one run"
 

@@ -16,7 +16,7 @@ class YawRateBias(Effect):
     family = "sensor"
     summary = "offset of the rate gyro"
     phrase = "a rate gyro offset of {bias}"
-    source = "physics reference, section 5, S60"
+    source = "docs/theory.md#sensors"
     parameters = (Parameter("bias", "rad/s", math.radians(0.1), -0.1, 0.1, scaling="rate"),)
     separate = "any straight run: heading and integrated yaw rate part"
 

@@ -1,4 +1,4 @@
-"""The model that is fitted to data: equations (2) to (8) of the source paper, in the reading of the physics reference, section 3.2.
+"""The model that is fitted to data: equations (2) to (8) of the source paper, in the reading of docs/theory.md#equations-of-motion.
 
 The left side (masses, hull derivatives) comes from published regressions on the main dimensions; the right side holds p0..p10. Its
 structure (quadratic
@@ -75,7 +75,7 @@ def coefficients(ship: Particulars) -> Coefficients:
 
     Source: Inoue et al. (1981) for the derivatives, whose structure eq. (2) is; Clarke et al. (1983) for the added masses in sway and yaw,
     Soeding (1982) for
-    surge, X_vr = -0.28 m_y from KCS (physics reference 3.2), a_H and x_H of Yoshimura & Masumoto (2012).
+    surge, X_vr = -0.28 m_y as KCS has it (docs/theory.md#equations-of-motion), a_H and x_H of Yoshimura & Masumoto (2012).
     """
     L, B, T, rho = ship.L, ship.B, ship.T, ship.rho
     form = (L, B, T, ship.Cb)

@@ -21,7 +21,7 @@ B4_70_PD08_B = (
 )  # fmt: skip
 
 # Side force and moment of a right-handed screw turning astern: A1..A5 and B1..B5 of the Hachii form, Esso Osaka model.
-# Source: physics reference, section 2.5 (Osaka low-speed MMG code).
+# Source: low-speed MMG code of Osaka University, as in Miyauchi et al. (2022), doi 10.1007/s00773-022-00889-3.
 _SIDE_A = (-7.9e-5, 7.99e-3, -4.93e-3, -5.87e-3, -5.58e-4)
 _SIDE_B = (3.5e-5, -3.17e-3, 1.96e-3, 2.33e-3, 2.25e-4)
 
@@ -83,7 +83,7 @@ def side_force_astern(n: Array, u: Array, D: float, L: float, T: float, rho: flo
     Y_P = rho/2 L T (nD)^2 {A1 + A2 J, J in [-0.35, -0.06]; A3 + A4 J below; A5 above}, J = u / (nD); N_P likewise with L^2 and B. The stern goes to
     port: Y_P < 0, N_P > 0. Zero for n >= 0.
 
-    Source: Hachii form as in the Osaka low-speed MMG code, Esso Osaka values (physics reference 2.5).
+    Source: form of Hachii with the values of the Esso Osaka, as in Miyauchi et al. (2022), doi 10.1007/s00773-022-00889-3.
     """
     tip = where(n < 0, n, -1.0 + 0.0 * n) * D
     J = u / where(tip < -1e-6, tip, -1e-6 + 0.0 * tip)

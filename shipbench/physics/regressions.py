@@ -1,7 +1,7 @@
 """Manoeuvring coefficients from the main dimensions (level trim). Prime-I: force on rho/2 L^2 U^2; MMG: force on rho/2 L T U^2.
 
 Validity: merchant ships. Against measured KCS and KVLCC2 values the linear derivatives are off by 10 to 25 %, the cubic ones by 50 % and
-more (physics reference, section 3.3): a fit that calls them exact inherits that.
+more: a fit that calls them exact inherits that.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ def inflow_speed(u: Array, n: Array, thrust: Array, w_P: Array, c: MMGRudder, D:
     n < 0:  Kitagawa's form u_R = sign(s) sqrt|s|, s = eta sign(a) a^2 + (1 - eta) b^2 + c_pr u^2, a = b - k_xr sqrt(8|T|/(rho pi D^2)), b
     = eps (1 - w_P) u.
 
-    Source: Yasukawa & Yoshimura (2015), eq. 38 in the Osaka low-speed writing; Kitagawa et al. for n < 0 (physics reference 2.6). Limits:
+    Source: Yasukawa & Yoshimura (2015), eq. 38, written for low speed, and Kitagawa's form for n < 0, both as in Miyauchi et al. (2022). Limits:
     eps kappa sqrt(eta)
     times the race speed at u = 0; close to zero when backing with headway. Going astern with n < 0 it is u.
     """

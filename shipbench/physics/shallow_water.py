@@ -26,7 +26,7 @@ def depth_factors(depth: Array, L: float, B: float, T: float, Cb: float) -> Dept
     K0 + K1 b + K2 b^2; added masses K0 + a K1 b + c K2 b^2 with b = Cb B (1 + B/L)^2 / T, (a, c) = (2/3, 8/15) for m_y and (2/5, 24/105)
     for J_z (Ankudinov).
 
-    Source: physics reference, E07 (Taimuri et al. 2020); Tang et al. (2020) and Furukawa et al. (2016) as in nikpau/mmgdynamics. Limit: 1
+    Source: Taimuri et al. (2020), Ocean Eng. 218; Tang et al. (2020) and Furukawa et al. (2016) as in github.com/nikpau/mmgdynamics. Limit: 1
     in deep water.
     """
     h = maximum(depth, 1.15 * T)

@@ -39,6 +39,7 @@ def tunnel_thrusters(u: Array, F_b: Array, F_s: Array, c: Tunnels, loss: Array =
 def fading(u: Array, L: float) -> Array:
     """Share of its force that a thruster may lose for good as the ship gathers way: 1 - exp(-|u| / (0.1 sqrt(g L))).
 
-    Source: shapes without a return at speed, k = exp(-|u| / u_0) and k = 1 + a Fn with a < 0 (physics reference 2.7). Limits: none at rest.
+    Source: public simulators, k = exp(-|u| / u_0) or 1 + a Fn with a < 0, without a return at speed; docs/theory.md#thrusters.
+    Limits: none at rest.
     """
     return 1.0 - exp(-absolute(u) / (0.1 * (9.81 * L) ** 0.5))

@@ -55,8 +55,8 @@ def harmonic(u_rw: Array, v_rw: Array, A_F: float, A_L: float, L: float) -> tupl
     C_X = -0.9 cos(gamma), C_Y = 0.95 sin(gamma), C_N = 0.1 sin(2 gamma), gamma as in `blendermann`. Written in velocities: nothing is
     undefined in still air.
 
-    Source: simplified form in nikpau/mmgdynamics (physics reference, E03 d), but for C_N: that has 0.2, twice the second harmonic of Blendermann's
-    0.18 (pi/2 - gamma) C_Y (0.09, E03 a), whose slope 0.18 holds for all his types of ship.
+    Source: simplified form in github.com/nikpau/mmgdynamics, but for C_N: that has 0.2, twice the second harmonic of Blendermann's
+    0.18 (pi/2 - gamma) C_Y (0.09), whose slope 0.18 holds for all his types of ship.
     """
     q = 0.5 * RHO_AIR
     speed = (u_rw * u_rw + v_rw * v_rw + 1e-12) ** 0.5

@@ -90,7 +90,7 @@ def parameter_scale(c: eq2.Coefficients) -> np.ndarray:
 
 
 def bounds(scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Box of p (physics reference, section 3.5, in units of the scale)."""
+    """Box of p in units of the scale; docs/theory.md#parameters-of-the-right-side."""
     low = np.array([-0.3, 0.0, 0.0, 0.0, -0.15, 0.5, -2.0, -8.0, 0.0, -0.5, 0.0])
     high = np.array([0.3, 5.0 * scale[1], 3.0 * scale[2], 20.0 * scale[3], 0.15, 6.0, 2.0, 0.0, 0.3, 0.5, 6.0])
     return low, high

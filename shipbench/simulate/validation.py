@@ -14,13 +14,13 @@ from .simulator import Simulator
 KVLCC2_SPEED, KVLCC2_RPM = 1.179, 624.0
 KCS_SPEED, KCS_RPM = 12.3467, 115.5
 
-# Overshoots (first, second) [deg] of the reference's own runs; source: physics reference, section 2.11.
+# Overshoots (first, second) [deg] of another implementation of the same published coefficients.
 _ZIGZAG = {
     "kvlcc2_l7": {10: (5.6, 16.6), -10: (8.2, 10.6), 20: (12.3, 18.5), -20: (16.2, 13.7)},
     "kcs": {10: (6.2, 12.2), -10: (7.8, 9.4), 20: (13.8, 16.2), -20: (16.1, 14.0)},
 }
 
-# Wageningen polynomial (Oosterveld & van Oossanen 1975), Z = 4, A_E/A_0 = 0.70, P/D = 0.8; physics reference, section 2.5.
+# Wageningen polynomial (Oosterveld & van Oossanen 1975), Z = 4, A_E/A_0 = 0.70, P/D = 0.8.
 _KT_POLYNOMIAL = {0.0: 0.354, 0.2: 0.291, 0.4: 0.212, 0.6: 0.123, 0.8: 0.028}
 
 

@@ -187,7 +187,7 @@ def test_left_side_is_clarke_and_inoue_by_hand():
     L, B, T, Cb = 130.0, 18.2, 6.1, 0.651
     Y_v = -(np.pi * T / L + 1.4 * Cb * B / L) * 0.5 * 1025 * L * T
     assert c.Y_v == pytest.approx(Y_v)
-    assert c.Y_v / (0.5 * 1025 * L * T) == pytest.approx(-0.275, abs=0.001)  # physics reference, section 3.4
+    assert c.Y_v / (0.5 * 1025 * L * T) == pytest.approx(-0.275, abs=0.001)  # Inoue et al. (1981), by hand
     assert c.N_v / (0.5 * 1025 * L**2 * T) == pytest.approx(-0.094, abs=0.001)
     assert c.N_r / (0.5 * 1025 * L**3 * T) == pytest.approx(-0.042, abs=0.001)
     m_y = np.pi * (T / L) ** 2 * (1 + 0.16 * Cb * B / T - 5.1 * (B / L) ** 2) * 0.5 * 1025 * L**3
