@@ -73,6 +73,7 @@ def data_make(
 
 @data_app.command("describe")
 def data_describe(
+    ctx: typer.Context,
     dataset: DatasetArgument,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Write a data card there: card.md and card.html, with plots.")] = None,
     full: Full = False,
@@ -87,7 +88,7 @@ def data_describe(
     with steps_shown(quiet or as_json):
         data = load_dataset(dataset)
         card = make_card(data)
-    written = write_card(card, data, out) if out is not None else []
+    written = write_card(card, data, out, str(ctx.obj)) if out is not None else []
     if as_json:
         print_json(card.document())
         return

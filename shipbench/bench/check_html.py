@@ -15,6 +15,7 @@ from ..checking.recording import Recording
 from ..records import Run
 from ..render.html import Tile, render_page
 from ..render.linked import COLOURS
+from .dataset_facts import fact_lines
 from .recorded import RUNS, recorded_plots, thinned
 from .report.svg import Axes
 
@@ -24,12 +25,10 @@ _POINTS = 1500
 _NAMED = 12
 """Runs of a finding that its row names."""
 _STYLE = """
-.findings td { min-width: 9rem; } .findings td.what { min-width: 20rem; } .findings td p { margin: 0 0 .4rem; }
+@media (min-width: 40.01rem) { .findings td { min-width: 9rem; } .findings td.what { min-width: 20rem; } }
+.findings td p { margin: 0 0 .4rem; }
 .findings pre { margin: .3rem 0; max-width: 34rem; }
 .level { font-weight: 600; } .level.faulty { color: var(--warn); } svg .dots { stroke-width: 4; stroke-linecap: round; }
-@media (max-width: 40rem) { .findings thead { display: none; } .findings tr { display: block; border-bottom: 2px solid var(--line);
-  padding: .4rem 0; }
-  .findings td, .findings td.what { display: block; border: 0; min-width: 0; padding-right: 0; } }
 """
 
 
@@ -47,7 +46,7 @@ def check_page(recording: Recording, findings: Sequence[Finding], document: dict
         _TEMPLATES, "check.html.j2", title=f"Data check: {recording.dataset.name}", dataset=recording.dataset.name, command=command,
         tiles=_tiles(recording, findings, len(runs)), plots=True, style=_STYLE, findings=[_row(f, runs) for f in findings],
         lines=document["lines"], contradictions=document["contradictions"], tracks=plots, which=_which(shown, set(concerned), len(runs)),
-        facts=[(key, str(line)) for key, line in _facts(document)],
+        facts=fact_lines({key: value for key, value in document.items() if key not in ("findings", "lines", "contradictions")}),
     )  # fmt: skip
 
 
@@ -91,11 +90,6 @@ def _row(finding: Finding, runs: dict[str, list[Run]]) -> dict[str, Any]:
         "text": finding.text, "where": where, "line": finding.line, "todo": finding.todo,
         "evidence": _evidence(finding.picture) if finding.picture is not None else None,
     }  # fmt: skip
-
-
-def _facts(document: dict[str, Any]) -> list[tuple[str, Any]]:
-    facts = {key: value for key, value in document.items() if key not in ("findings", "lines", "contradictions")}
-    return [(key, line) for key, value in facts.items() for line in (value if isinstance(value, list) else [value])]
 
 
 def _evidence(picture: Picture) -> dict[str, Any] | None:

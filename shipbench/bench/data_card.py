@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import base64
 import os
 import shutil
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +17,11 @@ from ..data.noise import channel_noise
 from ..data.sensitivity import IMITATED, UNFELT, Telling, tellings
 from ..errors import InputError
 from ..records import Dataset
-from ..render.html import content_policy
 from ..signals import UNITS
 from ..steps import step
-from .data_card_plots import Picture, pictures
-from .dataset_facts import dataset_facts, describe_tables
+from .data_card_html import card_page
+from .data_card_plots import Coverage, coverage, png
+from .dataset_facts import dataset_facts, describe_tables, fact_lines
 from .escaping import markdown_text
 from .tables import Table, TableColumn, display_unit, number, significant
 
@@ -163,15 +161,17 @@ def _told_apart(told: Sequence[Telling], how: str) -> Table:
     return Table("What the runs tell apart", columns, rows, [f"How: {how}", *([_FELT] if rows else [])])
 
 
-def write_card(card: Card, dataset: Dataset, out: Path) -> list[Path]:
+def write_card(card: Card, dataset: Dataset, out: Path, command: str) -> list[Path]:
     """Write `card.md` with its pictures, and `card.html`, which holds everything in one file; returns the two pages.
+
+    `command` is what made them, as the page states it.
 
     Raises:
         InputError: the folder cannot be written.
     """
-    drawn = pictures(dataset)
-    files = {f"{p.name}.png": p.png for p in drawn}
-    files |= {"card.md": markdown(card, drawn).encode(), "card.html": html(card, drawn).encode()}
+    covered = coverage(dataset)
+    files = {f"{c.name}.png": png(c, dataset.dt) for c in covered}
+    files |= {"card.md": markdown(card, covered).encode(), "card.html": card_page(card, dataset, covered, command).encode(errors="replace")}
     part = None
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -188,43 +188,12 @@ def write_card(card: Card, dataset: Dataset, out: Path) -> list[Path]:
     return [out / "card.md", out / "card.html"]
 
 
-def _lines(facts: dict[str, Any]) -> list[tuple[str, str]]:
-    return [(key, str(line)) for key, value in facts.items() for line in (value if isinstance(value, list) else [value])]
-
-
-def markdown(card: Card, drawn: Sequence[Picture]) -> str:
+def markdown(card: Card, covered: Sequence[Coverage]) -> str:
     """The card as Markdown; pictures are files beside it."""
-    parts = [f"# Data card: {markdown_text(card.name)}\n", "\n".join(f"- {key}: {markdown_text(line)}" for key, line in _lines(card.facts)) + "\n"]
-    coverage = "## Coverage\n\n" + "\n\n".join(f"![{p.title}]({p.name}.png)\n\n{p.caption}" for p in drawn) + "\n"
+    parts = [
+        f"# Data card: {markdown_text(card.name)}\n",
+        "\n".join(f"- {key}: {markdown_text(line)}" for key, line in fact_lines(card.facts)) + "\n",
+    ]
+    coverage = "## Coverage\n\n" + "\n\n".join(f"![{p.title}]({p.name}.png)\n\n{p.caption}" for p in covered) + "\n"
     texts = [t.markdown() for t in card.page()]
     return "\n".join([*parts, texts[0], coverage, *texts[1:]])
-
-
-_STYLE = """
-:root{color-scheme:light}body{font:16px/1.5 system-ui,sans-serif;color:#1a1a1a;background:#fff;max-width:72rem;margin:0 auto;padding:1rem}
-h1{font-size:1.5rem}h2{font-size:1.15rem;margin:2rem 0 .5rem}dl{display:grid;grid-template-columns:max-content 1fr;gap:.15rem 1rem}
-dt{color:#555}dd{margin:0;overflow-wrap:anywhere}.table{overflow-x:auto}table{border-collapse:collapse;font-size:.9rem}
-th,td{padding:.3rem .6rem;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}th{border-bottom:2px solid #999}
-.number{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}.note{color:#555;font-size:.85rem;max-width:60rem}
-.plots{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(20rem,100%),1fr));gap:1rem}figure{margin:0}
-img{width:100%;height:auto}figcaption{font-size:.85rem;color:#555}
-#gaps td{min-width:11rem}@media(max-width:40rem){dl{grid-template-columns:1fr}dt{margin-top:.3rem}}
-"""
-
-
-def html(card: Card, drawn: Sequence[Picture]) -> str:
-    """The card as one page that needs no network and no other file."""
-    facts = "".join(f"<dt>{escape(key)}</dt><dd>{escape(line)}</dd>" for key, line in _lines(card.facts))
-    figures = "".join(
-        f'<figure><img alt="{escape(p.title)}" src="data:image/png;base64,{base64.b64encode(p.png).decode()}">'
-        f"<figcaption>{escape(p.caption)}</figcaption></figure>"
-        for p in drawn
-    )
-    tables = [t.html() for t in card.page()]
-    title = f"Data card: {escape(card.name)}"
-    return (
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width,initial-scale=1">'
-        f'<meta http-equiv="Content-Security-Policy" content="{content_policy(_STYLE, images=True)}">'
-        f"<title>{title}</title><style>{_STYLE}</style></head><body><h1>{title}</h1><dl>{facts}</dl>"
-        f'<section id="gaps">{tables[0]}</section><h2>Coverage</h2><div class="plots">{figures}</div>{"".join(tables[1:])}</body></html>\n'
-    )

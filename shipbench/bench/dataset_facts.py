@@ -36,6 +36,11 @@ def dataset_facts(dataset: Dataset) -> dict[str, Any]:
     }
 
 
+def fact_lines(facts: dict[str, Any]) -> list[tuple[str, str]]:
+    """Name and text of each fact; a list becomes one line for each entry."""
+    return [(key, str(line)) for key, value in facts.items() for line in (value if isinstance(value, list) else [value])]
+
+
 ROUNDING = "The paper prints r with two decimals: its 0.01 rad/s stands for anything from 0.005 to 0.015."
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,11 +74,6 @@ class TableColumn:
         return f"{self.format(low)} to {self.format(high)}"
 
 
-def _html_cell(column: TableColumn, row: dict[str, Any]) -> str:
-    between = column.interval_text(row)
-    return escape(column.text(row)) + (f"<br><small>{escape(between)}</small>" if between else "")
-
-
 @dataclass(frozen=True)
 class Table:
     """Rows are dicts by column key; a row with `_reference` true is quoted from elsewhere and printed in italics."""
@@ -108,15 +102,6 @@ class Table:
         lines += [""] + [f"{markdown_text(note)}  " for note in self.notes]
         return "\n".join(lines).rstrip() + "\n"
 
-    def html(self) -> str:
-        """Heading, table and notes; every text is escaped."""
-        numeric = [' class="number"' if c.format else "" for c in self.columns]
-        head = "".join(f"<th{kind}>{escape(c.header)}</th>" for c, kind in zip(self.columns, numeric, strict=True))
-        rows = ["".join(f"<td{kind}>{_html_cell(c, row)}</td>" for c, kind in zip(self.columns, numeric, strict=True)) for row in self.rows]
-        body = "".join(f"<tr>{cells}</tr>" for cells in rows)
-        notes = "".join(f'<p class="note">{escape(note)}</p>' for note in self.notes)
-        return f'<h2>{escape(self.title)}</h2><div class="table"><table><tr>{head}</tr>{body}</table></div>{notes}'
-
     def show(self, console: Console) -> None:
         """Print on a terminal."""
         from .terminal import show_table
@@ -136,14 +121,19 @@ class Table:
 
 
 def table_cells(table: Table) -> dict[str, Any]:
-    """A table for the macro `table` of `render/macros.html.j2`: cells as text, beside the value that they are sorted by."""
+    """A table for the macro `table` of `render/macros.html.j2`: cells as text, beside the value that they are sorted by.
+
+    The head of a row is its model; in a table without models its first text. It stays in sight when the table is scrolled sideways.
+    """
+    models = any(c.key == "model" for c in table.columns)
+    heads = {c.key for i, c in enumerate(table.columns) if c.key == "model" or (not models and i == 0 and c.format is None)}
     lines = []
     for row in table.rows:
         cells = [
             {"text": c.text(row), "between": _between(c, row), "by": _sort_key(row.get(c.key)), "number": c.format is not None} for c in table.columns
         ]
         lines.append({"cells": cells, "reference": bool(row.get("_reference"))})
-    head = [{"text": c.header, "number": c.format is not None, "model": c.key == "model"} for c in table.columns]
+    head = [{"text": c.header, "number": c.format is not None, "model": c.key in heads} for c in table.columns]
     return {"title": table.title, "head": head, "rows": lines, "notes": list(table.notes)}
 
 

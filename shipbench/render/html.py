@@ -37,6 +37,7 @@ def render_page(
     title: str,
     dataset: str,
     command: str,
+    lead: str = "",
     tiles: Sequence[Tile] = (),
     plots: bool = False,
     images: bool = False,
@@ -50,6 +51,7 @@ def render_page(
         title: heading of the page.
         dataset: name of the data set or data sets.
         command: the command that made the page.
+        lead: the result in one or two sentences, above the tiles.
         tiles: figures at the top.
         plots: whether the page holds linked plots (see `render/linked.py`); adds Plotly, 1.2 MB.
         images: whether it holds pictures as `data:`.
@@ -67,7 +69,7 @@ def render_page(
     styles = _read("page.css") + style
     scripts = [*([_read(_PLOTLY)] if plots else []), _read("tables.js"), _read("copy.js"), *([_read("linked.js")] if plots else [])]
     return environment.get_template(template).render(
-        title=title, dataset=dataset, command=command, tiles=tiles, style=styles, scripts=scripts, plots=plots,
+        title=title, dataset=dataset, command=command, lead=lead, tiles=tiles, style=styles, scripts=scripts, plots=plots,
         policy=content_policy(styles, scripts, images=images, plots=plots), made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         shipbench=version("shipbench"), plotly=plotly_version() if plots else "", **context,
     )  # fmt: skip
