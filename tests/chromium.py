@@ -24,6 +24,16 @@ from typing import Any
 import pytest
 
 _HEIGHT = 844
+CONTRAST = """(() => {
+  const lum = (c) => { const [r, g, b] = c.match(/[\\d.]+/g).slice(0, 3)
+      .map((v) => v / 255).map((v) => v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4);
+    return .2126 * r + .7152 * g + .0722 * b; };
+  const paper = lum(getComputedStyle(document.body).backgroundColor);
+  const ratio = (c) => { const l = lum(c); return (Math.max(l, paper) + .05) / (Math.min(l, paper) + .05); };
+  const of = (s, what) => [...document.querySelectorAll(s)].map((e) => ratio(getComputedStyle(e)[what]));
+  return [Math.min(...of('p, td, th, a, dt, dd, .small, figcaption, summary', 'color')), Math.min(...of('.line', 'stroke')), paper];
+})()"""
+"""Least ratio of luminances of a text to the page, and of a line of a drawing; luminance of the page."""
 
 
 def browse(steps: list[list[Any]], scheme: str = "light") -> list[Any]:

@@ -53,7 +53,8 @@ class Card:
         what = (
             f"{missing} of the causes that are looked for cannot be identified with it." if missing else "No cause is known that it cannot identify."
         )
-        return f"{self.name}: {self.facts['runs']}. {what}"
+        runs, samples = str(self.facts["runs"]).split(" in ", 1)
+        return f"{self.name}: {runs} run{'s' * (runs != '1')} in {samples}. {what}"
 
     def brief(self) -> list[Table]:
         """What a terminal shows unless all tables are asked for: durations, and the trials that would add what is missing."""

@@ -46,7 +46,8 @@ def coverage(dataset: Dataset) -> list[Coverage]:
         Coverage("rudder_rpm", "Rudder and revolutions", "Positions where they are measured, else commands.",
                  *_time_in(S[:, N], delta, dt), "revolutions [rpm]", "rudder angle [deg], to starboard positive"),
         Coverage("headings", "Headings", f"95 % of them lie within {np.rad2deg(s.heading_arc()):.0f} deg.", dt * headings, sectors, np.zeros(0)),
-        Coverage("yaw_speed", "Yaw rate and speed", "", *_time_in(speed, np.rad2deg(S[:, R]), dt), "speed [m/s], astern negative", "yaw rate [deg/s]"),
+        Coverage("yaw_speed", "Yaw rate and speed", "", *_time_in(speed, np.rad2deg(S[:, R]), dt),
+                 "speed [m/s], astern negative", "yaw rate [deg/s]"),
     ]  # fmt: skip
     if S[:, F_B:].any():
         used = (S[:, F_B] != 0.0) | (S[:, F_S] != 0.0)

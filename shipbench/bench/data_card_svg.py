@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from .data_card_plots import Coverage
@@ -10,8 +12,11 @@ from .report.svg import Axes
 WIDTH, HEIGHT = 430.0, 330.0
 _LEVELS = 5
 STYLE = """
+.covered { display: grid; gap: 0 1.2rem; grid-template-columns: repeat(auto-fill, minmax(min(100%, 22rem), 1fr)); }
+.covered h3 { margin-top: 1.2rem; } .levels { display: block; } .levels span { white-space: nowrap; margin-right: .5rem; }
 .level { fill: var(--c0); stroke: none; } .l0 { fill-opacity: .25; } .l1 { fill-opacity: .42; } .l2 { fill-opacity: .6; }
 .l3 { fill-opacity: .8; } .l4 { fill-opacity: 1; } .zero { stroke: var(--dim); stroke-width: 1; } .ring { fill: none; stroke: var(--line); }
+.halo { paint-order: stroke; stroke: var(--paper); stroke-width: 3; }
 """
 """Rules of the classes that the drawings use beside those of the common style sheet."""
 
@@ -42,7 +47,7 @@ def _cells(covered: Coverage, dt: float) -> tuple[str, list[str]]:
     if y[0] < 0.0 < y[-1]:
         parts.append(f'<path class="zero" d="M{px[0]:.1f} {float(axes.py(0.0)):.1f}H{px[-1]:.1f}"/>')
     shown = [f"{edge:.2g}" if edge < 100.0 else f"{edge:.0f}" for edge in edges]
-    return "".join(parts), [f"{a} to {b} s" for a, b in zip(shown, shown[1:], strict=False)]
+    return "".join(parts), [f"{a} to {b} s" for a, b in pairwise(shown)]
 
 
 def _rose(covered: Coverage) -> str:
@@ -50,7 +55,7 @@ def _rose(covered: Coverage) -> str:
     middle, below, radius = WIDTH / 2, HEIGHT / 2, HEIGHT / 2 - 32.0
     most = max(float(covered.seconds.max()), 1e-9)
     parts = [f'<circle class="ring" cx="{middle:g}" cy="{below:g}" r="{part * radius:g}"/>' for part in (0.5, 1.0)]
-    for (a, b), time in zip(zip(covered.x, covered.x[1:], strict=False), covered.seconds, strict=True):
+    for (a, b), time in zip(pairwise(covered.x), covered.seconds, strict=True):
         if time > 0:
             r = radius * time / most
             (ax, ay), (bx, by) = ((middle + r * np.sin(angle), below - r * np.cos(angle)) for angle in (a, b))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 import re
@@ -10,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from toy_ship import toy, toy_folder
+from test_report_page import HOSTILE, Elements, drawings
+from toy_ship import TOY_SHIP, sail, toy, toy_folder
 from typer.testing import CliRunner
 
 from shipbench.bench.data_card import make_card, write_card
-from shipbench.bench.data_card_plots import pictures
+from shipbench.bench.data_card_plots import coverage
+from shipbench.bench.data_card_svg import svg
 from shipbench.cli import app
 from shipbench.data.base import load_dataset
 from shipbench.errors import InputError
@@ -52,29 +53,60 @@ def test_a_card_is_written_printed_and_given_as_json(cli, toy_folder, tmp_path):
     assert text == (tmp_path / "card/card.md").read_text(), "the same data give the same page"
 
 
-def test_the_page_needs_no_network_and_text_from_the_data_stays_text(toy_folder, tmp_path):
-    folder = toy_folder(runs=3)
-    description = folder / "dataset.toml"
-    description.write_text(description.read_text().replace('source = "formula"', 'source = "<script>alert(1)</script> & co"'))
-    data = load_dataset(str(folder))
-    _, page = write_card(make_card(data), data, tmp_path / "card")
-    html = page.read_text()
-    assert "<script" not in html
-    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; co" in html
-    assert "<script" not in (tmp_path / "card/card.md").read_text()
-    assert not re.search(r'(src|href)="(?!data:image/png;base64,)', html)
-    assert "content=\"default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'sha256-" in html
-    assert not re.search(r"https?:", re.sub(r"base64,[\w+/=]+", "", html))
-    assert "width=device-width" in html
-    for encoded in re.findall(r"base64,([\w+/=]+)", html):
-        assert base64.b64decode(encoded).startswith(b"\x89PNG")
-    assert html.count("<figure>") == 4
+def card_of(folder):
+    """The page of runs whose names and kinds of manoeuvre are hostile."""
+    runs = []
+    for i in range(30):
+        S, C = sail(30, i)
+        runs.append(Run(f"r{i} {HOSTILE}", np.arange(31.0), S, C, meta={"manoeuvre": HOSTILE if i == 29 else "turn"}))
+    data = Dataset("toy", TOY_SHIP, 1.0, tuple(runs), source=HOSTILE)
+    return write_card(make_card(data), data, folder, f"shipbench data describe {HOSTILE}")[1]
+
+
+def test_the_page_fetches_nothing_and_text_from_the_data_stays_text(tmp_path):
+    page = card_of(tmp_path)
+    text = page.read_text()
+    tags = Elements(text).tags
+    assert [a.get("type") for tag, a in tags if tag == "script"] == ["application/json", None, None, None, None]
+    assert "img" not in dict(tags)
+    for _, attributes in tags:
+        assert "src" not in attributes
+        assert attributes.get("href", "#").startswith("#")
+        assert not [name for name in attributes if name.startswith("on")]
+    assert "content=\"default-src 'none'; base-uri 'none'; form-action 'none'; style-src-elem 'sha256-" in text
+    assert "width=device-width" in text
+    assert "<script" not in page.with_name("card.md").read_text()
+    assert not Elements(page.with_name("card.md").read_text()).tags
+
+
+def test_the_page_has_one_header_tiles_and_the_runs_as_linked_plots(tmp_path):
+    text = card_of(tmp_path).read_text()
+    tiles = dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)<small>", text))
+    assert set(tiles) == {"Cannot be identified", "Runs", "Samples", "Duration", "Time step dt", "Ship"}
+    assert (tiles["Runs"], tiles["Samples"], tiles["Duration"], tiles["Time step dt"]) == ("30", "930", "0.25 h", "1 s")
+    assert "shipbench data describe &lt;img" in text
+    runs = drawings(text)["runs"]
+    assert len(runs) == 24
+    assert runs[-1]["note"] == HOSTILE, "of every kind of manoeuvre one run at least is drawn"
+    assert text.count("<figure><h3>") == 4
+    assert "24 of 30 runs, from every kind of manoeuvre." in text
+
+
+def test_a_drawing_holds_the_time_of_every_cell(harbour):
+    for covered in coverage(harbour):
+        drawn, levels = svg(covered, harbour.dt)
+        assert "nan" not in drawn
+        if levels:
+            assert len(levels) == 5
+            assert drawn.count("z") - drawn.count('class="zero"') == np.count_nonzero(covered.seconds)
+        else:
+            assert covered.seconds.sum() == pytest.approx(sum(len(r) for r in harbour.runs) * harbour.dt)
 
 
 def test_thrusters_and_wind_are_drawn_where_there_are_any(harbour):
     names = (*harbour.inputs, "wind_speed", "wind_from")
     windy = harbour.with_runs(Run(r.id, r.t, r.states, np.hstack([r.inputs, np.full((len(r), 2), 1.0)]), names) for r in harbour.runs)
-    assert [p.name for p in pictures(windy)][4:] == ["thrusters", "wind"]
+    assert [c.name for c in coverage(windy)][4:] == ["thrusters", "wind"]
 
 
 def test_a_folder_that_cannot_be_written_is_one_message(cli, toy_folder):
@@ -93,7 +125,7 @@ def test_nothing_half_written_is_left(toy_folder, tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "replace", full)
     with pytest.raises(InputError, match="No space left"):
-        write_card(card, data, tmp_path / "card")
+        write_card(card, data, tmp_path / "card", "shipbench")
     assert list((tmp_path / "card").iterdir()) == []
 
 
@@ -106,7 +138,7 @@ def test_data_that_hold_nearly_nothing_get_a_card_too(toy, tmp_path, samples, sp
     card = make_card(data)
     json.dumps(card.document(), allow_nan=False, default=str)
     assert len(card.tables["cannot_identify"].rows) > 8
-    write_card(card, data, tmp_path)
+    write_card(card, data, tmp_path, "shipbench")
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="no copy of the Esso Osaka data here (not distributed)")

@@ -1,0 +1,59 @@
+"""The pages of `data describe --out` and `leaderboard --format html`, opened and clicked in a real Chromium."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from chromium import CONTRAST, browse
+from test_data_card import card_of
+from test_report_page import HOSTILE
+
+TRACK, HISTORIES = "document.querySelector('[data-track]')", "document.querySelector('[data-histories]')"
+FITS = "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"
+
+
+@pytest.fixture(scope="session")
+def card(tmp_path_factory):
+    return str(card_of(tmp_path_factory.mktemp("card")))
+
+
+@pytest.mark.parametrize("name", ["card"])
+@pytest.mark.parametrize("width", [1440, 820, 390])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_every_width_in_light_and_dark(name, width, scheme, request, tmp_path):
+    page = request.getfixturevalue(name)
+    messages, (wide, window), (text, _, paper), saved = browse(
+        [["open", page, width], ["js", FITS], ["js", CONTRAST], ["shot", str(tmp_path / "page.png")]], scheme
+    )
+    assert messages == []  # no error, nothing that the policy refused
+    assert wide <= window  # tables scroll by themselves, the page does not
+    assert text >= 4.5  # WCAG AA
+    assert (paper < 0.2) == (scheme == "dark")
+    assert saved
+
+
+@pytest.mark.parametrize("name", ["card"])
+def test_nothing_of_a_hostile_name_runs_and_nothing_is_asked_of_a_network(name, request):
+    page = request.getfixturevalue(name)
+    _, (alerted, images), asked = browse([["open", page, 1280], ["js", "[window.alerted ?? 0, document.images.length]"], ["requests"]])
+    assert (alerted, images) == (0, 0)
+    assert [url for url in asked if not url.startswith(("data:", "blob:"))] == []
+
+
+def test_runs_of_a_card_are_chosen_and_read_off(card):
+    name = "document.querySelector('[data-run]').textContent"
+    text = "[...document.querySelectorAll('[data-histories] .hoverlayer text')].map(e => e.textContent).join(' ')"
+    _, first, _, second, _, told, marked = browse([
+        ["open", card, 1280], ["js", name], ["click", "button[data-step='1']"], ["js", name],
+        ["hover", "[data-histories] .nsewdrag[data-subplot='xy']", 0.5, 0.5], ["js", text], ["js", f"{TRACK}.data.at(-1).x.length"],
+    ])  # fmt: skip
+    assert HOSTILE in first  # as text
+    assert first != second
+    assert re.search(r"recorded : -?\d+\.\d{3} m/s", told)
+    assert marked == 1
+
+
+def test_what_cannot_be_identified_folds_on_a_phone_and_is_a_table_elsewhere(card):
+    shown = "getComputedStyle(document.querySelector('#gaps thead')).display"
+    assert browse([["open", card, 390], ["js", shown], ["open", card, 820], ["js", shown]])[1::2] == ["none", "table-header-group"]
