@@ -39,6 +39,8 @@ def table_iii(scores: Scores) -> Table:
         place += model != CEILING
         scored, expected = shares[model]
         line: dict[str, Any] = {"rank": "" if model == CEILING else str(place), "model": model, "runs": f"{scored}/{expected}"}
+        own = scores.scored[scores.scored["model"] == model]
+        line |= {f"_{m}_middle": tuple(own[m].quantile([0.25, 0.75])) for m in metrics}  # drawn on the page, in no table
         lines.append(line | {key: value for m in metrics for key, value in figures[m][model].items()})
     notes = [
         f"{', '.join(columns[m]['label'] + ' in ' + columns[m]['unit'] for m in metrics)}: averaged over the predicted time steps of each run; "

@@ -64,7 +64,7 @@ def _rose(covered: Coverage) -> str:
     parts += [f'<text class="x" x="{middle + dx:g}" y="{below + dy:g}">{name}</text>' for name, dx, dy in places]
     at = np.sin(np.pi / 4)  # beside the rings, between two names
     parts += [
-        f'<text x="{middle + part * radius * at + 3:.1f}" y="{below - part * radius * at - 3:.1f}">{part * most / 60.0:.2g} min</text>'
+        f'<text class="halo" x="{middle + part * radius * at + 3:.1f}" y="{below - part * radius * at - 3:.1f}">{part * most / 60.0:.2g} min</text>'
         for part in (0.5, 1.0)
     ]
     return "".join(parts)

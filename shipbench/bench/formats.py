@@ -1,17 +1,13 @@
-"""A leaderboard as Markdown, LaTeX, CSV and one static HTML page."""
+"""A leaderboard as Markdown, LaTeX, CSV and one HTML page."""
 
 from __future__ import annotations
 
-import base64
-import re
 from collections.abc import Sequence
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, unknown_name
-from ..names import shown
-from ..render.html import content_policy
+from .board_html import board_page
 from .escaping import csv_text, latex_text, one_line
 from .tables import Table
 
@@ -35,8 +31,14 @@ def check_formats(formats: Sequence[str]) -> None:
             raise unknown_name("format", name, list(FORMATS))
 
 
-def render(board: Board, name: str, command: str, images: Sequence[Path], folder: Path) -> tuple[str, str]:
-    """Suffix and text of `board` in the format `name`; `images` are its plots, `folder` is where the page will lie."""
+def render(board: Board, name: str, command: str, images: Sequence[Path], folder: Path, curves: dict[str, Any] | None = None) -> tuple[str, str]:
+    """Suffix and text of `board` in the format `name`.
+
+    Args:
+        board, name, command: the leaderboard, a key of `FORMATS`, and what rendered it.
+        images: its plots as files; `folder`: where the page will lie.
+        curves: what the HTML page draws instead of them (`report.curves.study_curves`).
+    """
     if name == "md":
         text = board.markdown(command, [path.relative_to(folder).as_posix() for path in images])
     elif name == "latex":
@@ -44,7 +46,7 @@ def render(board: Board, name: str, command: str, images: Sequence[Path], folder
     elif name == "csv":
         text = csv(board)
     else:
-        text = html(board, command, images)
+        text = board_page(board, command, images, curves)
     return FORMATS[name], text
 
 
@@ -87,22 +89,3 @@ def csv(board: Board) -> str:
                 ends = {end: row.get(f"{column.key}_{end}") for end in ("low", "high")}
                 lines.append(label | {"figure": csv_text(column.header), "value": row[column.key], **ends})
     return pd.DataFrame(lines, columns=["dataset", "table", "row", "figure", "value", "low", "high"]).to_csv(index=False, lineterminator="\n")
-
-
-def html(board: Board, command: str, images: Sequence[Path]) -> str:
-    """One page that needs no network and no other file."""
-    from jinja2 import Environment, FileSystemLoader
-    from markupsafe import Markup
-
-    def marked(text: str) -> Markup:
-        return Markup(re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(shown(text))))
-
-    templates = Path(__file__).with_name("templates")
-    style = (templates / "leaderboard.css").read_text(encoding="utf-8")
-    pages = Environment(loader=FileSystemLoader(templates), autoescape=True, trim_blocks=True)
-    pages.filters["marked"] = marked
-    drawn = [{"name": p.stem.replace("-", " "), "source": f"data:image/png;base64,{base64.b64encode(p.read_bytes()).decode()}"} for p in images]
-    about = [*board.head, f"Rendered by `{command}`."]
-    policy = content_policy(style, images=True)
-    page = pages.get_template("leaderboard.html")
-    return page.render(title=board.title, about=about, tables=board.tables, images=drawn, style=Markup(style), policy=policy) + "\n"

@@ -1,4 +1,4 @@
-"""The result of a leaderboard in one or two sentences, and the short table that a terminal shows: who is first, by how much, how sure."""
+"""The result of a leaderboard in one or two sentences, in tiles, and in the short table of a terminal: who is first, by how much, how sure."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..render.html import Tile, short_name
 from .board_scores import Scores
 from .tables import Table, number
 
@@ -25,6 +26,27 @@ def lead(scores: Scores) -> str:
     second = ranked[1]
     behind = f"'{first}' is first: mean position error (ED) {_metres(errors[first]['ed_mean'])}, '{second}' {_metres(errors[second]['ed_mean'])}."
     return f"{behind} {_certainty(scores, first, second)}"
+
+
+def lead_tiles(scores: Scores, horizon: float) -> list[Tile]:
+    """The first two models, their difference, windows, and what was not scored; `horizon` [s] is predicted."""
+    errors, found = scores.figures("ed"), []
+    ranked = [model for model in scores.ranked if scores.shares[model][0]]
+    for label, model in zip(("First", "Second"), ranked, strict=False):
+        mean, low, high = (errors[model][f"ed_mean{end}"] for end in ("", "_low", "_high"))
+        found.append(Tile(label, short_name(model), f"mean position error ED {_metres(mean)}{_between(low, high)}"))
+    pair = next((p for p in scores.pairs if [p.first, p.second] == ranked[:2]), None)
+    if pair is not None and np.isfinite(pair.p_holm) and pair.difference != 0.0:
+        sure = "significant" if pair.p_holm < _CERTAIN else "not significant"
+        found.append(
+            Tile("Difference in ED", sure, f"{_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, p {_p(pair.p_holm)}")
+        )
+    windows = len(scores.rows[["fold", "run"]].drop_duplicates())
+    missing = sum(expected - scored for scored, expected in scores.shares.values())
+    return [
+        *found, Tile("Windows", str(windows), f"of {horizon:g} s, from {_runs(scores)}"), Tile("Models", str(len(scores.models)), "on the same windows"),
+        Tile("Not scored", str(missing), "predictions; the reasons stand under Status and cost" if missing else "every prediction was scored"),
+    ]  # fmt: skip
 
 
 def _certainty(scores: Scores, first: str, second: str) -> str:

@@ -10,13 +10,14 @@ from typing import Any
 
 from ..errors import InputError
 from ..names import brief, file_name
+from ..render.html import Tile
 from . import board_statistics, board_tables
 from .board_scores import Scores, cluster_of
 from .cost import parameters_by_model
 from .escaping import markdown_text
 from .fit_notes import MARK, fit_notes
 from .formats import check_formats, render
-from .lead import lead, short_table
+from .lead import lead, lead_tiles, short_table
 from .memory import give_back_memory
 from .results import PROTOCOL, Frame, Results
 from .tables import Table, TableColumn
@@ -40,6 +41,8 @@ class Board:
     heading: str = "Leaderboard"
     lead: str = ""
     """Who is first, by how much, how sure."""
+    tiles: Sequence[Tile] = ()
+    """The same in figures, for a page."""
     short: Table | None = None
     """What a terminal shows of the tables."""
 
@@ -103,7 +106,8 @@ def _board(scores: Scores, summaries: list[dict[str, Any]]) -> Board:
     tables += [board_statistics.slice_table(scores), board_statistics.trial_table(scores)]
     tables.append(board_tables.status_table(scores, parameters_by_model(summaries)))
     known = [t for t in tables if t is not None]
-    return Board(scores.dataset, scores.models, known, _head(scores.rows, summaries), lead=lead(scores), short=short_table(known[0]))
+    tiles = lead_tiles(scores, summaries[0]["task"]["horizon_s"])
+    return Board(scores.dataset, scores.models, known, _head(scores.rows, summaries), lead=lead(scores), tiles=tiles, short=short_table(known[0]))
 
 
 def _marked(table: Table, dataset: str, summaries: list[dict[str, Any]]) -> Table:
@@ -201,7 +205,8 @@ def write_boards(
     for board in boards:
         if plots and board.dataset not in images:
             images[board.dataset] = _draw(results, board, out, tell)
-        paths = [_write(board, name, command, images.get(board.dataset, []), out) for name in formats]
+        curves = _curves(results, board) if plots and "html" in formats and board.dataset in names else None
+        paths = [_write(board, name, command, images.get(board.dataset, []), out, curves) for name in formats]
         written.append((board, paths[0]))
     return written
 
@@ -215,9 +220,17 @@ def _draw(results: Results, board: Board, out: Path, tell: Callable[[str], None]
     return draw_all(results, board.dataset, board.ranking, folder, lambda line: tell(f"{board.dataset}: {line}"))
 
 
-def _write(board: Board, form: str, command: str, images: Sequence[Path], out: Path) -> Path:
+def _curves(results: Results, board: Board) -> dict[str, Any]:
+    from .report.curves import study_curves
+
+    rows = results.rows[(results.rows["dataset"] == board.dataset) & (results.rows["status"] == "ok")]
+    scored = set(rows["model"])
+    return study_curves(results, board.dataset, [m for m in board.ranking if m in scored])
+
+
+def _write(board: Board, form: str, command: str, images: Sequence[Path], out: Path, curves: dict[str, Any] | None) -> Path:
     """The page in one format, in one step."""
-    suffix, text = render(board, form, command, images, out)
+    suffix, text = render(board, form, command, images, out, curves)
     out.mkdir(parents=True, exist_ok=True)
     page = file_name(board.dataset)
     part, path = out / f".{page}.{os.getpid()}.tmp", out / f"{page}{suffix}"

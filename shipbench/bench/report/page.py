@@ -11,18 +11,17 @@ from typing import Any
 
 from ...errors import InputError
 from ...render.html import Tile, render_page, short_name
-from ...render.linked import stroke
 from ..leaderboard import Board, build_board, scores_of
 from ..provenance import code_version
 from ..results import Frame, Results
 from ..tables import table_cells
 from . import pictures
 from .beside import check_given, diagnoses, fitted
-from .histories import study_plots
-from .series import POINTS, gather
+from .curves import study_curves
+from .series import POINTS
 from .slicing import regime_errors
 
-_HERE = Path(__file__).resolve().parent
+_TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 _FAILURES = 200
 
 
@@ -63,7 +62,7 @@ def render(sections: Sequence[dict[str, Any]], results: Results, command: str) -
     """The HTML. Everything but the pictures and our own style and script is escaped by the template."""
     names = ", ".join(s["name"] for s in sections)
     return render_page(
-        _HERE, "report.html.j2", title="Study of ship-motion prediction", dataset=names, command=command, tiles=_tiles(sections, results),
+        _TEMPLATES, "report.html.j2", title="Study of ship-motion prediction", dataset=names, command=command, tiles=_tiles(sections, results),
         plots=any(s["tracks"]["runs"] for s in sections), sections=sections, code=code_version(),
     )  # fmt: skip
 
@@ -88,26 +87,16 @@ def _tiles(sections: Sequence[dict[str, Any]], results: Results) -> list[Tile]:
 
 def _section(number: int, results: Results, board: Board, given: Sequence[Path], out: Path, points: int) -> dict[str, Any]:
     rows = results.rows[results.rows["dataset"] == board.dataset]
-    summary = next(s for s in results.summaries if s["dataset"] == board.dataset)
     scored = set(rows.loc[rows["status"] == "ok", "model"])
     models = [m for m in board.ranking if m in scored]
-    series = gather(results, board.dataset, models, points)
     found = regime_errors(rows, scores_of(results, board.dataset).windows, models)
     return {
-        "id": f"d{number}", "name": board.dataset, "head": board.head, "models": [_model(i, m) for i, m in enumerate(models)],
-        "tables": [table_cells(t) for t in board.tables], "tracks": study_plots(series, rows, models, summary["ship_L"], summary["ship_B"]),
-        "growth": [
-            ("Position error ED", pictures.growth(series, models, 0, "ED [m]")),
-            ("Heading error", pictures.growth(series, models, 1, "|heading error| [deg]")),
-        ],
+        "id": f"d{number}", "name": board.dataset, "head": board.head,
+        "tables": [table_cells(t) for t in board.tables],
+        **study_curves(results, board.dataset, models, points),
         "regimes": [(r, pictures.slices(r, models)) for r in found], "fits": fitted(results, board.dataset, models),
-        "diagnoses": diagnoses(results, board.dataset, given, out), "failures": _failures(rows), "left_out": series.left_out,
-        "horizon": summary["task"]["horizon_s"],
+        "diagnoses": diagnoses(results, board.dataset, given, out), "failures": _failures(rows),
     }  # fmt: skip
-
-
-def _model(i: int, name: str) -> dict[str, Any]:
-    return {"i": i, "name": name, "stroke": stroke(i)}
 
 
 def _failures(rows: Frame) -> dict[str, Any]:
