@@ -1,4 +1,4 @@
-"""Intervals of every model on one axis: a strip beside each name, drawn in percent of its width so that names and numbers keep their size on a phone."""
+"""Intervals of every model on one axis: a strip beside each name, in percent of its width, so that names and numbers keep their size on a phone."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ STYLE = """
 .strips > span { overflow-wrap: anywhere; font-size: .88rem; } .strips small { color: var(--dim); white-space: nowrap; }
 .strip { width: 100%; height: 1.6rem; display: block; overflow: visible; } .interval { stroke-width: 5; } .strip .band { opacity: .3; }
 .strip .dot { stroke: var(--paper); stroke-width: 1.5; }
-@media (max-width: 40rem) { .strips { grid-template-columns: minmax(0, 1fr); } .strips > span:not(:empty) { margin-top: .4rem; } .strips > span:empty { display: none; } }
+@media (max-width: 40rem) { .strips { grid-template-columns: minmax(0, 1fr); }
+  .strips > span:not(:empty) { margin-top: .4rem; } .strips > span:empty { display: none; } }
 img { max-width: 100%; height: auto; background: #fff; }
 """
 _EDGE = 3.0

@@ -44,7 +44,8 @@ def lead_tiles(scores: Scores, horizon: float) -> list[Tile]:
     windows = len(scores.rows[["fold", "run"]].drop_duplicates())
     missing = sum(expected - scored for scored, expected in scores.shares.values())
     return [
-        *found, Tile("Windows", str(windows), f"of {horizon:g} s, from {_runs(scores)}"), Tile("Models", str(len(scores.models)), "on the same windows"),
+        *found, Tile("Windows", str(windows), f"of {horizon:g} s, from {_runs(scores)}"),
+        Tile("Models", str(len(scores.models)), "on the same windows"),
         Tile("Not scored", str(missing), "predictions; the reasons stand under Status and cost" if missing else "every prediction was scored"),
     ]  # fmt: skip
 

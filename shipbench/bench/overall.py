@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..extras import not_installed
+from ..render.html import Tile, short_name
 from .board_scores import FLOOR, Scores
 from .statistics import interval
 from .tables import Table, TableColumn, number
@@ -49,9 +50,10 @@ class Overall:
 
         Source: Demsar (2006), J. Mach. Learn. Res. 7; pairwise tests instead of Nemenyi's: Benavoli et al. (2016), J. Mach. Learn. Res. 17.
         """
-        from .plots import new_figure, save, short_name
+        from .plots import new_figure, save
+        from .plots import short_name as in_legend
 
-        ranks = dict(zip([short_name(m) for m in self.models], _ranks(self.errors).mean(axis=0), strict=True))
+        ranks = dict(zip([in_legend(m) for m in self.models], _ranks(self.errors).mean(axis=0), strict=True))
         figure = new_figure(8.0, 1.2 + 0.35 * len(self.models))
         _diagram(ranks, self.p_values(), figure.subplots())
         return save(figure, folder / "critical-difference.png")
@@ -60,10 +62,10 @@ class Overall:
         """p of every two models over data sets, Wilcoxon's signed-rank test after Holm; a DataFrame by short name."""
         import scikit_posthocs as posthocs
 
-        from .plots import short_name
+        from .plots import short_name as in_legend
 
         found = posthocs.posthoc_wilcoxon(list(self.errors.T), p_adjust="holm")
-        found.index = found.columns = [short_name(m) for m in self.models]
+        found.index = found.columns = [in_legend(m) for m in self.models]
         return found
 
 
@@ -97,8 +99,8 @@ def over_data_sets(sets: Sequence[Scores]) -> Overall | None:
     asked = sets[0].asked_baseline or FLOOR
     baseline = asked if asked in models and (errors[:, models.index(asked)] > 0).all() else None
     table = _table(sets, models, errors, baseline)
-    overall = Overall(Board(NAME, models, [table], _head(sets, models)), models, errors)
-    return Overall(Board(NAME, models, [_with_diagram(table, overall)], overall.board.head), models, errors)
+    board = Board(NAME, models, [table], _head(sets, models), lead=_lead(table, len(sets)), tiles=_tiles(table, len(sets)))
+    return Overall(replace(board, tables=[_with_diagram(table, Overall(board, models, errors))]), models, errors)
 
 
 def _table(sets: Sequence[Scores], models: list[str], errors: np.ndarray, baseline: str | None) -> Table:
@@ -128,6 +130,26 @@ def _table(sets: Sequence[Scores], models: list[str], errors: np.ndarray, baseli
         columns.append(TableColumn(f"skill against `{baseline}` [%]", "skill", number(1), interval=True))
         notes.append(f"Skill: 100 (1 - geometric mean of ED / ED of `{baseline}`).")
     return Table("Over all data sets", columns, lines, notes)
+
+
+def _lead(table: Table, count: int) -> str:
+    """Who has the best mean rank, and who follows."""
+    first, second = table.rows[:2]
+    return (
+        f"'{first['model']}' has the best mean rank over {count} data sets: {_rank(first)}. '{second['model']}' is second: {_rank(second)}. "
+        "Rank 1 is the least position error."
+    )
+
+
+def _tiles(table: Table, count: int) -> list[Tile]:
+    places = zip(("First", "Second"), table.rows, strict=False)
+    found = [Tile(label, short_name(row["model"]), f"mean rank {_rank(row)}") for label, row in places]
+    return [*found, Tile("Data sets", str(count), "each counts the same"), Tile("Models", str(len(table.rows)), "scored on all of them")]
+
+
+def _rank(row: dict[str, Any]) -> str:
+    low, high = row["rank_low"], row["rank_high"]
+    return f"{row['rank']:.2f}" + (f" (95 %: {low:.2f} to {high:.2f})" if np.isfinite([low, high]).all() else "")
 
 
 def _with_diagram(table: Table, overall: Overall) -> Table:

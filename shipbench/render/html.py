@@ -65,7 +65,7 @@ def render_page(
     environment = Environment(
         loader=FileSystemLoader([folder, _HERE]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters.update(ticks=_ticks, short=short_name, embedded=embedded)
+    environment.filters.update(ticks=_ticks, short=short_name, embedded=embedded, parts=_parts)
     styles = _read("page.css") + style
     scripts = [*([_read(_PLOTLY)] if plots else []), _read("tables.js"), _read("copy.js"), *([_read("linked.js")] if plots else [])]
     return environment.get_template(template).render(
@@ -93,6 +93,13 @@ def embedded(data: Any) -> Any:
 def short_name(model: str) -> str:
     """The last part of a model that is named by a file: `folder/m.py:Mine` is `m.py:Mine`."""
     return Path(model).name if "/" in model else model
+
+
+def _parts(name: Any) -> Any:
+    """Escaped text that may break at the signs that join the parts of a model's name."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"(?<=[+,])(?=\S)|(?<=\S)(?=\[)", "<wbr>", str(escape(name))))
 
 
 def _ticks(text: Any) -> Any:

@@ -7,7 +7,12 @@ import re
 import pytest
 from chromium import CONTRAST, browse
 from test_data_card import card_of
-from test_report_page import HOSTILE
+from test_report_page import HOSTILE, study
+
+from shipbench.bench.leaderboard import write_boards
+from shipbench.bench.results import read_results
+
+__all__ = ["study"]  # a fixture
 
 TRACK, HISTORIES = "document.querySelector('[data-track]')", "document.querySelector('[data-histories]')"
 FITS = "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"
@@ -18,7 +23,21 @@ def card(tmp_path_factory):
     return str(card_of(tmp_path_factory.mktemp("card")))
 
 
-@pytest.mark.parametrize("name", ["card"])
+@pytest.fixture(scope="session")
+def board(study, tmp_path_factory):
+    """A leaderboard with tracks, of four models on runs with hostile names."""
+    [(_, page)] = write_boards(read_results([study]), tmp_path_factory.mktemp("board"), f"shipbench leaderboard {HOSTILE}", formats=["html"])
+    return str(page)
+
+
+@pytest.fixture(scope="session")
+def tables(study, tmp_path_factory):
+    """The same without plots."""
+    found = write_boards(read_results([study]), tmp_path_factory.mktemp("tables"), "shipbench leaderboard", plots=False, formats=["html"])
+    return str(found[0][1])
+
+
+@pytest.mark.parametrize("name", ["card", "board", "tables"])
 @pytest.mark.parametrize("width", [1440, 820, 390])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_every_width_in_light_and_dark(name, width, scheme, request, tmp_path):
@@ -33,7 +52,7 @@ def test_it_fits_every_width_in_light_and_dark(name, width, scheme, request, tmp
     assert saved
 
 
-@pytest.mark.parametrize("name", ["card"])
+@pytest.mark.parametrize("name", ["card", "board", "tables"])
 def test_nothing_of_a_hostile_name_runs_and_nothing_is_asked_of_a_network(name, request):
     page = request.getfixturevalue(name)
     _, (alerted, images), asked = browse([["open", page, 1280], ["js", "[window.alerted ?? 0, document.images.length]"], ["requests"]])
@@ -57,3 +76,27 @@ def test_runs_of_a_card_are_chosen_and_read_off(card):
 def test_what_cannot_be_identified_folds_on_a_phone_and_is_a_table_elsewhere(card):
     shown = "getComputedStyle(document.querySelector('#gaps thead')).display"
     assert browse([["open", card, 390], ["js", shown], ["open", card, 820], ["js", shown]])[1::2] == ["none", "table-header-group"]
+
+
+def test_a_click_sorts_a_leaderboard_and_every_name_and_interval_is_in_sight(board):
+    table = "document.querySelector('#t0 ~ .scroll table')"
+    values = f"[...{table}.tBodies[0].rows].map(r => r.cells[4].dataset.by)"
+    head = "#t0 ~ .scroll thead th:nth-child(5) button"
+    names = f"[...{table}.querySelectorAll('th.model[scope=row]')].map(e => e.textContent)"
+    strips = "[...document.querySelectorAll('#intervals .strip .dot')].map(e => e.getBoundingClientRect()).map(b => [b.left, b.right])"
+    _, _, up, _, down, shown, dots = browse([
+        ["open", board, 390], ["click", head], ["js", values], ["click", head], ["js", values], ["js", names], ["js", strips],
+    ])  # fmt: skip
+    known = [float(v) for v in up if v]
+    assert known == sorted(known)
+    assert [float(v) for v in down if v] == known[::-1]
+    assert {name.split("/")[-1] for name in shown} >= {"hold", "m.py:Still", "m.py:Fails", "m.py:Blows"}
+    assert len(dots) >= 6
+    assert all(0 <= left < right <= 390 for left, right in dots)
+
+
+def test_a_model_switched_off_leaves_the_curves_of_a_leaderboard(board):
+    drawn = f"[{TRACK}, {HISTORIES}].map(p => p.data.filter(t => t.meta === 0 && t.visible === true).length)"
+    _, on, _, off = browse([["open", board, 1280], ["js", drawn], ["click", "input[data-toggle='0']"], ["js", drawn]])
+    assert all(on)
+    assert off == [0, 0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 from html.parser import HTMLParser
 from pathlib import Path
@@ -15,8 +16,10 @@ import pytest
 from toy_ship import write_toy_folder
 from typer.testing import CliRunner
 
+from shipbench.bench.board_strips import strips
 from shipbench.bench.results import read_results, read_truth
 from shipbench.bench.runner import run_tasks
+from shipbench.bench.tables import Table, TableColumn, number
 from shipbench.bench.task import make_task
 from shipbench.cli import app
 
@@ -109,9 +112,12 @@ def test_every_format_is_written_and_holds_the_same_figure(cli, two, tmp_path):
     assert f"| hold | {shown}<br>" in (tmp_path / "pages/toyset.md").read_text()
     assert rf"hold & \shortstack[r]{{{shown}\\" in (tmp_path / "pages/toyset.tex").read_text()
     html = (tmp_path / "pages/toyset.html").read_text()
-    assert "<td>hold</td><td" in html.replace("\n", "")
-    assert html.count("data:image/png;base64,") == 3
-    assert "http" not in html.split("</style>")[1].split("data:image")[0]  # nothing is fetched
+    assert re.search(rf'<th scope="row" class="model" data-by="hold">hold</th>\s*<td[^>]*>16/16</td>\s*<td[^>]*>{shown}<br><small>', html)
+    tags = Tags()
+    tags.feed(html)
+    assert tags.open == []
+    assert not {"img", "link", "iframe"} & set(tags.seen)
+    assert len(json.loads(re.search(r'<script type="application/json">(.*?)</script>', html, re.DOTALL)[1])["runs"]) == 16
 
 
 class Tags(HTMLParser):
@@ -124,10 +130,15 @@ class Tags(HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         self.seen.append(tag)
-        if tag not in ("meta", "br", "img"):
+        if tag not in ("meta", "br", "img", "wbr", "path", "line", "circle", "rect", "input"):
             self.open.append(tag)
 
+    def handle_startendtag(self, tag, attrs):
+        self.seen.append(tag)
+
     def handle_endtag(self, tag):
+        if tag == "path":
+            return
         assert self.open.pop() == tag
 
 
@@ -139,8 +150,42 @@ def test_a_models_name_cannot_break_the_page_or_the_tables(cli, two, tmp_path):
     tags = Tags()
     tags.feed((tmp_path / "pages/toyset.html").read_text())
     assert tags.open == []
-    assert "script" not in tags.seen
+    assert tags.seen.count("script") == 2  # sorts tables, copies lines; nothing of the name
+    html = (tmp_path / "pages/toyset.html").read_text()
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;&amp;_%$#|{}" in html
+    assert "<script>alert" not in html
     assert r"$<$script$>$alert(1)$<$/script$>$\&\_\%\$\#$|$\{\}" in (tmp_path / "pages/toyset.tex").read_text()
+
+
+def test_the_page_says_first_who_is_first_and_shows_intervals(cli, two, tmp_path):
+    assert cli("leaderboard", two / "anna", two / "ben", "--format", "html,md", "--out", "pages", "-q").exit_code == 0
+    html = (tmp_path / "pages/toyset.html").read_text()
+    lead = re.search(r'<p class="lead">(.*?)</p>', html)[1]
+    assert re.match(r"&#39;.*&#39; is first: mean position error \(ED\) [\d.]+ m, ", lead)
+    assert html.index(lead) < html.index('<dl class="tiles">') < html.index("<nav") < html.index("<table")
+    tiles = dict(re.findall(r"<dt>(.*?)</dt><dd[^>]*>(.*?)<small>", html))
+    assert {"First", "Second", "Windows", "Models", "Not scored"} <= set(tiles)
+    assert (tiles["Windows"], tiles["Models"], tiles["Not scored"]) == ("16", "2", "0")
+    assert {tiles["First"], tiles["Second"]} == {"hold", "mine.py:Still"}
+    assert html.count('<circle class="dot c0"') == 3  # ED, EDH, cVDM
+    assert "<code>shipbench leaderboard" in html
+
+
+def test_strips_place_the_mean_in_its_interval_and_skip_what_has_no_score():
+    columns = [TableColumn("model", "model"), TableColumn("ED", "ed_mean", number(2), interval=True)]
+    rows = [
+        {"model": "a", "ed_mean": 2.0, "ed_mean_low": 1.0, "ed_mean_high": 3.0, "_ed_middle": (1.5, 2.5)},
+        {"model": "b", "ed_mean": float("nan")}, {"model": "paper", "ed_mean": 4.0, "_reference": True},
+    ]  # fmt: skip
+    [drawn] = strips(Table("t", columns, rows))
+    [(model, text, svg)] = drawn["rows"]
+    assert (model, text) == ("a", "2.00 (1.00 to 3.00)")
+    low, high = (float(x) for x in re.search(r'class="interval c0" x1="([\d.]+)%" x2="([\d.]+)%"', svg).groups())
+    assert low < float(re.search(r'cx="([\d.]+)%"', svg)[1]) < high < 100.0
+    assert drawn["title"] == "Position error ED [m]"
+    assert strips(Table("t", columns, [{"model": "a", "ed_mean": float("nan")}]))[0]["rows"] == []
+    rows[0] |= {"ed_mean": 200.0, "ed_mean_low": 150.0, "ed_mean_high": 300.0}
+    assert strips(Table("t", columns, [*rows, {"model": "c", "ed_mean": 1.0}]))[0]["title"].endswith("logarithmic")
 
 
 def test_verify_passes_what_the_predictions_give_and_names_the_row_that_differs(cli, two):
