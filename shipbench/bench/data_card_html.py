@@ -52,7 +52,7 @@ def _tiles(card: Card, dataset: Dataset) -> list[Tile]:
     missing, ship = len(card.tables["cannot_identify"].rows), dataset.ship
     samples, kinds = sum(len(run) for run in dataset.runs), len({_kind(run) for run in dataset.runs if _kind(run)})
     times = sorted((len(run) - 1) * dataset.dt for run in dataset.runs)
-    length = f"{times[0]:.3g} s" if times[0] == times[-1] else f"{times[0]:.3g} to {times[-1]:.3g} s"
+    length = f"{times[0]:g} s" if times[0] == times[-1] else f"{times[0]:g} to {times[-1]:g} s"
     return [
         Tile("Cannot be identified", str(missing), "causes, each with the trial that would add it" if missing else "no cause that is looked for"),
         Tile("Runs", str(len(dataset)), f"{kinds} kind{'s' * (kinds != 1)} of manoeuvre" if kinds else "kinds of manoeuvre not given"),
