@@ -26,15 +26,16 @@ def _sections(command: Any, name: str) -> Iterator[str]:
     arguments = [p for p in command.params if p.param_type_name == "argument"]
     options = [p for p in command.params if p.param_type_name == "option" and not p.hidden]
     yield f"## `{' '.join([name, *(a.metavar or a.human_readable_name for a in arguments)])}`\n"
-    yield f"{_text(command.help)}\n"
+    yield f"{one_line(command.help)}\n"
     if arguments or options:
         yield "| | |\n|---|---|"
         for a in arguments:
-            yield f"| `{a.metavar or a.human_readable_name}` | {_text(getattr(a, 'help', ''))} |"
+            yield f"| `{a.metavar or a.human_readable_name}` | {one_line(getattr(a, 'help', ''))} |"
         for o in options:
-            yield f"| {', '.join(f'`{n}`' for n in (*o.opts, *o.secondary_opts))} | {_text(o.help)} |"
+            yield f"| {', '.join(f'`{n}`' for n in (*o.opts, *o.secondary_opts))} | {one_line(o.help)} |"
         yield ""
 
 
-def _text(words: str | None) -> str:
+def one_line(words: str | None) -> str:
+    """Words of the program as one line of Markdown that also fits a cell of a table."""
     return escape(" ".join((words or "").split()), quote=False).replace("|", "\\|")

@@ -1,4 +1,7 @@
-"""Floor: the ship keeps the surge, sway and yaw rate (and actuators) that it has at the start, whatever is commanded."""
+"""Floor: the ship keeps the surge, sway and yaw rate (and actuators) that it has at the start, whatever is commanded.
+
+Source: kinematics of a rigid body with constant speeds.
+"""
 
 from __future__ import annotations
 

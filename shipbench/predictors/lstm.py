@@ -2,6 +2,8 @@
 
 Trained free-running on windows that grow in length, on y and on the pose that follows from it. Without history the memory starts
 from a network of y at s0; with history the cell first runs over the measured y.
+
+Source: Hochreiter and Schmidhuber (1997), Long short-term memory, Neural Computation 9.
 """
 
 from __future__ import annotations

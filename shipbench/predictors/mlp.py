@@ -2,6 +2,8 @@
 
 y = [u, v, r, n, delta, F_b, F_s]; three hidden layers of 100, ReLU, mean squared error on standardised data, Adam 1e-3, batch 32, at most
 200 epochs, stop when validation does not improve by 1e-4 for 10 epochs.
+
+Source: the source paper, eq. (10) to (14).
 """
 
 from __future__ import annotations

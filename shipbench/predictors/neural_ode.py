@@ -2,6 +2,8 @@
 
 The residual is a small network of (u, v, r, n, delta, F_b, F_s), and of the velocity through the air where wind is measured, whose output starts
 at exactly zero: training starts at the fitted physics and the weights of the best validation rollout are kept, the untouched physics among them.
+
+Source: Chen et al. (2018), Neural ordinary differential equations, NeurIPS 31.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Ceiling for simulated data: the simulator itself, started from the recorded s0 (it does not know hidden gusts or the noise in s0)."""
+"""Ceiling for simulated data: the simulator itself, started from the recorded s0 (it does not know hidden gusts or the noise in s0).
+
+Source: Yasukawa and Yoshimura (2015), Introduction of MMG standard method for ship maneuvering predictions, J. Mar. Sci. Technol. 20.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The source paper's physics: eq. (2) to (8) with 11 parameters fitted by constrained nonlinear least squares over whole rollouts (eq. 9)."""
+"""The source paper's physics: eq. (2) to (8) with 11 parameters fitted by constrained nonlinear least squares over whole rollouts (eq. 9).
+
+Source: the source paper, eq. (2) to (9).
+"""
 
 from __future__ import annotations
 

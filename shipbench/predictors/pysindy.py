@@ -3,6 +3,8 @@
 d(nu)/dt = Xi Theta(u, v, r, n, delta, F_b, F_s, measured wind ahead and abeam, depth), Xi sparse by sequentially thresholded least squares
 (Brunton, Proctor and Kutz 2016, PNAS 113, eq. 2 to 7). All variables and accelerations are divided by their root mean square first, so that one
 threshold suits them all. The actuators follow their commands by a lag with a rate limit fitted to the data, as in `physics`.
+
+Source: Brunton, Proctor and Kutz (2016), Discovering governing equations from data by sparse identification, PNAS 113.
 """
 
 from __future__ import annotations

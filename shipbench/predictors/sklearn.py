@@ -2,6 +2,8 @@
 
 It learns y_k+1 - y_k from y_k and the inputs at k, both standardised, and is rolled out like the paper's network. A regressor with one output is
 fitted once per channel. Where it has a `random_state`, that is the seed.
+
+Source: Pedregosa et al. (2011), Scikit-learn: machine learning in Python, JMLR 12.
 """
 
 from __future__ import annotations
