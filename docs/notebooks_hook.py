@@ -37,7 +37,11 @@ def on_files(files: Files, config: Any) -> Files:
 
 def on_page_read_source(page: Any, config: Any) -> str | None:
     """Called by mkdocs for the text of a page: that of a notebook is made from its cells and outputs."""
-    return to_markdown(executed(Path(page.file.abs_src_path))) if isinstance(page.file, NotebookFile) else None
+    if not isinstance(page.file, NotebookFile):
+        return None
+    path = Path(page.file.abs_src_path)
+    title, text = to_markdown(executed(path)).split("\n\n", 1)
+    return f'{title}\n\n<a href="{path.name}" download>Download this notebook</a>\n\n{text}'
 
 
 def on_post_page(output: str, page: Any, config: Any) -> str:

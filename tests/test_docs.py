@@ -134,3 +134,7 @@ def test_the_site_builds_strictly_and_fetches_nothing(tmp_path):
     for command in ("shipbench run", "shipbench report RESULTS...", "shipbench data check DATASET"):
         assert f"<code>{command}</code>" in reference
     assert "--diagnosis" in reference
+    for notebook in (ROOT / "docs" / "notebooks").glob("*.ipynb"):
+        page = tmp_path / "site" / "notebooks" / notebook.stem
+        assert 'class="output"' in (page / "index.html").read_text()
+        assert (page / notebook.name).read_bytes() == notebook.read_bytes()  # to download
