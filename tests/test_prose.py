@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 
 pytest.importorskip("yaml", reason="mkdocs is not installed (extra `docs`)")
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))]
 LONGEST, MEDIAN = 35, 18
 """Most words of a sentence, and of the median of a page (CONTRIBUTING.md)."""
 _NO_PROSE = re.compile(
@@ -49,7 +50,8 @@ def _hooks():
                 spec = importlib.util.spec_from_file_location(path.stem, path)
                 module = importlib.util.module_from_spec(spec)
                 spec.loader.exec_module(module)
-                yield module
+                if hasattr(module, "on_page_markdown"):
+                    yield module
     finally:
         sys.path.remove(str(ROOT / "docs"))
 
@@ -60,6 +62,8 @@ HOOKS = list(_hooks())
 def generated(page: Path) -> str:
     """The page as the site has it, before it becomes HTML."""
     text = page.read_text("utf-8")
+    if page.suffix == ".ipynb":
+        return "\n\n".join("".join(cell["source"]) for cell in json.loads(text)["cells"] if cell["cell_type"] == "markdown")
     for hook in HOOKS:
         text = hook.on_page_markdown(text, SimpleNamespace(file=SimpleNamespace(src_path=page.name)), None, None)
     return text
