@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from shipbench.contract.base import BROKEN
+from shipbench.contract.check import check_model
+
 nbformat = pytest.importorskip("nbformat", reason="nbclient is not installed (extra `docs`)")
 ROOT = Path(__file__).parent.parent
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
@@ -72,3 +75,12 @@ def test_an_executed_notebook_is_kept_until_its_text_changes(tmp_path, hook, mon
     assert '<pre class="output">&lt; ' in first
     assert shown("import time\nprint('<', time.time_ns())") == first
     assert shown("import time\nprint('<', time.time_ns() )").split("output")[1] != first.split("output")[1]
+
+
+@pytest.mark.parametrize(("stem", "name"), [("pytorch-model", "MyNet"), ("own-simulation", "MySimulation")])
+def test_a_model_of_a_notebook_keeps_the_contract(stem, name, tmp_path):
+    notebook = nbformat.read(ROOT / "docs" / "notebooks" / f"{stem}.ipynb", as_version=4)
+    code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+    last = next(i for i, source in enumerate(code) if f"class {name}" in source)
+    (tmp_path / "my_model.py").write_text("\n\n".join(code[: last + 1]))
+    assert check_model(f"{tmp_path / 'my_model.py'}:{name}").of(BROKEN) == []
