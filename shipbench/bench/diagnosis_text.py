@@ -123,13 +123,18 @@ def gain_words(g: Gain | None, named: int = 1) -> str:
     low, high = g.ci95
     all_of_them = "it" if named == 1 else "both" if named == 2 else f"all {named}"
     doubt = "" if low > 0 else " This may be no gain at all." if high > 0 else " The extended model is worse."
-    between = _between(-high, -low, "less", "more") if low <= 0 <= high else "{:.0f} to {:.0f} %".format(*sorted((100 * abs(low), 100 * abs(high))))
-    share = f"{100 * abs(g.relative):.0f} % {'less' if g.relative >= 0 else 'more'}"
     return (
         f"With {all_of_them}, the {_METRICS.get(g.metric, g.metric)} on held-out runs {'falls' if g.relative >= 0 else 'rises'} from "
-        f"{figure(g.before)} m to {figure(g.after)} m: {share} (95 %: {between}), "
-        f"better in {g.runs_better.replace('/', ' of ')} runs.{doubt}"
+        f"{figure(g.before)} m to {figure(g.after)} m: {gain_share(g)}.{doubt}"
     )
+
+
+def gain_share(g: Gain) -> str:
+    """The relative gain with its interval and the runs that are better."""
+    low, high = g.ci95
+    between = _between(-high, -low, "less", "more") if low <= 0 <= high else "{:.0f} to {:.0f} %".format(*sorted((100 * abs(low), 100 * abs(high))))
+    share = f"{100 * abs(g.relative):.0f} % {'less' if g.relative >= 0 else 'more'}"
+    return f"{share} (95 %: {between}), better in {g.runs_better.replace('/', ' of ')} runs"
 
 
 def headline(d: Diagnosis) -> str:
@@ -175,13 +180,17 @@ def _unit(c: Candidate, name: str) -> str:
     return next((u for u in c.units.values() if u != "rad"), "1")
 
 
+def grade(score: float) -> str:
+    """Evidence of a score (twice the log Bayes factor) in the words of Kass and Raftery (1995), Bayes factors, section 3.2."""
+    factor = 0.5 * score
+    return f"{'very strong' if factor > 5.0 else 'strong' if factor > 3.0 else 'positive' if factor > 1.0 else 'weak'} evidence"
+
+
 def strength(c: Cause) -> str:
-    """Evidence in words with the log Bayes factor; the words are those of Kass and Raftery (1995), Bayes factors, section 3.2."""
+    """Evidence in words with the log Bayes factor."""
     if not math.isfinite(c.score):
         return "an error of the record itself"
-    factor = 0.5 * c.score
-    word = "very strong" if factor > 5.0 else "strong" if factor > 3.0 else "positive" if factor > 1.0 else "weak"
-    return f"{word} evidence (log Bayes factor {factor:.0f})" + (f", supported by {c.support}" if c.support else "")
+    return f"{grade(c.score)} (log Bayes factor {0.5 * c.score:.0f})" + (f", supported by {c.support}" if c.support else "")
 
 
 def force_words(force: dict[str, float]) -> str:

@@ -35,6 +35,11 @@ def stroke(i: int) -> str:
     return f'class="line c{i % COLOURS}"' + (f' stroke-dasharray="{dash}"' if dash else "")
 
 
+def switch(i: int, name: str) -> dict[str, Any]:
+    """Model number `i` for the macros `switches` and `errors` of `macros.html.j2`."""
+    return {"i": i, "name": name, "stroke": stroke(i)}
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A column: its name, what it is in words, the unit in which it is shown, and the decimals that are kept."""

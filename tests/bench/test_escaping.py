@@ -10,7 +10,7 @@ import pytest
 from test_diagnosis_report import make_diagnosis
 from test_leaderboard import results
 
-from shipbench.bench.diagnosis_report import page
+from shipbench.bench.diagnosis_html import diagnosis_page as page
 from shipbench.bench.escaping import csv_text, latex_text, markdown_text
 from shipbench.bench.formats import render
 from shipbench.bench.leaderboard import build_board
@@ -112,11 +112,11 @@ def digest_of(content):
 
 
 def test_pages_allow_their_own_style_and_nothing_else(tmp_path):
-    for text in (hostile("html", tmp_path, source="<style>*{display:none}</style>"), page(make_diagnosis())):
+    for text in (hostile("html", tmp_path, source="<style>*{display:none}</style>"), page(make_diagnosis(name="<style>*{display:none}</style>"))):
         policy = re.search(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', text)[1]
         assert policy.startswith("default-src 'none'; base-uri 'none'; form-action 'none'; ")
+        scripts = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
         assert "unsafe-eval" not in policy
-        for script in re.findall(r"<script>(.*?)</script>", text, re.DOTALL):
-            assert f"'sha256-{digest_of(script)}'" in policy
-        [style] = re.findall(r"<style[^>]*>(.*?)</style>", text, re.DOTALL)  # also none in a picture
+        assert re.findall(r"script-src ([^;]*)", policy) == ([" ".join(f"'sha256-{digest_of(s)}'" for s in scripts)] if scripts else [])
+        [style] = re.findall(r"<style[^>]*>(.*?)</style>", re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL), re.DOTALL)
         assert f"'sha256-{digest_of(style)}'" in policy

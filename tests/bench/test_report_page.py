@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from shipbench.bench.report.beside import _numbers, check_given, diagnoses
-from shipbench.bench.report.histories import _near
+from shipbench.bench.report.histories import near
 from shipbench.bench.report.page import write_report
 from shipbench.bench.report.series import gather
 from shipbench.bench.report.slicing import regime_errors
@@ -297,7 +297,7 @@ def test_a_prediction_that_leaves_the_picture_is_cut():
     away = truth.copy()
     away[5:, 1] = 1e7
     away[8, 0] = np.nan
-    assert np.isfinite(_near(away, truth)).all(axis=1).tolist() == [True] * 5 + [False] * 6
+    assert np.isfinite(near(away, truth)).all(axis=1).tolist() == [True] * 5 + [False] * 6
 
 
 def test_axes_put_points_where_they_belong():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ...render.linked import stroke
+from ...render.linked import switch
 from ..results import Results
 from .histories import study_plots
 from .pictures import growth
@@ -22,7 +22,7 @@ def study_curves(results: Results, dataset: str, models: Sequence[str], points: 
     rows = results.rows[results.rows["dataset"] == dataset]
     series = gather(results, dataset, models, points)
     return {
-        "models": [{"i": i, "name": name, "stroke": stroke(i)} for i, name in enumerate(models)],
+        "models": [switch(i, name) for i, name in enumerate(models)],
         "tracks": study_plots(series, rows, models, summary["ship_L"], summary["ship_B"]),
         "growth": [
             ("Position error ED", growth(series, models, 0, "ED [m]")),

@@ -19,7 +19,7 @@ _WIDTH, _HEIGHT = 400.0, 330.0
 
 def growth(series: Series, models: Sequence[str], which: int, ylabel: str) -> str:
     """Error (0: position, 1: heading) against time: median of the windows and the band between the quartiles."""
-    found = {m: np.quantile(series.errors[m][which], [0.25, 0.5, 0.75], axis=0) for m in models if m in series.errors}
+    found = {m: np.nanquantile(series.errors[m][which], [0.25, 0.5, 0.75], axis=0) for m in models if m in series.errors}
     if not found:
         return ""
     ends = [float(q[1, -1]) for q in found.values()]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_LEFT, _RIGHT, _TOP, _BOTTOM = 46.0, 10.0, 10.0, 36.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 46.0, 16.0, 10.0, 36.0
 
 
 @dataclass(frozen=True)
@@ -41,14 +41,15 @@ class Axes:
         """The `d` of the area between two lines."""
         return path(np.column_stack([self.px(np.concatenate([x, x[::-1]])), self.py(np.concatenate([low, high[::-1]]))])) + "z"
 
-    def grid(self, xlabel: str, ylabel: str, names: Sequence[str] = ()) -> str:
-        """Grid lines, ticks and labels; `names` replace the numbers of a horizontal axis of categories 0, 1, ..."""
+    def grid(self, xlabel: str, ylabel: str, names: Sequence[str] = (), xticks: Sequence[float] = ()) -> str:
+        """Grid lines, ticks and labels; `names` replace the numbers of a horizontal axis of categories 0, 1, ..., `xticks` its round numbers."""
         bottom, right = self.height - _BOTTOM, self.width - _RIGHT
         parts = []
         for value in ticks(*self.y, self.log):
             at = f"{float(self.py(value)):.1f}"
             parts.append(f'<path class="grid" d="M{_LEFT:g} {at}H{right:g}"/><text class="y" x="{_LEFT - 5:g}" y="{at}">{label(value)}</text>')
-        places = [(float(i), text) for i, text in enumerate(names)] if names else [(v, label(v)) for v in ticks(*self.x)]
+        round_numbers = [v for v in xticks if self.x[0] <= v <= self.x[1]] or ticks(*self.x)
+        places = [(float(i), text) for i, text in enumerate(names)] if names else [(v, label(v)) for v in round_numbers]
         for value, text in places:
             at = f"{float(self.px(value)):.1f}"
             parts.append(f'<path class="grid" d="M{at} {_TOP:g}V{bottom:g}"/><text class="x" x="{at}" y="{bottom + 14:g}">{text}</text>')
