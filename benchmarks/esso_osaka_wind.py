@@ -12,7 +12,7 @@ import numpy as np
 
 from shipbench import load_dataset
 from shipbench.diagnosis.analysis import analyse, plain_model
-from shipbench.diagnosis.clocks import NAMES, check_clocks
+from shipbench.diagnosis.clocks import check_clocks, late_effects
 from shipbench.diagnosis.plant import Plant
 from shipbench.records import Dataset
 
@@ -29,7 +29,7 @@ def measured(data: Dataset) -> np.ndarray:
 def seen(data: Dataset) -> np.ndarray | None:
     """The same from the motion alone, or None where no wind per run is named."""
     late = check_clocks(data)
-    found = analyse(plain_model(Plant.of(data if late is None else late.mended), settled=() if late is None else NAMES)).final
+    found = analyse(plain_model(Plant.of(data if late is None else late.mended), settled=() if late is None else late_effects())).final
     for term, value in zip(found.model.terms, found.values, strict=True):
         if term.label == "wind_per_run":
             public = [term.effect.public(row) for row in value * found.scales.amplitudes(term, found.plant.c.L)]

@@ -129,7 +129,7 @@ def _effect(part: dict[str, Any], as_json: bool) -> None:
         say_wrapped(f"It needs the recorded channels {', '.join(effect.channels)}.")
     say_wrapped(f"Source: {part['source']}.")
     say("\nExample:")
-    if part["name"] in ("unit_or_sign_error", "change_point"):
+    if effect.traits.describes_data:
         say("  shipbench diagnose demo")
     else:
         command = f"shipbench run --model physics --model physics+{part['name']} --dataset demo --horizon 60"

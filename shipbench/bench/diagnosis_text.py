@@ -15,7 +15,6 @@ WIDTH = 80
 """Columns of summary.txt."""
 DETECTION_LIMIT = 'Detection limit: the smallest effect these runs could have shown ("-": cannot be detected)'
 _METRICS = {"ED": "position error"}
-_NO_MODEL = ("unit_or_sign_error", "change_point")
 
 
 def figure(value: float, digits: int = 3) -> str:
@@ -158,7 +157,7 @@ def headline(d: Diagnosis) -> str:
 
 def next_command(d: Diagnosis) -> str:
     """The command that compares the plain model with the extended one."""
-    inside = [c.effect for c in d.causes if c.effect not in _NO_MODEL]
+    inside = [c.effect for c in d.causes if not EFFECTS.get(c.effect).traits.describes_data]
     model = "+".join(["physics", *inside])
     return f"shipbench run --model physics --model {shlex.quote(model)} --dataset {shlex.quote(d.spec or d.dataset)}" if inside else ""
 

@@ -17,7 +17,7 @@ from .misread import judged
 from .model import NUM_BASE, Scales
 from .ordinary import NOTICEABLE
 from .plain import null_fit
-from .plant import Plant
+from .plant import HULL, Plant
 from .record_error import RecordError
 from .select import Selection, candidates_for, select
 from .settle import Fit, hull_evidence
@@ -141,7 +141,7 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
     null = selection.null
     findings, plain, errors = find_in_gears(null.plant)
     gears = [] if cautious else _named_gears(findings, threshold, only)
-    hull = 0.0 if is_spent() or (only is not None and "hull_derivatives" not in only) else hull_evidence(selection.final)
+    hull = 0.0 if is_spent() or (only is not None and HULL.name not in only) else hull_evidence(selection.final)
     known = Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, ())
     if is_spent():
         return known

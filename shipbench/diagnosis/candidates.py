@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects.base import EFFECTS
+from ..effects.base import EFFECTS, searched_by
 from .analysis import HULL_THRESHOLD, Analysis
 from .causes import p_of
-from .clocks import NAMES
+from .clocks import late_velocities_effect
 from .gear_kinds import GearFinding
 from .outcome import Candidate
 from .possible import why_not
@@ -73,9 +73,10 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
         return f"a dependence on {found.unknown.variable} explains more ({found.unknown.score:.0f} against {own:.0f})"
     if label in inside:
         late = any(t.label == label and t.since is not None for t in found.final.model.terms)
-        return "named as a change_point" if late and "change_point" in named else _DOUBT
+        change = searched_by("change")[0].name
+        return f"named as a {change}" if late and change in named else _DOUBT
     if label in found.selection.unsure:
-        if "bank_suction" in inside and s.term.effect.vector and not s.term.per_run:
+        if set(s.term.effect.traits.imitates) & set(inside):
             return "beside a bank, accepted only where it does not point straight at the bank and the runs agree on it"
         unsteady = "one value for each run does not explain how runs differ"
         return unsteady if s.term.per_run else "the runs do not agree that its size differs from zero, or the ship becomes an outlier"
@@ -132,26 +133,26 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str], measured: bo
     effect, plant = EFFECTS.get(name), found.final.plant
     if name in named:
         reason = "named"
-    elif name == "hull_derivatives":
+    elif effect.traits.search == "hull":
         unpaid = "not shown to pay on held-out runs" if measured else "named only where it pays on held-out runs, which was not measured"
         reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}" if found.hull <= HULL_THRESHOLD else unpaid
-    elif name in NAMES:
+    elif effect.late:
         put_right = "the clocks of position and velocities were corrected before the fit"
-        reason = put_right if "velocity_delay" in named else "by the track, position and velocities are recorded at the same time"
+        reason = put_right if late_velocities_effect().name in named else "by the track, position and velocities are recorded at the same time"
     elif why := why_not(effect, plant):
         reason = why
-    elif name == "change_point" and (barred := other_kinds_from(plant.seg.kinds)):
+    elif effect.traits.search == "change" and (barred := other_kinds_from(plant.seg.kinds)):
         where = f"{len(barred)} of {len(places(plant.seg.runs))} places"
         reason = f"no sign of it; not looked for at {where} where another kind of manoeuvre follows"
-    elif name in ("change_point", "unit_or_sign_error"):
+    elif effect.traits.describes_data:
         reason = "no sign of it"
     elif not plant.seg.commanded and shows_in_record(effect):
         reason = "this actuator is not commanded in these runs"
     elif shows_in_record(effect):
         reason = "only commands are recorded: the actuator dynamics are fitted"
-    elif name == "going_astern":
+    elif effect.traits.search == "never":
         reason = f"not looked for; fit it with physics+{name}"
     else:
         reason = "not considered"
-    score = found.hull if name == "hull_derivatives" else float("nan")
+    score = found.hull if effect.traits.search == "hull" else float("nan")
     return Candidate(name, score, float("nan"), reason, family=effect.family)

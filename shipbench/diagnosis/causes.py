@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..checking.units import UnitFinding
-from ..effects.base import EFFECTS, Effect
+from ..effects.base import EFFECTS, Effect, searched_by
 from .analysis import HULL_THRESHOLD, Analysis
 from .by_place import goes_with, of_runs
-from .clocks import LateVelocities
+from .clocks import LateVelocities, late_effects, late_velocities_effect
 from .forces import force_of_hull, force_of_term
 from .gear_kinds import GearFinding
 from .generic import Dependence
@@ -20,7 +20,7 @@ from .model import FREE, hull_changes
 from .outcome import Cause, Estimate, Gain, what_it_is
 from .plant import HULL, NUM_HULL
 from .robust import covariance, inflation
-from .select import ALIKE, CONFUSED
+from .select import CONFUSED
 from .settle import Fit
 from .ship_file import whatever_the_ship
 from .term import Term
@@ -63,7 +63,7 @@ def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs
     notes = [f"The log Bayes factor compares the models {compared}", effect.way]
     notes += [goes_with(fit, of_runs(fit, index))] if term.per_run else []
     notes += [f"{effect.name} begins with run {runs[term.since]} (number {term.since}, the first is 0)"] if term.since is not None else []
-    name = effect.name if term.since is None else "change_point"
+    name = effect.name if term.since is None else searched_by("change")[0].name
     parameters = _parameters(fit, index, term)
     if term.since is not None:
         parameters = {"from_run": Estimate(float(term.since), "1", (np.nan, np.nan))} | parameters
@@ -84,7 +84,7 @@ def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
     steps = found.selection.steps
     own = max((s for s in steps if s.term.label == term.label), key=lambda s: (s.round, s.score), default=None)
     near = [s.term.label for s in steps if own is not None and s.is_near(own)]
-    near += [other for group in ALIKE if term.label in group for other in sorted(group - {term.label})]
+    near += term.effect.traits.aliases
     present = {t.label for t in found.final.model.terms}
     return tuple(dict.fromkeys(n for n in near if n not in present))
 
@@ -162,12 +162,12 @@ def _hull_cause(found: Analysis, gain: Gain | None) -> Cause:
     parameters = {p.name: Estimate(value, p.unit, (low, high)) for p, value, low, high in values}
     evidence = "A hull within 30 % of the regressions explains the runs better than one within 3 %."
     score = found.hull
-    return Cause("hull_derivatives", 0, score, p_of(found, score), parameters, (), "", gain, evidence, force=force_of_hull(fit))
+    return Cause(HULL.name, 0, score, p_of(found, score), parameters, (), "", gain, evidence, force=force_of_hull(fit))
 
 
 def _unit_cause(rank: int, u: UnitFinding) -> Cause:
     parameters = {f"{u.channel}_factor": Estimate(float(u.factor), "1", (float(u.factor), float(u.factor)))}
-    return Cause("unit_or_sign_error", rank, np.inf, 0.0, parameters, (), "", None, f"{u.channel}: {u.kind}. {u.evidence}")
+    return Cause(searched_by("units")[0].name, rank, np.inf, 0.0, parameters, (), "", None, f"{u.channel}: {u.kind}. {u.evidence}")
 
 
 def _late_cause(rank: int, found: Analysis, late: LateVelocities) -> Cause:
@@ -184,9 +184,10 @@ def _late_cause(rank: int, found: Analysis, late: LateVelocities) -> Cause:
     )
     if late.over_position < 0.0:
         evidence += " The runs do not agree on an early position."
-    confused = ("position_delay",) if late.over_position < 0.0 else ()
-    line = EFFECTS.get("velocity_delay").correction({k: e.value for k, e in parameters.items()})
-    return Cause("velocity_delay", rank, late.score, p_of(found, late.score), parameters, confused, "", None, evidence, correction=line)
+    effect = late_velocities_effect()
+    confused = tuple(name for name in late_effects() if name != effect.name) if late.over_position < 0.0 else ()
+    line = effect.correction({k: e.value for k, e in parameters.items()})
+    return Cause(effect.name, rank, late.score, p_of(found, late.score), parameters, confused, "", None, evidence, correction=line)
 
 
 def remaining(found: Analysis) -> dict[str, Any]:

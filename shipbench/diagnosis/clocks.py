@@ -15,6 +15,7 @@ from ..checking.recording import Recording
 from ..checking.track import keeps_time, lags, late_velocities, may_be_none
 from ..checking.yaw import late_yaw_rate
 from ..data.corrections import undelayed
+from ..effects.base import EFFECTS, Effect
 from ..records import Dataset, Run
 from ..signals import PSI, STATES, U, V
 from .budget import is_spent
@@ -25,8 +26,6 @@ from .model import Scales
 from .plant import Plant
 from .settle import Fit, Model
 
-NAMES = ("velocity_delay", "position_delay")
-"""What kinematics may answer."""
 _SURE = 2.0
 """Standard errors over the runs."""
 
@@ -66,15 +65,25 @@ def check_clocks(dataset: Dataset) -> LateVelocities | None:
     return LateVelocities(delay, sd, best == "filtered", 2.0 * float(np.sum(over)), 2.0 * float(np.sum(over_position)), ways[best])
 
 
+def late_effects() -> tuple[str, ...]:
+    """Names of the delays that kinematics may answer."""
+    return tuple(name for name in EFFECTS.names() if EFFECTS.get(name).late)
+
+
+def late_velocities_effect() -> Effect:
+    """The delay of both velocities together."""
+    return next(e for e in map(EFFECTS.get, late_effects()) if e.traits.faults_of == {"u", "v"})
+
+
 def not_asked(dataset: Dataset, late: LateVelocities | None) -> tuple[str, ...]:
     """Delays that are not asked of the model: all of them once the clocks are put right, or where measured speeds and the track show none."""
-    return NAMES if late is not None or (has_speeds(dataset) and keeps_time(Recording(dataset))) else ()
+    return late_effects() if late is not None or (has_speeds(dataset) and keeps_time(Recording(dataset))) else ()
 
 
 def ruled_out(dataset: Dataset, found: Fit) -> tuple[str, ...]:
     """Delays in a model that the track, which shows none, rules out by two standard errors: something else is late. (A supply vessel on a passage,
     nothing hidden: 1.8 s by the forces; by the track 0.5 s, standard error 0.4.)"""
-    late = [i for i, t in enumerate(found.model.terms) if t.label in NAMES and t.since is None]
+    late = [i for i, t in enumerate(found.model.terms) if t.effect.late and t.since is None]
     seen = lags(Recording(dataset)) if late and has_speeds(dataset) else None
     if seen is None:
         return ()
@@ -83,7 +92,7 @@ def ruled_out(dataset: Dataset, found: Fit) -> tuple[str, ...]:
     for i in late:
         term = found.model.terms[i]
         delay = float((found.values[i] * found.scales.amplitudes(term, found.plant.c.L))[0])
-        lag, sd = own if term.label == "velocity_delay" else position
+        lag, sd = own if term.effect.traits.faults_of == {"u", "v"} else position
         if any(term.setting):  # velocities that are late in the earth's axes are a position that is early
             lag, sd = -position[0], position[1]
         if may_be_none((lag, sd)) and abs(delay - lag) > 2.0 * sd:

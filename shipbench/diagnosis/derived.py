@@ -11,6 +11,7 @@ from scipy.fft import dct
 from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
 
+from ..effects.base import EFFECTS
 from ..records import Dataset, Run
 from ..signals import PSI, R, U, V, X, Y
 
@@ -20,7 +21,6 @@ in simulated trials, derived speeds 0.004 to 0.14), with few runs as low as chan
 _LEAST_TRACK, _LEAST_HEADING = 0.02, np.deg2rad(0.02)
 """Quick errors [m at 130 m, rad] below which they are those of the integration."""
 _LEAST_SAMPLES = 20
-_FAULTS = {"velocity_delay": {"u", "v"}, "speed_scale": {"u", "v"}, "yaw_rate_bias": {"r"}}
 
 
 def marked(dataset: Dataset) -> Dataset:
@@ -39,7 +39,8 @@ def marked(dataset: Dataset) -> Dataset:
 
 def faults(dataset: Dataset) -> tuple[str, ...]:
     """Faults of sensors that are not there."""
-    return tuple(name for name, channels in _FAULTS.items() if channels <= set(dataset.derived))
+    faulty = ((name, EFFECTS.get(name).traits.faults_of) for name in EFFECTS.names())
+    return tuple(name for name, channels in faulty if channels and channels <= set(dataset.derived))
 
 
 def has_speeds(dataset: Dataset) -> bool:

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from ..checking.standing import standing
 from ..checking.units import UnitFinding, corrected
-from ..effects.base import EFFECTS
+from ..effects.base import EFFECTS, searched_by
 from ..errors import InputError
 from ..processes import process_pool
 from ..records import Dataset
@@ -47,8 +47,6 @@ FOLDS = 5
 FEW_RUNS, FEW_SAMPLES = 5, 300
 _WHOLE = 0.2
 """Share of the time that the plain model of all runs takes, and the search beside it, where the gain is measured."""
-NOT_A_MODEL = ("unit_or_sign_error", "change_point")
-"""They describe the data, not the ship: correct the data, or fit the runs before and after the change apart."""
 
 
 @threadpool_limits.wrap(limits=1)  # its matrices are small: the threads of two processes on two cores wait for each other (24 runs: 81 s, now 36 s)
@@ -123,7 +121,8 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
     lines += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + mended + said(dataset) + doubts
     lines += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
     causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
-    lines += [f"change_point: {c.evidence} Fit the runs before it and from it on separately." for c in causes if c.effect == "change_point"]
+    changes = {e.name for e in searched_by("change")}
+    lines += [f"{c.effect}: {c.evidence} Fit the runs before it and from it on separately." for c in causes if c.effect in changes]
     behind = _behind_its_record(found, causes)
     lines += [f"{name}: {text}" for name, text in behind.items()]
     lines += what_is_left(found) if causes and not doubts else []
@@ -132,7 +131,7 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
     trace = trace_of(dataset, found, worth.hull)
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
     verdict = "unknown" if unknown else "found" if causes else "none"
-    names = [c.effect for c in causes if c.effect not in (*NOT_A_MODEL, *behind)]
+    names = [c.effect for c in causes if not (EFFECTS.get(c.effect).traits.describes_data or c.effect in behind)]
     return Diagnosis(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes),
         candidates=tuple(describe_candidates(found, [c.effect for c in causes], worth.gain is not None)),
@@ -281,7 +280,7 @@ def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, st
         how, mend = f"with a play of {math.degrees(size.value):.2g} deg behind", "Measure behind that play."
         if size.unit == "s":
             how = f"{abs(size.value):.2g} s {'later' if size.value > 0.0 else 'sooner'} than"
-            near = ", which comes near" if c.effect.endswith("_lag") else ""
+            near = ", which comes near" if effect.traits.gear_field == "T" else ""
             mend = f"Put the record right first, by [delay] {channel} = {-size.value:.2g} in dataset.toml{near}."
         told[c.effect] = f"the motion shows the {what} {how} its record, to which predictors fit their gears. {mend}"
     return told

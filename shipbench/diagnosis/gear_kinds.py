@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..effects.base import EFFECTS
 from ..physics.actuators import Gear
 
 _RATE_POWER = {"n": 2, "delta": 1, "F": 0}
@@ -73,23 +74,18 @@ def least_rate(actuator: str, scale: float) -> float:
 def slow_on_any_ship(found: GearFinding) -> bool:
     """Whether a gear that is slower than those of its ship would be so on the longest ship, too; whatever does not go with the length is."""
     scale = (_LONGEST / 130.0) ** 0.5
-    if found.effect.endswith("_lag"):
+    changed = EFFECTS.get(found.effect).traits.gear_field
+    if changed == "T":
         return ORDINARY[found.actuator].T * scale < found.gear.T
-    return not found.effect.endswith("_rate_limit") or bool(found.gear.rate < least_rate(found.actuator, scale))
+    return changed != "rate" or bool(found.gear.rate < least_rate(found.actuator, scale))
 
 
 def kinds_of(actuator: str, scale: float, span: float, ordinary: Gear) -> list[Kind]:
     """What may be wrong with an actuator; `span` is the range of its commands."""
     T, rate = ORDINARY[actuator].T * scale, least_rate(actuator, scale)
-    lag = Kind({"n": "shaft_lag", "delta": "rudder_lag", "F": "thruster_lag"}[actuator], "T", T, 60.0 * scale, ordinary.T)
-    if actuator == "n":
-        return [lag, Kind("shaft_rate_limit", "rate", 0.02 * rate, rate)]
-    if actuator == "F":
-        return [lag]
-    return [
-        lag,
-        Kind("rudder_rate_limit", "rate", 0.02 * rate, rate),
-        Kind("rudder_delay", "delay", 0.15 * scale, DELAY * scale),
-        Kind("rudder_deadband", "deadband", 0.004 * span, 0.3 * span),
-        Kind("rudder_backlash", "backlash", 0.004 * span, 0.3 * span),
-    ]
+    bounds = {
+        "T": (T, 60.0 * scale, ordinary.T), "rate": (0.02 * rate, rate), "delay": (0.15 * scale, DELAY * scale),
+        "deadband": (0.004 * span, 0.3 * span), "backlash": (0.004 * span, 0.3 * span),
+    }  # fmt: skip
+    found = [e for e in map(EFFECTS.get, EFFECTS.names()) if any(channel.startswith(actuator) for channel in e.acts_through)]
+    return [Kind(e.name, name, *bounds[name]) for name in bounds for e in found if e.traits.gear_field == name]

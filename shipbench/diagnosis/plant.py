@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -148,6 +148,11 @@ def _substeps(dt: float, L: float) -> int:
     return max(1, int(np.ceil(dt / (0.15 * L**0.5) - 1e-9)))
 
 
+def _known(inputs: Mapping[str, np.ndarray], ship: Particulars) -> list[Active]:
+    """Effects whose values the measured `inputs` give."""
+    return [Active(e, e.known(inputs, ship)) for e in map(EFFECTS.get, EFFECTS.names()) if e.known_with and set(e.known_with) <= set(inputs)]
+
+
 class Plant:
     """Rollouts of eq. (2) over all segments.
 
@@ -178,8 +183,8 @@ class Plant:
         t = segments.start[:, None, None] + np.minimum(k + self.parts, k + 1.0 - 1e-9)[:, None] * segments.dt
         wind = None if segments.wind is None else np.swapaxes(segments.wind[:, :-1], 0, 1)
         self.course = Course(Vessel(dataset_ship, self.c), segments.dt / self.substeps, t, wind)
-        self.water = [] if segments.depth is None else [Active(EFFECTS.get("shallow_water"), (dataset_ship.T / segments.depth,))]
-        """What the recorded depth does."""
+        self.water = _known({} if segments.depth is None else {"depth": segments.depth}, dataset_ship)
+        """Effects whose values a measured input gives."""
         self.inputs = frozenset(("wind_speed", "wind_from") * (wind is not None) + ("depth",) * bool(self.water))
         """Measured inputs that the model takes into account."""
         self.ordinary: dict[str, Gear] = {}

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..data.noise import white_noise
 from ..effects.base import Effect
-from ..signals import DELTA
+from ..signals import STATES
 from .gram import by_run, shared_alone, solve
 from .model import PLACES
 from .ordinary import STRANGE, is_strange, needed
@@ -18,37 +18,14 @@ from .screen import evidence
 from .settle import Fit
 from .term import Term
 
-_WINDS = ("wind", "wind_per_run")
-"""Causes whose superstructure is fitted."""
-NEGLIGIBLE = 0.05
-"""In typical sizes. With enough samples the form of a hull makes tiny causes certain: speeds 0.1 % off, a bank of a 65th of the usual suction."""
-_OWN = {
-    "rudder_delay": 0.6, "rudder_lag": 0.4, "rudder_asymmetry": 0.25, "current_per_run": 0.15, "wind_per_run": 0.15, "rudder_stall": 0.5,
-    "thruster_lag": 0.42, "wind_drift": 0.3,
-}  # fmt: skip
-"""Likewise. How soon a ship answers her rudder depends on heel and on the flow's memory, which eq. (2) does not know (S175 with heel, nothing hidden:
-0.5 to 0.7 s early, 0.3 to 0.42 of the typical size; a ship whose lift builds up over half a length: 0.51 late; over a third: a lag of 0.31 and 0.32);
-the race of a single screw turns, and meets the rudder more on one side (5 % more race to one side, 4 % less to the other: 0.15 to 0.22 of the typical
-size); gusts and swell do not average out in a run (gusts of 1.5 m/s that last 20 s have means over 120 s of 0.11 of the typical wind), and push a
-ship about as currents of single runs do; lift grows more slowly than the sine of the angle on many a rudder (one with a flap, whose lift goes as
-tanh: 0.19 lost, 0.4 of the typical size); thrusters whose record is their order lag by 2 s, but ordinary ones by up to 4.5 s
-(`gear_kinds.ORDINARY`); a drift of 0.3 % of the wind is 0.02 m/s, which the form of a hull gives (0.27 % on a cruise ship
-in a wind that moved no water)."""
-_LATE_STALL, _OF_LATE_STALL = 0.3, 0.7
-"""Angle [rad] from which a stall lies where rudders ordinarily stall, and the least size from there on. (A wing that stalls smoothly about 35 deg, on
-two ships with nothing hidden and on one with another hull: 0.28 to 0.31 lost from 20 deg on, worth 17 to 19.)"""
 _NOISES = 6.0
 """Play behind a record of the rudder, in standard deviations of its noise, which such play takes out. (A boat of 12 m with noise of 0.1 deg and no
 play, beside a lag of 0.2 s: 0.35 and 0.37 deg, worth 90 and 106; without the noise none.)"""
-_UNSEEN_PLAY = 0.4
-"""Likewise in typical sizes: it makes a ship answer her rudder later, as a lag does. (A trainer of 50 m whose lift builds up, without any: 0.39 and
-0.64 deg, 0.19 and 0.32 of the typical size.)"""
+_LATE_BESIDE_LATE = 0.6
+"""Least size of a delay beside that of another sensor, in typical sizes (docs/calibration.md#sizes-that-matter)."""
 _ABREAST = 0.1
 """Angle [rad] to the normal of a bank that was found, within which a steady wind or current makes up for its law. (Beside a bank that all runs of a
 barge followed, at 89 to 91 deg: a wind of 5.3 m/s and a current of 0.1 m/s from and to 270 deg, of which there were none.)"""
-_WHERE_FORCES_ACT = 0.08
-"""Lengths by which the forces of a hull act elsewhere than those of a fitted one. (An antenna whose velocities are its own, at 0.1 to 0.4
-lengths on six ships: root mean square of the errors; with none on a patrol vessel 0.08 and 0.06 were named, worth 85 and 26.)"""
 _DOUBT, _DOUBT_LATE = 0.05, 1e-5
 """Probability that a size is zero from which it is not sure; of a cause that begins with a run, which is chosen among hundreds of effects and runs.
 (Ten standard manoeuvres with nothing hidden: 0.01 to 1e-4; changes hidden in 24 runs: 1e-6 and less.)"""
@@ -85,9 +62,8 @@ def covariance(fit: Fit, index: int) -> np.ndarray:
     at, term = np.flatnonzero(np.isin(fit.prior.shared, fit.columns_of(index))), fit.model.terms[index]
     wider = np.maximum(1.0, inflation(fit, at)) ** 0.5
     cov = fit.solution.cov[np.ix_(at, at)] * np.outer(wider, wider)
-    if term.label == "antenna_offset" and any(term.setting):
-        cov[0, 0] += (_WHERE_FORCES_ACT * fit.plant.c.L / fit.scales.amplitudes(term, fit.plant.c.L)[0]) ** 2
-    return cov
+    spread = np.array(term.effect.form_spread(term.setting, fit.plant.c.L))
+    return cov + np.diag((spread / fit.scales.amplitudes(term, fit.plant.c.L)) ** 2)
 
 
 def is_borne_by_one(fit: Fit, index: int) -> bool:
@@ -148,9 +124,11 @@ def tells_runs_apart(fit: Fit) -> bool:
     return own_forces(fit) < _OWN_LEFT + _OWN_SHARE * max(worth, 0.0)
 
 
-def blows_on_a_ship(fit: Fit) -> bool:
-    """Whether a wind that is not measured needs no superstructure that no ship has: then something else is taken for it."""
-    return bool(np.max(np.abs(needed(fit)[[PLACES[f"wind_{axis}"] for axis in ("X", "Y", "N", "lever")]])) < STRANGE)
+def relies_on_a_ship(fit: Fit, effect: Effect) -> bool:
+    """Whether the coefficients of the ship that the effect relies on are those of some ship (a superstructure, of a wind that is not measured): else
+    something else is taken for it."""
+    places = [PLACES[name] for name in effect.traits.relies_on]
+    return not places or bool(np.max(np.abs(needed(fit)[places])) < STRANGE)
 
 
 def is_on_a_ship(fit: Fit, index: int) -> bool:
@@ -165,19 +143,20 @@ def stands(fit: Fit, index: int) -> bool:
     return is_on_a_ship(fit, index) and is_sure(fit, index)
 
 
-def mends_the_bank(fit: Fit, index: int) -> bool:
-    """Whether it is a steady wind or current along the normal of a bank that is a cause, too: what the bank's own law leaves looks like that."""
-    banks = [t.setting[0] for t in fit.model.terms if t.label == "bank_suction"]
-    if not banks or fit.model.terms[index].label not in ("current", "wind"):
+def imitates(fit: Fit, index: int) -> bool:
+    """Whether it is a steady vector along the normal of a cause that it imitates (a bank): what the law of that one leaves looks like it."""
+    of = fit.model.terms[index].effect.traits.imitates
+    normals = [t.effect.normal(t.setting) for t in fit.model.terms if t.label in of]
+    if not normals:
         return False
     north, east = fit.values[index]
-    return any(abs(np.sin(np.arctan2(east, north) - bearing)) < _ABREAST for bearing in banks)
+    return any(n is not None and abs(np.sin(np.arctan2(east, north) - n)) < _ABREAST for n in normals)
 
 
 def shows_on_any_ship(effect: Effect) -> bool:
     """Whether it shows beside the coefficients of another ship, too: a fault of a sensor, or a force that breaks a symmetry which every ship has (not
     a wind of each run, nor a bank, which act through coefficients alone)."""
-    return effect.family == "sensor" or (effect.breaks_symmetry and effect.name not in ("wind_per_run", "bank_suction"))
+    return effect.family == "sensor" or (effect.breaks_symmetry and not effect.traits.by_coefficients)
 
 
 def bends(fit: Fit, index: int, null: Fit) -> bool:
@@ -193,9 +172,9 @@ def is_sure(fit: Fit, index: int) -> bool:
     from scipy.stats import f
 
     term = fit.model.terms[index]
-    if term.label in _WINDS and not blows_on_a_ship(fit):
+    if not relies_on_a_ship(fit, term.effect):
         return False
-    if mends_the_bank(fit, index):
+    if imitates(fit, index):
         return False
     if term.per_run:
         return lasts(fit) and tells_runs_apart(fit)
@@ -208,24 +187,24 @@ def is_sure(fit: Fit, index: int) -> bool:
 
 def least_size(fit: Fit, term: Term) -> float:
     """Below which a cause does not matter, in typical sizes. Of a gear's time half a sample, too, for which an order may have stood before it was
-    recorded; of play behind a record what the record's noise makes of it; of a stall more where rudders ordinarily stall. Beside the delay of another
+    recorded; of play behind a record what the record's noise makes of it. Beside the delay of another
     sensor as of the rudder's: by what positions are later than velocities, the track tells; which of the two is late, how soon the ship answers
     alone."""
-    least = _OWN.get(term.label, NEGLIGIBLE)
-    if term.label == "rudder_stall" and max(term.setting, default=0.0) > _LATE_STALL:
-        least = _OF_LATE_STALL
+    least = term.effect.least_size(term.setting)
     if term.effect.late and any(t.effect.late for t in fit.model.terms if t.label != term.label):
-        least = max(least, _OWN["rudder_delay"])
+        least = max(least, _LATE_BESIDE_LATE)
     if term.effect.enters == "gear" and term.effect.parameters[0].unit == "s":
         least = max(least, 0.5 * fit.plant.seg.dt / float(fit.scales.amplitudes(term, fit.plant.c.L)[0]))
-    if term.label == "rudder_backlash" and not fit.plant.seg.commanded:
-        least = max(least, _UNSEEN_PLAY, _NOISES * _rudder_noise(fit.plant.seg) / float(fit.scales.amplitudes(term, fit.plant.c.L)[0]))
+    if term.effect.traits.least_unrecorded and not fit.plant.seg.commanded:
+        noise = _record_noise(fit.plant.seg, term.effect.acts_through[0]) / float(fit.scales.amplitudes(term, fit.plant.c.L)[0])
+        least = max(least, term.effect.traits.least_unrecorded, _NOISES * noise)
     return least
 
 
-def _rudder_noise(seg: Segments) -> float:
-    """Standard deviation of the noise of the record of the rudder, in rad."""
-    return float(np.median([white_noise(delta[real]) for delta, real in zip(seg.states[..., DELTA], seg.mask, strict=True)]))
+def _record_noise(seg: Segments, channel: str) -> float:
+    """Standard deviation of the noise of the record of an actuator, in its unit."""
+    record = seg.states[..., STATES.index(channel)]
+    return float(np.median([white_noise(values[real]) for values, real in zip(record, seg.mask, strict=True)]))
 
 
 def matters(fit: Fit, index: int) -> bool:

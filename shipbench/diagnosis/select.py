@@ -22,9 +22,6 @@ from .screen import Score, changes, glance, overlap, screen
 from .settle import Fit, hull_evidence, settle
 from .term import Term
 
-NOT_SCREENED = ("hull_derivatives", "change_point", "unit_or_sign_error", "going_astern", "rudder_rate_limit", "shaft_rate_limit")
-"""Found by their own tests (prior width of the hull, gated columns, kinematics, the record of the gears), or what every ship does. A limit has no
-slope where it does not act: where only commands are recorded, the rates of the gears are fitted instead."""
 MOST_EFFECTS = 6
 _REFITS = 3
 _WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
@@ -42,33 +39,11 @@ _NEAR = 1.0
 _IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
 """What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
 _OFF_FORM, _MISTAKEN, _OF_RUNS = 0.02, 10.0, 50.0
-AS_SHIPS_DIFFER = (
-    "added_resistance", "bank_suction", "center_of_gravity_shift", "cross_flow_drag", "mass_change", "race_gain", "rudder_backlash", "rudder_delay",
-    "rudder_gain", "rudder_lag", "rudder_stall", "shaft_lag", "shallow_water", "thrust_gain", "thruster_gain", "thruster_lever",
-    "thruster_speed_loss", "wake_variation",
-)  # fmt: skip
-"""A hull that lies off the regressions is not of the fitted form either, and what its form lacks passes for these, in which ships differ anyhow:
-they must be worth this share of the evidence for such a hull besides. (Mariner, nothing hidden: 600 to 1200 for the hull, 13 to 18 for a wrong name;
-thrust or mass off by their typical size on development ships: 80 to 290, and 28 to 31.) So must a cause with a value for each run, one that
-begins with a run, and a bank: where each run is another manoeuvre elsewhere, what the form lacks differs from run to run."""
-OFTEN_MISTAKEN = ("mass_change", "rudder_stall", "thrust_gain", "thruster_lever")
-"""What such forms passed for most: these, and values of single runs, must be worth more again. (Ships of five simulators with other equations: eight
-wrong names were worth 13 to 28, right ones 20 and from 50 on; of values of single runs, wrong ones 15 to 87 and from 147 on, right ones from 125.)"""
-ALIKE = ({"mass_change", "thrust_gain"},)
-"""Told as confused with each other however far apart: a ship that is slow to gain speed has more mass or less thrust, and for what else they do the
-hull's derivatives make up. (Five simulators: in six of eight sets with the thrust off mass was ahead, by 4 to 24; in two of six with the mass off
-thrust was, by 3 and 12.)"""
-CONFUSED, _OF_FORMULAS, _PUSH_ALIKE = 10.0, 0.1, ({"wind", "wave_drift"}, {"wind_per_run", "wave_drift"})
+CONFUSED, _OF_FORMULAS = 10.0, 0.1
 """Candidates within this of the winner's score are called confused with it; of these, within this share of it: how far they lie apart, their formulas
 decide. (Drift in waves by another formula: wind 706, waves 681.)"""
 _CHANGES, _CHANGE_MARGIN, _OWN_MARGIN = 2, 14.0, 4.0
 """A beginning is chosen among all effects: it must beat the best cause without one by this; the second where that is the same effect."""
-_INSEPARABLE = ({"wind", "wind_per_run", "wave_drift"},)
-"""Beside one of these the others are not named: wind and short waves come together and push alike (docs/theory.md#environment)."""
-_LASTING = (
-    "cross_flow_drag", "wake_variation", "race_gain", "rudder_stall", "rudder_asymmetry", "propeller_walk", "propeller_walk_astern", "bank_suction",
-)  # fmt: skip
-"""Hull, rudder and propeller keep their shape during trials, a bank its place: these do not begin with a run."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +62,7 @@ class Step:
 
     def is_near(self, best: Step) -> bool:
         """Whether the data do not tell it from the step that was taken instead."""
-        share = _OF_FORMULAS * ({self.term.label, best.term.label} in _PUSH_ALIKE)
+        share = _OF_FORMULAS * push_alike(self.term.effect, best.term.effect)
         return self.round == best.round and self.score > best.score - max(CONFUSED, share * best.score)
 
 
@@ -111,6 +86,11 @@ class Selection:
     small: Fit | None = None
 
 
+def push_alike(one: Effect, other: Effect) -> bool:
+    """Whether two effects of one group have different formulas, by which alone they are told apart."""
+    return bool(one.traits.group) and one.traits.group == other.traits.group and type(one).force is not type(other).force
+
+
 def shows_in_record(effect: Effect) -> bool:
     """Whether it acts between command and actuator alone: where the actuator is recorded, it is looked for in the record, not in the motion."""
     return effect.enters == "gear" and not effect.unrecorded
@@ -119,8 +99,8 @@ def shows_in_record(effect: Effect) -> bool:
 def asked_besides(term: Term, off_form: float, size: float = 0.0) -> float:
     """What a term must be worth besides the threshold, since what the form of a hull lacks could pass for it. Not so much of one whose `size`, in
     typical ones, doubts the ship file: that is no name."""
-    besides = _OF_RUNS if term.per_run else _MISTAKEN if term.label in OFTEN_MISTAKEN and size < STRANGE_SIZE else 0.0
-    return besides + off_form * (term.per_run or term.since is not None or term.label in AS_SHIPS_DIFFER)
+    besides = _OF_RUNS if term.per_run else _MISTAKEN if term.effect.traits.absorbs_misfit and size < STRANGE_SIZE else 0.0
+    return besides + off_form * (term.per_run or term.since is not None or term.effect.traits.between_ships)
 
 
 def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Sequence[str] = ()) -> list[Term]:
@@ -128,7 +108,7 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Se
     found = []
     for name in names if names is not None else EFFECTS.names():
         effect = EFFECTS.get(name)
-        if name in NOT_SCREENED or name in settled or (not plant.seg.commanded and shows_in_record(effect)):
+        if effect.traits.search != "screening" or name in settled or (not plant.seg.commanded and shows_in_record(effect)):
             continue
         if why_not(effect, plant):
             continue
@@ -287,8 +267,8 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
     if any(t.since is not None for t in now.model.terms):
         return best
     plain, gain = best, 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
-    out, least = (*(t.label for t in now.model.terms), *_LASTING), max(_CHANGE_MARGIN, _FAR_BEHIND * gain)
-    late = [s for s in changes(now) if s.score > least and s.term.label not in out][:_CHANGES]
+    present, least = {t.label for t in now.model.terms}, max(_CHANGE_MARGIN, _FAR_BEHIND * gain)
+    late = [s for s in changes(now) if s.score > least and s.term.label not in present and not s.term.effect.traits.persistent][:_CHANGES]
     if not late:
         return best
     start = Beginning.of(now, origin, [s.term for s in late])
@@ -333,7 +313,8 @@ def _tie(best: Score) -> float:
 def _beside(now: Fit) -> set[str]:
     """Effects that are in the model, and those that cannot be named beside them."""
     present = {t.label for t in now.model.terms}
-    return present | {label for group in _INSEPARABLE if group & present for label in group}
+    groups = {t.effect.traits.group for t in now.model.terms} - {""}
+    return present | {t.label for t in now.candidates if t.effect.traits.group in groups}
 
 
 def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -> list[Score]:

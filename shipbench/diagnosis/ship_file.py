@@ -90,7 +90,9 @@ def whatever_the_ship(name: str, found: Analysis) -> bool:
     shorter ship an ordinary rudder or shaft is slow: it must be slow for the longest ship. A wind of each run and a bank act through coefficients
     alone, and what these lack in a run's manoeuvre, or in those of one place, passes for them (a current shows in track and speeds besides; a ship
     that towed a barge on an elastic line had a bank). Of a change, what has changed decides."""
-    effect = EFFECTS.get(next((t.label for t in found.final.model.terms if t.since is not None), name) if name == "change_point" else name)
+    effect = EFFECTS.get(name)
+    if effect.traits.search == "change":
+        effect = next((t.effect for t in found.final.model.terms if t.since is not None), effect)
     return shows_on_any_ship(effect) or any(g.effect == name and slow_on_any_ship(g) for g in found.gears)
 
 

@@ -57,9 +57,9 @@ class Structure(Effect):
     source = "see above"
     parameters = (
         Parameter("race", "1", 0.2, -0.9, 1.0),
-        Parameter("wake_variation", "1", 0.3, -1.0, 2.0),
+        Parameter("wake_in_turns", "1", 0.3, -1.0, 2.0),
         Parameter("thruster_loss", "1", 0.25, -0.5, 1.2),
-        Parameter("thruster_gain", "1", 0.1, -0.5, 0.5),
+        Parameter("thruster_force", "1", 0.1, -0.5, 0.5),
         Parameter("cross_flow", "1", 0.6, -1.0, 2.0),
         Parameter("walk_astern", "1", 0.4, -2.0, 2.0),
         Parameter("straightening", "1", 0.3, -0.9, 1.0),

@@ -15,6 +15,9 @@ from ..ship import Particulars
 from ..signals import PSI, R, U, V, X, Y
 from .base import Effect, Parameter, per_run
 
+_FORM = 0.08
+"""Lengths by which the forces of a hull act elsewhere than those of a fitted one (docs/calibration.md#sizes-that-matter)."""
+
 
 class AntennaOffset(Effect):
     family = "sensor"
@@ -43,6 +46,10 @@ class AntennaOffset(Effect):
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
         return [(0.0,), (1.0,)]
+
+    def form_spread(self, setting: Sequence[float], L: float) -> tuple[float, ...]:
+        """The antenna's own velocities agree with the track: how far ahead they belong only the forces tell."""
+        return (_FORM * L if any(setting) else 0.0, 0.0)
 
     def correction(self, values: Mapping[str, float]) -> str:
         """The antenna's place, where the velocities are midship's."""

@@ -16,6 +16,7 @@ from ..ops import Array, absolute, cos, maximum, sin, smoothstep
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class BankSuction(Effect):
@@ -23,6 +24,7 @@ class BankSuction(Effect):
     summary = "a bank along the channel"
     phrase = "suction towards a bank"
     source = "Norrbin (1974), 10th Symp. Naval Hydrodynamics; docs/theory.md#environment"
+    traits = Traits(local=True, between_ships=True, persistent=True, by_coefficients=True)
     parameters = (
         Parameter("strength", "1", 0.3, -2.0, 2.0),
         Parameter("moment", "1", 0.06, -0.4, 0.4, other=True),
@@ -40,6 +42,10 @@ class BankSuction(Effect):
         unit = 0.5 * ship.rho * ship.L * ship.T * phi * sin(bearing - s.psi)
         u = s.u - e.u_c
         e.push(0.0, unit * c * u * u, -(0.2 * c + moment) * ship.L * unit * u * absolute(u))
+
+    def normal(self, setting: Sequence[float]) -> float | None:
+        """Bearing of the bank."""
+        return setting[0]
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
         """Banks on four sides, along and across the direction in which the places visited lie, each two breadths beyond the outermost of them, and

@@ -20,8 +20,9 @@ from ..physics.actuators import Gear
 from ..physics.modifiers import Flow, Modifiers
 from ..registry import Registry
 from ..ship import Particulars
+from .traits import SEARCHES, Traits
 
-EFFECTS = Registry("effect", "effects", "EFFECT", helpers=frozenset({"base"}))
+EFFECTS = Registry("effect", "effects", "EFFECT", helpers=frozenset({"base", "traits"}))
 
 _FROUDE = {"1": 0.0, "speed": 0.5, "time": 0.5, "rate": -0.5, "length": 1.0, "area": 2.0, "rpm rate": -1.0}
 _REFERENCE_LENGTH = 130.0
@@ -68,7 +69,8 @@ class Effect:
     has it already), `scales` (channels that it records (1 + q) times too large), `breaks_symmetry` (a force that knows port from
     starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that are wrong), `late` (tells of another
     time, and as much of the motion as a sensor in time, but where a record begins or ends), `unrecorded` (of a gear's: it may also act behind the
-    record of the actuator, where the motion alone shows it). `way`: how one of those that `fitted` gives acts, where the user should be told.
+    record of the actuator, where the motion alone shows it), `traits` (facts about ships and about its look-alikes). `way`: how one of those that
+    `fitted` gives acts, where the user should be told.
     """
 
     name: str = ""
@@ -86,6 +88,7 @@ class Effect:
     breaks_symmetry: ClassVar[bool] = False
     late: ClassVar[bool] = False
     unrecorded: ClassVar[bool] = False
+    traits: ClassVar[Traits] = Traits()
     way: str = ""
 
     def __init_subclass__(cls) -> None:
@@ -101,6 +104,26 @@ class Effect:
     def acts_through(self) -> tuple[str, ...]:
         """Actuators of which one at least must work for it to act; none where it needs no actuator."""
         return _ACTS_THROUGH.get(self.family, ())
+
+    def least_size(self, setting: Sequence[float]) -> float:
+        """Size in typical ones from which it is practically significant, with these shape parameters."""
+        return self.traits.least_size
+
+    def normal(self, setting: Sequence[float]) -> float | None:
+        """Direction [rad] along which its force acts, fixed to the earth; None for most."""
+        return None
+
+    def form_spread(self, setting: Sequence[float], L: float) -> tuple[float, ...]:
+        """Standard deviation of its amplitudes, in their units, that the form of a hull of length L [m] adds to any estimate."""
+        return tuple(0.0 for p in self.parameters if not p.shape)
+
+    def known(self, inputs: Mapping[str, np.ndarray], ship: Particulars) -> tuple[np.ndarray, ...]:
+        """Values `q` by the measured `inputs` of `known_with`.
+
+        Raises:
+            NotImplementedError: the model takes these inputs in itself (wind).
+        """
+        raise NotImplementedError
 
     def plausible(self, q: Sequence[float], ship: Particulars) -> bool:
         """True where all sizes `q` lie within the bounds of their parameters, shapes left out or not."""
@@ -162,6 +185,12 @@ class Effect:
                 raise InputError(f"effect '{self.name}': {self.vector[0]} is missing; accepted: {', '.join(known)}.")
             return size * math.cos(towards), size * math.sin(towards)
         return tuple(float(values.get(p.name, p.typical if p.shape else 0.0)) for p in self.parameters)
+
+
+def searched_by(search: str) -> tuple[Effect, ...]:
+    """Effects that a diagnosis looks for in one way, a key of `SEARCHES`."""
+    assert search in SEARCHES
+    return tuple(effect for effect in map(EFFECTS.get, EFFECTS.names()) if effect.traits.search == search)
 
 
 class Holder(Protocol):

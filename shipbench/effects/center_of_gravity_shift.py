@@ -9,6 +9,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class CenterOfGravityShift(Effect):
@@ -16,6 +17,7 @@ class CenterOfGravityShift(Effect):
     summary = "longitudinal centre of gravity"
     phrase = "a centre of gravity shifted forward by {shift}"
     source = "Fossen (2021), chapter 3; docs/theory.md#hull-and-loading"
+    traits = Traits(between_ships=True)
     parameters = (Parameter("shift", "m", 4.0, -15.0, 15.0, scaling="length"),)
     separate = "rudder reversals and thruster pushes at two positions"
 

@@ -16,6 +16,7 @@ from ..physics.actuators import Gear
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect
+from .traits import Traits
 
 
 class ChangePoint(Effect):
@@ -23,6 +24,7 @@ class ChangePoint(Effect):
     summary = "an effect that begins at a run or at a time"
     phrase = "a change that begins at run number {from_run}"
     source = "Page (1955), Biometrika 42, 523-527: change of a mean from a run or time on"
+    traits = Traits(search="change", describes_data=True, wraps=True, local=True)
     parameters = ()
     separate = "repeat the first run's manoeuvre at the end of the trials"
 

@@ -10,6 +10,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter, body_axes
+from .traits import Traits
 
 
 class Current(Effect):
@@ -17,6 +18,7 @@ class Current(Effect):
     summary = "uniform current, the same in all runs"
     phrase = "a current of {speed} towards {to}"
     source = "Fossen (2021), section 10.3; added masses act on the velocity through the water"
+    traits = Traits(imitates=("bank_suction",))
     parameters = (Parameter("north", "m/s", 0.3, -6.0, 6.0, scaling="speed"), Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"))
     breaks_symmetry = True
     vector = ("speed", "to")

@@ -8,6 +8,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter, body_axes
+from .traits import Traits
 
 
 class CurrentPerRun(Effect):
@@ -15,6 +16,7 @@ class CurrentPerRun(Effect):
     summary = "uniform current, another one in each run"
     phrase = "a current that differs from run to run"
     source = "Fossen (2021), section 10.3"
+    traits = Traits(least_size=0.15)
     parameters = (Parameter("north", "m/s", 0.3, -6.0, 6.0, scaling="speed"), Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"))
     breaks_symmetry = True
     per_run = True

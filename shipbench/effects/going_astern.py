@@ -13,6 +13,7 @@ from ..ops import Array, clip, minimum, sqrt
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class GoingAstern(Effect):
@@ -20,6 +21,7 @@ class GoingAstern(Effect):
     summary = "hull, thrust and rudder while going astern"
     phrase = "forces astern that differ from the model"
     source = "Yoshimura, Nakao & Ishibashi (2009): v u and r u in place of v U and r U; Miyauchi et al. (2022): flow at the rudder"
+    traits = Traits(search="never")
     parameters = (
         Parameter("N_v", "1", 0.5, -0.5, 2.0),
         Parameter("Y_r", "1", 0.5, -2.0, 4.0),

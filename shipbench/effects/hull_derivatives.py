@@ -8,6 +8,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class HullDerivatives(Effect):
@@ -15,6 +16,7 @@ class HullDerivatives(Effect):
     summary = "hull derivatives that differ from the regressions"
     phrase = "hull coefficients that differ from the regressions"
     source = "Clarke, Gedling & Hine (1983): scatter of measured derivatives about the regressions; docs/theory.md#coefficients-of-the-left-side"
+    traits = Traits(search="hull")
     parameters = (
         Parameter("Y_v", "1", 0.25, -0.9, 3.0, title="sway damping", relative=True),
         Parameter("Y_r", "1", 0.25, -0.9, 3.0, title="sway force due to yaw rate", relative=True),

@@ -8,6 +8,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class MassChange(Effect):
@@ -15,6 +16,7 @@ class MassChange(Effect):
     summary = "mass of the ship"
     phrase = "a mass that is {share}"
     source = "docs/theory.md#equations-of-motion"
+    traits = Traits(between_ships=True, absorbs_misfit=True, aliases=("thrust_gain",))
     parameters = (Parameter("share", "1", 0.15, -0.5, 1.0, title="mass", relative=True),)
     separate = "pushes of a force of known size: thrusters, a bollard"
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..ops import Array
 from ..signals import X, Y
 from .base import Effect, Parameter, delayed
+from .traits import Traits
 
 
 class PositionDelay(Effect):
@@ -17,6 +18,7 @@ class PositionDelay(Effect):
     summary = "latency of the position"
     phrase = "positions that are {delay} late"
     source = "docs/theory.md#sensors"
+    traits = Traits(faults_of=frozenset({"x", "y"}))
     parameters = (Parameter("delay", "s", 2.0, -10.0, 10.0, scaling="time"),)
     separate = "changes of speed and course"
 

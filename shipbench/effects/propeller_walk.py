@@ -11,6 +11,7 @@ from ..physics.modifiers import Flow, Modifiers
 from ..physics.propeller import thrust_quadratic
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class PropellerWalk(Effect):
@@ -18,6 +19,7 @@ class PropellerWalk(Effect):
     summary = "side force of the propeller ahead"
     phrase = "a side force of the propeller ahead of {share}"
     source = "p0 in eq. (6) of the source paper; docs/theory.md#propulsion"
+    traits = Traits(persistent=True, in_place_of=(0,))
     parameters = (Parameter("share", "1", 0.05, -0.3, 0.3, title="side force", share_of="thrust"),)
     breaks_symmetry = True
     separate = "straight runs at one speed with the shaft speed up and down"

@@ -12,6 +12,7 @@ from ..physics.modifiers import Flow, Modifiers
 from ..physics.propeller import side_force_astern
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class PropellerWalkAstern(Effect):
@@ -19,6 +20,7 @@ class PropellerWalkAstern(Effect):
     summary = "side force of the propeller astern"
     phrase = "a side force of the propeller astern"
     source = "Miyauchi et al. (2022), doi 10.1007/s00773-022-00889-3: form of Hachii, values of the Esso Osaka"
+    traits = Traits(persistent=True)
     parameters = (
         Parameter("size", "1", 1.0, -4.0, 4.0),
         Parameter("share", "1", 0.1, -0.5, 0.5, other=True, title="side force", share_of="thrust at rest"),

@@ -8,6 +8,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class RudderAsymmetry(Effect):
@@ -15,6 +16,7 @@ class RudderAsymmetry(Effect):
     summary = "unequal lift to port and starboard"
     phrase = "a rudder lift to starboard that is {asymmetry}"
     source = "gamma_R of Yasukawa & Yoshimura (2015), eq. 33"
+    traits = Traits(persistent=True, least_size=0.25, in_place_of=(4,))
     parameters = (Parameter("asymmetry", "1", 0.2, -0.8, 0.8, title="lift to starboard", relative=True),)
     breaks_symmetry = True
     separate = "turns of equal amplitude to both sides, small and large: an offset matters most at small angles"

@@ -9,6 +9,7 @@ from dataclasses import replace
 from ..ops import Array
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class RudderBacklash(Effect):
@@ -16,6 +17,7 @@ class RudderBacklash(Effect):
     summary = "play of the steering gear"
     phrase = "a play of {play} in the steering gear"
     source = "docs/theory.md#rudder"
+    traits = Traits(between_ships=True, least_unrecorded=0.4, gear_field="backlash")
     parameters = (Parameter("play", "rad", math.radians(2.0), 0.0, 0.15),)
     unrecorded = True
     separate = "slow rudder reversals: play leaves a constant difference, a lag none"

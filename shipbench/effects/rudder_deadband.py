@@ -9,6 +9,7 @@ from dataclasses import replace
 from ..ops import Array
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class RudderDeadband(Effect):
@@ -16,6 +17,7 @@ class RudderDeadband(Effect):
     summary = "deadband of the steering gear, or play before it"
     phrase = "a rudder deadband of {band}"
     source = "docs/theory.md#rudder"
+    traits = Traits(gear_field="deadband")
     parameters = (Parameter("band", "rad", math.radians(1.5), 0.0, 0.12),)
     separate = "rudder steps smaller than the suspected band"
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from ..ops import Array
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class RudderDelay(Effect):
@@ -15,6 +16,7 @@ class RudderDelay(Effect):
     summary = "transport delay of the steering gear or of its record"
     phrase = "a rudder delay of {delay}"
     source = "docs/theory.md#rudder"
+    traits = Traits(between_ships=True, least_size=0.6, gear_field="delay")
     parameters = (Parameter("delay", "s", 1.5, -10.0, 10.0, scaling="time"),)
     unrecorded = True
     separate = "quick rudder reversals, sampled faster"

@@ -8,6 +8,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class RudderGain(Effect):
@@ -15,6 +16,7 @@ class RudderGain(Effect):
     summary = "lift of the rudder"
     phrase = "a rudder lift that is {gain}"
     source = "docs/theory.md#rudder"
+    traits = Traits(between_ships=True)
     parameters = (Parameter("gain", "1", 0.25, -0.7, 1.0, title="rudder lift", relative=True),)
     separate = "kick ahead at zero speed with the rudder over: it isolates the rudder from the hull"
 

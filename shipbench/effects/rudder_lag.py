@@ -8,6 +8,7 @@ from dataclasses import replace
 from ..ops import Array
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class RudderLag(Effect):
@@ -15,6 +16,7 @@ class RudderLag(Effect):
     summary = "slow first-order steering gear"
     phrase = "an additional rudder lag of {lag}"
     source = "docs/theory.md#actuators"
+    traits = Traits(between_ships=True, least_size=0.4, gear_field="T")
     parameters = (Parameter("lag", "s", 3.0, 0.0, 30.0, scaling="time"),)
     unrecorded = True
     separate = "small and large rudder steps: a lag takes the same time for both"

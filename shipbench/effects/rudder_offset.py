@@ -9,6 +9,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class RudderOffset(Effect):
@@ -16,6 +17,7 @@ class RudderOffset(Effect):
     summary = "zero error of the rudder angle"
     phrase = "a rudder offset of {offset}"
     source = "docs/theory.md#rudder"
+    traits = Traits(in_place_of=(4,), in_place_beside_hull=(0,))
     parameters = (Parameter("offset", "rad", math.radians(2.0), -0.15, 0.15),)
     breaks_symmetry = True
     separate = "vary the shaft speed at one speed: the offset acts with the race, propeller walk with the thrust, wind with neither"

@@ -9,6 +9,7 @@ from dataclasses import replace
 from ..ops import Array, minimum, where
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class RudderRateLimit(Effect):
@@ -16,6 +17,7 @@ class RudderRateLimit(Effect):
     summary = "slow steering gear: rate limit"
     phrase = "a rudder rate limit of {rate}"
     source = "docs/theory.md#actuators; SOLAS II-1, regulation 29 (65 deg in 28 s)"
+    traits = Traits(search="record", gear_field="rate")
     parameters = (Parameter("rate", "rad/s", math.radians(1.2), 0.0017, 0.2, scaling="rate"),)
     separate = "small and large rudder steps: a rate limit takes longer for the large one"
 

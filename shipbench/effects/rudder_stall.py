@@ -10,6 +10,10 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
+
+_ORDINARY_ANGLE, _LEAST_BEYOND = 0.3, 0.7
+"""Angle [rad] from which rudders ordinarily stall, and the least size of a stall that begins there (docs/calibration.md#sizes-that-matter)."""
 
 
 class RudderStall(Effect):
@@ -17,6 +21,7 @@ class RudderStall(Effect):
     summary = "stall of the rudder at large angles"
     phrase = "a rudder that loses {lost_share} at large angles"
     source = "Brix (1993), Manoeuvring Technical Manual; docs/theory.md#rudder"
+    traits = Traits(between_ships=True, absorbs_misfit=True, persistent=True, least_size=0.5)
     parameters = (
         Parameter("lost_share", "1", 0.5, 0.0, 0.95, title="lift loss", share_of="lift"),
         Parameter("angle", "rad", 0.3, 0.1, 0.7, shape=True),
@@ -28,6 +33,9 @@ class RudderStall(Effect):
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
         return [(0.1,), (0.2,), (0.35,)]
+
+    def least_size(self, setting: Sequence[float]) -> float:
+        return _LEAST_BEYOND if max(setting, default=0.0) > _ORDINARY_ANGLE else super().least_size(setting)
 
 
 EFFECT = RudderStall()

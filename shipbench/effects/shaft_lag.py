@@ -8,6 +8,7 @@ from dataclasses import replace
 from ..ops import Array
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class ShaftLag(Effect):
@@ -15,6 +16,7 @@ class ShaftLag(Effect):
     summary = "slow first-order shaft"
     phrase = "an additional shaft lag of {lag}"
     source = "docs/theory.md#actuators"
+    traits = Traits(between_ships=True, gear_field="T")
     parameters = (Parameter("lag", "s", 10.0, 0.0, 120.0, scaling="time"),)
     unrecorded = True
     separate = "small and large steps of the shaft speed"

@@ -8,6 +8,7 @@ from dataclasses import replace
 from ..ops import Array, minimum, where
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class ShaftRateLimit(Effect):
@@ -15,6 +16,7 @@ class ShaftRateLimit(Effect):
     summary = "slow shaft: rate limit"
     phrase = "a shaft rate limit of {rate}"
     source = "docs/theory.md#actuators"
+    traits = Traits(search="record", gear_field="rate")
     parameters = (Parameter("rate", "rpm/s", 1.0, 0.02, 60.0, scaling="rpm rate"),)
     separate = "small and large steps of the shaft speed"
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..ops import Array
 from ..signals import U, V
 from .base import Effect, Parameter, per_run
+from .traits import Traits
 
 
 class SpeedScale(Effect):
@@ -18,6 +19,7 @@ class SpeedScale(Effect):
     summary = "scale of the speed log"
     phrase = "recorded speeds that are {scale}"
     source = "docs/theory.md#sensors"
+    traits = Traits(faults_of=frozenset({"u", "v"}))
     parameters = (Parameter("scale", "1", 0.05, -0.5, 0.5, title="recorded speed", relative=True),)
     scales = ("u", "v")
     separate = "straight runs on reciprocal courses"

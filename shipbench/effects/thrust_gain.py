@@ -8,6 +8,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class ThrustGain(Effect):
@@ -15,6 +16,7 @@ class ThrustGain(Effect):
     summary = "thrust of the propeller"
     phrase = "a propeller thrust that is {gain}"
     source = "docs/theory.md#propulsion"
+    traits = Traits(between_ships=True, absorbs_misfit=True, aliases=("mass_change",))
     parameters = (Parameter("gain", "1", 0.15, -0.6, 1.0, title="propeller thrust", relative=True),)
     separate = "acceleration from rest, or a bollard pull"
 

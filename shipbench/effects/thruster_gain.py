@@ -8,6 +8,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class ThrusterGain(Effect):
@@ -15,6 +16,7 @@ class ThrusterGain(Effect):
     summary = "force of the thrusters"
     phrase = "thruster forces that are {gain}"
     source = "docs/theory.md#thrusters"
+    traits = Traits(between_ships=True)
     parameters = (Parameter("gain", "1", -0.4, -1.0, 1.0, title="thruster force", relative=True),)
     separate = "thruster pushes at rest"
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from ..ops import Array
 from ..physics.actuators import Gear
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class ThrusterLag(Effect):
@@ -15,6 +16,7 @@ class ThrusterLag(Effect):
     summary = "slow thrusters"
     phrase = "an additional thruster lag of {lag}"
     source = "docs/theory.md#thrusters"
+    traits = Traits(least_size=0.42, gear_field="T")
     parameters = (Parameter("lag", "s", 6.0, 0.0, 60.0, scaling="time"),)
     separate = "steps of the thruster order"
 

@@ -9,6 +9,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class ThrusterLever(Effect):
@@ -16,6 +17,7 @@ class ThrusterLever(Effect):
     summary = "lever of the bow thruster"
     phrase = "a bow thruster shifted forward by {shift}"
     source = "docs/theory.md#thrusters"
+    traits = Traits(between_ships=True, absorbs_misfit=True)
     parameters = (Parameter("shift", "m", -20.0, -60.0, 60.0, scaling="length"),)
     separate = "bow and stern thruster alone, at rest"
 

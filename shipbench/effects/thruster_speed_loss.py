@@ -12,6 +12,7 @@ from ..physics.modifiers import Flow, Modifiers
 from ..physics.thruster import fading
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class ThrusterSpeedLoss(Effect):
@@ -19,6 +20,7 @@ class ThrusterSpeedLoss(Effect):
     summary = "loss of thruster force at speed"
     phrase = "thrusters that lose force at speed"
     source = "Int. Shipbuilding Progress (1967), doi 10.3233/ISP-1967-1415601, and k = exp(-|u|/u_0); docs/theory.md#thrusters"
+    traits = Traits(between_ships=True)
     parameters = (Parameter("loss", "1", 0.5, -0.5, 1.2), Parameter("fading", "1", 0.5, -0.2, 1.2, other=True))
     separate = "thruster pushes at 0, 1 and 2 m/s"
 

@@ -16,6 +16,7 @@ from ..ops import Array
 from ..ship import Particulars
 from ..signals import STATES
 from .base import Effect, Parameter
+from .traits import Traits
 
 KNOT = 1852.0 / 3600.0
 """[m/s]."""
@@ -36,6 +37,7 @@ class UnitOrSignError(Effect):
     summary = "a channel recorded in another unit or with the other sign"
     phrase = "a channel with another unit or sign"
     source = "docs/theory.md#sensors"
+    traits = Traits(search="units", describes_data=True)
     parameters = (Parameter("factor", "1", -2.0, -4000.0, 4000.0), Parameter("channel", "1", float(STATES.index("r")), 0.0, 9.0, shape=True))
     separate = "none needed: heading against yaw rate, track against speeds, rudder against turning show it in any record"
 

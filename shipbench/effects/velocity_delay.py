@@ -10,6 +10,7 @@ from ..ops import Array
 from ..ship import Particulars
 from ..signals import PSI, U, V
 from .base import Effect, Parameter, body_axes, delayed, per_run
+from .traits import Traits
 
 
 class VelocityDelay(Effect):
@@ -18,6 +19,7 @@ class VelocityDelay(Effect):
     summary = "latency of the velocities"
     phrase = "velocities that are {delay} late"
     source = "docs/theory.md#sensors"
+    traits = Traits(faults_of=frozenset({"u", "v"}))
     parameters = (Parameter("delay", "s", 2.0, -10.0, 10.0, scaling="time"), Parameter("earth_axes", "1", 0.0, 0.0, 1.0, shape=True))
     separate = "changes of speed and quick turns"
 

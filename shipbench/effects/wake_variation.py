@@ -10,6 +10,7 @@ from ..ops import Array, absolute, arctan2, exp, maximum
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class WakeVariation(Effect):
@@ -17,6 +18,7 @@ class WakeVariation(Effect):
     summary = "wake fraction in turns"
     phrase = "a wake fraction that changes in turns"
     source = "Yasukawa & Yoshimura (2015), eq. 24"
+    traits = Traits(between_ships=True, persistent=True)
     parameters = (Parameter("size", "1", 0.6, -1.0, 2.0),)
     separate = "the same turn with the shaft stopped"
 

@@ -13,6 +13,7 @@ from ..ops import Array, absolute, sqrt
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter, body_axes
+from .traits import Traits
 
 
 class WaveDrift(Effect):
@@ -20,6 +21,7 @@ class WaveDrift(Effect):
     summary = "mean drift force of waves"
     phrase = "a wave drift force towards {to}"
     source = "Faltinsen et al. (1980), 13th Symp. Naval Hydrodynamics: limit of short waves, simplified as in docs/theory.md#environment"
+    traits = Traits(group="wind and waves")
     parameters = (Parameter("north", "m^2", 0.12, -8.0, 8.0, scaling="area"), Parameter("east", "m^2", 0.12, -8.0, 8.0, scaling="area"))
     breaks_symmetry = True
     vector = ("amplitude_squared", "to")

@@ -11,6 +11,7 @@ from ..ops import Array, sqrt
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter, body_axes
+from .traits import Traits
 
 
 class Wind(Effect):
@@ -18,6 +19,7 @@ class Wind(Effect):
     summary = "mean wind, the same in all runs"
     phrase = "a wind of {speed} from {from}"
     source = "Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51: lowest harmonics in the fitted model; docs/theory.md#environment"
+    traits = Traits(group="wind and waves", imitates=("bank_suction",), relies_on=("wind_X", "wind_Y", "wind_N", "wind_lever"))
     parameters = (Parameter("north", "m/s", 7.0, -60.0, 60.0, scaling="speed"), Parameter("east", "m/s", 7.0, -60.0, 60.0, scaling="speed"))
     breaks_symmetry = True
     vector = ("speed", "from")

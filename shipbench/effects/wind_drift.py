@@ -8,6 +8,7 @@ from ..ops import Array
 from ..physics.modifiers import Flow, Modifiers
 from ..ship import Particulars
 from .base import Effect, Parameter
+from .traits import Traits
 
 
 class WindDrift(Effect):
@@ -15,6 +16,7 @@ class WindDrift(Effect):
     summary = "water that drifts with the wind"
     phrase = "a water drift of {share}"
     source = "Wu (1975), J. Fluid Mech. 68, 49-70: some 3 % of the wind at the surface, less over the draught"
+    traits = Traits(least_size=0.3)
     parameters = (Parameter("share", "1", 0.01, -0.1, 0.1, title="water drift", share_of="wind speed"),)
     separate = "drifting with the shaft stopped, in wind of several strengths"
     channels = ("wind_speed", "wind_from")

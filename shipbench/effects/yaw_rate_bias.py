@@ -10,6 +10,7 @@ import numpy as np
 from ..ops import Array
 from ..signals import R
 from .base import Effect, Parameter, per_run
+from .traits import Traits
 
 
 class YawRateBias(Effect):
@@ -17,6 +18,7 @@ class YawRateBias(Effect):
     summary = "offset of the rate gyro"
     phrase = "a rate gyro offset of {bias}"
     source = "docs/theory.md#sensors"
+    traits = Traits(faults_of=frozenset({"r"}))
     parameters = (Parameter("bias", "rad/s", math.radians(0.1), -0.1, 0.1, scaling="rate"),)
     separate = "any straight run: heading and integrated yaw rate part"
 

@@ -35,7 +35,6 @@ class Active(NamedTuple):
 
 
 ACTUATOR_OF = ("n", "delta", "F", "F")
-_IN_PLACE_OF = {"rudder_offset": 4, "rudder_asymmetry": 4, "propeller_walk": 0}
 _INVERSE_STEPS = 30
 
 
@@ -124,10 +123,12 @@ class Extension:
 
         With the hull's derivatives free, p0 and a rudder offset push the stern alike wherever the revolutions follow the speed; p0 stays zero then.
         """
-        fitted = [t.name for t in self.terms if None in t.given]
-        held = {_IN_PLACE_OF[name]: name for name in fitted if name in _IN_PLACE_OF}
-        if {"rudder_offset", "hull_derivatives"} <= set(fitted):
-            held.setdefault(0, "rudder_offset")
+        fitted = [t for t in self.terms if None in t.given]
+        held = {p: t.name for t in fitted for p in t.effect.traits.in_place_of}
+        if any(t.effect.traits.search == "hull" for t in fitted):
+            for t in fitted:
+                for p in t.effect.traits.in_place_beside_hull:
+                    held.setdefault(p, t.name)
         return held
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[Extension]:
@@ -170,7 +171,7 @@ def extension_of(specs: Sequence[EffectSpec]) -> Extension:
     """
     names = [s.name for s in specs]
     for name in names:
-        if names.count(name) > 1 and name != "change_point":
+        if names.count(name) > 1 and not EFFECTS.get(name).traits.wraps:
             raise InputError(f"effect '{name}' is named {names.count(name)} times; name it once.")
     return Extension(tuple(_term(s) for s in specs))
 
@@ -178,17 +179,17 @@ def extension_of(specs: Sequence[EffectSpec]) -> Extension:
 def _term(spec: EffectSpec) -> Term:
     effect: Effect = EFFECTS.get(spec.name)
     params = dict(spec.params)
-    if spec.name == "unit_or_sign_error":
-        raise InputError("effect 'unit_or_sign_error' cannot extend a model: it is mended in the data. Set [units] or [signs] in dataset.toml.")
-    if spec.name == "change_point":
+    if effect.traits.wraps:
         inner, begins = params.pop("effect", None), params.pop("time", None)
         if not isinstance(inner, str) or not _is_number(begins):
             raise InputError(
-                f"effect 'change_point' needs an effect and the time [s] within every run from which it acts; given: {spec.params or 'nothing'}. "
-                "Write change_point[effect=rudder_offset,time=60]. A change from one run to another cannot extend a model: it knows no runs."
+                f"effect '{spec.name}' needs an effect and the time [s] within every run from which it acts; given: {spec.params or 'nothing'}. "
+                f"Write {spec.name}[effect=rudder_offset,time=60]. A change from one run to another cannot extend a model: it knows no runs."
             )
         of = _term(EffectSpec(inner, params))
         return Term(spec, effect.of(of.effect, from_time=float(begins)), of.given)  # type: ignore[attr-defined]
+    if effect.traits.describes_data:
+        raise InputError(f"effect '{spec.name}' cannot extend a model: it is mended in the data. Set [units] or [signs] in dataset.toml.")
     return Term(spec, effect, _given(effect, params))
 
 

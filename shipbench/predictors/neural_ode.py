@@ -32,9 +32,6 @@ from .device import check_device
 from .physics import Physics
 from .training import Chunk, Recipe, StackedTask, train
 
-_NOWHERE = ("bank_suction", "change_point")
-"""Effects that depend on where the ship is, or when."""
-
 
 class Stage(NamedTuple):
     """Part of the training: window length [knots], windows per minibatch, number of epochs."""
@@ -136,8 +133,8 @@ class NeuralODE(PredictorBase):
         """
         self.physics = Physics().extend(effects)
         for effect in effects:
-            enters = "sensor" if effect.name in _NOWHERE else EFFECTS.get(effect.name).enters
-            if enters == "sensor":
+            part = EFFECTS.get(effect.name)
+            if part.traits.local or part.enters == "sensor":
                 raise InputError(
                     f"effect '{effect.name}' cannot extend neural_ode: it acts on the sensors, or at a place or time. "
                     f"Accepted: effects that act as forces or in the gears. Write physics+{effect.name}, or mend the data."

@@ -12,7 +12,7 @@ from shipbench.diagnosis.gear_kinds import ORDINARY
 from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
 from shipbench.diagnosis.model import NUM_BASE, PLACES
 from shipbench.diagnosis.plant import ordinary_gears
-from shipbench.diagnosis.robust import bends, covariance, inflation, is_borne_by_one, is_on_a_ship, is_sure, least_size, matters, mends_the_bank
+from shipbench.diagnosis.robust import bends, covariance, imitates, inflation, is_borne_by_one, is_on_a_ship, is_sure, least_size, matters
 from shipbench.diagnosis.select import asked_besides
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
@@ -26,17 +26,19 @@ def _reduced(S: np.ndarray) -> Reduced:
     return Reduced(S, np.zeros(len(S)), np.zeros(0), np.zeros(0))
 
 
-def fit_of(estimates: np.ndarray, since: int | None = None) -> SimpleNamespace:
-    """Runs (N,) with information 9 each, whose own least squares estimates are given; prior N(0, 1)."""
-    information, num = 9.0, len(estimates)
-    S = np.empty((num, 2, 2))
-    S[:, 0, 0], S[:, 0, 1], S[:, 1, 0], S[:, 1, 1] = information, information * estimates, information * estimates, 1.0
-    cov = np.array([[1.0 / (1.0 + num * information)]])
+def fit_of(estimates: np.ndarray, since: int | None = None, effect: str = "rudder_offset", setting: tuple[float, ...] = ()) -> SimpleNamespace:
+    """Runs (N,) with information 9 each on every amplitude, whose own least squares estimates of the first are given, of others 0; prior N(0, 1)."""
+    term, information, num = Term(EFFECTS.get(effect), setting, since=since), 9.0, len(estimates)
+    S = np.zeros((num, term.size + 1, term.size + 1))
+    S[:] = np.diag(np.append(np.full(term.size, information), 1.0))
+    S[:, 0, -1], S[:, -1, 0] = information * estimates, information * estimates
+    cov = np.eye(term.size) / (1.0 + num * information)
     mean = cov[0] * information * estimates.sum()
+    at, typical = np.arange(term.size), np.array([p.typical for p in term.effect.parameters if not p.shape])
     return SimpleNamespace(
-        reduced=_reduced(S), solution=SimpleNamespace(mean=mean, cov=cov), prior=Prior(np.array([0]), np.ones(1), *_NONE), values=(mean,),
-        columns_of=lambda index: np.array([0]), plant=SimpleNamespace(seg=SimpleNamespace(runs=num)),
-        model=SimpleNamespace(terms=(SimpleNamespace(label="current", per_run=False, since=since),)),
+        reduced=_reduced(S), solution=SimpleNamespace(mean=mean, cov=cov), prior=Prior(at, np.ones(term.size), *_NONE), values=(mean,),
+        columns_of=lambda index: at, plant=SimpleNamespace(seg=SimpleNamespace(runs=num), c=SimpleNamespace(L=130.0)),
+        model=SimpleNamespace(terms=(term,)), scales=SimpleNamespace(amplitudes=lambda *_: typical),
     )  # fmt: skip
 
 
@@ -83,8 +85,8 @@ def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
     solution = solve(reduced, prior)
     fit = SimpleNamespace(
         reduced=reduced, prior=prior, solution=solution, values=(solution.mean,), columns_of=lambda index: np.array([0]),
-        plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS)),
-        model=SimpleNamespace(terms=(SimpleNamespace(label="current", per_run=False, since=None),)),
+        plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS), c=SimpleNamespace(L=130.0)), scales=SimpleNamespace(amplitudes=lambda *_: np.ones(1)),
+        model=SimpleNamespace(terms=(Term(EFFECTS.get("rudder_offset")),)),
     )  # fmt: skip
     assert solution.mean[0] == pytest.approx(0.5, abs=0.05)
     assert inflation(fit, np.array([0]))[0] < 3.0
@@ -95,9 +97,7 @@ def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
 def test_how_far_ahead_velocities_are_is_as_sure_as_where_the_forces_of_a_hull_act(monkeypatch, forward: float, own: bool, sure: bool):
     """An antenna 4 m astern with velocities of its own was named on a patrol vessel of 52 m that had none; positions alone tell it by the track."""
     monkeypatch.setattr(robust, "is_on_a_ship", lambda *_: True)
-    fit = fit_of(np.full(RUNS, forward * 130.0 / 12.0))
-    fit.plant.c, fit.scales = SimpleNamespace(L=130.0), SimpleNamespace(amplitudes=lambda *_: np.array([12.0]))
-    fit.model.terms = (SimpleNamespace(label="antenna_offset", per_run=False, since=None, setting=(float(own),)),)
+    fit = fit_of(np.full(RUNS, forward * 130.0 / 12.0), effect="antenna_offset", setting=(float(own),))
     assert is_sure(fit, 0) is sure
 
 
@@ -106,7 +106,7 @@ def _of_runs(gram: Gram, prior: Prior) -> SimpleNamespace:
     reduced = gram.reduce(np.zeros(3))
     return SimpleNamespace(
         gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, reduced=reduced, solution=solve(reduced, prior),
-        model=SimpleNamespace(terms=tuple(SimpleNamespace(label="current_per_run", per_run=True, since=None) for _ in prior.random)),
+        model=SimpleNamespace(terms=tuple(Term(EFFECTS.get("current_per_run"), per_run=True) for _ in prior.random)),
     )  # fmt: skip
 
 
@@ -242,7 +242,7 @@ def test_a_wind_straight_at_a_bank_mends_its_law(towards: float, bank: tuple[flo
     fit = _sized("wind", np.array([np.cos(towards), np.sin(towards)]))
     if bank is not None:
         fit.model.terms = (*fit.model.terms, Term(EFFECTS.get("bank_suction"), bank))
-    assert mends_the_bank(fit, 0) is wanted
+    assert imitates(fit, 0) is wanted
 
 
 @pytest.mark.parametrize(("share", "wanted"), [(0.0027, False), (0.01, True)])
