@@ -19,6 +19,7 @@ from .ordinary import NOTICEABLE
 from .plain import null_fit
 from .plant import HULL, Plant
 from .record_error import RecordError
+from .requirements import Standard
 from .select import Selection, candidates_for, select
 from .settle import Fit, hull_evidence
 
@@ -72,6 +73,10 @@ class Analysis:
     @property
     def final(self) -> Fit:
         return self.selection.final
+
+    @property
+    def standard(self) -> Standard:
+        return Standard(self.selection.null, self.threshold, self.selection.off_form)
 
     def score(self, index: int) -> tuple[float, int, str]:
         """Twice the log evidence that the index-th cause adds, number of runs that support it, and to what: beside the others or where it was added.

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from dataclasses import replace
+
+import numpy as np
 
 from .fit import fit
 from .plain import REFIT_ITERATIONS
+from .requirements import EVIDENCE, Requirement, Standard, first_unmet
 from .settle import Fit
 
 
@@ -19,12 +22,12 @@ def without(before: Fit, index: int) -> Fit:
     return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=REFIT_ITERATIONS, guess=before.motion)
 
 
-def needed_only(found: Fit, threshold: float, besides: Callable[[Fit, int], float], spare_last: bool = True) -> Fit:
-    """Drop terms that are no longer worth the threshold and what is asked of them `besides`, judged on the linearisation, then by a refit."""
+def needed_only(found: Fit, standard: Standard, spare_last: bool = True) -> Fit:
+    """Drop terms that are no longer worth what is asked of them, judged on the linearisation, then by a refit."""
     index = 0
     while index < len(found.model.terms) - spare_last:
-        least = threshold + besides(found, index)
-        if found.worth(index) < least:
+        least = standard.threshold + standard.asked_besides(found.model.terms[index], np.max(np.abs(found.values[index])))
+        if not EVIDENCE.check(found, index, standard).met:
             less = without(found, index)
             if 2.0 * (found.evidence - less.evidence) < least:
                 found = less
@@ -33,10 +36,15 @@ def needed_only(found: Fit, threshold: float, besides: Callable[[Fit, int], floa
     return found
 
 
-def wanted_only(found: Fit, wanted: Callable[[Fit, int], bool]) -> tuple[Fit, tuple[str, ...]]:
-    """Without the terms that are not `wanted`, the last first, and their effects."""
-    dropped: tuple[str, ...] = ()
-    while others := [i for i in range(len(found.model.terms)) if not wanted(found, i)]:
-        dropped += (found.model.terms[others[-1]].label,)
-        found = without(found, others[-1])
+def wanted_only(found: Fit, requirements: Iterable[Requirement], standard: Standard) -> tuple[Fit, dict[str, str]]:
+    """Without the terms that do not meet all requirements, the last first; and their effects, with what they do not meet."""
+    dropped: dict[str, str] = {}
+    while standard.careful:
+        verdicts = [(i, first_unmet(requirements, found, i, standard)) for i in range(len(found.model.terms))]
+        unmet = [(i, v) for i, v in verdicts if not v.met]
+        if not unmet:
+            break
+        index, verdict = unmet[-1]
+        dropped[found.model.terms[index].label] = verdict.reason
+        found = without(found, index)
     return found, dropped

@@ -14,9 +14,9 @@ from .clocks import late_velocities_effect
 from .gear_kinds import GearFinding
 from .outcome import Candidate
 from .possible import why_not
-from .robust import least_size
+from .requirements import detection_limit
 from .screen import Score, other_kinds_from, places
-from .select import asked_besides, shows_in_record
+from .select import shows_in_record
 from .settle import Fit
 
 _DOUBT = "in the model, but not named while the ship file is in doubt"
@@ -64,7 +64,7 @@ def _gear_candidate(found: Analysis, g: GearFinding, named: Sequence[str], motio
 def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str]) -> str:
     """Why a candidate that was screened is not named; last: its score beside the causes found."""
     label, steps, inside = s.term.label, found.selection.steps, [t.label for t in found.final.model.terms]
-    odd = asked_besides(s.term, found.selection.off_form)
+    odd = found.standard.asked_besides(s.term)
     asked, score = found.threshold + odd, max([s.score, *(x.score for x in steps if x.term.label == label)])
     if label in named:
         return "named"
@@ -75,13 +75,8 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
         late = any(t.label == label and t.since is not None for t in found.final.model.terms)
         change = searched_by("change")[0].name
         return f"named as a {change}" if late and change in named else _DOUBT
-    if label in found.selection.unsure:
-        if set(s.term.effect.traits.imitates) & set(inside):
-            return "beside a bank, accepted only where it does not point straight at the bank and the runs agree on it"
-        unsteady = "one value for each run does not explain how runs differ"
-        return unsteady if s.term.per_run else "the runs do not agree that its size differs from zero, or the ship becomes an outlier"
-    if label in found.selection.tiny:
-        return f"score {score:.0f}, but less than {least_size(found.selection.null, s.term):.0%} of its typical size: not practically significant"
+    if label in found.selection.unmet:
+        return f"score {score:.0f}, but {found.selection.unmet[label]}"
     if not s.term.per_run and float(np.trace(s.information)) < 1.0:
         return "these data cannot separate it from the fitted coefficients"
     if score <= found.threshold:
@@ -104,29 +99,14 @@ def _shown(s: Score, fit: Fit) -> dict[str, float]:
 
 
 def _detectable(found: Analysis, s: Score) -> dict[str, float]:
-    """Size from which a cause is expected to be named, along each amplitude i, where x^2 V_ii - log det(1 + V) is what is asked of it; of values of
-    single runs the root mean square x, where the sum of x^2 tr(V) - log det(1 + x^2 V) is. None below `least_size`, NaN beyond the bounds."""
-    null, term = found.selection.null, s.term
-    unit, effect = null.scales.amplitudes(term, null.plant.c.L), term.effect
-    asked = found.threshold + term.cost(null.plant.seg.runs) + asked_besides(term, found.selection.off_form)
-    if term.per_run:
-        least = np.full(term.size, max(_root_mean_square(s.information, asked), least_size(null, term)))
-    else:
-        V, volume = np.maximum(np.diag(s.information), 1e-12), np.linalg.slogdet(np.eye(term.size) + s.information)[1]
-        least = np.maximum(np.sqrt((asked + volume) / V), least_size(null, term))
+    """Size from which a cause is expected to be named, along each amplitude; of values of single runs the root mean square. NaN beyond the bounds."""
+    null, effect = found.selection.null, s.term.effect
+    term, unit, least = s.term, null.scales.amplitudes(s.term, null.plant.c.L), detection_limit(s, found.standard)
     values = {}
     for size, p in zip(unit * least, [p for p in effect.sized(null.plant.c.L) if not p.shape], strict=True):
         seen = effect.public((size, 0.0))[effect.vector[0]] if effect.vector else float(size)
         values[f"{p.name}_rms" if term.per_run else p.name] = seen if size <= max(abs(p.low), abs(p.high)) else float("nan")
     return values
-
-
-def _root_mean_square(information: np.ndarray, asked: float) -> float:
-    """Of the values of single runs, whose `information` (N, size, size) is known, where they are expected to score `asked`."""
-    from scipy.optimize import brentq
-
-    seen = np.maximum(np.linalg.eigvalsh(information), 0.0) + 1e-12
-    return float(np.exp(brentq(lambda x: np.sum(np.exp(2.0 * x) * seen - np.log1p(np.exp(2.0 * x) * seen)) - asked, -20.0, 20.0)))
 
 
 def _not_screened(found: Analysis, name: str, named: Sequence[str], measured: bool) -> Candidate:

@@ -138,11 +138,6 @@ def is_on_a_ship(fit: Fit, index: int) -> bool:
     return bool(term.effect.plausible((*size, *term.setting), fit.plant.ship))
 
 
-def stands(fit: Fit, index: int) -> bool:
-    """Whether a cause is sure, and a ship may have it of that size."""
-    return is_on_a_ship(fit, index) and is_sure(fit, index)
-
-
 def imitates(fit: Fit, index: int) -> bool:
     """Whether it is a steady vector along the normal of a cause that it imitates (a bank): what the law of that one leaves looks like it."""
     of = fit.model.terms[index].effect.traits.imitates
@@ -165,24 +160,15 @@ def bends(fit: Fit, index: int, null: Fit) -> bool:
     return not shows_on_any_ship(fit.model.terms[index].effect) and is_strange(needed(fit)) and not is_strange(needed(null))
 
 
-def is_sure(fit: Fit, index: int) -> bool:
-    """Whether the values of a cause differ from zero (Hotelling's test over the runs), and the other runs do not speak against it where one bears it;
-    where each run has its own, whether they last for the run. Of a wind, whether it could blow on a ship; of a steady wind or current, whether it
-    does not merely mend the law of a bank."""
+def runs_agree(fit: Fit, index: int) -> bool:
+    """Whether the values of a cause that all runs share differ from zero (Hotelling's test over the runs)."""
     from scipy.stats import f
 
-    term = fit.model.terms[index]
-    if not relies_on_a_ship(fit, term.effect):
-        return False
-    if imitates(fit, index):
-        return False
-    if term.per_run:
-        return lasts(fit) and tells_runs_apart(fit)
     value, num = fit.values[index], fit.plant.seg.runs
     size, free = len(value), max(num - len(value), 1)
     squares = float(value @ np.linalg.solve(covariance(fit, index), value))
     doubt = float(f.sf(squares * free / (size * max(num - 1, 1)), size, free))
-    return doubt < (_DOUBT if term.since is None else _DOUBT_LATE) and not is_borne_by_one(fit, index)
+    return doubt < (_DOUBT if fit.model.terms[index].since is None else _DOUBT_LATE)
 
 
 def least_size(fit: Fit, term: Term) -> float:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import product, takewhile
 
 import numpy as np
@@ -13,11 +13,11 @@ from .backward import needed_only, wanted_only
 from .budget import is_spent
 from .fit import Origin, fit, looking_at
 from .model import Linearisation
-from .ordinary import STRANGE_SIZE, widened
+from .ordinary import widened
 from .plain import REFIT_ITERATIONS, beside_noise_of
 from .plant import Plant
 from .possible import why_not
-from .robust import bends, matters, stands
+from .requirements import SAME_SHIP, SIGNIFICANT, SURE, Standard, first_unmet
 from .screen import Score, changes, glance, overlap, screen
 from .settle import Fit, hull_evidence, settle
 from .term import Term
@@ -38,7 +38,8 @@ _NEAR = 1.0
 """A refit that ends so little below the threshold is fitted on: at rest the variances may still creep, by up to half of this."""
 _IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
 """What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
-_OFF_FORM, _MISTAKEN, _OF_RUNS = 0.02, 10.0, 50.0
+_OFF_FORM = 0.02
+"""Share of the evidence for a hull off the regressions that a cause in which ships differ is asked besides (docs/calibration.md#evidence-asked)."""
 CONFUSED, _OF_FORMULAS = 10.0, 0.1
 """Candidates within this of the winner's score are called confused with it; of these, within this share of it: how far they lie apart, their formulas
 decide. (Drift in waves by another formula: wind 706, waves 681.)"""
@@ -70,9 +71,8 @@ class Step:
 class Selection:
     """null: the plain model, beside the noise that suits the causes; plain: beside its own; final: with the causes found; scores: of every candidate
     in the first round, and `last` beside the final one; off_form: what a cause for which the form of a hull could pass must be worth besides
-    (`asked_besides`); unsure: effects taken out again, since over the runs their size may be zero, does not explain how runs differ, or asks for a
-    stranger ship; tiny: effects that gain more than the threshold, but are too small to matter; small: the plain model with those of them that it is
-    better with, where nothing else was found."""
+    (`Standard.asked_besides`); unmet: effects that gain more than the threshold, and why they are not named (the first requirement that they do not
+    meet); small: the plain model with those of them that are too small to matter, where nothing else was found."""
 
     null: Fit
     plain: Fit
@@ -81,8 +81,7 @@ class Selection:
     last: list[Score]
     steps: list[Step]
     off_form: float = 0.0
-    unsure: tuple[str, ...] = ()
-    tiny: tuple[str, ...] = ()
+    unmet: Mapping[str, str] = field(default_factory=dict)
     small: Fit | None = None
 
 
@@ -94,13 +93,6 @@ def push_alike(one: Effect, other: Effect) -> bool:
 def shows_in_record(effect: Effect) -> bool:
     """Whether it acts between command and actuator alone: where the actuator is recorded, it is looked for in the record, not in the motion."""
     return effect.enters == "gear" and not effect.unrecorded
-
-
-def asked_besides(term: Term, off_form: float, size: float = 0.0) -> float:
-    """What a term must be worth besides the threshold, since what the form of a hull lacks could pass for it. Not so much of one whose `size`, in
-    typical ones, doubts the ship file: that is no name."""
-    besides = _OF_RUNS if term.per_run else _MISTAKEN if term.effect.traits.absorbs_misfit and size < STRANGE_SIZE else 0.0
-    return besides + off_form * (term.per_run or term.since is not None or term.effect.traits.between_ships)
 
 
 def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Sequence[str] = ()) -> list[Term]:
@@ -190,19 +182,19 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
     if grown.again is not None:
         again = _grown(grown.again, threshold, most, again=True)
         null, grown = (null, grown) if is_spent() else (grown.again, again)
-    now, scores, careful = grown.now, grown.scores, threshold > 0.0
-    pruned = needed_only(now, threshold, grown.besides, spare_last=False)
-    pruned, unsure = wanted_only(pruned, lambda f, i: stands(f, i) and not bends(f, i, null)) if careful else (pruned, ())
+    now, scores, standard = grown.now, grown.scores, replace(grown.standard, null=null)
+    pruned = needed_only(now, standard, spare_last=False)
+    pruned, unsure = wanted_only(pruned, (*SURE, SAME_SHIP), standard)
     whole = pruned
-    pruned, small = wanted_only(pruned, matters) if careful else (pruned, ())
+    pruned, small = wanted_only(pruned, (SIGNIFICANT,), standard)
     if pruned is not now:
         now = looking_at(pruned, null.candidates)
-        sure, more = wanted_only(now, stands) if small else (now, ())  # without what is too small, too
+        sure, more = wanted_only(now, SURE, standard) if small else (now, {})  # without what is too small, too
         if more:
-            now, unsure = looking_at(sure, null.candidates), unsure + more
+            now, unsure = looking_at(sure, null.candidates), unsure | more
         scores = screen(now)
     return Selection(
-        null, plain, now, grown.first, scores, grown.steps, grown.off_form, unsure, (*grown.tiny, *small),
+        null, plain, now, grown.first, scores, grown.steps, standard.off_form, grown.tiny | small | unsure,
         whole if small and not now.model.terms else None,
     )  # fmt: skip
 
@@ -210,35 +202,32 @@ def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selectio
 @dataclass(frozen=True)
 class _Grown:
     """A model `now` with every cause that was worth adding to the plain one, and the steps to it, as in `Selection`; again: the plain model beside
-    other noise, from which to begin once more; then `now` holds the first cause alone. careful: whether causes are chosen, not given."""
+    other noise, from which to begin once more; then `now` holds the first cause alone. tiny: effects that are too small to matter, and why."""
 
     now: Fit
     first: list[Score]
     scores: list[Score]
     steps: list[Step]
-    tiny: set[str]
-    off_form: float
-    careful: bool
+    tiny: dict[str, str]
+    standard: Standard
     again: Fit | None = None
-
-    def besides(self, found: Fit, index: int) -> float:
-        """What a cause must be worth besides the threshold."""
-        return asked_besides(found.model.terms[index], self.off_form, np.max(np.abs(found.values[index]))) if self.careful else 0.0
 
     def gain(self, tried: Fit) -> float:
         """2 log evidence of the last term of `tried` beyond that; a tiny one gains nothing."""
         term = tried.model.terms[-1]
         # every ship is a little unequal, every run has a breath of wind, every record is a little late: what is too small of that stays, and others
         # are judged beside it
-        if self.careful and not (term.effect.breaks_symmetry or term.per_run or term.effect.enters == "gear" or matters(tried, -1)):
+        spared = not self.standard.careful or term.effect.breaks_symmetry or term.per_run or term.effect.enters == "gear"
+        if not (spared or SIGNIFICANT.check(tried, -1, self.standard).met):
             return -np.inf
-        return 2.0 * (tried.evidence - self.now.evidence) - self.besides(tried, -1)
+        return 2.0 * (tried.evidence - self.now.evidence) - self.standard.asked_besides(term, np.max(np.abs(tried.values[-1])))
 
 
 def _grown(null: Fit, threshold: float, most: int, again: bool = False) -> _Grown:
     """Forward selection; again: do not ask for other noise once more."""
     first, careful = screen(null), threshold > 0.0  # who is told the names needs no such care
-    state = _Grown(null, first, first, [], set(), _OFF_FORM * max(hull_evidence(null), 0.0) if careful and not is_spent() else 0.0, careful)
+    standard = Standard(null, threshold, _OFF_FORM * max(hull_evidence(null), 0.0) if careful and not is_spent() else 0.0, careful)
+    state = _Grown(null, first, first, [], {}, standard)
     origin = Origin.of(null.plant, null.scales)
     for round_ in takewhile(lambda _: not is_spent(), range(most)):
         now = state.now
@@ -246,23 +235,25 @@ def _grown(null: Fit, threshold: float, most: int, again: bool = False) -> _Grow
         if not is_spent() and all(2.0 * (f.evidence - now.evidence) < threshold for f, _ in tried):
             tried += refits(now, absorbed([f for f, _ in tried], now, threshold, origin), origin, threshold)
         state.steps.extend(Step.of(round_, f, now, score) for f, score in tried)
-        state.tiny.update(f.model.terms[-1].label for f, score in tried if score > threshold and not matters(f, -1))
+        for f, score in tried:
+            if score > threshold and not (size := SIGNIFICANT.check(f, -1, standard)).met:
+                state.tiny[f.model.terms[-1].label] = size.reason
         # of a round that is cut short the best is not known
-        best = None if is_spent() else _or_change(now, max((f for f, _ in tried), key=state.gain, default=None), origin)
+        best = None if is_spent() else _or_change(now, max((f for f, _ in tried), key=state.gain, default=None), origin, standard)
         imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
         # what a fit that does not rest could still gain by itself is no gain of the next cause
         if best is None or state.gain(best) < threshold + imprecise + now.excess:
             break
         if best.model.terms[-1].since is not None:
             state.steps.append(Step.of(round_, best, now, 2.0 * (best.evidence - now.evidence)))
-        now = widened(looking_at(needed_only(best, threshold, state.besides), null.candidates))
+        now = widened(looking_at(needed_only(best, standard), null.candidates))
         if round_ == 0 and not again and (other := beside_noise_of(now, null)) is not None:
             return replace(state, now=now, again=other)
         state = state if is_spent() else replace(state, now=now, scores=screen(now))
     return state
 
 
-def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
+def _or_change(now: Fit, best: Fit | None, origin: Origin, standard: Standard) -> Fit | None:
     """The best candidate, or one that begins at a later run, where that explains the runs better by the threshold."""
     if any(t.since is not None for t in now.model.terms):
         return best
@@ -275,7 +266,7 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin) -> Fit | None:
     for score in late:
         found = start.refit(score, _least(best, now) if best is not None and gain > _CHANGE_MARGIN else -np.inf)
         own = plain is not None and plain.model.terms[-1].label == score.term.label
-        if 2.0 * (found.evidence - now.evidence) > gain + (_OWN_MARGIN if own else _CHANGE_MARGIN) and stands(found, -1):
+        if 2.0 * (found.evidence - now.evidence) > gain + (_OWN_MARGIN if own else _CHANGE_MARGIN) and first_unmet(SURE, found, -1, standard).met:
             best, gain = found, 2.0 * (found.evidence - now.evidence)
     return best
 

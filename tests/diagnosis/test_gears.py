@@ -186,7 +186,7 @@ def test_play_is_judged_beside_a_lag_that_is_too_small_to_matter(monkeypatch: py
     found = select(plain_model(Plant.of(_recorded_before(ship, Behind("delta", "T2"), 0.2, DELTA, trials))), 10.0)
     (play,) = [s for s in found.steps if s.term.label == "rudder_backlash" and s.round == 0]
     assert play.score > 30.0
-    assert {"rudder_delay", "rudder_lag"} <= set(found.tiny)
+    assert {"rudder_delay", "rudder_lag"} <= set(found.unmet)
     assert not found.final.model.terms
 
 

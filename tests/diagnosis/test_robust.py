@@ -7,19 +7,24 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis import robust
+from shipbench.diagnosis import requirements, robust
 from shipbench.diagnosis.gear_kinds import ORDINARY
 from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
 from shipbench.diagnosis.model import NUM_BASE, PLACES
 from shipbench.diagnosis.plant import ordinary_gears
-from shipbench.diagnosis.robust import bends, covariance, imitates, inflation, is_borne_by_one, is_on_a_ship, is_sure, least_size, matters
-from shipbench.diagnosis.select import asked_besides
+from shipbench.diagnosis.requirements import SURE, Standard, first_unmet
+from shipbench.diagnosis.robust import bends, covariance, imitates, inflation, is_borne_by_one, is_on_a_ship, least_size, matters
 from shipbench.diagnosis.term import Term
 from shipbench.effects.base import EFFECTS
 from shipbench.signals import DELTA
 
 RUNS = 20
 _NONE = np.zeros(0, dtype=int), np.zeros(0)
+
+
+def is_sure(fit: SimpleNamespace, index: int) -> bool:
+    """Whether a cause meets all that is asked of it by itself, but for a ship that may have it."""
+    return first_unmet(SURE[1:], fit, index, Standard(fit, 10.0)).met
 
 
 def _reduced(S: np.ndarray) -> Reduced:
@@ -94,9 +99,8 @@ def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
 
 
 @pytest.mark.parametrize(("forward", "own", "sure"), [(0.08, True, False), (0.3, True, True), (0.08, False, True)])
-def test_how_far_ahead_velocities_are_is_as_sure_as_where_the_forces_of_a_hull_act(monkeypatch, forward: float, own: bool, sure: bool):
+def test_how_far_ahead_velocities_are_is_as_sure_as_where_the_forces_of_a_hull_act(forward: float, own: bool, sure: bool):
     """An antenna 4 m astern with velocities of its own was named on a patrol vessel of 52 m that had none; positions alone tell it by the track."""
-    monkeypatch.setattr(robust, "is_on_a_ship", lambda *_: True)
     fit = fit_of(np.full(RUNS, forward * 130.0 / 12.0), effect="antenna_offset", setting=(float(own),))
     assert is_sure(fit, 0) is sure
 
@@ -272,10 +276,11 @@ def test_a_wing_that_stalls_smoothly_about_35_deg_is_an_ordinary_rudder(begins: 
 
 def test_more_is_asked_of_what_the_form_of_a_hull_could_be():
     """Where each run is another manoeuvre, what a polynomial lacks differs from run to run and passes for winds of single runs."""
+    standard = Standard(fit_of(np.zeros(RUNS)), 10.0, off_form=3.0)
     current, mass, bank = (EFFECTS.get(name) for name in ("current", "mass_change", "bank_suction"))
-    plain, late, mistaken, near = (asked_besides(t, 3.0) for t in (Term(current), Term(current, since=3), Term(mass), Term(bank)))
+    plain, late, mistaken, near = (standard.asked_besides(t) for t in (Term(current), Term(current, since=3), Term(mass), Term(bank)))
     assert (plain, late, near) == (0.0, 3.0, 3.0)
-    assert 3.0 < mistaken < asked_besides(Term(EFFECTS.get("wind_per_run"), per_run=True), 3.0)
+    assert 3.0 < mistaken < standard.asked_besides(Term(EFFECTS.get("wind_per_run"), per_run=True))
 
 
 @pytest.mark.parametrize(("effect", "lever", "sure"), [("wind_per_run", 2.0, True), ("wind_per_run", -9.3, False), ("current_per_run", -9.3, True)])
@@ -284,6 +289,6 @@ def test_a_wind_that_needs_a_superstructure_of_no_ship_is_none(monkeypatch, effe
     z = np.zeros(NUM_BASE)
     z[PLACES["wind_lever"]] = lever
     monkeypatch.setattr(robust, "needed", lambda fit: z)
-    monkeypatch.setattr(robust, "lasts", lambda fit: True)
-    monkeypatch.setattr(robust, "tells_runs_apart", lambda fit: True)
+    monkeypatch.setattr(requirements, "lasts", lambda fit: True)
+    monkeypatch.setattr(requirements, "tells_runs_apart", lambda fit: True)
     assert is_sure(SimpleNamespace(model=SimpleNamespace(terms=(Term(EFFECTS.get(effect), per_run=True),))), 0) is sure

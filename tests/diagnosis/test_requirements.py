@@ -1,0 +1,75 @@
+"""One list of requirements decides, explains and counts the detection limit."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_robust import RUNS, fit_of
+
+from shipbench.diagnosis import requirements
+from shipbench.diagnosis.requirements import REQUIREMENTS, Requirement, Standard, Verdict, detection_limit, first_unmet
+from shipbench.diagnosis.screen import Score
+from shipbench.diagnosis.term import Term
+from shipbench.effects.base import EFFECTS, Effect
+from shipbench.effects.traits import Traits
+
+
+class Never(Requirement):
+    """No cause meets it."""
+
+    def check(self, fit, index, standard) -> Verdict:
+        return Verdict(False, "never met")
+
+    def least_size(self, seen, standard) -> float:
+        return 7.0
+
+
+class Always(Requirement):
+    """Every cause meets it."""
+
+    def check(self, fit, index, standard) -> Verdict:
+        return Verdict(True)
+
+
+def test_the_first_requirement_that_is_not_met_gives_the_reason():
+    fit = fit_of(np.zeros(RUNS))
+    assert first_unmet((Always(), Never()), fit, 0, Standard(fit, 10.0)) == Verdict(False, "never met")
+    assert first_unmet((Always(),), fit, 0, Standard(fit, 10.0)).met
+
+
+def _seen(effect: str = "rudder_offset", information: float = 900.0) -> Score:
+    term = Term(EFFECTS.get(effect))
+    return Score(term, 50.0, np.zeros(term.size), np.nan, information * np.eye(term.size), np.zeros(RUNS))
+
+
+def test_the_detection_limit_is_what_the_most_demanding_requirement_asks_for(monkeypatch):
+    fit = SimpleNamespace(plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS)), model=SimpleNamespace(terms=()))
+    limit = detection_limit(_seen(), Standard(fit, 10.0))
+    assert limit == pytest.approx(np.sqrt((10.0 + np.log(901.0)) / 900.0))
+    assert detection_limit(_seen(), Standard(fit, 40.0)) > limit
+    assert detection_limit(_seen(information=1e9), Standard(fit, 10.0)) == Traits().least_size
+    monkeypatch.setattr(requirements, "REQUIREMENTS", (*REQUIREMENTS, Never()))
+    assert detection_limit(_seen(), Standard(fit, 10.0)) == 7.0
+
+
+class Stranger(Effect):
+    """An effect of a plug-in, of which shipbench knows nothing but what it states itself."""
+
+    family = "hull"
+    parameters = EFFECTS.get("mass_change").parameters
+    traits = Traits(between_ships=True, absorbs_misfit=True, least_size=0.4)
+
+
+def test_an_effect_of_a_plug_in_is_asked_the_same_as_one_of_the_library():
+    own, theirs = Term(EFFECTS.get("mass_change")), Term(Stranger())
+    standard = Standard(fit_of(np.zeros(RUNS)), 10.0, off_form=5.0)
+    assert standard.asked_besides(theirs) == standard.asked_besides(own) > 5.0
+    fit = SimpleNamespace(plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS)), model=SimpleNamespace(terms=()))
+    seen = Score(theirs, 50.0, np.zeros(1), np.nan, 1e9 * np.eye(1), np.zeros(RUNS))
+    assert detection_limit(seen, Standard(fit, 10.0)) == 0.4
+
+
+def test_whoever_is_told_the_names_asks_for_no_evidence():
+    assert Standard(fit_of(np.zeros(RUNS)), 0.0, off_form=5.0, careful=False).asked_besides(Term(EFFECTS.get("mass_change"))) == 0.0
