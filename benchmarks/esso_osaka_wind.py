@@ -12,8 +12,8 @@ import numpy as np
 
 from shipbench import load_dataset
 from shipbench.diagnosis.analysis import analyse, plain_model
-from shipbench.diagnosis.clocks import check_clocks, late_effects
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.preparation.time_offsets import late_effects, late_velocities_of
 from shipbench.records import Dataset
 
 
@@ -28,8 +28,8 @@ def measured(data: Dataset) -> np.ndarray:
 
 def seen(data: Dataset) -> np.ndarray | None:
     """The same from the motion alone, or None where no wind per run is named."""
-    late = check_clocks(data)
-    found = analyse(plain_model(Plant.of(data if late is None else late.mended), settled=() if late is None else late_effects())).final
+    late = late_velocities_of(data)
+    found = analyse(plain_model(Plant.of(data if late is None else late[1]), settled=() if late is None else late_effects())).final
     for term, value in zip(found.model.terms, found.values, strict=True):
         if term.label == "wind_per_run":
             public = [term.effect.public(row) for row in value * found.scales.amplitudes(term, found.plant.c.L)]

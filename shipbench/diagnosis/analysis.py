@@ -13,11 +13,11 @@ from .gain import Extension
 from .gear_kinds import GearFinding
 from .gears import find_in_gears
 from .generic import NO_FORM, Dependence, Search, dependences
-from .misread import judged
 from .model import NUM_BASE, Scales
 from .ordinary import NOTICEABLE
 from .plain import null_fit
 from .plant import HULL, Plant
+from .preparation.actuator_readings import judged
 from .record_error import RecordError
 from .requirements import Standard
 from .select import Selection, candidates_for, select

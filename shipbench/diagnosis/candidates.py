@@ -10,10 +10,10 @@ import numpy as np
 from ..effects.base import EFFECTS, searched_by
 from .analysis import HULL_THRESHOLD, Analysis
 from .causes import p_of
-from .clocks import late_velocities_effect
 from .gear_kinds import GearFinding
 from .outcome import Candidate
 from .possible import why_not
+from .preparation.time_offsets import late_velocities_effect
 from .requirements import detection_limit
 from .screen import Score, other_kinds_from, places
 from .select import shows_in_record

@@ -12,13 +12,13 @@ from ..checking.units import UnitFinding
 from ..effects.base import EFFECTS, Effect, searched_by
 from .analysis import HULL_THRESHOLD, Analysis
 from .by_place import goes_with, of_runs
-from .clocks import LateVelocities, late_effects, late_velocities_effect
 from .forces import force_of_hull, force_of_term
 from .gear_kinds import GearFinding
 from .generic import Dependence
 from .model import FREE, hull_changes
 from .outcome import Cause, Estimate, Gain, what_it_is
 from .plant import HULL, NUM_HULL
+from .preparation.time_offsets import LateVelocities, late_effects, late_velocities_effect
 from .robust import covariance, inflation
 from .select import CONFUSED
 from .settle import Fit

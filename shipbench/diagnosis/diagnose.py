@@ -20,31 +20,28 @@ from ..errors import InputError
 from ..processes import process_pool
 from ..records import Dataset
 from ..steps import step, within
-from . import misread
 from .analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .budget import Budget, is_spent, limited
 from .candidates import describe_candidates
 from .causes import describe_causes, remaining, unknown_part, what_is_left
-from .clocks import check_clocks, not_asked, ruled_out, with_prompt_yaw_rate
-from .derived import faults, has_speeds, marked, said
-from .felt_wind import with_true_wind
 from .fit import Fit
 from .gain import FoldGain, fold_gain, summarise
 from .noise import noise_in_words
 from .outcome import Cause, Diagnosis, Gain
-from .over_ground import over_ground
-from .parts import in_parts, runs_in_words
-from .plant import FOLD_STEPS, MOST_STEPS, SEGMENT, THOROUGH_STEPS, Plant, least_depth
-from .record import Record, corrected_record, joined, refuse_contradictions
+from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, least_depth
+from .preparation import actuator_readings as misread
+from .preparation.actuator_signs import turned_actuators
+from .preparation.base import prepare
+from .preparation.passes import GIVEN, PASSES
+from .preparation.record_errors import joined
+from .preparation.splitting import is_too_little
+from .preparation.time_offsets import ruled_out
 from .ship_file import doubts_of, odd_for, own_propeller
-from .silent_log import with_speeds_of_the_track
 from .strange import left_out
 from .trace import trace_of
-from .turned import turned_actuators
 from .wrong import what_is_wrong
 
 FOLDS = 5
-FEW_RUNS, FEW_SAMPLES = 5, 300
 _WHOLE = 0.2
 """Share of the time that the plain model of all runs takes, and the search beside it, where the gain is measured."""
 
@@ -79,18 +76,9 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
     """As `diagnose`, within a budget that is counted."""
     step("read the record", 0.0, 0.02)
     began, fingerprint = time.perf_counter(), dataset.fingerprint
-    dataset, told = in_parts(dataset, FEW_RUNS)
-    warnings = told + _check(dataset)
-    record = corrected_record(dataset) if only is None else Record(dataset, [], [])
-    units = record.errors
-    dataset, mended = _mended(record.dataset) if only is None else (dataset, [])
-    refuse_contradictions(dataset)
-    dataset = _in_time(dataset)
-    late = check_clocks(dataset) if only is None and has_speeds(dataset) else None
-    if late is not None:
-        dataset = late.mended
-    settled = (*(not_asked(dataset, late) if only is None else ()), *faults(dataset))
-    cautious = len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
+    ready = prepare(dataset, PASSES if only is None else GIVEN)
+    dataset, units, settled, warnings = ready.dataset, list(ready.errors), ready.excluded, list(ready.notes)
+    cautious = is_too_little(dataset)
     apart = len({run.group for run in dataset.runs}) > 1
     if not apart and len(dataset) > 1:
         warnings.append("all runs are one group (pieces of one log, say): no gain can be measured on runs that are held out.")
@@ -117,10 +105,10 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
         worth = (
             _cross_validated(dataset, found, seed, partial(work, budget=share), pool, ahead) if wanted and not doubts and not is_spent() else Worth()
         )
-    lines = record.told + warnings + used.said(nothing=not rests) + list(worth.told)
-    lines += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + mended + said(dataset) + doubts
+    lines = warnings + used.said(nothing=not rests) + list(worth.told)
+    lines += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + doubts
     lines += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
-    causes = describe_causes(found, units, late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
+    causes = describe_causes(found, units, ready.late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
     changes = {e.name for e in searched_by("change")}
     lines += [f"{c.effect}: {c.evidence} Fit the runs before it and from it on separately." for c in causes if c.effect in changes]
     behind = _behind_its_record(found, causes)
@@ -150,45 +138,6 @@ class Worth:
     per_run: tuple[tuple[str, float, float], ...] = ()
     hull: bool = False
     told: tuple[str, ...] = ()
-
-
-def _check(dataset: Dataset) -> list[str]:
-    """Refuse what cannot be fitted; warn of what cannot be trusted."""
-    samples = sum(len(r) for r in dataset.runs)
-    if samples < 20:
-        raise InputError(
-            f"data set '{dataset.name}' has {samples} samples in {runs_in_words(dataset)}; a diagnosis needs at least 20, better 24 runs of 120 s."
-        )
-    L = dataset.ship.L
-    rarest = SEGMENT * (L / 130.0) ** 0.5
-    if dataset.dt > rarest:
-        raise InputError(
-            f"data set '{dataset.name}' has a sample every {dataset.dt:g} s. A ship of {L:g} m turns in less. Accepted: up to {rarest:.3g} s. "
-            "Give t and dt in dataset.toml in seconds."
-        )
-    states = np.concatenate([r.states for r in dataset.runs])
-    if np.max(np.hypot(states[:, 3], states[:, 4])) < 0.01 * L**0.5:
-        raise InputError(
-            f"data set '{dataset.name}': the ship never moves faster than {0.01 * L**0.5:.2f} m/s; check the columns u and v and their units."
-        )
-    warnings = []
-    if len(dataset) < FEW_RUNS or samples < FEW_SAMPLES:
-        warnings.append(
-            f"{runs_in_words(dataset)} and {samples} samples are too few to name a cause (at least {FEW_RUNS} runs and {FEW_SAMPLES} samples): "
-            "candidates are ranked, none is named."
-        )
-    if np.std(states[:, 7]) < 1e-3 and np.std(states[:, 5]) < 1e-5:
-        warnings.append("the rudder is never used and the ship never turns: nothing can be said about rudder and hull.")
-    return warnings
-
-
-def _mended(dataset: Dataset) -> tuple[Dataset, list[str]]:
-    """The data set with what its own record shows to be wrong put right, and lines for the reader."""
-    dataset, lines = marked(dataset), []
-    for put_right in (with_speeds_of_the_track, over_ground, with_prompt_yaw_rate, with_true_wind):
-        dataset, told = put_right(dataset)
-        lines += told
-    return dataset, lines
 
 
 def _as_it_must_be_read(
@@ -231,13 +180,6 @@ def _of_depth(dataset: Dataset, plant: Plant) -> list[str]:
         f"the recorded depth falls to {least:.3g} m, and the ship draws {plant.ship.T:.3g} m: it is not used. A depth counts from the surface; "
         "to one below the keel add the draught."
     ]
-
-
-def _in_time(dataset: Dataset) -> Dataset:
-    """Runs in the order in which they were sailed, where all say when they began: a change begins with one of them."""
-    began = {run.id: run.began for run in dataset.runs}
-    known = {name: moment for name, moment in began.items() if moment is not None}
-    return dataset.with_runs(sorted(dataset.runs, key=lambda run: known[run.id])) if len(known) == len(began) else dataset
 
 
 @threadpool_limits.wrap(limits=1)  # a process of its own

@@ -9,7 +9,9 @@ import pytest
 
 from shipbench.checking.base import check_dataset
 from shipbench.checking.speed_log import silence
-from shipbench.diagnosis.diagnose import _mended, diagnose
+from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.preparation.base import Prepared
+from shipbench.diagnosis.preparation.log_dropout import speeds_of_the_track
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
 from shipbench.signals import U, V, X, Y
@@ -84,7 +86,8 @@ def test_the_same_creep_with_a_log_that_does_not_see_it_is_told():
 
 def test_the_diagnosis_takes_the_speeds_of_the_track():
     data = trials()
-    mended, (line, *_) = _mended(silent(data))
+    ready = speeds_of_the_track(Prepared(silent(data)))
+    mended, (line,) = ready.dataset, ready.notes
     assert line.startswith("u and v read nothing (below ")
     assert line.endswith("u and v are taken from the positions in all runs instead.")
     assert mended.derived == ("u", "v")

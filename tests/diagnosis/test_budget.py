@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis import analysis, clocks, noise
+from shipbench.diagnosis import analysis, noise
 from shipbench.diagnosis import diagnose as whole
 from shipbench.diagnosis import select as selection
 from shipbench.diagnosis.analysis import THRESHOLD, plain_model
@@ -17,6 +17,7 @@ from shipbench.diagnosis.fit import Origin, fit
 from shipbench.diagnosis.gain import FoldGain
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.preparation import time_offsets as clocks
 from shipbench.diagnosis.settle import Fit, Model
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
@@ -132,9 +133,9 @@ def test_no_gain_is_measured_with_a_training_part_that_was_stopped(turned):
 def test_clocks_are_not_judged_by_fits_that_were_stopped(turned, monkeypatch):
     monkeypatch.setattr(clocks, "late_velocities", lambda _: (1.0, 0.1))
     monkeypatch.setattr(clocks, "_evidence", lambda data, _: np.zeros(len(data)))
-    assert clocks.check_clocks(turned) is not None
+    assert clocks.late_velocities_of(turned) is not None
     with limited(Budget(iterations=0)):
-        assert clocks.check_clocks(turned) is None
+        assert clocks.late_velocities_of(turned) is None
 
 
 @pytest.mark.long

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from shipbench.data.base import load_dataset
-from shipbench.diagnosis.clocks import put_back, unfiltered
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.plain import null_fit
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.preparation.time_offsets import put_back, unfiltered
 from shipbench.diagnosis.screen import screen
 from shipbench.diagnosis.select import candidates_for
 from shipbench.errors import InputError
@@ -38,7 +38,7 @@ def recorded() -> Dataset:
 
 @pytest.fixture(scope="module")
 def runs(recorded) -> Dataset:
-    """Before the receiver's filter, which `check_clocks` takes out first."""
+    """Before the receiver's filter, which `correct_late_velocities` takes out first."""
     return put_back(unfiltered(recorded, FILTER)[0], {}, FILTER)
 
 

@@ -14,17 +14,18 @@ import shipbench.simulate.trials
 from shipbench.bench.diagnosis_text import summary_lines
 from shipbench.checking.recording import Recording
 from shipbench.checking.track import keeps_time
-from shipbench.diagnosis import clocks
 from shipbench.diagnosis.analysis import THRESHOLD, plain_model
-from shipbench.diagnosis.clocks import check_clocks
 from shipbench.diagnosis.colour import Colour
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.fit import Origin, fit
 from shipbench.diagnosis.model import Scales
 from shipbench.diagnosis.noise import colour_of
-from shipbench.diagnosis.over_ground import over_ground
 from shipbench.diagnosis.plain import beside_noise_of, null_fit
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.preparation import time_offsets as clocks
+from shipbench.diagnosis.preparation.base import Prepared
+from shipbench.diagnosis.preparation.time_offsets import late_velocities_of
+from shipbench.diagnosis.preparation.water_speeds import speeds_over_ground
 from shipbench.diagnosis.select import select
 from shipbench.diagnosis.settle import Model
 from shipbench.diagnosis.strange import left_out
@@ -173,9 +174,10 @@ def test_a_log_through_water_is_seen_and_put_over_ground(number):
         S[:, U], S[:, V] = S[:, U] - c * drift[0] - s * drift[1], S[:, V] - c * drift[1] + s * drift[0]
 
     data = sea_trials(load_mmg_ship("container130"), 20 + number, [Hidden(EFFECTS.get("current"), tuple(drift))], Trials(runs=12))
-    assert over_ground(data)[1] == []
+    assert speeds_over_ground(Prepared(data)) == Prepared(data)
     logged = _changed(data, through_water)
-    mended, (line,) = over_ground(logged)
+    ready = speeds_over_ground(Prepared(logged))
+    mended, (line,) = ready.dataset, ready.notes
     assert "through water" in line
     for run, true in zip(mended.runs, data.runs, strict=True):
         assert np.abs(run.states[:, [U, V]] - true.states[:, [U, V]]).max() < 0.05
@@ -229,15 +231,16 @@ def test_a_cause_is_seen_through_a_swell(monkeypatch):
 
 
 def test_velocities_filtered_in_the_earths_axes_are_seen_and_put_back(trials, filtered):
-    late = check_clocks(filtered)
-    assert late is not None
+    found = late_velocities_of(filtered)
+    assert found is not None
+    late, mended_runs = found
     assert late.delay == pytest.approx(LATE, rel=0.2)
     assert min(late.score, late.over_position) > 50.0
     assert late.filtered
-    assert [len(r) for r in late.mended.runs] == [len(r) - 2 * int(np.ceil(late.delay / filtered.dt)) for r in filtered.runs]
-    assert check_clocks(late.mended) is None
+    assert [len(r) for r in mended_runs.runs] == [len(r) - 2 * int(np.ceil(late.delay / filtered.dt)) for r in filtered.runs]
+    assert late_velocities_of(mended_runs) is None
     edge = int(np.ceil(late.delay / filtered.dt))
-    for mended, recorded, true in zip(late.mended.runs, filtered.runs, trials.runs, strict=True):
+    for mended, recorded, true in zip(mended_runs.runs, filtered.runs, trials.runs, strict=True):
         fast = true.states[edge:-edge, U]
         assert np.abs(mended.states[:, U] - fast).mean() < np.abs(recorded.states[edge:-edge, U] - fast).mean()
 
@@ -251,21 +254,22 @@ def test_velocities_that_are_late_without_a_filter_are_told_from_filtered_ones(t
         earth[by:] = earth[:-by].copy()
         S[:, U], S[:, V] = (earth * np.conj(turn)).real, (earth * np.conj(turn)).imag
 
-    late = check_clocks(_changed(trials, change))
-    assert late is not None
+    found = late_velocities_of(_changed(trials, change))
+    assert found is not None
+    late, _ = found
     assert not late.filtered
     assert late.delay == pytest.approx(LATE, rel=0.2)
 
 
 def test_clocks_that_agree_or_a_late_position_are_left_to_the_model(trials):
-    assert check_clocks(trials) is None
+    assert late_velocities_of(trials) is None
     by = int(LATE / trials.dt)
 
     def late(S: np.ndarray) -> None:
         S[by:, :2] = S[:-by, :2].copy()
 
     behind = _changed(trials, late)
-    assert check_clocks(behind.with_runs([replace(r, t=r.t[by:], states=r.states[by:], inputs=r.inputs[by:]) for r in behind.runs])) is None
+    assert late_velocities_of(behind.with_runs([replace(r, t=r.t[by:], states=r.states[by:], inputs=r.inputs[by:]) for r in behind.runs])) is None
 
 
 @pytest.mark.parametrize(("scatter", "late"), [(60.0, True), (1.0, False)])
@@ -274,7 +278,7 @@ def test_a_position_that_is_early_is_believed_only_where_the_runs_agree(filtered
     early = 5.0 + scatter * np.resize([1.0, -1.0], num)
     shares = iter([np.zeros(num), -np.ones(num), early, np.full(num, -50.0)])  # filtered, late, position early, as recorded
     monkeypatch.setattr(clocks, "_evidence", lambda *_: next(shares))
-    assert (check_clocks(filtered) is not None) is late
+    assert (late_velocities_of(filtered) is not None) is late
 
 
 def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):

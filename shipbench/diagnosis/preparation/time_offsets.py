@@ -6,45 +6,47 @@ before them is not theirs, and beside it every other fault of a sensor is hidden
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
-from ..checking.recording import Recording
-from ..checking.track import keeps_time, lags, late_velocities, may_be_none
-from ..checking.yaw import late_yaw_rate
-from ..data.corrections import undelayed
-from ..effects.base import EFFECTS, Effect
-from ..records import Dataset, Run
-from ..signals import PSI, STATES, U, V
-from .budget import is_spent
-from .derived import has_speeds
-from .fit import Origin, fit
-from .gram import by_run
-from .model import Scales
-from .plant import Plant
-from .settle import Fit, Model
+from ...checking.recording import Recording
+from ...checking.track import keeps_time, lags, late_velocities, may_be_none
+from ...checking.yaw import late_yaw_rate
+from ...data.corrections import undelayed
+from ...effects.base import EFFECTS, Effect
+from ...records import Dataset, Run
+from ...signals import PSI, STATES, U, V
+from ..budget import is_spent
+from ..fit import Origin, fit
+from ..gram import by_run
+from ..model import Scales
+from ..plant import Plant
+from ..settle import Fit, Model
+from .base import LateVelocities, Prepared
+from .derived_speeds import has_speeds
 
 _SURE = 2.0
 """Standard errors over the runs."""
 
 
-@dataclass(frozen=True)
-class LateVelocities:
-    """delay, sd [s]; filtered: by a filter of first order, else as they were; score: 2 log evidence of the plain model that mending the velocities
-    adds; over_position: the same over moving the position instead; mended: the runs with it taken out."""
+def correct_late_velocities(prepared: Prepared) -> Prepared:
+    """Put velocities back in time that are late as a vector, and exclude the delays that kinematics answer: all once the clocks are put right, or
+    where measured speeds and the track show none."""
+    dataset = prepared.dataset
+    if not has_speeds(dataset):
+        return prepared
+    found = late_velocities_of(dataset)
+    if found is not None:
+        late, mended = found
+        return replace(prepared, dataset=mended, late=late, excluded=(*prepared.excluded, *late_effects()))
+    return replace(prepared, excluded=(*prepared.excluded, *late_effects())) if keeps_time(Recording(dataset)) else prepared
 
-    delay: float
-    sd: float
-    filtered: bool
-    score: float
-    over_position: float
-    mended: Dataset
 
-
-def check_clocks(dataset: Dataset) -> LateVelocities | None:
-    """Late velocities, if the track shows them and the plain model agrees that it is they that are late, not the position that is early."""
+def late_velocities_of(dataset: Dataset) -> tuple[LateVelocities, Dataset] | None:
+    """Late velocities and the runs with them taken out, if the track shows them and the plain model agrees that it is they that are late, not the
+    position that is early."""
     found = late_velocities(Recording(dataset))
     if found is None:
         return None
@@ -62,7 +64,7 @@ def check_clocks(dataset: Dataset) -> LateVelocities | None:
     # a position cannot be early, only all else late: that is believed where the runs agree
     if np.sum(over) < 0.0 or -np.sum(over_position) > _SURE * len(over) ** 0.5 * np.std(over_position):
         return None
-    return LateVelocities(delay, sd, best == "filtered", 2.0 * float(np.sum(over)), 2.0 * float(np.sum(over_position)), ways[best])
+    return LateVelocities(delay, sd, best == "filtered", 2.0 * float(np.sum(over)), 2.0 * float(np.sum(over_position))), ways[best]
 
 
 def late_effects() -> tuple[str, ...]:
@@ -73,11 +75,6 @@ def late_effects() -> tuple[str, ...]:
 def late_velocities_effect() -> Effect:
     """The delay of both velocities together."""
     return next(e for e in map(EFFECTS.get, late_effects()) if e.traits.faults_of == {"u", "v"})
-
-
-def not_asked(dataset: Dataset, late: LateVelocities | None) -> tuple[str, ...]:
-    """Delays that are not asked of the model: all of them once the clocks are put right, or where measured speeds and the track show none."""
-    return late_effects() if late is not None or (has_speeds(dataset) and keeps_time(Recording(dataset))) else ()
 
 
 def ruled_out(dataset: Dataset, found: Fit) -> tuple[str, ...]:
@@ -100,18 +97,19 @@ def ruled_out(dataset: Dataset, found: Fit) -> tuple[str, ...]:
     return tuple(out)
 
 
-def with_prompt_yaw_rate(dataset: Dataset) -> tuple[Dataset, list[str]]:
-    """The data set with a yaw rate that was late against the heading put back, and a line for the reader. A heading cannot be early: of the two it is
-    the yaw rate, and beside it a rudder, or whatever else turns the ship, would seem to be late."""
+def correct_late_yaw_rate(prepared: Prepared) -> Prepared:
+    """Put a yaw rate back in time that is late against the heading. A heading cannot be early: of the two it is the yaw rate, and beside it a rudder,
+    or whatever else turns the ship, would seem to be late."""
+    dataset = prepared.dataset
     found = None if "r" in dataset.derived else late_yaw_rate(Recording(dataset))
     if found is None:
-        return dataset, []
+        return prepared
     delay, sd = found
     line = (
         f"the yaw rate follows the heading {delay:.2g} s late (standard error {sd:.1g} s; seen by kinematics). It is put back before anything else "
         f"is looked for; in dataset.toml: [delay] r = {delay:.3g}."
     )
-    return put_back(dataset, {"r": delay}, 0.0), [line]
+    return prepared.corrected(put_back(dataset, {"r": delay}, 0.0), line)
 
 
 def put_back(dataset: Dataset, delay: dict[str, float], ends: float) -> Dataset:

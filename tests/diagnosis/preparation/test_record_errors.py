@@ -10,7 +10,8 @@ import pytest
 
 from shipbench.data.reread import reread
 from shipbench.diagnosis import diagnose as diagnosis
-from shipbench.diagnosis.record import corrected_record, refuse_contradictions
+from shipbench.diagnosis.preparation.base import Prepared
+from shipbench.diagnosis.preparation.record_errors import correct_record_errors, refuse_contradictions
 from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
@@ -58,34 +59,34 @@ CORRECTED = {
 
 @pytest.mark.parametrize("what", CORRECTED)
 def test_what_the_check_has_a_line_for_is_corrected_and_said(what: str):
-    record = corrected_record(read_as(CORRECTED[what]))
+    record = correct_record_errors(Prepared(read_as(CORRECTED[what])))
     for run, true in zip(record.dataset.runs, trials().runs, strict=True):
         np.testing.assert_allclose(run.states, true.states, rtol=1e-6, atol=1e-9)
         np.testing.assert_allclose(run.inputs, true.inputs, rtol=1e-6, atol=1e-9)
     factors = {e.channel: e.factor for e in record.errors}
     assert {STATES[c] for c in CORRECTED[what]} == {c for c in factors if not c.endswith("_c")}
-    assert all("corrected before the fit" in line for line in record.told)
-    assert len(record.told) >= 1
-    refuse_contradictions(record.dataset)
+    assert all("corrected before the fit" in line for line in record.notes)
+    assert len(record.notes) >= 1
+    refuse_contradictions(record)
 
 
 def test_east_and_north_exchanged_are_read_as_such():
     runs = [replace(run, states=run.states[:, [Y, X, *range(2, 10)]]) for run in trials().runs]
-    record = corrected_record(trials().with_runs(runs))
+    record = correct_record_errors(Prepared(trials().with_runs(runs)))
     np.testing.assert_array_equal(record.dataset.runs[3].states, trials().runs[3].states)
     assert [(e.channel, e.factor) for e in record.errors] == [("x", 1.0)]
 
 
 def test_a_clean_record_stays_as_it_is():
-    record = corrected_record(trials())
+    record = correct_record_errors(Prepared(trials()))
     assert record.dataset is trials()
-    assert (record.errors, record.told) == ([], [])
-    refuse_contradictions(trials())
+    assert (record.errors, record.notes) == ((), ())
+    refuse_contradictions(Prepared(trials()))
 
 
 def test_a_log_that_reads_too_little_is_left_to_the_fit():
-    record = corrected_record(read_as({U: 0.8, V: 0.8}))
-    assert (record.errors, record.told) == ([], [])
+    record = correct_record_errors(Prepared(read_as({U: 0.8, V: 0.8})))
+    assert (record.errors, record.notes) == ((), ())
 
 
 CONTRADICTIONS = {
@@ -112,9 +113,9 @@ def test_samples_rarer_than_a_turn_are_refused():
 def test_noise_of_a_ship_at_rest_and_a_gyro_s_constant_error_are_no_contradiction():
     rng = np.random.default_rng(0)
     still = [replace(run, states=run.states * 0.0 + 0.5 * rng.standard_normal(run.states.shape) * (np.arange(10) < 2)) for run in trials().runs]
-    refuse_contradictions(trials().with_runs(still))
+    refuse_contradictions(Prepared(trials().with_runs(still)))
     drifting = [replace(run, states=run.states + 0.002 * (np.arange(10) == R)) for run in trials().runs]
-    refuse_contradictions(trials().with_runs(drifting))
+    refuse_contradictions(Prepared(trials().with_runs(drifting)))
 
 
 def test_a_data_set_is_read_again_as_its_folder_would_be():

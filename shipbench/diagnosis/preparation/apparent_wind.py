@@ -3,21 +3,23 @@ waves or another ship's superstructure."""
 
 from __future__ import annotations
 
-from ..checking.recording import Recording
-from ..checking.wind import blows_to
-from ..checking.wind_reading import CHANNELS, WindReading, said, wind_reading
-from ..records import Dataset
+from ...checking.recording import Recording
+from ...checking.wind import blows_to
+from ...checking.wind_reading import CHANNELS, WindReading, said, wind_reading
+from .base import Prepared
 
 _ADVICE = "`shipbench data check` has the lines for dataset.toml."
 
 
-def with_true_wind(dataset: Dataset) -> tuple[Dataset, list[str]]:
-    """The data set with the true wind in its channels, and a line for the reader where it had another."""
+def true_wind(prepared: Prepared) -> Prepared:
+    """Put the true wind into its channels where they hold another one."""
+    dataset = prepared.dataset
     recorded = [name for name in CHANNELS if name in dataset.inputs]
     if len(recorded) == 1:
-        return dataset, [f"{recorded[0]} is recorded alone: without both {' and '.join(CHANNELS)} the wind counts as not measured."]
+        alone = f"{recorded[0]} is recorded alone: without both {' and '.join(CHANNELS)} the wind counts as not measured."
+        return prepared.corrected(dataset, alone)
     if not recorded:
-        return dataset, []
+        return prepared
     lines = []
     found = wind_reading(Recording(dataset))
     if found is not None:
@@ -26,4 +28,4 @@ def with_true_wind(dataset: Dataset) -> tuple[Dataset, list[str]]:
     if blows_to(Recording(dataset)) is not None:
         dataset = WindReading(sign="to").applied(dataset)
         lines.append(f"wind_from is where the wind blows to: it is turned. {_ADVICE}")
-    return dataset, lines
+    return prepared.corrected(dataset, *lines)

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from shipbench.checking.units import check_units, corrected, merged
-from shipbench.diagnosis import turned
 from shipbench.diagnosis.analysis import plain_model
 from shipbench.diagnosis.cases import UNITS, draw_case, misread
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.preparation import actuator_signs as turned
+from shipbench.diagnosis.preparation.actuator_signs import turned_actuators
 from shipbench.diagnosis.settle import Fit
-from shipbench.diagnosis.turned import turned_actuators
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset

@@ -7,25 +7,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..checking.recording import Recording
-from ..checking.track import through_water
-from ..records import Dataset, Run
-from ..signals import PSI, U, V
-from .derived import has_speeds
+from ...checking.recording import Recording
+from ...checking.track import through_water
+from ...records import Run
+from ...signals import PSI, U, V
+from .base import Prepared
+from .derived_speeds import has_speeds
 
 
-def over_ground(dataset: Dataset) -> tuple[Dataset, list[str]]:
-    """The data set with velocities over ground, and a line for the reader where it had others. What is derived from positions is over ground."""
+def speeds_over_ground(prepared: Prepared) -> Prepared:
+    """Put velocities through water over ground. What is derived from positions is over ground."""
+    dataset = prepared.dataset
     found = through_water(Recording(dataset)) if has_speeds(dataset) else None
     if found is None:
-        return dataset, []
+        return prepared
     north, east = found
     line = (
         f"u and v are through water: the track drifts {np.hypot(north, east):.3g} m/s towards {np.rad2deg(np.arctan2(east, north)) % 360.0:.0f} deg "
         "more than they say. That is added to them; the current that the ship feels is looked for as any other cause. `shipbench data check` has "
         "the lines for dataset.toml."
     )
-    return dataset.with_runs([_drifting(run, north, east) for run in dataset.runs]), [line]
+    return prepared.corrected(dataset.with_runs([_drifting(run, north, east) for run in dataset.runs]), line)
 
 
 def _drifting(run: Run, north: float, east: float) -> Run:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.felt_wind import with_true_wind
+from shipbench.diagnosis.preparation.apparent_wind import true_wind
+from shipbench.diagnosis.preparation.base import Prepared
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
 from shipbench.signals import PSI, U, V
@@ -35,18 +36,20 @@ def _felt(dataset: Dataset, moving: float, from_bow: float, turned: float = 0.0)
 
 
 def test_a_true_wind_is_left_alone(windy):
-    assert with_true_wind(windy) == (windy, [])
+    assert true_wind(Prepared(windy)) == Prepared(windy)
 
 
 @pytest.mark.parametrize(("moving", "from_bow"), [(1.0, 1.0), (0.0, 1.0), (1.0, 0.0)])
 def test_a_felt_wind_becomes_the_true_one(windy, moving: float, from_bow: float):
-    found, lines = with_true_wind(_felt(windy, moving, from_bow))
+    ready = true_wind(Prepared(_felt(windy, moving, from_bow)))
+    found, lines = ready.dataset, ready.notes
     np.testing.assert_allclose(_vector(found), _vector(windy), atol=1e-6)
     assert len(lines) == 1
 
 
 def test_a_wind_that_is_where_it_blows_to_is_turned(windy):
-    found, (line,) = with_true_wind(_felt(windy, 0.0, 0.0, np.pi))
+    ready = true_wind(Prepared(_felt(windy, 0.0, 0.0, np.pi)))
+    found, (line,) = ready.dataset, ready.notes
     np.testing.assert_allclose(_vector(found), _vector(windy), atol=1e-6)
     assert "blows to" in line
 
@@ -55,7 +58,8 @@ def test_a_wind_that_is_where_it_blows_to_is_turned(windy):
 def test_half_a_wind_is_none_and_said(windy, kept: int):
     names = windy.inputs
     half = windy.with_runs([replace(r, inputs=r.inputs[:, [0, 1, 2, 3, kept]], inputs_names=(*names[:4], names[kept])) for r in windy.runs])
-    found, (line,) = with_true_wind(half)
+    ready = true_wind(Prepared(half))
+    found, (line,) = ready.dataset, ready.notes
     assert found is half
     assert line.startswith(f"{names[kept]} is recorded alone")
 

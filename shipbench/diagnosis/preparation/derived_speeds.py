@@ -11,9 +11,10 @@ from scipy.fft import dct
 from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
 
-from ..effects.base import EFFECTS
-from ..records import Dataset, Run
-from ..signals import PSI, R, U, V, X, Y
+from ...effects.base import EFFECTS
+from ...records import Dataset, Run
+from ...signals import PSI, R, U, V, X, Y
+from .base import Prepared
 
 _SLOW, _HOLLOW, _BY_CHANCE = 2, 0.5, 1e-4
 """Half swings along a run that count as slow; the share of the power at quick ones below which there is none (independent sensors: from 1 on, 4 to 40
@@ -37,23 +38,26 @@ def marked(dataset: Dataset) -> Dataset:
     return replace(dataset, derived=tuple(dict.fromkeys(found)))
 
 
-def faults(dataset: Dataset) -> tuple[str, ...]:
-    """Faults of sensors that are not there."""
+def mark_derived_speeds(prepared: Prepared) -> Prepared:
+    """Mark speeds that follow from positions or headings as derived."""
+    return replace(prepared, dataset=marked(prepared.dataset))
+
+
+def faults_of_derived_speeds(prepared: Prepared) -> Prepared:
+    """Exclude faults of sensors that are not there."""
+    derived = prepared.dataset.derived
+    if not derived:
+        return prepared
     faulty = ((name, EFFECTS.get(name).traits.faults_of) for name in EFFECTS.names())
-    return tuple(name for name, channels in faulty if channels and channels <= set(dataset.derived))
+    absent = [name for name, channels in faulty if channels and channels <= set(derived)]
+    names = " and ".join(", ".join(derived).rsplit(", ", 1))
+    note = f"not counted as measured: {names}, derived from positions or headings, which they follow when summed up, errors and all."
+    return replace(prepared, excluded=(*prepared.excluded, *absent), notes=(*prepared.notes, note))
 
 
 def has_speeds(dataset: Dataset) -> bool:
     """Whether surge and sway are measured, so that the track can be held against them."""
     return not {"u", "v"} & set(dataset.derived)
-
-
-def said(dataset: Dataset) -> list[str]:
-    """A line for the reader."""
-    if not dataset.derived:
-        return []
-    names = " and ".join(", ".join(dataset.derived).rsplit(", ", 1))
-    return [f"not counted as measured: {names}, derived from positions or headings, which they follow when summed up, errors and all."]
 
 
 def beside_track(run: Run) -> np.ndarray:

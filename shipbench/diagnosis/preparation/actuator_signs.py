@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..checking.units import UnitFinding, check_commands
-from ..records import Dataset
-from ..signals import DELTA, F_B, F_S, STATES, N
-from .model import CENTRE, FREE, SPREAD
-from .plain import first_evidence, first_fit
-from .settle import Fit
+from ...checking.units import UnitFinding, check_commands
+from ...records import Dataset
+from ...signals import DELTA, F_B, F_S, STATES, N
+from ..model import CENTRE, FREE, SPREAD
+from ..plain import first_evidence, first_fit
+from ..settle import Fit
 
 _LIFT = FREE.index(5)
 """Place of the slope of the rudder's lift among the fit's parameters."""

@@ -5,24 +5,25 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
-from ..checking.applying import laid
-from ..checking.base import check_dataset
-from ..checking.finding import Finding
-from ..checking.units import UnitFinding
-from ..checking.units import merged as one_per_channel
-from ..data.reread import reread
-from ..data.units import sign_factor, unit_factor
-from ..effects.base import EFFECTS
-from ..errors import InputError
-from ..records import Dataset, Run
-from ..ship import Particulars, complete
-from ..signals import COMMANDS, PSI, STATES, X, Y
-from .derived import beside_heading, beside_track
-from .plant import SEGMENT
+from ...checking.applying import laid
+from ...checking.base import check_dataset
+from ...checking.finding import Finding
+from ...checking.units import UnitFinding
+from ...checking.units import merged as one_per_channel
+from ...data.reread import reread
+from ...data.units import sign_factor, unit_factor
+from ...effects.base import EFFECTS
+from ...errors import InputError
+from ...records import Run
+from ...ship import Particulars, complete
+from ...signals import COMMANDS, PSI, STATES, X, Y
+from ..plant import SEGMENT
+from .base import Prepared
+from .derived_speeds import beside_heading, beside_track
 
 _ROUNDS = 3
 """After the unit of the speeds, that of the positions may be seen."""
@@ -32,28 +33,19 @@ _LEAST = {"way": 0.1, "turn": np.deg2rad(15.0)}
 _KEEP = "To keep the correction: shipbench data check FOLDER --apply."
 
 
-@dataclass(frozen=True)
-class Record:
-    """A data set with the errors of its record taken out, those of them that are causes (of wrong numbers, not of double runs), and lines for the
-    reader."""
-
-    dataset: Dataset
-    errors: list[UnitFinding]
-    told: list[str]
-
-
 def joined(errors: Sequence[UnitFinding]) -> list[UnitFinding]:
     """One error per channel; frames and kinds of velocities, which are no factors, first."""
     return [e for e in errors if e.factor == 1.0] + one_per_channel([e for e in errors if e.factor != 1.0])
 
 
-def corrected_record(dataset: Dataset) -> Record:
-    """The data set as it must be read, by the errors that the check finds. A fault that an effect of the library is, of a size that it may have, is
+def correct_record_errors(prepared: Prepared) -> Prepared:
+    """Correct units, signs and frames by the errors that the check finds. A fault that an effect of the library is, of a size that it may have, is
     left to the fit, which tells how large it is and what it is worth.
 
     Raises:
         InputError: errors are left however often they are corrected.
     """
+    dataset = prepared.dataset
     errors: list[UnitFinding] = []
     told: dict[str, str] = {}
     ship = complete(dataset.ship)
@@ -70,15 +62,16 @@ def corrected_record(dataset: Dataset) -> Record:
         dataset = reread(dataset, lines.description)
         told |= {f.text: f"{f.text} It is corrected before the fit. {_KEEP}" for f in found}
         errors += [e for f in found for e in _errors(f)]
-    return Record(dataset, joined(errors), list(told.values()))
+    return replace(prepared.corrected(dataset, *told.values()), errors=(*prepared.errors, *joined(errors)))
 
 
-def refuse_contradictions(dataset: Dataset) -> None:
+def refuse_contradictions(prepared: Prepared) -> Prepared:
     """Refuse runs whose positions and speeds, or heading and yaw rate, say different things most of the time.
 
     Raises:
         InputError: in most pieces in which the ship moves, and in three at least, more than half of the squared way, or turn, is unexplained.
     """
+    dataset = prepared.dataset
     length = max(1, round(SEGMENT * (dataset.ship.L / 130.0) ** 0.5 / dataset.dt))
     track, turns = (np.concatenate(parts) for parts in zip(*(_ends(run, length) for run in dataset.runs), strict=True))
     for (made, said), least, what, by, unit, channels in (
@@ -95,6 +88,7 @@ def refuse_contradictions(dataset: Dataset) -> None:
                 f"{one:.3g} {unit} where {by} {other:.3g} {unit}, or another way. Accepted: 0.3 to 3.4 times as much, the same way. "
                 f"Correct the unit, sign or column of {channels}, or the unit of t, in dataset.toml. Look with: shipbench data check FOLDER."
             )
+    return prepared
 
 
 def _ends(run: Run, length: int) -> tuple[np.ndarray, np.ndarray]:

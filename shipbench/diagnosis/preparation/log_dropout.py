@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..checking.speed_log import in_words, silence
-from ..importing.position import to_body
-from ..importing.speeds import derivative
-from ..records import Dataset, Run
-from ..signals import PSI, U, V, X, Y
-from .derived import has_speeds
+from ...checking.speed_log import in_words, silence
+from ...importing.position import to_body
+from ...importing.speeds import derivative
+from ...records import Run
+from ...signals import PSI, U, V, X, Y
+from .base import Prepared
+from .derived_speeds import has_speeds
 
 
-def with_speeds_of_the_track(dataset: Dataset) -> tuple[Dataset, list[str]]:
-    """The data set with u and v from its positions where the log reads nothing though the ship makes way, and a line for the reader."""
+def speeds_of_the_track(prepared: Prepared) -> Prepared:
+    """Take u and v from the positions where the log reads nothing though the ship makes way."""
+    dataset = prepared.dataset
     found = silence(dataset) if has_speeds(dataset) else None
     if found is None:
-        return dataset, []
+        return prepared
     runs = [_by_track(run, dataset.dt, (dataset.ship.L / 9.81) ** 0.5) for run in dataset.runs]
     line = f"{in_words(found)} u and v are taken from the positions in all runs instead."
-    return replace(dataset.with_runs(runs), derived=tuple(dict.fromkeys((*dataset.derived, "u", "v")))), [line]
+    return prepared.corrected(replace(dataset.with_runs(runs), derived=tuple(dict.fromkeys((*dataset.derived, "u", "v")))), line)
 
 
 def _by_track(run: Run, dt: float, scale: float) -> Run:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.diagnose import FEW_RUNS, diagnose
-from shipbench.diagnosis.parts import in_parts
+from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.preparation.base import Prepared
+from shipbench.diagnosis.preparation.splitting import FEW_RUNS, split_long_runs
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset, Run
@@ -26,7 +27,8 @@ def _logs(runs: int, seconds: int) -> Dataset:
 @pytest.mark.parametrize(("runs", "seconds", "parts"), [(1, 1800, 15), (3, 400, 9), (1, 6000, 24)])
 def test_a_few_long_runs_are_cut_into_parts_of_equal_length(runs: int, seconds: int, parts: int):
     data = _logs(runs, seconds)
-    cut, told = in_parts(data, FEW_RUNS)
+    ready = split_long_runs(Prepared(data))
+    cut, told = ready.dataset, ready.notes
     assert len(cut) == parts
     assert f"cut into {parts} parts" in told[0]
     lengths = np.array([len(part) for part in cut.runs])
@@ -40,7 +42,7 @@ def test_a_few_long_runs_are_cut_into_parts_of_equal_length(runs: int, seconds: 
 @pytest.mark.parametrize(("runs", "seconds"), [(1, 900), (4, 230), (FEW_RUNS, 400)])
 def test_short_runs_and_runs_enough_stay_as_they_are(runs: int, seconds: int):
     data = _logs(runs, seconds)
-    assert in_parts(data, FEW_RUNS) == (data, [])
+    assert split_long_runs(Prepared(data)) == Prepared(data)
 
 
 @pytest.mark.parametrize("hidden", [pytest.param((), marks=pytest.mark.long), ("current",)])

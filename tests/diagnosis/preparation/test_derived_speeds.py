@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.derived import marked
 from shipbench.diagnosis.diagnose import diagnose
+from shipbench.diagnosis.preparation.derived_speeds import marked
 from shipbench.effects.base import EFFECTS
 from shipbench.importing.speeds import derivative
 from shipbench.physics.mmg import load_mmg_ship

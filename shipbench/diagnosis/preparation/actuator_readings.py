@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..records import Dataset
-from ..signals import ACTUATORS, MOTION
-from .outcome import what_it_is
-from .plain import first_evidence
-from .record_error import CHANNELS, RecordError
-from .settle import Fit
+from ...records import Dataset
+from ...signals import ACTUATORS, MOTION
+from ..outcome import what_it_is
+from ..plain import first_evidence
+from ..record_error import CHANNELS, RecordError
+from ..settle import Fit
 
 
 def judged(null: Fit, errors: Sequence[RecordError]) -> list[RecordError]:
