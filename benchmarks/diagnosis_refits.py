@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import measure
 
-from shipbench.diagnosis.fit import Origin, looking_at
-from shipbench.diagnosis.model import Scales
-from shipbench.diagnosis.plain import null_fit
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.screen import screen
-from shipbench.diagnosis.select import Beginning, candidates_for, select
-from shipbench.diagnosis.settle import Fit
+from shipbench.diagnosis.inference.baseline import null_fit
+from shipbench.diagnosis.inference.gauss_newton import Origin, looking_at
+from shipbench.diagnosis.inference.laplace import Fit
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import Scales
+from shipbench.diagnosis.selection.screening import screen
+from shipbench.diagnosis.selection.stepwise import Beginning, candidates_for, select
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.hidden import Hidden

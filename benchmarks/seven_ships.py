@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shipbench.diagnosis.case_ships import draw_ship
 from shipbench.physics.mmg import MMGShip
 from shipbench.records import Dataset
 from shipbench.ship import Ship
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.ships import draw_ship
 
 _DRAWN = 3
 SHIPS = [*(f"drawn {i + 1}" for i in range(_DRAWN)), *PUBLISHED]

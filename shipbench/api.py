@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from .bench.results import Results, read_results
 from .checking.finding import SEVERITIES, Finding
 from .data.base import load_dataset
-from .diagnosis.outcome import Diagnosis
+from .diagnosis.result import Diagnosis
 from .errors import InputError
 from .names import brief
 from .records import Dataset

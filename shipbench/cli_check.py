@@ -130,8 +130,8 @@ def suite_check(
     quiet: Quiet = False,
 ) -> None:
     """Plant faults in clean simulated sets and count what `data check` finds: check.md."""
-    from .bench.check_suite import suite_command
     from .bench.progress import make_progress
+    from .suites.checks.suite import suite_command
 
     page, tables = suite_command(seeds=seeds, first=seed, development=development, out=out, progress=make_progress(quiet), command=str(ctx.obj))
     for table in tables:

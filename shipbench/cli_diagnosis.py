@@ -68,8 +68,8 @@ def suite_diagnosis(
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
 ) -> None:
     """Hide causes in simulated runs, diagnose them, and score the diagnosis: leaderboards/diagnosis.md."""
-    from .bench.diagnosis_suite import suite_command
     from .diagnosis.diagnose import diagnose as run
+    from .suites.diagnosis.suite import suite_command
 
     page, rows = suite_command(
         diagnose=run, seed=seed, per_effect=per_effect, kinds=kinds, development=development, out=out, resume=resume, workers=workers,

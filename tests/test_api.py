@@ -322,7 +322,7 @@ def shown(harbour, scores) -> dict[str, object]:
     """One object of each public kind, with long names and many parts."""
     from shipbench.api import Verdict
     from shipbench.bench.runner import Outcome
-    from shipbench.diagnosis.outcome import Candidate, Cause, Estimate
+    from shipbench.diagnosis.result import Candidate, Cause, Estimate
     from shipbench.specs import parse_spec
 
     long = harbour.with_runs([replace(run, id=f"{run.id} {'long ' * 14}", meta={"manoeuvre": f"{run.id} turn"}) for run in harbour])

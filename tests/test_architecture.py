@@ -18,7 +18,7 @@ LAYERS = {
     "registry": 1, "specs": 1, "compiled": 1, "integrate": 1, "ship": 1,
     "arrays": 1, "frames": 1, "render": 1, "notebook": 1, "processes": 1,
     "records": 2, "physics": 2, "metrics": 2.5, "effects": 2.7, "simulate": 3, "predictors": 3.5, "data": 4, "importing": 4.3,
-    "checking": 4.5, "diagnosis": 4.7, "contract": 4.8, "bench": 5,
+    "checking": 4.5, "diagnosis": 4.7, "contract": 4.8, "bench": 5, "suites": 5.2,
     "scores": 5.3, "api": 5.4, "adapters": 5.5, "cli_common": 5.8, "cli_check": 5.9, "cli_contract": 5.9, "cli_diagnosis": 5.9, "cli_data": 5.9,
     "cli_demo": 5.9, "cli_import": 5.9, "cli_leaderboard": 5.9, "cli_parts": 5.9, "cli_report": 5.9, "cli": 6, "__init__": 7, "__main__": 7,
 }  # fmt: skip

@@ -21,7 +21,7 @@ from shipbench.bench.results import read_results
 from shipbench.bench.tables import Table, TableColumn, number
 from shipbench.bench.terminal import command_lines
 from shipbench.cli import app
-from shipbench.diagnosis.outcome import Cause, Diagnosis, Estimate
+from shipbench.diagnosis.result import Cause, Diagnosis, Estimate
 from shipbench.steps import listening, step, tick, within
 
 WIDTHS = [80, 100, 120]

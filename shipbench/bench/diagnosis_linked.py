@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnosis.outcome import Diagnosis, Trace
+from ..diagnosis.result import Diagnosis, Trace
 from ..metrics.base import fit_percent
 from ..metrics.ed import ed
 from ..render.linked import Line, linked_plots, linked_run

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from ..diagnosis.follows import AXES
-from ..diagnosis.outcome import Diagnosis, what_it_is
-from ..diagnosis.wrong import FORCE_UNITS
+from ..diagnosis.evaluation.dependence import AXES
+from ..diagnosis.result import Diagnosis, what_it_is
+from ..diagnosis.evaluation.residuals import FORCE_UNITS
 from .diagnosis_text import figure, grade
 
 

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from ..diagnosis.outcome import Diagnosis
+from ..diagnosis.result import Diagnosis
 from .diagnosis_html import diagnosis_page
 from .diagnosis_text import in_words, summary_lines
 

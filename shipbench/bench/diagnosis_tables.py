@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ..diagnosis.follows import AXES
-from ..diagnosis.outcome import Diagnosis, Trace
-from ..diagnosis.wrong import CHANNEL_UNITS, CHANNELS, ErrorTables, squared_error
+from ..diagnosis.evaluation.dependence import AXES
+from ..diagnosis.result import Diagnosis, Trace
+from ..diagnosis.evaluation.residuals import CHANNEL_UNITS, CHANNELS, ErrorTables, squared_error
 from ..signals import PSI, R, U, V
 from .diagnosis_linked import fits, rollouts
 from .diagnosis_text import detectable

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 
-from ..diagnosis.outcome import Candidate, Cause, Diagnosis, Estimate, Gain, what_it_is
+from ..diagnosis.result import Candidate, Cause, Diagnosis, Estimate, Gain, what_it_is
 from ..effects.base import EFFECTS, Effect, Parameter
 from .tables import display_unit
 from .terminal import command_lines, paragraph

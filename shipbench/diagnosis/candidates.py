@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects.base import EFFECTS, searched_by
-from .analysis import HULL_THRESHOLD, Analysis
-from .causes import p_of
-from .gear_kinds import GearFinding
-from .outcome import Candidate
-from .possible import why_not
+from .actuators.kinds import GearFinding
+from .explain import p_of
+from .inference.laplace import Fit
 from .preparation.time_offsets import late_velocities_effect
-from .requirements import detection_limit
-from .screen import Score, other_kinds_from, places
-from .select import shows_in_record
-from .settle import Fit
+from .result import Candidate
+from .selection.analysis import HULL_THRESHOLD, Analysis
+from .selection.applicable import why_not
+from .selection.requirements import detection_limit
+from .selection.screening import Score, other_kinds_from, places
+from .selection.stepwise import shows_in_record
 
 _DOUBT = "in the model, but not named while the ship file is in doubt"
 

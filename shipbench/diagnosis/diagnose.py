@@ -20,15 +20,16 @@ from ..errors import InputError
 from ..processes import process_pool
 from ..records import Dataset
 from ..steps import step, within
-from .analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .budget import Budget, is_spent, limited
 from .candidates import describe_candidates
-from .causes import describe_causes, remaining, unknown_part, what_is_left
-from .fit import Fit
-from .gain import FoldGain, fold_gain, summarise
-from .noise import noise_in_words
-from .outcome import Cause, Diagnosis, Gain
-from .plant import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, least_depth
+from .evaluation.held_out_gain import FoldGain, fold_gain, summarise
+from .evaluation.residuals import what_is_wrong
+from .evaluation.series import trace_of
+from .explain import describe_causes, remaining, unknown_part, what_is_left
+from .inference.gauss_newton import Fit
+from .inference.noise_selection import noise_in_words
+from .inference.outliers import left_out
+from .model.forward import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, least_depth
 from .preparation import actuator_readings as misread
 from .preparation.actuator_signs import turned_actuators
 from .preparation.base import prepare
@@ -36,10 +37,9 @@ from .preparation.passes import GIVEN, PASSES
 from .preparation.record_errors import joined
 from .preparation.splitting import is_too_little
 from .preparation.time_offsets import ruled_out
-from .ship_file import doubts_of, odd_for, own_propeller
-from .strange import left_out
-from .trace import trace_of
-from .wrong import what_is_wrong
+from .result import Cause, Diagnosis, Gain
+from .selection.analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
+from .selection.ship_file import doubts_of, odd_for, own_propeller
 
 FOLDS = 5
 _WHOLE = 0.2

@@ -18,7 +18,7 @@ from shipbench.bench.diagnosis_linked import changed, chosen_segments, fits
 from shipbench.bench.diagnosis_report import write_diagnosis, write_report
 from shipbench.bench.diagnosis_text import WIDTH, gain_words, headline, summary_lines
 from shipbench.cli import app
-from shipbench.diagnosis.outcome import Candidate, Cause, Diagnosis, Estimate, Gain, Wrong
+from shipbench.diagnosis.result import Candidate, Cause, Diagnosis, Estimate, Gain, Wrong
 from tests.diagnosis.test_wrong import make_trace
 
 GAIN = Gain("ED", 21.3, 9.8, 0.54, (0.4, 0.66), "24/24")

@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
-from shipbench.bench import diagnosis_scores as scores
-from shipbench.bench.diagnosis_page import read_rows, render, tables, write_page
-from shipbench.bench.diagnosis_suite import Job, run_case, run_suite, suite_command
 from shipbench.cli import app
-from shipbench.diagnosis import case_ships
-from shipbench.diagnosis.cases import KINDS, count, draw_case
-from shipbench.diagnosis.outcome import Cause, Diagnosis, Estimate, Gain
+from shipbench.diagnosis.result import Cause, Diagnosis, Estimate, Gain
 from shipbench.errors import InputError
 from shipbench.simulate.trials import Trials
+from shipbench.suites.diagnosis import scores as scores
+from shipbench.suites.diagnosis import ships as case_ships
+from shipbench.suites.diagnosis.cases import KINDS, count, draw_case
+from shipbench.suites.diagnosis.page import read_rows, render, tables, write_page
+from shipbench.suites.diagnosis.suite import Job, run_case, run_suite, suite_command
 
 TINY = Trials(runs=4, samples=40)
 PAGE = Path(__file__).parents[2] / "leaderboards" / "diagnosis.md"

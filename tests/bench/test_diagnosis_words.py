@@ -5,7 +5,7 @@ import re
 import pytest
 
 from shipbench.bench.diagnosis_text import cause_lines, estimate, force_words, in_words
-from shipbench.diagnosis.outcome import Cause, Estimate
+from shipbench.diagnosis.result import Cause, Estimate
 from shipbench.effects.base import EFFECTS
 
 BANNED = re.compile(r"\b(told|said|felt|knots?|heals?|mends?|misread|plant|revolutions|off the regressions|off the formula)\b", re.IGNORECASE)

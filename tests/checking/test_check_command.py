@@ -17,11 +17,11 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
-from shipbench.bench.check_faults import FAULTS
-from shipbench.bench.check_sets import base_set
-from shipbench.bench.check_suite import write_planted
 from shipbench.bench.recorded import RUNS, thinned
 from shipbench.cli import app
+from shipbench.suites.checks.clean_sets import base_set
+from shipbench.suites.checks.faults import FAULTS
+from shipbench.suites.checks.suite import write_planted
 
 SHIP, SEED = "kcs", 311
 BY_NAME = {fault.name: fault for fault in FAULTS}

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 import tomli_w
 
-from shipbench.bench.check_suite import apply_lines
 from shipbench.checking.base import check_path
 from shipbench.checking.finding import Finding
 from shipbench.data.esso_osaka import SHIP
 from shipbench.data.files import read_dataset
+from shipbench.suites.checks.suite import apply_lines
 
 SHARED = Path(__file__).parents[3] / "shared" / "data" / "esso-osaka-frt"
 FILES = sorted(SHARED.glob("*/*.csv.gz"))

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 from typer.testing import CliRunner
 
-from shipbench.bench import check_suite
-from shipbench.bench.check_faults import FAULTS, Fault
-from shipbench.bench.check_sets import base_set
 from shipbench.cli import app
+from shipbench.suites.checks import suite as check_suite
+from shipbench.suites.checks.clean_sets import base_set
+from shipbench.suites.checks.faults import FAULTS, Fault
 
 
 @pytest.fixture

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from shipbench.bench.check_faults import FAULTS
-from shipbench.bench.check_sets import base_set
-from shipbench.bench.check_suite import write_planted
 from shipbench.checking.base import check_path
 from shipbench.checking.finding import Finding
+from shipbench.suites.checks.clean_sets import base_set
+from shipbench.suites.checks.faults import FAULTS
+from shipbench.suites.checks.suite import write_planted
 
 BY_NAME = {fault.name: fault for fault in FAULTS}
 

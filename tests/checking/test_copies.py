@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shipbench.bench.check_sets import base_set
 from shipbench.checking.base import check_dataset
 from shipbench.records import Dataset, Run
+from shipbench.suites.checks.clean_sets import base_set
 
 
 def windows(data: Dataset, run: Run, starts: list[int], length: int, **meta: object) -> list[Run]:

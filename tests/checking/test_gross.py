@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.bench.check_sets import base_set
 from shipbench.checking.base import check_dataset
 from shipbench.records import Dataset
 from shipbench.signals import PSI, N, R, U, V, X, Y
+from shipbench.suites.checks.clean_sets import base_set
 
 
 def changed(data: Dataset, change: Callable[[np.ndarray], None]) -> Dataset:

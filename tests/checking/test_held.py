@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.bench.check_sets import base_set
 from shipbench.checking.base import check_dataset
 from shipbench.data.corrections import between_fixes
 from shipbench.records import Dataset
 from shipbench.signals import PSI, X, Y
+from shipbench.suites.checks.clean_sets import base_set
 
 
 def held(data: Dataset, every: int, **late: int) -> Dataset:

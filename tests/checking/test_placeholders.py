@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.bench.check_sets import base_set
 from shipbench.checking.base import check_dataset
 from shipbench.records import Dataset
 from shipbench.signals import DELTA, PSI, STATES, R, U, X, Y
+from shipbench.suites.checks.clean_sets import base_set
 
 
 def with_block(data: Dataset, channels: list[int], value: float, first: int, last: int) -> Dataset:

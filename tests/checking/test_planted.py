@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipbench.bench.check_faults import FAULTS, Fault
-from shipbench.bench.check_sets import EQUATION, SHIPS, base_set, clean_sets
-from shipbench.bench.check_suite import Outcome, apply_lines, run_case, write_planted
 from shipbench.checking.base import check_dataset, check_path
 from shipbench.data.files import read_dataset
 from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.signals import DELTA, PSI, STATES, N, R, U, V, X, Y
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.checks.clean_sets import EQUATION, SHIPS, base_set, clean_sets
+from shipbench.suites.checks.faults import FAULTS, Fault
+from shipbench.suites.checks.suite import Outcome, apply_lines, run_case, write_planted
 
 SEED = 311  # neither one on which thresholds were set nor one that the suite reports
 SHIP = "kcs"

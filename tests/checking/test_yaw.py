@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.bench.check_sets import base_set
 from shipbench.checking.base import check_dataset
 from shipbench.records import Dataset
 from shipbench.signals import PSI, R
+from shipbench.suites.checks.clean_sets import base_set
 
 
 def with_yaw_rate(data: Dataset, make) -> Dataset:

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.fit import Origin, fit, start
-from shipbench.diagnosis.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, by_run, ornstein_uhlenbeck, solve
-from shipbench.diagnosis.inverse import inverses, log_determinant
-from shipbench.diagnosis.model import Linearisation, Scales, predict
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.screen import _wrong_way
-from shipbench.diagnosis.settle import Model, products_of, settle
-from shipbench.diagnosis.structure import STRUCTURE
-from shipbench.diagnosis.term import Term
+from shipbench.diagnosis.inference.gauss_newton import Origin, fit, start
+from shipbench.diagnosis.inference.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, by_run, ornstein_uhlenbeck, solve
+from shipbench.diagnosis.inference.laplace import Model, products_of, settle
+from shipbench.diagnosis.inference.linalg import inverses, log_determinant
+from shipbench.diagnosis.model.between_ships import STRUCTURE
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import Linearisation, Scales, predict
+from shipbench.diagnosis.model.term import Term
+from shipbench.diagnosis.selection.screening import _wrong_way
 from shipbench.effects.base import EFFECTS, flow_first
 from shipbench.physics import eq2
 from shipbench.physics.mmg import load_mmg_ship

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.averaging import averaged
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.strange import left_out
+from shipbench.diagnosis.inference.outliers import left_out
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.resampling import averaged
 from shipbench.records import Dataset, Run
 from shipbench.ship import Ship
 from shipbench.signals import COMMANDS

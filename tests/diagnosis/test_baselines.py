@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.baselines import derivative_regression, white_residual_test
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.baselines import derivative_regression, white_residual_test
 
 NAMES = ["current", "rudder_offset", "thrust_gain", "heading_bias", "rudder_delay"]
 PLAN = Trials(runs=6, samples=60, gusts=0.5)

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from shipbench.diagnosis.bound import LEVEL, bound, expected_ratio, power
-from shipbench.diagnosis.model import Scales
-from shipbench.diagnosis.plain import null_fit
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.settle import Fit
+from shipbench.diagnosis.inference.baseline import null_fit
+from shipbench.diagnosis.inference.laplace import Fit
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import Scales
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.oracle_bound import LEVEL, bound, expected_ratio, power
 
 PLAN = Trials(runs=6, samples=60)
 

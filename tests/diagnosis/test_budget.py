@@ -7,18 +7,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis import analysis, noise
 from shipbench.diagnosis import diagnose as whole
-from shipbench.diagnosis import select as selection
-from shipbench.diagnosis.analysis import THRESHOLD, plain_model
 from shipbench.diagnosis.budget import Budget, count, is_spent, limited
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.fit import Origin, fit
-from shipbench.diagnosis.gain import FoldGain
-from shipbench.diagnosis.model import Scales
-from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.evaluation.held_out_gain import FoldGain
+from shipbench.diagnosis.inference import noise_selection as noise
+from shipbench.diagnosis.inference.gauss_newton import Origin, fit
+from shipbench.diagnosis.inference.laplace import Fit, Model
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import Scales
 from shipbench.diagnosis.preparation import time_offsets as clocks
-from shipbench.diagnosis.settle import Fit, Model
+from shipbench.diagnosis.selection import analysis
+from shipbench.diagnosis.selection import stepwise as selection
+from shipbench.diagnosis.selection.analysis import THRESHOLD, plain_model
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship

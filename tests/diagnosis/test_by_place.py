@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.by_place import goes_with
+from shipbench.diagnosis.evaluation.run_values import goes_with
 
 RUNS, SAMPLES = 24, 30
 

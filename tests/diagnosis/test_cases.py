@@ -7,9 +7,6 @@ import pickle
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.case_ships import PARENTS, as_polynomial, draw_ship, scaled
-from shipbench.diagnosis.cases import KINDS, OWN_KINDS, SIZES, UNITS, count, draw_case, misread, singles
-from shipbench.diagnosis.outside import OUTSIDE, canonical
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.hull import polynomial, unified
@@ -19,6 +16,9 @@ from shipbench.simulate.fitted_ship import fitted_trials, is_sane
 from shipbench.simulate.manoeuvres import turning_circle
 from shipbench.simulate.simulator import Simulator
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.cases import KINDS, OWN_KINDS, SIZES, UNITS, count, draw_case, misread, singles
+from shipbench.suites.diagnosis.ships import PARENTS, as_polynomial, draw_ship, scaled
+from shipbench.suites.diagnosis.unmodelled import OUTSIDE, canonical
 
 TINY = Trials(runs=4, samples=40)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.screen import other_kinds_from
+from shipbench.diagnosis.selection.screening import other_kinds_from
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset, Run

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.diagnose import _of_depth, diagnose
-from shipbench.diagnosis.model import Scales
-from shipbench.diagnosis.plain import null_fit
-from shipbench.diagnosis.plant import DEEP, Plant
+from shipbench.diagnosis.inference.baseline import null_fit
+from shipbench.diagnosis.model.forward import DEEP, Plant
+from shipbench.diagnosis.model.linearisation import Scales
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from shipbench.data.base import load_dataset
-from shipbench.diagnosis.model import Scales
-from shipbench.diagnosis.plain import null_fit
-from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.inference.baseline import null_fit
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import Scales
 from shipbench.diagnosis.preparation.time_offsets import put_back, unfiltered
-from shipbench.diagnosis.screen import screen
-from shipbench.diagnosis.select import candidates_for
+from shipbench.diagnosis.selection.screening import screen
+from shipbench.diagnosis.selection.stepwise import candidates_for
 from shipbench.errors import InputError
 from shipbench.records import Dataset, Run
 

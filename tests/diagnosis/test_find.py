@@ -14,18 +14,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.analysis import THRESHOLD
-from shipbench.diagnosis.cases import ON_PUBLISHED, draw_case, singles
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.fit import Origin
-from shipbench.diagnosis.model import Scales
-from shipbench.diagnosis.outcome import Diagnosis
-from shipbench.diagnosis.outside import canonical
-from shipbench.diagnosis.plain import null_fit
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.screen import changes, screen
-from shipbench.diagnosis.select import absorbed, candidates_for, select
-from shipbench.diagnosis.ship_file import whatever_the_ship
+from shipbench.diagnosis.inference.baseline import null_fit
+from shipbench.diagnosis.inference.gauss_newton import Origin
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import Scales
+from shipbench.diagnosis.result import Diagnosis
+from shipbench.diagnosis.selection.analysis import THRESHOLD
+from shipbench.diagnosis.selection.screening import changes, screen
+from shipbench.diagnosis.selection.ship_file import whatever_the_ship
+from shipbench.diagnosis.selection.stepwise import absorbed, candidates_for, select
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship
@@ -33,6 +31,8 @@ from shipbench.records import Dataset
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.cases import ON_PUBLISHED, draw_case, singles
+from shipbench.suites.diagnosis.unmodelled import canonical
 
 SEED = int(os.environ.get("SHIPBENCH_SEED", secrets.randbelow(10_000)))
 CLEAR = (

@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 
 from shipbench import kept_code
-from shipbench.diagnosis import gears
-from shipbench.diagnosis.analysis import plain_model
-from shipbench.diagnosis.case_ships import scaled
+from shipbench.diagnosis.actuators import identify as gears
+from shipbench.diagnosis.actuators.identify import _Record, find_in_gears
+from shipbench.diagnosis.actuators.kinds import GearFinding, kinds_of, slow_on_any_ship
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.gain import rollout_plant
-from shipbench.diagnosis.gear_kinds import GearFinding, kinds_of, slow_on_any_ship
-from shipbench.diagnosis.gears import _Record, find_in_gears
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.rolling import Active
-from shipbench.diagnosis.select import select
+from shipbench.diagnosis.evaluation.held_out_gain import rollout_plant
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.rollout import Active
+from shipbench.diagnosis.selection.analysis import plain_model
+from shipbench.diagnosis.selection.stepwise import select
 from shipbench.effects.base import EFFECTS, Effect, Parameter
 from shipbench.ops import Array
 from shipbench.physics.actuators import Gear, gear_path
@@ -27,6 +26,7 @@ from shipbench.records import Dataset
 from shipbench.signals import DELTA, N
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.ships import scaled
 
 
 @pytest.fixture
@@ -182,7 +182,7 @@ def test_a_gear_behind_its_record_is_named(effect: str, gear: Behind, size: floa
 def test_play_is_judged_beside_a_lag_that_is_too_small_to_matter(monkeypatch: pytest.MonkeyPatch):
     """On a boat a record that is 0.2 s early was passed over, and play that is not there named for it."""
     ship, trials = scaled(load_mmg_ship("kcs"), 12.0), Trials(runs=12, samples=120, thrusters=False, astern=False, gusts=0.5, noise=0.3)
-    monkeypatch.setattr("shipbench.diagnosis.select._HOPE_MARGIN", np.inf)  # no refit is given up
+    monkeypatch.setattr("shipbench.diagnosis.selection.stepwise._HOPE_MARGIN", np.inf)  # no refit is given up
     found = select(plain_model(Plant.of(_recorded_before(ship, Behind("delta", "T2"), 0.2, DELTA, trials))), 10.0)
     (play,) = [s for s in found.steps if s.term.label == "rudder_backlash" and s.round == 0]
     assert play.score > 30.0

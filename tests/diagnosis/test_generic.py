@@ -7,14 +7,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.fit import fit
-from shipbench.diagnosis.generic import SENSORS, Dependence, Search, dependences
-from shipbench.diagnosis.model import Scales
-from shipbench.diagnosis.outside import Outside, get
-from shipbench.diagnosis.plain import null_fit
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.settle import Fit, Model
-from shipbench.diagnosis.term import Term
+from shipbench.diagnosis.inference.baseline import null_fit
+from shipbench.diagnosis.inference.gauss_newton import fit
+from shipbench.diagnosis.inference.laplace import Fit, Model
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import Scales
+from shipbench.diagnosis.model.term import Term
+from shipbench.diagnosis.selection.unknown import SENSORS, Dependence, Search, dependences
 from shipbench.effects.base import EFFECTS
 from shipbench.ops import Array
 from shipbench.physics.mmg import load_mmg_ship
@@ -23,6 +22,7 @@ from shipbench.ship import Particulars
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.unmodelled import Outside, get
 
 HULL = ("speed", "sway velocity", "yaw rate")
 

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from shipbench.diagnosis.budget import Budget
 from shipbench.diagnosis.diagnose import _folds, _one_fold, diagnose
-from shipbench.diagnosis.gain import summarise
+from shipbench.diagnosis.evaluation.held_out_gain import summarise
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset

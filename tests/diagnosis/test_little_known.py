@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.case_ships import draw_ship
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
@@ -15,6 +14,7 @@ from shipbench.records import Dataset
 from shipbench.ship import Ship
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.ships import draw_ship
 
 CURRENT = Hidden(EFFECTS.get("current"), (0.25, -0.2))
 

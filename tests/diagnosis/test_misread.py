@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shipbench.diagnosis.actuators.identify import find_in_gears
+from shipbench.diagnosis.actuators.record_error import RecordError, readings
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.gears import find_in_gears
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.record_error import RecordError, readings
+from shipbench.diagnosis.model.forward import Plant
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.actuators import Gear, gear_path
 from shipbench.physics.mmg import load_mmg_ship

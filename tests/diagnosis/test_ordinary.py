@@ -9,17 +9,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis import ordinary
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.model import NUM_BASE, PLACES, Linearisation, Scales
-from shipbench.diagnosis.ordinary import NOTICEABLE, STRANGE, STRANGE_SUM, needed, widened, widths_of
-from shipbench.diagnosis.outside import Outside
-from shipbench.diagnosis.plain import null_fit
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.screen import screen
-from shipbench.diagnosis.select import candidates_for
-from shipbench.diagnosis.settle import Fit, settle
-from shipbench.diagnosis.structure import STRUCTURE
+from shipbench.diagnosis.inference import robust_prior as ordinary
+from shipbench.diagnosis.inference.baseline import null_fit
+from shipbench.diagnosis.inference.laplace import Fit, settle
+from shipbench.diagnosis.inference.robust_prior import NOTICEABLE, STRANGE, STRANGE_SUM, needed, widened, widths_of
+from shipbench.diagnosis.model.between_ships import STRUCTURE
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import NUM_BASE, PLACES, Linearisation, Scales
+from shipbench.diagnosis.selection.screening import screen
+from shipbench.diagnosis.selection.stepwise import candidates_for
 from shipbench.effects.base import EFFECTS
 from shipbench.ops import Array
 from shipbench.physics.eq2 import accelerations, coefficients
@@ -30,6 +29,7 @@ from shipbench.ship import Particulars, Propeller, complete
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.unmodelled import Outside
 
 RACE = PLACES["race"]
 

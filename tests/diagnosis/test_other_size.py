@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from shipbench.diagnosis import other_size
-from shipbench.diagnosis.model import Scales
-from shipbench.diagnosis.other_size import better_size
-from shipbench.diagnosis.plain import null_fit
-from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.inference.baseline import null_fit
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import Scales
+from shipbench.diagnosis.selection import other_size
+from shipbench.diagnosis.selection.other_size import better_size
 from shipbench.ship import Ship, complete
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials

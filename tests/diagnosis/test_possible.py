@@ -9,11 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.possible import why_not
-from shipbench.diagnosis.robust import is_on_a_ship
-from shipbench.diagnosis.select import candidates_for
-from shipbench.diagnosis.term import Term
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.term import Term
+from shipbench.diagnosis.selection.agreement import is_on_a_ship
+from shipbench.diagnosis.selection.applicable import why_not
+from shipbench.diagnosis.selection.stepwise import candidates_for
 from shipbench.effects.base import EFFECTS, Effect, Parameter
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
@@ -61,7 +61,7 @@ def test_what_acts_through_an_actuator_that_never_works_is_not_asked(channels: t
 
 def test_a_rudder_that_stands_still_while_the_ship_turns_does_not_work(monkeypatch):
     assert why_not(EFFECTS.get("rudder_offset"), without(DELTA, value=1e-3)) == ""  # held, for all that is known
-    monkeypatch.setattr("shipbench.diagnosis.plant.standing", lambda _: {"delta": ("it turns all the same", {})})
+    monkeypatch.setattr("shipbench.diagnosis.model.linearisation.forward.standing", lambda _: {"delta": ("it turns all the same", {})})
     assert "rudder never moves" in why_not(EFFECTS.get("rudder_offset"), without(DELTA, value=1e-3))
 
 

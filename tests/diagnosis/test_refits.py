@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis import fit as refit
-from shipbench.diagnosis.fit import Origin, fit, looking_at
-from shipbench.diagnosis.gram import background, background_cov, update_force
-from shipbench.diagnosis.model import Linearisation, Scales
-from shipbench.diagnosis.plain import null_fit
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.screen import _changes, screen
-from shipbench.diagnosis.select import Beginning, candidates_for
-from shipbench.diagnosis.settle import Fit, Model, hull_evidence, settle
+from shipbench.diagnosis.inference import gauss_newton as refit
+from shipbench.diagnosis.inference.baseline import null_fit
+from shipbench.diagnosis.inference.gauss_newton import Origin, fit, looking_at
+from shipbench.diagnosis.inference.gram import background, background_cov, update_force
+from shipbench.diagnosis.inference.laplace import Fit, Model, hull_evidence, settle
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import Linearisation, Scales
+from shipbench.diagnosis.selection.screening import _changes, screen
+from shipbench.diagnosis.selection.stepwise import Beginning, candidates_for
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.hidden import Hidden

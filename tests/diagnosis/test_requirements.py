@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from test_robust import RUNS, fit_of
 
-from shipbench.diagnosis import requirements
-from shipbench.diagnosis.requirements import REQUIREMENTS, Requirement, Standard, Verdict, detection_limit, first_unmet
-from shipbench.diagnosis.screen import Score
-from shipbench.diagnosis.term import Term
+from shipbench.diagnosis.model.term import Term
+from shipbench.diagnosis.selection import requirements
+from shipbench.diagnosis.selection.requirements import REQUIREMENTS, Requirement, Standard, Verdict, detection_limit, first_unmet
+from shipbench.diagnosis.selection.screening import Score
 from shipbench.effects.base import EFFECTS, Effect
 from shipbench.effects.traits import Traits
 

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.analysis import Analysis
-from shipbench.diagnosis.causes import rivals_of
-from shipbench.diagnosis.select import Step
-from shipbench.diagnosis.term import Term
+from shipbench.diagnosis.explain import rivals_of
+from shipbench.diagnosis.model.term import Term
+from shipbench.diagnosis.selection.analysis import Analysis
+from shipbench.diagnosis.selection.stepwise import Step
 from shipbench.effects.base import EFFECTS
 
 

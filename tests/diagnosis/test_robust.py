@@ -7,14 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis import requirements, robust
-from shipbench.diagnosis.gear_kinds import ORDINARY
-from shipbench.diagnosis.gram import Gram, Prior, Reduced, solve
-from shipbench.diagnosis.model import NUM_BASE, PLACES
-from shipbench.diagnosis.plant import ordinary_gears
-from shipbench.diagnosis.requirements import SURE, Standard, first_unmet
-from shipbench.diagnosis.robust import bends, covariance, imitates, inflation, is_borne_by_one, is_on_a_ship, least_size, matters
-from shipbench.diagnosis.term import Term
+from shipbench.diagnosis.actuators.kinds import ORDINARY
+from shipbench.diagnosis.inference.gram import Gram, Prior, Reduced, solve
+from shipbench.diagnosis.model.forward import ordinary_gears
+from shipbench.diagnosis.model.linearisation import NUM_BASE, PLACES
+from shipbench.diagnosis.model.term import Term
+from shipbench.diagnosis.selection import agreement as robust
+from shipbench.diagnosis.selection import requirements
+from shipbench.diagnosis.selection.agreement import bends, covariance, imitates, inflation, is_borne_by_one, is_on_a_ship, least_size, matters
+from shipbench.diagnosis.selection.requirements import SURE, Standard, first_unmet
 from shipbench.effects.base import EFFECTS
 from shipbench.signals import DELTA
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from shipbench import kept_code
-from shipbench.diagnosis import rolling
-from shipbench.diagnosis.gain import plain_base, rollout_plant
-from shipbench.diagnosis.model import NUM_BASE, Linearisation, Point, Scales
-from shipbench.diagnosis.plant import Plant, cut
-from shipbench.diagnosis.term import Term
+from shipbench.diagnosis.evaluation.held_out_gain import plain_base, rollout_plant
+from shipbench.diagnosis.model import rollout as rolling
+from shipbench.diagnosis.model.forward import Plant, cut
+from shipbench.diagnosis.model.linearisation import NUM_BASE, Linearisation, Point, Scales
+from shipbench.diagnosis.model.term import Term
 from shipbench.effects.base import EFFECTS, Effect, Parameter
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset, Run

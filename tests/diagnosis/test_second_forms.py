@@ -8,15 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.analysis import THRESHOLD, asked, plain_model
-from shipbench.diagnosis.case_ships import scaled
-from shipbench.diagnosis.cases import draw_case
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.generic import Dependence
-from shipbench.diagnosis.model import hull_changes
-from shipbench.diagnosis.outside import Outside
-from shipbench.diagnosis.plant import HULL, NUM_HULL, Plant
-from shipbench.diagnosis.select import select
+from shipbench.diagnosis.model.forward import HULL, NUM_HULL, Plant
+from shipbench.diagnosis.model.linearisation import hull_changes
+from shipbench.diagnosis.selection.analysis import THRESHOLD, asked, plain_model
+from shipbench.diagnosis.selection.stepwise import select
+from shipbench.diagnosis.selection.unknown import Dependence
 from shipbench.effects.base import EFFECTS
 from shipbench.ops import Array
 from shipbench.physics.mmg import load_mmg_ship
@@ -27,6 +24,9 @@ from shipbench.ship import Particulars, complete
 from shipbench.signals import U
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.cases import draw_case
+from shipbench.suites.diagnosis.ships import scaled
+from shipbench.suites.diagnosis.unmodelled import Outside
 
 
 def trials(effect: str, *values: float, ship: str = "container130", runs: int = 24) -> Dataset:

@@ -14,22 +14,22 @@ import shipbench.simulate.trials
 from shipbench.bench.diagnosis_text import summary_lines
 from shipbench.checking.recording import Recording
 from shipbench.checking.track import keeps_time
-from shipbench.diagnosis.analysis import THRESHOLD, plain_model
-from shipbench.diagnosis.colour import Colour
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.fit import Origin, fit
-from shipbench.diagnosis.model import Scales
-from shipbench.diagnosis.noise import colour_of
-from shipbench.diagnosis.plain import beside_noise_of, null_fit
-from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.inference.baseline import beside_noise_of, null_fit
+from shipbench.diagnosis.inference.gauss_newton import Origin, fit
+from shipbench.diagnosis.inference.laplace import Model
+from shipbench.diagnosis.inference.noise_selection import colour_of
+from shipbench.diagnosis.inference.outliers import left_out
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import Scales
+from shipbench.diagnosis.model.noise import Colour
+from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.preparation import time_offsets as clocks
 from shipbench.diagnosis.preparation.base import Prepared
 from shipbench.diagnosis.preparation.time_offsets import late_velocities_of
 from shipbench.diagnosis.preparation.water_speeds import speeds_over_ground
-from shipbench.diagnosis.select import select
-from shipbench.diagnosis.settle import Model
-from shipbench.diagnosis.strange import left_out
-from shipbench.diagnosis.term import Term
+from shipbench.diagnosis.selection.analysis import THRESHOLD, plain_model
+from shipbench.diagnosis.selection.stepwise import select
 from shipbench.effects.base import EFFECTS, delayed
 from shipbench.physics.actuators import gear_path
 from shipbench.physics.mmg import load_mmg_ship
@@ -343,7 +343,7 @@ def test_a_late_yaw_rate_is_put_back_and_no_late_rudder(trials, channels: tuple[
 def test_a_piece_in_which_the_ship_was_pushed_is_left_out_and_said_so(monkeypatch, seed: int):
     """The push drags the first fit so far that nothing looks strange where it ends."""
     trials = sea_trials(load_mmg_ship("kcs"), seed, (), Trials(runs=12, samples=120))
-    monkeypatch.setattr("shipbench.diagnosis.strange._ONE_IN", 20)  # a piece of 24; else it takes 100 of them
+    monkeypatch.setattr("shipbench.diagnosis.inference.outliers._ONE_IN", 20)  # a piece of 24; else it takes 100 of them
     assert not left_out(null_fit(Plant.of(trials), Scales(Plant.of(trials))).plant, trials.runs)
     pushed, push = 4, np.arange(20.0)
     states = [run.states.copy() for run in trials.runs]

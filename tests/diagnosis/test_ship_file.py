@@ -10,21 +10,21 @@ import pytest
 
 from shipbench.checking.units import UnitFinding
 from shipbench.diagnosis import diagnose as whole
-from shipbench.diagnosis import ship_file
-from shipbench.diagnosis.analysis import THRESHOLD, plain_model
-from shipbench.diagnosis.case_ships import draw_ship
-from shipbench.diagnosis.cases import draw_case, singles
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.model import NUM_BASE
-from shipbench.diagnosis.plant import Plant
-from shipbench.diagnosis.select import select
-from shipbench.diagnosis.ship_file import doubts_of, whatever_the_ship
-from shipbench.diagnosis.term import Term
+from shipbench.diagnosis.model.forward import Plant
+from shipbench.diagnosis.model.linearisation import NUM_BASE
+from shipbench.diagnosis.model.term import Term
+from shipbench.diagnosis.selection import ship_file
+from shipbench.diagnosis.selection.analysis import THRESHOLD, plain_model
+from shipbench.diagnosis.selection.ship_file import doubts_of, whatever_the_ship
+from shipbench.diagnosis.selection.stepwise import select
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.cases import draw_case, singles
+from shipbench.suites.diagnosis.ships import draw_ship
 
 QUESTION = "Is the ship file that of this ship"
 

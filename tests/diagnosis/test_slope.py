@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis import settle as settling
-from shipbench.diagnosis.fit import Origin, fit, start
-from shipbench.diagnosis.model import FREE, NUM_BASE, Linearisation, Point, Scales
-from shipbench.diagnosis.plain import null_fit
-from shipbench.diagnosis.plant import HULL, Plant
-from shipbench.diagnosis.screen import screen
-from shipbench.diagnosis.settle import Fit, Model, settle
-from shipbench.diagnosis.slope import slopes
-from shipbench.diagnosis.structure import STRUCTURE
-from shipbench.diagnosis.term import Term
+from shipbench.diagnosis.inference import laplace as settling
+from shipbench.diagnosis.inference.baseline import null_fit
+from shipbench.diagnosis.inference.gauss_newton import Origin, fit, start
+from shipbench.diagnosis.inference.laplace import Fit, Model, settle
+from shipbench.diagnosis.inference.log_determinant import slopes
+from shipbench.diagnosis.model.between_ships import STRUCTURE
+from shipbench.diagnosis.model.forward import HULL, Plant
+from shipbench.diagnosis.model.linearisation import FREE, NUM_BASE, Linearisation, Point, Scales
+from shipbench.diagnosis.model.term import Term
+from shipbench.diagnosis.selection.screening import screen
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.published import PUBLISHED, published_trials

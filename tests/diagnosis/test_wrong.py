@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis import wrong
-from shipbench.diagnosis.follows import Follows, curve, follows, with_speed
-from shipbench.diagnosis.outcome import Trace
-from shipbench.diagnosis.wrong import _whiteness, error_tables, force_words, what_is_wrong
+from shipbench.diagnosis.evaluation import residuals as wrong
+from shipbench.diagnosis.evaluation.dependence import Follows, curve, follows, with_speed
+from shipbench.diagnosis.evaluation.residuals import _whiteness, error_tables, force_words, what_is_wrong
+from shipbench.diagnosis.result import Trace
 
 
 def make_trace(runs: int = 12, samples: int = 61, seed: int = 0) -> Trace:

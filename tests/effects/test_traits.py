@@ -15,7 +15,7 @@ from shipbench.effects.traits import SEARCHES, Traits
 PACKAGE = Path(shipbench.__file__).parent
 GENERIC = {"current", "wind", "list"}
 """Names of effects that are words of their own: a group of channels, a command."""
-SUITES = ("diagnosis/cases.py", "diagnosis/case_ships.py", "bench/diagnosis_scores.py", "bench/check_sets.py")
+SUITES = ("suites/diagnosis/cases.py", "suites/diagnosis/ships.py", "suites/diagnosis/scores.py", "suites/checks/clean_sets.py")
 """They hide effects, and score what was named."""
 FILES = [p for folder in ("diagnosis", "predictors", "bench") for p in sorted((PACKAGE / folder).rglob("*.py"))]
 

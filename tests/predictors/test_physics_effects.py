@@ -11,7 +11,6 @@ import pytest
 from typer.testing import CliRunner
 
 from shipbench.data.files import write_dataset
-from shipbench.diagnosis.case_ships import scaled
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship
@@ -24,6 +23,7 @@ from shipbench.records import Dataset, Run
 from shipbench.ship import complete
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.ships import scaled
 
 SHIP = load_mmg_ship("container130")
 

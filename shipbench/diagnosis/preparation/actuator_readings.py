@@ -9,10 +9,10 @@ import numpy as np
 
 from ...records import Dataset
 from ...signals import ACTUATORS, MOTION
-from ..outcome import what_it_is
-from ..plain import first_evidence
-from ..record_error import CHANNELS, RecordError
-from ..settle import Fit
+from ..actuators.record_error import CHANNELS, RecordError
+from ..inference.baseline import first_evidence
+from ..inference.laplace import Fit
+from ..result import what_it_is
 
 
 def judged(null: Fit, errors: Sequence[RecordError]) -> list[RecordError]:

@@ -7,9 +7,9 @@ import numpy as np
 from ...checking.units import UnitFinding, check_commands
 from ...records import Dataset
 from ...signals import DELTA, F_B, F_S, STATES, N
-from ..model import CENTRE, FREE, SPREAD
-from ..plain import first_evidence, first_fit
-from ..settle import Fit
+from ..inference.baseline import first_evidence, first_fit
+from ..inference.laplace import Fit
+from ..model.linearisation import CENTRE, FREE, SPREAD
 
 _LIFT = FREE.index(5)
 """Place of the slope of the rudder's lift among the fit's parameters."""

@@ -21,7 +21,7 @@ from ...errors import InputError
 from ...records import Run
 from ...ship import Particulars, complete
 from ...signals import COMMANDS, PSI, STATES, X, Y
-from ..plant import SEGMENT
+from ..model.forward import SEGMENT
 from .base import Prepared
 from .derived_speeds import beside_heading, beside_track
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...records import Dataset
-from ..plant import SEGMENT
+from ..model.forward import SEGMENT
 from .base import Prepared
 
 _SECONDS = 120.0

@@ -19,11 +19,11 @@ from ...effects.base import EFFECTS, Effect
 from ...records import Dataset, Run
 from ...signals import PSI, STATES, U, V
 from ..budget import is_spent
-from ..fit import Origin, fit
-from ..gram import by_run
-from ..model import Scales
-from ..plant import Plant
-from ..settle import Fit, Model
+from ..inference.gauss_newton import Origin, fit
+from ..inference.gram import by_run
+from ..inference.laplace import Fit, Model
+from ..model.forward import Plant
+from ..model.linearisation import Scales
 from .base import LateVelocities, Prepared
 from .derived_speeds import has_speeds
 

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from shipbench.checking.units import check_units, corrected, merged
-from shipbench.diagnosis.analysis import plain_model
-from shipbench.diagnosis.cases import UNITS, draw_case, misread
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.plant import Plant
+from shipbench.diagnosis.inference.laplace import Fit
+from shipbench.diagnosis.model.forward import Plant
 from shipbench.diagnosis.preparation import actuator_signs as turned
 from shipbench.diagnosis.preparation.actuator_signs import turned_actuators
-from shipbench.diagnosis.settle import Fit
+from shipbench.diagnosis.selection.analysis import plain_model
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
@@ -23,6 +22,7 @@ from shipbench.signals import DELTA, F_B, F_S, STATES
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials, sea_trials
+from shipbench.suites.diagnosis.cases import UNITS, draw_case, misread
 
 PLAN = Trials(runs=12)
 

@@ -1,0 +1,298 @@
+"""Causes between command and actuator, looked for where both are recorded: every actuator alone, without the ship's motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...ops import where
+from ...physics.actuators import Gear, gear_path, gear_step
+from ..budget import is_spent
+from ..model.forward import Plant, Segments, ordinary_gears
+from .kinds import DELAY, ORDINARY, GearFinding, Kind, kinds_of, least_rate
+from .record_error import CHANNELS, FORMS, RecordError, readings
+
+if TYPE_CHECKING:
+    from ...compiled import Lanes
+
+_SCAN, _HALVINGS = (4, 12, 24), 8
+_ROUNDS, _FINE, _WORTH_A_MOVE, _MOST, _STEP = 150, 1e-3, 3e-5, 200, 0.02
+_SECOND, _PARTS = 0.5, 4
+"""Greatest time constant of an ordinary second stage, as a share of the first's; parts of a sample in which it is followed."""
+_LEAST_SCORE, _LEAST_ERROR, _CORRECTIONS, _PROMISING = 10.0, 0.03, 3, 0.1
+"""Least score of an error of the record, least size that is told, relative, how often record and gear are corrected in turn, and the share of what
+the best effect explains from which they are: that may make ten times as much of it."""
+_OWN_SPREAD, _RECORD, _CLOCK = 0.25, 0.01, 0.02
+"""Standard deviations: of an ordinary gear's time constant, relative (a lag is reported beyond it); of the scale of a record, relative; of a time, in
+samples."""
+
+
+def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear], list[RecordError]]:
+    """Findings of every actuator that moves, best first, the best ordinary gears, and what the records err by; nothing where only commands are
+    recorded (those that the motion was fitted with)."""
+    if plant.seg.commanded:
+        return [], plant.ordinary, []
+    seg, gears = plant.long, ordinary_gears(plant.c.L)
+    found: list[GearFinding] = []
+    errors: list[RecordError] = []
+    for name, channels in CHANNELS.items():
+        if is_spent():
+            break
+        rows = range(len(seg.run))
+        picked = [(b, c) for c in channels for b in rows if np.ptp(seg.commands[b, seg.mask[b], c]) > 0]
+        if len({seg.run[b] for b, _ in picked}) > 1:
+            record = _Record.of(seg, plant.c.L, name, np.array(picked))
+            findings, gears[name], error = record.findings(ordinary_gears(plant.c.L)[name])
+            found += findings
+            errors += [] if error is None else [error]
+    return sorted(found, key=lambda f: -f.score), gears, errors
+
+
+@dataclass(frozen=True)
+class _Record:
+    """Commands (P, K) and positions (P, K + 1) of one actuator over P pieces; judged (P, K): real samples, after the longest delay looked for:
+    what was ordered before the record began is not known."""
+
+    name: str
+    scale: float
+    dt: float
+    command: np.ndarray
+    measured: np.ndarray
+    judged: np.ndarray
+    run: np.ndarray
+    runs: int
+
+    @classmethod
+    def of(cls, seg: Segments, L: float, name: str, picked: np.ndarray) -> _Record:
+        scale, (b, c) = (L / 130.0) ** 0.5, picked.T
+        late = np.arange(seg.states.shape[1] - 1) * seg.dt >= min(DELAY * scale, 0.25 * seg.states.shape[1] * seg.dt)
+        return cls(name, scale, seg.dt, seg.commands[b, :-1, c], seg.states[b, :, 6 + c], seg.mask[b, 1:] & late, seg.run[b], seg.runs)
+
+    def paths(self, z: np.ndarray, kind: Kind | None) -> np.ndarray:
+        """Positions (M, P, K) that M gears would give; z (M, values): logarithms of time constant, rate[, the value of `kind`]."""
+        code = _follower(kind and kind.field)
+        if code is not None:
+            return np.swapaxes(self._followed(code, z, kind, self.command.shape[1])[..., 1], 1, 2)
+        tiled = np.repeat(np.exp(z), len(self.command), axis=0).T
+        gear = Gear(tiled[0], tiled[1])
+        if kind is not None:
+            gear = replace(gear, **{kind.field: tiled[kind.at]})
+        parts = _PARTS if kind is not None and kind.field == "T2" else 1
+        path = gear_path(np.tile(self.measured[:, 0], len(z)), np.tile(self.command, (len(z), 1)), self.dt, gear, parts)
+        return path[:, parts::parts].reshape(len(z), *self.command.shape)
+
+    def errors(self, z: np.ndarray, kind: Kind | None) -> np.ndarray:
+        """Record less path (M, P, K), zero where it is not judged."""
+        return np.where(self.judged, self.measured[:, 1:] - self.paths(z, kind), 0.0)
+
+    def costs(self, z: np.ndarray, kind: Kind | None) -> np.ndarray:
+        """Sums of the squared errors (M,)."""
+        code = _follower(kind and kind.field)
+        if code is not None:
+            return self._followed(code, z, kind, 1)[:, 0, :, 2].sum(axis=1)
+        return np.concatenate([np.sum(self.errors(part, kind) ** 2, axis=(1, 2)) for part in np.array_split(z, len(z) // _MOST + 1)])
+
+    def _followed(self, code: Lanes, z: np.ndarray, kind: Kind | None, kept: int) -> np.ndarray:
+        """Motor, position and sum of squared errors so far, (M, kept, P, 3): at every sample or, if 1 is kept, at the end."""
+        (P, K), values = self.command.shape, np.exp(z)
+        whole = np.zeros(len(z), dtype=int)
+        if kind is not None and kind.field == "delay":
+            shift = values[:, kind.at] / self.dt
+            whole = np.floor(shift).astype(int)
+            values[:, kind.at] = shift - whole
+        most, out = int(whole.max()) + 1, np.empty((len(z), kept, P, 3))
+        held = np.concatenate([np.repeat(self.command[:, :1], most, axis=1), self.command], axis=1)
+        start = np.stack([self.measured[:, 0], self.measured[:, 0], np.zeros(P)], axis=-1)[:, None]
+        for late in np.unique(whole):
+            rows, first = np.flatnonzero(whole == late), most - late
+            record = np.stack([held[:, first : first + K], held[:, first - 1 : first - 1 + K], self.measured[:, 1:], self.judged], axis=-1)
+            found = np.empty((len(rows), kept, P, 3))
+            bundles = [start, values[rows, None, None, None], np.array([self.dt]), np.swapaxes(record, 0, 1)[:, :, None]]
+            code(bundles, (len(rows), K, P, 1), found, carried=True)
+            out[rows] = found
+        return out
+
+    def findings(self, usual: Gear) -> tuple[list[GearFinding], Gear, RecordError | None]:
+        """Every effect beside the best ordinary gear, that gear, and what the record errs by.
+
+        Of an actuator whose record reads too little it seems that it stays short of its commands, as with a deadband: where an error of the record
+        explains more than every effect, they are judged without it.
+        """
+        found, ordinary, error = self._judged(usual)
+        if error is None:
+            return found, ordinary, None
+        found, ordinary, _ = replace(self, measured=error.taken_out(self.measured))._judged(usual)
+        return found, ordinary, error if error.size > _LEAST_ERROR else None
+
+    def _judged(self, usual: Gear) -> tuple[list[GearFinding], Gear, RecordError | None]:
+        """The same of the record as it is, with an error that explains more than every effect.
+
+        Two stages look like a delay, end stops like an error: they are fitted only where something is to be explained, since that takes as long as
+        all the others.
+        """
+        kinds = kinds_of(self.name, self.scale, float(np.percentile(np.abs(self.command), 98)), usual)
+        ordinary, fits = self._fitted(None), [self._fitted(kind) for kind in kinds]
+        gear, plain = Gear(*(float(v) for v in np.exp(ordinary))), self.errors(ordinary[None], None)[0]
+        found = [self._finding(kind, z, ordinary, plain) for kind, z in zip(kinds, fits, strict=True)]
+        stops, _ = self._ended(ordinary, None, float(np.sum(plain**2)))
+        if max(stops, self._misread(ordinary, None, plain).score, *(f.score for f in found)) < _LEAST_SCORE:
+            return found, gear, None
+        second = self._second
+        z = self._fitted(second, [ordinary, *fits])
+        plain = min(plain, self.errors(z[None], second)[0], key=lambda e: float(np.sum(e**2)))
+        found = [self._finding(kind, fit, ordinary, plain) for kind, fit in zip(kinds, fits, strict=True)]
+        error = self._misread(z, second, plain)
+        least, before = max(_LEAST_SCORE, *(f.score for f in found)), float(np.sum(plain**2))
+        for _ in range(_CORRECTIONS if error.score > _PROMISING * least else 0):
+            z = replace(self, measured=error.taken_out(self.measured))._fitted(second, [ordinary, *fits])
+            error = self._misread(z, second, plain)
+        worth, record = max((self._ended(fit, kind, before) for fit, kind in zip((ordinary, *fits), (None, *kinds), strict=True)), key=lambda x: x[0])
+        if worth > max(least, error.score):
+            return record._judged(usual)
+        return found, gear, error if error.score > least else None
+
+    def _ended(self, z: np.ndarray, kind: Kind | None, before: float) -> tuple[float, _Record]:
+        """The same with orders ended where the record of a gear says that its stops are, and the score of these (and of `kind`)."""
+        from scipy.optimize import minimize_scalar
+
+        def ended(limit: float) -> _Record:
+            return replace(self, command=np.clip(self.command, -limit, limit))
+
+        most, record = float(np.max(np.abs(self.command))), self
+        for _ in range(2):
+            best = minimize_scalar(lambda limit, z=z: ended(limit).costs(z[None], kind)[0], bounds=(0.2 * most, most), method="bounded")
+            record = ended(float(best.x))
+            if self._worth(float(self.costs(z[None], kind)[0]), record.errors(z[None], kind)[0], 1) < 0.0:
+                return -np.inf, self
+            z = record._fitted(kind)
+        return self._worth(before, record.errors(z[None], kind)[0], 1 + (kind is not None)), record
+
+    def _misread(self, z: np.ndarray, kind: Kind | None, plain: np.ndarray) -> RecordError:
+        """What the record reads beside the positions of a gear; score: against the errors `plain`."""
+        at = self.paths(z[None], kind)[0]
+        off, forms = np.where(self.judged, self.measured[:, 1:] - at, 0.0), np.where(self.judged, readings(at), 0.0)
+        factors = np.linalg.lstsq(forms.reshape(len(forms), -1).T, off.ravel(), rcond=None)[0]
+        score = self._worth(float(np.sum(plain**2)), off - np.tensordot(factors, forms, 1), len(factors))
+        told = (factors[:, None] * forms[:, self.judged])[1:]
+        best = FORMS[1 + int(np.argmax(np.linalg.norm(told, axis=1)))].format(self.name)
+        size = np.sqrt(np.mean(told.sum(axis=0) ** 2) / max(np.mean(self.measured[:, 1:][self.judged] ** 2), 1e-300))
+        return RecordError(self.name, best, score, float(size), factors)
+
+    def _worth(self, before: float, rest: np.ndarray, values: int) -> float:
+        """Score of `values` more values that leave `rest` (P, K) of errors whose squares were `before` together."""
+        samples, after = float(self.judged.sum()), max(float(np.sum(rest**2)), 1e-300)
+        return float(samples * _discount(rest) * np.log(max(before, 1e-300) / after) - values * np.log(10.0 * len(np.unique(self.run))))
+
+    def _fitted(self, kind: Kind | None, near: Sequence[np.ndarray] = ()) -> np.ndarray:
+        """Logarithms of the time constant, the rate[, the value of `kind`] of the best gear; near: gears like whose first two it may be."""
+        span = float(np.percentile(np.abs(self.command), 98))
+        rate = max(least_rate(self.name, self.scale), 0.01 * span / self.scale)
+        most = max(10.0 * span / self.dt, 2.0 * rate)
+        low, high = np.log([0.02 * self.scale, rate]), np.log([ORDINARY[self.name].T * self.scale, most])
+        if kind is not None:
+            low, high = np.resize(low, max(2, kind.at + 1)), np.resize(high, max(2, kind.at + 1))
+            low[kind.at], high[kind.at] = np.log(kind.low), np.log(kind.high)
+        return self._least(kind, low, high, near)
+
+    def _finding(self, kind: Kind, z: np.ndarray, ordinary: np.ndarray, plain: np.ndarray) -> GearFinding:
+        rest = self.errors(z[None], kind)[0]
+        variance = max(float(np.sum(rest**2)) / float(self.judged.sum()), 1e-300)
+        discount, per_run = _discount(rest), np.zeros(self.runs)
+        np.add.at(per_run, self.run, discount * np.sum(plain**2 - rest**2, axis=1) / (2.0 * variance))
+        score = self._worth(float(np.sum(plain**2)), rest, 1)
+        steps = _STEP * np.eye(len(z))
+        slopes = ((self.errors(z + steps, kind) - self.errors(z - steps, kind)) / (2.0 * _STEP)).reshape(len(z), -1)
+        relative = np.linalg.inv(discount / variance * slopes @ slopes.T + np.eye(len(z)))[kind.at, kind.at] ** 0.5
+        size = float(np.exp(z[kind.at]))
+        clock = _CLOCK * self.dt if kind.field in ("T", "delay") else 0.0
+        spread = 1.96 * float(np.sqrt((size * np.hypot(relative, _RECORD)) ** 2 + (_OWN_SPREAD * kind.beyond) ** 2 + clock**2))
+        value = size - kind.beyond
+        gear = replace(Gear(*(float(v) for v in np.exp(z[:2]))), **{kind.field: size})
+        least = self._detectable(kind, ordinary, plain) - (float(np.exp(ordinary[0])) if kind.field == "T" else 0.0)
+        return GearFinding(kind.effect, score, value, (value - spread, value + spread), per_run, self.name, gear, least)
+
+    @property
+    def _second(self) -> Kind:
+        """An ordinary second stage."""
+        return Kind("", "T2", 0.02 * self.scale, _SECOND * ORDINARY[self.name].T * self.scale)
+
+    def _detectable(self, kind: Kind, ordinary: np.ndarray, plain: np.ndarray) -> float:
+        """Size from which `kind` is expected to be found on a gear that is like the `ordinary` one otherwise, whose errors are `plain`: what its time
+        constant, rate and a second stage cannot take up as well is seen. NaN beyond the bounds."""
+        least, most = (kind.high, kind.low) if kind.field == "rate" else (kind.low, kind.high)
+        begins = ordinary if kind.at == 2 else kind.like(ordinary, least)
+        free = _STEP * np.eye(2)[[at for at in (0, 1) if at != kind.at]]
+        at_first, squares = self.errors(begins[None], None).ravel(), max(float(np.sum(plain**2)), 1e-300)
+        stages = self.errors(np.stack([self._second.like(begins, part * self._second.low) for part in (1.0, 5.0)]), self._second)
+        slopes = np.concatenate([self.errors(begins + free, None) - self.errors(begins - free, None), np.diff(stages, axis=0)])
+        slopes = slopes.reshape(len(slopes), -1).T
+
+        def is_seen(size: float) -> bool:
+            off = self.errors(kind.like(ordinary, size)[None], kind).ravel() - at_first
+            off -= slopes @ np.linalg.lstsq(slopes, off, rcond=None)[0]
+            return self._worth(squares + float(off @ off), plain, 1) > _LEAST_SCORE
+
+        if not is_seen(most):
+            return np.nan
+        for _ in range(_HALVINGS):
+            middle = float(np.sqrt(least * most))
+            least, most = (least, middle) if is_seen(middle) else (middle, most)
+        return most
+
+    def _least(self, kind: Kind | None, low: np.ndarray, high: np.ndarray, near: Sequence[np.ndarray]) -> np.ndarray:
+        """Minimum of the squared error inside a box: a grid, and a pattern of neighbours of its best point that shrinks when none is much better
+        (else it creeps along a valley where the time constant hardly matters).
+
+        Deadband and play leave the cost without a usable slope. The valley is narrow in the rate and in what is
+        looked for: these are scanned closely.
+        """
+        grid = [np.linspace(a, b, n) for a, b, n in zip(low, high, _SCAN, strict=False)]
+        points = np.clip([(*z[:2], *rest) for z in near for rest in product(*grid[2:])] or [*product(*grid)], low, high)
+        half = (high - low) / np.array(_SCAN[: len(low)])
+        pattern = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(low))))
+        best, center = np.inf, points[0]
+        for _ in range(_ROUNDS):
+            costs = self.costs(points, kind)
+            least, before = float(costs.min()), best
+            if least < best:
+                best, center = least, points[int(costs.argmin())]
+            if least > (1.0 - _WORTH_A_MOVE) * before:
+                half = 0.5 * half
+                if np.all(half < _FINE):
+                    break
+            points = np.unique(np.clip(center + half * pattern, low, high), axis=0)
+        return center
+
+
+def _discount(rest: np.ndarray) -> float:
+    """What a sample counts for, of errors (P, K) that are correlated from one to the next."""
+    rho = min(max(float(np.sum(rest[:, 1:] * rest[:, :-1]) / np.sum(rest**2)), 0.0), 0.98) if np.any(rest) else 0.0
+    return (1.0 - rho) / (1.0 + rho)
+
+
+@cache
+def _follower(field: str | None) -> Lanes | None:
+    """Machine code of a sample of `gear_step`: motor, position, cost; time constant, rate[, value of `field`, of a delay the part of a sample]; dt;
+    command, the one before it, record, whether it is judged. None where there is no compiler."""
+    import casadi as ca
+
+    from ...compiled import Lanes
+
+    beside = field if field not in ("T", "rate") else None
+    sizes = {"state": 3, "values": 2 + (beside is not None), "dt": 1, "record": 4}
+    whole = [ca.SX.sym(name, num) for name, num in sizes.items()]
+    (motor, position, cost), (T, rate, *value), (dt,), (now, before, measured, judged) = (ca.vertsplit(v) for v in whole)
+    gear, wanted = Gear(T, rate), [(now, dt)]
+    if beside == "delay":
+        wanted = [(before, value[0] * dt), (now, (1.0 - value[0]) * dt)]
+    elif beside is not None:
+        wanted = [(now, dt / _PARTS)] * _PARTS if beside == "T2" else wanted
+        gear = replace(gear, **{beside: value[0]})
+    motor, position = gear_step(motor, position, wanted, gear)
+    after = ca.vertcat(motor, position, cost + where(judged, (measured - position) ** 2, 0.0))
+    return Lanes.of(ca.Function("follower", whole, [after], {"cse": True}))

@@ -1,0 +1,91 @@
+"""What may be wrong between command and actuator, and what an ordinary gear is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...effects.base import EFFECTS
+from ...physics.actuators import Gear
+
+_RATE_POWER = {"n": 2, "delta": 1, "F": 0}
+DELAY = 10.0
+"""Longest delay [s] at 130 m that is looked for."""
+_LONGEST = 400.0
+"""Length [m] of the longest ships."""
+
+
+@dataclass(frozen=True)
+class Ordinary:
+    """What an ordinary gear may be, at 130 m: greatest time constant [s] and smallest rate [actuator's unit per s]."""
+
+    T: float
+    rate: float
+
+
+ORDINARY = {"n": Ordinary(12.0, 2.0), "delta": Ordinary(2.0, np.deg2rad(1.9)), "F": Ordinary(4.5, 0.0)}
+"""Shaft as for slow Diesels; rudder as SOLAS II-1 reg. 29 asks (65 deg in 28 s, 2.3 deg/s) less a margin; thrusters as for electric tunnels."""
+
+
+@dataclass(frozen=True)
+class GearFinding:
+    """An effect of a gear. score: 2 log likelihood ratio against the best ordinary gear, of one stage or two, samples discounted for their
+    correlation, less log(10 N) for the added value; value: of the effect's parameter, ci95; per_run (N,); detectable: the smallest value (of a rate
+    the greatest) that is expected to be found, NaN for none."""
+
+    effect: str
+    score: float
+    value: float
+    ci95: tuple[float, float]
+    per_run: np.ndarray
+    actuator: str
+    gear: Gear
+    detectable: float = np.nan
+
+
+@dataclass(frozen=True)
+class Kind:
+    """An effect of one actuator: bounds of its value in the gear, and how a gear takes it; `beyond` is subtracted when it is reported."""
+
+    effect: str
+    field: str
+    low: float
+    high: float
+    beyond: float = 0.0
+
+    @property
+    def at(self) -> int:
+        """Where its value stands beside time constant and rate, or in place of one of them."""
+        return {"T": 0, "rate": 1}.get(self.field, 2)
+
+    def like(self, ordinary: np.ndarray, size: float) -> np.ndarray:
+        """Logarithms of time constant, rate[, value] of a gear with this effect, otherwise like the `ordinary` one."""
+        return np.concatenate([ordinary[: self.at], [np.log(size)], ordinary[self.at + 1 :]])
+
+
+def least_rate(actuator: str, scale: float) -> float:
+    """Least rate of an ordinary gear, by Froude's law; a full-scale rudder under 130 m need be no faster (SOLAS)."""
+    if actuator == "delta" and scale > 0.4:
+        scale = max(scale, 1.0)
+    return ORDINARY[actuator].rate / scale ** _RATE_POWER[actuator]
+
+
+def slow_on_any_ship(found: GearFinding) -> bool:
+    """Whether a gear that is slower than those of its ship would be so on the longest ship, too; whatever does not go with the length is."""
+    scale = (_LONGEST / 130.0) ** 0.5
+    changed = EFFECTS.get(found.effect).traits.gear_field
+    if changed == "T":
+        return ORDINARY[found.actuator].T * scale < found.gear.T
+    return changed != "rate" or bool(found.gear.rate < least_rate(found.actuator, scale))
+
+
+def kinds_of(actuator: str, scale: float, span: float, ordinary: Gear) -> list[Kind]:
+    """What may be wrong with an actuator; `span` is the range of its commands."""
+    T, rate = ORDINARY[actuator].T * scale, least_rate(actuator, scale)
+    bounds = {
+        "T": (T, 60.0 * scale, ordinary.T), "rate": (0.02 * rate, rate), "delay": (0.15 * scale, DELAY * scale),
+        "deadband": (0.004 * span, 0.3 * span), "backlash": (0.004 * span, 0.3 * span),
+    }  # fmt: skip
+    found = [e for e in map(EFFECTS.get, EFFECTS.names()) if any(channel.startswith(actuator) for channel in e.acts_through)]
+    return [Kind(e.name, name, *bounds[name]) for name in bounds for e in found if e.traits.gear_field == name]

@@ -1,0 +1,196 @@
+"""What naming a cause is worth: open-loop rollouts of runs that were not fitted, with everything repeated on every training part."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ...physics.actuators import Gear
+from ...records import Dataset
+from ...ship import complete
+from ..budget import is_spent
+from ..model.between_ships import STRUCTURE
+from ..model.forward import NUM_HULL, Plant, cut
+from ..model.linearisation import FREE, NUM_BASE, Linearisation, Point, Scales
+from ..model.resampling import averaged
+from ..model.term import Term
+from ..result import Gain
+
+HORIZON = 120.0
+_STEPS = 8
+_BOOTSTRAP = 2000
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What a diagnosis of some runs adds to the plain model: terms with first guesses, the hull, and gears that differ from the ordinary ones."""
+
+    terms: tuple[Term, ...] = ()
+    values: tuple[np.ndarray, ...] = ()
+    hull: bool = False
+    gears: dict[str, Gear] | None = None
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """A fitted open-loop model: base parameters and effects; no latent force, initial states as measured."""
+
+    base: np.ndarray
+    terms: tuple[Term, ...]
+    values: tuple[np.ndarray, ...]
+
+
+def rollout_plant(dataset: Dataset, gears: dict[str, Gear]) -> Plant:
+    """Segments of `HORIZON` (Froude-scaled), fast records averaged; driven by the commands through `gears` from where the actuators begin."""
+    ship, dataset = complete(dataset.ship), averaged(dataset)
+    segments = cut(dataset, max(20, round(HORIZON * (ship.L / 130.0) ** 0.5 / dataset.dt)))
+    return Plant(ship, replace(segments, commanded=True), gears=gears, recorded=not segments.commanded)
+
+
+def plain_base() -> np.ndarray:
+    """Base parameters of eq. (2) alone: the ordinary differences of `Structure` taken out again, so that "before" is the plain physics model."""
+    base = np.zeros(NUM_BASE)
+    base[len(FREE) + NUM_HULL :] = STRUCTURE.plain()
+    return base
+
+
+def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
+    """Least squares of whole rollouts over p, the named effects (and the hull where it is named), weakly held by their priors.
+
+    Channels are weighed by the root mean square of the error before the fit, positions as one: the spread that the model must explain. Once the
+    budget is spent, it ends where it stands.
+    """
+    free = list(range(len(FREE) + (NUM_HULL if extension.hull else 0)))
+    terms = tuple(t for t in extension.terms if not t.per_run)  # a run that was not seen has no value of its own
+    start = tuple(v for t, v in zip(extension.terms, extension.values, strict=True) if not t.per_run)
+    lin = _lin(plant, scales, Rollout(plain_base(), terms, start))
+    weights = _weights(lin)
+    for _ in range(_STEPS):
+        if is_spent():
+            break
+        base, own = lin.parameter_columns(free)
+        J = np.concatenate([base, *own], axis=-1) * weights[None, :, None]
+        J = J * np.repeat(plant.seg.mask, 6, axis=1)[..., None]
+        e = _errors(lin) * weights
+        ok = np.isfinite(J).all(axis=(1, 2)) & np.isfinite(e).all(axis=1)
+        at = np.concatenate([lin.point.base[free], *lin.point.values]) if terms else lin.point.base[free]
+        prior = np.ones(len(at))
+        step = np.linalg.solve(
+            np.einsum("bti,btj->ij", J[ok], J[ok]) + np.diag(prior), np.einsum("bti,bt->i", J[ok], e[ok]) - prior * (at - _centre(free, terms))
+        )
+        share, old = 1.0, _cost(lin, weights)
+        while True:
+            trial = _lin(plant, scales, _moved(lin.point, free, terms, at + share * step))
+            if _cost(trial, weights) < old or share < 0.1:
+                break
+            share *= 0.5
+        if _cost(trial, weights) > 0.999 * old:
+            break
+        lin = trial
+    return Rollout(lin.point.base, terms, lin.point.values)
+
+
+def _centre(free: Sequence[int], terms: Sequence[Term]) -> np.ndarray:
+    return np.concatenate([plain_base()[list(free)], np.zeros(sum(t.size for t in terms))])
+
+
+def _moved(point: Point, free: Sequence[int], terms: Sequence[Term], at: np.ndarray) -> Rollout:
+    base = point.base.copy()
+    base[list(free)] = at[: len(free)]
+    sizes = np.cumsum([len(free), *(t.size for t in terms)])
+    return Rollout(base, tuple(terms), tuple(at[a:b] for a, b in pairwise(sizes)))
+
+
+def _lin(plant: Plant, scales: Scales, model: Rollout) -> Linearisation:
+    """The rollout, begun so that the sensors of the model read what was measured first."""
+    B = len(plant.seg.run)
+    point = Point(model.base, np.zeros((B, 6)), np.zeros((B, plant.knots, 3)), model.terms, model.values)
+    lin = Linearisation(plant, scales, point)
+    if not any(a.effect.enters == "sensor" for a in lin.now):
+        return lin
+    eta = -(lin.predicted[:, 0] - plant.seg.states[:, 0, :6]) / scales.eta
+    return Linearisation(plant, scales, replace(point, eta=eta))
+
+
+def _errors(lin: Linearisation) -> np.ndarray:
+    e = np.where(lin.plant.seg.mask[..., None], lin.plant.seg.states[..., :6] - lin.predicted, 0.0)
+    return e.reshape(len(e), -1)
+
+
+def _weights(lin: Linearisation) -> np.ndarray:
+    e = _errors(lin).reshape(len(lin.motion), -1, 6)
+    size = np.sqrt(np.nanmean(np.where(np.isfinite(e), e, np.nan) ** 2, axis=(0, 1)))
+    size[:2] = np.sqrt(np.mean(size[:2] ** 2))
+    return np.tile(1.0 / np.maximum(size, lin.scales.noise), lin.plant.steps + 1)
+
+
+def _cost(lin: Linearisation, weights: np.ndarray) -> float:
+    """Diverged segments count as errors of a hundred times the ordinary."""
+    with np.errstate(all="ignore"):
+        e = np.clip(np.nan_to_num(_errors(lin) * weights, nan=100.0, posinf=100.0, neginf=-100.0), -100.0, 100.0)
+    return float(np.sum(e**2))
+
+
+def distance(plant: Plant, scales: Scales, model: Rollout) -> tuple[np.ndarray, np.ndarray]:
+    """Mean ED [m] of every run (N,), the given sample not scored, and the predicted motion (B, K + 1, 6)."""
+    lin = _lin(plant, scales, model)
+    with np.errstate(all="ignore"):
+        ed = np.hypot(*np.moveaxis(lin.predicted[..., :2] - plant.seg.states[..., :2], -1, 0))
+    ed = np.nan_to_num(ed, nan=1e3 * plant.c.L, posinf=1e3 * plant.c.L)
+    scored = plant.seg.mask.copy()
+    scored[:, 0] = False
+    total, count = np.zeros(plant.seg.runs), np.zeros(plant.seg.runs)
+    np.add.at(total, plant.seg.run, np.sum(np.where(scored, ed, 0.0), axis=1))
+    np.add.at(count, plant.seg.run, scored.sum(axis=1))
+    return total / np.maximum(count, 1), lin.predicted
+
+
+@dataclass(frozen=True)
+class FoldGain:
+    """ED [m] of the test runs: by the plain model, with the causes, and with the hull's derivatives fitted as well; what the training runs led to,
+    and whether their selection was stopped by its budget."""
+
+    test: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    with_hull: np.ndarray
+    names: tuple[str, ...]
+    stopped: bool = False
+
+
+def fold_gain(dataset: Dataset, test: np.ndarray, extension: Extension, plain: dict[str, Gear], hull: bool) -> FoldGain:
+    """Fit the plain model, the extended one (and that with the hull) to the training runs alone, and roll all out on the test runs."""
+    inside = set(test.tolist())
+    part = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i not in inside])
+    rest = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i in inside])
+    plant, held = rollout_plant(part, plain), rollout_plant(rest, plain)
+    scales = Scales(plant)
+    before, _ = distance(held, scales, fit_rollout(plant, scales, Extension()))
+    names = tuple(t.label for t in extension.terms)
+    after, driven, goal = before, plant, held
+    if extension.gears:
+        gears = plain | extension.gears
+        driven, goal = rollout_plant(part, gears), rollout_plant(rest, gears)
+    if names or extension.gears:
+        after, _ = distance(goal, scales, fit_rollout(driven, scales, extension))
+    with_hull = after
+    if hull:
+        with_hull, _ = distance(goal, scales, fit_rollout(driven, scales, replace(extension, hull=True)))
+    return FoldGain(test, before, after, with_hull, names)
+
+
+def summarise(before: np.ndarray, after: np.ndarray, seed: int, groups: Sequence[str]) -> Gain:
+    """Paired gain with a bootstrap interval over groups of runs."""
+    rng = np.random.default_rng(seed)
+    place = {group: i for i, group in enumerate(dict.fromkeys(groups))}
+    member = np.array([place[group] for group in groups])
+    draws = rng.integers(0, len(place), (_BOOTSTRAP, len(place)))
+    plain, extended = (np.bincount(member, ed)[draws].sum(axis=1) for ed in (before, after))
+    relative = 1.0 - extended / np.maximum(plain, 1e-12)
+    low, high = np.quantile(relative, [0.025, 0.975])
+    better = int(np.sum(after < before))
+    mean_b, mean_a = float(before.mean()), float(after.mean())
+    return Gain("ED", mean_b, mean_a, 1.0 - mean_a / max(mean_b, 1e-12), (float(low), float(high)), f"{better}/{len(before)}")

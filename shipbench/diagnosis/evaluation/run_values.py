@@ -1,0 +1,47 @@
+"""What the values that single runs have of a cause go with: the place where a run was sailed, or its number."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..inference.laplace import Fit
+
+_SHARE, _CHANCE = 0.7, 1e-3
+"""Of the variance of the values that a straight line must explain, and the chance of as good a one for values that go with nothing."""
+
+
+def of_runs(fit: Fit, index: int) -> np.ndarray:
+    """(runs, components) of the index-th cause, which has a value for each run; a vector by its components."""
+    term = fit.model.terms[index]
+    effect, value = term.effect, fit.values[index] * fit.scales.amplitudes(term, fit.plant.c.L)
+    if effect.vector is None:
+        return value
+    size, towards = np.array([tuple(effect.public(row).values()) for row in value]).T
+    return np.stack([size * np.cos(towards), size * np.sin(towards)], axis=1)
+
+
+def goes_with(fit: Fit, values: np.ndarray) -> str:
+    """In words, with the share of the variance: what `values` (runs, components) go with, empty if nothing."""
+    seg = fit.plant.seg
+    weight = np.maximum(np.bincount(seg.run, seg.mask.sum(axis=1), minlength=seg.runs), 1.0)
+    x, y = (np.bincount(seg.run, np.sum(seg.states[..., i] * seg.mask, axis=1), minlength=seg.runs) / weight for i in (0, 1))
+    found = [(_chance(values, at), words) for at, words in ((np.stack([x, y], axis=1), "place"), (np.arange(seg.runs)[:, None], "number"))]
+    (chance, share), words = min(found, key=lambda f: f[0][0])
+    if chance > _CHANCE or share < _SHARE:
+        return ""
+    told = "from place to place" if words == "place" else "with time"
+    return f"it differs {told}: {share:.0%} of the variance of its values goes with the {words} of the runs"
+
+
+def _chance(values: np.ndarray, at: np.ndarray) -> tuple[float, float]:
+    """Of the F test for `values` (N, C) on a straight line in `at` (N, K), and the share of the variance that it explains."""
+    from scipy.stats import f
+
+    (N, C), K = values.shape, at.shape[1]
+    total = float(np.sum((values - values.mean(axis=0)) ** 2))
+    if N < K + 4 or total == 0.0:
+        return 1.0, 0.0
+    A = np.column_stack([np.ones(N), (at - at.mean(axis=0)) / np.maximum(at.std(axis=0), 1e-12)])
+    left = values - A @ np.linalg.lstsq(A, values, rcond=None)[0]
+    share = 1.0 - float(np.sum(left**2)) / total
+    return float(f.sf(share / K / max((1.0 - share) / (N - K - 1), 1e-12), K * C, (N - K - 1) * C)), share

@@ -1,0 +1,62 @@
+"""What the plots of a diagnosis are drawn from: rollouts before and after, the latent force and the residuals, along the runs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...records import Dataset
+from ..model.forward import Segments
+from ..model.linearisation import Scales
+from ..result import Trace
+from ..selection.analysis import Analysis
+from .held_out_gain import Extension, distance, fit_rollout, rollout_plant
+
+_EVERY = 5
+
+
+def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
+    """Open-loop rollouts of the models fitted to all runs (the gain is held out, these pictures are not), latent forces before and after."""
+    extension = found.extension(hull)
+    plain = rollout_plant(dataset, found.plain_gears)
+    scales = Scales(plain)
+    before = distance(plain, scales, fit_rollout(plain, scales, Extension()))[1]
+    after = before
+    if extension.terms or extension.hull or extension.gears:
+        driven = rollout_plant(dataset, found.plain_gears | (extension.gears or {}))
+        after = distance(driven, scales, fit_rollout(driven, scales, extension))[1]
+    seg, null, final = plain.seg, found.selection.null, found.final
+    short, B = null.plant, len(null.estimate)
+
+    def force(z: np.ndarray) -> np.ndarray:
+        """At the samples, (B, K + 1, 3)."""
+        return short.hat @ (np.moveaxis(z[:, 6:].reshape(B, 3, short.knots), 1, 2) * null.scales.w)
+
+    sd = np.sqrt(np.maximum(np.diagonal(null.cov, axis1=1, axis2=2), 0.0))
+    unit = null.scales.noise * np.exp(0.5 * null.hyper.log_noise)
+    white = null.scales.colour.whitened((short.seg.states[..., :6] - null.columns.predicted) / unit)
+    white[..., ~short.seg.seen] = np.nan
+    lines = [_along(short.seg, v, seg) for v in (force(null.estimate), force(sd), force(final.estimate), white)]
+    hide = seg.mask[..., None]
+    t = np.arange(plain.steps + 1) * seg.dt
+
+    def shown(values: np.ndarray) -> np.ndarray:
+        return np.where(hide, values, np.nan)
+
+    return Trace(
+        run=seg.run, names=tuple(r.id for r in dataset.runs), start=seg.start, t=t, measured=shown(seg.states[..., :6]), before=shown(before),
+        after=shown(after), inputs=shown(seg.states[..., 6:]), knots=t[::_EVERY], force=shown(lines[0])[:, ::_EVERY],
+        force_sd=shown(lines[1])[:, ::_EVERY], force_after=shown(lines[2])[:, ::_EVERY], white=shown(lines[3]), held_out=False,
+    )  # fmt: skip
+
+
+def _along(short: Segments, values: np.ndarray, long: Segments) -> np.ndarray:
+    """Values (B, K + 1, C) on short segments, put on long ones of the same runs."""
+    first = np.round(short.start / short.dt).astype(int)
+    length = int(np.max(first + short.mask.sum(axis=1)))
+    runs = np.full((short.runs, length, values.shape[-1]), np.nan)  # pieces that thinning left out have no force
+    for b, run in enumerate(short.run):
+        count = int(short.mask[b].sum())
+        runs[run, first[b] : first[b] + count] = values[b, :count]
+    start = np.round(long.start / long.dt).astype(int)
+    at = np.minimum(start[:, None] + np.arange(long.mask.shape[1]), length - 1)
+    return runs[long.run[:, None], at]

@@ -1,0 +1,152 @@
+"""The plain model fitted to all runs, beside which causes are looked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..budget import is_spent
+from ..model.forward import FEW_PIECES, Plant
+from ..model.linearisation import Scales
+from ..model.noise import Colour
+from ..model.term import Term
+from .gauss_newton import Origin, fit, looking_at
+from .gram import Hyper
+from .laplace import Fit, Model, evidence_with
+from .noise_selection import WORTH, colour_of, swinging_force
+from .outliers import strange_pieces
+from .robust_prior import widened
+
+_GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
+_FINER, _FINER_STEPS = 1.2, 3
+"""Factor of the steps that follow, and the most of them."""
+_SEARCHES = 3
+"""For strange pieces."""
+_FIRST_ITERATIONS = 8
+"""Of the first fit, which gives the background: until that stands, lower variances are rewarded, and a fit creeps towards them for ever."""
+_CREEPS = 20.0
+"""Excess of a first fit that has not come to rest. (124 development sets: 31 to 3659 in nine, at most 19 in the others.)"""
+REFIT_ITERATIONS = 16
+"""Of a fit that begins beside another one."""
+
+
+def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
+    """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion; where sensors err
+    for longer than a sample, with such noise; without the few pieces that no ship's motion explains. Once the budget is spent, that of some pieces
+    alone, where it stands."""
+    few = plant.thinned(FEW_PIECES)
+    found, share = _begun(few, scales), len(few.seg.run) / len(plant.seg.run)
+    if plant.seg.commanded:
+        found, scales, _ = _beside_waves(found, scales, share, waves_alone=True)  # a force that follows them says nothing of a gear
+        for i, name, field in ((0, "n", "T"), (1, "delta", "rate"), (1, "delta", "T")):
+            if np.ptp(plant.seg.commands[..., i]) > 0.0:
+                found = _with_gear(found, name, field)
+    found, scales, colour = _beside_waves(found, scales, share)
+    if is_spent():
+        return looking_at(found, candidates)
+    if few is not plant:
+        found = _begun(plant.driven(found.plant.ordinary), scales)
+    scales = found.scales.coloured(colour)
+    found = _without_strange(fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion))
+    return widened(found)
+
+
+def beside_noise_of(named: Fit, null: Fit) -> Fit | None:
+    """The plain model `null` fitted again beside the noise that suits the causes of `named`; None where its own does about as well, or is white. What
+    a late or a turned sensor errs by lasts, as noise may, and beside such noise it is worth less, or is taken for something else."""
+    if is_spent() or not null.scales.colour.share.any():
+        return None
+    colour = colour_of(named)
+    if evidence_with(named, colour) < evidence_with(named, named.scales.colour) + WORTH:
+        return None
+    return widened(fit(null.plant, null.scales.coloured(colour), Model(), null.point, null.hyper, candidates=null.candidates, guess=null.motion))
+
+
+def first_evidence(plant: Plant, null: Fit) -> float:
+    """Log evidence of `first_fit`."""
+    return first_fit(plant, null).evidence
+
+
+def first_fit(plant: Plant, null: Fit, like: Fit | None = None) -> Fit:
+    """The plain model of another reading, or some pieces, of what `null` was fitted to: from the beginning, with the same units; with the forces and
+    the noise of the fit `like`."""
+    return _first(plant, Scales(plant).alike(null.scales), iterations=REFIT_ITERATIONS, hyper=like.hyper if like else None)
+
+
+def _begun(plant: Plant, scales: Scales) -> Fit:
+    """The first fit, of which the others take the background.
+
+    On a ship far from the regressions the force that tracks her is so large that it may go on doing what the parameters should; and a push may drag
+    a fit so far that nothing looks strange where it ends. One that creeps is made again, from a force of ordinary size, then without what is strange
+    where it began, and kept if it rests then.
+    """
+    found = _without_strange(_first(plant, scales))
+    if found.excess > _CREEPS and not is_spent():
+        calm = _without_strange(_first(plant, scales, weak=True))
+        if calm.excess > _CREEPS and len(pieces := strange_pieces(_first(plant, scales, iterations=1))):
+            calm = _without_strange(_first(plant.without(pieces), scales))
+        if calm.excess < _CREEPS:
+            found = calm
+    return replace(found, scales=scales.with_background(found.hyper))
+
+
+def _beside_waves(found: Fit, scales: Scales, share: float, waves_alone: bool = False) -> tuple[Fit, Scales, Colour]:
+    """A first fit, its units, and the noise that suits it (`colour_of`); made again beside the waves, where the ship moves with them: a force that
+    follows them is large, hides what is slow, and leaves residuals that swing too fast."""
+    colour = colour_of(found, share, waves_alone)
+    waves = swinging_force(found, colour)
+    if np.isfinite(waves.period).any() and not is_spent():
+        scales = scales.coloured(waves)
+        found = _begun(found.plant, scales)
+        colour = colour_of(found, share, waves_alone)
+    return found, scales, colour
+
+
+def _first(plant: Plant, scales: Scales, iterations: int = _FIRST_ITERATIONS, weak: bool = False, hyper: Hyper | None = None) -> Fit:
+    origin = Origin.of(plant, scales)
+    hyper = hyper or (replace(origin.hyper, log_force=np.minimum(origin.hyper.log_force, 0.0)) if weak else origin.hyper)
+    return fit(plant, scales, Model(), origin.point, hyper, iterations=iterations, guess=origin.motion, far=True)
+
+
+def _without_strange(found: Fit) -> Fit:
+    """Fitted again without the strangest pieces, which hide the next ones."""
+    for _ in range(_SEARCHES):
+        pieces = strange_pieces(found)
+        if not len(pieces) or is_spent():
+            break
+        plant, candidates = found.plant.without(pieces), found.candidates
+        found = fit(plant, found.scales, found.model, found.point, found.hyper, candidates=candidates, guess=found.motion)
+    return found
+
+
+def _with_gear(found: Fit, name: str, field: str) -> Fit:
+    """`found` behind a gear whose time constant or rate is that of an ordinary one times the factor that suits the motion (servos of models are
+    quicker than Froude's law makes an ordinary gear; what remains of a gear that is a little off passes for a delay)."""
+    first = found
+    if is_spent():
+        return found
+    for factors in _GEAR_FACTORS:
+        for factor in factors:
+            tried = _behind(found, name, field, getattr(first.plant.ordinary[name], field) * factor)
+            if is_spent() or 2.0 * (tried.evidence - found.evidence) < _WORTH_A_GEAR:
+                break
+            found = tried
+        if found is not first or is_spent():
+            break
+    for factor in (_FINER, 1.0 / _FINER):
+        before = found
+        for _ in range(_FINER_STEPS):
+            tried = _behind(found, name, field, getattr(found.plant.ordinary[name], field) * factor)
+            if is_spent() or tried.evidence <= found.evidence:
+                break
+            found = tried
+        if found is not before or is_spent():
+            break
+    return found
+
+
+def _behind(found: Fit, name: str, field: str, value: float) -> Fit:
+    plant = found.plant.driven({name: replace(found.plant.ordinary[name], **{field: value})})
+    return fit(plant, found.scales, found.model, found.point, found.hyper, iterations=REFIT_ITERATIONS, guess=found.motion)

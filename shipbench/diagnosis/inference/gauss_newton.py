@@ -1,0 +1,201 @@
+"""The joint fit: base parameters, effects, initial states and the latent force, with the variances of force and noise (an iterated smoother)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..budget import count, is_spent
+from ..model.forward import Plant
+from ..model.linearisation import NUM_BASE, Linearisation, Point, Scales
+from ..model.term import Term
+from .gram import Hyper
+from .laplace import Fit, Model, at_point, by_segment, leaning, objective, point_from, settle, suiting
+
+_MAY_RISE, _FREE_STEPS, _LEAST_SHARE = 1.1, 5, 0.05
+"""Factor by which a step may raise the cost, on the first steps; later ones must lower it."""
+_MAY_FOLLOW, _LEAST_OF_ALL = 100.0, 1e-3
+"""Factor of the cost beyond which the latent force is not asked whether it could follow: the trajectory blows up, and even a first step is halved to
+this share before it is given up."""
+_LEAP = 0.3
+"""Most that the logarithm of a variance moves between those later steps: two linearisations may else call the other's variance wrong for ever."""
+_AT_REST, _AT_REST_EVIDENCE = 0.5, 0.1
+"""Excess of the cost over what the linear model promises, and change of the evidence, at which a fit rests."""
+_STALE = 3
+"""Later steps with neither a better point nor the promise of one, each half of the one before, after which a fit rests, too: two linearisations may
+lead to and fro for ever."""
+_LOST = 100.0
+"""Excess of the cost where free steps have led astray (a current and positions of 1.5 m noise: 11000, at the regressions still)."""
+_NEAR_REST = 30.0
+"""Excess up to which a fit that goes on from another takes no free steps: they would lead away, and later ones back."""
+_FOLLOWING, _HALVINGS = 6, 5
+"""Steps of initial states and latent force alone at the end, and trials of each."""
+
+
+def fit(
+    plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 20,
+    candidates: Sequence[Term] = (), guess: np.ndarray | None = None, hope: float = -np.inf, far: bool = False,
+    begun: tuple[Linearisation, Fit] | None = None, free_steps: int = _FREE_STEPS,
+) -> Fit:  # fmt: skip
+    """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), until it rests or promises
+    less log evidence than `hope`, when it is not worth its time; or, once the budget is spent, where it stands.
+
+    A step is at first halved only where the cost explodes: the cost of a step that is right for the parameters rises until the latent force has
+    followed, and the path would else end where parameters compensate each other. The best point of the path is kept, by its evidence once the force
+    has followed; there it does. If that led astray, each step must lower the cost from the first on. `candidates` get columns there. far: `point` is
+    that of an `Origin`; begun: its linearisation, and a fit there whose products hold.
+    """
+    log_tau2, began = dict(log_tau2 or {}), (hyper, dict(log_tau2 or {}))
+    if len(point.terms) < len(model.terms):
+        new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
+        point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
+    lin, seen = begun or (Linearisation(plant, scales, point, guess), None)
+    best, before, promised, stale, early = None, -np.inf, -np.inf, 0, np.nan
+    for number in range(iterations):
+        free = number < free_steps
+        found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP, seen=seen, far=far and not number)
+        if not (number or far) and found.excess < _NEAR_REST:
+            free_steps = 0
+        if number < 2:
+            early = found.promise
+        if number and found.promise < hope:
+            return found
+        hyper, log_tau2 = found.hyper, found.log_tau2
+        worth = found.evidence if free else found.evidence_followed
+        if free or best is None or worth > best[0] + _AT_REST_EVIDENCE or found.promise > promised + _AT_REST_EVIDENCE:
+            stale = 0
+        else:
+            stale += 1
+        promised = -np.inf if free else max(promised, found.promise)
+        if best is None or worth > best[0]:
+            best = worth, found, lin
+        count()
+        if is_spent() or stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
+            break
+        before = found.evidence
+        after, seen = _step(lin, found, number + 1 < free_steps, 0.5**stale) if number < iterations - 1 else (None, None)
+        if after is None:
+            break
+        lin = after
+    assert best is not None
+    found, lin = _followed(*best[1:])
+    if free_steps and found.excess > _LOST and not is_spent():
+        again = fit(
+            plant, scales, model, point, *began, iterations=iterations, candidates=candidates, guess=guess, hope=hope, far=far, begun=begun,
+            free_steps=0,
+        )  # fmt: skip
+        if again.evidence > found.evidence:
+            return again
+    return replace(settle(lin, model, found.hyper, found.log_tau2, candidates, leap=0.0) if candidates else found, early=early)
+
+
+def looking_at(found: Fit, candidates: Sequence[Term]) -> Fit:
+    """`found` with columns of `candidates`, fitted on if it does not rest on the linearisation with which fits begin."""
+    plant, scales, model, hyper, log_tau2 = found.plant, found.scales, found.model, found.hyper, found.log_tau2
+    again = settle(Linearisation(plant, scales, found.point, found.motion), model, hyper, log_tau2, candidates, leap=0.0)
+    if again.excess < _AT_REST or is_spent():
+        return again
+    return fit(plant, scales, model, found.point, hyper, log_tau2, candidates=candidates, guess=found.motion)
+
+
+def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Linearisation | None, Fit | None]:
+    """Towards the point that the linear model thinks best, and the fit there if one was made; None where no part of the way, from `share` on, is any
+    better (the first steps are `free`).
+
+    A point is better if its cost is lower, or would be once the latent force has followed: on exact sensors the trajectory of a new point is nearly
+    always dearer than that of the old one, whose force has been fitted.
+    """
+    plant, scales, model, may_rise = lin.plant, lin.scales, found.model, _MAY_RISE if free else 1.0
+    target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
+    at, followed, share = objective(lin, model, found.hyper, found.log_tau2, found.gram), at_point(found, lin.point), share
+    while not is_spent():
+        part = between(lin.point, target, share)
+        trial = Linearisation(plant, scales, part, lin.towards(part), coarse=free)
+        cost = objective(trial, model, found.hyper, found.log_tau2, found.gram)
+        if cost + leaning(found, part) < may_rise * at:
+            return trial, None
+        seen = settle(trial, model, found.hyper, found.log_tau2, leap=0.0) if cost < _MAY_FOLLOW * at else None
+        if seen is not None and at_point(seen, part) + np.sum(seen.reduced.logdet - found.reduced.logdet) < followed:
+            return trial, seen
+        share *= 0.5
+        if share < _LEAST_SHARE and free and cost < _MAY_FOLLOW * at:
+            return trial, seen
+        if share < (_LEAST_OF_ALL if free else _LEAST_SHARE):
+            break
+    return None, None
+
+
+def _followed(found: Fit, lin: Linearisation) -> tuple[Fit, Linearisation]:
+    """Initial states and latent force where they suit the parameters of the point best; the step of a segment is halved while its cost rises."""
+    for _ in range(_FOLLOWING):
+        if found.excess < _AT_REST or is_spent():
+            break
+        here, (eta, w), before = lin.point, suiting(found, lin.point), by_segment(lin, found.hyper, found.gram)
+        share = np.ones(len(before))
+        for _ in range(_HALVINGS):
+            part = replace(here, eta=here.eta + share[:, None] * (eta - here.eta), w=here.w + share[:, None, None] * (w - here.w))
+            trial = Linearisation(found.plant, found.scales, part, lin.towards(part), coarse=False)
+            costs = by_segment(trial, found.hyper, found.gram)
+            worse = ~(costs <= before)
+            if not worse.any():
+                break
+            share[worse] *= 0.5
+        if not costs.sum() < before.sum():  # an unstable ship's trajectory may blow up from its own point
+            break
+        after = settle(trial, found.model, found.hyper, found.log_tau2, leap=0.0)
+        gained = after.evidence - found.evidence
+        if gained > 0.0:
+            found, lin = after, trial
+        if gained < _AT_REST_EVIDENCE:
+            break
+    return found, lin
+
+
+def between(a: Point, b: Point, share: float) -> Point:
+    """a + share (b - a); terms that `a` lacks start from zero."""
+
+    def mix(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+        return p + share * (q - p)
+
+    old = [a.values[i] if i < len(a.values) else np.zeros_like(v) for i, v in enumerate(b.values)]
+    return Point(mix(a.base, b.base), mix(a.eta, b.eta), mix(a.w, b.w), b.terms, tuple(mix(p, q) for p, q in zip(old, b.values, strict=True)))
+
+
+def within_bounds(plant: Plant, scales: Scales, point: Point) -> Point:
+    """Amplitudes held inside the bounds of their effects; those of single runs are held by what the runs have in common."""
+    values = []
+    for term, value in zip(point.terms, point.values, strict=True):
+        if term.per_run:
+            values.append(value)
+            continue
+        unit = scales.amplitudes(term, plant.c.L)
+        sized = [p for p in term.effect.sized(plant.c.L) if not p.shape]
+        values.append(np.clip(value, [p.low / s for p, s in zip(sized, unit, strict=True)], [p.high / s for p, s in zip(sized, unit, strict=True)]))
+    return replace(point, values=tuple(values))
+
+
+def start(plant: Plant) -> tuple[Point, Hyper]:
+    """Regressions, no effect, no latent force."""
+    B = len(plant.seg.run)
+    hyper = Hyper(np.zeros(3), np.zeros(6), 12.0 * plant.froude)
+    return Point(np.zeros(NUM_BASE), np.zeros((B, 6)), np.zeros((B, plant.knots, 3))), hyper
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where fits begin: regressions, with trajectories on the measured ones by the latent force alone. Gauss-Newton is nearly linear from there; from
+    another fit it may end where parameters compensate each other."""
+
+    point: Point
+    hyper: Hyper
+    motion: np.ndarray
+
+    @classmethod
+    def of(cls, plant: Plant, scales: Scales) -> Origin:
+        still, (point, hyper) = Model(hull=1e-4, base=1e-4), start(plant)
+        lin = Linearisation(plant, scales, point, plant.seg.states[..., :6].copy())
+        found = settle(lin, still, hyper, {})
+        tracked = point_from(still, point, found.solution, found.prior, found.estimate)
+        return cls(tracked, found.hyper, lin.towards(tracked))

@@ -1,0 +1,144 @@
+"""Which correlation of the sensors' noise suits a fit, and what a reader is told of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+
+from ...signals import R, U, V
+from ..budget import is_spent
+from ..evaluation.residuals import CHANNEL_UNITS, RESIDUALS
+from ..model.noise import Colour
+from .laplace import Fit, evidence_with
+
+_SHARES, _TIMES = (1.0, 4.0, 16.0, 64.0), (2.0, 6.0, 20.0)
+_SMOOTH_SHARES, _SMOOTH_TIMES = (16.0, 64.0), (0.5, 1.0, 2.0, 4.0)
+"""Tried, of errors that last and of filtered noise; times in samples."""
+_FIRST, WORTH = ((1.0, 2.0), (4.0, 6.0)), 50.0
+"""Share and time of noise that is tried first, and the log evidence that it must gain in all pieces together: a cause in the sensors leaves lasting
+residuals, too."""
+_SWINGS, _MOST_LAG = -0.1, 12
+"""Correlation of residuals below which they swing (independent ones: above -0.08), and the lag [samples] up to which that is looked for."""
+_PERIODS, _DAMPING, _FURTHER = (1.7, 2.0, 2.3), (0.1, 0.25), 1.15
+"""Periods tried, in lags of the lowest correlation, damping ratios, and the factor of further periods: where the latent force follows the waves, what
+is left swings faster than they."""
+_RISES, _LONGEST, _LIKELY = 0.2, 30, 4.0
+"""Rise of the correlation of the latent force from its lowest on, from which it swings (without waves: 0, in a swell: 0.33 to 0.48), the lag
+[samples] up to which that is looked for, and the share of such waves in a velocity."""
+
+
+def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colour:
+    """Correlation of the noise of each channel that suits the residuals by far better than none; found: of this share of the pieces. waves_alone:
+    look for motion with the waves, and for nothing that lasts. Channels that are not reached before the budget is spent keep white noise."""
+    worth = WORTH * share
+    colour = Colour.white(found.plant.steps + 1)
+    best = evidence_with(found, colour)
+    for channel in np.flatnonzero(found.plant.seg.seen).tolist():
+        if is_spent():
+            break
+        grids = _swinging(found, colour, channel) + ([] if waves_alone else _lasting(found, colour, channel, best + worth))
+        reached, way = max((_climbed(found, grid) for grid in grids), key=lambda c: c[0], default=(best, colour))
+        if reached > best + worth:
+            best, colour = _tuned(found, way, channel, reached)
+    return colour
+
+
+def _climbed(found: Fit, grid: np.ndarray) -> tuple[float, Colour]:
+    """Log evidence and noise of a grid's summit, from its second entry along the first two axes on, as far as a neighbour is better."""
+    at = (1, 1, *[0] * (grid.ndim - 2))
+    known = {at: evidence_with(found, grid[at])}
+    while True:
+        steps = [(axis, step) for axis in range(grid.ndim) for step in (-1, 1) if 0 <= at[axis] + step < grid.shape[axis]]
+        for axis, step in steps:
+            beside = (*at[:axis], at[axis] + step, *at[axis + 1 :])
+            if beside not in known and not is_spent():
+                known[beside] = evidence_with(found, grid[beside])
+        summit = max(known, key=lambda place: known[place])
+        if summit == at:
+            return known[at], grid[at]
+        at = summit
+
+
+def _tuned(found: Fit, colour: Colour, channel: int, best: float) -> tuple[float, Colour]:
+    """Log evidence and noise of `colour`, which has the evidence `best`, with a longer or a shorter period in a channel, as far as that is better
+    and a piece holds one, a sample no more than half of one."""
+    share, time, period = (float(x[channel]) for x in (colour.share, colour.time, colour.period))
+    for factor in (_FURTHER, 1.0 / _FURTHER):
+        stretch = factor
+        while 2.0 < period * stretch < found.plant.steps and not is_spent():
+            way = colour.with_channel(channel, share, time * stretch, period * stretch)
+            worth = evidence_with(found, way)
+            if worth <= best:
+                break
+            best, colour, stretch = worth, way, stretch * factor
+    return best, colour
+
+
+def _lasting(found: Fit, colour: Colour, channel: int, least: float) -> list[np.ndarray]:
+    """Errors that last for seconds, or were filtered, where such noise reaches the `least` evidence: grids of share and time."""
+    if max(evidence_with(found, colour.with_channel(channel, share, time)) for share, time in _FIRST) < least:
+        return []
+    return [
+        _grid((_SHARES, _TIMES), lambda share, time: colour.with_channel(channel, share, time)),
+        _grid((_SMOOTH_SHARES, _SMOOTH_TIMES), lambda share, time: colour.with_channel(channel, share, time, smooth=True)),
+    ]
+
+
+def _grid(axes: tuple[tuple[float, ...], ...], way: Callable[..., Colour]) -> np.ndarray:
+    grid = np.empty([len(axis) for axis in axes], dtype=object)
+    for at, values in zip(np.ndindex(grid.shape), product(*axes), strict=True):
+        grid[at] = way(*values)
+    return grid
+
+
+def _swinging(found: Fit, colour: Colour, channel: int) -> list[np.ndarray]:
+    """Motion with the waves, where the residuals swing: a grid of share, period and damping."""
+    seg = found.plant.seg
+    e = np.where(seg.mask, seg.states[..., channel] - found.columns.predicted[..., channel], 0.0)
+    lags = range(1, min(_MOST_LAG, e.shape[1] - 1) + 1)
+    correlation = [float(np.sum(e[:, lag:] * e[:, :-lag]) / np.sum(e**2)) for lag in lags]
+    if min(correlation) > _SWINGS:
+        return []
+    half = 1 + int(np.argmin(correlation))
+
+    def way(share: float, factor: float, damping: float) -> Colour:
+        period = factor * half
+        return colour.with_channel(channel, share, period / (2.0 * np.pi * damping), period)
+
+    return [_grid((_SHARES, _PERIODS, _DAMPING), way)]
+
+
+def swinging_force(found: Fit, colour: Colour) -> Colour:
+    """`colour` with noise that swings in the velocities of the axes in which the latent force does: it follows waves that are long to its knots, and
+    no residual shows them."""
+    for axis, channel in enumerate((U, V, R)):
+        w = np.where(found.plant.seg.mask, found.point.w[..., axis] @ found.plant.hat.T, 0.0)
+        lags = range(1, min(_LONGEST, w.shape[1] - 1) + 1)
+        correlation = np.array([np.sum(w[:, lag:] * w[:, :-lag]) for lag in lags]) / max(np.sum(w**2), 1e-300)
+        lowest, later = np.minimum.accumulate(correlation), np.maximum.accumulate(correlation[::-1])[::-1]
+        half = int(np.argmax(later - lowest))
+        if np.isinf(colour.period[channel]) and later[half] - lowest[half] > _RISES:
+            period = 1.0 + half + float(np.argmax(correlation[half:]))
+            colour = colour.with_channel(channel, _LIKELY, period / (2.0 * np.pi * _DAMPING[0]), period)
+    return colour
+
+
+def noise_in_words(found: Fit) -> dict[str, str]:
+    """What the fit takes as noise of each channel that is not white: motion with the waves, or errors of the sensor that last. It is no cause, but a
+    reader has to know of it."""
+    colour, dt = found.scales.colour, found.plant.seg.dt
+    size = np.exp(0.5 * found.hyper.log_noise) * found.scales.noise * np.sqrt(colour.share)
+    told = {}
+    for channel in np.flatnonzero(colour.share).tolist():
+        name = RESIDUALS[channel]
+        unit, factor = CHANNEL_UNITS["position" if name in ("x", "y") else name]
+        period, time = dt * colour.period[channel], dt * colour.time[channel]
+        kind = (
+            f"swings with a period of about {period:.2g} s, as in waves" if np.isfinite(period)
+            else f"errors that are smooth for about {time:.2g} s, as of a filter" if colour.smooth[channel]
+            else f"errors that last for about {time:.2g} s"
+        )  # fmt: skip
+        told[name] = f"{kind} (standard deviation {factor * size[channel]:.2g} {unit})"
+    return told

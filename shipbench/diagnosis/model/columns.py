@@ -1,0 +1,37 @@
+"""Sensitivities of what the sensors record, and how the motion's own sensitivities change with the same causes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .rollout import Active
+
+ASIDE, AWAY = (2, 3, 4, 5), 0.01
+"""Heading and velocities: what forces are derived by to see how the motion's sensitivities change; and the step, in units of the scales."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Sensitivities about a point, T = 6 (K + 1) with the channel last: eta (B, T, 6), w (B, T, 3 knots), base (B, T, NUM_BASE), one (B, T, size) per
+    term of the point (`own`) and per candidate; predicted (B, K + 1, 6)."""
+
+    predicted: np.ndarray
+    eta: np.ndarray
+    w: np.ndarray
+    base: np.ndarray
+    own: tuple[np.ndarray, ...]
+    candidates: tuple[np.ndarray, ...]
+    bends: tuple[Bend, ...]
+
+
+@dataclass(frozen=True)
+class Bend:
+    """How the motion's own sensitivities change with columns of base, own terms or candidates: through forces, by `rates` (size, K, B, 3), the change
+    of the acceleration in the middle of every step beside the trajectory (`Linearisation.aside`) less that on it; through sensors, by `sensors`, what
+    they are when each is moved by `unit`, or None where that changes nothing."""
+
+    rates: np.ndarray | None
+    sensors: tuple[tuple[Active, ...] | None, ...] = ()
+    unit: float = 1.0

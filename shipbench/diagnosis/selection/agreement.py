@@ -1,0 +1,199 @@
+"""Whether the size of a cause is sure, if runs are independent, not samples (of a model that is not the ship's, its own errors are too small), and
+whether it matters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...data.noise import white_noise
+from ...effects.base import Effect
+from ...signals import STATES
+from ..inference.gram import by_run, shared_alone, solve
+from ..inference.laplace import Fit
+from ..inference.robust_prior import STRANGE, is_strange, needed
+from ..model.forward import Segments
+from ..model.linearisation import PLACES
+from ..model.term import Term
+from .screening import evidence
+
+_NOISES = 6.0
+"""Play behind a record of the rudder, in standard deviations of its noise, which such play takes out. (A boat of 12 m with noise of 0.1 deg and no
+play, beside a lag of 0.2 s: 0.35 and 0.37 deg, worth 90 and 106; without the noise none.)"""
+_LATE_BESIDE_LATE = 0.6
+"""Least size of a delay beside that of another sensor, in typical sizes (docs/calibration.md#sizes-that-matter)."""
+_ABREAST = 0.1
+"""Angle [rad] to the normal of a bank that was found, within which a steady wind or current makes up for its law. (Beside a bank that all runs of a
+barge followed, at 89 to 91 deg: a wind of 5.3 m/s and a current of 0.1 m/s from and to 270 deg, of which there were none.)"""
+_DOUBT, _DOUBT_LATE = 0.05, 1e-5
+"""Probability that a size is zero from which it is not sure; of a cause that begins with a run, which is chosen among hundreds of effects and runs.
+(Ten standard manoeuvres with nothing hidden: 0.01 to 1e-4; changes hidden in 24 runs: 1e-6 and less.)"""
+
+_AGAINST = -2.0
+"""2 log evidence of a cause, any one run taken away, below which the other runs speak against it. (A bank on ships of the literature that had none:
+-5 to -6, but 7 to 28 with the run that lay nearest to it; true causes, development cases: 10 and more.)"""
+
+_OWN_LEFT, _OWN_SHARE = 30.0, 0.1
+"""2 log evidence of forces of single runs that may be left beside causes with values for single runs: so much, and this share of what those are
+worth. (On 21 sets with such a cause at most 0.06 of it is left, on the Esso Osaka's runs 11 to 13; on a boat whose lift builds up slowly, where a
+current or wind of 0.5 to 1.7 typical sizes was named for it, 103 to 250, a fifth to all of it. Beside two such causes together 59 were left there,
+which is too little to be seen.)"""
+_OWN_FORCE = float(np.log(0.5**2))
+"""Variance of a run's own force from which its search begins, in units of the latent force."""
+_FACTORS = np.log(np.array([0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0]) ** 2)
+"""Of the variances of the values of single runs, or pieces, of which the likeliest is taken."""
+
+
+def inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
+    """Variance of the shared coefficients `at` (P,) by the sandwich clustered by run, over the model's; what single runs have of their own is
+    integrated out, else each run's current would pass for its disagreement with the others."""
+    S, *_ = shared_alone(fit.reduced, fit.prior)
+    scores = S[:, :-1, -1] - S[:, :-1, :-1] @ fit.solution.mean
+    bread = fit.solution.cov
+    num = len(S)
+    sandwich = bread @ (scores.T @ scores * num / max(num - 1, 1)) @ bread
+    return np.diag(sandwich)[at] / np.diag(bread)[at]
+
+
+def covariance(fit: Fit, index: int) -> np.ndarray:
+    """Of the values of a cause that all runs share, (P, P) in typical sizes: the model's, widened to the sandwich where that is wider. Where only the
+    forces tell how far ahead on the ship positions and velocities are, by as much more as the form of a hull moves those."""
+    at, term = np.flatnonzero(np.isin(fit.prior.shared, fit.columns_of(index))), fit.model.terms[index]
+    wider = np.maximum(1.0, inflation(fit, at)) ** 0.5
+    cov = fit.solution.cov[np.ix_(at, at)] * np.outer(wider, wider)
+    spread = np.array(term.effect.form_spread(term.setting, fit.plant.c.L))
+    return cov + np.diag((spread / fit.scales.amplitudes(term, fit.plant.c.L)) ** 2)
+
+
+def is_borne_by_one(fit: Fit, index: int) -> bool:
+    """Whether one run alone bears a cause, against what the others say: there is evidence for it, and, that run taken away, against it."""
+    S, *_ = shared_alone(fit.reduced, fit.prior)
+    inside, whole = np.isin(fit.prior.shared, fit.columns_of(index)), S.sum(axis=0)
+
+    def evidence(keep: np.ndarray) -> np.ndarray:
+        at, precision = np.append(keep, True), fit.prior.precision[keep]
+        total = np.concatenate([whole[None], whole - S])[:, at][:, :, at]
+        A, b = total[:, :-1, :-1] + np.diag(precision), total[:, :-1, -1]
+        fitted = np.sum(b * np.linalg.solve(A, b[..., None])[..., 0], axis=1)
+        return np.asarray(fitted - np.linalg.slogdet(A)[1] + np.sum(np.log(precision)))
+
+    with_all, *left = evidence(np.ones_like(inside)) - evidence(~inside)
+    return bool(with_all > 0.0 and len(left) > 1 and min(left) < _AGAINST)
+
+
+def lasts(fit: Fit) -> bool:
+    """Whether one value in each run of all causes that have such explains the runs no worse than one in each piece of it, what runs share held where
+    it is: a wind or a current stays for a run, what the model lacks of the ship changes with the manoeuvre. Of all together, since they take over
+    from each other, and a wind has gusts (that of the Esso Osaka beside a current of 0.01 m/s: 123 and 153; both together: 462 and 344). Runs of one
+    piece cannot tell."""
+    columns, num = fit.prior.random, len(fit.gram.run)
+    pieces = replace(fit.gram, run=np.arange(num), runs=num).reduce(fit.hyper.log_force).S[:, columns]
+    held = np.zeros(pieces.shape[-1])
+    held[fit.prior.shared], held[-1] = fit.solution.mean, -1.0
+    information, left = pieces[:, :, columns], -pieces @ held
+
+    def worth(A: np.ndarray, b: np.ndarray) -> float:
+        ways = [(A + np.diag(np.exp(-t)), t) for t in fit.prior.log_tau2 + _FACTORS[:, None]]
+        return max(float(np.sum(b * np.linalg.solve(W, b[..., None])[..., 0]) - np.sum(np.linalg.slogdet(W)[1] + np.sum(t))) for W, t in ways)
+
+    return worth(by_run(information, fit.gram.run), by_run(left, fit.gram.run)) >= worth(information, left)
+
+
+def own_forces(fit: Fit) -> float:
+    """2 log evidence of a constant force of its own in each run, in all three axes of the ship, beside all causes."""
+    inside = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
+    gram, shared, end = fit.gram.only(inside), len(fit.prior.shared), len(inside)
+    prior = replace(fit.prior, shared=np.arange(shared), random=np.arange(shared, end))
+    constant = np.zeros((gram.G.shape[-1], 3))
+    constant[6 : gram.latent] = np.kron(np.eye(3), np.ones((gram.knots, 1)))
+    unit = np.eye(len(constant))
+    with_own = np.hstack([unit[:, :-1], constant, unit[:, -1:]])
+    slope = np.insert(gram.slope, [end] * 3, 0.0, axis=1)
+    wider = replace(gram, G=np.swapaxes(with_own, 0, 1) @ gram.G @ with_own, slope=slope)
+    own = replace(prior, random=np.arange(shared, end + 3), log_tau2=np.append(prior.log_tau2, np.full(3, _OWN_FORCE)))
+    log_force = fit.hyper.log_force
+    return 2.0 * (evidence(wider, own, log_force, 3)[0] - evidence(gram, prior, log_force)[0])
+
+
+def tells_runs_apart(fit: Fit) -> bool:
+    """Whether the values of single runs of all causes that have such leave little in which runs differ: a constant force of its own in each run, in
+    the axes of the ship, beside them. What the model lacks of the ship is another force in each manoeuvre, and no current or wind explains it."""
+    alone = replace(fit.prior, random=fit.prior.random[:0], log_tau2=fit.prior.log_tau2[:0])
+    worth = 2.0 * (fit.solution.log_evidence - solve(fit.reduced, alone).log_evidence)
+    return own_forces(fit) < _OWN_LEFT + _OWN_SHARE * max(worth, 0.0)
+
+
+def relies_on_a_ship(fit: Fit, effect: Effect) -> bool:
+    """Whether the coefficients of the ship that the effect relies on are those of some ship (a superstructure, of a wind that is not measured): else
+    something else is taken for it."""
+    places = [PLACES[name] for name in effect.traits.relies_on]
+    return not places or bool(np.max(np.abs(needed(fit)[places])) < STRANGE)
+
+
+def is_on_a_ship(fit: Fit, index: int) -> bool:
+    """Whether a ship may have a cause of the size found (`Effect.plausible`); of values of single runs their root mean square counts."""
+    term, values = fit.model.terms[index], fit.values[index] * fit.scales.amplitudes(fit.model.terms[index], fit.plant.c.L)
+    size = np.sqrt(np.mean(values**2, axis=0)) if term.per_run else values
+    return bool(term.effect.plausible((*size, *term.setting), fit.plant.ship))
+
+
+def imitates(fit: Fit, index: int) -> bool:
+    """Whether it is a steady vector along the normal of a cause that it imitates (a bank): what the law of that one leaves looks like it."""
+    of = fit.model.terms[index].effect.traits.imitates
+    normals = [t.effect.normal(t.setting) for t in fit.model.terms if t.label in of]
+    if not normals:
+        return False
+    north, east = fit.values[index]
+    return any(n is not None and abs(np.sin(np.arctan2(east, north) - n)) < _ABREAST for n in normals)
+
+
+def shows_on_any_ship(effect: Effect) -> bool:
+    """Whether it shows beside the coefficients of another ship, too: a fault of a sensor, or a force that breaks a symmetry which every ship has (not
+    a wind of each run, nor a bank, which act through coefficients alone)."""
+    return effect.family == "sensor" or (effect.breaks_symmetry and not effect.traits.by_coefficients)
+
+
+def bends(fit: Fit, index: int, null: Fit) -> bool:
+    """Whether a cause that goes by the ship file is in a model that needs a stranger ship than the plain model `null` does: then it explains nothing,
+    but one error by another. (A late rudder for lift that builds up slowly: the thrusters 9 spreads off, without it 5.)"""
+    return not shows_on_any_ship(fit.model.terms[index].effect) and is_strange(needed(fit)) and not is_strange(needed(null))
+
+
+def runs_agree(fit: Fit, index: int) -> bool:
+    """Whether the values of a cause that all runs share differ from zero (Hotelling's test over the runs)."""
+    from scipy.stats import f
+
+    value, num = fit.values[index], fit.plant.seg.runs
+    size, free = len(value), max(num - len(value), 1)
+    squares = float(value @ np.linalg.solve(covariance(fit, index), value))
+    doubt = float(f.sf(squares * free / (size * max(num - 1, 1)), size, free))
+    return doubt < (_DOUBT if fit.model.terms[index].since is None else _DOUBT_LATE)
+
+
+def least_size(fit: Fit, term: Term) -> float:
+    """Below which a cause does not matter, in typical sizes. Of a gear's time half a sample, too, for which an order may have stood before it was
+    recorded; of play behind a record what the record's noise makes of it. Beside the delay of another
+    sensor as of the rudder's: by what positions are later than velocities, the track tells; which of the two is late, how soon the ship answers
+    alone."""
+    least = term.effect.least_size(term.setting)
+    if term.effect.late and any(t.effect.late for t in fit.model.terms if t.label != term.label):
+        least = max(least, _LATE_BESIDE_LATE)
+    if term.effect.enters == "gear" and term.effect.parameters[0].unit == "s":
+        least = max(least, 0.5 * fit.plant.seg.dt / float(fit.scales.amplitudes(term, fit.plant.c.L)[0]))
+    if term.effect.traits.least_unrecorded and not fit.plant.seg.commanded:
+        noise = _record_noise(fit.plant.seg, term.effect.acts_through[0]) / float(fit.scales.amplitudes(term, fit.plant.c.L)[0])
+        least = max(least, term.effect.traits.least_unrecorded, _NOISES * noise)
+    return least
+
+
+def _record_noise(seg: Segments, channel: str) -> float:
+    """Standard deviation of the noise of the record of an actuator, in its unit."""
+    record = seg.states[..., STATES.index(channel)]
+    return float(np.median([white_noise(values[real]) for values, real in zip(record, seg.mask, strict=True)]))
+
+
+def matters(fit: Fit, index: int) -> bool:
+    """Whether a cause reaches its least size; of one with a value for each run, their root mean square counts."""
+    term, squares = fit.model.terms[index], np.sum(np.square(fit.values[index]), axis=-1)
+    return bool(np.mean(squares) >= least_size(fit, term) ** 2)

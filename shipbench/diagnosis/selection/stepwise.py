@@ -1,0 +1,322 @@
+"""Which causes: forward selection with nonlinear refits of the best candidates, and a backward pass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product, takewhile
+
+import numpy as np
+
+from ...effects.base import EFFECTS, Effect
+from ..budget import is_spent
+from ..inference.baseline import REFIT_ITERATIONS, beside_noise_of
+from ..inference.gauss_newton import Origin, fit, looking_at
+from ..inference.laplace import Fit, hull_evidence, settle
+from ..inference.robust_prior import widened
+from ..model.forward import Plant
+from ..model.linearisation import Linearisation
+from ..model.term import Term
+from .applicable import why_not
+from .backward import needed_only, wanted_only
+from .requirements import SAME_SHIP, SIGNIFICANT, SURE, Standard, first_unmet
+from .screening import Score, changes, glance, overlap, screen
+
+MOST_EFFECTS = 6
+_REFITS = 3
+_WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
+"""Least linear score of what is refitted: of the threshold, and of the best."""
+_RIVAL, _RIVALS = 0.25, 4
+_TIE, _TIE_OF_VECTORS = 0.1, 0.5
+"""Scores of two ways of an effect that differ by less are equal: a moment that goes with the square of a size has no slope at zero, either way. Of
+winds and waves, whose forces grow with the square, by this share: those of waves four times as strong as typical ones end in another order."""
+_HOPE, _HOPE_MARGIN = 0.6, 30.0
+"""A refit is given up where it promises less than this share of what the best so far has gained, less the margin. (198 refits on development ships:
+promises at the second linearisation fell short of the end by at most 27 % and 60, and none was lower whose end came within 6 of the best. With the
+file of another ship every fit creeps, that of the plain model, too, and they fell short by 200.)"""
+_NEAR = 1.0
+"""A refit that ends so little below the threshold is fitted on: at rest the variances may still creep, by up to half of this."""
+_IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
+"""What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
+_OFF_FORM = 0.02
+"""Share of the evidence for a hull off the regressions that a cause in which ships differ is asked besides (docs/calibration.md#evidence-asked)."""
+CONFUSED, _OF_FORMULAS = 10.0, 0.1
+"""Candidates within this of the winner's score are called confused with it; of these, within this share of it: how far they lie apart, their formulas
+decide. (Drift in waves by another formula: wind 706, waves 681.)"""
+_CHANGES, _CHANGE_MARGIN, _OWN_MARGIN = 2, 14.0, 4.0
+"""A beginning is chosen among all effects: it must beat the best cause without one by this; the second where that is the same effect."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A candidate that was refitted in a round, its score at its own optimum (2 log evidence over the model before), or what it promised when it
+    was given up, and the number of runs that are likelier there than by the model before."""
+
+    round: int
+    term: Term
+    score: float
+    supporters: int
+
+    @classmethod
+    def of(cls, number: int, tried: Fit, now: Fit, score: float) -> Step:
+        return cls(number, tried.model.terms[-1], score, int(np.sum(tried.solution.per_run > now.solution.per_run)))
+
+    def is_near(self, best: Step) -> bool:
+        """Whether the data do not tell it from the step that was taken instead."""
+        share = _OF_FORMULAS * push_alike(self.term.effect, best.term.effect)
+        return self.round == best.round and self.score > best.score - max(CONFUSED, share * best.score)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """null: the plain model, beside the noise that suits the causes; plain: beside its own; final: with the causes found; scores: of every candidate
+    in the first round, and `last` beside the final one; off_form: what a cause for which the form of a hull could pass must be worth besides
+    (`Standard.asked_besides`); unmet: effects that gain more than the threshold, and why they are not named (the first requirement that they do not
+    meet); small: the plain model with those of them that are too small to matter, where nothing else was found."""
+
+    null: Fit
+    plain: Fit
+    final: Fit
+    first: list[Score]
+    last: list[Score]
+    steps: list[Step]
+    off_form: float = 0.0
+    unmet: Mapping[str, str] = field(default_factory=dict)
+    small: Fit | None = None
+
+
+def push_alike(one: Effect, other: Effect) -> bool:
+    """Whether two effects of one group have different formulas, by which alone they are told apart."""
+    return bool(one.traits.group) and one.traits.group == other.traits.group and type(one).force is not type(other).force
+
+
+def shows_in_record(effect: Effect) -> bool:
+    """Whether it acts between command and actuator alone: where the actuator is recorded, it is looked for in the record, not in the motion."""
+    return effect.enters == "gear" and not effect.unrecorded
+
+
+def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Sequence[str] = ()) -> list[Term]:
+    """Every effect that could act on these data, less those that are `settled`, once per shape setting."""
+    found = []
+    for name in names if names is not None else EFFECTS.names():
+        effect = EFFECTS.get(name)
+        if effect.traits.search != "screening" or name in settled or (not plant.seg.commanded and shows_in_record(effect)):
+            continue
+        if why_not(effect, plant):
+            continue
+        ways = list(product(effect.fitted(plant.c.L), effect.settings(plant.seg.states[..., :2], plant.ship)))
+        found += [Term(way, setting, effect.per_run, choices=len(ways)) for way, setting in ways]
+    return found
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """A model and candidates at an `Origin`, where it has not been fitted yet: one linearisation `lin`, at which they are `seen`, and from which a
+    refit with any of them starts."""
+
+    now: Fit
+    origin: Origin
+    lin: Linearisation
+    seen: Fit
+
+    @classmethod
+    def of(cls, now: Fit, origin: Origin, terms: Sequence[Term]) -> Beginning:
+        at = replace(origin.point, terms=now.model.terms, values=now.values)
+        lin = Linearisation(now.plant, now.scales, at, origin.motion)
+        return cls(now, origin, lin, settle(lin, now.model, origin.hyper, now.log_tau2, terms, far=True))
+
+    def refit(self, score: Score, least: float = -np.inf) -> Fit:
+        """The model with one more term, given up where it does not promise to gain `least`."""
+        now, term, columns, candidates = self.now, score.term, self.seen.columns, self.seen.candidates
+        place, shared = candidates.index(term), self.seen.products.shared
+        at, inside = shared - sum(t.size for t in candidates[place:]), shared - sum(t.size for t in candidates)
+        held = replace(
+            self.seen, products=self.seen.products.only(np.append(np.arange(inside), at + np.arange(term.size))), candidates=(),
+            columns=replace(columns, own=(*columns.own, columns.candidates[place]), candidates=()),
+        )  # fmt: skip
+        lin, model = self.lin.holding(place, term), replace(now.model, terms=(*now.model.terms, term))
+        log_tau2 = now.log_tau2 | ({len(now.model.terms): score.log_tau2} if term.per_run else {})
+        hope = now.evidence + 0.5 * least
+        return fit(
+            now.plant, now.scales, model, lin.point, self.origin.hyper, log_tau2, iterations=REFIT_ITERATIONS, hope=hope, far=True, begun=(lin, held)
+        )
+
+
+def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) -> list[tuple[Fit, float]]:
+    """`now` with each of the candidates, and what it gains (2 log evidence), or promised to gain when it was given up beside a better one that gains
+    more than the threshold.
+
+    In the order of their scores at `origin`, where refits begin, at a glance: what comes first is mostly the best, beside which others are given up
+    soon.
+    """
+    if not scores:
+        return []
+    start = Beginning.of(now, origin, [s.term for s in scores])
+    seen = {s.term: s.score for s in glance(start.seen)}
+    found, best, least = list[tuple[Fit, float]](), threshold, -np.inf
+    for score in sorted(scores, key=lambda s: -seen[s.term]):
+        if is_spent():
+            break
+        tried = start.refit(score, least)
+        if threshold - _NEAR < 2.0 * (tried.evidence - now.evidence) < threshold:
+            tried = fit(tried.plant, tried.scales, tried.model, tried.point, tried.hyper, tried.log_tau2, guess=tried.motion)
+        gained, promised = 2.0 * (tried.evidence - now.evidence), 2.0 * (tried.promise - now.evidence)
+        found.append((tried, promised if promised < least else gained))
+        if gained > best:
+            best, least = gained, _least(tried, now)
+    return found
+
+
+def _least(best: Fit, now: Fit) -> float:
+    """What a refit must promise to gain beside the best one; less by as much as that one's own promise fell short."""
+    return 2.0 * (_HOPE * (best.evidence - now.evidence) - max(best.promise - best.early, 0.0)) - _HOPE_MARGIN
+
+
+def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selection:
+    """Add the best candidate while it gains more than `threshold` and than what the causes found leave; drop what a later one has made needless.
+
+    `null` must carry the candidates. Candidates are refitted if their linear score is among the best, or the best of their family. Where other noise
+    suits the first cause than suits the plain model, this begins once more beside that.
+    """
+    plain, grown = null, _grown(null, threshold, most)
+    if grown.again is not None:
+        again = _grown(grown.again, threshold, most, again=True)
+        null, grown = (null, grown) if is_spent() else (grown.again, again)
+    now, scores, standard = grown.now, grown.scores, replace(grown.standard, null=null)
+    pruned = needed_only(now, standard, spare_last=False)
+    pruned, unsure = wanted_only(pruned, (*SURE, SAME_SHIP), standard)
+    whole = pruned
+    pruned, small = wanted_only(pruned, (SIGNIFICANT,), standard)
+    if pruned is not now:
+        now = looking_at(pruned, null.candidates)
+        sure, more = wanted_only(now, SURE, standard) if small else (now, {})  # without what is too small, too
+        if more:
+            now, unsure = looking_at(sure, null.candidates), unsure | more
+        scores = screen(now)
+    return Selection(
+        null, plain, now, grown.first, scores, grown.steps, standard.off_form, grown.tiny | small | unsure,
+        whole if small and not now.model.terms else None,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Grown:
+    """A model `now` with every cause that was worth adding to the plain one, and the steps to it, as in `Selection`; again: the plain model beside
+    other noise, from which to begin once more; then `now` holds the first cause alone. tiny: effects that are too small to matter, and why."""
+
+    now: Fit
+    first: list[Score]
+    scores: list[Score]
+    steps: list[Step]
+    tiny: dict[str, str]
+    standard: Standard
+    again: Fit | None = None
+
+    def gain(self, tried: Fit) -> float:
+        """2 log evidence of the last term of `tried` beyond that; a tiny one gains nothing."""
+        term = tried.model.terms[-1]
+        # every ship is a little unequal, every run has a breath of wind, every record is a little late: what is too small of that stays, and others
+        # are judged beside it
+        spared = not self.standard.careful or term.effect.breaks_symmetry or term.per_run or term.effect.enters == "gear"
+        if not (spared or SIGNIFICANT.check(tried, -1, self.standard).met):
+            return -np.inf
+        return 2.0 * (tried.evidence - self.now.evidence) - self.standard.asked_besides(term, np.max(np.abs(tried.values[-1])))
+
+
+def _grown(null: Fit, threshold: float, most: int, again: bool = False) -> _Grown:
+    """Forward selection; again: do not ask for other noise once more."""
+    first, careful = screen(null), threshold > 0.0  # who is told the names needs no such care
+    standard = Standard(null, threshold, _OFF_FORM * max(hull_evidence(null), 0.0) if careful and not is_spent() else 0.0, careful)
+    state = _Grown(null, first, first, [], {}, standard)
+    origin = Origin.of(null.plant, null.scales)
+    for round_ in takewhile(lambda _: not is_spent(), range(most)):
+        now = state.now
+        tried = refits(now, worth_a_refit(state.scores, now, threshold), origin, threshold)
+        if not is_spent() and all(2.0 * (f.evidence - now.evidence) < threshold for f, _ in tried):
+            tried += refits(now, absorbed([f for f, _ in tried], now, threshold, origin), origin, threshold)
+        state.steps.extend(Step.of(round_, f, now, score) for f, score in tried)
+        for f, score in tried:
+            if score > threshold and not (size := SIGNIFICANT.check(f, -1, standard)).met:
+                state.tiny[f.model.terms[-1].label] = size.reason
+        # of a round that is cut short the best is not known
+        best = None if is_spent() else _or_change(now, max((f for f, _ in tried), key=state.gain, default=None), origin, standard)
+        imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
+        # what a fit that does not rest could still gain by itself is no gain of the next cause
+        if best is None or state.gain(best) < threshold + imprecise + now.excess:
+            break
+        if best.model.terms[-1].since is not None:
+            state.steps.append(Step.of(round_, best, now, 2.0 * (best.evidence - now.evidence)))
+        now = widened(looking_at(needed_only(best, standard), null.candidates))
+        if round_ == 0 and not again and (other := beside_noise_of(now, null)) is not None:
+            return replace(state, now=now, again=other)
+        state = state if is_spent() else replace(state, now=now, scores=screen(now))
+    return state
+
+
+def _or_change(now: Fit, best: Fit | None, origin: Origin, standard: Standard) -> Fit | None:
+    """The best candidate, or one that begins at a later run, where that explains the runs better by the threshold."""
+    if any(t.since is not None for t in now.model.terms):
+        return best
+    plain, gain = best, 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
+    present, least = {t.label for t in now.model.terms}, max(_CHANGE_MARGIN, _FAR_BEHIND * gain)
+    late = [s for s in changes(now) if s.score > least and s.term.label not in present and not s.term.effect.traits.persistent][:_CHANGES]
+    if not late:
+        return best
+    start = Beginning.of(now, origin, [s.term for s in late])
+    for score in late:
+        found = start.refit(score, _least(best, now) if best is not None and gain > _CHANGE_MARGIN else -np.inf)
+        own = plain is not None and plain.model.terms[-1].label == score.term.label
+        if 2.0 * (found.evidence - now.evidence) > gain + (_OWN_MARGIN if own else _CHANGE_MARGIN) and first_unmet(SURE, found, -1, standard).met:
+            best, gain = found, 2.0 * (found.evidence - now.evidence)
+    return best
+
+
+def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[Score]:
+    """The best, the best of each family, and whatever could stand in for the best: one way of each effect, or those that tie."""
+    present, best = _beside(now), dict[str, Score]()
+    for s in scores:
+        if s.term.label not in present:
+            best.setdefault(s.term.label, s)
+    ranked = sorted(best.values(), key=lambda s: -s.score)
+    if not ranked or ranked[0].score < _WORTH_A_REFIT * threshold:
+        return []
+    least = max(_WORTH_A_REFIT * threshold, _FAR_BEHIND * ranked[0].score)
+    chosen = [s for s in ranked[:_REFITS] if s.score > least]
+    families = {s.term.effect.family for s in chosen}
+    for s in ranked[_REFITS:]:
+        if s.score > max(threshold, least) and s.term.effect.family not in families:
+            chosen.append(s)
+            families.add(s.term.effect.family)
+    best_of_all = ranked[0].term.effect
+    rivals = overlap(now, ranked[0].term, ranked[0].estimate)
+    if best_of_all.vector or best_of_all.per_run:  # their sensitivities depend on the size too much for the linear overlap
+        rivals |= {s.term.label: 1.0 for s in ranked if s.term.effect.vector or s.term.effect.per_run}
+    near = sorted((s for s in ranked if rivals.get(s.term.label, 0.0) > _RIVAL and s not in chosen), key=lambda s: -rivals[s.term.label])
+    chosen += near[:_RIVALS]
+    return [s for s in scores if any(s is c or (s.term.label == c.term.label and s.score > c.score - _tie(c)) for c in chosen)]
+
+
+def _tie(best: Score) -> float:
+    """What another way of an effect may score less to be refitted, too."""
+    return max(_TIE, _TIE_OF_VECTORS * best.score) if best.term.effect.vector and not best.term.per_run else _TIE
+
+
+def _beside(now: Fit) -> set[str]:
+    """Effects that are in the model, and those that cannot be named beside them."""
+    present = {t.label for t in now.model.terms}
+    groups = {t.effect.traits.group for t in now.model.terms} - {""}
+    return present | {t.label for t in now.candidates if t.effect.traits.group in groups}
+
+
+def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -> list[Score]:
+    """Vectors and values of single runs that are worth a refit as seen from `origin`, where the model has not been fitted yet: in few or short runs
+    in calm weather latent force and parameters take a current over so well that nothing is left of it where they rest."""
+    terms = [t for t in now.candidates if t.effect.vector or t.per_run]
+    if not terms or np.isinf(threshold):
+        return []
+    best: dict[str, Score] = {}
+    for s in screen(Beginning.of(now, origin, terms).seen):
+        best.setdefault(s.term.label, s)
+    least = max(threshold, _FAR_BEHIND * max(s.score for s in best.values()))
+    seen = _beside(now) | {f.model.terms[-1].label for f in tried}
+    return [s for label, s in best.items() if label not in seen and s.score > least][:_RIVALS]

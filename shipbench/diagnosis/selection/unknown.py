@@ -1,0 +1,245 @@
+"""The second library: what an unexplained force, or an error of a sensor, depends on, where no named cause fits. It needs no simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+import numpy as np
+
+from ..budget import is_spent
+from ..inference.gauss_newton import fit
+from ..inference.gram import Gram, Prior, beside_products, ornstein_uhlenbeck, solve
+from ..inference.laplace import Fit, products_of, settled_evidence, sloped, whitened
+from ..inference.log_determinant import coefficients_at, slopes
+from ..model.columns import Bend, Columns
+from ..model.linearisation import Linearisation
+from .features import Feature, of_forces, of_sensors
+from .screening import evidence
+
+AXES = ("surge", "sway", "yaw")
+SENSORS = {"recorded heading": 2, "recorded surge": 3, "recorded sway": 4, "recorded yaw rate": 5}
+"""What a sensor's error is an error of, and its channel."""
+_NAMED = ("recorded heading", "recorded yaw rate")
+"""Whose constant errors are causes of the library."""
+_PRIOR_SD, _SENSOR_SD = 0.5, 3.0
+"""Of a form's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m), or of ordinary noise of the
+channel (0.23 deg, 0.04 m/s, 0.04 m/s, 0.04 deg/s)."""
+NO_FORM = ("nothing", "heading", "position", "time", "waves", "run", "measured wind")
+"""What no ship's form depends on."""
+_BY_RUN = ("heading", "position", "waves", "run")
+"""What every run has its own of. What a model lacks of a ship is another force in each manoeuvre, and passes for one that follows these: it does only
+if it explains more than a constant force of its own in each run; and one with the period of waves, more than one of its own phase in each run, since
+waves rock a ship, and the latent force, which has no periods, makes too much of those that are in step by chance."""
+_WORTH_MORE = 2.0
+_OFTEN_ENOUGH = 4.0
+"""Seconds (Froude-scaled, 130 m) between samples up to which errors of sensors are looked for: what a rudder does between rarer ones is not known,
+and turns that begin late by that pass for a slow compass."""
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """A missing force on one axis or more, or the error of a recorded channel, follows one variable, best in this form. score: 2 log Bayes factor,
+    less that of the choice of the form; share: of the variance of that axis's latent force that it takes; size, taken: root mean square of what it
+    is, and of what it takes of the latent force, in units of the latent force, or of ordinary noise."""
+
+    variable: str
+    axis: str
+    form: str
+    score: float
+    share: float
+    size: float
+    taken: float
+
+    @property
+    def of_sensor(self) -> bool:
+        """Whether it is an error of a sensor, or of an order."""
+        return self.axis.startswith(("recorded ", "ordered "))
+
+    @property
+    def has_name(self) -> bool:
+        """Whether it is a cause of the library: too small to be named, perhaps, but not unknown."""
+        return self.variable == "nothing" and self.axis in _NAMED
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """One form on one axis, with its columns; ways: number of forms of which it was chosen."""
+
+    axis: str
+    variable: str
+    form: str
+    ways: int
+    columns: np.ndarray
+    bend: Bend
+
+    @property
+    def size(self) -> int:
+        return int(self.columns.shape[-1])
+
+    @property
+    def cost(self) -> float:
+        """Log evidence that the choice of the form costs."""
+        return float(np.log(self.ways))
+
+
+def dependences(fit: Fit, beside: Collection[str] = ()) -> list[Dependence]:
+    """What `Search` finds."""
+    return Search(fit, beside).found
+
+
+class Search:
+    """Every variable on every axis and channel, best first (`found`); judged beside the model of a fit, and beside forces that follow the variables
+    `beside`, as on a ship that is the same to port and to starboard.
+
+    The forces are there at every step of the trajectory: between the knots of the latent force, rudder and propeller change. Once the budget is
+    spent, what is found is not all, and not to be used.
+    """
+
+    def __init__(self, fit: Fit, beside: Collection[str] = ()) -> None:
+        lin = Linearisation(fit.plant, fit.scales, fit.point, fit.motion)
+        self.fit, self.lin, self.columns = fit, lin, lin.columns()
+        forces, errors = of_forces(lin), of_sensors(lin)
+        sides = [_pushed(lin, axis, {v: [f for f in forces[v] if f.odd == (axis > 0)] for v in beside}) for axis in range(len(AXES))]
+        self.sides = [t for of_axis in sides for t in of_axis]
+        base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
+        self.first = len(base) + sum(t.size for t in self.sides)
+        self.prior = _with(fit.prior, np.arange(len(base), self.first))
+        shared, random = len(self.prior.shared), len(self.prior.random)
+        self.plain = replace(self.prior, shared=np.arange(shared), random=shared + np.arange(random))
+        self.inside = np.concatenate([self.prior.shared, self.prior.random]).astype(int)
+        self.usual = fit.hyper.log_force
+        self.before = evidence(self._gram([]).only(self.inside), self.plain, self.usual)[0]
+        free = {v: of for v, of in forces.items() if v not in beside}
+        alone = [pair for axis in range(len(AXES)) for pair in self._best(_pushed(lin, axis, free))]
+        apart = {v: [pair for pair in alone if pair[0].variable == v] for v in NO_FORM}
+        apart["nothing"] = [pair for pair in apart["nothing"] if pair[0].axis != "surge"]  # where another form of resistance comes near a constant
+        joined = [self._together(pairs) for pairs in apart.values()]
+        often = fit.plant.seg.dt < _OFTEN_ENOUGH * fit.plant.froude
+        channels = [(name, channel) for name, channel in SENSORS.items() if often and fit.plant.seg.seen[channel]]
+        alone += self._best([t for name, channel in channels for t in _added(lin, name, channel, errors)])
+        self._parts = {d: parts for d, *parts in [*alone, *(pair for pair in joined if pair is not None)]}
+        constant = {d.axis: t for d, t in alone if d.variable == "nothing" and d.axis in AXES}
+        doubtful = [d for d in self._parts if d.variable in _BY_RUN and not d.of_sensor and d.score > 0.0]
+        own = {d: self._parts[d] if d.variable == "waves" else [constant[axis] for axis in d.axis.split(" and ")] for d in doubtful}
+        lost = [d for d in doubtful if not is_spent() and self._of_runs(own[d]) > d.score]
+        told = {d: replace(d, variable="time") if d.variable == "waves" else d for d in self._parts if d not in lost}
+        self._parts = {named: self._parts[d] for d, named in told.items()}
+        self.found = sorted(self._parts, key=lambda d: -d.score)
+
+    def settled(self, d: Dependence) -> Dependence:
+        """The same, judged as named causes are, which are fitted: with the variances of the noise re-estimated, and an error of a sensor taken out of
+        the record. Before it is known the noise holds a large one, and the fit is dragged along."""
+        parts, usual = self._parts[d], self._settled([])
+        score = 2.0 * (self._settled(parts) - usual - sum(t.cost for t in parts))
+        return replace(d, score=max(score, d.score, *(self._refitted(t) for t in parts if d.of_sensor)))
+
+    def _of_runs(self, tried: Sequence[_Tried]) -> float:
+        """2 log evidence of the forces `tried` with coefficients of its own in each run."""
+        num, prior = sum(t.size for t in tried), self.plain
+        at = len(self.inside) + np.arange(num)
+        prior = replace(prior, random=np.append(prior.random, at), log_tau2=np.append(prior.log_tau2, np.zeros(num)))
+        gram = self._gram(tried).only(np.append(self.inside, self.first + np.arange(num)))
+        return 2.0 * (evidence(gram, prior, self.usual, num)[0] - self.before)
+
+    def _refitted(self, tried: _Tried) -> float:
+        """Score of an error without which the plain model is fitted again, where its coefficients keep prior and precision. At least so much: of an
+        error of several degrees the linear estimate leaves some."""
+        now, at = self.fit, self.first + np.arange(tried.size)
+        solution = solve(self._gram([tried]).reduce(self.usual), _with(self.prior, at))
+        mean, cov = solution.mean[-tried.size :], solution.cov[-tried.size :, -tried.size :]
+        error = (tried.columns @ mean).reshape(now.plant.seg.states[..., :6].shape)
+        found = fit(now.plant.less(error), now.scales, now.model, now.point, now.hyper, now.log_tau2, guess=now.motion)
+        return float(2.0 * (found.evidence - now.evidence - tried.cost) - mean @ mean + np.linalg.slogdet(cov)[1])
+
+    def _settled(self, tried: Sequence[_Tried]) -> float:
+        more, columns = [*self.sides, *tried], self._columns_with(tried)
+        products = products_of(self.fit.plant, self.fit.scales, self.fit.point, columns)
+        return settled_evidence(self.fit, sloped(self.lin, columns, products, self.fit.hyper), sum(t.size for t in more))
+
+    def _best(self, tried: Sequence[_Tried]) -> list[tuple[Dependence, _Tried]]:
+        """The best form of every variable and axis."""
+        if not tried or is_spent():
+            return []
+        gram = self._gram(tried)
+        reduced = gram.reduce(self.usual)
+        null = solve(reduced, self.prior).log_evidence
+        places = np.split(self.first + np.arange(sum(t.size for t in tried)), np.cumsum([t.size for t in tried])[:-1])
+        found = []
+        for _, group in groupby(zip(tried, places, strict=True), key=lambda pair: (pair[0].axis, pair[0].variable)):
+            solution, best, at = max(((solve(reduced, _with(self.prior, at)), t, at) for t, at in group), key=lambda way: way[0].log_evidence)
+            gain, log_force = solution.log_evidence - null, self.usual
+            if gain - best.cost > _WORTH_MORE and not is_spent():
+                after, log_force = self._evidence(gram, at)
+                gain = after - self.before
+            size, share, taken = float(np.linalg.norm(solution.mean[-best.size :])), np.nan, 0.0
+            if best.axis in AXES:
+                before, after = np.exp([self.usual, log_force])[:, AXES.index(best.axis)]
+                share, taken = float(1.0 - after / before), float(np.sqrt(max(before - after, 0.0)))
+            unit = _SENSOR_SD if best.axis in SENSORS else _PRIOR_SD
+            found.append((Dependence(best.variable, best.axis, best.form, 2.0 * (gain - best.cost), share, unit * size, taken), best))
+        return found
+
+    def _together(self, of: Sequence[tuple[Dependence, _Tried]]) -> tuple[Dependence, *tuple[_Tried, ...]] | None:
+        """The best forms of a variable on all axes where they are worth something, the strongest first; None where that is one axis alone."""
+        parts = sorted((pair for pair in of if pair[0].score > 2.0 * _WORTH_MORE), key=lambda pair: -pair[0].score)
+        if len(parts) < 2 or is_spent():
+            return None
+        gram, size = self._gram([t for _, t in parts]), sum(t.size for _, t in parts)
+        after, _ = self._evidence(gram, self.first + np.arange(size))
+        score = 2.0 * (after - self.before - sum(t.cost for _, t in parts))
+        return replace(parts[0][0], axis=" and ".join(t.axis for _, t in parts), score=score), *(t for _, t in parts)
+
+    def _evidence(self, gram: Gram, at: np.ndarray) -> tuple[float, np.ndarray]:
+        """Log evidence with the columns `at` as well, and the variances of the force, re-estimated."""
+        prior = _with(self.plain, len(self.inside) + np.arange(len(at)))
+        return evidence(gram.only(np.append(self.inside, at)), prior, self.usual)[:2]
+
+    def _gram(self, tried: Sequence[_Tried]) -> Gram:
+        """The Gram of the fit with more columns, under its noise (products of single channels would take six times the memory)."""
+        fit, seg, columns = self.fit, self.fit.plant.seg, self._columns_with(tried)
+        Z = whitened(fit.plant, fit.scales, fit.point, columns)
+        G, part = np.zeros((2, Z.shape[1], Z.shape[3], Z.shape[3]))
+        for z, log_noise in zip(Z, fit.hyper.log_noise, strict=True):
+            z *= np.exp(-0.5 * log_noise)
+            G += np.matmul(np.swapaxes(z, 1, 2), z, out=part)
+        nothing = np.zeros((len(G), G.shape[-1] - 6 - 3 * fit.plant.knots))
+        correlation = ornstein_uhlenbeck(fit.plant.knots, fit.plant.knot_time, fit.hyper.tau)
+        gram = Gram(G, fit.plant.knots, *correlation, nothing[:, -1], nothing, seg.run, seg.runs)
+        inverse = gram.only(np.arange(0)).reduce(fit.hyper.log_force).inverse
+        return replace(gram, slope=beside_products(slopes(self.lin, columns, inverse, fit.hyper), coefficients_at(self.lin, columns)))
+
+    def _columns_with(self, tried: Sequence[_Tried]) -> Columns:
+        more = [*self.sides, *tried]
+        return replace(self.columns, candidates=tuple(t.columns for t in more), bends=(*self.columns.bends, *(t.bend for t in more)))
+
+
+def _pushed(lin: Linearisation, axis: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
+    """Forces on one axis."""
+    forms = [(v, f) for v, group in of.items() for f in group]
+    if not forms:
+        return []
+    on, aside = (_PRIOR_SD * np.concatenate(x) for x in ([f.on for _, f in forms], [f.aside for _, f in forms]))
+    columns, bend = lin.pushed(axis, on, aside)
+    found, at = [], 0
+    for v, f in forms:
+        part = np.s_[at : at + f.size]
+        found.append(_Tried(AXES[axis], v, f.form, f.ways, columns[..., part], Bend(None if bend.rates is None else bend.rates[part])))
+        at += f.size
+    return found
+
+
+def _added(lin: Linearisation, name: str, channel: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
+    """Errors in one channel of the record."""
+    found = []
+    for v, group in of.items():
+        for f in group:
+            error = np.zeros((*lin.motion.shape, f.size))
+            error[..., channel, :] = _SENSOR_SD * lin.scales.noise[channel] * np.moveaxis(f.on, 0, -1).swapaxes(0, 1)
+            found.append(_Tried(name, v, f.form, f.ways, error.reshape(len(error), -1, f.size), Bend(None, (None,) * f.size)))
+    return found
+
+
+def _with(prior: Prior, at: np.ndarray) -> Prior:
+    return replace(prior, shared=np.append(prior.shared, at), precision=np.append(prior.precision, np.ones(len(at))))
