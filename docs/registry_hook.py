@@ -103,6 +103,7 @@ def _metrics() -> Iterator[str]:
 
 def _checks() -> Iterator[str]:
     from shipbench.bench.check_faults import FAULTS
+
     from shipbench.checking import base
 
     gross = [inspect.getmodule(part) for name, part in vars(base).items() if name.startswith("mend_")]
