@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from .cache import cache_folder, make_private, stranger
+from .storage import put
 
 _log = logging.getLogger(__name__)
 _SECONDS = 30
@@ -157,7 +158,7 @@ def _compile(command: tuple[str, ...], source: str, folder: Path, key: str) -> P
         with made.open("rb") as file:  # on the disk before it has its name: no half of it is there after a power cut
             os.fsync(file.fileno())
         path = folder / f"{key}-{_digest(made)}.so"
-        os.replace(made, path)
+        put(made, path)
     return path
 
 

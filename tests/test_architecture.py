@@ -13,7 +13,7 @@ ROOT = Path(__file__).parent.parent / "shipbench"
 FILES = sorted(ROOT.rglob("*.py"))
 
 LAYERS = {
-    "cache": 0, "kept_code": 0.5, "errors": 0, "ops": 0, "signals": 0, "matlab_files": 0, "steps": 0, "regular_files": 0.3,
+    "cache": 0, "kept_code": 0.5, "errors": 0, "ops": 0, "signals": 0, "matlab_files": 0, "steps": 0, "storage": 0, "regular_files": 0.3,
     "names": 0.5, "extras": 0.5, "toml_files": 0.6,
     "registry": 1, "specs": 1, "compiled": 1, "integrate": 1, "ship": 1,
     "arrays": 1, "frames": 1, "render": 1, "notebook": 1, "processes": 1,

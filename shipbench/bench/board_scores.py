@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, unknown_name
-from .results import Frame
+from ..storage import Frame
 from .statistics import Bootstrap, Matched, Pair, interval
 
 STATISTICS = ("mean", "median", "std", "iqr")

@@ -9,10 +9,10 @@ import numpy as np
 from ..metrics.base import Column
 from ..metrics.trial_indices import COLUMNS as TRIAL_COLUMNS
 from ..metrics.trial_indices import NAMES as TRIAL_NAMES
+from ..storage import Frame
 from .board_scores import CEILING, Scores
 from .board_tables import FEW_RUNS, SIGMA, group_lines
 from .regimes import slices
-from .results import Frame
 from .statistics import RESAMPLES
 from .tables import Table, TableColumn, display_unit, number, significant
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from ..checking.finding import Finding, Picture, toml_line
 from ..checking.recording import Recording
 from ..errors import InputError
 from ..names import file_name
+from ..storage import write_text
 from .check_html import check_page
 from .dataset_facts import dataset_facts
 
@@ -41,21 +41,14 @@ def write_findings(recording: Recording, findings: Sequence[Finding], folder: Pa
         folder.mkdir(parents=True, exist_ok=True)
         for old in folder.glob("[0-9][0-9]-*.png"):
             old.unlink()
-        written = [_write(folder / "check.html", page), _write(folder / "findings.json", json.dumps(document, indent=1, default=str) + "\n")]
-        written.append(_write(folder / "dataset_lines.toml", document["lines"] + "\n"))
+        written = [write_text(folder / "check.html", page), write_text(folder / "findings.json", json.dumps(document, indent=1, default=str) + "\n")]
+        written.append(write_text(folder / "dataset_lines.toml", document["lines"] + "\n"))
         for number, finding in enumerate(findings, 1):
             if finding.picture is not None:
                 written.append(_draw(finding.picture, folder / f"{number:02d}-{file_name(finding.kind.replace(' ', '_'))}.png"))
     except OSError as error:
         raise InputError(f"cannot write to {folder}: {error.strerror}. Give a folder that can be written.") from None
     return written
-
-
-def _write(path: Path, text: str) -> Path:
-    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    part.write_text(text, encoding="utf-8", errors="replace")  # names from badly decoded files may hold lone surrogates
-    os.replace(part, path)
-    return path
 
 
 def _draw(picture: Picture, path: Path) -> Path:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from ..storage import write_text
 from .board_scores import Scores
 from .executors import Execution
 from .leaderboard import Board, build_board, scores_of
@@ -63,9 +63,7 @@ def run_curve(
         found[n], boards[n] = scores_of(outcome.results, dataset), build_board(outcome.results, dataset)
     board = _board(found, boards[numbers[-1]])
     image = _save(draw(found, board.dataset), out / "learning-curve.png")
-    part = out / f".learning-curve.{os.getpid()}.tmp"
-    part.write_text(board.markdown(command, [image.name]), encoding="utf-8")
-    os.replace(part, out / "learning-curve.md")
+    write_text(out / "learning-curve.md", board.markdown(command, [image.name]))
     return Curve(board, out / "learning-curve.md", failed)
 
 

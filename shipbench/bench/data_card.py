@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
 from collections.abc import Sequence
@@ -19,6 +18,7 @@ from ..errors import InputError
 from ..records import Dataset
 from ..signals import UNITS
 from ..steps import step
+from ..storage import put
 from .data_card_html import card_page
 from .data_card_plots import Coverage, coverage, png
 from .dataset_facts import dataset_facts, describe_tables, fact_lines
@@ -180,7 +180,7 @@ def write_card(card: Card, dataset: Dataset, out: Path, command: str) -> list[Pa
         for name, content in files.items():
             (part / name).write_bytes(content)
         for name in files:  # the pages come last, when their pictures are there
-            os.replace(part / name, out / name)
+            put(part / name, out / name)
     except OSError as error:
         raise InputError(f"cannot write the data card to {out}: {error.strerror}. Give a folder that can be written with --out.") from None
     finally:

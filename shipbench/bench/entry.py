@@ -13,8 +13,9 @@ from ..errors import InputError
 from ..metrics.base import METRICS
 from ..metrics.trial_indices import COLUMNS as TRIAL_COLUMNS
 from ..names import LONGEST_LABEL, check_label, check_name, check_run, shown
+from ..storage import Frame
 from .regimes import COLUMNS as FEATURES
-from .results import STATUSES, Frame
+from .results import STATUSES
 from .scoring import DIVERGED_DISTANCE, HORIZONS_S, columns
 from .task import make_task
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +14,9 @@ from ..data.mat import cells, save_mat, struct_array
 from ..errors import InputError
 from ..records import Batch
 from ..signals import STATES, UNITS
+from ..storage import Frame, in_one_step, write_rows
 from .escaping import csv_text
-from .results import Cell, Frame, read_predictions, read_results, read_truth, write_rows
+from .results import Cell, read_predictions, read_results, read_truth
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,12 +78,10 @@ def export_predictions(folder: Path, out: Path, format: str) -> list[Path]:
         return [path]
     tables = {"predictions": _table(found), "starts": _starts(found)}
     try:
-        out.mkdir(parents=True, exist_ok=True)
         for name, table in tables.items():
             _write(out / f"{name}.{format}", table)
-        part = out / f".summary.{os.getpid()}.tmp"
-        part.write_bytes((folder / "summary.json").read_bytes())
-        os.replace(part, out / "summary.json")
+        with in_one_step(out / "summary.json") as part:
+            part.write_bytes((folder / "summary.json").read_bytes())
     except OSError as error:
         raise InputError(f"cannot write to {out}: {error.strerror}. Give a folder that can be written.") from None
     return [*(out / f"{name}.{format}" for name in tables), out / "summary.json"]
@@ -93,11 +91,10 @@ def _write(path: Path, table: Frame) -> None:
     if path.suffix == ".parquet":
         write_rows(path, table)
         return
-    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     words = [name for name in table if table[name].dtype.kind not in "biuf"]
     table = table.assign(**{name: table[name].map(csv_text) for name in words})
-    table.to_csv(part, index=False)  # the shortest decimals that give the same number back
-    os.replace(part, path)
+    with in_one_step(path) as part:
+        table.to_csv(part, index=False)  # the shortest decimals that give the same number back
 
 
 def _table(found: list[Predicted]) -> Frame:

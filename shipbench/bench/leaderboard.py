@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 from ..errors import InputError
 from ..names import brief, file_name
 from ..render.html import Tile
+from ..storage import Frame, write_text
 from . import board_statistics, board_tables
 from .board_scores import Scores, cluster_of
 from .cost import parameters_by_model
@@ -19,7 +19,7 @@ from .fit_notes import MARK, fit_notes
 from .formats import check_formats, render
 from .lead import lead, lead_tiles, short_table
 from .memory import give_back_memory
-from .results import PROTOCOL, Frame, Results
+from .results import PROTOCOL, Results
 from .tables import Table, TableColumn
 
 SPLITS = {
@@ -231,9 +231,4 @@ def _curves(results: Results, board: Board) -> dict[str, Any]:
 def _write(board: Board, form: str, command: str, images: Sequence[Path], out: Path, curves: dict[str, Any] | None) -> Path:
     """The page in one format, in one step."""
     suffix, text = render(board, form, command, images, out, curves)
-    out.mkdir(parents=True, exist_ok=True)
-    page = file_name(board.dataset)
-    part, path = out / f".{page}.{os.getpid()}.tmp", out / f"{page}{suffix}"
-    part.write_text(text, encoding="utf-8", errors="replace")
-    os.replace(part, path)
-    return path
+    return write_text(out / f"{file_name(board.dataset)}{suffix}", text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,8 @@ from ..errors import InputError
 from ..metrics.ed import ed
 from ..names import shown
 from ..signals import PSI, X, Y
-from .results import Cell, Frame, Results, read_predictions, read_truth
+from ..storage import Frame, in_one_step
+from .results import Cell, Results, read_predictions, read_truth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,10 +99,9 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.stem}.{os.getpid()}.tmp.png")
-    figure.savefig(part)
-    os.replace(part, path)
+    """Write a figure in one step and return its path."""
+    with in_one_step(path, suffix=path.suffix) as part:
+        figure.savefig(part)
     return path
 
 

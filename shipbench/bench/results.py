@@ -11,11 +11,9 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -28,14 +26,12 @@ from ..names import brief, file_name
 from ..records import Batch
 from ..regular_files import open_regular, read_json, read_npz
 from ..signals import COMMANDS, STATES
+from ..storage import Frame, in_one_step, put, write_json, write_rows
 from .regimes import window_features
 from .scoring import measure
 
 PROTOCOL = 1
 """Version of what a score means. A change that moves a published score raises it; rows of different protocols are never ranked together."""
-
-Frame = Any
-"""A pandas DataFrame. pandas' own annotations are unions of all that a method can return, which no checker can follow."""
 
 STATUSES = ("ok", "diverged", "failed", "skipped")
 _MOST_ROWS = 10_000_000
@@ -63,37 +59,12 @@ class Cell:
         return Path("cells", file_name(self.dataset), file_name(self.model), f"fold{self.fold}-seed{self.seed}")
 
 
-@contextmanager
-def _in_one_step(path: Path) -> Iterator[Path]:
-    """A hidden sibling to write, which then takes the place of `path`: a reader sees the old or the new, never half. It goes if writing fails."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        yield part
-        os.replace(part, path)
-    except BaseException:
-        shutil.rmtree(part) if part.is_dir() else part.unlink(missing_ok=True)
-        raise
-
-
-def write_json(path: Path, data: Any) -> None:
-    """Write JSON in one step."""
-    with _in_one_step(path) as part:
-        part.write_text(json.dumps(data, indent=1, default=str) + "\n", encoding="utf-8")
-
-
-def write_rows(path: Path, rows: Frame) -> None:
-    """Write parquet in one step."""
-    with _in_one_step(path) as part:
-        rows.to_parquet(part, index=False)
-
-
 def write_truth(out: Path, dataset: str, fold: int, batch: Batch) -> None:
     """Save what every model of this fold is scored against."""
     path = truth_path(out, dataset, fold)
     if path.parent.is_symlink():
         raise InputError(f"{path.parent} is a link; accepted: a folder, so that a study writes only below {out}. Remove the link.")
-    with _in_one_step(path) as part, part.open("wb") as file:
+    with in_one_step(path) as part, part.open("wb") as file:
         np.savez_compressed(file, ids=np.array(batch.ids), s0=batch.s0, U=batch.U, truth=batch.truth)
 
 
@@ -151,7 +122,7 @@ def write_cell(out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: n
     """Write a finished cell in one step (an older one is replaced); `files` are further ones, by relative name (saved model, equations)."""
     final = out / cell.folder
     old = final.with_name(f".{final.name}.{os.getpid()}.old.tmp")
-    with _in_one_step(final) as part:
+    with in_one_step(final) as part:
         part.mkdir(parents=True)
         if S is not None:
             np.savez_compressed(part / "predictions.npz", S=S)
@@ -161,10 +132,10 @@ def write_cell(out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: n
         rows.to_parquet(part / "rows.parquet", index=False)
         write_json(part / "summary.json", summary | {"files": _digests(part)})
         if final.exists():  # moved away whole: who is killed in between leaves no cell, never half of one
-            os.replace(final, old)
+            put(final, old)
     for extra in (p for p in old.glob("*") if p.name not in _CELL_FILES):  # somebody's own notes stay
         if not (final / extra.name).exists():
-            os.replace(extra, final / extra.name)
+            put(extra, final / extra.name)
     shutil.rmtree(old, ignore_errors=True)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from ..predictors.base import make_predictor
 from ..records import Dataset
 from ..signals import STATES
 from ..specs import parse_spec
+from ..storage import in_one_step
 from .escaping import csv_text
 from .task import samples
 
@@ -53,11 +53,8 @@ def predict_runs(model: str, dataset: Dataset, horizon_s: float | None = None, d
 def write_csv(rollouts: list[Rollout], path: str | Path) -> None:
     """Columns trajectory, t and the ten states (SI, `n` in rpm), written in one step; of run names see `csv_text`."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    with part.open("w", newline="", encoding="utf-8") as file:
+    with in_one_step(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["trajectory", "t", *STATES])
         for run, t, states in rollouts:
             writer.writerows([csv_text(run), f"{time:.10g}", *(f"{value:.10g}" for value in state)] for time, state in zip(t, states, strict=True))
-    os.replace(part, path)

@@ -19,6 +19,7 @@ from ..predictors._saved import check_origin
 from ..records import Dataset
 from ..specs import Spec, parse_spec
 from ..steps import listening
+from ..storage import Frame, write_json
 from .executors import Execution, Workers, answers_of, open_workers
 from .folds import make_folds, select_runs
 from .models import facts_of
@@ -26,7 +27,7 @@ from .patience import Patience
 from .plan import Part, Study
 from .progress import Progress, Silent
 from .provenance import code_version, machine
-from .results import PROTOCOL, Cell, Frame, Results, assemble, scored_before, write_cell, write_json, write_truth
+from .results import PROTOCOL, Cell, Results, assemble, scored_before, write_cell, write_truth
 from .scoring import columns, divergence, measure
 from .study_folder import claimed
 from .task import Task

@@ -9,8 +9,9 @@ from typing import Any
 
 from ..errors import InputError
 from ..names import shown
+from ..storage import Frame
 from .entry import TEXTS, TIMES, WHOLE, check_columns, check_entry, check_labels, check_scores, check_task_of, check_windows
-from .results import PROTOCOL, Cell, Frame
+from .results import PROTOCOL, Cell
 from .task import make_task
 
 _CELL = ["dataset", "model", "fold", "seed"]

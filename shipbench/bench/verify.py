@@ -16,11 +16,12 @@ from ..predictors.registered import PREDICTORS
 from ..records import Batch, Dataset
 from ..regular_files import read_json
 from ..specs import parse_spec
+from ..storage import Frame
 from .cost import count_parameters
 from .folds import Fold, make_folds, select_runs
 from .regimes import COLUMNS as FEATURES
 from .regimes import window_features
-from .results import Cell, Frame, Results, read_predictions, read_truth
+from .results import Cell, Results, read_predictions, read_truth
 from .scoring import divergence, measure
 from .task import make_task
 

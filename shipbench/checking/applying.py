@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import shutil
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -17,6 +16,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from ..data.files import BEFORE_CHECK, parse_description
 from ..errors import InputError
+from ..storage import write_text
 from ..toml_files import read_toml
 from .finding import Finding, toml_line
 
@@ -142,9 +142,7 @@ def write_lines(folder: Path, findings: Sequence[Finding]) -> tuple[Laid, Path |
         text = _edited(path.read_text(encoding="utf-8"), found)
         old = next(p for n in range(1, 10_000) if not (p := path.with_name(BEFORE_CHECK + f".{n}" * (n > 1))).exists())
         shutil.copy2(path, old)
-        part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
+        write_text(path, text)
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}. Give a folder that can be written.") from None
     return found, old

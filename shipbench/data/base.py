@@ -23,6 +23,7 @@ from ..records import Dataset
 from ..registry import Registry
 from ..regular_files import read_text
 from ..specs import parse_spec
+from ..storage import put
 from .public import PublicData
 
 _HELPERS = frozenset({
@@ -191,7 +192,7 @@ def _to_cache(dataset: Dataset, folder: Path) -> None:
         write_dataset(dataset, fresh, format="parquet")
         (fresh / "fingerprint.txt").write_text(dataset.fingerprint)
         _clear(folder)
-        os.replace(fresh, folder)
+        put(fresh, folder)
     except (ShipbenchError, OSError) as error:
         _log.warning("the data set '%s' cannot be kept in %s (%s); it will be made again next time", dataset.name, folder.parent, error)
         if fresh is not None:

@@ -19,6 +19,7 @@ from ..names import check_name
 from ..records import Dataset, Run
 from ..ship import Ship
 from ..signals import COMMANDS, STATES, wrap_angle
+from ..storage import in_one_step, write_text
 from ..toml_files import Number, fault, read_toml
 from .corrections import Corrections, check_names, continuous, correct_run, split_meta, to_ned
 from .trajectories import read_trajectories
@@ -231,16 +232,13 @@ def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz"
         accepted = "Metadata may hold text, numbers, booleans, lists and tables."
         raise InputError(f"data set '{dataset.name}' cannot be written: {error}. {accepted}") from None
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        fresh = folder / f".trajectories.tmp.{format}"
-        if format == "parquet":
-            table.to_parquet(fresh, index=False)
-        else:
-            table.to_csv(fresh, index=False)
-        os.replace(fresh, folder / name)
+        with in_one_step(folder / name) as fresh:
+            if format == "parquet":
+                table.to_parquet(fresh, index=False)
+            else:
+                table.to_csv(fresh, index=False)
         for file, text in texts.items():
-            (folder / f".{file}.tmp").write_text(text, encoding="utf-8")
-            os.replace(folder / f".{file}.tmp", folder / file)
+            write_text(folder / file, text)
         for other in set(TABLES) - {name}:  # an earlier table in another format would contradict this one
             (folder / other).unlink(missing_ok=True)
     except OSError as error:

@@ -12,7 +12,6 @@ Row k of commands and environment is held on [t_k, t_k+1). Units and signs are t
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from ..records import Dataset, Run
 from ..regular_files import open_regular
 from ..ship import Ship
 from ..signals import COMMANDS, ENVIRONMENT, STATES, UNITS
+from ..storage import in_one_step
 
 _RUN_FIELDS = ("id", "t", "states", "commands", "environment", "names", "units", "meta")
 
@@ -52,15 +52,9 @@ def save_mat(path: Path, variables: dict[str, Any]) -> None:
     from scipy.io import savemat
     from scipy.io.matlab import MatWriteError
 
-    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            with part.open("wb") as file:
-                savemat(file, variables, do_compression=True, oned_as="column", long_field_names=True)
-            os.replace(part, path)
-        finally:
-            part.unlink(missing_ok=True)
+        with in_one_step(path) as part, part.open("wb") as file:
+            savemat(file, variables, do_compression=True, oned_as="column", long_field_names=True)
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}. Give a file or folder that can be written.") from None
     except (MatWriteError, OverflowError) as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import tempfile
@@ -20,6 +19,7 @@ import tomli_w
 from ..data.files import BEFORE_CHECK, TABLES
 from ..errors import InputError
 from ..ship import Ship
+from ..storage import exchange
 
 CSV_ROWS = 200_000
 _OURS = {*TABLES, "dataset.toml", "ship.toml"}
@@ -72,23 +72,10 @@ class FolderWriter:
             (self.fresh / "dataset.toml").write_text(tomli_w.dumps(description), encoding="utf-8")
             (self.fresh / "ship.toml").write_text(ship.to_toml(), encoding="utf-8")
             self.fresh.chmod(0o755)  # mkdtemp makes it private
-            self._replace()
+            exchange(self.fresh, self._target)
         except OSError as error:
             raise self._unwritable(error) from None
         return self.out / table.name
-
-    def _replace(self) -> None:
-        if not self._target.is_dir():
-            os.replace(self.fresh, self._target)
-            return
-        old = self.fresh.with_name(self.fresh.name + ".old")
-        os.replace(self._target, old)
-        try:
-            os.replace(self.fresh, self._target)
-        except OSError:
-            os.replace(old, self._target)
-            raise
-        shutil.rmtree(old, ignore_errors=True)
 
     def __enter__(self) -> FolderWriter:
         return self

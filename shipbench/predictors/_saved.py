@@ -6,7 +6,6 @@ import functools
 import hashlib
 import json
 import logging
-import os
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -18,6 +17,7 @@ import numpy as np
 from ..errors import InputError
 from ..records import Dataset
 from ..regular_files import MOST_ARRAYS, read_bytes, read_json, read_npz
+from ..storage import in_one_step, write_text
 
 _log = logging.getLogger(__name__)
 _LARGEST_JSON = 16_000_000
@@ -101,14 +101,10 @@ def check_origin(name: str, origin: Origin | None, data: Dataset) -> list[str]:
 
 def write_saved(folder: Path, meta: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
     """`meta` as model.json and `arrays` as arrays.npz, each in one step, with a digest by which damage is found."""
-    folder.mkdir(parents=True, exist_ok=True)
-    part = folder / ".arrays.tmp.npz"
-    np.savez(part, allow_pickle=False, **arrays)
-    digest = _digest(meta, part.read_bytes())
-    os.replace(part, folder / "arrays.npz")
-    text = folder / ".model.tmp.json"
-    text.write_text(json.dumps({**meta, "digest": digest}, indent=1), encoding="utf-8")
-    os.replace(text, folder / "model.json")
+    with in_one_step(folder / "arrays.npz", suffix=".npz") as part:
+        np.savez(part, allow_pickle=False, **arrays)
+        digest = _digest(meta, part.read_bytes())
+    write_text(folder / "model.json", json.dumps({**meta, "digest": digest}, indent=1))
 
 
 def read_meta(folder: Path) -> dict[str, Any]:

@@ -10,8 +10,8 @@ import numpy as np
 from ...metrics.ed import ed
 from ...render.linked import Line, Quantity, linked_plots, linked_run
 from ...signals import DELTA, F_B, F_S, PSI, STATES, N, R, U, V, X, Y, wrap_angle
+from ...storage import Frame
 from ..plots import outline
-from ..results import Frame
 from .series import Series, Track
 
 _DEGREES = 180.0 / np.pi

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +9,10 @@ from typing import Any
 
 from ...errors import InputError
 from ...render.html import Tile, render_page, short_name
+from ...storage import Frame, write_text
 from ..leaderboard import Board, build_board, scores_of
 from ..provenance import code_version
-from ..results import Frame, Results
+from ..results import Results
 from ..tables import table_cells
 from . import pictures
 from .beside import check_given, diagnoses, fitted
@@ -46,14 +45,9 @@ def write_report(results: Results, out: Path, command: str, *, given: Sequence[P
     boards = [build_board(results, name) for name in names]
     sections = [_section(i, results, board, given, out, points // len(boards)) for i, board in enumerate(boards)]
     text = render(sections, results, command)
-    part = out.with_name(f".{out.name}.{os.getpid()}.tmp")
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8", errors="replace")  # names from badly decoded files may hold lone surrogates
-        os.replace(part, out)
+        write_text(out, text)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            part.unlink()
         raise InputError(f"cannot write the page to {out}: {error.strerror}. Give a file that can be written with --out.") from None
     return Written(out, out.stat().st_size, {s["name"]: s["left_out"] for s in sections if s["left_out"]})
 

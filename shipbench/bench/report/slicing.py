@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ...storage import Frame
 from ..regimes import slices
-from ..results import Frame
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fnmatch
-import os
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 from ...errors import InputError
 from ...regular_files import check_output
+from ...storage import put
 from ..mapping import SOURCE_KEYS
 from ..writer import run_name
 from .columns import read_samples
@@ -62,7 +62,7 @@ def write_proposal(
     try:
         if not any(note.startswith("MISSING: no column") or note.startswith("MISSING: no position") for note in notes):
             notes += try_draft(write, list(dict.fromkeys(log for source in sources for log in source.logs)), sources, split)
-        os.replace(write(), path)
+        put(write(), path)
     finally:
         fresh.unlink(missing_ok=True)
     command = f"shipbench data import LOG --map {shlex.quote(str(path))} --ship ship.toml --out FOLDER"

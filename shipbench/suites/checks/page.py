@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...bench.provenance import code_version
 from ...bench.tables import Table, TableColumn, number
+from ...storage import write_text
 from ..diagnosis.scores import wilson
 from .faults import FAULTS
 
@@ -95,8 +95,4 @@ def write_page(path: Path, tables: Sequence[Table], command: str, seeds: str) ->
         f"- Command: `{command}`, {seeds}",
         f"- Code: shipbench {code['shipbench']}, source {code['source']}", "",
     ]  # fmt: skip
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    part.write_text("\n".join([*head, *(table.markdown() for table in tables)]), encoding="utf-8")
-    os.replace(part, path)
-    return path
+    return write_text(path, "\n".join([*head, *(table.markdown() for table in tables)]))

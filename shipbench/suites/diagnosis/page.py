@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ...bench.tables import Table, TableColumn, number
+from ...storage import write_text
 from . import scores as scores
 
 Row = scores.Row
@@ -99,15 +99,12 @@ def render(rows: Sequence[Row], about: dict[str, Any]) -> str:
 
 def write_page(folder: Path, rows: Sequence[Row], about: dict[str, Any]) -> Path:
     """Write `diagnosis.md` and the rows it comes from, `diagnosis.json`; returns the path of the page."""
-    folder.mkdir(parents=True, exist_ok=True)
     left_out = {"signature", "warnings"}
     lean = [{k: v for k, v in row.items() if k not in left_out | (set() if row["kind"] == "change" else {"evidence"})} for row in rows]
     lines = ",\n".join(json.dumps(row) for row in lean)
     text = f'{{"about": {json.dumps(about)},\n"rows": [\n{lines}\n]}}\n'
     for name, content in (("diagnosis.json", text), ("diagnosis.md", render(lean, about))):
-        part = folder / f".{name}.{os.getpid()}.tmp"
-        part.write_text(content, encoding="utf-8")
-        os.replace(part, folder / name)
+        write_text(folder / name, content)
     return folder / "diagnosis.md"
 
 

@@ -17,12 +17,12 @@ from threadpoolctl import threadpool_limits
 
 from ...bench.progress import Progress, Silent
 from ...bench.provenance import code_version, machine
-from ...bench.results import write_json
 from ...diagnosis.result import Diagnosis
 from ...errors import InputError, ShipbenchError, WorkError, unknown_name
 from ...processes import process_pool
 from ...records import Dataset
 from ...simulate.trials import Trials
+from ...storage import write_json
 from .cases import KINDS, Case, count, draw_case
 
 Diagnose = Callable[..., Diagnosis]
