@@ -14,7 +14,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from shipbench.bench.results import read_results
+from shipbench.bench.submissions import read_results
 from shipbench.data.base import load_dataset
 
 STYLES = {

@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .bench.results import Results, read_results
+from .bench.submissions import Results, read_results
 from .checking.finding import SEVERITIES, Finding
 from .data.base import load_dataset
 from .diagnosis.result import Diagnosis

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from .bench.leaderboard import Board
+    from .bench.board import Board
     from .bench.tables import Table
 
 SETTINGS: dict[str, Any] = {"context_settings": {"help_option_names": ["-h", "--help"]}, "no_args_is_help": True}
@@ -49,7 +49,9 @@ def console_for_tables() -> Console:
 
 def show_table(table: Table) -> None:
     """Print one table."""
-    table.show(console_for_tables())
+    from .bench.terminal import show_table as show
+
+    show(table, console_for_tables())
 
 
 def say_wrapped(text: str, indent: str = "", hanging: str = "", err: bool = False) -> None:

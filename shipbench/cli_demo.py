@@ -23,8 +23,8 @@ def demo(
     from .bench.diagnosis_report import write_diagnosis
     from .bench.progress import make_progress
     from .bench.report.page import write_report
-    from .bench.results import read_results
     from .bench.runner import run_tasks
+    from .bench.submissions import read_results
     from .bench.task import load_tasks
     from .data.base import load_dataset
     from .data.demo import SPEED, TOWARDS

@@ -12,7 +12,7 @@ from .errors import InputError
 from .names import file_name
 
 if TYPE_CHECKING:
-    from .bench.results import Results
+    from .bench.submissions import Results
 
 _Results = Annotated[list[Path] | None, typer.Argument(metavar="[RESULTS]...", help="Result folders (default: the newest below runs/).")]
 
@@ -38,7 +38,7 @@ def leaderboard(
 ) -> None:
     """Render leaderboards and plots from the results of one or several people."""
     from .bench.leaderboard import write_boards
-    from .bench.results import check_target, read_results, write_submission
+    from .bench.submissions import check_target, read_results, write_submission
 
     found = read_results(results or [_newest_results()])
     if submission is not None:

@@ -21,7 +21,7 @@ def report(
 ) -> None:
     """Write a page to look at: leaderboard, tracks, error growth, regimes, fitted parameters, failures; one HTML file that needs no network."""
     from .bench.report.page import write_report
-    from .bench.results import read_results
+    from .bench.submissions import read_results
 
     if out is not None:
         check_output(out, [] if out.suffix == ".html" else results)

@@ -13,7 +13,7 @@ from .bench.board_tables import TABLE_III
 from .bench.fit_notes import fit_notes
 from .bench.lead import lead
 from .bench.leaderboard import scores_of
-from .bench.results import Results
+from .bench.submissions import Results
 from .errors import InputError, unknown_name
 from .names import brief, shown
 

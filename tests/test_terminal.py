@@ -15,9 +15,10 @@ from toy_ship import write_toy_folder
 from typer.testing import CliRunner
 
 from shipbench.bench import progress
+from shipbench.bench.board import Board
 from shipbench.bench.diagnosis_text import summary_lines
-from shipbench.bench.leaderboard import Board, build_board
-from shipbench.bench.results import read_results
+from shipbench.bench.leaderboard import build_board
+from shipbench.bench.submissions import read_results
 from shipbench.bench.tables import Table, TableColumn, number
 from shipbench.bench.terminal import command_lines
 from shipbench.cli import app

@@ -12,7 +12,7 @@ from .board_strips import STYLE, strips
 from .tables import table_cells
 
 if TYPE_CHECKING:
-    from .leaderboard import Board
+    from .board import Board
 
 _TEMPLATES = Path(__file__).with_name("templates")
 

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..storage import write_text
+from .board import Board
 from .board_scores import Scores
 from .executors import Execution
-from .leaderboard import Board, build_board, scores_of
+from .leaderboard import build_board, scores_of
 from .progress import Progress
 from .runner import check_task, run_tasks
 from .tables import Table, TableColumn, number

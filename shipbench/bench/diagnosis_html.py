@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnosis.result import Cause, Diagnosis, what_it_is
 from ..diagnosis.evaluation.residuals import error_tables
+from ..diagnosis.result import Cause, Diagnosis, what_it_is
 from ..render.html import Tile, render_page
 from ..render.linked import switch
 from . import diagnosis_svg as svg

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from ..diagnosis.evaluation.dependence import AXES
-from ..diagnosis.result import Diagnosis, what_it_is
 from ..diagnosis.evaluation.residuals import FORCE_UNITS
+from ..diagnosis.result import Diagnosis, what_it_is
 from .diagnosis_text import figure, grade
 
 

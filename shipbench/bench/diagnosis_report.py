@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
 from ..diagnosis.result import Diagnosis
+from ..storage import write_text
 from .diagnosis_html import diagnosis_page
 from .diagnosis_text import in_words, summary_lines
 
@@ -16,8 +16,8 @@ def write_diagnosis(d: Diagnosis, folder: Path) -> list[Path]:
     """Write diagnosis.json, summary.txt and report.html into `folder` (made if missing), each atomically; returns the paths."""
     content = json.dumps(document(d), indent=1, allow_nan=False)
     return [
-        _write(folder / "diagnosis.json", content + "\n"),
-        _write(folder / "summary.txt", "\n".join(summary_lines(d)) + "\n"),
+        write_text(folder / "diagnosis.json", content + "\n"),
+        write_text(folder / "summary.txt", "\n".join(summary_lines(d)) + "\n"),
         write_report(d, folder / "report.html"),
     ]
 
@@ -32,13 +32,4 @@ def document(d: Diagnosis) -> dict[str, Any]:
 
 def write_report(d: Diagnosis, path: Path) -> Path:
     """Write the page alone; returns `path`."""
-    return _write(path, diagnosis_page(d))
-
-
-def _write(path: Path, text: str) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    # names of runs may hold lone surrogates from badly decoded files
-    temporary.write_text(text, encoding="utf-8", errors="replace")
-    os.replace(temporary, path)
-    return path
+    return write_text(path, diagnosis_page(d))

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..diagnosis.evaluation.dependence import AXES, UNITS, at_knots, curve, samples_of
-from ..diagnosis.result import Trace
 from ..diagnosis.evaluation.residuals import FORCE_UNITS, INPUTS, LAGS, RESIDUALS, ErrorTables, Slice, correlogram, slices, squared_error
+from ..diagnosis.result import Trace
 from ..render.linked import stroke
 from .diagnosis_linked import rollouts
 from .report.pictures import growth

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from ..diagnosis.evaluation.dependence import AXES
-from ..diagnosis.result import Diagnosis, Trace
 from ..diagnosis.evaluation.residuals import CHANNEL_UNITS, CHANNELS, ErrorTables, squared_error
+from ..diagnosis.result import Diagnosis, Trace
 from ..signals import PSI, R, U, V
 from .diagnosis_linked import fits, rollouts
 from .diagnosis_text import detectable

@@ -16,7 +16,8 @@ from ..records import Batch
 from ..signals import STATES, UNITS
 from ..storage import Frame, in_one_step, write_rows
 from .escaping import csv_text
-from .results import Cell, read_predictions, read_results, read_truth
+from .results import Cell, read_predictions, read_truth
+from .submissions import read_results
 
 
 @dataclass(frozen=True, eq=False)

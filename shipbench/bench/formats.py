@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import InputError, unknown_name
+from .board import Board
 from .board_html import board_page
 from .escaping import csv_text, latex_text, one_line
 from .tables import Table
-
-if TYPE_CHECKING:
-    from .leaderboard import Board
 
 FORMATS = {"md": ".md", "latex": ".tex", "csv": ".csv", "html": ".html"}
 """Name of a format -> suffix of its file."""

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..names import brief, file_name
-from ..render.html import Tile
+from ..names import file_name
 from ..storage import Frame, write_text
 from . import board_statistics, board_tables
+from .board import Board
 from .board_scores import Scores, cluster_of
 from .cost import parameters_by_model
-from .escaping import markdown_text
 from .fit_notes import MARK, fit_notes
 from .formats import check_formats, render
 from .lead import lead, lead_tiles, short_table
 from .memory import give_back_memory
-from .results import PROTOCOL, Results
+from .results import PROTOCOL
+from .submissions import Results
 from .tables import Table, TableColumn
 
 SPLITS = {
@@ -27,43 +27,6 @@ SPLITS = {
     "speed": "trained on the slower runs, scored on the fastest",
 }  # fmt: skip
 """How a page names the split of a task."""
-
-
-@dataclass(frozen=True, eq=False)
-class Board:
-    """Tables of one data set, best model first; `ranking` holds the model specs in that order."""
-
-    dataset: str
-    ranking: list[str]
-    tables: list[Table]
-    head: list[str]
-    """Lines on where the figures come from."""
-    heading: str = "Leaderboard"
-    lead: str = ""
-    """Who is first, by how much, how sure."""
-    tiles: Sequence[Tile] = ()
-    """The same in figures, for a page."""
-    short: Table | None = None
-    """What a terminal shows of the tables."""
-
-    def __repr__(self) -> str:
-        return brief(f"<Board {self.title}: {len(self.tables)} tables; {', '.join(self.ranking)}>")
-
-    @property
-    def title(self) -> str:
-        """Title of the page."""
-        return f"{self.heading}: {self.dataset}"
-
-    def markdown(self, command: str, plots: Sequence[str] = ()) -> str:
-        """The whole page; `command` is what rendered it, `plots` are image paths relative to it."""
-        lines = [f"# {markdown_text(self.title)}", "", *[f"- {markdown_text(line)}" for line in [*self.head, f"Rendered by `{command}`."]], ""]
-        tables = [table.markdown() for table in self.tables]
-        images = [f"![{Path(p).stem.replace('-', ' ')}]({p})\n" for p in plots]
-        return "\n".join(["\n".join(lines), *tables[:1], *images, *tables[1:]])
-
-    def as_json(self) -> dict[str, Any]:
-        """Everything as plain data."""
-        return {"dataset": self.dataset, "ranking": self.ranking, "about": self.head, "tables": [t.as_json() for t in self.tables]}
 
 
 def build_board(results: Results, dataset: str, baseline: str | None = None) -> Board:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from html import escape
 
 from ..names import shown
-from .progress import duration
+from .durations import duration
 
 
 def in_notebook() -> bool:

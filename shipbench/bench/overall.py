@@ -6,18 +6,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..extras import not_installed
 from ..render.html import Tile, short_name
+from .board import Board
 from .board_scores import FLOOR, Scores
 from .statistics import interval
 from .tables import Table, TableColumn, number
-
-if TYPE_CHECKING:
-    from .leaderboard import Board
 
 NAME = "over-data-sets"
 ALPHA = 0.05
@@ -86,8 +84,6 @@ def _ranks(errors: np.ndarray) -> np.ndarray:
 
 def over_data_sets(sets: Sequence[Scores]) -> Overall | None:
     """The page over several data sets, for the ranked models that have every score on all of them; None for one data set or one such model."""
-    from .leaderboard import Board
-
     if len(sets) < 2:
         return None
     models = [m for m in sets[0].ranked if all(m in s.matched.complete for s in sets)]

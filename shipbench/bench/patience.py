@@ -9,8 +9,9 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import Any
 
 from ..errors import WorkError
+from .durations import duration
 from .executors import Workers
-from .progress import Progress, duration
+from .progress import Progress
 
 LOOK_S, FIRST_S, AGAIN_S = 1.0, 5.0, 60.0
 """Seconds between two looks, until the first word and until the next."""

@@ -16,7 +16,8 @@ from ..metrics.ed import ed
 from ..names import shown
 from ..signals import PSI, X, Y
 from ..storage import Frame, in_one_step
-from .results import Cell, Results, read_predictions, read_truth
+from .results import Cell, read_predictions, read_truth
+from .submissions import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

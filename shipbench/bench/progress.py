@@ -10,6 +10,7 @@ from typing import Any, Protocol, TextIO
 
 from ..names import shown
 from ..steps import listening
+from .durations import duration
 
 
 class Progress(Protocol):
@@ -43,14 +44,6 @@ class Silent:
         print(f"warning: {text}", file=sys.stderr, flush=True)
 
     def finish(self) -> None: ...
-
-
-def duration(seconds: float) -> str:
-    """Seconds as people say them: 42 s, 3 min 05 s, 1 h 12 min."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    return f"{whole // 60} min {whole % 60:02d} s" if whole < 3600 else f"{whole // 3600} h {whole % 3600 // 60:02d} min"
 
 
 EVERY_S = 10.0

@@ -27,9 +27,10 @@ from .patience import Patience
 from .plan import Part, Study
 from .progress import Progress, Silent
 from .provenance import code_version, machine
-from .results import PROTOCOL, Cell, Results, assemble, scored_before, write_cell, write_truth
+from .results import PROTOCOL, Cell, assemble, scored_before, write_cell, write_truth
 from .scoring import columns, divergence, measure
 from .study_folder import claimed
+from .submissions import Results
 from .task import Task
 from .work import Answer, digests
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..names import shown
-from ..storage import Frame
+from ..names import brief, shown
+from ..regular_files import read_json
+from ..storage import Frame, write_json, write_rows
 from .entry import TEXTS, TIMES, WHOLE, check_columns, check_entry, check_labels, check_scores, check_task_of, check_windows
-from .results import PROTOCOL, Cell
+from .results import PROTOCOL, Cell, read_frame, truth_path, window_table
 from .task import make_task
 
 _CELL = ["dataset", "model", "fold", "seed"]
@@ -175,3 +178,94 @@ def check_windows_of(folder: Path, windows: Frame, summaries: Sequence[dict[str,
         raise refuse("holds a window twice")
     if others := [key for key in there if key not in scored]:
         raise refuse(f"holds a window that was not scored: run {shown(others[0][-1])[:80]} of '{shown(others[0][0])[:80]}', fold {others[0][3]}")
+
+
+@dataclass(frozen=True)
+class Results:
+    """Rows and summaries of one or more studies; `sources` are their folders, one per summary."""
+
+    rows: Frame
+    summaries: list[dict[str, Any]]
+    sources: list[Path]
+
+    def __repr__(self) -> str:
+        models, sets = ({s[key]: None for s in self.summaries} for key in ("model", "dataset"))
+        return brief(f"<Results: {len(self.rows)} rows, {len(self.summaries)} fits of {', '.join(models)} on {', '.join(sets)}>")
+
+    @cached_property
+    def windows(self) -> Frame | None:
+        """Motion of the true ship in every scored window, from all folders that hold it; None where none does."""
+        import pandas as pd
+
+        folders = {source: [s for s, at in zip(self.summaries, self.sources, strict=True) if at == source] for source in dict.fromkeys(self.sources)}
+        found = [frame for folder, own in folders.items() if (frame := _read_windows(folder, own)) is not None]
+        keys = ["dataset", "fingerprint", "task", "fold", "run"]
+        return pd.concat(found, ignore_index=True).drop_duplicates(keys, ignore_index=True) if found else None
+
+
+def read_results(folders: str | Path | Sequence[str | Path]) -> Results:
+    """Read one or several result folders of `shipbench run`.
+
+    Raises:
+        InputError: a folder holds no results, they contradict themselves or one another (see `submissions`), or the same cell stands in two of
+            them.
+    """
+    import pandas as pd
+
+    frames, summaries, sources = [], [], []
+    folders = [folders] if isinstance(folders, str | Path) else folders
+    for folder in map(Path, folders):
+        if missing := [name for name in ("rows.parquet", "summary.json") if not (folder / name).exists()]:
+            raise InputError(f"{folder} holds no results: it has no {' and no '.join(missing)}. Give a folder that `shipbench run --out` wrote.")
+        try:
+            rows, found = read_frame(folder / "rows.parquet"), read_json(folder / "summary.json")
+        except InputError as error:
+            raise InputError(f"{folder} holds no results: {error}") from None
+        frames.append(check_submission(folder, rows, found))
+        summaries += found
+        sources += [folder] * len(found)
+    if not summaries:
+        raise InputError(f"no finished cell in {', '.join(map(str, folders))}; run `shipbench run` (again, with --resume) first.")
+    rows = pd.concat(frames, ignore_index=True)
+    check_together(rows, summaries, sources)
+    return Results(rows, summaries, sources)
+
+
+def check_target(results: Results, folder: Path) -> None:
+    """Refuse a folder for a submission whose own results it would replace.
+
+    Raises:
+        InputError: it is one of the folders that were read, or holds a study.
+    """
+    same = folder.resolve() in {source.resolve() for source in results.sources}
+    if same or (folder / "study.json").exists() or (folder / "cells").exists():
+        what = "is one of the result folders" if same else "holds the results of a study"
+        raise InputError(f"--submission {folder} {what}, which it would replace. Give another folder.")
+
+
+def write_submission(results: Results, folder: Path) -> None:
+    """Write `rows.parquet`, `summary.json` and, where the windows are known, `windows.parquet`: all that a leaderboard is rendered from.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    try:
+        if results.windows is not None:
+            write_rows(folder / "windows.parquet", results.windows)
+        write_rows(folder / "rows.parquet", results.rows)
+        write_json(folder / "summary.json", results.summaries)
+    except OSError as error:
+        raise InputError(f"cannot write to {folder}: {error.strerror}. Give a folder that can be written with --submission.") from None
+
+
+def _read_windows(folder: Path, summaries: list[dict[str, Any]]) -> Frame | None:
+    """`windows.parquet` of a study, made from the saved truth where it is missing; None without both."""
+    path = folder / "windows.parquet"
+    if path.exists():
+        windows = read_frame(path)
+    elif all(truth_path(folder, s["dataset"], s["fold"]).exists() for s in summaries):
+        windows = window_table(folder, summaries)
+    else:
+        return None
+    check_windows_of(folder, windows, summaries)
+    return windows

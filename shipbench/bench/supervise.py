@@ -22,7 +22,7 @@ _PASSES = 50
 
 
 def main(alive: int) -> None:
-    """Answer one question (`isolate.answer`) in a child process, end all that it left, and end as it did.
+    """Answer one question (`answering.answer`) in a child process, end all that it left, and end as it did.
 
     Args:
         alive: reading end of a pipe that the study holds: it ends with the study, also by `kill -9`.
@@ -33,7 +33,7 @@ def main(alive: int) -> None:
         _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         os.close(alive)
         os.setsid()  # a model that signals its own group does not reach this process
-        from .isolate import answer
+        from .answering import answer
 
         answer()
     os.close(0)

@@ -12,7 +12,7 @@ import numpy as np
 from .escaping import markdown_text
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    pass
 
 DISPLAY = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "N": ("kN", 1e-3)}
 """Units that people read, for those that rows keep: name and factor."""
@@ -101,12 +101,6 @@ class Table:
             lines.append("| " + " | ".join(cells) + " |")
         lines += [""] + [f"{markdown_text(note)}  " for note in self.notes]
         return "\n".join(lines).rstrip() + "\n"
-
-    def show(self, console: Console) -> None:
-        """Print on a terminal."""
-        from .terminal import show_table
-
-        show_table(self, console)
 
     def as_json(self) -> dict[str, Any]:
         """Title, rows with raw values (NaN as null), notes."""

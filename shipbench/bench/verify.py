@@ -21,8 +21,9 @@ from .cost import count_parameters
 from .folds import Fold, make_folds, select_runs
 from .regimes import COLUMNS as FEATURES
 from .regimes import window_features
-from .results import Cell, Results, read_predictions, read_truth
+from .results import Cell, read_predictions, read_truth
 from .scoring import divergence, measure
+from .submissions import Results
 from .task import make_task
 
 TOLERANCE = 1e-9

@@ -16,7 +16,8 @@ from .clock import check_format, to_seconds
 from .coordinates import check_hemispheres
 from .entries import Channel
 from .mapping import Mapping, Source
-from .tables import Table, open_table, reading
+from .table import Table, reading
+from .tables import open_table
 from .values import channel_values
 
 

@@ -12,7 +12,7 @@ from ..errors import InputError
 from .cells import Cells, is_text
 from .entries import MINUTES, Channel
 from .mapping import Source
-from .tables import Table
+from .table import Table
 
 SIDES = {"lat": {"N": 1.0, "S": -1.0}, "lon": {"E": 1.0, "W": -1.0}}
 _WORDS = {"NORTH": "N", "SOUTH": "S", "EAST": "E", "WEST": "W"}

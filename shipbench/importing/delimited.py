@@ -15,7 +15,7 @@ import pyarrow.csv
 from ..errors import InputError
 from .blanks import Collapsed
 from .mapping import Layout
-from .tables import BLANKS, DELIMITERS, KINDS, TEXT_BLOCK, Table, check_number, uncompressed
+from .table import BLANKS, DELIMITERS, KINDS, TEXT_BLOCK, Table, check_number, uncompressed
 
 _NO_TEXT = ("idna", "punycode", "undefined", "unicode_escape", "raw_unicode_escape")
 """Codecs of Python that make text of text, not of a file's bytes."""

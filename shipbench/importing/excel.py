@@ -14,7 +14,7 @@ import pyarrow as pa
 from ..errors import InputError
 from ..extras import needed_by
 from .mapping import Layout
-from .tables import MOST_COLUMNS, Table, as_batch
+from .table import MOST_COLUMNS, Table, as_batch
 
 _LARGEST, _LARGEST_WHOLE = 1_000_000_000, 100_000_000
 _DENSEST = 200

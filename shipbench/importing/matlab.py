@@ -15,7 +15,7 @@ from ..matlab_files import check_matlab
 from ..regular_files import open_regular
 from .matlab73 import open_matlab73
 from .matlab_objects import not_read, object_vectors
-from .tables import MOST_COLUMNS, Table, as_batch
+from .table import MOST_COLUMNS, Table, as_batch
 
 _ROWS = 50_000
 _OBJECTS = "\0objects"

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..extras import needed_by
 from .matlab_objects import how_to_save, not_read, object_vectors
-from .tables import MOST_COLUMNS, Table, as_batch
+from .table import MOST_COLUMNS, Table, as_batch
 
 _ROWS = 50_000
 _DEEPEST = 8

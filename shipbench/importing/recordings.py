@@ -15,7 +15,8 @@ from .cells import Cells, Counts
 from .channels import read_blocks, read_named
 from .clock import is_daily
 from .mapping import Source
-from .tables import open_table, reading
+from .table import reading
+from .tables import open_table
 
 _ROWS = 50_000
 

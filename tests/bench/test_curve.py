@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from shipbench.bench.curve import draw, run_curve
 from shipbench.bench.leaderboard import scores_of
-from shipbench.bench.results import read_results
+from shipbench.bench.submissions import read_results
 from shipbench.bench.task import make_task
 from shipbench.cli import app
 

@@ -12,8 +12,9 @@ import pytest
 from shipbench.bench.board_tables import PAPER
 from shipbench.bench.leaderboard import build_board, write_boards
 from shipbench.bench.regimes import COLUMNS as REGIME_COLUMNS
-from shipbench.bench.results import PROTOCOL, Results
+from shipbench.bench.results import PROTOCOL
 from shipbench.bench.statistics import Matched
+from shipbench.bench.submissions import Results
 from shipbench.bench.tables import Table, TableColumn, number, significant
 from shipbench.errors import InputError
 from shipbench.metrics.trial_indices import NAMES as TRIAL_NAMES

@@ -11,7 +11,7 @@ from test_leaderboard import many, results
 
 from shipbench.bench.leaderboard import scores_of, write_boards
 from shipbench.bench.overall import NAME, data_sets_needed, over_data_sets
-from shipbench.bench.results import Results
+from shipbench.bench.submissions import Results
 
 
 def merged(sets):

@@ -10,7 +10,7 @@ from test_data_card import card_of
 from test_report_page import HOSTILE, study
 
 from shipbench.bench.leaderboard import write_boards
-from shipbench.bench.results import read_results
+from shipbench.bench.submissions import read_results
 
 __all__ = ["study"]  # a fixture
 

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from shipbench.bench.plots import against_horizon, boxes, choose_runs, draw_all, outline, short_name, style, tracks
-from shipbench.bench.results import read_results
 from shipbench.bench.runner import run_tasks
+from shipbench.bench.submissions import read_results
 from shipbench.bench.task import make_task
 
 

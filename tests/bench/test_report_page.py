@@ -18,8 +18,8 @@ from shipbench.bench.report.page import write_report
 from shipbench.bench.report.series import gather
 from shipbench.bench.report.slicing import regime_errors
 from shipbench.bench.report.svg import Axes, limits, path, ticks
-from shipbench.bench.results import read_results
 from shipbench.bench.runner import run_tasks
+from shipbench.bench.submissions import read_results
 from shipbench.bench.tables import Table, TableColumn, number, table_cells
 from shipbench.bench.task import make_task
 from shipbench.cli import app

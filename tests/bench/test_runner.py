@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipbench.bench.results import PROTOCOL, Cell, read_results, read_truth, rescore
+from shipbench.bench.results import PROTOCOL, Cell, read_truth, rescore
 from shipbench.bench.runner import run_tasks
+from shipbench.bench.submissions import read_results
 from shipbench.bench.task import make_task
 from shipbench.errors import InputError
 

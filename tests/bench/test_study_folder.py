@@ -15,8 +15,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipbench.bench.results import Cell, read_results, read_truth, truth_path
+from shipbench.bench.results import Cell, read_truth, truth_path
 from shipbench.bench.runner import run_tasks
+from shipbench.bench.submissions import read_results
 from shipbench.bench.task import make_task
 from shipbench.errors import InputError, WorkError
 

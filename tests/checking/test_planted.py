@@ -18,7 +18,8 @@ from shipbench.signals import DELTA, PSI, STATES, N, R, U, V, X, Y
 from shipbench.simulate.trials import Trials, sea_trials
 from shipbench.suites.checks.clean_sets import EQUATION, SHIPS, base_set, clean_sets
 from shipbench.suites.checks.faults import FAULTS, Fault
-from shipbench.suites.checks.suite import Outcome, apply_lines, run_case, write_planted
+from shipbench.suites.checks.outcome import Outcome
+from shipbench.suites.checks.suite import apply_lines, run_case, write_planted
 
 SEED = 311  # neither one on which thresholds were set nor one that the suite reports
 SHIP = "kcs"

@@ -14,7 +14,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from ...errors import InputError
 from ...names import file_name, shown
 from ...regular_files import read_bytes, read_json
-from ..results import Cell, Results
+from ..results import Cell
+from ..submissions import Results
 
 _PARAMETER = re.compile(r"^\s+(\w+)\s+=\s+([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)\s+(\S.*)$", re.IGNORECASE)
 _LONGEST = 20_000

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...render.linked import switch
-from ..results import Results
+from ..submissions import Results
 from .histories import study_plots
 from .pictures import growth
 from .series import POINTS, gather

@@ -10,9 +10,10 @@ from typing import Any
 from ...errors import InputError
 from ...render.html import Tile, render_page, short_name
 from ...storage import Frame, write_text
-from ..leaderboard import Board, build_board, scores_of
+from ..board import Board
+from ..leaderboard import build_board, scores_of
 from ..provenance import code_version
-from ..results import Results
+from ..submissions import Results
 from ..tables import table_cells
 from . import pictures
 from .beside import check_given, diagnoses, fitted

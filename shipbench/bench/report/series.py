@@ -14,7 +14,8 @@ from ...metrics.base import fit_percent
 from ...metrics.ed import ed
 from ...records import Batch
 from ...signals import PSI, wrap_angle
-from ..results import Cell, Results, read_predictions, read_truth
+from ..results import Cell, read_predictions, read_truth
+from ..submissions import Results
 
 POINTS = 80_000
 """Time steps of all models and runs of one page together; one takes some 31 characters (11 columns), beside Plotly's

@@ -13,7 +13,8 @@ import pyarrow.compute as pc
 
 from ...errors import InputError
 from ..mapping import Layout
-from ..tables import Table, open_table
+from ..table import Table
+from ..tables import open_table
 from .heads import Head, read_head
 from .layout import Form, find_form
 

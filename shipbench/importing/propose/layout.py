@@ -16,7 +16,8 @@ from ...errors import InputError
 from ..delimited import find_encoding
 from ..excel import first_rows
 from ..mapping import Layout
-from ..tables import BLANKS, DELIMITERS, TEXT_BLOCK, kind_of, reading, uncompressed
+from ..table import BLANKS, DELIMITERS, TEXT_BLOCK, reading, uncompressed
+from ..tables import kind_of
 from .heads import read_head, units_of
 
 _LINES = 400

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...bench.provenance import code_version
 from ...bench.tables import Table, TableColumn, number
 from ...storage import write_text
 from ..diagnosis.scores import wilson
 from .faults import FAULTS
-
-if TYPE_CHECKING:
-    from .suite import Outcome
+from .outcome import Outcome
 
 
 def _counts(kinds: Iterable[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import tomli_w
@@ -19,27 +19,9 @@ from ...errors import InputError
 from ...records import Dataset
 from .clean_sets import base_set, clean_sets, sources_of
 from .faults import FAULTS, Fault
+from .outcome import CLEAN_SEEDS, OFFSET, Outcome
 from .page import result_tables, write_page
 from .planting import planting
-
-CLEAN_SEEDS = 10
-"""Clean sets of each kind and ship, for every seed of the planted ones."""
-_OFFSET = 7000
-"""Between development seeds and reported ones."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """found: a finding that the fault calls for. others: kinds of findings that it does not. healed: whether its lines, laid into dataset.toml, make
-    a set that loads and in which a second check finds nothing (`after`: what it found); None where it has no line."""
-
-    fault: str
-    source: str
-    seed: int
-    found: bool
-    others: tuple[str, ...]
-    healed: bool | None
-    after: tuple[str, ...] = ()
 
 
 def write_planted(dataset: Dataset, fault: Fault | None, seed: int, folder: Path) -> Path:
@@ -92,7 +74,7 @@ def suite_command(
     """
     if seeds < 1:
         raise InputError(f"--seeds {seeds}; accepted: a whole number from 1.")
-    progress, start = progress or Silent(), first + (_OFFSET if development else 0)
+    progress, start = progress or Silent(), first + (OFFSET if development else 0)
     jobs = [(fault, source, start + i) for fault in FAULTS for source in sources_of(fault.wind) for i in range(seeds)]
     clean = list(clean_sets([start + 100 + i for i in range(CLEAN_SEEDS * seeds)]))
     progress.start(len(jobs) + len(clean))
