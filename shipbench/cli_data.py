@@ -81,7 +81,8 @@ def data_describe(
     as_json: Json = False,
 ) -> None:
     """Print a data card: statistics (beside the paper's Table II), durations, noise, what the data cannot identify."""
-    from .bench.data_card import make_card, write_card
+    from .bench.data_card import make_card
+    from .bench.data_card_html import write_card
     from .bench.progress import steps_shown
     from .data.base import load_dataset
 

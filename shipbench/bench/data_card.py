@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,15 +11,10 @@ import numpy as np
 from ..data.coverage import NEEDED, Gap, gaps, unit_time
 from ..data.noise import channel_noise
 from ..data.sensitivity import IMITATED, UNFELT, Telling, tellings
-from ..errors import InputError
 from ..records import Dataset
 from ..signals import UNITS
 from ..steps import step
-from ..storage import put
-from .data_card_html import card_page
-from .data_card_plots import Coverage, coverage, png
-from .dataset_facts import dataset_facts, describe_tables, fact_lines
-from .escaping import markdown_text
+from .dataset_facts import dataset_facts, describe_tables
 from .tables import Table, TableColumn, display_unit, number, significant
 
 _NOISE = (
@@ -160,41 +152,3 @@ def _told_apart(told: Sequence[Telling], how: str) -> Table:
         TableColumn("most alike", "alike"), TableColumn("cosine", "cosine", number(2)), TableColumn("can be told apart", "verdict"),
     ]  # fmt: skip
     return Table("What the runs tell apart", columns, rows, [f"How: {how}", *([_FELT] if rows else [])])
-
-
-def write_card(card: Card, dataset: Dataset, out: Path, command: str) -> list[Path]:
-    """Write `card.md` with its pictures, and `card.html`, which holds everything in one file; returns the two pages.
-
-    `command` is what made them, as the page states it.
-
-    Raises:
-        InputError: the folder cannot be written.
-    """
-    covered = coverage(dataset)
-    files = {f"{c.name}.png": png(c, dataset.dt) for c in covered}
-    files |= {"card.md": markdown(card, covered).encode(), "card.html": card_page(card, dataset, covered, command).encode(errors="replace")}
-    part = None
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        part = Path(tempfile.mkdtemp(prefix=".card-", dir=out))
-        for name, content in files.items():
-            (part / name).write_bytes(content)
-        for name in files:  # the pages come last, when their pictures are there
-            put(part / name, out / name)
-    except OSError as error:
-        raise InputError(f"cannot write the data card to {out}: {error.strerror}. Give a folder that can be written with --out.") from None
-    finally:
-        if part is not None:
-            shutil.rmtree(part, ignore_errors=True)
-    return [out / "card.md", out / "card.html"]
-
-
-def markdown(card: Card, covered: Sequence[Coverage]) -> str:
-    """The card as Markdown; pictures are files beside it."""
-    parts = [
-        f"# Data card: {markdown_text(card.name)}\n",
-        "\n".join(f"- {key}: {markdown_text(line)}" for key, line in fact_lines(card.facts)) + "\n",
-    ]
-    coverage = "## Coverage\n\n" + "\n\n".join(f"![{p.title}]({p.name}.png)\n\n{p.caption}" for p in covered) + "\n"
-    texts = [t.markdown() for t in card.page()]
-    return "\n".join([*parts, texts[0], coverage, *texts[1:]])

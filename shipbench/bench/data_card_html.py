@@ -1,22 +1,24 @@
-"""The page of a data card: what cannot be identified, coverage, the runs as linked plots, all tables."""
+"""A data card on disk, and its page: what cannot be identified, coverage, the runs as linked plots, all tables."""
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from ..errors import InputError
 from ..records import Dataset, Run
 from ..render.html import Tile, render_page
-from .data_card_plots import Coverage
+from ..storage import put
+from .data_card import Card
+from .data_card_plots import Coverage, coverage, png
 from .data_card_svg import HEIGHT, STYLE, WIDTH, svg
 from .dataset_facts import fact_lines
+from .escaping import markdown_text
 from .recorded import RUNS, recorded_plots
 from .tables import table_cells
-
-if TYPE_CHECKING:
-    from .data_card import Card
 
 _TEMPLATES = Path(__file__).with_name("templates")
 
@@ -61,3 +63,41 @@ def _tiles(card: Card, dataset: Dataset) -> list[Tile]:
         Tile("Time step dt", f"{dataset.dt:g} s", f"{1.0 / dataset.dt:.3g} Hz"),
         Tile("Ship", ship.name, f"L = {ship.L:g} m, B = {ship.B:g} m, T = {ship.T:g} m"),
     ]  # fmt: skip
+
+
+def write_card(card: Card, dataset: Dataset, out: Path, command: str) -> list[Path]:
+    """Write `card.md` with its pictures, and `card.html`, which holds everything in one file; returns the two pages.
+
+    `command` is what made them, as the page states it.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    covered = coverage(dataset)
+    files = {f"{c.name}.png": png(c, dataset.dt) for c in covered}
+    files |= {"card.md": markdown(card, covered).encode(), "card.html": card_page(card, dataset, covered, command).encode(errors="replace")}
+    part = None
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix=".card-", dir=out))
+        for name, content in files.items():
+            (part / name).write_bytes(content)
+        for name in files:  # the pages come last, when their pictures are there
+            put(part / name, out / name)
+    except OSError as error:
+        raise InputError(f"cannot write the data card to {out}: {error.strerror}. Give a folder that can be written with --out.") from None
+    finally:
+        if part is not None:
+            shutil.rmtree(part, ignore_errors=True)
+    return [out / "card.md", out / "card.html"]
+
+
+def markdown(card: Card, covered: Sequence[Coverage]) -> str:
+    """The card as Markdown; pictures are files beside it."""
+    parts = [
+        f"# Data card: {markdown_text(card.name)}\n",
+        "\n".join(f"- {key}: {markdown_text(line)}" for key, line in fact_lines(card.facts)) + "\n",
+    ]
+    coverage = "## Coverage\n\n" + "\n\n".join(f"![{p.title}]({p.name}.png)\n\n{p.caption}" for p in covered) + "\n"
+    texts = [t.markdown() for t in card.page()]
+    return "\n".join([*parts, texts[0], coverage, *texts[1:]])

@@ -126,8 +126,9 @@ def _no_cause(d: Diagnosis) -> str:
         return ""
     if d.verdict == "unknown" and d.unknown:
         share = d.unknown.get("share")
-        known = isinstance(share, float) and math.isfinite(share)
-        taken = f" It explains {100 * share:.0f} % of the variance of the missing force." if known else ""
+        taken = ""
+        if isinstance(share, float) and math.isfinite(share):
+            taken = f" It explains {100 * share:.0f} % of the variance of the missing force."
         return f"No effect of the library explains the runs as well as {what_it_is(d.unknown)}.{taken}"
     return "No cause is identified. The detection limits state which effects these runs could have shown."
 

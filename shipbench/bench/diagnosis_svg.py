@@ -81,7 +81,8 @@ def _contrast(rows: Sequence[Slice]) -> float:
 
 def _steps(axes: Axes, rows: Sequence[Slice], scale: float) -> str:
     """A level line over the range of each slice, joined where one ends at the beginning of the next."""
-    x, y = [], []
+    x: list[float] = []
+    y: list[float] = []
     for row in rows:
         if x and row.low > x[-1]:
             x, y = [*x, np.nan], [*y, np.nan]

@@ -13,7 +13,8 @@ from test_report_page import HOSTILE, Elements, drawings
 from toy_ship import TOY_SHIP, sail, toy, toy_folder
 from typer.testing import CliRunner
 
-from shipbench.bench.data_card import make_card, write_card
+from shipbench.bench.data_card import make_card
+from shipbench.bench.data_card_html import write_card
 from shipbench.bench.data_card_plots import coverage
 from shipbench.bench.data_card_svg import svg
 from shipbench.cli import app
