@@ -29,8 +29,8 @@ from scipy.optimize import least_squares
 from shipbench.data.base import load_dataset
 from shipbench.integrate import kinematics
 from shipbench.physics import eq2
-from shipbench.predictors._physics_fit import _START, bounds, inverse_size, parameter_scale
 from shipbench.predictors.physics import Physics
+from shipbench.predictors.physics_model.fit import _START, bounds, inverse_size, parameter_scale
 from shipbench.records import Batch
 from shipbench.signals import MOTION
 

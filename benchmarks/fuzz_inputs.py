@@ -237,8 +237,8 @@ IMPORT = ["data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ds/sh
 REPORT = ["report", "res", "--out", "out/r.html", "-q"]
 EXPORT = ["data", "export", "ds", "--format", "csv", "--out", "out/d"]
 LOADED = (
-    "matplotlib.pyplot", "pyarrow.parquet", "scipy.io", "shipbench.cli", "shipbench.bench.runner", "shipbench.bench.leaderboard",
-    "shipbench.bench.report.page", "shipbench.checking", "shipbench.importing.importer", "shipbench.importing.propose", "shipbench.data.files",
+    "matplotlib.pyplot", "pyarrow.parquet", "scipy.io", "shipbench.cli.app.app", "shipbench.bench.runner", "shipbench.leaderboard.pages",
+    "shipbench.reports.study.page", "shipbench.checking", "shipbench.importing.importer", "shipbench.importing.propose", "shipbench.data.files",
     "shipbench.predictors.physics",
 )  # fmt: skip
 KINDS: dict[str, tuple[list[str], list[list[str]]]] = {
@@ -368,7 +368,7 @@ def _child(arguments: list[str], folder: Path, said: Path) -> None:
         used = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE") if Path("/proc/self/statm").exists() else 0
         resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        from shipbench.cli import main
+        from shipbench.cli.app import main
 
         sys.argv = ["shipbench", *arguments]
         main()

@@ -24,7 +24,7 @@ UNITS = {"x": "m", "y": "m", "psi": "deg", "u": "m/s", "v": "m/s", "r": "deg/s",
 RATE, BLOCK = 10.0, 200_000
 IMPORT = (
     "import resource, sys\n"
-    "from shipbench.cli import app\n"
+    "from shipbench.cli.app import app\n"
     "try: app(sys.argv[1:])\n"
     "except SystemExit as end: code = end.code\n"
     "print('peak', resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)\n"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipbench.bench.statistics import Bootstrap, interval
+from shipbench.leaderboard.statistics import Bootstrap, interval
 
 REPEATS, RESAMPLES, SIGMA = 1000, 999, 0.7
 

@@ -27,8 +27,8 @@ from torch.utils.data import DataLoader, TensorDataset
 from shipbench.data.base import load_dataset
 from shipbench.predictors._features import InputFeatures
 from shipbench.predictors._one_step import transitions
-from shipbench.predictors._stacked import Scaler, StackedRuns
 from shipbench.predictors.base import make_predictor, parse_spec
+from shipbench.predictors.networks.stacked import Scaler, StackedRuns
 from shipbench.records import Dataset
 
 EPOCHS = 200

@@ -24,8 +24,8 @@ from torchdiffeq import odeint
 
 from shipbench.data.base import load_dataset
 from shipbench.predictors import neural_ode
-from shipbench.predictors._residual import Drive, Grid, Residual, features, typical_accelerations
-from shipbench.predictors._stacked import Scaler, generators, hold_error, position_score, random_windows, trapezoid_pose
+from shipbench.predictors.networks.residual import Drive, Grid, Residual, features, typical_accelerations
+from shipbench.predictors.networks.stacked import Scaler, generators, hold_error, position_score, random_windows, trapezoid_pose
 from shipbench.predictors.physics import Physics
 from shipbench.records import Dataset
 from shipbench.signals import PSI, R, U, V, X, Y

@@ -16,7 +16,7 @@ import measure
 
 COMMANDS = ("--help", "models", "effects", "data list")
 TARGET_S = 0.4
-_MODULES = "from shipbench.cli import app\ntry: app(sys.argv[1:])\nexcept SystemExit as end: assert not end.code"
+_MODULES = "from shipbench.cli.app import app\ntry: app(sys.argv[1:])\nexcept SystemExit as end: assert not end.code"
 _HEAVY = "{'torch', 'casadi', 'lightning', 'pandas', 'scipy', 'matplotlib'} & set(sys.modules)"
 
 

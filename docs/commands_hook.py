@@ -13,7 +13,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
         return markdown
     import typer
 
-    from shipbench.cli import app
+    from shipbench.cli.app import app
 
     return markdown.replace("<!-- commands -->", "\n".join(_sections(typer.main.get_command(app), "shipbench")))
 

@@ -49,9 +49,9 @@ def _extras() -> Iterator[str]:
 
 
 def _models() -> Iterator[str]:
-    from shipbench.bench.listing import explain_part, read_part
     from shipbench.extras import EXTRAS
     from shipbench.predictors.registered import PREDICTORS
+    from shipbench.reports.listing import explain_part, read_part
 
     for name in PREDICTORS.built_in():
         summary, parameters, needs = read_part(ROOT / "shipbench" / "predictors" / f"{name}.py", PREDICTORS.attribute)

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .api import benchmark, check_data, diagnose, import_log, propose_mapping, report
-    from .bench.leaderboard import build_board, write_boards
     from .bench.runner import run_tasks
     from .bench.submissions import read_results
     from .bench.task import Task, load_tasks
     from .contract.check import check_model
     from .data.base import DATASETS, load_dataset
     from .errors import InputError, ShipbenchError, WorkError
+    from .leaderboard.pages import build_board, write_boards
     from .metrics.base import METRICS
     from .predictors.base import PREDICTORS, Predictor, PredictorBase, make_predictor
     from .records import Batch, Dataset, Run
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "benchmark": "api", "check_data": "api", "diagnose": "api", "import_log": "api", "propose_mapping": "api", "report": "api", "Scores": "scores",
-    "build_board": "bench.leaderboard", "write_boards": "bench.leaderboard", "read_results": "bench.submissions",
+    "build_board": "leaderboard.pages", "write_boards": "leaderboard.pages", "read_results": "bench.submissions",
     "run_tasks": "bench.runner", "Task": "bench.task", "load_tasks": "bench.task", "check_model": "contract.check",
     "DATASETS": "data.base", "load_dataset": "data.base",
     "InputError": "errors", "ShipbenchError": "errors", "WorkError": "errors", "METRICS": "metrics.base",

@@ -123,7 +123,7 @@ class Verdict(Diagnosis):
     """A diagnosis that shows its verdict in words; `verdict`, `causes`, `extended_model` and `gain` are the main fields."""
 
     def __repr__(self) -> str:
-        from .bench.diagnosis_text import headline
+        from .reports.diagnosis.text import headline
 
         compare = f'Compare: shipbench.benchmark(["physics", "{self.extended_model}"], data)' if self.extended_model != "physics" else ""
         return brief("\n".join([f"Diagnosis of {self.dataset}", headline(self), compare]).rstrip())

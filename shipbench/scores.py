@@ -9,19 +9,19 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .bench.board_tables import TABLE_III
-from .bench.fit_notes import fit_notes
-from .bench.lead import lead
-from .bench.leaderboard import scores_of
 from .bench.submissions import Results
 from .errors import InputError, unknown_name
+from .leaderboard.fit_notes import fit_notes
+from .leaderboard.lead import lead
+from .leaderboard.pages import scores_of
+from .leaderboard.tables import TABLE_III
 from .names import brief, shown
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from .bench.board_scores import Scores as BoardScores
+    from .leaderboard.scores import Scores as BoardScores
 
 
 class Scores:
@@ -99,7 +99,7 @@ class Scores:
         Raises:
             InputError: an unknown run or data set, or no predictions are saved.
         """
-        from .bench.plots import tracks
+        from .leaderboard.plots import tracks
 
         name, models, summary = self._drawn(dataset)
         rows = self._boards[name].rows
@@ -117,7 +117,7 @@ class Scores:
         Raises:
             InputError: an unknown data set, or no predictions are saved.
         """
-        from .bench.plots import boxes
+        from .leaderboard.plots import boxes
 
         name, models, summary = self._drawn(dataset)
         return _shown_in_notebooks(boxes(self._boards[name].rows, models, summary))
@@ -128,7 +128,7 @@ class Scores:
         Raises:
             InputError: an unknown data set, or no predictions are saved.
         """
-        from .bench.plots import against_horizon
+        from .leaderboard.plots import against_horizon
 
         name, models, summary = self._drawn(dataset)
         return _shown_in_notebooks(against_horizon(self.results, name, models, summary["dt"]))
@@ -139,13 +139,13 @@ class Scores:
         Raises:
             InputError: the file cannot be written, or a folder holds no diagnosis of these data.
         """
-        from .bench.report.page import write_report
+        from .reports.study.page import write_report
 
         return write_report(self.results, Path(path), "shipbench.report(...) in Python", given=list(diagnosis)).path
 
     def _drawn(self, dataset: str | None) -> tuple[str, list[str], dict[str, Any]]:
         """Name of a data set, its models that can be drawn, and a summary of its study."""
-        from .bench.plots import drawable
+        from .leaderboard.plots import drawable
 
         name = dataset if dataset is not None else self.datasets[0]
         if name not in self._boards:

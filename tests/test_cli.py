@@ -16,7 +16,7 @@ import pytest
 from toy_ship import toy_folder
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 
 __all__ = ["toy_folder"]  # a fixture
 
@@ -58,7 +58,7 @@ def test_every_command_has_help(cli, command):
 
 def test_help_is_fast_and_loads_nothing_heavy():
     code = (
-        "import sys; from shipbench.cli import app\n"
+        "import sys; from shipbench.cli.app import app\n"
         "try: app(['--help'])\n"
         "except SystemExit: pass\n"
         "print([m for m in ('torch', 'casadi', 'matplotlib', 'pandas', 'numpy', 'lightning') if m in sys.modules])"

@@ -8,7 +8,7 @@ import re
 import numpy as np
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.data.demo import SPEED, TOWARDS
 
 

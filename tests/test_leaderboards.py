@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from shipbench.bench.folds import make_folds, select_runs
-from shipbench.bench.leaderboard import build_board, scores_of
-from shipbench.bench.overall import over_data_sets
 from shipbench.bench.regimes import window_features
 from shipbench.bench.results import PROTOCOL, STATUSES
 from shipbench.bench.submissions import read_results
 from shipbench.bench.task import load_tasks
 from shipbench.data.base import load_dataset
+from shipbench.leaderboard.overall import over_data_sets
+from shipbench.leaderboard.pages import build_board, scores_of
 
 FOLDER = Path(__file__).parent.parent / "leaderboards"
 STUDIES = sorted(p.parent for p in FOLDER.glob("results/*/rows.parquet"))

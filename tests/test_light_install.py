@@ -32,7 +32,7 @@ def without_networks(code: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 
 def command(*words: str) -> str:
-    return f"from shipbench.cli import main; sys.argv = ['shipbench', *{words!r}]; main()"
+    return f"from shipbench.cli.app import main; sys.argv = ['shipbench', *{words!r}]; main()"
 
 
 @pytest.fixture

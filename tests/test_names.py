@@ -7,7 +7,7 @@ import pytest
 from toy_ship import TOY_SHIP, sail, write_toy_folder
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.errors import InputError
 from shipbench.names import check_label, check_name, file_name, shown
 from shipbench.records import Dataset, Run

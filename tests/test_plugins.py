@@ -12,16 +12,16 @@ from toy_ship import toy
 from typer.testing import CliRunner
 
 from shipbench import registry
-from shipbench.bench.listing import describe_parts
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.data.base import DATASETS, _cache_key, load_dataset
 from shipbench.data.files import write_dataset
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.metrics.base import METRICS
 from shipbench.predictors.base import PREDICTORS, make_predictor, parse_spec
+from shipbench.reports.listing import describe_parts
 
 __all__ = ["toy"]  # a fixture
 

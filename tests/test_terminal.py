@@ -15,14 +15,14 @@ from toy_ship import write_toy_folder
 from typer.testing import CliRunner
 
 from shipbench.bench import progress
-from shipbench.bench.board import Board
-from shipbench.bench.diagnosis_text import summary_lines
-from shipbench.bench.leaderboard import build_board
 from shipbench.bench.submissions import read_results
-from shipbench.bench.tables import Table, TableColumn, number
-from shipbench.bench.terminal import command_lines
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.diagnosis.result import Cause, Diagnosis, Estimate
+from shipbench.leaderboard.board import Board
+from shipbench.leaderboard.pages import build_board
+from shipbench.render.table import Table, TableColumn, number
+from shipbench.render.terminal import command_lines
+from shipbench.reports.diagnosis.text import summary_lines
 from shipbench.steps import listening, step, tick, within
 
 WIDTHS = [80, 100, 120]

@@ -13,9 +13,9 @@ import numpy as np
 from ..data.mat import cells, save_mat, struct_array
 from ..errors import InputError
 from ..records import Batch
+from ..render.escaping import csv_text
 from ..signals import STATES, UNITS
 from ..storage import Frame, in_one_step, write_rows
-from .escaping import csv_text
 from .results import Cell, read_predictions, read_truth
 from .submissions import read_results
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..metrics.trial_indices import NAMES, trial_indices
 from ..records import Batch
+from ..render.table import display_unit, significant
 from ..signals import DELTA, U, V
-from .tables import display_unit, significant
 
 Frame = Any
 RPM_C, THRUSTERS_C = 0, slice(2, 4)

@@ -22,14 +22,14 @@ from ..steps import listening
 from ..storage import Frame, write_json
 from .executors import Execution, Workers, answers_of, open_workers
 from .folds import make_folds, select_runs
+from .lock import claimed
 from .models import facts_of
 from .patience import Patience
-from .plan import Part, Study
 from .progress import Progress, Silent
 from .provenance import code_version, machine
 from .results import PROTOCOL, Cell, assemble, scored_before, write_cell, write_truth
 from .scoring import columns, divergence, measure
-from .study_folder import claimed
+from .study import Part, Study
 from .submissions import Results
 from .task import Task
 from .work import Answer, digests

@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import ShipbenchError
-from ..predictors._fit_report import FitReport
 from ..predictors._user_file import code_of, files_read, on_import_path
 from ..predictors.base import History, make_predictor
+from ..predictors.physics_model.fit_report import FitReport
 from ..records import Dataset
 from ..specs import Spec
 from .cost import count_parameters

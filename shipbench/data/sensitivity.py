@@ -68,8 +68,8 @@ def tellings(dataset: Dataset) -> tuple[list[Telling], str]:
 
 def _columns(windows: Dataset) -> tuple[np.ndarray, list[str], dict[str, str]]:
     """Changes (samples, causes) of the weighted rollouts by typical sizes; columns of one name belong together."""
-    from ..predictors._physics_fit import Data, parameter_scale, rollout_function  # casadi
     from ..predictors.physics import Physics
+    from ..predictors.physics_model.fit import Data, parameter_scale, rollout_function  # casadi
 
     with np.errstate(all="ignore"):  # where nothing moves, the fit's intervals are empty; they are not asked for
         model = Physics(iterations=_FIT_STEPS).fit(windows)

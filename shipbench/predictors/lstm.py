@@ -21,7 +21,9 @@ from ..signals import COMMANDS, PSI
 from ._features import CHANNELS, InputFeatures
 from ._numbers import RATE, ROUNDS, WEIGHT, WIDTH, check_numbers
 from ._saved import check_shapes, sample_time
-from ._stacked import (
+from .base import History, PredictorBase
+from .device import check_device
+from .networks.stacked import (
     Scaler,
     StackedLinear,
     StackedMLP,
@@ -35,9 +37,7 @@ from ._stacked import (
     trapezoid_pose,
     with_valid,
 )
-from .base import History, PredictorBase
-from .device import check_device
-from .training import Chunk, Recipe, StackedTask, train
+from .networks.training import Chunk, Recipe, StackedTask, train
 
 _Y = 7
 _MOST_STEPS = 150

@@ -22,10 +22,10 @@ from ._features import InputFeatures
 from ._numbers import LAYERS, RATE, ROUNDS, WEIGHT, WIDTH, check_numbers
 from ._one_step import NUM_CHANNELS, check_target, one_step_rollout, transitions
 from ._saved import check_shapes, sample_time
-from ._stacked import Scaler, StackedMLP, StackedRuns, generators, padded, with_valid
 from .base import History, PredictorBase
 from .device import check_device
-from .training import Chunk, Recipe, StackedTask, epochs_of_samples, train
+from .networks.stacked import Scaler, StackedMLP, StackedRuns, generators, padded, with_valid
+from .networks.training import Chunk, Recipe, StackedTask, epochs_of_samples, train
 
 _GATHERED, _SCORED = 256, 16384
 """Minibatches that are gathered, and samples of a member that are scored, at a time."""

@@ -22,15 +22,15 @@ from ..integrate import motion_rhs, rk4_step
 from ..records import Dataset
 from ..signals import ACTUATORS, MOTION, R, U
 from ..specs import EffectSpec
-from ._fit_report import FitReport
 from ._numbers import RATE, ROUNDS, WEIGHT, WIDTH, check_numbers
-from ._residual import Drive, Grid, Residual, features, solve, typical_accelerations
 from ._saved import check_shapes
-from ._stacked import Scaler, generators, hold_error, padded, position_score, random_windows, shares_of, trapezoid_pose, with_valid
 from .base import History, PredictorBase
 from .device import check_device
+from .networks.residual import Drive, Grid, Residual, features, solve, typical_accelerations
+from .networks.stacked import Scaler, generators, hold_error, padded, position_score, random_windows, shares_of, trapezoid_pose, with_valid
+from .networks.training import Chunk, Recipe, StackedTask, train
 from .physics import Physics
-from .training import Chunk, Recipe, StackedTask, train
+from .physics_model.fit_report import FitReport
 
 
 class Stage(NamedTuple):

@@ -18,18 +18,18 @@ from ..records import Batch, Dataset
 from ..ship import Ship, complete
 from ..signals import ACTUATORS, COMMANDS, MOTION
 from ..specs import EffectSpec
-from ._actuator_fit import DEFAULT_ACTUATORS, fit_actuators
-from ._fit_report import FitReport, position_error, with_reversed_shaft
 from ._numbers import check_numbers
-from ._physics_effects import Extension, extension_of, geared, measured, no_gear, roll, true_start
-from ._physics_gears import fit_gears, gears_of
-from ._physics_rollout import Rolling, actuators_after
 from ._saved import check_shapes, sample_time
 from .base import History, PredictorBase
 from .hold import Hold
+from .physics_model.actuator_fit import DEFAULT_ACTUATORS, fit_actuators
+from .physics_model.effects import Extension, extension_of, geared, measured, no_gear, roll, true_start
+from .physics_model.fit_report import FitReport, position_error, with_reversed_shaft
+from .physics_model.gears import fit_gears, gears_of
+from .physics_model.rollout import Rolling, actuators_after
 
 if TYPE_CHECKING:
-    from ._physics_fit import Fit
+    from .physics_model.fit import Fit
 
 PARAMETERS = (
     ("p0", "lateral over axial propeller force", "1"),
@@ -108,7 +108,7 @@ class Physics(PredictorBase):
             InputError: the spec gives an effect a value that no such ship has.
             WorkError: the fit found no finite rollouts.
         """
-        from ._physics_fit import fit_parameters  # casadi is loaded only for fitting
+        from .physics_model.fit import fit_parameters  # casadi is loaded only for fitting
 
         data = train.merged(valid)
         self._set_ship(data.ship, data.inputs, data.dt, data.actuators == "commanded")
@@ -130,7 +130,7 @@ class Physics(PredictorBase):
 
     def _report(self, batch: Batch) -> FitReport:
         """How the fit follows its own runs."""
-        from ._physics_fit import bounds, fit_parameters, parameter_scale
+        from .physics_model.fit import bounds, fit_parameters, parameter_scale
 
         low, high = bounds(parameter_scale(self.c))
         edge = 1e-4 * (high - low)
@@ -151,8 +151,8 @@ class Physics(PredictorBase):
 
     def _fit_effects(self, batch: Batch, base: Fit, asked: Extension) -> Fit:
         """Gears first where they are recorded, then everything else together, once for every setting of open shape parameters; the best is kept."""
-        from ._physics_effects_fit import fit_extension
-        from ._physics_fit import Data
+        from .physics_model.effects_fit import fit_extension
+        from .physics_model.fit import Data
 
         asked = Extension(asked.terms)  # a second fit starts afresh
         if not self.commanded:

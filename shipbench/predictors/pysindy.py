@@ -19,11 +19,11 @@ from ..integrate import motion_rhs, rk4_step
 from ..physics.actuators import lag_with_rate_limit
 from ..records import Dataset
 from ..signals import ACTUATORS, COMMANDS, MOTION, PSI, STATES, VELOCITY
-from ._actuator_fit import fit_actuators
 from ._features import InputFeatures
 from ._numbers import WEIGHT, check_numbers
 from ._saved import check_shapes, sample_time
 from .base import History, PredictorBase
+from .physics_model.actuator_fit import fit_actuators
 
 _BEYOND = 10.0
 """A run whose velocity exceeds this many times the largest of the training data has diverged: polynomials leave the data fast."""

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 _HERE = Path(__file__).resolve().parent
+_TEMPLATES = _HERE / "templates"
 _PLOTLY = "vendor/plotly-basic.min.js"
 """Plotly's basic bundle as published on npm (`plotly.js-basic-dist-min`); its first lines hold the version, its licence lies beside it."""
 
@@ -31,7 +32,6 @@ class Tile:
 
 
 def render_page(
-    folder: Path,
     template: str,
     *,
     title: str,
@@ -42,12 +42,13 @@ def render_page(
     plots: bool = False,
     images: bool = False,
     style: str = "",
+    folder: Path = _TEMPLATES,
     **context: Any,
 ) -> str:
     """The HTML of a page. Every value in `context` is escaped by the template.
 
     Args:
-        folder, template: where the page's template lies, and its file name.
+        template: name of a file of `render/templates`.
         title: heading of the page.
         dataset: name of the data set or data sets.
         command: the command that made the page.
@@ -56,6 +57,7 @@ def render_page(
         plots: whether the page holds linked plots (see `render/linked.py`); adds Plotly, 1.2 MB.
         images: whether it holds pictures as `data:`.
         style: rules of this page alone, behind those of the common style sheet.
+        folder: where the template lies.
         context: what else the template uses; `shipbench` (version) is set.
     """  # fmt: skip
     from importlib.metadata import version
@@ -63,7 +65,7 @@ def render_page(
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
-        loader=FileSystemLoader([folder, _HERE]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader([folder, _TEMPLATES]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters.update(ticks=_ticks, short=short_name, embedded=embedded, parts=_parts)
     styles = _read("page.css") + style

@@ -9,11 +9,11 @@ import pytest
 from toy_ship import write_toy_folder
 from typer.testing import CliRunner
 
-from shipbench.bench.curve import draw, run_curve
-from shipbench.bench.leaderboard import scores_of
 from shipbench.bench.submissions import read_results
 from shipbench.bench.task import make_task
-from shipbench.cli import app
+from shipbench.cli.app import app
+from shipbench.leaderboard.learning_curve import draw, run_curve
+from shipbench.leaderboard.pages import scores_of
 
 MODEL = """
 import numpy as np

@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from shipbench.bench import executors
-from shipbench.cli import app
+from shipbench.cli.app import app
 
 pytest.importorskip("distributed", reason="needs shipbench[dask]")
 

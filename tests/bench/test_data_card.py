@@ -13,14 +13,14 @@ from test_report_page import HOSTILE, Elements, drawings
 from toy_ship import TOY_SHIP, sail, toy, toy_folder
 from typer.testing import CliRunner
 
-from shipbench.bench.data_card import make_card
-from shipbench.bench.data_card_html import write_card
-from shipbench.bench.data_card_plots import coverage
-from shipbench.bench.data_card_svg import svg
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.data.base import load_dataset
 from shipbench.errors import InputError
 from shipbench.records import Dataset, Run
+from shipbench.reports.dataset.card import make_card
+from shipbench.reports.dataset.card_page import write_card
+from shipbench.reports.dataset.coverage import coverage
+from shipbench.reports.dataset.coverage_svg import svg
 
 __all__ = ["toy", "toy_folder"]  # fixtures
 

@@ -9,7 +9,7 @@ import pytest
 from chromium import CONTRAST, browse
 from test_diagnosis_report import CAUSE, extended, make_diagnosis
 
-from shipbench.bench.diagnosis_html import diagnosis_page
+from shipbench.reports.diagnosis.page import diagnosis_page
 
 HOSTILE = "<img src=x onerror='window.alerted=1'>"
 TRACK, HISTORIES = "document.querySelector('[data-track]')", "document.querySelector('[data-histories]')"

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from shipbench.bench.diagnosis_html import diagnosis_page as page
-from shipbench.bench.diagnosis_linked import changed, chosen_segments, fits
-from shipbench.bench.diagnosis_report import write_diagnosis, write_report
-from shipbench.bench.diagnosis_text import WIDTH, gain_words, headline, summary_lines
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.diagnosis.result import Candidate, Cause, Diagnosis, Estimate, Gain, Wrong
+from shipbench.reports.diagnosis.files import write_diagnosis, write_report
+from shipbench.reports.diagnosis.linked import changed, chosen_segments, fits
+from shipbench.reports.diagnosis.page import diagnosis_page as page
+from shipbench.reports.diagnosis.text import WIDTH, gain_words, headline, summary_lines
 from tests.diagnosis.test_wrong import make_trace
 
 GAIN = Gain("ED", 21.3, 9.8, 0.54, (0.4, 0.66), "24/24")
@@ -122,7 +122,7 @@ def test_the_commands_name_the_data_as_the_user_did(spec, tmp_path, monkeypatch)
 
 
 def test_a_size_without_interval_is_written_without_one():
-    from shipbench.bench.diagnosis_text import interval
+    from shipbench.reports.diagnosis.text import interval
 
     assert interval(Estimate(1317.0, "m", (float("nan"), float("nan")))) == "1317 m"
     assert interval(Estimate(0.31, "m/s", (0.28, 0.34))) == "0.310 m/s (95 %: 0.280 to 0.340)"

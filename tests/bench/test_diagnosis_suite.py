@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.diagnosis.result import Cause, Diagnosis, Estimate, Gain
 from shipbench.errors import InputError
 from shipbench.simulate.trials import Trials

@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from shipbench.bench.diagnosis_text import cause_lines, estimate, force_words, in_words
 from shipbench.diagnosis.result import Cause, Estimate
 from shipbench.effects.base import EFFECTS
+from shipbench.reports.diagnosis.text import cause_lines, estimate, force_words, in_words
 
 BANNED = re.compile(r"\b(told|said|felt|knots?|heals?|mends?|misread|plant|revolutions|off the regressions|off the formula)\b", re.IGNORECASE)
 LONGEST = 30

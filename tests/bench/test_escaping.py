@@ -10,14 +10,14 @@ import pytest
 from test_diagnosis_report import make_diagnosis
 from test_leaderboard import results
 
-from shipbench.bench.diagnosis_html import diagnosis_page as page
-from shipbench.bench.escaping import csv_text, latex_text, markdown_text
-from shipbench.bench.formats import render
-from shipbench.bench.leaderboard import build_board
+from shipbench.bench.predict import write_csv
 from shipbench.bench.progress import Bar
-from shipbench.bench.rollout import write_csv
-from shipbench.bench.tables import Table, TableColumn
-from shipbench.cli_common import console_for_tables
+from shipbench.cli.common import console_for_tables
+from shipbench.leaderboard.formats import render
+from shipbench.leaderboard.pages import build_board
+from shipbench.render.escaping import csv_text, latex_text, markdown_text
+from shipbench.render.table import Table, TableColumn
+from shipbench.reports.diagnosis.page import diagnosis_page as page
 
 SCRIPT = "<script>alert(1)</script>"
 

@@ -14,7 +14,7 @@ from toy_ship import toy_folder
 from typer.testing import CliRunner
 
 from shipbench.bench.results import Cell, read_predictions, read_truth
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.signals import STATES
 
 __all__ = ["toy_folder"]  # a fixture

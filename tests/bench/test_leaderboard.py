@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipbench.bench.board_tables import PAPER
-from shipbench.bench.leaderboard import build_board, write_boards
 from shipbench.bench.regimes import COLUMNS as REGIME_COLUMNS
 from shipbench.bench.results import PROTOCOL
-from shipbench.bench.statistics import Matched
 from shipbench.bench.submissions import Results
-from shipbench.bench.tables import Table, TableColumn, number, significant
 from shipbench.errors import InputError
+from shipbench.leaderboard.pages import build_board, write_boards
+from shipbench.leaderboard.statistics import Matched
+from shipbench.leaderboard.tables import PAPER
 from shipbench.metrics.trial_indices import NAMES as TRIAL_NAMES
+from shipbench.render.table import Table, TableColumn, number, significant
 
 REGIMES = REGIME_COLUMNS[:5]
 

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 import shipbench
-from shipbench.bench.listing import read_part
+from shipbench.reports.listing import read_part
 
 
 def test_fields_of_the_bound_class_and_its_bases_are_parameters(tmp_path):

@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 from test_leaderboard import many, results
 
-from shipbench.bench.leaderboard import scores_of, write_boards
-from shipbench.bench.overall import NAME, data_sets_needed, over_data_sets
 from shipbench.bench.submissions import Results
+from shipbench.leaderboard.overall import NAME, data_sets_needed, over_data_sets
+from shipbench.leaderboard.pages import scores_of, write_boards
 
 
 def merged(sets):

@@ -9,8 +9,8 @@ from chromium import CONTRAST, browse
 from test_data_card import card_of
 from test_report_page import HOSTILE, study
 
-from shipbench.bench.leaderboard import write_boards
 from shipbench.bench.submissions import read_results
+from shipbench.leaderboard.pages import write_boards
 
 __all__ = ["study"]  # a fixture
 

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipbench.bench.plots import against_horizon, boxes, choose_runs, draw_all, outline, short_name, style, tracks
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.submissions import read_results
 from shipbench.bench.task import make_task
+from shipbench.leaderboard.plots import against_horizon, boxes, choose_runs, draw_all, outline, short_name, style, tracks
 
 
 @pytest.fixture

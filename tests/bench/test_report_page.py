@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from shipbench.bench.report.beside import _numbers, check_given, diagnoses
-from shipbench.bench.report.histories import near
-from shipbench.bench.report.page import write_report
-from shipbench.bench.report.series import gather
-from shipbench.bench.report.slicing import regime_errors
-from shipbench.bench.report.svg import Axes, limits, path, ticks
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.submissions import read_results
-from shipbench.bench.tables import Table, TableColumn, number, table_cells
 from shipbench.bench.task import make_task
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.errors import InputError
+from shipbench.leaderboard.histories import near
+from shipbench.leaderboard.series import gather
+from shipbench.leaderboard.slicing import regime_errors
 from shipbench.metrics.base import fit_percent
+from shipbench.render.svg import Axes, limits, path, ticks
+from shipbench.render.table import Table, TableColumn, number, table_cells
+from shipbench.reports.study.beside import _numbers, check_given, diagnoses
+from shipbench.reports.study.page import write_report
 
 HOSTILE = "<img src=x onerror=alert(1)>&\"'</script><script>alert(2)</script>"
 MODELS = """

@@ -195,7 +195,7 @@ def test_no_process_outlives_a_study_that_is_stopped(folder, sent):
 def test_a_study_is_stopped_while_lightning_trains_and_counts_no_failure(folder, sent):
     (folder / "trained.py").write_text(TRAINED)
     command = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # as above
-    command += "from shipbench.cli import main; main()"
+    command += "from shipbench.cli.app import main; main()"
     options = ["run", "-m", "trained.py:Trained", "-d", "toyset", "--horizon", "20", "--folds", "2", "-o", "out", "--executor", "local"]
     study = subprocess.Popen([sys.executable, "-c", command, *options], cwd=folder, env=environment(), stderr=subprocess.PIPE, text=True)
     end = time.monotonic() + 120

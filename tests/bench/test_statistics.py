@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipbench.bench import statistics
-from shipbench.bench.statistics import Bootstrap, Matched, interval
+from shipbench.leaderboard import statistics
+from shipbench.leaderboard.statistics import Bootstrap, Matched, interval
 
 
 def matched(errors, models=("a", "b"), codes=None, weights=None, resamples=999):

@@ -16,13 +16,13 @@ import pytest
 from toy_ship import write_toy_folder
 from typer.testing import CliRunner
 
-from shipbench.bench.board_strips import strips
 from shipbench.bench.results import read_truth
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.submissions import read_results
-from shipbench.bench.tables import Table, TableColumn, number
 from shipbench.bench.task import make_task
-from shipbench.cli import app
+from shipbench.cli.app import app
+from shipbench.leaderboard.strips import strips
+from shipbench.render.table import Table, TableColumn, number
 
 MODEL = """
 import numpy as np

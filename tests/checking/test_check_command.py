@@ -17,8 +17,8 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
-from shipbench.bench.recorded import RUNS, thinned
-from shipbench.cli import app
+from shipbench.cli.app import app
+from shipbench.reports.recorded import RUNS, thinned
 from shipbench.suites.checks.clean_sets import base_set
 from shipbench.suites.checks.faults import FAULTS
 from shipbench.suites.checks.suite import write_planted

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.suites.checks import suite as check_suite
 from shipbench.suites.checks.clean_sets import base_set
 from shipbench.suites.checks.faults import FAULTS, Fault

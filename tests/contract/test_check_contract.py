@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.contract.base import BROKEN, NOT_APPLICABLE, PASSED
 from shipbench.contract.check import check_model
 from shipbench.contract.rules import RULES

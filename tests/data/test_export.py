@@ -11,7 +11,7 @@ from scipy.io import loadmat, savemat
 from toy_ship import sail, toy_folder
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.data.base import load_dataset
 from shipbench.data.files import write_dataset
 from shipbench.data.mat import read_mat, write_mat

@@ -20,7 +20,7 @@ import pytest
 from test_esso_osaka_conversion import recorded
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.data import esso_osaka
 from shipbench.data import public as public_module
 from shipbench.data.base import DATASETS, load_dataset
@@ -106,7 +106,7 @@ def test_on_a_terminal_the_user_is_asked(public, tmp_path, answer, code, files):
     program = (
         "import sys; from dataclasses import replace; from pathlib import Path; from shipbench.data import esso_osaka as e\n"
         f"p = replace(e.PUBLIC, registry=Path({str(public.registry)!r}), url={public.url!r}); e.DATASET = replace(e.DATASET, public=p)\n"
-        "from shipbench.cli import main; sys.argv = ['shipbench', 'data', 'get', 'esso_osaka']; main()"
+        "from shipbench.cli.app import main; sys.argv = ['shipbench', 'data', 'get', 'esso_osaka']; main()"
     )
     ours, theirs = pty.openpty()
     with subprocess.Popen([sys.executable, "-c", program], stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:

@@ -24,7 +24,7 @@ from shipbench.ops import Array
 from shipbench.physics.eq2 import accelerations, coefficients
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.physics.modifiers import Flow, Modifiers
-from shipbench.predictors._physics_fit import parameter_scale
+from shipbench.predictors.physics_model.fit import parameter_scale
 from shipbench.ship import Particulars, Propeller, complete
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials

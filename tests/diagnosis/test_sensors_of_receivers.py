@@ -11,7 +11,6 @@ import pytest
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 import shipbench.simulate.trials
-from shipbench.bench.diagnosis_text import summary_lines
 from shipbench.checking.recording import Recording
 from shipbench.checking.track import keeps_time
 from shipbench.diagnosis.diagnose import diagnose
@@ -34,6 +33,7 @@ from shipbench.effects.base import EFFECTS, delayed
 from shipbench.physics.actuators import gear_path
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
+from shipbench.reports.diagnosis.text import summary_lines
 from shipbench.signals import PSI, R, U, V, X, Y
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials

@@ -6,7 +6,7 @@ import pytest
 from trial import SHIP, mapping, write
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 
 
 @pytest.fixture

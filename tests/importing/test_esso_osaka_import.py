@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.data.base import load_dataset
 from shipbench.data.esso_osaka import SHIP, find_copy
 from shipbench.errors import InputError

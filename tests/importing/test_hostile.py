@@ -18,7 +18,7 @@ import pytest
 from trial import SHIP, channels, logged, mapping, write
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.data.base import load_dataset
 from shipbench.importing.writer import FolderWriter
 
@@ -182,7 +182,7 @@ def test_a_full_disk_is_one_message_and_leaves_nothing(tmp_path):
     write(tmp_path, "log.csv", logged(np.arange(0.0, 4000.0, 0.5)))
     write(tmp_path, "mapping.toml", mapping())
     write(tmp_path, "ship.toml", SHIP)
-    code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)); from shipbench.cli import app; app(sys.argv[1:])"
+    code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)); from shipbench.cli.app import app; app(sys.argv[1:])"
     command = [sys.executable, "-c", code, "data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ship.toml", "--out", "out"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2

@@ -13,7 +13,7 @@ import pytest
 from trial import SHIP, logged, motion, write
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.data.base import load_dataset
 
 T = np.arange(0.0, 90.0)

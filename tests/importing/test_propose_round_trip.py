@@ -11,7 +11,7 @@ import pytest
 from trial import SHIP, motion, write
 from typer.testing import CliRunner
 
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.data.base import load_dataset
 from shipbench.signals import STATES
 

@@ -16,7 +16,7 @@ from shipbench.bench.executors import Execution
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
 from shipbench.bench.work import FoldData, Job, work
-from shipbench.cli import app
+from shipbench.cli.app import app
 from shipbench.contract.check import check_model
 from shipbench.errors import InputError
 from shipbench.predictors.base import make_predictor, parse_spec

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.bench.leaderboard import build_board
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
 from shipbench.data.files import write_dataset
-from shipbench.predictors._fit_report import FitReport
+from shipbench.leaderboard.pages import build_board
 from shipbench.predictors.base import make_predictor, parse_spec
 from shipbench.predictors.physics import Physics
+from shipbench.predictors.physics_model.fit_report import FitReport
 from shipbench.signals import COMMANDS, STATES
 
 

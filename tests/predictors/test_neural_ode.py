@@ -8,8 +8,8 @@ import torch
 
 from shipbench.errors import InputError
 from shipbench.physics.wind import apparent_wind
-from shipbench.predictors._residual import Drive, Grid, Residual, features, solve, typical_accelerations
-from shipbench.predictors._stacked import Scaler, generators
+from shipbench.predictors.networks.residual import Drive, Grid, Residual, features, solve, typical_accelerations
+from shipbench.predictors.networks.stacked import Scaler, generators
 from shipbench.predictors.neural_ode import NeuralODE
 from shipbench.predictors.physics import Physics
 from shipbench.signals import MOTION, VELOCITY

@@ -9,8 +9,8 @@ import pytest
 
 from shipbench.physics import eq2
 from shipbench.physics.actuators import lag_with_rate_limit
-from shipbench.predictors._actuator_fit import DEFAULT_ACTUATORS, fit_actuators
 from shipbench.predictors.physics import Physics
+from shipbench.predictors.physics_model.actuator_fit import DEFAULT_ACTUATORS, fit_actuators
 from shipbench.records import Batch, Dataset, Run
 from shipbench.ship import complete
 from shipbench.signals import COMMANDS
@@ -90,7 +90,7 @@ def test_the_fit_is_much_better_than_its_start(harbour, fitted):
 
 
 def test_the_gradient_used_by_the_fit_is_the_finite_difference(harbour):
-    from shipbench.predictors import _physics_fit as fit
+    from shipbench.predictors.physics_model import fit as fit
 
     model = Physics(iterations=0).fit(harbour)
     batch = harbour.subset([0, 1]).batch()
@@ -110,7 +110,7 @@ def test_the_gradient_used_by_the_fit_is_the_finite_difference(harbour):
 
 
 def test_rollout_of_the_fit_and_of_predict_are_the_same_model(harbour, fitted):
-    from shipbench.predictors import _physics_fit as fit
+    from shipbench.predictors.physics_model import fit as fit
 
     batch = harbour.subset([0, 1, 2]).batch()
     path = fitted.actuator_path(batch.s0, batch.U)
@@ -198,9 +198,9 @@ def test_left_side_is_clarke_and_inoue_by_hand():
 
 @pytest.mark.parametrize(("commanded", "wind", "substeps"), [(False, False, 1), (False, True, 3), (True, True, 1)])
 def test_rolling_is_the_same_model_as_the_formula_step_by_step(harbour, fitted, commanded, wind, substeps):
-    from shipbench.predictors._physics_effects import roll
-    from shipbench.predictors._physics_fit import parameter_scale
-    from shipbench.predictors._physics_rollout import Rolling
+    from shipbench.predictors.physics_model.effects import roll
+    from shipbench.predictors.physics_model.fit import parameter_scale
+    from shipbench.predictors.physics_model.rollout import Rolling
 
     model = Physics()
     model._set_ship(harbour.ship, (*COMMANDS, "depth", "wind_from", "wind_speed") if wind else COMMANDS, 1.0, commanded)

@@ -14,11 +14,11 @@ from shipbench.data.files import write_dataset
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.mmg import load_mmg_ship
-from shipbench.predictors import _physics_effects as effects
-from shipbench.predictors._physics_effects_fit import _Extended
-from shipbench.predictors._physics_fit import Data
 from shipbench.predictors.base import make_predictor, parse_spec
 from shipbench.predictors.physics import Physics
+from shipbench.predictors.physics_model import effects as effects
+from shipbench.predictors.physics_model.effects_fit import _Extended
+from shipbench.predictors.physics_model.fit import Data
 from shipbench.records import Dataset, Run
 from shipbench.ship import complete
 from shipbench.simulate.hidden import Hidden
@@ -233,7 +233,7 @@ def test_a_river_s_current_on_a_boat_is_within_what_may_be_found():
 
 
 def test_it_runs_beside_the_plain_physics_on_the_command_line(tmp_path):
-    from shipbench.cli import app
+    from shipbench.cli.app import app
 
     write_dataset(trials(3, ("current", (0.3, 0.3)), runs=6, samples=40), tmp_path / "tiny")
     specs = ["physics", "physics+current", "physics+current[speed=0.42,to=0.785]+rudder_delay"]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.bench.rollout import predict_runs
+from shipbench.bench.predict import predict_runs
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
 from shipbench.data.files import write_dataset

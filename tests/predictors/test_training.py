@@ -10,7 +10,7 @@ import torch
 
 from shipbench.errors import WorkError
 from shipbench.predictors._features import InputFeatures, dead_reckoning
-from shipbench.predictors._stacked import (
+from shipbench.predictors.networks.stacked import (
     Scaler,
     StackedLinear,
     StackedMLP,
@@ -21,7 +21,7 @@ from shipbench.predictors._stacked import (
     trapezoid_pose,
     with_valid,
 )
-from shipbench.predictors.training import BestWeights, Chunk, Recipe, StackedTask, clip_members, epochs_of_samples, train
+from shipbench.predictors.networks.training import BestWeights, Chunk, Recipe, StackedTask, clip_members, epochs_of_samples, train
 from shipbench.signals import COMMANDS, PSI, U, V
 
 

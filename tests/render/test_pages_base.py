@@ -32,12 +32,12 @@ def test_a_page_has_one_header_and_escapes_what_it_is_given(tmp_path):
     (tmp_path / "p.html.j2").write_text('{% extends "base.html.j2" %}{% block content %}{{ word }}{% endblock %}')
     hostile = "<img src=x>"
     made = {"title": hostile, "dataset": hostile, "command": hostile, "tiles": [Tile(hostile, hostile, hostile)], "word": hostile}
-    text = render_page(tmp_path, "p.html.j2", **made)
+    text = render_page("p.html.j2", folder=tmp_path, **made)
     assert "<img" not in text
     assert text.count("&lt;img") == 8  # title twice, data set, command, tile, word
     assert re.search(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC", text)
     assert "Plotly" not in text
-    with_plots = render_page(tmp_path, "p.html.j2", plots=True, **made)
+    with_plots = render_page("p.html.j2", folder=tmp_path, plots=True, **made)
     assert f"Plotly {plotly_version()} (MIT licence)" in with_plots
 
 

@@ -15,7 +15,7 @@ from ...effects.hull_derivatives import EFFECT as HULL
 from ...ops import Array
 from ...physics import eq2
 from ...physics.actuators import Gear, gear_path
-from ...predictors._actuator_fit import DEFAULT_ACTUATORS
+from ...predictors.physics_model.actuator_fit import DEFAULT_ACTUATORS
 from ...records import Dataset
 from ...ship import Particulars, complete
 from ...signals import ACTUATORS, MOTION, STATES

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...effects.base import flow_first
 from ...ops import Array
-from ...predictors._physics_fit import parameter_scale
+from ...predictors.physics_model.fit import parameter_scale
 from ..inference.gram import Hyper
 from .between_ships import STRUCTURE
 from .columns import ASIDE, AWAY, Bend, Columns

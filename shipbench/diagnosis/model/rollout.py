@@ -19,7 +19,7 @@ from ...ops import Array
 from ...physics import eq2
 from ...physics.modifiers import Flow, Modifiers
 from ...physics.wind import apparent_wind
-from ...predictors._physics_rollout import numbers_of, with_numbers
+from ...predictors.physics_model.rollout import numbers_of, with_numbers
 from ...ship import Particulars
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...bench.provenance import code_version
-from ...bench.tables import Table, TableColumn, number
+from ...render.table import Table, TableColumn, number
 from ...storage import write_text
 from ..diagnosis.scores import wilson
 from .faults import FAULTS

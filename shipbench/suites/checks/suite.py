@@ -10,13 +10,13 @@ from pathlib import Path
 import tomli_w
 
 from ...bench.progress import Progress, Silent
-from ...bench.tables import Table
 from ...checking.applying import write_lines
 from ...checking.base import check_dataset, check_path
 from ...checking.finding import Finding
 from ...data.files import read_dataset
 from ...errors import InputError
 from ...records import Dataset
+from ...render.table import Table
 from .clean_sets import base_set, clean_sets, sources_of
 from .faults import FAULTS, Fault
 from .outcome import CLEAN_SEEDS, OFFSET, Outcome

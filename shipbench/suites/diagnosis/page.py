@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...bench.tables import Table, TableColumn, number
+from ...render.table import Table, TableColumn, number
 from ...storage import write_text
 from . import scores as scores
 

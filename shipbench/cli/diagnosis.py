@@ -1,0 +1,84 @@
+"""The commands of the diagnosis: `diagnose`, `suite`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..names import file_name
+from ..regular_files import make_folder
+from .common import DatasetArgument, Full, Json, Quiet, print_json, say, screen_width
+
+
+def diagnose(
+    dataset: DatasetArgument,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for diagnosis.json, report.html, summary.txt (default diagnoses/NAME).")
+    ] = None,
+    gain: Annotated[bool, typer.Option(help="Measure the gain on held-out runs (most of the time).")] = True,
+    seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
+    workers: Annotated[int, typer.Option(help="Processes for the folds.")] = 2,
+    thorough: Annotated[bool, typer.Option("--thorough", help="Use up to twice as much of a long record (twice the time or more).")] = False,
+    cpu_limit: Annotated[float, typer.Option(min=1.0, max=86_400.0, help="CPU seconds after which it ends with what stands; it is said.")] = 900.0,
+    full: Full = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Show what the physics model gets wrong on a data set, name the cause, and measure what naming it is worth."""
+    from ..bench.progress import steps_shown
+    from ..data.base import load_dataset
+    from ..diagnosis.budget import Budget
+    from ..diagnosis.diagnose import diagnose as run
+    from ..reports.diagnosis.files import document, write_diagnosis
+    from ..reports.diagnosis.text import summary_lines
+
+    data = load_dataset(dataset)
+    folder = out or Path("diagnoses") / file_name(Path(data.name).name)
+    make_folder(folder)
+    with steps_shown(quiet or as_json):
+        found = run(data, gain=gain, seed=seed, workers=workers, thorough=thorough, budget=Budget(seconds=cpu_limit))
+    found = replace(found, spec=dataset)
+    written = write_diagnosis(found, folder)
+    if as_json:
+        print_json(document(found))
+        return
+    for line in summary_lines(found, screen_width(), full):
+        say(line)
+    say(f"Written: {', '.join(str(p) for p in written)}")
+
+
+suite_app = typer.Typer(help="Test suites of the framework itself.", no_args_is_help=True)
+
+
+@suite_app.command("diagnosis")
+def suite_diagnosis(
+    ctx: typer.Context,
+    seed: Annotated[int, typer.Option(help="Everything is drawn from it.")] = 0,
+    per_effect: Annotated[int, typer.Option(help="Sets per effect and size.")] = 3,
+    kinds: Annotated[
+        str | None, typer.Option(help="single,pair,none-same,none-other,outside,change,unit,published,none-published (default all).")
+    ] = None,
+    development: Annotated[bool, typer.Option("--development", help="The ships on which thresholds are set.")] = False,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the rows.")] = Path("runs/suite-diagnosis"),
+    gain: Annotated[bool, typer.Option(help="Also the held-out gain of every diagnosis and of the oracle (four times the time).")] = True,
+    resume: Annotated[bool, typer.Option(help="Keep what the same code has finished before.")] = True,
+    workers: Annotated[int, typer.Option(help="Processes.")] = 2,
+) -> None:
+    """Hide causes in simulated runs, diagnose them, and score the diagnosis: leaderboards/diagnosis.md."""
+    from ..diagnosis.diagnose import diagnose as run
+    from ..suites.diagnosis.suite import suite_command
+
+    page, rows = suite_command(
+        diagnose=run, seed=seed, per_effect=per_effect, kinds=kinds, development=development, out=out, resume=resume, workers=workers,
+        gain=gain, command=str(ctx.obj),
+    )  # fmt: skip
+    say(f"Written: {page} ({len(rows)} sets)")
+
+
+def register(app: typer.Typer) -> None:
+    """Add these commands to the command line."""
+    app.command()(diagnose)
+    app.add_typer(suite_app, name="suite")

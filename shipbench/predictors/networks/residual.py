@@ -1,0 +1,165 @@
+"""Physics plus a learned residual acceleration, for all members at once, and its solution by torchdiffeq over windows of measured runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import torch
+import torchdiffeq
+from torch import Tensor, nn
+
+from ...physics import eq2
+from ...physics.modifiers import Flow
+from ...physics.wind import apparent_wind
+from ...records import Dataset
+from ...signals import PSI, R, U, V
+from .._features import CHANNELS
+from ..physics import Physics
+from ..physics_model.effects import Active, accelerations
+from .stacked import Scaler, StackedMLP
+
+Air = tuple[Tensor, Tensor]
+
+
+class Residual(nn.Module):
+    """Accelerations of all members: physics plus network.
+
+    Args:
+        physics: the fitted models, one per member, all with the same effects.
+        hidden: width of the two hidden layers.
+        scale_in: of `features`; scale_out (members, 1, 3): size of the accelerations.
+    """
+
+    p: Tensor
+    q: Tensor
+    scale_out: Tensor
+
+    def __init__(self, physics: Sequence[Physics], hidden: int, scale_in: Scaler, scale_out: Tensor, draw: Sequence[torch.Generator]) -> None:
+        super().__init__()
+        self.c, self.ship = physics[0].c, physics[0].particulars
+        forces = [_forces(m) for m in physics]
+        self.effects = [(a.effect, len(a.q)) for a in forces[0]]
+        q = np.array([[v for a in own for v in a.q] for own in forces])
+        self.register_buffer("q", torch.as_tensor(q, dtype=scale_out.dtype).T[..., None].contiguous())
+        self.register_buffer("p", torch.as_tensor(np.stack([m.p for m in physics]), dtype=scale_out.dtype).T[..., None].contiguous())
+        self.register_buffer("scale_out", scale_out)
+        self.scale_in = scale_in
+        self.net = StackedMLP([scale_in.mean.shape[-1], hidden, hidden, 3], draw, torch.tanh, zero_last=True)
+
+    def learned(self, x: Tensor) -> Tensor:
+        """Residual accelerations (members, batch, 3) of `features` (members, batch, 7 or 9), in units of `scale_out`."""
+        return self.net(self.scale_in(x))
+
+    def forward(
+        self, psi: Tensor | None, u: Tensor, v: Tensor, r: Tensor, actuators: Sequence[Tensor], air: Air | None
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """(du, dv, dr), each (members, batch); `air` is true wind speed and direction."""
+        apparent = None if air is None or psi is None else apparent_wind(psi, u, v, *air)
+        n, delta, F_b, F_s = actuators
+        if self.effects and psi is not None:
+            q = iter(self.q.unbind(0))
+            active = [Active(effect, tuple(next(q) for _ in range(num))) for effect, num in self.effects]
+            nowhere = torch.zeros_like(u)
+            flow = Flow(nowhere, nowhere, nowhere, psi, u, v, r, n, delta, F_b, F_s)
+            du, dv, dr = accelerations(active, flow, air, self.c, self.p.unbind(0), self.ship)
+        else:
+            du, dv, dr = eq2.accelerations(u, v, r, n, delta, F_b, F_s, apparent, self.c, self.p.unbind(0))
+        more = (self.learned(torch.stack([u, v, r, *actuators, *(apparent or ())], dim=-1)) * self.scale_out).unbind(-1)
+        return du + more[0], dv + more[1], dr + more[2]
+
+
+def _forces(physics: Physics) -> list[Active]:
+    """The effects of a fitted model that act as forces."""
+    return [] if physics.extension is None else list(physics.extension.active("force"))
+
+
+def features(S: Tensor, air: Tensor | None) -> Tensor:
+    """What the network sees of states (..., 10): u, v, r, n, delta, F_b, F_s, and the speed through the air where true wind (..., 2) is given."""
+    seen = S[..., CHANNELS]
+    if air is None:
+        return seen
+    return torch.cat([seen, torch.stack(apparent_wind(S[..., PSI], S[..., U], S[..., V], *air.unbind(-1)), dim=-1)], dim=-1)
+
+
+class Grid(NamedTuple):
+    """How the training integrates: a knot every `stride` samples, `per_knot` midpoint steps of `step` seconds between knots."""
+
+    stride: int
+    per_knot: int
+    step: float
+
+    @classmethod
+    def of(cls, physics: Physics) -> Grid:
+        """Steps of about a second for 100 m (the time scale of a ship goes with sqrt(L)), never across a change of the inputs that it misses."""
+        if physics.substeps > 1:
+            return cls(1, physics.substeps, physics.dt / physics.substeps)
+        stride = max(1, int(0.1 * np.sqrt(physics.c.L) / physics.dt))
+        return cls(stride, 1, stride * physics.dt)
+
+
+class Drive(NamedTuple):
+    """What is known ahead of the rollouts of all members' runs.
+
+    Args:
+        S: (runs, knots + 1, 10) measured states.
+        path: (runs, steps, 2, 4) actuators at the beginning and in the middle of every integration step.
+        air: (runs, steps, 2) true wind, or None.
+        counts: runs of each member.
+    """
+
+    S: Tensor
+    path: Tensor
+    air: Tensor | None
+    counts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, physics: Sequence[Physics], datasets: Sequence[Dataset], grid: Grid) -> Drive:
+        """Actuators do not depend on the hull's motion, so that their path is known before the rollout."""
+        parts, counts, d = [], [], grid.stride
+        for model, data in zip(physics, datasets, strict=True):
+            batch = data.batch()
+            knots = batch.U.shape[1] // d
+            S = np.concatenate([batch.s0[:, None], batch.truth], axis=1)[:, : knots * d + 1 : d]
+            full = model.actuator_path(batch.s0, batch.U)
+            begin, middle = full[:, 0 : knots * d * grid.per_knot : d, 0], full[:, d // 2 :: d, d % 2][:, : knots * grid.per_knot]
+            air = model._wind(batch.U)
+            wind = np.zeros((len(S), 0, 2)) if air is None else np.repeat(air[:, : knots * d : d], grid.per_knot, axis=1)
+            parts.append([torch.as_tensor(known, dtype=torch.float32) for known in (S, np.stack([begin, middle], axis=2), wind)])
+            counts.append(len(S))
+        states, path, held = (torch.cat(known) for known in zip(*parts, strict=True))
+        return cls(states, path, held if held.shape[1] else None, tuple(counts))
+
+
+def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step: float) -> Tensor:
+    """u, v, r at the ends of the steps by torchdiffeq's midpoint rule (members, batch, steps, 3).
+
+    Args:
+        start: (members, batch, 10).
+        path: (members, batch, steps, 2, 4); air: (members, batch, steps, 2) or None.
+        step: [s].
+    """
+    stages = path.permute(2, 3, 4, 0, 1).contiguous()  # time first: one step is then a contiguous block
+    wind = None if air is None else air.permute(2, 3, 0, 1).contiguous()
+
+    def rate(t: Tensor, y: Tensor) -> Tensor:
+        j, half = divmod(round(2.0 * float(t)), 2)  # time in steps: the rule asks at j and j + 1/2
+        u, v, r = y[0], y[1], y[2]
+        rates = model(y[3] if turns else None, u, v, r, stages[j, half].unbind(0), None if wind is None else (wind[j, 0], wind[j, 1]))
+        return step * torch.stack((*rates, r) if turns else rates)
+
+    turns = wind is not None or bool(model.effects)  # the heading matters
+    first = start[..., [U, V, R, PSI] if turns else [U, V, R]].movedim(-1, 0)
+    times = torch.arange(path.shape[2] + 1, dtype=start.dtype, device=start.device)
+    return torchdiffeq.odeint(rate, first, times, method="midpoint")[1:, :3].permute(2, 3, 0, 1)  # pyright: ignore[reportIndexIssue, reportCallIssue, reportArgumentType]
+
+
+def typical_accelerations(physics: Sequence[Physics], drive: Drive) -> Tensor:
+    """Root mean square (members, 1, 3) of the physics' accelerations without measured wind along the measured states."""
+    sizes = []
+    for model, S in zip(physics, drive.S.double().split(drive.counts), strict=True):
+        flow = Flow(0.0, 0.0, 0.0, S[..., PSI].numpy(), *S[..., CHANNELS].movedim(-1, 0).numpy())
+        found = accelerations(_forces(model), flow, None, model.c, list(model.p), model.particulars)
+        sizes.append([float(np.sqrt(np.mean(np.square(a)))) for a in found])
+    return torch.tensor(sizes, dtype=torch.float32)[:, None]

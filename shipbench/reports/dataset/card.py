@@ -1,0 +1,154 @@
+"""The data card: what a data set holds, how noisy it is, what it covers, and what it cannot identify; as tables, Markdown and one HTML page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...data.coverage import NEEDED, Gap, gaps, unit_time
+from ...data.noise import channel_noise
+from ...data.sensitivity import IMITATED, UNFELT, Telling, tellings
+from ...records import Dataset
+from ...render.table import Table, TableColumn, display_unit, number, significant
+from ...signals import UNITS
+from ...steps import step
+from .facts import dataset_facts, describe_tables
+
+_NOISE = (
+    "Noise: standard deviation of what is new in every sample (least of the differences of order 2 to 6, by their median absolute deviation). It "
+    "sees white noise only, some 5 % too small; drifts, biases and filtered noise are not in it, and real gusts are. Step: resolution of the record."
+)
+_FELT = (
+    f"Felt: change of the runs by a typical size, as a share of what holding the speeds gets wrong; below {100 * UNFELT:g} % it is not felt at all. "
+    f"Imitated: share of that change (squared) that the other causes can make together; above {100 * IMITATED:.0f} % (a variance inflation of 10) "
+    "the cause cannot be told apart, whatever the size of the data set. Of a current or wind the direction that is told worst counts."
+)
+
+
+_GAPS = "cannot_identify"
+
+
+@dataclass(frozen=True)
+class Card:
+    """Everything on the card: facts by name, tables by key in the order of a terminal, whose end is read; a page begins with the gaps."""
+
+    name: str
+    facts: dict[str, Any]
+    tables: dict[str, Table]
+
+    def lead(self) -> str:
+        """What the data set holds, and how much of it cannot be identified, in two sentences."""
+        missing = len(self.tables[_GAPS].rows)
+        what = (
+            f"{missing} of the causes that are looked for cannot be identified with it." if missing else "No cause is known that it cannot identify."
+        )
+        runs, samples = str(self.facts["runs"]).split(" in ", 1)
+        return f"{self.name}: {runs} run{'s' * (runs != '1')} in {samples}. {what}"
+
+    def brief(self) -> list[Table]:
+        """What a terminal shows unless all tables are asked for: durations, and the trials that would add what is missing."""
+        gaps = self.tables[_GAPS]
+        kept = [column for column in gaps.columns if column.key != "because"]
+        return [self.tables["durations"], *([replace(gaps, columns=kept, notes=())] if gaps.rows else [])]
+
+    def page(self) -> list[Table]:
+        """The tables in the order of a page."""
+        return [self.tables[_GAPS], *(table for key, table in self.tables.items() if key != _GAPS)]
+
+    def document(self) -> dict[str, Any]:
+        """As JSON."""
+        return {"dataset": self.name, "facts": self.facts, **{key: table.as_json() for key, table in self.tables.items()}}
+
+
+def make_card(dataset: Dataset) -> Card:
+    """Statistics, durations, noise, gaps and sensitivities of a data set."""
+    step("statistics", 0.0, 0.1)
+    statistics = dict(zip(("statistics", "table_ii", "against_the_paper"), describe_tables(dataset), strict=False))
+    step("what the runs tell apart", 0.1, 0.9)
+    told, how = tellings(dataset)
+    step("noise and coverage", 0.9, 1.0)
+    tables = {
+        **statistics, "durations": _durations(dataset), "noise": _noise(dataset), "told_apart": _told_apart(told, how),
+        _GAPS: _gap_table(gaps(dataset) + _alike(told), dataset),
+    }  # fmt: skip
+    return Card(dataset.name, dataset_facts(dataset), tables)
+
+
+def _gap_table(found: Sequence[Gap], dataset: Dataset) -> Table:
+    columns = [TableColumn("cannot be identified", "subject"), TableColumn("because", "because"), TableColumn("what would add it", "manoeuvre")]
+    rows = [{"subject": g.subject, "because": g.because, "manoeuvre": g.manoeuvre} for g in found]
+    unit = unit_time(dataset.ship.L)
+    notes = [
+        f"Times are judged in ship lengths: one takes {unit:.3g} s at a Froude number of 0.1 (10 sqrt(L/g)), {NEEDED:g} of them are needed.",
+        "What is not listed can still be weakly determined: fits print intervals, and `shipbench diagnose` prints detection limits.",
+    ]
+    return Table("What these data cannot identify", columns, rows, notes if rows else ["Nothing of what is looked for is missing.", *notes])
+
+
+def _alike(told: Sequence[Telling]) -> list[Gap]:
+    """The causes that others imitate; two that do so for each other make one line."""
+    found, done = [], set()
+    twins = {t.subject: t.alike for t in told if t.cosine**2 > IMITATED}
+    for t in told:
+        if t.imitated <= IMITATED or t.subject in done:
+            continue
+        alone = t.subject in twins
+        if twins.get(t.alike) == t.subject:
+            done.add(t.alike)
+        who = f"{t.alike} alone makes {100 * t.cosine**2:.1f} %" if alone else f"most alike: {t.alike} (cosine {t.cosine:.2f})"
+        because = f"{100 * t.imitated:.1f} % of what it does to the runs can be made by other causes, {100 * IMITATED:.0f} % is the limit; {who}"
+        found.append(Gap(f"{t.subject} apart from {t.alike if alone else 'the other causes together'}", because, t.manoeuvre))
+    return found
+
+
+def _durations(dataset: Dataset) -> Table:
+    """Runs, samples and times of every kind of manoeuvre."""
+    kinds: dict[str, list[float]] = {}
+    for run in dataset.runs:
+        kinds.setdefault(str(run.meta.get("manoeuvre", "not given")), []).append((len(run) - 1) * dataset.dt)
+    groups = [*kinds.items(), *([("all", [x for times in kinds.values() for x in times])] if len(kinds) > 1 else [])]
+    rows = [
+        {"kind": kind, "runs": len(times), "least": min(times), "median": float(np.median(times)), "most": max(times), "sum": sum(times) / 3600.0}
+        for kind, times in groups
+    ]
+    columns = [
+        TableColumn("manoeuvre", "kind"), TableColumn("runs", "runs", number(0)), TableColumn("shortest [s]", "least", significant(3)),
+        TableColumn("median [s]", "median", significant(3)), TableColumn("longest [s]", "most", significant(3)),
+        TableColumn("together [h]", "sum", significant(3)),
+    ]  # fmt: skip
+    return Table("Durations", columns, rows, [f"One sample every {dataset.dt:g} s ({1.0 / dataset.dt:g} Hz)."])
+
+
+def _noise(dataset: Dataset) -> Table:
+    rows = []
+    for c in channel_noise(dataset):
+        unit, factor = display_unit(UNITS[c.channel])
+        rows.append({
+            "channel": c.channel, "unit": unit, "noise": factor * c.noise, "greatest": factor * c.greatest, "run": c.run, "step": factor * c.step,
+            "repeated": 100.0 * c.repeated,
+        })  # fmt: skip
+    columns = [
+        TableColumn("channel", "channel"), TableColumn("unit", "unit"), TableColumn("noise, median run", "noise", significant(2)),
+        TableColumn("noisiest run", "greatest", significant(2)), TableColumn("which", "run"), TableColumn("step", "step", significant(3)),
+        TableColumn("repeated samples [%]", "repeated", number(1)),
+    ]  # fmt: skip
+    return Table("Noise of the channels", columns, rows, [_NOISE])
+
+
+def _told_apart(told: Sequence[Telling], how: str) -> Table:
+    rows = []
+    for t in told:
+        felt = t.felt > UNFELT
+        verdict = "not felt" if not felt else "no" if t.imitated > IMITATED else "yes"
+        rows.append({
+            "subject": t.subject, "felt": 100 * t.felt, "imitated": 100 * t.imitated if felt else None, "alike": t.alike,
+            "cosine": t.cosine if felt else None, "verdict": verdict,
+        })  # fmt: skip
+    columns = [
+        TableColumn("cause", "subject"), TableColumn("felt [%]", "felt", significant(2)), TableColumn("imitated [%]", "imitated", number(1)),
+        TableColumn("most alike", "alike"), TableColumn("cosine", "cosine", number(2)), TableColumn("can be told apart", "verdict"),
+    ]  # fmt: skip
+    return Table("What the runs tell apart", columns, rows, [f"How: {how}", *([_FELT] if rows else [])])

@@ -1,0 +1,301 @@
+"""A diagnosis in words, for the terminal and the page."""
+
+from __future__ import annotations
+
+import math
+import shlex
+
+from ...diagnosis.result import Candidate, Cause, Diagnosis, Estimate, Gain, what_it_is
+from ...effects.base import EFFECTS, Effect, Parameter
+from ...render.table import display_unit
+from ...render.terminal import command_lines, paragraph
+
+_SHOWN = 10
+WIDTH = 80
+"""Columns of summary.txt."""
+DETECTION_LIMIT = 'Detection limit: the smallest effect these runs could have shown ("-": cannot be detected)'
+_METRICS = {"ED": "position error"}
+
+
+def figure(value: float, digits: int = 3) -> str:
+    """So many significant digits, powers of ten only for what is very small or large."""
+    if abs(value) < 1e-12:
+        return "0"
+    if not 1e-3 <= abs(value) < 1e5:
+        return f"{value:.{digits}g}"
+    return f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
+
+
+def quantity(value: float | None, unit: str) -> str:
+    """A value with its unit as people read it: angles in degrees, forces in kN."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    shown, factor = display_unit(unit)
+    return figure(factor * value) + ("" if shown == "1" else f" {shown}")
+
+
+def interval(e: Estimate) -> str:
+    """Such as `0.31 m/s (95 %: 0.28 to 0.34)`; without interval where there is none."""
+    factor = display_unit(e.unit)[1]
+    known = all(v is not None and math.isfinite(v) for v in e.ci95)
+    if not known and e.unit == "1" and e.value is not None and e.value == round(e.value):
+        return f"{e.value:.0f}"  # a choice: the number of a run, a side
+    return quantity(e.value, e.unit) + (f" (95 %: {figure(factor * e.ci95[0])} to {figure(factor * e.ci95[1])})" if known else "")
+
+
+def estimate(effect: str, name: str, e: Estimate) -> str:
+    """A parameter of an effect in words: a direction as three digits, a relative change or a share in percent, else its value with unit."""
+    part = _effect(effect)
+    if e.value is None or not math.isfinite(e.value) or part is None:
+        return f"{name} {interval(e)}"
+    known = all(v is not None and math.isfinite(v) for v in e.ci95)
+    if part.vector is not None and name == part.vector[1]:
+        return f"{name} {_bearing(e.value)}" + (f" (95 %: {_bearing(e.ci95[0])} to {_bearing(e.ci95[1])})" if known else "")
+    parameter = _parameter(part, name)
+    label = f"{parameter.title} {name}" if parameter is not None and parameter.title else name
+    if parameter is not None and parameter.relative:
+        return f"{label} {_changed(e.value)}" + (f" (95 %: {_between(*e.ci95, 'smaller', 'larger')})" if known else "")
+    if parameter is not None and parameter.share_of:
+        doubt = f" (95 %: {100 * e.ci95[0]:.0f} to {100 * e.ci95[1]:.0f} %)" if known else ""
+        return f"{label} {100 * e.value:.0f} % of {parameter.share_of}{doubt}"
+    return f"{label} {interval(e)}"
+
+
+def in_words(c: Cause) -> str:
+    """A cause as a noun phrase with its size, such as `a current of 0.36 m/s towards 059°`; the typed name stands beside it where it is not in it."""
+    part = _effect(c.effect)
+    if part is None:
+        return c.effect
+    sizes = {name: _size(part, name, e) for name, e in c.parameters.items()}
+    try:
+        words = part.phrase.format_map(sizes) or part.summary
+    except KeyError:  # reported under other names, such as root mean squares over runs
+        words = part.summary
+    return words if all(word in words for word in c.effect.split("_")) else f"{words} ({c.effect})"
+
+
+def _size(part: Effect, name: str, e: Estimate) -> str:
+    """A value alone, with two significant digits."""
+    if e.value is None or not math.isfinite(e.value):
+        return "unknown size"
+    if part.vector is not None and name == part.vector[1]:
+        return _bearing(e.value)
+    parameter = _parameter(part, name)
+    if parameter is not None and parameter.relative:
+        return _changed(e.value)
+    if parameter is not None and parameter.share_of:
+        return f"{100 * e.value:.0f} % of the {parameter.share_of}"
+    shown, factor = display_unit(e.unit)
+    return f"{figure(float(f'{factor * e.value:.2g}'), 2)}" + ("" if shown == "1" else f" {shown}")
+
+
+def _parameter(part: Effect, name: str) -> Parameter | None:
+    return next((p for p in part.parameters if p.name == name), None)
+
+
+def _changed(relative: float) -> str:
+    return f"{100 * abs(relative):.0f} % {'smaller' if relative < 0 else 'larger'}"
+
+
+def _between(low: float, high: float, less: str, more: str) -> str:
+    """Two relative changes as an interval, such as `24 to 79 % less` or `65 % less to 52 % more`."""
+    if low < 0 < high:
+        return f"{100 * -low:.0f} % {less} to {100 * high:.0f} % {more}"
+    near, far = sorted((100 * abs(low), 100 * abs(high)))
+    return f"{near:.0f} to {far:.0f} % {less if low < 0 else more}"
+
+
+def _effect(name: str) -> Effect | None:
+    """The effect of this name; None for one that is not installed here."""
+    return EFFECTS.get(name) if name in EFFECTS else None
+
+
+def _bearing(angle: float) -> str:
+    """An angle [rad] as a bearing of three digits."""
+    return f"{round(math.degrees(angle)) % 360:03d}°"
+
+
+def gain_words(g: Gain | None, named: int = 1) -> str:
+    """The gain of the extension, with so many named causes, on runs that were not fitted."""
+    if g is None:
+        return "The gain on held-out runs was not measured."
+    low, high = g.ci95
+    all_of_them = "it" if named == 1 else "both" if named == 2 else f"all {named}"
+    doubt = "" if low > 0 else " This may be no gain at all." if high > 0 else " The extended model is worse."
+    return (
+        f"With {all_of_them}, the {_METRICS.get(g.metric, g.metric)} on held-out runs {'falls' if g.relative >= 0 else 'rises'} from "
+        f"{figure(g.before)} m to {figure(g.after)} m: {gain_share(g)}.{doubt}"
+    )
+
+
+def gain_share(g: Gain) -> str:
+    """The relative gain with its interval and the runs that are better."""
+    low, high = g.ci95
+    between = _between(-high, -low, "less", "more") if low <= 0 <= high else "{:.0f} to {:.0f} %".format(*sorted((100 * abs(low), 100 * abs(high))))
+    share = f"{100 * abs(g.relative):.0f} % {'less' if g.relative >= 0 else 'more'}"
+    return f"{share} (95 %: {between}), better in {g.runs_better.replace('/', ' of ')} runs"
+
+
+def headline(d: Diagnosis) -> str:
+    """The verdict in one or two sentences."""
+    if d.verdict == "found":
+        *first, last = map(in_words, d.causes)
+        found = f"{', '.join(first)}, and {last}" if first else last
+        return f"Found: {found}. {gain_words(d.gain, len(d.causes))}"
+    if d.verdict == "unknown" and d.unknown:
+        return (
+            f"The model lacks something that is not in the library: {what_it_is(d.unknown)}. "
+            f"The log Bayes factor is {0.5 * d.unknown['score']:.0f}. No effect of the library explains as much."
+        )
+    if d.warnings:
+        return "No cause is identified. The warnings below give the reason. The detection limits state what these runs could have shown."
+    return (
+        "Nothing found beyond ordinary differences between ships: no effect of the library and no unexplained dependence. "
+        "The detection limits state what these runs could have shown."
+    )
+
+
+def next_command(d: Diagnosis) -> str:
+    """The command that compares the plain model with the extended one."""
+    inside = [c.effect for c in d.causes if not EFFECTS.get(c.effect).traits.describes_data]
+    model = "+".join(["physics", *inside])
+    return f"shipbench run --model physics --model {shlex.quote(model)} --dataset {shlex.quote(d.spec or d.dataset)}" if inside else ""
+
+
+def detectable(c: Candidate) -> str:
+    """Detection limit per amplitude, the unit once where it is the same; "-" where no possible size would."""
+    known = [(name, v, _unit(c, name)) for name, v in c.detectable.items() if v is not None and math.isfinite(v)]
+    parts = []
+    for i, (name, v, unit) in enumerate(known):
+        follows = i + 1 < len(known) and known[i + 1][2] == unit
+        parts.append(f"{name} {figure(display_unit(unit)[1] * v) if follows else quantity(v, unit)}")
+    return ", ".join(parts) or "-"
+
+
+def _unit(c: Candidate, name: str) -> str:
+    """Components of a vector are in the unit of its size."""
+    if name in c.units:
+        return c.units[name]
+    return next((u for u in c.units.values() if u != "rad"), "1")
+
+
+def grade(score: float) -> str:
+    """Evidence of a score (twice the log Bayes factor) in the words of Kass and Raftery (1995), Bayes factors, section 3.2."""
+    factor = 0.5 * score
+    return f"{'very strong' if factor > 5.0 else 'strong' if factor > 3.0 else 'positive' if factor > 1.0 else 'weak'} evidence"
+
+
+def strength(c: Cause) -> str:
+    """Evidence in words with the log Bayes factor."""
+    if not math.isfinite(c.score):
+        return "an error of the record itself"
+    return f"{grade(c.score)} (log Bayes factor {0.5 * c.score:.0f})" + (f", supported by {c.support}" if c.support else "")
+
+
+def force_words(force: dict[str, float]) -> str:
+    """Greatest forces, such as `up to 38.0 kN sideways and 1.20 MN m in yaw on these runs`; empty where there are none."""
+    places = (("surge", "N", "lengthwise"), ("sway", "N", "sideways"), ("yaw", "N m", "in yaw"))
+    parts = [f"{_newtons(force[axis], unit)} {place}" for axis, unit, place in places if axis in force]
+    *first, last = parts or [""]
+    return f"up to {', '.join(first)} and {last} on these runs" if first else f"up to {last} on these runs" if last else ""
+
+
+def _newtons(value: float, unit: str) -> str:
+    """Two significant digits with the prefix that suits the size."""
+    rounded = float(f"{value:.2g}")
+    factor, prefix = (1e-6, "M") if rounded >= 1e6 else (1e-3, "k") if rounded >= 1e3 else (1.0, "")
+    return f"{figure(factor * rounded, 2)} {prefix}{unit}"
+
+
+def cause_texts(c: Cause, alone: Gain | None = None) -> list[str]:
+    """What is known of a cause besides its sizes, a text each: force, evidence, gain where it is the only cause, look-alikes, correction."""
+    force = force_words(c.force)
+    texts = [f"Its force is {force}."] if force else []
+    texts.append(f"{strength(c)[0].upper()}{strength(c)[1:]}.")
+    texts += [c.evidence.rstrip(".") + "."] if c.evidence else []
+    if alone is not None and alone.ci95[0] > 0.0:
+        removed = f"{figure(alone.before - alone.after)} m of {figure(alone.before)} m {_METRICS.get(alone.metric, alone.metric)}"
+        texts.append(f"Naming it removes {removed} on held-out runs.")
+    if c.confused_with:
+        texts.append(f"These data cannot separate it from {', '.join(c.confused_with)}.")
+        texts += [f"A trial that can: {c.separating_manoeuvre.rstrip('.')}."] if c.separating_manoeuvre else []
+    return texts + ([f"To correct the record, write in dataset.toml: {c.correction}"] if c.correction else [])
+
+
+def cause_lines(c: Cause, width: int = WIDTH, alone: Gain | None = None) -> list[str]:
+    """A cause with sizes, force, evidence and look-alikes; alone: the gain where it is the only cause."""
+    part = _effect(c.effect)
+    lines = paragraph(f"{c.rank}. {c.effect}" + (f": {part.summary}" if part else ""), width, "  ", " " * 5)
+    for name, e in c.parameters.items():
+        lines += paragraph(estimate(c.effect, name, e), width, " " * 7, " " * 9)
+    for text in cause_texts(c, alone):
+        lines += paragraph(text, width, " " * 5)
+    return lines
+
+
+def _candidate_lines(d: Diagnosis, width: int) -> list[str]:
+    shown = d.candidates[:_SHOWN]
+    if not shown:
+        return []
+    wide = max(len(c.effect) for c in shown)
+    lines = [f"Candidates (best {len(shown)} of {len(d.candidates)}):", f"  {'effect':<{wide}s}     score  result"]
+    for c in shown:
+        score = f"{c.score:8.1f}" if math.isfinite(c.score) else "       -"
+        lines += paragraph(f"{c.effect:<{wide}s}  {score}  {c.rejected_because}", width, "  ", " " * (wide + 14))
+    return [*lines, ""]
+
+
+def _detectable_lines(d: Diagnosis, width: int) -> list[str]:
+    """Everything where nothing was found; else the best candidates that were not named."""
+    kept = (
+        sorted(d.candidates, key=lambda c: c.effect) if d.verdict == "none" else [c for c in d.candidates[:_SHOWN] if c.rejected_because != "named"]
+    )
+    kept = [c for c in kept if c.detectable]
+    if not kept:
+        return []
+    wide = max(len(c.effect) for c in kept)
+    lines = paragraph(DETECTION_LIMIT + ":", width)
+    for c in kept:
+        lines += paragraph(f"{c.effect:<{wide}s}  {detectable(c)}", width, "  ", " " * (wide + 4))
+    return [*lines, ""]
+
+
+def _wrong_lines(d: Diagnosis, width: int) -> list[str]:
+    """What the plain model gets wrong in each channel, and what is taken as noise."""
+    lines = ["What the plain physics model gets wrong:"] if d.what_is_wrong else []
+    for w in d.what_is_wrong:
+        none = "its missing force shows no dependence on motion, actuators or time alone"
+        when = w.when if w.depends_on else f"{w.when}; {none}".removeprefix("; ")
+        lines += paragraph(f"{w.channel}, {100 * w.share_of_error:.0f} % of the error: {when}", width, "  ", "      ")
+    lines += [""] if lines else []
+    if noise := d.unexplained_after.get("taken_as_noise"):
+        lines.append("Treated as noise:")
+        for channel, words in noise.items():
+            lines += paragraph(f"{channel}: {words}", width, "  ", "      ")
+        lines.append("")
+    return lines
+
+
+def summary_lines(d: Diagnosis, width: int = WIDTH, full: bool = True) -> list[str]:
+    """A diagnosis as plain lines of at most `width` columns.
+
+    Args:
+        full: with what the plain model gets wrong, the candidates and the detection limits; else the verdict, its causes and the next command.
+    """
+    lines = [*paragraph(f"Diagnosis of {d.dataset} ({d.seconds:.0f} s)", width), "", *paragraph(headline(d), width), ""]
+    for warning in d.warnings:
+        lines += paragraph(f"WARNING: {warning}", width, "", " " * 9)
+    if d.warnings:
+        lines.append("")
+    if d.causes:
+        lines.append("Causes:")
+        for c in d.causes:
+            lines += cause_lines(c, width, d.gain if len(d.causes) == 1 else None)
+        lines.append("")
+    if full:
+        lines += _wrong_lines(d, width) + _candidate_lines(d, width) + _detectable_lines(d, width)
+    if command := next_command(d):
+        lines += [*paragraph(f"Extended model: {d.extended_model}", width), *command_lines(command, width)]
+    if not full:
+        lines += ["", "All tables (errors by channel, candidates, detection limits): --full"]
+    return lines
