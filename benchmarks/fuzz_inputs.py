@@ -237,7 +237,7 @@ IMPORT = ["data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ds/sh
 REPORT = ["report", "res", "--out", "out/r.html", "-q"]
 EXPORT = ["data", "export", "ds", "--format", "csv", "--out", "out/d"]
 LOADED = (
-    "matplotlib.pyplot", "pyarrow.parquet", "scipy.io", "shipbench.cli.app.app", "shipbench.bench.runner", "shipbench.leaderboard.pages",
+    "matplotlib.pyplot", "pyarrow.parquet", "scipy.io", "shipbench.cli.app", "shipbench.bench.runner", "shipbench.leaderboard.pages",
     "shipbench.reports.study.page", "shipbench.checking", "shipbench.importing.importer", "shipbench.importing.propose", "shipbench.data.files",
     "shipbench.predictors.physics",
 )  # fmt: skip

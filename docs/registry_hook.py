@@ -102,7 +102,7 @@ def _metrics() -> Iterator[str]:
 
 
 def _checks() -> Iterator[str]:
-    from shipbench.bench.check_faults import FAULTS
+    from shipbench.suites.checks.faults import FAULTS
 
     from shipbench.checking import base
 
