@@ -102,9 +102,8 @@ def _metrics() -> Iterator[str]:
 
 
 def _checks() -> Iterator[str]:
-    from shipbench.suites.checks.faults import FAULTS
-
     from shipbench.checking import base
+    from shipbench.suites.checks.faults import FAULTS
 
     gross = [inspect.getmodule(part) for name, part in vars(base).items() if name.startswith("mend_")]
     checks = [importlib.import_module(f"shipbench.checking.{name}") for name in base.CHECKS.built_in()]

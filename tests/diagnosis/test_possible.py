@@ -61,7 +61,7 @@ def test_what_acts_through_an_actuator_that_never_works_is_not_asked(channels: t
 
 def test_a_rudder_that_stands_still_while_the_ship_turns_does_not_work(monkeypatch):
     assert why_not(EFFECTS.get("rudder_offset"), without(DELTA, value=1e-3)) == ""  # held, for all that is known
-    monkeypatch.setattr("shipbench.diagnosis.model.linearisation.forward.standing", lambda _: {"delta": ("it turns all the same", {})})
+    monkeypatch.setattr("shipbench.diagnosis.model.forward.standing", lambda _: {"delta": ("it turns all the same", {})})
     assert "rudder never moves" in why_not(EFFECTS.get("rudder_offset"), without(DELTA, value=1e-3))
 
 
