@@ -19,7 +19,10 @@ HOUSE: dict[float, dict[str, str]] = {
         "storage": "every file and folder comes into its place in one step", "cache": "folders of the user's cache", "matlab_files": "MATLAB files",
     },
     0.3: {"regular_files": "opening files of strangers, with bounds"},
-    0.5: {"names": "names from outside", "extras": "optional packages", "kept_code": "what of a cache is trusted"},
+    0.5: {
+        "names": "names from outside", "thresholds": "numbers that decide, with their evidence",
+         "extras": "optional packages", "kept_code": "what of a cache is trusted",
+    },
     0.6: {"toml_files": "reading TOML"},
     1: {
         "registry": "parts by name, plug-ins", "specs": "`mlp[hidden=64]`", "integrate": "Runge-Kutta", "compiled": "formulas as machine code",

@@ -16,29 +16,9 @@ from ..inference.robust_prior import STRANGE, is_strange, needed
 from ..model.forward import Segments
 from ..model.linearisation import PLACES
 from ..model.term import Term
+from ..thresholds import THRESHOLDS
 from .screening import evidence
 
-_NOISES = 6.0
-"""Play behind a record of the rudder, in standard deviations of its noise, which such play takes out. (A boat of 12 m with noise of 0.1 deg and no
-play, beside a lag of 0.2 s: 0.35 and 0.37 deg, worth 90 and 106; without the noise none.)"""
-_LATE_BESIDE_LATE = 0.6
-"""Least size of a delay beside that of another sensor, in typical sizes (docs/calibration.md#sizes-that-matter)."""
-_ABREAST = 0.1
-"""Angle [rad] to the normal of a bank that was found, within which a steady wind or current makes up for its law. (Beside a bank that all runs of a
-barge followed, at 89 to 91 deg: a wind of 5.3 m/s and a current of 0.1 m/s from and to 270 deg, of which there were none.)"""
-_DOUBT, _DOUBT_LATE = 0.05, 1e-5
-"""Probability that a size is zero from which it is not sure; of a cause that begins with a run, which is chosen among hundreds of effects and runs.
-(Ten standard manoeuvres with nothing hidden: 0.01 to 1e-4; changes hidden in 24 runs: 1e-6 and less.)"""
-
-_AGAINST = -2.0
-"""2 log evidence of a cause, any one run taken away, below which the other runs speak against it. (A bank on ships of the literature that had none:
--5 to -6, but 7 to 28 with the run that lay nearest to it; true causes, development cases: 10 and more.)"""
-
-_OWN_LEFT, _OWN_SHARE = 30.0, 0.1
-"""2 log evidence of forces of single runs that may be left beside causes with values for single runs: so much, and this share of what those are
-worth. (On 21 sets with such a cause at most 0.06 of it is left, on the Esso Osaka's runs 11 to 13; on a boat whose lift builds up slowly, where a
-current or wind of 0.5 to 1.7 typical sizes was named for it, 103 to 250, a fifth to all of it. Beside two such causes together 59 were left there,
-which is too little to be seen.)"""
 _OWN_FORCE = float(np.log(0.5**2))
 """Variance of a run's own force from which its search begins, in units of the latent force."""
 _FACTORS = np.log(np.array([0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0]) ** 2)
@@ -79,7 +59,7 @@ def is_borne_by_one(fit: Fit, index: int) -> bool:
         return np.asarray(fitted - np.linalg.slogdet(A)[1] + np.sum(np.log(precision)))
 
     with_all, *left = evidence(np.ones_like(inside)) - evidence(~inside)
-    return bool(with_all > 0.0 and len(left) > 1 and min(left) < _AGAINST)
+    return bool(with_all > 0.0 and len(left) > 1 and min(left) < THRESHOLDS.value("against"))
 
 
 def lasts(fit: Fit) -> bool:
@@ -121,7 +101,7 @@ def tells_runs_apart(fit: Fit) -> bool:
     the axes of the ship, beside them. What the model lacks of the ship is another force in each manoeuvre, and no current or wind explains it."""
     alone = replace(fit.prior, random=fit.prior.random[:0], log_tau2=fit.prior.log_tau2[:0])
     worth = 2.0 * (fit.solution.log_evidence - solve(fit.reduced, alone).log_evidence)
-    return own_forces(fit) < _OWN_LEFT + _OWN_SHARE * max(worth, 0.0)
+    return own_forces(fit) < THRESHOLDS.value("own_forces_left") + THRESHOLDS.value("own_forces_share") * max(worth, 0.0)
 
 
 def relies_on_a_ship(fit: Fit, effect: Effect) -> bool:
@@ -145,7 +125,7 @@ def imitates(fit: Fit, index: int) -> bool:
     if not normals:
         return False
     north, east = fit.values[index]
-    return any(n is not None and abs(np.sin(np.arctan2(east, north) - n)) < _ABREAST for n in normals)
+    return any(n is not None and abs(np.sin(np.arctan2(east, north) - n)) < THRESHOLDS.value("along_the_normal") for n in normals)
 
 
 def shows_on_any_ship(effect: Effect) -> bool:
@@ -168,7 +148,7 @@ def runs_agree(fit: Fit, index: int) -> bool:
     size, free = len(value), max(num - len(value), 1)
     squares = float(value @ np.linalg.solve(covariance(fit, index), value))
     doubt = float(f.sf(squares * free / (size * max(num - 1, 1)), size, free))
-    return doubt < (_DOUBT if fit.model.terms[index].since is None else _DOUBT_LATE)
+    return doubt < (THRESHOLDS.value("doubt") if fit.model.terms[index].since is None else THRESHOLDS.value("doubt_of_a_change"))
 
 
 def least_size(fit: Fit, term: Term) -> float:
@@ -178,12 +158,12 @@ def least_size(fit: Fit, term: Term) -> float:
     alone."""
     least = term.effect.least_size(term.setting)
     if term.effect.late and any(t.effect.late for t in fit.model.terms if t.label != term.label):
-        least = max(least, _LATE_BESIDE_LATE)
+        least = max(least, THRESHOLDS.value("delay_beside_delay"))
     if term.effect.enters == "gear" and term.effect.parameters[0].unit == "s":
         least = max(least, 0.5 * fit.plant.seg.dt / float(fit.scales.amplitudes(term, fit.plant.c.L)[0]))
     if term.effect.traits.least_unrecorded and not fit.plant.seg.commanded:
         noise = _record_noise(fit.plant.seg, term.effect.acts_through[0]) / float(fit.scales.amplitudes(term, fit.plant.c.L)[0])
-        least = max(least, term.effect.traits.least_unrecorded, _NOISES * noise)
+        least = max(least, term.effect.traits.least_unrecorded, THRESHOLDS.value("play_over_noise") * noise)
     return least
 
 
