@@ -65,7 +65,7 @@ def test_a_network_is_refused_before_the_study_with_the_one_command(folder, name
 
 def test_models_marks_the_networks_and_no_other(folder):
     done = without_networks(
-        "from shipbench.bench.listing import describe_parts; from shipbench.errors import InputError\n"
+        "from shipbench.reports.listing import describe_parts; from shipbench.errors import InputError\n"
         "from shipbench.predictors.base import PREDICTORS\n"
         "for part in describe_parts(PREDICTORS):\n"
         "    try: PREDICTORS.get(part['name']); refused = ''\n"

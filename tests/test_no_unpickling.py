@@ -15,7 +15,7 @@ from shipbench.predictors.base import make_predictor, parse_spec
 
 PACKAGE = Path(__file__).parent.parent / "shipbench"
 LOADERS = {"load", "loads", "Unpickler", "read_pickle", "read_hdf"}
-FROM_MEMORY = {"bench/isolate.py", "bench/executors.py"}
+FROM_MEMORY = {"bench/answering.py", "bench/isolate.py", "bench/executors.py"}
 """Pipes between our own processes, and a copy in memory."""
 
 

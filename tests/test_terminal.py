@@ -21,7 +21,7 @@ from shipbench.diagnosis.result import Cause, Diagnosis, Estimate
 from shipbench.leaderboard.board import Board
 from shipbench.leaderboard.pages import build_board
 from shipbench.render.table import Table, TableColumn, number
-from shipbench.render.terminal import command_lines
+from shipbench.render.terminal import command_lines, show_table
 from shipbench.reports.diagnosis.text import summary_lines
 from shipbench.steps import listening, step, tick, within
 
@@ -105,7 +105,7 @@ def test_a_name_of_any_length_and_every_figure_are_whole():
         row |= {f: 1234.5, f"{f}_low": 1000.25, f"{f}_high": 2000.75}
     columns = [TableColumn("model", "model"), *[TableColumn(f"figure of {f} [m]", f, number(2), interval=f < "f7") for f in figures]]
     table, stream = Table("Title", columns, [row, row | {"model": "hold"}]), io.StringIO()
-    table.show(Console(file=stream, width=80))
+    show_table(table, Console(file=stream, width=80))
     fits(stream.getvalue(), 80)
     whole(table, stream.getvalue())
     assert name in stream.getvalue().splitlines()  # on a line of its own
@@ -114,7 +114,7 @@ def test_a_name_of_any_length_and_every_figure_are_whole():
 def test_a_table_of_words_that_does_not_fit_becomes_a_list():
     stream = io.StringIO()
     columns = [TableColumn("what", "a"), TableColumn("why", "b"), TableColumn("then", "c")]
-    Table("Title", columns, [{"a": "one", "b": "long words " * 9, "c": "short"}]).show(Console(file=stream, width=80))
+    show_table(Table("Title", columns, [{"a": "one", "b": "long words " * 9, "c": "short"}]), Console(file=stream, width=80))
     fits(stream.getvalue(), 80)
     assert stream.getvalue().splitlines()[1:3] == ["one", "  why: " + ("long words " * 6).strip() + " long"]
 

@@ -232,7 +232,7 @@ def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz"
         accepted = "Metadata may hold text, numbers, booleans, lists and tables."
         raise InputError(f"data set '{dataset.name}' cannot be written: {error}. {accepted}") from None
     try:
-        with in_one_step(folder / name) as fresh:
+        with in_one_step(folder / name, suffix=f".{format}") as fresh:
             if format == "parquet":
                 table.to_parquet(fresh, index=False)
             else:

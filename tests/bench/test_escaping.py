@@ -17,6 +17,7 @@ from shipbench.leaderboard.formats import render
 from shipbench.leaderboard.pages import build_board
 from shipbench.render.escaping import csv_text, latex_text, markdown_text
 from shipbench.render.table import Table, TableColumn
+from shipbench.render.terminal import show_table
 from shipbench.reports.diagnosis.page import diagnosis_page as page
 
 SCRIPT = "<script>alert(1)</script>"
@@ -93,7 +94,8 @@ def test_names_of_runs_in_predictions_are_text(tmp_path):
 
 
 def test_a_terminal_gets_no_commands_and_no_markup(capsys):
-    Table("t\x1b[2J", [TableColumn("h\x9b2J", "a")], [{"a": "[red]x[/nothing] \u202e"}], ["n\x07"]).show(console_for_tables())
+    table = Table("t\x1b[2J", [TableColumn("h\x9b2J", "a")], [{"a": "[red]x[/nothing] \u202e"}], ["n\x07"])
+    show_table(table, console_for_tables())
     shown = capsys.readouterr().out
     assert not set(shown) & set("\x1b\x9b\x07\u202e")
     assert "[red]x[/nothing] \\u202e" in shown

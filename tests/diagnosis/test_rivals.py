@@ -20,16 +20,16 @@ def step(number: int, label: str, score: float) -> Step:
 
 def test_only_what_came_near_in_the_round_in_which_a_cause_was_added_is_its_rival():
     steps = [step(0, "speed_scale", 90.0), step(0, "wind", 60.0), step(1, "wind", 40.0), step(1, "wave_drift", 38.0), step(1, "list", 12.0)]
-    named = [SimpleNamespace(label="wind")]
+    named = [Term(EFFECTS.get("wind"))]
     found = SimpleNamespace(selection=SimpleNamespace(steps=steps), final=SimpleNamespace(model=SimpleNamespace(terms=named)))
     assert rivals_of(found, named[0]) == ("wave_drift",)
-    named.append(SimpleNamespace(label="wave_drift"))
+    named.append(Term(EFFECTS.get("wave_drift")))
     assert rivals_of(found, named[0]) == ()
 
 
 def test_mass_and_thrust_are_always_told_as_confused():
     """The one that was there was behind the other by up to 24 on ships of five simulators."""
-    steps, mass = [step(0, "mass_change", 40.0), step(0, "thrust_gain", 18.0), step(0, "wind", 17.0)], SimpleNamespace(label="mass_change")
+    steps, mass = [step(0, "mass_change", 40.0), step(0, "thrust_gain", 18.0), step(0, "wind", 17.0)], Term(EFFECTS.get("mass_change"))
     found = SimpleNamespace(selection=SimpleNamespace(steps=steps), final=SimpleNamespace(model=SimpleNamespace(terms=[mass])))
     assert rivals_of(found, mass) == ("thrust_gain",)
 
@@ -37,7 +37,7 @@ def test_mass_and_thrust_are_always_told_as_confused():
 @pytest.mark.parametrize(("named", "other", "told"), [("wind", "wave_drift", True), ("wave_drift", "wind", True), ("current", "wave_drift", False)])
 def test_wind_and_waves_are_told_as_confused_where_their_formulas_decide(named: str, other: str, told: bool):
     """Drift in waves by another formula on a tanker: wind was ahead by 25 of 706, and waves not spoken of."""
-    steps, cause = [step(0, named, 706.0), step(0, other, 681.0)], SimpleNamespace(label=named)
+    steps, cause = [step(0, named, 706.0), step(0, other, 681.0)], Term(EFFECTS.get(named))
     found = SimpleNamespace(selection=SimpleNamespace(steps=steps), final=SimpleNamespace(model=SimpleNamespace(terms=[cause])))
     assert rivals_of(found, cause) == ((other,) if told else ())
 

@@ -378,7 +378,7 @@ def test_the_size_of_the_blocks_does_not_change_the_result(trial_import, monkeyp
     trial_import(logged(t), plan)
     whole = load_dataset("out")
     assert len(whole) == 8
-    monkeypatch.setattr("shipbench.importing.tables.TEXT_BLOCK", 4000)
+    monkeypatch.setattr("shipbench.importing.delimited.TEXT_BLOCK", 4000)
     trial_import(logged(t), plan, "--force")
     assert load_dataset("out").fingerprint == whole.fingerprint
 

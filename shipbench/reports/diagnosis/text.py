@@ -157,7 +157,7 @@ def headline(d: Diagnosis) -> str:
 
 def next_command(d: Diagnosis) -> str:
     """The command that compares the plain model with the extended one."""
-    inside = [c.effect for c in d.causes if not EFFECTS.get(c.effect).traits.describes_data]
+    inside = [c.effect for c in d.causes if not (c.effect in EFFECTS and EFFECTS.get(c.effect).traits.describes_data)]
     model = "+".join(["physics", *inside])
     return f"shipbench run --model physics --model {shlex.quote(model)} --dataset {shlex.quote(d.spec or d.dataset)}" if inside else ""
 
