@@ -47,7 +47,7 @@ def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -
 
 
 def _gear_candidate(found: Analysis, g: GearFinding, named: Sequence[str], motion: Candidate | None) -> Candidate:
-    """The same of an effect of a gear; motion: what the ship's motion says of it."""
+    """Candidate line of an effect of an actuator; motion: the line that the ship's motion gives it."""
     name, unit = EFFECTS.get(g.effect).parameters[0].name, EFFECTS.get(g.effect).parameters[0].unit
     sizes = [g.detectable, motion.detectable[name]] if motion else [g.detectable]
     detectable = {name: float(np.fmin.reduce(sizes))}

@@ -191,7 +191,7 @@ def _late_cause(rank: int, found: Analysis, late: LateVelocities) -> Cause:
 
 
 def remaining(found: Analysis) -> dict[str, Any]:
-    """How much of the latent force the causes took away, and what the rest depends on."""
+    """Share of the latent force that the causes took away, and the dependence that the rest shows."""
     null, final = found.selection.null, found.final
     share = 1.0 - np.exp(final.hyper.log_force - null.hyper.log_force)
     force = np.exp(0.5 * final.hyper.log_force) * null.scales.w

@@ -18,6 +18,7 @@ from shipbench.diagnosis.model.forward import Plant
 from shipbench.diagnosis.model.rollout import Active
 from shipbench.diagnosis.selection.analysis import plain_model
 from shipbench.diagnosis.selection.stepwise import select
+from shipbench.diagnosis.thresholds import THRESHOLDS
 from shipbench.effects.base import EFFECTS, Effect, Parameter
 from shipbench.ops import Array
 from shipbench.physics.actuators import Gear, gear_path
@@ -182,7 +183,8 @@ def test_a_gear_behind_its_record_is_named(effect: str, gear: Behind, size: floa
 def test_play_is_judged_beside_a_lag_that_is_too_small_to_matter(monkeypatch: pytest.MonkeyPatch):
     """On a boat a record that is 0.2 s early was passed over, and play that is not there named for it."""
     ship, trials = scaled(load_mmg_ship("kcs"), 12.0), Trials(runs=12, samples=120, thrusters=False, astern=False, gusts=0.5, noise=0.3)
-    monkeypatch.setattr("shipbench.diagnosis.selection.stepwise._HOPE_MARGIN", np.inf)  # no refit is given up
+    margin = replace(THRESHOLDS.rows["refit_margin"], value=np.inf)  # no refit is given up
+    monkeypatch.setitem(THRESHOLDS.rows, margin.name, margin)
     found = select(plain_model(Plant.of(_recorded_before(ship, Behind("delta", "T2"), 0.2, DELTA, trials))), 10.0)
     (play,) = [s for s in found.steps if s.term.label == "rudder_backlash" and s.round == 0]
     assert play.score > 30.0

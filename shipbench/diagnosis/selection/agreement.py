@@ -19,10 +19,8 @@ from ..model.term import Term
 from ..thresholds import THRESHOLDS
 from .screening import evidence
 
-_OWN_FORCE = float(np.log(0.5**2))
-"""Variance of a run's own force from which its search begins, in units of the latent force."""
 _FACTORS = np.log(np.array([0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0]) ** 2)
-"""Of the variances of the values of single runs, or pieces, of which the likeliest is taken."""
+"""Grid of factors of the variances of the values of single runs, or pieces; the likeliest is taken."""
 
 
 def inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
@@ -37,8 +35,9 @@ def inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
 
 
 def covariance(fit: Fit, index: int) -> np.ndarray:
-    """Of the values of a cause that all runs share, (P, P) in typical sizes: the model's, widened to the sandwich where that is wider. Where only the
-    forces tell how far ahead on the ship positions and velocities are, by as much more as the form of a hull moves those."""
+    """Covariance of the values of a cause that all runs share, (P, P) in typical sizes: the model's, widened to the
+    sandwich where that is wider. Where only the forces tell how far ahead on the ship positions and velocities are, by
+    as much more as the form of a hull moves those."""
     at, term = np.flatnonzero(np.isin(fit.prior.shared, fit.columns_of(index))), fit.model.terms[index]
     wider = np.maximum(1.0, inflation(fit, at)) ** 0.5
     cov = fit.solution.cov[np.ix_(at, at)] * np.outer(wider, wider)
@@ -63,10 +62,10 @@ def is_borne_by_one(fit: Fit, index: int) -> bool:
 
 
 def lasts(fit: Fit) -> bool:
-    """Whether one value in each run of all causes that have such explains the runs no worse than one in each piece of it, what runs share held where
-    it is: a wind or a current stays for a run, what the model lacks of the ship changes with the manoeuvre. Of all together, since they take over
-    from each other, and a wind has gusts (that of the Esso Osaka beside a current of 0.01 m/s: 123 and 153; both together: 462 and 344). Runs of one
-    piece cannot tell."""
+    """Whether one value in each run of all causes that have such explains the runs no worse than one in each piece of
+    it, what runs share held where it is: a wind or a current stays for a run, what the model lacks of the ship changes
+    with the manoeuvre. All such causes are judged together, since they take over from each other, and a wind has gusts
+    (docs/calibration.md#values-of-single-runs). Runs of one piece cannot tell."""
     columns, num = fit.prior.random, len(fit.gram.run)
     pieces = replace(fit.gram, run=np.arange(num), runs=num).reduce(fit.hyper.log_force).S[:, columns]
     held = np.zeros(pieces.shape[-1])
@@ -91,7 +90,8 @@ def own_forces(fit: Fit) -> float:
     with_own = np.hstack([unit[:, :-1], constant, unit[:, -1:]])
     slope = np.insert(gram.slope, [end] * 3, 0.0, axis=1)
     wider = replace(gram, G=np.swapaxes(with_own, 0, 1) @ gram.G @ with_own, slope=slope)
-    own = replace(prior, random=np.arange(shared, end + 3), log_tau2=np.append(prior.log_tau2, np.full(3, _OWN_FORCE)))
+    start = np.full(3, float(np.log(0.5**2)))  # half the latent force
+    own = replace(prior, random=np.arange(shared, end + 3), log_tau2=np.append(prior.log_tau2, start))
     log_force = fit.hyper.log_force
     return 2.0 * (evidence(wider, own, log_force, 3)[0] - evidence(gram, prior, log_force)[0])
 
@@ -135,8 +135,8 @@ def shows_on_any_ship(effect: Effect) -> bool:
 
 
 def bends(fit: Fit, index: int, null: Fit) -> bool:
-    """Whether a cause that goes by the ship file is in a model that needs a stranger ship than the plain model `null` does: then it explains nothing,
-    but one error by another. (A late rudder for lift that builds up slowly: the thrusters 9 spreads off, without it 5.)"""
+    """Whether a cause that goes by the ship file is in a model that makes the ship an outlier, which she is not in the
+    plain model `null`: then it explains one error by another (docs/calibration.md#ship-file)."""
     return not shows_on_any_ship(fit.model.terms[index].effect) and is_strange(needed(fit)) and not is_strange(needed(null))
 
 
@@ -152,10 +152,12 @@ def runs_agree(fit: Fit, index: int) -> bool:
 
 
 def least_size(fit: Fit, term: Term) -> float:
-    """Below which a cause does not matter, in typical sizes. Of a gear's time half a sample, too, for which an order may have stood before it was
-    recorded; of play behind a record what the record's noise makes of it. Beside the delay of another
-    sensor as of the rudder's: by what positions are later than velocities, the track tells; which of the two is late, how soon the ship answers
-    alone."""
+    """Least size of a cause that is practically significant, in typical sizes.
+
+    Times of an actuator are at least half a sample, for which an order may have stood before it was recorded. Play
+    behind a record exceeds what the record's noise makes of it. A delay beside that of another sensor is judged as that
+    of a rudder: which of the two sensors is late, the ship's answer alone tells.
+    """
     least = term.effect.least_size(term.setting)
     if term.effect.late and any(t.effect.late for t in fit.model.terms if t.label != term.label):
         least = max(least, THRESHOLDS.value("delay_beside_delay"))

@@ -19,43 +19,26 @@ from ..inference.robust_prior import NOTICEABLE
 from ..model.forward import HULL, Plant
 from ..model.linearisation import NUM_BASE, Scales
 from ..preparation.actuator_readings import judged
+from ..thresholds import THRESHOLDS
 from .requirements import Standard
 from .stepwise import Selection, candidates_for, select
 from .unknown import NO_FORM, Dependence, Search, dependences
 
-THRESHOLD = 10.0
-"""Least gain of a named cause, 2 log Bayes factor. From nulls on the development ships, whose structure differs from the model's; the bootstrap of
-each diagnosis may raise it."""
-HULL_THRESHOLD = 30.0
-GENERIC_THRESHOLD, _OFF_FORM, _NO_FORM_THRESHOLD = 20.0, (4.0, 12.0), 16.0
-"""Least score of an unknown force. What follows something that a ship's form depends on (`NO_FORM` is what it does not) must be worth so many times
-`Selection.off_form` besides: the first where what it takes is twice what is noticeable, the second where it is what is noticeable, between and
-below in proportion. (550 sets without such a force, on development ships and ships of the literature under 18 conditions: 17 below that at the
-nearest. Below what is noticeable, a tanker of 305 m in 30 runs of 180 s with nothing hidden: 101 for n|n| delta in yaw, where twelve times would ask
-96 and this asks 109.) Nor does an error of a sensor depend on the form: the record contradicts itself."""
-_FAR_OFF = 0.75
-"""The first factor grows with `off_form` from 5 on: so far off the regressions the form is a ship's own. (It rests on two boats with nothing hidden,
-of 17 and 23 m, with `off_form` 16: 111 to 127 and 179 for u^2 delta, where four times would ask 85.)"""
-GENERIC_MARGIN = 10.0
-"""Least that it must be worth beyond all named causes together, as what the runs show in their place; within so much it is told beside them."""
-_CONTENDS, _CONTENDERS = 0.4, 3
-"""Share of what named causes are worth from which, and number of dependences that are looked at more closely in their place. (A log
-mounted at an angle: worth 1525 before the noise is known, which holds it, and 3379 then; what was named in its place 3210.)"""
-_LEAST_FORCE, _LEAST_ERROR = 0.07, 0.3
-"""Least size of an unknown force in units of the latent force: 0.35 mm/s^2; in yaw 7e-6 rad/s^2 at 130 m; and of an error in units of ordinary noise:
-0.07 deg, 0.012 m/s, 0.012 deg/s."""
+THRESHOLD = THRESHOLDS.value("evidence")
+"""Least gain of a named cause, 2 log Bayes factor; the bootstrap of each diagnosis may raise it."""
+HULL_THRESHOLD = THRESHOLDS.value("evidence_of_hull")
 _HULL_ALONE = ("speed", "sway velocity", "yaw rate")
 _ESTIMATED = ("rudder", "revolutions", "revolutions and rudder", "speed and rudder")
-"""A force that follows nothing but the hull's own motion is the hull's: where its derivatives are off, it is no unknown cause, and others are judged
-beside it (in turns the rudder, too, follows the yaw rate). So with rudder and revolutions, where the ship file leaves rudder or propeller to an
-estimate."""
+"""Variables of forces that belong to the hull where its derivatives are off, and to rudder and propeller where the ship
+file leaves them to an estimate: they are no unknown cause, and others are judged beside them."""
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """What was found in one set of runs. threshold: that was used; hull: 2 log evidence that the hull is off the regressions, or 0; gears: named
-    findings; plain_gears: the ordinary gears that fit best; unknown: the dependence that no named cause covers; rival: one that covers about as much
-    as the named causes; left: one that is there beside them; misread: what the records of actuators err by."""
+    """Findings of one set of runs. threshold: that was used; hull: 2 log evidence that the hull is off the regressions,
+    or 0; gears: named findings; plain_gears: the ordinary gears that fit best; unknown: the dependence that no named
+    cause covers; rival: one that covers about as much as the named causes; left: one that is there beside them;
+    misread: what the records of actuators err by."""
 
     selection: Selection
     threshold: float
@@ -91,7 +74,7 @@ class Analysis:
         return score, supporters, "with and without it beside the other causes" if len(self.final.model.terms) > 1 else "with and without it"
 
     def extension(self, name_hull: bool) -> Extension:
-        """What the diagnosis adds to the plain model."""
+        """Terms, values and gears that the diagnosis adds to the plain model."""
         if self.unknown is not None:
             return Extension()
         gears = {g.actuator: g.gear for g in self.gears} or None
@@ -99,7 +82,8 @@ class Analysis:
 
 
 def causes_of(plant: Plant, threshold: float, only: Sequence[str] | None = None, settled: Sequence[str] = ()) -> tuple[Extension, dict[str, Gear]]:
-    """What one training part alone leads to, by the same selection, with the threshold of the whole; and the best ordinary gears."""
+    """Causes of one training part alone, by the same selection, with the threshold of the whole; and the best ordinary
+    gears."""
     selection = select(plain_model(plant, only, settled), threshold)
     findings, plain, _ = find_in_gears(selection.final.plant)
     gears = {g.actuator: g.gear for g in _named_gears(findings, threshold, only)}
@@ -141,7 +125,7 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
     Once the budget is spent, no dependences are told: they are compared with each other.
     """
     draws = null_maxima(null, seed)
-    threshold = max(THRESHOLD, float(np.quantile(draws, 0.95))) if only is None else 0.0
+    threshold = max(THRESHOLD, float(np.quantile(draws, THRESHOLDS.value("null_quantile")))) if only is None else 0.0
     selection = select(null, np.inf if cautious else threshold)
     null = selection.null
     findings, plain, errors = find_in_gears(null.plant)
@@ -171,30 +155,37 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
 
 
 def asked(d: Dependence, off_form: float) -> float:
-    """Least score of an unknown force or error. What goes with time, but leaves the latent force as large as it was, is motion with the waves."""
-    if not d.of_sensor and d.variable == "time" and d.taken < _LEAST_FORCE:
+    """Least score of an unknown force or error, 2 log evidence; infinite for one that is too small.
+
+    A force that depends on a variable of a ship's form must be worth several times `off_form` (`Selection.off_form`)
+    besides: the more, the less of the latent force it takes. A force that depends on time, but leaves the latent force
+    as large as it was, is motion with the waves.
+    """
+    least = THRESHOLDS.value("error_size") if d.of_sensor else THRESHOLDS.value("force_size")
+    if not d.of_sensor and d.variable == "time" and d.taken < least:
         return np.inf
     ahead = (d.axis, d.variable) == ("surge", "nothing")  # a resistance or a propeller of another form comes near a constant
     if d.of_sensor or (d.variable in NO_FORM and not ahead):
-        return _NO_FORM_THRESHOLD if d.size > (_LEAST_ERROR if d.of_sensor else _LEAST_FORCE) else np.inf
-    seen, hardly = _OFF_FORM
+        return THRESHOLDS.value("evidence_free_of_form") if d.size > least else np.inf
+    seen, hardly = THRESHOLDS.value("off_form_of_large"), THRESHOLDS.value("off_form_of_small")
     ordinary = seen + (hardly - seen) * max(2.0 - d.taken / NOTICEABLE, 0.0)
-    times = max(ordinary, _FAR_OFF * off_form)
-    return GENERIC_THRESHOLD + times * off_form if d.taken > _LEAST_FORCE else np.inf
+    times = max(ordinary, THRESHOLDS.value("off_form_slope") * off_form)
+    return THRESHOLDS.value("evidence_of_unknown") + times * off_form if d.taken > least else np.inf
 
 
 def _unknown(selection: Selection, gears: Sequence[GearFinding], search: Search) -> tuple[Dependence | None, Dependence | None]:
     """The dependence that beats all named causes together, if one does; or a sensor's error that comes about as near."""
     named = bool(selection.final.model.terms) or bool(gears)
     worth = max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) if named else 0.0
-    found = [d for d in search.found if d.score > max(asked(d, selection.off_form), _CONTENDS * worth)]
-    contenders = [d if is_spent() else search.settled(d) for d in found[:_CONTENDERS]] if named else found[:1]
-    best = max(contenders, key=lambda d: d.score, default=None)
+    least, first = THRESHOLDS.value("contender_share") * worth, THRESHOLDS.count("contenders")
+    found = [d for d in search.found if d.score > max(asked(d, selection.off_form), least)]
+    contenders = [d if is_spent() else search.settled(d) for d in found[:first]] if named else found[:1]
+    best, margin = max(contenders, key=lambda d: d.score, default=None), THRESHOLDS.value("unknown_margin")
     if best is None or best.has_name:
         return None, None
-    if not named or best.score > worth + GENERIC_MARGIN:
+    if not named or best.score > worth + margin:
         return best, None
-    return None, best if best.of_sensor and best.score > worth - GENERIC_MARGIN else None
+    return None, best if best.of_sensor and best.score > worth - margin else None
 
 
 def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:

@@ -10,25 +10,18 @@ import numpy as np
 from ...physics.wind import apparent_wind
 from ..model.forward import Plant, Segments
 from ..model.linearisation import Linearisation
+from ..thresholds import THRESHOLDS
 
 Features = tuple[np.ndarray, ...]
-_SHORTEST, _LONGEST, _MOST_PERIODS = 8.0, 200.0, 60
-"""Periods that are tried, in seconds (Froude-scaled, 130 m), and how many at most: even in frequency, from one to the next the longest run sees half
-a cycle more, so that one of them is near enough to any."""
-_LONGEST_SWELL = 1.8
-"""Longest period of waves that rock a ship [s], for the root of her length [m]: of a wave of five ship lengths (T^2 = 2 pi lambda / g)."""
-_SHORTEST_WAVE, _MOST_WAVES, _MOST_KNOTS = 4.0, 25, 5000
-"""Shortest wave over the places visited that is tried, in ship lengths, most of them in twice the extent of the places, and most knots of the force
-at which they are compared."""
-_MIRROR = np.array([1.0, -1.0])[:, None, None]
 _CENTRED = ("heading", "position", "run")
-"""Of these only differences count: a force that is always there is none that follows them."""
+"""Variables of which only differences count: a force that is always there does not depend on them."""
 
 
 class State(NamedTuple):
-    """What a force or an error may follow, in units of the root mean square of the record: motion u, v, r over ground, actuators n, delta, F_b, F_s;
-    psi [rad]; x, y: place, from the middle of all; t: time since the run began [s]; run: from 0 for the first to 1 for the last; air: velocity of the
-    ship relative to the measured air, forward and to starboard; calm: to air at rest."""
+    """Variables that a force or an error may depend on, in units of the root mean square of the record: motion u, v, r
+    over ground, actuators n, delta, F_b, F_s; psi [rad]; x, y: place, from the middle of all; t: time since the run
+    began [s]; run: from 0 for the first to 1 for the last; air: velocity of the ship relative to the measured air,
+    forward and to starboard; calm: to air at rest."""
 
     x: np.ndarray
     y: np.ndarray
@@ -141,9 +134,12 @@ def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
     wind = None if seg.wind is None else np.swapaxes(seg.wind[:, :-1], 0, 1)
     on, aside = (_state(plant, middle[0], act, t, wind) for middle in (lin.middle, lin.aside))
     ends = _ends(plant)
-    low, high = 1.0 / (_LONGEST * plant.froude), 1.0 / max(_SHORTEST * plant.froude, 4.0 * seg.dt)
-    tried = np.linspace(low, high, min(1 + int(np.ceil(2.0 * max(high - low, 0.0) * ends)), _MOST_PERIODS))
-    rocking = tried > 1.0 / (_LONGEST_SWELL * plant.c.L**0.5)
+    low = 1.0 / (THRESHOLDS.value("longest_period") * plant.froude)
+    high = 1.0 / max(THRESHOLDS.value("shortest_period") * plant.froude, 4.0 * seg.dt)
+    # even in frequency: from one to the next the longest run sees half a cycle more, so that one is near enough to any
+    even = 1 + int(np.ceil(2.0 * max(high - low, 0.0) * ends))
+    tried = np.linspace(low, high, min(even, THRESHOLDS.count("periods")))
+    rocking = tried > 1.0 / (THRESHOLDS.value("longest_swell") * plant.c.L**0.5)
     rhythms, periods = ({f"cos(2 pi t / {T:.3g} s + phase)": _period(float(T)) for T in 1.0 / part} for part in (tried[rocking], tried[~rocking]))
     waves, compared = _waves(lin)
     forms = {**_OF_FORCES, "time": _grown(ends) | periods, "waves": rhythms, "position": {**_OF_FORCES["position"], **waves}}
@@ -168,10 +164,11 @@ def _waves(lin: Linearisation) -> tuple[dict[str, Form], int]:
     plant, seg = lin.plant, lin.plant.seg
     at = np.minimum(np.round(np.arange(plant.knots) * plant.knot_time / seg.dt).astype(int), plant.steps)
     known, (centre, unit) = seg.mask[:, at], _places(seg)
-    every = 1 + int(known.sum()) // _MOST_KNOTS
+    every = 1 + int(known.sum()) // 5000  # so many knots of the force tell the waves apart
     places, force = ((lin.motion[:, at, :2][known] - centre) / unit)[::every], lin.point.w[known][::every]
     step = np.pi / max(float(np.max(np.ptp(places, axis=0))), 1e-9)
-    most = min(int(2.0 * np.pi * unit / (_SHORTEST_WAVE * plant.c.L) / step), _MOST_WAVES)
+    shortest = THRESHOLDS.value("shortest_wave") * plant.c.L
+    most = min(int(2.0 * np.pi * unit / shortest / step), THRESHOLDS.count("waves"))
     i, j = np.meshgrid(np.arange(-most, most + 1), np.arange(most + 1), indexing="ij")
     numbers = step * np.stack([i, j], axis=-1)[((j > 0) | (i > 0)) & (np.hypot(i, j) <= most)]
     if not len(numbers):
@@ -196,7 +193,7 @@ def _grown(ends: float) -> dict[str, Form]:
 
 
 def _ends(plant: Plant) -> float:
-    """How long the longest run lasts [s]."""
+    """Duration of the longest run [s]."""
     seg = plant.seg
     return float(np.max(seg.start + seg.dt * (seg.mask.sum(axis=1) - 1)))
 
@@ -204,7 +201,8 @@ def _ends(plant: Plant) -> float:
 def _features(of: Forms, on: State, aside: State, real: np.ndarray, ways: Mapping[str, int]) -> dict[str, list[Feature]]:
     """By variable. ways: of forms that were chosen from more than stand here."""
     found: dict[str, list[Feature]] = {}
-    mirrored = on._replace(v=-on.v, r=-on.r, delta=-on.delta, **{name: getattr(on, name) * _MIRROR for name in ("air", "calm")})
+    to_starboard = np.array([1.0, -1.0])[:, None, None]
+    mirrored = on._replace(v=-on.v, r=-on.r, delta=-on.delta, air=on.air * to_starboard, calm=on.calm * to_starboard)
     for variable, forms in of.items():
         found[variable] = []
         for name, form in forms.items():
@@ -240,5 +238,5 @@ def _places(seg: Segments) -> tuple[np.ndarray, float]:
 
 
 def _rms(x: np.ndarray) -> np.ndarray:
-    """Of every row."""
+    """Root mean square of every row."""
     return np.maximum(np.sqrt(np.mean(np.square(x), axis=1)), 1e-9)

@@ -10,11 +10,9 @@ import numpy as np
 from ..inference.laplace import Fit
 from ..inference.robust_prior import STRANGE_SIZE
 from ..model.term import Term
+from ..thresholds import THRESHOLDS
 from .agreement import bends, imitates, is_borne_by_one, is_on_a_ship, lasts, least_size, matters, relies_on_a_ship, runs_agree, tells_runs_apart
 from .screening import Score
-
-_MISTAKEN, _OF_RUNS = 10.0, 50.0
-"""Evidence asked besides of effects that absorb what the form of a hull lacks, and of values of single runs (docs/calibration.md#evidence-asked)."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,11 @@ class Standard:
         if not self.careful:
             return 0.0
         traits = term.effect.traits
-        besides = _OF_RUNS if term.per_run else _MISTAKEN if traits.absorbs_misfit and size < STRANGE_SIZE else 0.0
+        besides = 0.0
+        if term.per_run:
+            besides = THRESHOLDS.value("evidence_of_run_values")
+        elif traits.absorbs_misfit and size < STRANGE_SIZE:
+            besides = THRESHOLDS.value("evidence_of_misfit")
         return besides + self.off_form * (term.per_run or term.since is not None or traits.between_ships)
 
 

@@ -12,18 +12,10 @@ from ..inference.gram import Gram, Prior, Reduced, accelerated, background, shar
 from ..inference.laplace import Fit
 from ..inference.linalg import log_determinant
 from ..model.term import Term
+from ..thresholds import THRESHOLDS
 
 _TAUS = np.log(np.array([0.03, 0.1, 0.3, 1.0, 3.0]) ** 2)
-_CYCLES, _LEAST_START = 6, float(np.log(0.1**2))
-_HOPELESS_PER_RUN = 14.0
-"""A score below zero, or so much lower for values per run, whose cost is high, is left as it is under the variances of the null. (On development
-ships, where the plain model rests and at an `Origin`: of 3,821 such scores none rose above 4.)"""
-_BORNE_BY_OTHERS = 0.25
-"""Share of a change's score that must be left when any one run is taken away. On ships of other equations changes that were none kept 0.13 at most;
-hidden ones (development cases) a third at least."""
-_RUNS_FOR_A_CHANGE = 8
-_ALIKE, _BY_CHANCE, _ORDERS = (0.35, 0.5), 0.05, 500
-"""Share of the runs before and after a change that are of the same kinds, at least: between the two what all but one of twenty random orders have."""
+"""Grid of log variances of the values of single runs, in squares of the typical size."""
 
 
 @dataclass(frozen=True)
@@ -68,12 +60,12 @@ def evidence(gram: Gram, prior: Prior, log_force: np.ndarray, own_random: int = 
         second = np.mean(solution.means[:, own] ** 2) + np.mean(np.diagonal(solution.covs[:, own, own], axis1=1, axis2=2))
         return solution.log_evidence, np.append(force, np.log(second))
 
-    theta = accelerated(step, np.append(log_force, prior.log_tau2[-1:] if own_random else []), _CYCLES)
+    theta = accelerated(step, np.append(log_force, prior.log_tau2[-1:] if own_random else []), 6)
     return step(theta)[0], theta[:3], float(theta[3]) if own_random else 0.0
 
 
 def _columns(fit: Fit) -> list[np.ndarray]:
-    """Where the columns of the candidates stand that `fit` was given."""
+    """Places of the columns of the candidates that `fit` was given."""
     at, columns = fit.reduced.S.shape[1] - 1 - sum(t.size for t in fit.candidates), []
     for term in fit.candidates:
         columns.append(np.arange(at, at + term.size))
@@ -108,10 +100,11 @@ def screen(fit: Fit) -> list[Score]:
         if _wrong_way(term, scores[i].estimate):
             scores[i] = replace(scores[i], score=min(scores[i].score, 0.0))
             continue
-        if scores[i].score < -_HOPELESS_PER_RUN * term.per_run or is_spent():
+        if scores[i].score < -THRESHOLDS.value("hopeless_score") * term.per_run or is_spent():
             continue
         own = term.size if term.per_run else 0
-        prior = with_columns(renumbered, len(base) + np.arange(term.size), term, max(scores[i].log_tau2, _LEAST_START))
+        start = max(scores[i].log_tau2, float(np.log(0.1**2)))  # from nothing it would not grow
+        prior = with_columns(renumbered, len(base) + np.arange(term.size), term, start)
         after, _, log_tau2 = evidence(gram.only(np.append(base, columns[i])), prior, log_force, own)
         scores[i] = replace(scores[i], score=2.0 * (after - before) - term.cost(fit.plant.seg.runs), log_tau2=log_tau2)
     return sorted(scores, key=lambda s: -s.score)
@@ -140,9 +133,11 @@ def _score(fit: Fit, term: Term, at: np.ndarray, null: float, null_runs: np.ndar
 
 
 def overlap(fit: Fit, term: Term, value: np.ndarray) -> dict[str, float]:
-    """How much of the evidence for a candidate of size `value` each other candidate could take over: 1 - gap/total, the best of its settings.
+    """Share of the evidence for a candidate of size `value` that each other candidate could take over: 1 - gap/total,
+    the best of its settings.
 
-    gap is the expected log likelihood ratio left between the two (docs/theory.md#evidence-of-a-cause); base parameters are projected out of both.
+    gap is the expected log likelihood ratio left between the two (docs/theory.md#evidence-of-a-cause); base parameters
+    are projected out of both.
     """
     by_run, base, places = _of_all_runs(fit)
     columns, S = dict(zip(fit.candidates, places, strict=True)), by_run.sum(axis=0)
@@ -170,7 +165,7 @@ def changes(fit: Fit) -> list[Score]:
     """
     (S, base, columns), barred = _of_all_runs(fit), other_kinds_from(fit.plant.seg.kinds)
     begins = np.array([k for k in places(len(S)) if k not in barred], dtype=int)
-    if not len(begins) or len(S) < _RUNS_FOR_A_CHANGE:
+    if not len(begins) or len(S) < THRESHOLDS.count("runs_for_a_change"):
         return []
     total, from_run = S.sum(axis=0), np.cumsum(S[::-1], axis=0)[::-1]
     prior, cost, found = fit.prior.precision, 2.0 * float(np.log(len(S))), []
@@ -183,7 +178,7 @@ def changes(fit: Fit) -> list[Score]:
         if score > 0.0:
             late = np.arange(len(S))[:, None, None] >= k
             least = float(np.min(_changes(total - S, from_run[k] - np.where(late, S, 0.0), base, prior, cols, cost)[0]))
-        if least >= _BORNE_BY_OTHERS * score:
+        if least >= THRESHOLDS.value("change_without_one_run") * score:
             nan = np.full(term.size, np.nan)
             found.append(Score(replace(term, since=k), score, means[best], nan, np.zeros((term.size, term.size)), np.zeros(len(S))))
     return sorted(found, key=lambda s: -s.score)
@@ -195,14 +190,15 @@ def places(runs: int) -> range:
 
 
 def other_kinds_from(kinds: Sequence[str]) -> list[int]:
-    """Of `places` those from which on mostly other kinds of manoeuvre are sailed than before, and more so than where kinds come in random order; none
-    where the kind of a run is not known."""
+    """Return those of `places` from which on mostly other kinds of manoeuvre are sailed than before, and more so than
+    in random order of the kinds; none where the kind of a run is not known."""
     if not all(kinds):
         return []
     of = np.array([[kind == one for one in sorted(set(kinds))] for kind in kinds], dtype=float)
     at, shuffle = np.array(places(len(kinds)), dtype=int), np.random.default_rng(0)
-    by_chance = [_alike(shuffle.permutation(of), at) for _ in range(_ORDERS)]
-    least = np.clip(np.quantile(by_chance, _BY_CHANCE, axis=0), *_ALIKE)
+    by_chance = [_alike(shuffle.permutation(of), at) for _ in range(500)]
+    bounds = THRESHOLDS.value("alike_lower"), THRESHOLDS.value("alike_upper")
+    least = np.clip(np.quantile(by_chance, THRESHOLDS.value("alike_by_chance"), axis=0), *bounds)
     return [int(k) for k in at[_alike(of, at) < least]]
 
 

@@ -11,21 +11,11 @@ from ..actuators.kinds import slow_on_any_ship
 from ..inference.laplace import Fit
 from ..inference.robust_prior import STRANGE_SIZE, is_strange, needed
 from ..model.linearisation import NUM_BASE, PLACES
+from ..thresholds import THRESHOLDS
 from .agreement import shows_on_any_ship
 from .analysis import Analysis
 from .other_size import better_size, size_instead_of
 
-ORDINARY_SUM = 20.0
-"""Sum of squares below which no other size is tried, which takes as long as the first fit. (With the files of ships of less than 0.6 or more than 1.7
-times the length: 22 and more.)"""
-ODD, ODD_SUM = 5.0, 75.0
-"""Of one parameter and of all, from which a cause that goes by the ship file is told with a warning. (Of 74 sets with right files 8 reach
-one of them, all of ships of the literature; of 42 with wrong ones 33.)"""
-_MOST = 100.0
-STRANGE_THRUST = 4.0
-"""Of the thrust the fit asks for, in units of what the ship file leaves open of it (of kt a factor of 1.2, of the diameter 2.2 besides)."""
-ODD_THRUST = 1.3
-"""Factor of the thrust of an estimated propeller from which it is spoken of."""
 _QUESTION = "Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)?"
 
 
@@ -38,12 +28,12 @@ def doubts_of(found: Analysis) -> list[str]:
     signs = []
     if is_strange(z) and is_strange(needed(found.selection.null)):
         signs.append(_moved(z))
-    if abs(z[PLACES["log_thrust"]]) > STRANGE_THRUST:
+    if abs(z[PLACES["log_thrust"]]) > THRESHOLDS.value("thrust_outlier"):
         signs.append(f"the propeller would have to give {_thrust_factor(fit):.2g} times the thrust that the ship file makes likely")
     for term, value in zip(fit.model.terms, fit.values, strict=True):
         if term.effect.family in ("hull", "propulsion") and np.max(np.abs(value)) > STRANGE_SIZE:
             signs.append(f"{term.label} would have to be {np.max(np.abs(value)):.1f} times its typical size")
-    if not signs and np.sum(z**2) > ORDINARY_SUM:
+    if not signs and np.sum(z**2) > THRESHOLDS.value("other_size_sum"):
         signs = better_size(found.selection.plain)
     if not signs and _is_odd(z) and (size := _size_instead(found, [term.label for term in fit.model.terms])):
         signs = [_moved(z), *size]
@@ -73,23 +63,26 @@ def odd_for(found: Analysis, named: Sequence[str]) -> list[str]:
 
 
 def _is_odd(z: np.ndarray) -> bool:
-    return bool(np.max(np.abs(z)) > ODD or np.sum(z**2) > ODD_SUM)
+    one, together = THRESHOLDS.value("doubtful_parameter"), THRESHOLDS.value("doubtful_sum")
+    return bool(np.max(np.abs(z)) > one or np.sum(z**2) > together)
 
 
 def _size_instead(found: Analysis, among: Sequence[str]) -> list[str]:
-    """What is said if a ship of nearly the same size does as well as those of the causes `among` that go by the ship file and act as forces."""
+    """Return a sign if a ship of nearly the same size does as well as those of the causes `among` that go by the ship
+    file and act as forces."""
     terms = {t.label: i for i, t in enumerate(found.final.model.terms) if t.label in among and not whatever_the_ship(t.label, found)}
     worth = sum(0.5 * found.score(i)[0] for i in terms.values())
     return size_instead_of(" and ".join(terms), worth, found.selection.plain) if terms else []
 
 
 def whatever_the_ship(name: str, found: Analysis) -> bool:
-    """Whether a cause shows beside the coefficients of another ship, too: a fault of a sensor, delay or play of a gear seen in its own record, a
-    force that breaks a symmetry which every ship has. (46 trials, with nothing, wind, a rudder offset or a current hidden, each diagnosed with
-    another ship's file: no sensor and no such force was named but those that were there, while thrust, mass and others were.) With the file of a
-    shorter ship an ordinary rudder or shaft is slow: it must be slow for the longest ship. A wind of each run and a bank act through coefficients
-    alone, and what these lack in a run's manoeuvre, or in those of one place, passes for them (a current shows in track and speeds besides; a ship
-    that towed a barge on an elastic line had a bank). Of a change, what has changed decides."""
+    """Check whether a cause shows beside the coefficients of another ship, too (docs/calibration.md#ship-file).
+
+    So do a fault of a sensor, delay or play of an actuator between command and record, and a force that breaks a
+    symmetry which every ship has. With the file of a shorter ship an ordinary rudder or shaft is slow: it must be slow
+    for the longest ship. A wind of each run and a bank do not: they act through coefficients alone, and what these lack
+    in one manoeuvre or place passes for them. Of a change, what has changed decides.
+    """
     effect = EFFECTS.get(name)
     if effect.traits.search == "change":
         effect = next((t.effect for t in found.final.model.terms if t.since is not None), effect)
@@ -97,9 +90,9 @@ def whatever_the_ship(name: str, found: Analysis) -> bool:
 
 
 def own_propeller(found: Analysis) -> list[str]:
-    """What the runs say of a propeller that the ship file leaves open."""
+    """Return a note on the thrust of a propeller that the ship file leaves open."""
     factor, ship = _thrust_factor(found.final), found.final.plant.ship
-    if max(factor, 1.0 / factor) < ODD_THRUST:
+    if max(factor, 1.0 / factor) < THRESHOLDS.value("thrust_reported"):
         return []
     what = "diameter, kt" if ship.lacks("propeller") else "kt"
     return [
@@ -109,7 +102,7 @@ def own_propeller(found: Analysis) -> list[str]:
 
 
 def _moved(z: np.ndarray) -> str:
-    largest, together = (f"more than {_MOST:.0f}" if x > _MOST else f"{x:.1f}" for x in (np.max(np.abs(z)), np.sum(z**2) ** 0.5))
+    largest, together = ("more than 100" if x > 100.0 else f"{x:.1f}" for x in (np.max(np.abs(z)), np.sum(z**2) ** 0.5))
     return f"the fit moves a parameter by {largest} times its ordinary spread (all together {together} times)"
 
 

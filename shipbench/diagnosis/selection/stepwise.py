@@ -17,34 +17,14 @@ from ..inference.robust_prior import widened
 from ..model.forward import Plant
 from ..model.linearisation import Linearisation
 from ..model.term import Term
+from ..thresholds import THRESHOLDS
 from .applicable import why_not
 from .backward import needed_only, wanted_only
 from .requirements import SAME_SHIP, SIGNIFICANT, SURE, Standard, first_unmet
 from .screening import Score, changes, glance, overlap, screen
 
-MOST_EFFECTS = 6
-_REFITS = 3
-_WORTH_A_REFIT, _FAR_BEHIND = 0.5, 0.1
-"""Least linear score of what is refitted: of the threshold, and of the best."""
-_RIVAL, _RIVALS = 0.25, 4
-_TIE, _TIE_OF_VECTORS = 0.1, 0.5
-"""Scores of two ways of an effect that differ by less are equal: a moment that goes with the square of a size has no slope at zero, either way. Of
-winds and waves, whose forces grow with the square, by this share: those of waves four times as strong as typical ones end in another order."""
-_HOPE, _HOPE_MARGIN = 0.6, 30.0
-"""A refit is given up where it promises less than this share of what the best so far has gained, less the margin. (198 refits on development ships:
-promises at the second linearisation fell short of the end by at most 27 % and 60, and none was lower whose end came within 6 of the best. With the
-file of another ship every fit creeps, that of the plain model, too, and they fell short by 200.)"""
-_NEAR = 1.0
-"""A refit that ends so little below the threshold is fitted on: at rest the variances may still creep, by up to half of this."""
-_IMPRECISE, _MOST_IMPRECISE = 0.05, 20.0
-"""What a named cause leaves unexplained, because its formula is not the ship's, passes for another cause: the next must be worth more than that."""
-_OFF_FORM = 0.02
-"""Share of the evidence for a hull off the regressions that a cause in which ships differ is asked besides (docs/calibration.md#evidence-asked)."""
-CONFUSED, _OF_FORMULAS = 10.0, 0.1
-"""Candidates within this of the winner's score are called confused with it; of these, within this share of it: how far they lie apart, their formulas
-decide. (Drift in waves by another formula: wind 706, waves 681.)"""
-_CHANGES, _CHANGE_MARGIN, _OWN_MARGIN = 2, 14.0, 4.0
-"""A beginning is chosen among all effects: it must beat the best cause without one by this; the second where that is the same effect."""
+CONFUSED = THRESHOLDS.value("confused_score")
+"""Candidates within this of the winner's score, 2 log evidence, are called confused with it."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +43,7 @@ class Step:
 
     def is_near(self, best: Step) -> bool:
         """Whether the data do not tell it from the step that was taken instead."""
-        share = _OF_FORMULAS * push_alike(self.term.effect, best.term.effect)
+        share = THRESHOLDS.value("confused_formulas") * push_alike(self.term.effect, best.term.effect)
         return self.round == best.round and self.score > best.score - max(CONFUSED, share * best.score)
 
 
@@ -158,7 +138,7 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
         if is_spent():
             break
         tried = start.refit(score, least)
-        if threshold - _NEAR < 2.0 * (tried.evidence - now.evidence) < threshold:
+        if threshold - THRESHOLDS.value("near_threshold") < 2.0 * (tried.evidence - now.evidence) < threshold:
             tried = fit(tried.plant, tried.scales, tried.model, tried.point, tried.hyper, tried.log_tau2, guess=tried.motion)
         gained, promised = 2.0 * (tried.evidence - now.evidence), 2.0 * (tried.promise - now.evidence)
         found.append((tried, promised if promised < least else gained))
@@ -168,19 +148,20 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
 
 
 def _least(best: Fit, now: Fit) -> float:
-    """What a refit must promise to gain beside the best one; less by as much as that one's own promise fell short."""
-    return 2.0 * (_HOPE * (best.evidence - now.evidence) - max(best.promise - best.early, 0.0)) - _HOPE_MARGIN
+    """Gain that a refit must promise beside the best one; less by as much as that one's own promise fell short."""
+    share, margin = THRESHOLDS.value("refit_share_of_best"), THRESHOLDS.value("refit_margin")
+    return 2.0 * (share * (best.evidence - now.evidence) - max(best.promise - best.early, 0.0)) - margin
 
 
-def select(null: Fit, threshold: float, *, most: int = MOST_EFFECTS) -> Selection:
+def select(null: Fit, threshold: float) -> Selection:
     """Add the best candidate while it gains more than `threshold` and than what the causes found leave; drop what a later one has made needless.
 
     `null` must carry the candidates. Candidates are refitted if their linear score is among the best, or the best of their family. Where other noise
     suits the first cause than suits the plain model, this begins once more beside that.
     """
-    plain, grown = null, _grown(null, threshold, most)
+    plain, grown = null, _grown(null, threshold)
     if grown.again is not None:
-        again = _grown(grown.again, threshold, most, again=True)
+        again = _grown(grown.again, threshold, again=True)
         null, grown = (null, grown) if is_spent() else (grown.again, again)
     now, scores, standard = grown.now, grown.scores, replace(grown.standard, null=null)
     pruned = needed_only(now, standard, spare_last=False)
@@ -223,13 +204,14 @@ class _Grown:
         return 2.0 * (tried.evidence - self.now.evidence) - self.standard.asked_besides(term, np.max(np.abs(tried.values[-1])))
 
 
-def _grown(null: Fit, threshold: float, most: int, again: bool = False) -> _Grown:
+def _grown(null: Fit, threshold: float, again: bool = False) -> _Grown:
     """Forward selection; again: do not ask for other noise once more."""
     first, careful = screen(null), threshold > 0.0  # who is told the names needs no such care
-    standard = Standard(null, threshold, _OFF_FORM * max(hull_evidence(null), 0.0) if careful and not is_spent() else 0.0, careful)
+    off_form = THRESHOLDS.value("off_form") * max(hull_evidence(null), 0.0) if careful and not is_spent() else 0.0
+    standard = Standard(null, threshold, off_form, careful)
     state = _Grown(null, first, first, [], {}, standard)
     origin = Origin.of(null.plant, null.scales)
-    for round_ in takewhile(lambda _: not is_spent(), range(most)):
+    for round_ in takewhile(lambda _: not is_spent(), range(THRESHOLDS.count("causes"))):
         now = state.now
         tried = refits(now, worth_a_refit(state.scores, now, threshold), origin, threshold)
         if not is_spent() and all(2.0 * (f.evidence - now.evidence) < threshold for f, _ in tried):
@@ -240,7 +222,9 @@ def _grown(null: Fit, threshold: float, most: int, again: bool = False) -> _Grow
                 state.tiny[f.model.terms[-1].label] = size.reason
         # of a round that is cut short the best is not known
         best = None if is_spent() else _or_change(now, max((f for f, _ in tried), key=state.gain, default=None), origin, standard)
-        imprecise = min(_IMPRECISE * 2.0 * (now.evidence - null.evidence), _MOST_IMPRECISE)
+        # what the causes found leave unexplained, because their formulas are not the ship's, passes for another cause
+        left = THRESHOLDS.value("left_by_causes_share") * 2.0 * (now.evidence - null.evidence)
+        imprecise = min(left, THRESHOLDS.value("left_by_causes_most"))
         # what a fit that does not rest could still gain by itself is no gain of the next cause
         if best is None or state.gain(best) < threshold + imprecise + now.excess:
             break
@@ -258,15 +242,18 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin, standard: Standard) -
     if any(t.since is not None for t in now.model.terms):
         return best
     plain, gain = best, 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
-    present, least = {t.label for t in now.model.terms}, max(_CHANGE_MARGIN, _FAR_BEHIND * gain)
-    late = [s for s in changes(now) if s.score > least and s.term.label not in present and not s.term.effect.traits.persistent][:_CHANGES]
+    margin = THRESHOLDS.value("change_margin")
+    present, least = {t.label for t in now.model.terms}, max(margin, THRESHOLDS.value("refit_share_of_score") * gain)
+    late = [s for s in changes(now) if s.score > least and s.term.label not in present]
+    late = [s for s in late if not s.term.effect.traits.persistent][: THRESHOLDS.count("changes_refitted")]
     if not late:
         return best
     start = Beginning.of(now, origin, [s.term for s in late])
     for score in late:
-        found = start.refit(score, _least(best, now) if best is not None and gain > _CHANGE_MARGIN else -np.inf)
+        found = start.refit(score, _least(best, now) if best is not None and gain > margin else -np.inf)
         own = plain is not None and plain.model.terms[-1].label == score.term.label
-        if 2.0 * (found.evidence - now.evidence) > gain + (_OWN_MARGIN if own else _CHANGE_MARGIN) and first_unmet(SURE, found, -1, standard).met:
+        ahead = THRESHOLDS.value("change_margin_own") if own else margin
+        if 2.0 * (found.evidence - now.evidence) > gain + ahead and first_unmet(SURE, found, -1, standard).met:
             best, gain = found, 2.0 * (found.evidence - now.evidence)
     return best
 
@@ -278,12 +265,13 @@ def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[S
         if s.term.label not in present:
             best.setdefault(s.term.label, s)
     ranked = sorted(best.values(), key=lambda s: -s.score)
-    if not ranked or ranked[0].score < _WORTH_A_REFIT * threshold:
+    worth, refitted = THRESHOLDS.value("refit_share_of_threshold") * threshold, THRESHOLDS.count("refits")
+    if not ranked or ranked[0].score < worth:
         return []
-    least = max(_WORTH_A_REFIT * threshold, _FAR_BEHIND * ranked[0].score)
-    chosen = [s for s in ranked[:_REFITS] if s.score > least]
+    least = max(worth, THRESHOLDS.value("refit_share_of_score") * ranked[0].score)
+    chosen = [s for s in ranked[:refitted] if s.score > least]
     families = {s.term.effect.family for s in chosen}
-    for s in ranked[_REFITS:]:
+    for s in ranked[refitted:]:
         if s.score > max(threshold, least) and s.term.effect.family not in families:
             chosen.append(s)
             families.add(s.term.effect.family)
@@ -291,14 +279,18 @@ def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[S
     rivals = overlap(now, ranked[0].term, ranked[0].estimate)
     if best_of_all.vector or best_of_all.per_run:  # their sensitivities depend on the size too much for the linear overlap
         rivals |= {s.term.label: 1.0 for s in ranked if s.term.effect.vector or s.term.effect.per_run}
-    near = sorted((s for s in ranked if rivals.get(s.term.label, 0.0) > _RIVAL and s not in chosen), key=lambda s: -rivals[s.term.label])
-    chosen += near[:_RIVALS]
+    near = [s for s in ranked if rivals.get(s.term.label, 0.0) > THRESHOLDS.value("rival_overlap") and s not in chosen]
+    chosen += sorted(near, key=lambda s: -rivals[s.term.label])[: THRESHOLDS.count("rivals")]
     return [s for s in scores if any(s is c or (s.term.label == c.term.label and s.score > c.score - _tie(c)) for c in chosen)]
 
 
 def _tie(best: Score) -> float:
-    """What another way of an effect may score less to be refitted, too."""
-    return max(_TIE, _TIE_OF_VECTORS * best.score) if best.term.effect.vector and not best.term.per_run else _TIE
+    """Score by which another way of an effect may fall short to be refitted, too: a moment that grows with the square
+    of a size has no slope at zero."""
+    tie = THRESHOLDS.value("tie")
+    if best.term.effect.vector and not best.term.per_run:
+        return max(tie, THRESHOLDS.value("tie_of_vectors") * best.score)
+    return tie
 
 
 def _beside(now: Fit) -> set[str]:
@@ -317,6 +309,6 @@ def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -
     best: dict[str, Score] = {}
     for s in screen(Beginning.of(now, origin, terms).seen):
         best.setdefault(s.term.label, s)
-    least = max(threshold, _FAR_BEHIND * max(s.score for s in best.values()))
+    least = max(threshold, THRESHOLDS.value("refit_share_of_score") * max(s.score for s in best.values()))
     seen = _beside(now) | {f.model.terms[-1].label for f in tried}
-    return [s for label, s in best.items() if label not in seen and s.score > least][:_RIVALS]
+    return [s for label, s in best.items() if label not in seen and s.score > least][: THRESHOLDS.count("rivals")]

@@ -1,4 +1,5 @@
-"""The second library: what an unexplained force, or an error of a sensor, depends on, where no named cause fits. It needs no simulation."""
+"""The second library: variables on which an unexplained force, or an error of a sensor, depends where no named cause
+fits. It needs no simulation."""
 
 from __future__ import annotations
 
@@ -15,27 +16,22 @@ from ..inference.laplace import Fit, products_of, settled_evidence, sloped, whit
 from ..inference.log_determinant import coefficients_at, slopes
 from ..model.columns import Bend, Columns
 from ..model.linearisation import Linearisation
+from ..thresholds import THRESHOLDS
 from .features import Feature, of_forces, of_sensors
 from .screening import evidence
 
 AXES = ("surge", "sway", "yaw")
 SENSORS = {"recorded heading": 2, "recorded surge": 3, "recorded sway": 4, "recorded yaw rate": 5}
-"""What a sensor's error is an error of, and its channel."""
+"""Recorded quantities of which errors are looked for, and their channels."""
 _NAMED = ("recorded heading", "recorded yaw rate")
-"""Whose constant errors are causes of the library."""
-_PRIOR_SD, _SENSOR_SD = 0.5, 3.0
-"""Of a form's coefficient, in units of the scales of the latent force (5 mm/s^2, 5 mm/s^2, 1e-4 rad/s^2 at 130 m), or of ordinary noise of the
-channel (0.23 deg, 0.04 m/s, 0.04 m/s, 0.04 deg/s)."""
+"""Records whose constant errors are causes of the library."""
 NO_FORM = ("nothing", "heading", "position", "time", "waves", "run", "measured wind")
-"""What no ship's form depends on."""
+"""Variables on which no ship's form depends."""
 _BY_RUN = ("heading", "position", "waves", "run")
-"""What every run has its own of. What a model lacks of a ship is another force in each manoeuvre, and passes for one that follows these: it does only
-if it explains more than a constant force of its own in each run; and one with the period of waves, more than one of its own phase in each run, since
-waves rock a ship, and the latent force, which has no periods, makes too much of those that are in step by chance."""
-_WORTH_MORE = 2.0
-_OFTEN_ENOUGH = 4.0
-"""Seconds (Froude-scaled, 130 m) between samples up to which errors of sensors are looked for: what a rudder does between rarer ones is not known,
-and turns that begin late by that pass for a slow compass."""
+"""Variables with a range of its own in each run. What a model lacks of a ship differs between manoeuvres, and passes
+for a force that depends on these. It must explain more than a constant force of its own in each run; with the period of
+waves more than a force of its own phase in each run. The latent force has no periods, and makes too much of waves that
+are in step by chance."""
 
 
 @dataclass(frozen=True)
@@ -85,16 +81,16 @@ class _Tried:
 
 
 def dependences(fit: Fit, beside: Collection[str] = ()) -> list[Dependence]:
-    """What `Search` finds."""
+    """Dependences that `Search` finds, best first."""
     return Search(fit, beside).found
 
 
 class Search:
-    """Every variable on every axis and channel, best first (`found`); judged beside the model of a fit, and beside forces that follow the variables
-    `beside`, as on a ship that is the same to port and to starboard.
+    """Search of every variable on every axis and channel, best first (`found`); judged beside the model of a fit, and
+    beside forces that follow the variables `beside`, as on a ship that is the same to port and to starboard.
 
-    The forces are there at every step of the trajectory: between the knots of the latent force, rudder and propeller change. Once the budget is
-    spent, what is found is not all, and not to be used.
+    The forces are there at every step of the trajectory: between the knots of the latent force, rudder and propeller
+    change. Once the budget is spent, what is found is not all, and not to be used.
     """
 
     def __init__(self, fit: Fit, beside: Collection[str] = ()) -> None:
@@ -116,7 +112,7 @@ class Search:
         apart = {v: [pair for pair in alone if pair[0].variable == v] for v in NO_FORM}
         apart["nothing"] = [pair for pair in apart["nothing"] if pair[0].axis != "surge"]  # where another form of resistance comes near a constant
         joined = [self._together(pairs) for pairs in apart.values()]
-        often = fit.plant.seg.dt < _OFTEN_ENOUGH * fit.plant.froude
+        often = fit.plant.seg.dt < THRESHOLDS.value("samples_for_errors") * fit.plant.froude
         channels = [(name, channel) for name, channel in SENSORS.items() if often and fit.plant.seg.seen[channel]]
         alone += self._best([t for name, channel in channels for t in _added(lin, name, channel, errors)])
         self._parts = {d: parts for d, *parts in [*alone, *(pair for pair in joined if pair is not None)]}
@@ -170,20 +166,21 @@ class Search:
         for _, group in groupby(zip(tried, places, strict=True), key=lambda pair: (pair[0].axis, pair[0].variable)):
             solution, best, at = max(((solve(reduced, _with(self.prior, at)), t, at) for t, at in group), key=lambda way: way[0].log_evidence)
             gain, log_force = solution.log_evidence - null, self.usual
-            if gain - best.cost > _WORTH_MORE and not is_spent():
+            if gain - best.cost > THRESHOLDS.value("variances_again") and not is_spent():
                 after, log_force = self._evidence(gram, at)
                 gain = after - self.before
             size, share, taken = float(np.linalg.norm(solution.mean[-best.size :])), np.nan, 0.0
             if best.axis in AXES:
                 before, after = np.exp([self.usual, log_force])[:, AXES.index(best.axis)]
                 share, taken = float(1.0 - after / before), float(np.sqrt(max(before - after, 0.0)))
-            unit = _SENSOR_SD if best.axis in SENSORS else _PRIOR_SD
+            unit = THRESHOLDS.value("error_prior" if best.axis in SENSORS else "force_prior")
             found.append((Dependence(best.variable, best.axis, best.form, 2.0 * (gain - best.cost), share, unit * size, taken), best))
         return found
 
     def _together(self, of: Sequence[tuple[Dependence, _Tried]]) -> tuple[Dependence, *tuple[_Tried, ...]] | None:
         """The best forms of a variable on all axes where they are worth something, the strongest first; None where that is one axis alone."""
-        parts = sorted((pair for pair in of if pair[0].score > 2.0 * _WORTH_MORE), key=lambda pair: -pair[0].score)
+        least = 2.0 * THRESHOLDS.value("variances_again")
+        parts = sorted((pair for pair in of if pair[0].score > least), key=lambda pair: -pair[0].score)
         if len(parts) < 2 or is_spent():
             return None
         gram, size = self._gram([t for _, t in parts]), sum(t.size for _, t in parts)
@@ -220,7 +217,8 @@ def _pushed(lin: Linearisation, axis: int, of: Mapping[str, Sequence[Feature]]) 
     forms = [(v, f) for v, group in of.items() for f in group]
     if not forms:
         return []
-    on, aside = (_PRIOR_SD * np.concatenate(x) for x in ([f.on for _, f in forms], [f.aside for _, f in forms]))
+    sd = THRESHOLDS.value("force_prior")
+    on, aside = (sd * np.concatenate(x) for x in ([f.on for _, f in forms], [f.aside for _, f in forms]))
     columns, bend = lin.pushed(axis, on, aside)
     found, at = [], 0
     for v, f in forms:
@@ -232,11 +230,11 @@ def _pushed(lin: Linearisation, axis: int, of: Mapping[str, Sequence[Feature]]) 
 
 def _added(lin: Linearisation, name: str, channel: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
     """Errors in one channel of the record."""
-    found = []
+    found, sd = [], THRESHOLDS.value("error_prior") * lin.scales.noise[channel]
     for v, group in of.items():
         for f in group:
             error = np.zeros((*lin.motion.shape, f.size))
-            error[..., channel, :] = _SENSOR_SD * lin.scales.noise[channel] * np.moveaxis(f.on, 0, -1).swapaxes(0, 1)
+            error[..., channel, :] = sd * np.moveaxis(f.on, 0, -1).swapaxes(0, 1)
             found.append(_Tried(name, v, f.form, f.ways, error.reshape(len(error), -1, f.size), Bend(None, (None,) * f.size)))
     return found
 
