@@ -16,6 +16,7 @@ from shipbench.diagnosis.model.forward import Plant
 from shipbench.diagnosis.model.linearisation import Linearisation, Scales
 from shipbench.diagnosis.selection.screening import _changes, screen
 from shipbench.diagnosis.selection.stepwise import Beginning, candidates_for
+from shipbench.diagnosis.thresholds import THRESHOLDS
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.hidden import Hidden
@@ -58,7 +59,7 @@ def test_where_free_steps_lead_astray_each_step_lowers_the_cost(null, monkeypatc
         return (None, None) if free else real(lin, found, free, share)
 
     def fitted(lost: float) -> float:
-        monkeypatch.setattr(refit, "_LOST", lost)
+        monkeypatch.setitem(THRESHOLDS.rows, "led_astray", replace(THRESHOLDS.rows["led_astray"], value=lost))
         return fit(null.plant, null.scales, model, origin.point, origin.hyper, guess=origin.motion, far=True).evidence
 
     rest = fitted(np.inf)

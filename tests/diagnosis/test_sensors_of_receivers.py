@@ -29,6 +29,7 @@ from shipbench.diagnosis.preparation.time_offsets import late_velocities_of
 from shipbench.diagnosis.preparation.water_speeds import speeds_over_ground
 from shipbench.diagnosis.selection.analysis import THRESHOLD, plain_model
 from shipbench.diagnosis.selection.stepwise import select
+from shipbench.diagnosis.thresholds import THRESHOLDS
 from shipbench.effects.base import EFFECTS, delayed
 from shipbench.physics.actuators import gear_path
 from shipbench.physics.mmg import load_mmg_ship
@@ -343,7 +344,8 @@ def test_a_late_yaw_rate_is_put_back_and_no_late_rudder(trials, channels: tuple[
 def test_a_piece_in_which_the_ship_was_pushed_is_left_out_and_said_so(monkeypatch, seed: int):
     """The push drags the first fit so far that nothing looks strange where it ends."""
     trials = sea_trials(load_mmg_ship("kcs"), seed, (), Trials(runs=12, samples=120))
-    monkeypatch.setattr("shipbench.diagnosis.inference.outliers._ONE_IN", 20)  # a piece of 24; else it takes 100 of them
+    row = THRESHOLDS.rows["segments_per_outlier"]
+    monkeypatch.setitem(THRESHOLDS.rows, row.name, replace(row, value=20))  # a segment of 24; else it takes 100 of them
     assert not left_out(null_fit(Plant.of(trials), Scales(Plant.of(trials))).plant, trials.runs)
     pushed, push = 4, np.arange(20.0)
     states = [run.states.copy() for run in trials.runs]

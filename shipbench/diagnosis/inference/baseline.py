@@ -12,24 +12,18 @@ from ..model.forward import FEW_PIECES, Plant
 from ..model.linearisation import Scales
 from ..model.noise import Colour
 from ..model.term import Term
+from ..thresholds import THRESHOLDS
 from .gauss_newton import Origin, fit, looking_at
 from .gram import Hyper
 from .laplace import Fit, Model, evidence_with
-from .noise_selection import WORTH, colour_of, swinging_force
+from .noise_selection import colour_of, swinging_force
 from .outliers import strange_pieces
 from .robust_prior import widened
 
-_GEAR_FACTORS, _WORTH_A_GEAR = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125)), 6.0
-_FINER, _FINER_STEPS = 1.2, 3
-"""Factor of the steps that follow, and the most of them."""
-_SEARCHES = 3
-"""For strange pieces."""
-_FIRST_ITERATIONS = 8
-"""Of the first fit, which gives the background: until that stands, lower variances are rewarded, and a fit creeps towards them for ever."""
-_CREEPS = 20.0
-"""Excess of a first fit that has not come to rest. (124 development sets: 31 to 3659 in nine, at most 19 in the others.)"""
+_GEAR_FACTORS = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125))
+"""Factors of an ordinary time constant or rate that are tried first, slower and faster."""
 REFIT_ITERATIONS = 16
-"""Of a fit that begins beside another one."""
+"""Iterations of a fit that begins beside another one."""
 
 
 def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
@@ -59,7 +53,7 @@ def beside_noise_of(named: Fit, null: Fit) -> Fit | None:
     if is_spent() or not null.scales.colour.share.any():
         return None
     colour = colour_of(named)
-    if evidence_with(named, colour) < evidence_with(named, named.scales.colour) + WORTH:
+    if evidence_with(named, colour) < evidence_with(named, named.scales.colour) + THRESHOLDS.value("coloured_noise"):
         return None
     return widened(fit(null.plant, null.scales.coloured(colour), Model(), null.point, null.hyper, candidates=null.candidates, guess=null.motion))
 
@@ -78,16 +72,16 @@ def first_fit(plant: Plant, null: Fit, like: Fit | None = None) -> Fit:
 def _begun(plant: Plant, scales: Scales) -> Fit:
     """The first fit, of which the others take the background.
 
-    On a ship far from the regressions the force that tracks her is so large that it may go on doing what the parameters should; and a push may drag
-    a fit so far that nothing looks strange where it ends. One that creeps is made again, from a force of ordinary size, then without what is strange
-    where it began, and kept if it rests then.
+    On a ship far from the regressions the force that tracks her is so large that it may go on doing what the parameters
+    should. A push may drag a fit so far that nothing is an outlier where it ends. A fit that has not converged is made
+    again: from a force of ordinary size, then without the outliers where it began. It is kept if it converges then.
     """
-    found = _without_strange(_first(plant, scales))
-    if found.excess > _CREEPS and not is_spent():
+    found, most = _without_strange(_first(plant, scales)), THRESHOLDS.value("unconverged_excess")
+    if found.excess > most and not is_spent():
         calm = _without_strange(_first(plant, scales, weak=True))
-        if calm.excess > _CREEPS and len(pieces := strange_pieces(_first(plant, scales, iterations=1))):
+        if calm.excess > most and len(pieces := strange_pieces(_first(plant, scales, iterations=1))):
             calm = _without_strange(_first(plant.without(pieces), scales))
-        if calm.excess < _CREEPS:
+        if calm.excess < most:
             found = calm
     return replace(found, scales=scales.with_background(found.hyper))
 
@@ -104,15 +98,16 @@ def _beside_waves(found: Fit, scales: Scales, share: float, waves_alone: bool = 
     return found, scales, colour
 
 
-def _first(plant: Plant, scales: Scales, iterations: int = _FIRST_ITERATIONS, weak: bool = False, hyper: Hyper | None = None) -> Fit:
+def _first(plant: Plant, scales: Scales, iterations: int = 8, weak: bool = False, hyper: Hyper | None = None) -> Fit:
+    """Fit from the regressions, briefly: until there is a background, lower variances are rewarded without end."""
     origin = Origin.of(plant, scales)
     hyper = hyper or (replace(origin.hyper, log_force=np.minimum(origin.hyper.log_force, 0.0)) if weak else origin.hyper)
     return fit(plant, scales, Model(), origin.point, hyper, iterations=iterations, guess=origin.motion, far=True)
 
 
 def _without_strange(found: Fit) -> Fit:
-    """Fitted again without the strangest pieces, which hide the next ones."""
-    for _ in range(_SEARCHES):
+    """Fit again without the largest outliers, which hide the next ones."""
+    for _ in range(3):
         pieces = strange_pieces(found)
         if not len(pieces) or is_spent():
             break
@@ -122,22 +117,25 @@ def _without_strange(found: Fit) -> Fit:
 
 
 def _with_gear(found: Fit, name: str, field: str) -> Fit:
-    """`found` behind a gear whose time constant or rate is that of an ordinary one times the factor that suits the motion (servos of models are
-    quicker than Froude's law makes an ordinary gear; what remains of a gear that is a little off passes for a delay)."""
+    """Fit behind a gear whose time constant or rate is an ordinary one times the factor that suits the motion.
+
+    Servos of models are quicker than Froude's law makes an ordinary gear. What remains of a gear that is a little off
+    passes for a delay.
+    """
     first = found
     if is_spent():
         return found
     for factors in _GEAR_FACTORS:
         for factor in factors:
             tried = _behind(found, name, field, getattr(first.plant.ordinary[name], field) * factor)
-            if is_spent() or 2.0 * (tried.evidence - found.evidence) < _WORTH_A_GEAR:
+            if is_spent() or 2.0 * (tried.evidence - found.evidence) < THRESHOLDS.value("other_gear"):
                 break
             found = tried
         if found is not first or is_spent():
             break
-    for factor in (_FINER, 1.0 / _FINER):
+    for factor in (1.2, 1.0 / 1.2):  # finer, from there
         before = found
-        for _ in range(_FINER_STEPS):
+        for _ in range(3):
             tried = _behind(found, name, field, getattr(found.plant.ordinary[name], field) * factor)
             if is_spent() or tried.evidence <= found.evidence:
                 break

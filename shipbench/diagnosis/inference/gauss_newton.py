@@ -11,27 +11,16 @@ from ..budget import count, is_spent
 from ..model.forward import Plant
 from ..model.linearisation import NUM_BASE, Linearisation, Point, Scales
 from ..model.term import Term
+from ..thresholds import THRESHOLDS
 from .gram import Hyper
 from .laplace import Fit, Model, at_point, by_segment, leaning, objective, point_from, settle, suiting
 
-_MAY_RISE, _FREE_STEPS, _LEAST_SHARE = 1.1, 5, 0.05
-"""Factor by which a step may raise the cost, on the first steps; later ones must lower it."""
-_MAY_FOLLOW, _LEAST_OF_ALL = 100.0, 1e-3
-"""Factor of the cost beyond which the latent force is not asked whether it could follow: the trajectory blows up, and even a first step is halved to
-this share before it is given up."""
-_LEAP = 0.3
-"""Most that the logarithm of a variance moves between those later steps: two linearisations may else call the other's variance wrong for ever."""
+_FREE_STEPS = 5
+"""First steps, which may raise the cost a little; later ones must lower it."""
+_LEAST_SHARE, _MAY_FOLLOW = 0.05, 100.0
+"""Share to which a step is halved before it is given up; factor of the cost beyond which no force could follow it."""
 _AT_REST, _AT_REST_EVIDENCE = 0.5, 0.1
-"""Excess of the cost over what the linear model promises, and change of the evidence, at which a fit rests."""
-_STALE = 3
-"""Later steps with neither a better point nor the promise of one, each half of the one before, after which a fit rests, too: two linearisations may
-lead to and fro for ever."""
-_LOST = 100.0
-"""Excess of the cost where free steps have led astray (a current and positions of 1.5 m noise: 11000, at the regressions still)."""
-_NEAR_REST = 30.0
-"""Excess up to which a fit that goes on from another takes no free steps: they would lead away, and later ones back."""
-_FOLLOWING, _HALVINGS = 6, 5
-"""Steps of initial states and latent force alone at the end, and trials of each."""
+"""Excess of the cost over what the linear model predicts, and change of the evidence, at which a fit has converged."""
 
 
 def fit(
@@ -54,9 +43,9 @@ def fit(
     lin, seen = begun or (Linearisation(plant, scales, point, guess), None)
     best, before, promised, stale, early = None, -np.inf, -np.inf, 0, np.nan
     for number in range(iterations):
-        free = number < free_steps
-        found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else _LEAP, seen=seen, far=far and not number)
-        if not (number or far) and found.excess < _NEAR_REST:
+        free = number < free_steps  # later, variances move little, or two linearisations may alternate for ever
+        found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else 0.3, seen=seen, far=far and not number)
+        if not (number or far) and found.excess < THRESHOLDS.value("near_convergence"):
             free_steps = 0
         if number < 2:
             early = found.promise
@@ -72,7 +61,8 @@ def fit(
         if best is None or worth > best[0]:
             best = worth, found, lin
         count()
-        if is_spent() or stale == _STALE or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
+        # it stops after three halved steps without a better point: two linearisations may alternate for ever
+        if is_spent() or stale == 3 or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
             break
         before = found.evidence
         after, seen = _step(lin, found, number + 1 < free_steps, 0.5**stale) if number < iterations - 1 else (None, None)
@@ -81,7 +71,7 @@ def fit(
         lin = after
     assert best is not None
     found, lin = _followed(*best[1:])
-    if free_steps and found.excess > _LOST and not is_spent():
+    if free_steps and found.excess > THRESHOLDS.value("led_astray") and not is_spent():
         again = fit(
             plant, scales, model, point, *began, iterations=iterations, candidates=candidates, guess=guess, hope=hope, far=far, begun=begun,
             free_steps=0,
@@ -107,7 +97,7 @@ def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Lin
     A point is better if its cost is lower, or would be once the latent force has followed: on exact sensors the trajectory of a new point is nearly
     always dearer than that of the old one, whose force has been fitted.
     """
-    plant, scales, model, may_rise = lin.plant, lin.scales, found.model, _MAY_RISE if free else 1.0
+    plant, scales, model, may_rise = lin.plant, lin.scales, found.model, 1.1 if free else 1.0
     target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
     at, followed, share = objective(lin, model, found.hyper, found.log_tau2, found.gram), at_point(found, lin.point), share
     while not is_spent():
@@ -122,19 +112,19 @@ def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Lin
         share *= 0.5
         if share < _LEAST_SHARE and free and cost < _MAY_FOLLOW * at:
             return trial, seen
-        if share < (_LEAST_OF_ALL if free else _LEAST_SHARE):
+        if share < (1e-3 if free else _LEAST_SHARE):
             break
     return None, None
 
 
 def _followed(found: Fit, lin: Linearisation) -> tuple[Fit, Linearisation]:
     """Initial states and latent force where they suit the parameters of the point best; the step of a segment is halved while its cost rises."""
-    for _ in range(_FOLLOWING):
+    for _ in range(6):
         if found.excess < _AT_REST or is_spent():
             break
         here, (eta, w), before = lin.point, suiting(found, lin.point), by_segment(lin, found.hyper, found.gram)
         share = np.ones(len(before))
-        for _ in range(_HALVINGS):
+        for _ in range(5):
             part = replace(here, eta=here.eta + share[:, None] * (eta - here.eta), w=here.w + share[:, None, None] * (w - here.w))
             trial = Linearisation(found.plant, found.scales, part, lin.towards(part), coarse=False)
             costs = by_segment(trial, found.hyper, found.gram)
@@ -185,8 +175,10 @@ def start(plant: Plant) -> tuple[Point, Hyper]:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where fits begin: regressions, with trajectories on the measured ones by the latent force alone. Gauss-Newton is nearly linear from there; from
-    another fit it may end where parameters compensate each other."""
+    """Start of fits: the regressions, with trajectories kept on the measured ones by the latent force alone.
+
+    Gauss-Newton is nearly linear from there. From another fit it may end where parameters compensate each other.
+    """
 
     point: Point
     hyper: Hyper

@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..thresholds import THRESHOLDS
 from .linalg import inverses, log_determinant
 
-ETA_PRECISION = 1e-4
-"""Weak: an initial state may lie 100 units of noise away from its first sample."""
+ETA_PRECISION = THRESHOLDS.value("initial_state_precision")
+"""Prior precision of an initial state beside its first sample."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ class Products:
 
 
 def beside_products(slopes: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """What slopes (B, G) of the log determinants, at coefficients `at` (B, G), add to the products of [shared, e] with e, (B, G + 1)."""
+    """Products (B, G + 1) to add to those of [shared, e] with e, from slopes (B, G) at coefficients `at` (B, G)."""
     return np.concatenate([-0.5 * slopes, -np.sum(slopes * at, axis=1, keepdims=True)], axis=1)
 
 
@@ -180,8 +181,7 @@ class Reduced:
 
 @dataclass(frozen=True)
 class Prior:
-    """Which shared columns are in the model: `shared` with prior precisions (one value for all runs), `random` with variances log_tau2 (one per
-    run)."""
+    """Columns in the model: `shared` by all runs with prior precisions, `random` with variances log_tau2 of each run."""
 
     shared: np.ndarray
     precision: np.ndarray
@@ -253,13 +253,6 @@ def background_cov(gram: Gram, reduced: Reduced, prior: Prior, solution: Solutio
     return reduced.inverse + J @ solution.cov @ np.swapaxes(J, 1, 2) + R @ solution.covs[gram.run] @ np.swapaxes(R, 1, 2)
 
 
-_LEAST_FORCE = float(np.log(0.1**2))
-"""No model follows a ship closer than a tenth of the unit of the latent force (0.5 mm/s^2, and 1e-5 rad/s^2 at 130 m): exact sensors in a calm would
-else show with certainty that every hull differs in form from a polynomial, and what the form lacks passes for a cause."""
-_MOST_FORCE = float(np.log(30.0**2))
-"""Nor is a force larger than 0.15 m/s^2 and 3e-3 rad/s^2 at 130 m: where a trajectory of the refit runs away, the variance would run after it."""
-
-
 def update_force(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution, estimate: np.ndarray) -> np.ndarray:
     """One EM step for the variances of the latent force, log (3,).
 
@@ -274,7 +267,8 @@ def update_force(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution,
         own = np.swapaxes(R, 1, 2) @ (gram.K_inv @ R)
         spread = np.sum(gram.K_inv * reduced.inverse[:, at, at].sum(axis=0)) + np.sum(shared * solution.cov) + np.sum(own * covs)
         log_force[j] = np.log((np.sum(w @ gram.K_inv * w) + spread) / (B * gram.knots))
-    return np.clip(log_force, _LEAST_FORCE, _MOST_FORCE)
+    least, most = THRESHOLDS.value("least_latent_force"), THRESHOLDS.value("most_latent_force")
+    return np.clip(log_force, float(np.log(least**2)), float(np.log(most**2)))
 
 
 def coefficients_of(gram: Gram, prior: Prior, solution: Solution, estimate: np.ndarray, size: int) -> np.ndarray:
@@ -302,9 +296,6 @@ def update_noise(
     return np.maximum(np.log(variances), floor)
 
 
-_AT_REST, _LEAP, _LEAST = 0.003, 16.0, -20.0
-
-
 def accelerated(step: Callable[[np.ndarray], tuple[float, np.ndarray]], theta: np.ndarray, cycles: int) -> np.ndarray:
     """Logarithms of variances after EM steps, extrapolated: plain EM creeps where the data say little of the force.
 
@@ -316,9 +307,9 @@ def accelerated(step: Callable[[np.ndarray], tuple[float, np.ndarray]], theta: n
         _, first = step(theta)
         plain, second = step(first)
         change, curve = first - theta, second - 2.0 * first + theta
-        if np.max(np.abs(second - first)) < _AT_REST:
+        if np.max(np.abs(second - first)) < 0.003:
             return second
-        length = float(np.clip(np.linalg.norm(change) / (np.linalg.norm(curve) + 1e-12), 1.0, _LEAP))
-        leap, beyond = step(np.maximum(theta + 2.0 * length * change + length**2 * curve, _LEAST))
+        length = float(np.clip(np.linalg.norm(change) / (np.linalg.norm(curve) + 1e-12), 1.0, 16.0))
+        leap, beyond = step(np.maximum(theta + 2.0 * length * change + length**2 * curve, -20.0))
         theta = beyond if leap >= plain else second
     return theta

@@ -14,6 +14,7 @@ from ..model.forward import NUM_HULL, Plant
 from ..model.linearisation import FREE, NUM_BASE, Linearisation, Point, Scales
 from ..model.noise import Colour
 from ..model.term import Term
+from ..thresholds import THRESHOLDS
 from .gram import (
     ETA_PRECISION,
     Gram,
@@ -33,12 +34,7 @@ from .gram import (
 from .linalg import log_determinant
 from .log_determinant import coefficients_at, slopes
 
-_EM_CYCLES, _NARROW = 3, 0.1
-_RUNS_LEAP = 0.5
-"""Most that the logarithm of the variance of values per run moves at once: far from rest the linear model may want none of them, and a variance that
-has vanished hardly returns."""
-_LOG_FLOOR = np.log(0.1**2)
-"""A channel is never taken for better than a tenth of an ordinary sensor, else the latent force follows its noise."""
+_EM_CYCLES = 3
 
 
 @dataclass(frozen=True)
@@ -224,7 +220,7 @@ def at_point(found: Fit, point: Point) -> float:
 
 
 def leaning(found: Fit, point: Point) -> float:
-    """How much higher the log determinant of the force is at a point, as the linearisation of `found` expects it."""
+    """Rise of the log determinant of the force at a point, as the linearisation of `found` predicts it."""
     slope = by_run(found.gram.slope, found.gram.run)
     return -2.0 * float(np.sum(_coefficients(found, point)[:, :-1] * slope[:, :-1])) + float(np.sum(slope[:, -1]))
 
@@ -299,7 +295,7 @@ def evidence_with(found: Fit, colour: Colour) -> float:
 
 
 def hull_evidence(found: Fit) -> float:
-    """2 log evidence for a hull that lies off the regressions by the usual 30 %, against one that lies within 3 %."""
+    """Return 2 log evidence for a hull that differs from the regressions as usual, against one that follows them."""
     products = found.products.without(sum(t.size for t in found.candidates))
 
     def with_hull(width: float) -> float:
@@ -307,7 +303,7 @@ def hull_evidence(found: Fit) -> float:
         hyper, log_tau2 = _variances(products, model, found.hyper, found.log_tau2, _EM_CYCLES)
         return solve(products.weigh(hyper).reduce(hyper.log_force), model.prior(log_tau2)).log_evidence
 
-    return 2.0 * (with_hull(1.0) - with_hull(_NARROW))
+    return 2.0 * (with_hull(1.0) - with_hull(THRESHOLDS.value("hull_on_regressions")))
 
 
 def settled_evidence(found: Fit, products: Products, more: int) -> float:
@@ -321,6 +317,7 @@ def _variances(
 ) -> tuple[Hyper, dict[int, float]]:
     """Variances of force, noise and random effects on one linearisation; more: shared columns behind those of the model."""
     random = [i for i, term in enumerate(model.terms) if term.per_run]
+    least = np.log(THRESHOLDS.value("least_noise") ** 2)
 
     def step(theta: np.ndarray) -> tuple[float, np.ndarray]:
         now, tau2 = Hyper(theta[:3], theta[3:9], hyper.tau), dict(zip(random, theta[9:], strict=True))
@@ -329,11 +326,12 @@ def _variances(
         solution = solve(reduced, prior)
         estimate = background(gram, reduced, prior, solution)
         force = update_force(gram, reduced, prior, solution, estimate)
-        noise = update_noise(products, gram, reduced, prior, solution, estimate, _LOG_FLOOR)
+        noise = update_noise(products, gram, reduced, prior, solution, estimate, least)
         return solution.log_evidence, np.concatenate([force, noise, _random_variances(model, solution)])
 
     first = np.concatenate([hyper.log_force, hyper.log_noise, [log_tau2.get(i, 0.0) for i in random]])
-    leaps = np.append(np.full(9, leap), np.full(len(random), min(leap, _RUNS_LEAP)))
+    # values per run move less: a variance that vanishes far from convergence hardly returns
+    leaps = np.append(np.full(9, leap), np.full(len(random), min(leap, 0.5)))
     theta = np.clip(accelerated(step, first, cycles), first - leaps, first + leaps)
     return Hyper(theta[:3], theta[3:9], hyper.tau), dict(zip(random, (float(v) for v in theta[9:]), strict=True))
 

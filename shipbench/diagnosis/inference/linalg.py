@@ -61,8 +61,10 @@ def inverses(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def log_determinant(A: np.ndarray) -> np.ndarray:
-    """Of positive definite matrices (..., n, n): half the work of a decomposition that must pivot, which is left for matrices that are only nearly
-    so."""
+    """Log determinants of positive definite matrices (..., n, n).
+
+    It is half the work of a decomposition with pivoting, which is left for matrices that are nearly singular.
+    """
     try:
         return 2.0 * np.log(np.diagonal(np.linalg.cholesky(A), axis1=-2, axis2=-1)).sum(axis=-1)
     except np.linalg.LinAlgError:

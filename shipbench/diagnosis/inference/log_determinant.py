@@ -1,4 +1,4 @@
-"""How the log determinant of the latent force depends on the parameters.
+"""Dependence of the latent force's log determinant on the parameters.
 
 The evidence of parameters is the posterior with the force integrated out: besides the squares it holds the log determinant of the force's precision,
 and a ship that is more damped answers the force less. Squares alone take the ship for one that is less damped and moves with little force: by a few

@@ -1,4 +1,4 @@
-"""Which correlation of the sensors' noise suits a fit, and what a reader is told of it."""
+"""Selection of the correlation of the sensors' noise, and its description for the reader."""
 
 from __future__ import annotations
 
@@ -11,28 +11,21 @@ from ...signals import R, U, V
 from ..budget import is_spent
 from ..evaluation.residuals import CHANNEL_UNITS, RESIDUALS
 from ..model.noise import Colour
+from ..thresholds import THRESHOLDS
 from .laplace import Fit, evidence_with
 
-_SHARES, _TIMES = (1.0, 4.0, 16.0, 64.0), (2.0, 6.0, 20.0)
-_SMOOTH_SHARES, _SMOOTH_TIMES = (16.0, 64.0), (0.5, 1.0, 2.0, 4.0)
-"""Tried, of errors that last and of filtered noise; times in samples."""
-_FIRST, WORTH = ((1.0, 2.0), (4.0, 6.0)), 50.0
-"""Share and time of noise that is tried first, and the log evidence that it must gain in all pieces together: a cause in the sensors leaves lasting
-residuals, too."""
-_SWINGS, _MOST_LAG = -0.1, 12
-"""Correlation of residuals below which they swing (independent ones: above -0.08), and the lag [samples] up to which that is looked for."""
-_PERIODS, _DAMPING, _FURTHER = (1.7, 2.0, 2.3), (0.1, 0.25), 1.15
-"""Periods tried, in lags of the lowest correlation, damping ratios, and the factor of further periods: where the latent force follows the waves, what
-is left swings faster than they."""
-_RISES, _LONGEST, _LIKELY = 0.2, 30, 4.0
-"""Rise of the correlation of the latent force from its lowest on, from which it swings (without waves: 0, in a swell: 0.33 to 0.48), the lag
-[samples] up to which that is looked for, and the share of such waves in a velocity."""
+_LASTING, _SMOOTH = ((1.0, 4.0, 16.0, 64.0), (2.0, 6.0, 20.0)), ((16.0, 64.0), (0.5, 1.0, 2.0, 4.0))
+"""Grids of errors that last and of filtered noise: variance over that of the white part, and time [samples]."""
+_FIRST = ((1.0, 2.0), (4.0, 6.0))
+"""Pairs of share and time that are tried before a grid."""
+_WAVES = (_LASTING[0], (1.7, 2.0, 2.3), (0.1, 0.25))
+"""Grid of motion with the waves: share, period in lags of the lowest correlation, and damping ratio."""
 
 
 def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colour:
     """Correlation of the noise of each channel that suits the residuals by far better than none; found: of this share of the pieces. waves_alone:
     look for motion with the waves, and for nothing that lasts. Channels that are not reached before the budget is spent keep white noise."""
-    worth = WORTH * share
+    worth = THRESHOLDS.value("coloured_noise") * share
     colour = Colour.white(found.plant.steps + 1)
     best = evidence_with(found, colour)
     for channel in np.flatnonzero(found.plant.seg.seen).tolist():
@@ -65,7 +58,7 @@ def _tuned(found: Fit, colour: Colour, channel: int, best: float) -> tuple[float
     """Log evidence and noise of `colour`, which has the evidence `best`, with a longer or a shorter period in a channel, as far as that is better
     and a piece holds one, a sample no more than half of one."""
     share, time, period = (float(x[channel]) for x in (colour.share, colour.time, colour.period))
-    for factor in (_FURTHER, 1.0 / _FURTHER):
+    for factor in (1.15, 1.0 / 1.15):
         stretch = factor
         while 2.0 < period * stretch < found.plant.steps and not is_spent():
             way = colour.with_channel(channel, share, time * stretch, period * stretch)
@@ -81,8 +74,8 @@ def _lasting(found: Fit, colour: Colour, channel: int, least: float) -> list[np.
     if max(evidence_with(found, colour.with_channel(channel, share, time)) for share, time in _FIRST) < least:
         return []
     return [
-        _grid((_SHARES, _TIMES), lambda share, time: colour.with_channel(channel, share, time)),
-        _grid((_SMOOTH_SHARES, _SMOOTH_TIMES), lambda share, time: colour.with_channel(channel, share, time, smooth=True)),
+        _grid(_LASTING, lambda share, time: colour.with_channel(channel, share, time)),
+        _grid(_SMOOTH, lambda share, time: colour.with_channel(channel, share, time, smooth=True)),
     ]
 
 
@@ -97,9 +90,9 @@ def _swinging(found: Fit, colour: Colour, channel: int) -> list[np.ndarray]:
     """Motion with the waves, where the residuals swing: a grid of share, period and damping."""
     seg = found.plant.seg
     e = np.where(seg.mask, seg.states[..., channel] - found.columns.predicted[..., channel], 0.0)
-    lags = range(1, min(_MOST_LAG, e.shape[1] - 1) + 1)
+    lags = range(1, min(THRESHOLDS.count("wave_lag"), e.shape[1] - 1) + 1)
     correlation = [float(np.sum(e[:, lag:] * e[:, :-lag]) / np.sum(e**2)) for lag in lags]
-    if min(correlation) > _SWINGS:
+    if min(correlation) > THRESHOLDS.value("wave_correlation"):
         return []
     half = 1 + int(np.argmin(correlation))
 
@@ -107,7 +100,7 @@ def _swinging(found: Fit, colour: Colour, channel: int) -> list[np.ndarray]:
         period = factor * half
         return colour.with_channel(channel, share, period / (2.0 * np.pi * damping), period)
 
-    return [_grid((_SHARES, _PERIODS, _DAMPING), way)]
+    return [_grid(_WAVES, way)]
 
 
 def swinging_force(found: Fit, colour: Colour) -> Colour:
@@ -115,19 +108,22 @@ def swinging_force(found: Fit, colour: Colour) -> Colour:
     no residual shows them."""
     for axis, channel in enumerate((U, V, R)):
         w = np.where(found.plant.seg.mask, found.point.w[..., axis] @ found.plant.hat.T, 0.0)
-        lags = range(1, min(_LONGEST, w.shape[1] - 1) + 1)
+        lags = range(1, min(THRESHOLDS.count("swell_lag"), w.shape[1] - 1) + 1)
         correlation = np.array([np.sum(w[:, lag:] * w[:, :-lag]) for lag in lags]) / max(np.sum(w**2), 1e-300)
         lowest, later = np.minimum.accumulate(correlation), np.maximum.accumulate(correlation[::-1])[::-1]
         half = int(np.argmax(later - lowest))
-        if np.isinf(colour.period[channel]) and later[half] - lowest[half] > _RISES:
+        if np.isinf(colour.period[channel]) and later[half] - lowest[half] > THRESHOLDS.value("swell_correlation"):
             period = 1.0 + half + float(np.argmax(correlation[half:]))
-            colour = colour.with_channel(channel, _LIKELY, period / (2.0 * np.pi * _DAMPING[0]), period)
+            share, time = THRESHOLDS.value("swell_variance"), period / (2.0 * np.pi * _WAVES[2][0])
+            colour = colour.with_channel(channel, share, time, period)
     return colour
 
 
 def noise_in_words(found: Fit) -> dict[str, str]:
-    """What the fit takes as noise of each channel that is not white: motion with the waves, or errors of the sensor that last. It is no cause, but a
-    reader has to know of it."""
+    """Describe the noise of each channel that is not white: motion with the waves, or errors of the sensor that last.
+
+    It is no cause, but a reader has to know of it.
+    """
     colour, dt = found.scales.colour, found.plant.seg.dt
     size = np.exp(0.5 * found.hyper.log_noise) * found.scales.noise * np.sqrt(colour.share)
     told = {}

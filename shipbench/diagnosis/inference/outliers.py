@@ -1,5 +1,8 @@
-"""What of a record is not fitted: what a long one has too much of, and pieces that no ship's motion explains: held, pushed or aground, a record that
-jumps. One such piece of ten seconds can speak louder for a cause than all others together."""
+"""Parts of a record that are not fitted: the surplus of a long one, and outliers.
+
+Outliers are pieces that no ship's motion explains: a ship that is held, pushed or aground, or a record that jumps.
+One such piece of ten seconds can weigh more for a cause than all others together.
+"""
 
 from __future__ import annotations
 
@@ -9,20 +12,14 @@ import numpy as np
 
 from ...records import Run
 from ..model.forward import Plant
+from ..thresholds import THRESHOLDS
 from .laplace import Fit
-
-_STRANGE = 30.0
-"""Times the square of the latent force in the other pieces (five times their force)."""
-_ONE_IN = 100
-"""At most one piece in so many is left out: what happens more often is a part of these runs."""
-_MOST = 0.95
-"""Share of the record below which it is said how much is fitted."""
 
 
 def strange_pieces(found: Fit) -> np.ndarray:
-    """Pieces whose latent force, in any axis, is far beyond that of the others; the strangest first."""
+    """Pieces whose latent force, in any axis, is far beyond that of the others; the largest first."""
     gram, knots, z = found.gram, found.plant.knots, found.estimate
-    left = len(z) // _ONE_IN - int(np.sum(~found.plant.seg.mask.any(axis=1)))
+    left = len(z) // THRESHOLDS.count("segments_per_outlier") - int(np.sum(~found.plant.seg.mask.any(axis=1)))
     if left <= 0:
         return np.zeros(0, dtype=int)
     squares = np.empty((len(z), 3))
@@ -32,15 +29,15 @@ def strange_pieces(found: Fit) -> np.ndarray:
     others = (squares.sum(axis=0) - squares) / (len(z) - 1)
     worst = np.max(squares / others, axis=1)
     order = np.argsort(-worst)[:left]
-    return order[worst[order] > _STRANGE]
+    return order[worst[order] > THRESHOLDS.value("outlier_segment")]
 
 
 def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
-    """What was left out of the fit: the share of a long record, and strange pieces, in the times of their runs."""
+    """Say what was left out of the fit: the share of a long record, and outliers, in the times of their runs."""
     seg = plant.seg
     fitted, whole = seg.dt * float(np.maximum(seg.mask.sum(axis=1) - 1, 0).sum()), float(sum(run.t[-1] - run.t[0] - seg.dt for run in runs))
     found = []
-    if fitted < _MOST * whole:
+    if fitted < THRESHOLDS.value("fitted_share") * whole:
         found.append(
             f"{fitted / whole:.0%} of the record is fitted, {len(seg.run)} pieces of {plant.steps * seg.dt:.0f} s, spread over all runs; "
             "`--thorough` fits up to twice as much."
@@ -51,8 +48,9 @@ def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
         begins = run.t[0] + seg.start[piece]
         pieces.append(f"run '{run.id}', {begins:g} to {min(begins + plant.steps * seg.dt, run.t[-1]):g} s")
     if pieces:
+        times = THRESHOLDS.value("outlier_segment") ** 0.5
         found.append(
-            f"left out, since the missing force is more than {_STRANGE**0.5:.0f} times the ordinary one there (ship held or pushed, or a record that "
-            f"jumps?): {'; '.join(pieces)}."
+            f"left out, since the missing force is more than {times:.0f} times the ordinary one there "
+            f"(ship held or pushed, or a record that jumps?): {'; '.join(pieces)}."
         )
     return found

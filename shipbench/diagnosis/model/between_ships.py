@@ -1,4 +1,4 @@
-"""What differs between one ordinary ship and another, beside hull derivatives and the fitted parameters: part of every fit, never a cause."""
+"""Differences between ordinary ships, beside hull and fitted parameters: part of every fit, never a cause."""
 
 from __future__ import annotations
 
@@ -24,37 +24,17 @@ from ...ship import Particulars
 
 
 class Structure(Effect):
-    """What differs between one ordinary ship and another beyond hull and rudder lift: race at the rudder, wake in turns, thrusters at speed.
+    """Differences between ordinary ships beyond hull derivatives and rudder lift.
 
-    Without it every ship's own race or thruster tunnel would be reported as missing physics. Centres and spreads: kappa 0.3 to 0.8,
-    C_2 - 1 of the wake 0 to 0.6, by side (Yasukawa & Yoshimura 2015), loss of the thrusters' moment up to 50 % (docs/theory.md#thrusters), cross-flow
-    drag of a hull whose regressions lack it, side force of a propeller going astern, gamma_R 0.4 to 0.64, by side, l'_R -0.7 to -1
-    (Yasukawa & Yoshimura 2015, table 3), X'_vv and X'_rr that eq. (2) lacks (same table: -0.040, 0.011); added mass between sway and yaw, which
-    regressions hardly know and the MMG form leaves out (of m L); flow at the rudder that a reversed propeller stops, from none to all (Miyauchi
-    et al. 2022); thrust astern, of which eq. (2) knows one level (0.65 of ahead at rest; four-quadrant curves 0.5 to 0.8); wind on
-    superstructures of all kinds (Blendermann 1994); added mass in surge, for which charts (Zhou et al. 1983) and ships of the
-    literature have 0.4 to 0.75 of Soeding's value (0.036 and 0.071 of the mass); N_v and Y_r of a ship that goes astern,
-    which eq. (2) takes for those ahead (from there, as in cubic polynomials, to the change of sign of theory: Yoshimura, Nakao & Ishibashi 2009),
-    and her rudder, which then works from its trailing edge; thrust of a propeller that the ship file leaves open (log of the factor): K_T goes with
-    the pitch, 0.6 to 1.1 of the diameter, and thrust with the fourth power of the diameter, for which 0.6 T is 20 % too much or too little (KVLCC2,
-    KCS). Quadrants that K_T does not know: drag of a propeller that stands still, beside K_T's own (V_A^2, in rho D^2: 0.14, B4-70 has 0.31); flow
-    at the rudder behind it, slower or faster by 20 %, and what a propeller that turns astern sucks from there (of n D); the terms with n V_A, in
-    k_1, of a propeller that turns astern, and of one that turns ahead on a ship which goes astern (B4-70 against eq. 2: 0.8 to -0.2, and -0.3 to
-    -1.5; Roddy, Hess & Faller 2006). The first and the last but one are narrow: in a stop they pass for mass or thrust, and where a ship needs more
-    she gets a wider spread (`ordinary.widened`). Last, other forms of what is above: force that thrusters lose for good as the ship gathers way, bow
-    and stern, side force of a propeller going astern as a share of its thrust at rest, of a few per cent, and a wake that falls with
-    the square of the angle at the propeller, as w_P0 exp(-4 beta_P^2) (0.2 to 0.5 of 1 - w_P0 for w_P0 of 0.18 to 0.33), or of S175
-    without end (Son & Nomoto 1982): thrust that she loses in long hard turns passed for mass. Of two tunnels with the same record each gives its own
-    force, by where it stands in the hull (0.8 to 1.0 of its thrust): what one has more than the other passed for its lever. late_stall: share of the
-    lift that the rudder loses from 26 to 37 deg, since every rudder stalls at 30 to 40 deg (Brix 1993), sharper than a cubic lift does.
-    wave_resistance: of X'_uu 0.015 at a Froude number of 0.25, growing with its fourth power (p1 and p2 end at the square of the speed; without it
-    a fast ship needed thrust, mass and a propeller of her own). drag_forward: cross-flow drag of sections, 2 q xi beside C_D, larger forward or aft
-    (Hooft, Ocean Eng. 21 (1994) 329; without it a ship pushed sideways at rest had another lever of her bow thruster).
+    Each parameter has a normal prior: its centre is in `centres`, its standard deviation is `typical`. Without them
+    every ship's own propeller race or thruster tunnel would be reported as missing physics.
+
+    Source: docs/calibration.md#ordinary-differences-between-ships, with meaning and units.
     """
 
     family = "hull"
     summary = "ordinary differences between ships"
-    source = "see above"
+    source = "docs/calibration.md#ordinary-differences-between-ships"
     parameters = (
         Parameter("race", "1", 0.2, -0.9, 1.0),
         Parameter("wake_in_turns", "1", 0.3, -1.0, 2.0),
@@ -109,22 +89,25 @@ class Structure(Effect):
         return np.array([p.typical * own.get(p.name, 1.0) for p in self.parameters])
 
     def wider(self, ship: Particulars) -> dict[str, float]:
-        """How many times more ships differ in them than their spreads say, which are narrow for the sake of the fit: 0.31 and 0.8 of B4-70, above;
-        and waves, which a full hull makes at a lower Froude number, as C_b = 1.12 - 1.68 Fn goes (Alexander, for slow ships; Watson, Practical Ship
-        Design, 1998, eq. 3.11). (A barge with C_b 0.88 lay 9 spreads off at Fn 0.18.)"""
+        """Factors of the spreads of parameters whose spread is narrower in the fit than between ships.
+
+        A full hull makes waves at a lower Froude number: C_b = 1.12 - 1.68 Fn.
+
+        Source: Alexander's formula in Watson, Practical Ship Design, 1998, eq. 3.11.
+        """
         waves = (0.25 / max((1.12 - ship.Cb) / 1.68, 0.1)) ** 4
         return {"windmilling": 3.0, "thrust_backing": 2.5, "wave_resistance": max(waves, 1.0)}
 
+    def centres(self) -> np.ndarray:
+        """Prior means of the values, as differences from eq. (2)."""
+        own = {name: self.astern for name in ("N_v_astern", "Y_r_astern", "reversal")}
+        own |= {"backing": self.backing, "m_x": self.m_x, "braking": self.braking}
+        first = [c for _, c in self.parts]
+        return np.array([*first, *(own.get(p.name, 0.0) for p in self.parameters[len(first) :])])
+
     def plain(self) -> np.ndarray:
         """Values, in units of their spreads, at which it adds nothing to eq. (2)."""
-        centres = np.zeros(len(self.parameters))
-        centres[: len(self.parts)] = [c for _, c in self.parts]
-        names = [p.name for p in self.parameters]
-        for name in ("N_v_astern", "Y_r_astern", "reversal"):
-            centres[names.index(name)] = self.astern
-        for name in ("backing", "m_x", "braking"):
-            centres[names.index(name)] = getattr(self, name)
-        return np.array([-c / p.typical for c, p in zip(centres, self.parameters, strict=True)])
+        return np.array([-c / p.typical for c, p in zip(self.centres(), self.parameters, strict=True)])
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         for (effect, centre), value in zip(self.parts, q[:6], strict=True):
@@ -155,7 +138,7 @@ class Structure(Effect):
         e.wake = e.wake - (1.0 - ship.w_P0) * in_turns
 
     def _off_design(self, e: Modifiers, s: Flow, q: Sequence[Array], headway: Array, ship: Particulars) -> None:
-        """Quadrants that K_T does not know: a propeller that does not drive or is turned against the flow."""
+        """Add the quadrants that K_T does not know: a propeller that does not drive or is turned against the flow."""
         n, D, u = s.n / 60.0, ship.D_P, s.u - e.u_c
         ahead, V_A = maximum(n, 0.0), u - ship.w_P0 * maximum(u, 0.0)
         share = V_A * V_A / (V_A * V_A + (0.7 * math.pi * n * D) ** 2 + 1e-4)

@@ -9,7 +9,7 @@ import numpy as np
 from .rollout import Active
 
 ASIDE, AWAY = (2, 3, 4, 5), 0.01
-"""Heading and velocities: what forces are derived by to see how the motion's sensitivities change; and the step, in units of the scales."""
+"""States (heading, velocities) for second derivatives of the motion, and the step in units of the scales."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Columns:
 
 @dataclass(frozen=True)
 class Bend:
-    """How the motion's own sensitivities change with columns of base, own terms or candidates: through forces, by `rates` (size, K, B, 3), the change
+    """Change of the motion's own sensitivities with columns of base, own terms or candidates: through forces, by `rates` (size, K, B, 3), the change
     of the acceleration in the middle of every step beside the trajectory (`Linearisation.aside`) less that on it; through sensors, by `sensors`, what
     they are when each is moved by `unit`, or None where that changes nothing."""
 

@@ -19,28 +19,24 @@ from ...predictors.physics_model.actuator_fit import DEFAULT_ACTUATORS
 from ...records import Dataset
 from ...ship import Particulars, complete
 from ...signals import ACTUATORS, MOTION, STATES
+from ..thresholds import THRESHOLDS
 from .resampling import averaged
 from .rollout import Active, Course, Vessel
 
 NUM_HULL = len(HULL.parameters)
 NO_GEAR = Gear(1e-3, 1e12)
-SEGMENT = 60.0
-_EARLIER = 40.0
-"""Seconds of commands (Froude-scaled, 130 m) before a piece: where its actuators stand when it begins."""
-_LONG = 5
-MOST_STEPS, FOLD_STEPS, THOROUGH_STEPS = 24_000, 6_000, 48_000
-"""Of all segments together, per stage: more cost many minutes. (A training part of 90 runs names the same from 86 pieces as from 144, in half
-the time; its fits of rollouts take all of its runs.) What differs from run to run, such as the wind, may show only in all of a long record
-(3.5 h of a 3 m model: 48,000)."""
-DEEP = 10.0
-"""Draughts from which water is deep: it changes no derivative by more than 5 %."""
-FEW_PIECES = 200
-"""Segments from which gears and the noise of sensors are told: 100 runs of 120 s at 130 m."""
+SEGMENT = THRESHOLDS.value("segment_length")
+MOST_STEPS = THRESHOLDS.count("most_steps")
+FOLD_STEPS = THRESHOLDS.count("most_steps_of_a_fold")
+THOROUGH_STEPS = THRESHOLDS.count("most_steps_thorough")
+"""Integration steps of all segments together, per stage."""
+DEEP = THRESHOLDS.value("deep_water")
+FEW_PIECES = THRESHOLDS.count("segments_for_noise")
 
 
 def ordinary_gears(L: float) -> dict[str, Gear]:
     """Shaft [rpm], steering gear [rad] and thrusters [N] of an ordinary ship of length L, where no actuator is recorded: time constants and rates of
-    `predictors._actuator_fit.DEFAULT_ACTUATORS`, Froude-scaled."""
+    `actuator_fit.DEFAULT_ACTUATORS`, Froude-scaled."""
     T_n, rate_n, T_delta, rate_delta, T_F, _ = (float(v) for v in DEFAULT_ACTUATORS)
     scale = (L / 130.0) ** 0.5
     return {"n": Gear(T_n * scale, rate_n / scale**2), "delta": Gear(T_delta * scale, rate_delta / scale), "F": Gear(T_F * scale, 1e12)}
@@ -93,13 +89,13 @@ class Segments:
         )  # fmt: skip
 
     def without(self, pieces: np.ndarray) -> Segments:
-        """The same with nothing to be seen in some pieces."""
+        """Return them with nothing to be seen in some pieces."""
         mask = self.mask.copy()
         mask[pieces] = False
         return replace(self, mask=mask)
 
     def turned(self, actuators: Sequence[int]) -> Segments:
-        """The same with some actuators (of n, delta, F_b, F_s) read to the other side."""
+        """Return them with some actuators (of n, delta, F_b, F_s) read to the other side."""
         sign = np.where(np.isin(np.arange(4), actuators), -1.0, 1.0)
         states = np.concatenate([self.states[..., :6], self.states[..., 6:] * sign], axis=-1)
         return replace(self, states=states, commands=self.commands * sign, earlier=self.earlier * sign)
@@ -120,7 +116,7 @@ def cut(dataset: Dataset, steps: int) -> Segments:
     ship, commanded = complete(dataset.ship), dataset.actuators == "commanded"
     scale = (ship.L / 130.0) ** 0.5
     depth = inputs[..., dataset.inputs.index("depth")].mean(axis=1) if ship.T < least_depth(dataset) < DEEP * ship.T else None
-    back = np.arange(-round(_EARLIER * scale / dataset.dt) if commanded else 0, 0)
+    back = np.arange(-round(THRESHOLDS.value("commands_before_segment") * scale / dataset.dt) if commanded else 0, 0)
     return Segments(
         dt=dataset.dt, commanded=commanded, states=states, commands=inputs[..., :4],
         earlier=np.stack([run.inputs[np.maximum(a + back, 0), :4] for _, run, a, _ in pieces]),
@@ -138,7 +134,7 @@ def working(dataset: Dataset) -> frozenset[str]:
 
 
 def least_depth(dataset: Dataset) -> float:
-    """The least that is recorded [m]; infinite where none is."""
+    """Least recorded depth [m]; infinite where none is recorded."""
     if "depth" not in dataset.inputs:
         return np.inf
     return float(min(np.min(run.inputs[:, dataset.inputs.index("depth")]) for run in dataset.runs))
@@ -196,19 +192,19 @@ class Plant:
         self.path = np.stack([self._stages(i, gears[k]) for i, k in enumerate(("n", "delta", "F", "F"))], axis=-1)
 
     def driven(self, gears: dict[str, Gear]) -> Plant:
-        """The same runs with some other ordinary gears."""
+        """Return the same runs with some other ordinary gears."""
         plant = copy(self)
         plant.drive(self.ordinary | gears)
         return plant
 
     def without(self, pieces: np.ndarray) -> Plant:
-        """The same runs with nothing to be seen in some pieces."""
+        """Return the same runs with nothing to be seen in some pieces."""
         plant = copy(self)
         plant.seg = self.seg.without(pieces)
         return plant
 
     def less(self, error: np.ndarray) -> Plant:
-        """The same runs with an error (B, K + 1, 6) taken out of the recorded motion."""
+        """Return the same runs with an error (B, K + 1, 6) taken out of the recorded motion."""
         plant, states = copy(self), self.seg.states.copy()
         states[..., :6] -= error
         plant.seg = replace(self.seg, states=states)
@@ -223,15 +219,15 @@ class Plant:
         return Plant(self.ship, self.seg.where(wanted), self.long, self.ordinary, self.froude)
 
     def resized(self, factor: float) -> Plant:
-        """The same runs of a similar ship; pieces, latent force and units stay, so that evidence can be compared."""
+        """Return the same runs of a similar ship; pieces, latent force and units stay, so that evidence compares."""
         return Plant(self.ship.resized(factor), self.seg, self.long, froude=self.froude)
 
     def turned(self, actuators: Sequence[int]) -> Plant:
-        """The same runs with some actuators (of n, delta, F_b, F_s) read to the other side."""
+        """Return the same runs with some actuators (of n, delta, F_b, F_s) read to the other side."""
         return Plant(self.ship, self.seg.turned(actuators), self.long.turned(actuators), self.ordinary, self.froude)
 
     def with_actuators(self, actuators: np.ndarray) -> Plant:
-        """The same runs with other records (B, K + 1, 4) of the actuators."""
+        """Return the same runs with other records (B, K + 1, 4) of the actuators."""
         seg = replace(self.seg, states=np.concatenate([self.seg.states[..., MOTION], actuators], axis=-1))
         return Plant(self.ship, seg, self.long, self.ordinary, self.froude)
 
@@ -240,12 +236,13 @@ class Plant:
         """The plant of a data set, cut into segments of about 60 s at 130 m (Froude-scaled): over longer ones the motion is far from linear in its
         parameters, and little is learnt from the place where the next one begins. Fast records are averaged, long ones thinned to `most_steps`
         integration steps. `long` are longer pieces, with every sample, for what has no such limit: the gears."""
-        ship, motion = complete(dataset.ship), averaged(dataset)
+        ship, motion, longer = complete(dataset.ship), averaged(dataset), THRESHOLDS.count("long_segment")
         length = SEGMENT * (ship.L / 130.0) ** 0.5
-        segments, long = cut(motion, max(20, round(length / motion.dt))), cut(dataset, _LONG * max(20, round(length / dataset.dt)))
+        segments = cut(motion, max(20, round(length / motion.dt)))
+        long = cut(dataset, longer * max(20, round(length / dataset.dt)))
         steps = (segments.states.shape[1] - 1) * _substeps(segments.dt, ship.L)
         most = max(len(dataset), most_steps // steps)
-        return cls(ship, segments.thinned(most), long.thinned(max(len(dataset), most // _LONG)))
+        return cls(ship, segments.thinned(most), long.thinned(max(len(dataset), most // longer)))
 
     def path_of(self, active: Sequence[Active]) -> np.ndarray:
         """Actuators at the three stages of every integration step, (B, steps * substeps, 3, 4): n, delta, F_b, F_s.
@@ -330,7 +327,7 @@ class Plant:
         return np.moveaxis(path.reshape(len(path), self.steps, self.substeps, 3, 4), 1, 0)
 
     def measured(self, motion: np.ndarray, active: Sequence[Active]) -> np.ndarray:
-        """What the sensors would have recorded of `motion` (..., B, K + 1, 6)."""
+        """Predict the sensors' record of `motion` (..., B, K + 1, 6)."""
         sensors = [a for a in active if a.effect.enters == "sensor"]
         if not sensors:
             return motion

@@ -13,6 +13,7 @@ from ...effects.base import flow_first
 from ...ops import Array
 from ...predictors.physics_model.fit import parameter_scale
 from ..inference.gram import Hyper
+from ..thresholds import THRESHOLDS
 from .between_ships import STRUCTURE
 from .columns import ASIDE, AWAY, Bend, Columns
 from .forward import HULL, NUM_HULL, Plant
@@ -21,18 +22,18 @@ from .rollout import Active
 from .term import Term
 
 FREE = (1, 2, 5, 7, 8, 10)
-"""Of p0..p10 what a symmetric ship has: resistance, lift and drag of the rudder. A side force at zero rudder is an effect with a name."""
+"""Parameters of p0..p10 that a symmetric ship has: resistance, lift and drag of the rudder."""
 CENTRE = np.array([0.2, 1.0, 1.0, -0.8, 0.3, 1.0])
 SPREAD = np.array([3.0, 1.5, 0.5, 0.8, 1.0, 1.0])
-"""Mean and standard deviation of the free parameters before any data, in units of `parameter_scale`; drag of the rudder at zero angle is that of
-friction, 2.5 C_F (Brix 1993). Resistance that grows with speed itself is small on ships and large in the models of control engineers (12 of these
-units in the supply vessel of Fossen, Sagatun & Sorensen, Control Eng. Practice 4 (1996) 369)."""
-_HULL_SPREAD, _PLAIN, _ONE_SIGN = 0.3, 0.5, np.array([p.name in ("Y_v", "N_v", "N_r") for p in HULL.parameters])
-"""Standard deviation of the relative error of the regressions: 10 to 50 % (docs/theory.md#coefficients-of-the-left-side). What has one sign on
-every hull nears zero from so far down on: else a large tanker that did not feel the water explained her runs as well as 24 currents did."""
+"""Prior mean and standard deviation of the free parameters, in units of `parameter_scale`.
+
+Source: docs/calibration.md#ordinary-differences-between-ships.
+"""
+_ONE_SIGN = np.array([p.name in ("Y_v", "N_v", "N_r") for p in HULL.parameters])
+"""Derivatives that have one sign on every hull."""
 NUM_BASE = len(FREE) + NUM_HULL + len(STRUCTURE.parameters)
 PLACES = {p.name: len(FREE) + NUM_HULL + i for i, p in enumerate(STRUCTURE.parameters)}
-"""Of the parameters of the structure among all NUM_BASE."""
+"""Place of each parameter of the structure among all NUM_BASE."""
 
 
 @dataclass
@@ -66,19 +67,19 @@ class Scales:
         self.colour = Colour.white(plant.steps + 1)
 
     def coloured(self, colour: Colour) -> Scales:
-        """The same with another correlation of the noise."""
+        """Return them with another correlation of the noise."""
         new = copy(self)
         new.colour = colour
         return new
 
     def with_background(self, background: Hyper) -> Scales:
-        """The same for fits that are compared."""
+        """Return them for fits that are compared."""
         new = copy(self)
         new.background = background
         return new
 
     def alike(self, other: Scales) -> Scales:
-        """The same with the noise and the background of a fit that is compared."""
+        """Return them with the noise and the background of a fit that is compared."""
         new = self.coloured(other.colour)
         new.background = other.background
         return new
@@ -90,8 +91,10 @@ class Scales:
 
 def hull_changes(base: np.ndarray) -> np.ndarray:
     """Relative changes (..., NUM_HULL) of the hull's derivatives and added masses from their values in `base`."""
-    change, least = _HULL_SPREAD * base, 1.0 - _PLAIN
-    return np.where(_ONE_SIGN, np.maximum(change, least * np.exp(np.minimum(change + _PLAIN, 0.0) / least) - 1.0), change)
+    change, linear = THRESHOLDS.value("hull_spread") * base, THRESHOLDS.value("hull_change_linear")
+    least = 1.0 - linear
+    bounded = np.maximum(change, least * np.exp(np.minimum(change + linear, 0.0) / least) - 1.0)
+    return np.where(_ONE_SIGN, bounded, change)
 
 
 def parameters(scales: Scales, base: np.ndarray) -> tuple[list[np.ndarray | float], list[Active]]:
@@ -108,7 +111,7 @@ def parameters(scales: Scales, base: np.ndarray) -> tuple[list[np.ndarray | floa
 
 
 def predict(plant: Plant, scales: Scales, point: Point) -> np.ndarray:
-    """What the sensors would have recorded at `point`, (B, K + 1, 6)."""
+    """Predict the sensors' record at `point`, (B, K + 1, 6)."""
     return Linearisation(plant, scales, point).predicted
 
 
@@ -126,12 +129,8 @@ def _since(plant: Plant, term: Term, value: Array) -> Array:
     return value if term.since is None else np.where(plant.seg.run >= term.since, value, 0.0)
 
 
-_STEP, _OWN_STEP, _OWN_VECTOR_STEP, CANDIDATE_STEP, VECTOR_STEP = 1e-4, 0.02, 0.5, 0.5, 1.0
-"""Steps in units of the scales. A candidate's is finite: some (wind, deadband) act with the square of their size or not at all below one; that of a
-vector goes both ways, because its sign differs from heading to heading. So does that of a vector in the model, or a wind near zero, where its
-force has no slope, would be held there."""
-
-
+_STEP = 1e-4
+"""Finite difference in units of the scales."""
 _quiet = np.errstate(over="ignore", invalid="ignore")
 """A trial whose trajectory blows up is judged by its cost, which is not finite."""
 
@@ -181,7 +180,7 @@ class Linearisation:
 
     @_quiet
     def parameter_columns(self, free: Sequence[int] = range(NUM_BASE)) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-        """Those of the `free` base parameters and of the terms in the model alone."""
+        """Sensitivities of the `free` base parameters and of the terms in the model alone."""
         p, ship = parameters(self.scales, self.point.base + _STEP * np.eye(NUM_BASE)[list(free), None, None, :])
         changed, bent = self._changed(_STEP, p=p, ship=ship)
         self.base_sources, self.bends = self._ends(changed), [Bend(bent)]
@@ -271,7 +270,8 @@ class Linearisation:
 
     def _of_term(self, index: int, term: Term) -> np.ndarray:
         """Columns of a term that is in the model."""
-        step = _OWN_VECTOR_STEP if term.effect.vector and self.coarse else _OWN_STEP
+        # a vector near zero, where its force has no slope, would else stay there
+        step = 0.5 if term.effect.vector and self.coarse else 0.02
         steps = step * self.scales.amplitudes(term, self.plant.c.L)
         columns, sources, bend = self._moved(index, term, steps, step)
         if term.effect.vector and sources is not None and bend.rates is not None:
@@ -287,7 +287,8 @@ class Linearisation:
         found: dict[int, np.ndarray] = {}
         self.candidate_sources: list[np.ndarray | None] = []
         for i, term in enumerate(candidates):
-            step = VECTOR_STEP if term.effect.vector else CANDIDATE_STEP
+            # finite: some effects (wind, deadband) act with the square of their size, or not at all when small
+            step = 1.0 if term.effect.vector else 0.5
             unit = step * self.scales.amplitudes(term, self.plant.c.L)
             if term.effect.enters != "force":
                 found[i], source, bend = self._moved(None, term, unit, step)
@@ -296,7 +297,7 @@ class Linearisation:
                 continue
             own = [np.where(np.arange(term.size) == a, unit[a], 0.0)[:, None, None] for a in range(term.size)]
             q = [_since(self.plant, term, value) for value in own]
-            sides = (1.0, -1.0) if term.effect.vector else (1.0,)
+            sides = (1.0, -1.0) if term.effect.vector else (1.0,)  # its sign differs between headings
             change, bent = np.mean([self._changed(side * step, forces=self._beside(term, q, side), often=False) for side in sides], axis=0)
             self.candidate_sources.append(self._ends(change))
             self.bends.append(Bend(bent))
@@ -311,7 +312,7 @@ class Linearisation:
         return [found[i] for i in range(len(candidates))]
 
     def holding(self, index: int, term: Term) -> Linearisation:
-        """The same with a candidate in the model that has no size yet. After `columns`, of which it was the index-th candidate."""
+        """Return it with the index-th candidate of `columns` in the model, without a size yet."""
         new, runs = copy(self), self.plant.seg.runs
         value = np.zeros((runs, term.size)) if term.per_run else np.zeros(term.size)
         new.point = replace(self.point, terms=(*self.point.terms, term), values=(*self.point.values, value))

@@ -35,7 +35,7 @@ class Colour:
         return cls(nothing, np.ones(6), never, nothing > 0.0, np.tile(np.eye(samples), (6, 1, 1)), np.zeros((6, samples + 1)))
 
     def with_channel(self, channel: int, share: float, time: float, period: float = np.inf, smooth: bool = False) -> Colour:
-        """The same with another noise in one channel."""
+        """Return it with another noise in one channel."""
         samples = self.factor.shape[1]
         lag = np.abs(np.subtract.outer(np.arange(samples), np.arange(samples)))
         root = np.linalg.cholesky(np.eye(samples) + share * _correlation(lag, time, period, smooth))
@@ -54,7 +54,7 @@ class Colour:
         return out
 
     def whiten(self, values: np.ndarray, channels: Sequence[int]) -> None:
-        """The same in place, of some channels, which come first: (channels, B, K + 1, ...)."""
+        """Whiten in place some channels, which come first: (channels, B, K + 1, ...)."""
         for at, channel in enumerate(channels):
             if self.share[channel] > 0.0:
                 values[at] = np.einsum("kl,bl...->bk...", self.factor[channel], values[at], optimize=True)
@@ -79,7 +79,7 @@ class Colour:
 
 
 def _correlation(lag: np.ndarray, time: float, period: float, smooth: bool) -> np.ndarray:
-    """Of the part that lasts, at lags in samples."""
+    """Correlation of the part that lasts, at lags in samples."""
     decay = np.exp(-lag / time)
     if smooth:
         return (1.0 + lag / time + (lag / time) ** 2 / 3.0) * decay

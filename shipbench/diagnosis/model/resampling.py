@@ -1,5 +1,8 @@
-"""Fast records averaged to what a ship's motion needs: one sample a second at 130 m. A record at 10 Hz says as much in a tenth of the arithmetic, and
-the errors of its sensors, which last for seconds, become those of neighbouring samples."""
+"""Averaging of fast records to what a ship's motion needs.
+
+A record at 10 Hz says as much in a tenth of the arithmetic. The errors of its sensors, which last for seconds, become
+those of neighbouring samples.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,7 @@ import numpy as np
 
 from ...records import Dataset, Run
 from ...ship import complete
-
-_EVERY = 1.0
-"""Seconds at 130 m (Froude-scaled). Averaging over a window T moves a channel by its second derivative times T^2 / 24: millimetres, here."""
+from ..thresholds import THRESHOLDS
 
 
 def averaged(dataset: Dataset) -> Dataset:
@@ -19,7 +20,8 @@ def averaged(dataset: Dataset) -> Dataset:
 
     As many as fit into a second at 130 m (Froude-scaled) and leave the shortest run with two samples; the data set itself where that is one.
     """
-    most = min(_EVERY * (complete(dataset.ship).L / 130.0) ** 0.5 / dataset.dt + 1e-6, min(map(len, dataset.runs)) / 2)
+    every = THRESHOLDS.value("sample_interval")
+    most = min(every * (complete(dataset.ship).L / 130.0) ** 0.5 / dataset.dt + 1e-6, min(map(len, dataset.runs)) / 2)
     num = int(most) - (int(most) + 1) % 2
     if num < 3:
         return dataset

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from ...compiled import Lanes
 
-_MOST_BUILT = 256
 _built: dict[tuple[Any, ...], Lanes | None] = {}
 
 
@@ -61,7 +60,7 @@ class Vessel:
 
 @dataclass(frozen=True)
 class Course:
-    """Where and how long the lanes go: t (K, B, S, 3) [s] since the run began and wind (K, B, 2) or None, S integration steps of h [s] a sample; the
+    """Times and steps of the lanes: t (K, B, S, 3) [s] since the run began and wind (K, B, 2) or None, S integration steps of h [s] a sample; the
     stages of a step are its beginning, middle and end."""
 
     vessel: Vessel
@@ -71,7 +70,7 @@ class Course:
 
     @property
     def midway(self) -> tuple[slice, slice, int, int]:
-        """Where the middle of every sample is found in what is given at the stages of every integration step."""
+        """Index of the middle of every sample in arrays given at the stages of every integration step."""
         S = self.t.shape[2]
         return slice(None), slice(None), S // 2, S % 2
 
@@ -121,7 +120,7 @@ class Course:
         return x
 
     def _bundles(self, x: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, t: np.ndarray, *push: np.ndarray) -> list[Any]:
-        """What the machine code takes, each spread over (D, K, B, S, its numbers)."""
+        """Arguments of the machine code, each spread over (D, K, B, S, its numbers)."""
         values = np.stack(np.broadcast_arrays(*p, *(v for a in active for v in a.q)), axis=-1)[..., None, :]
         stages = [a.reshape(*self.t.shape[:2], a.shape[2], -1) for a in (act, t, *push)]
         return [x, values, np.array([self.h, *_numbers(active, self.vessel)]), *stages, *([] if self.wind is None else [self.wind[:, :, None]])]
@@ -138,7 +137,7 @@ class Course:
         kind = (self.wind is not None, steps)
         key = (tuple((type(a.effect) if a.own else a.effect, len(a.q), len(a.own)) for a in active), *kind)
         if key not in _built:
-            if len(_built) >= _MOST_BUILT:
+            if len(_built) >= 256:  # bounds the memory
                 _built.clear()
             _built[key] = _compiled(active, self.vessel, *kind, any_ship=True)
         if _built[key] is not None:
@@ -190,7 +189,7 @@ def _fields(vessel: Vessel) -> tuple[Any, ...]:
 
 
 def _numbers(active: Sequence[Active], vessel: Vessel) -> list[float]:
-    """What the code takes as numbers besides the step: the ship's, and the effects' own."""
+    """Numbers that the code takes besides the step: the ship's, and the effects' own."""
     return [*numbers_of(_fields(vessel)), *(number for a in active for number in a.own)]
 
 
@@ -199,7 +198,7 @@ def _names(vessel: Vessel) -> list[str]:
 
 
 def _compiled(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool, any_ship: bool) -> Lanes | None:
-    """None where there is no compiler, or an effect that takes no symbols."""
+    """Compile the step or the accelerations; None where there is no compiler, or an effect that takes no symbols."""
     from ...compiled import Lanes
 
     try:

@@ -7,11 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...effects.base import Effect
-
-_PER_RUN = 14.0
-"""A value for every run takes up so much of what single manoeuvres do beyond the model. (200 sets with nothing hidden, on development ships and
-ships of the literature: before any cost one reaches 22 beyond what the form of its hull is allowed, the others at most 19; with the threshold 27
-are asked.)"""
+from ..thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -34,7 +30,8 @@ class Term:
         return self.effect.name
 
     def cost(self, runs: int) -> float:
-        """Twice the log odds against it before any data: for the choice of a beginning or of shape parameters, for variances of values per run."""
+        """Twice the prior log odds against it: choice of beginning or shape parameters, variances of values per run."""
         if self.since is not None:
             return 2.0 * float(np.log(runs))
-        return 2.0 * float(np.log(self.choices)) + (_PER_RUN + float(np.log(runs)) if self.per_run else 0.0)
+        own = THRESHOLDS.value("values_per_run") + float(np.log(runs)) if self.per_run else 0.0
+        return 2.0 * float(np.log(self.choices)) + own
