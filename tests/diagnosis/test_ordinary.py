@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,7 +17,7 @@ from shipbench.diagnosis.inference.laplace import Fit, settle
 from shipbench.diagnosis.inference.robust_prior import NOTICEABLE, STRANGE, STRANGE_SUM, needed, widened, widths_of
 from shipbench.diagnosis.model.between_ships import STRUCTURE
 from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.linearisation import NUM_BASE, PLACES, Linearisation, Scales
+from shipbench.diagnosis.model.linearisation import CENTRE, FREE, NUM_BASE, PLACES, SPREAD, Linearisation, Scales
 from shipbench.diagnosis.selection.screening import screen
 from shipbench.diagnosis.selection.stepwise import candidates_for
 from shipbench.effects.base import EFFECTS
@@ -97,6 +98,16 @@ def test_an_ordinary_ship_keeps_its_spreads():
 def test_a_ship_of_the_literature_with_an_odd_rudder_is_neither_doubted_nor_explained():
     verdict = diagnose(published_trials(PUBLISHED["mariner"], 42), gain=False)
     assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
+
+
+def test_the_page_of_the_calibration_has_the_prior_of_the_code():
+    """Centre and spread of every parameter, as they stand in the table of docs/calibration.md."""
+    page = (Path(__file__).parents[2] / "docs" / "calibration.md").read_text("utf-8")
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in page.splitlines() if line.startswith("| `")]
+    rows = {row[0].strip("`"): row[-4:-2] for row in cells if len(row) in (5, 6)}
+    prior = {p.name: (c, p.typical) for p, c in zip(STRUCTURE.parameters, STRUCTURE.centres(), strict=True)}
+    prior |= {f"p{i}": (c, s) for i, c, s in zip(FREE, CENTRE, SPREAD, strict=True)}
+    assert {name: tuple(map(float, rows[name])) for name in prior} == prior
 
 
 EXACT = Trials(noise=0.0, gusts=0.0)

@@ -181,7 +181,7 @@ class Reduced:
 
 @dataclass(frozen=True)
 class Prior:
-    """Columns in the model: `shared` by all runs with prior precisions, `random` with variances log_tau2 of each run."""
+    """Columns in the model: `shared` by all runs with prior precisions, `random` with a variance log_tau2 each."""
 
     shared: np.ndarray
     precision: np.ndarray
