@@ -90,7 +90,7 @@ def own_forces(fit: Fit) -> float:
     with_own = np.hstack([unit[:, :-1], constant, unit[:, -1:]])
     slope = np.insert(gram.slope, [end] * 3, 0.0, axis=1)
     wider = replace(gram, G=np.swapaxes(with_own, 0, 1) @ gram.G @ with_own, slope=slope)
-    start = np.full(3, float(np.log(0.5**2)))  # half the latent force
+    start = np.full(3, float(np.log(0.5**2)))  # search begins at half the latent force
     own = replace(prior, random=np.arange(shared, end + 3), log_tau2=np.append(prior.log_tau2, start))
     log_force = fit.hyper.log_force
     return 2.0 * (evidence(wider, own, log_force, 3)[0] - evidence(gram, prior, log_force)[0])

@@ -164,7 +164,7 @@ def _waves(lin: Linearisation) -> tuple[dict[str, Form], int]:
     plant, seg = lin.plant, lin.plant.seg
     at = np.minimum(np.round(np.arange(plant.knots) * plant.knot_time / seg.dt).astype(int), plant.steps)
     known, (centre, unit) = seg.mask[:, at], _places(seg)
-    every = 1 + int(known.sum()) // 5000  # so many knots of the force tell the waves apart
+    every = 1 + int(known.sum()) // 5000  # compared at no more than 5000 knots of the force
     places, force = ((lin.motion[:, at, :2][known] - centre) / unit)[::every], lin.point.w[known][::every]
     step = np.pi / max(float(np.max(np.ptp(places, axis=0))), 1e-9)
     shortest = THRESHOLDS.value("shortest_wave") * plant.c.L

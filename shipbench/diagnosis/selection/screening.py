@@ -60,7 +60,7 @@ def evidence(gram: Gram, prior: Prior, log_force: np.ndarray, own_random: int = 
         second = np.mean(solution.means[:, own] ** 2) + np.mean(np.diagonal(solution.covs[:, own, own], axis1=1, axis2=2))
         return solution.log_evidence, np.append(force, np.log(second))
 
-    theta = accelerated(step, np.append(log_force, prior.log_tau2[-1:] if own_random else []), 6)
+    theta = accelerated(step, np.append(log_force, prior.log_tau2[-1:] if own_random else []), 6)  # cycles
     return step(theta)[0], theta[:3], float(theta[3]) if own_random else 0.0
 
 
@@ -103,7 +103,7 @@ def screen(fit: Fit) -> list[Score]:
         if scores[i].score < -THRESHOLDS.value("hopeless_score") * term.per_run or is_spent():
             continue
         own = term.size if term.per_run else 0
-        start = max(scores[i].log_tau2, float(np.log(0.1**2)))  # from nothing it would not grow
+        start = max(scores[i].log_tau2, float(np.log(0.1**2)))  # least variance at the start
         prior = with_columns(renumbered, len(base) + np.arange(term.size), term, start)
         after, _, log_tau2 = evidence(gram.only(np.append(base, columns[i])), prior, log_force, own)
         scores[i] = replace(scores[i], score=2.0 * (after - before) - term.cost(fit.plant.seg.runs), log_tau2=log_tau2)
@@ -196,7 +196,7 @@ def other_kinds_from(kinds: Sequence[str]) -> list[int]:
         return []
     of = np.array([[kind == one for one in sorted(set(kinds))] for kind in kinds], dtype=float)
     at, shuffle = np.array(places(len(kinds)), dtype=int), np.random.default_rng(0)
-    by_chance = [_alike(shuffle.permutation(of), at) for _ in range(500)]
+    by_chance = [_alike(shuffle.permutation(of), at) for _ in range(500)]  # random orders
     bounds = THRESHOLDS.value("alike_lower"), THRESHOLDS.value("alike_upper")
     least = np.clip(np.quantile(by_chance, THRESHOLDS.value("alike_by_chance"), axis=0), *bounds)
     return [int(k) for k in at[_alike(of, at) < least]]
