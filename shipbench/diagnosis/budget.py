@@ -1,5 +1,8 @@
-"""How much work and memory one diagnosis may take. Work is counted where fits iterate. Every loop over fits, candidates or forms asks `is_spent`;
-then fits end where they stand, and what rests on them is not told: what was found before stands, what was not looked for is said."""
+"""Limits of work and memory of one diagnosis.
+
+Work is counted where fits iterate. Every loop over fits, candidates or forms asks `is_spent`. Then fits end where they
+stand, and results of these fits are not reported. Earlier results stand; what was not looked for is said.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +14,6 @@ from dataclasses import dataclass, field
 
 from ..errors import InputError
 from ..steps import tick
-
-USUAL = 60
-"""Iterations of one step of a diagnosis, for the progress alone."""
 
 
 @dataclass
@@ -33,14 +33,14 @@ class Budget:
 
     @property
     def is_spent(self) -> bool:
-        """Whether a limit is reached; remembered."""
+        """Check whether a limit is reached; remembered."""
         seconds = time.process_time() - self.began
         if self.stopped is None and (self.used >= self.iterations or seconds >= self.seconds):
             self.stopped = self.used, seconds
         return self.stopped is not None
 
     def part(self, parts: int) -> Budget:
-        """That of one of so many parts which share the seconds that are left."""
+        """Budget of one of so many parts, which share the seconds that are left."""
         left = self.seconds - (time.process_time() - self.began)
         return Budget(self.iterations, max(left, 0.0) / parts, self.gigabytes)
 
@@ -64,8 +64,8 @@ class Budget:
         Raises:
             InputError: it would take more than the `gigabytes`.
         """
-        products, sensitivities = _COPIES * 6 * columns**2, _COPIES * 6 * samples * columns
-        needed = 8e-9 * pieces * (products + sensitivities)
+        products, sensitivities = columns**2, samples * columns
+        needed = 8e-9 * pieces * (3 * 6 * (products + sensitivities))  # of six channels, three copies at once
         if needed > self.gigabytes:
             raise InputError(
                 f"the record: {pieces} pieces of {samples} samples with {columns} columns would take {needed:.3g} GB of memory. "
@@ -74,8 +74,6 @@ class Budget:
             )
 
 
-_COPIES = 3
-"""Arrays of columns, or of their products, of all six channels, that exist at once."""
 _NOW: ContextVar[Budget | None] = ContextVar("budget", default=None)
 
 
@@ -91,18 +89,18 @@ def limited(budget: Budget) -> Iterator[Budget]:
 
 def count() -> None:
     """Count one iteration of a fit, also for the progress."""
-    tick(USUAL)
+    tick(60)  # about as many in one step of a diagnosis
     budget = _NOW.get()
     if budget is not None:
         budget.used += 1
 
 
 def is_spent() -> bool:
-    """Whether the diagnosis in progress is to end."""
+    """Check whether the diagnosis in progress is to end."""
     budget = _NOW.get()
     return budget is not None and budget.is_spent
 
 
 def refuse_large(pieces: int, samples: int, columns: int) -> None:
-    """As `Budget.refuse_large`, of the diagnosis in progress."""
+    """Refuse a large linearisation of the diagnosis in progress, see `Budget.refuse_large`."""
     (_NOW.get() or Budget()).refuse_large(pieces, samples, columns)

@@ -40,13 +40,13 @@ from .preparation.time_offsets import ruled_out
 from .result import Cause, Diagnosis, Gain
 from .selection.analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .selection.ship_file import doubts_of, odd_for, own_propeller
+from .thresholds import THRESHOLDS
 
-FOLDS = 5
 _WHOLE = 0.2
-"""Share of the time that the plain model of all runs takes, and the search beside it, where the gain is measured."""
+"""Share of the time for the plain model of all runs, and as much for the search, where the gain is measured (progress)."""
 
 
-@threadpool_limits.wrap(limits=1)  # its matrices are small: the threads of two processes on two cores wait for each other (24 runs: 81 s, now 36 s)
+@threadpool_limits.wrap(limits=1)  # its matrices are small: threads of several processes would wait for each other
 def diagnose(
     dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequence[str] | None = None, workers: int = 1, thorough: bool = False,
     budget: Budget | None = None,
@@ -73,7 +73,7 @@ def diagnose(
 
 
 def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | None, workers: int, steps: int, used: Budget) -> Diagnosis:
-    """As `diagnose`, within a budget that is counted."""
+    """Diagnosis within a budget that is counted, see `diagnose`."""
     step("read the record", 0.0, 0.02)
     began, fingerprint = time.perf_counter(), dataset.fingerprint
     ready = prepare(dataset, PASSES if only is None else GIVEN)
@@ -83,8 +83,8 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
     if not apart and len(dataset) > 1:
         warnings.append("all runs are one group (pieces of one log, say): no gain can be measured on runs that are held out.")
     wanted = gain and apart and not cautious
-    whole = _WHOLE if wanted else 0.48
-    work = partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled, budget=used.part(FOLDS))
+    whole, folds = _WHOLE if wanted else 0.48, THRESHOLDS.count("folds")
+    work = partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled, budget=used.part(folds))
     with process_pool(workers) if wanted and workers > 1 else nullcontext() as pool:
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
@@ -101,7 +101,7 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
             if dataset is not as_recorded or no_cause != settled:
                 ahead, work = None, partial(work, dataset=dataset, settled=no_cause)
         doubts = doubts_of(found) if only is None and rests else []
-        share = used.part(FOLDS)
+        share = used.part(folds)
         worth = (
             _cross_validated(dataset, found, seed, partial(work, budget=share), pool, ahead) if wanted and not doubts and not is_spent() else Worth()
         )
@@ -143,9 +143,11 @@ class Worth:
 def _as_it_must_be_read(
     dataset: Dataset, null: Fit, steps: int, settled: Sequence[str], seed: int
 ) -> tuple[Analysis, Dataset, list[UnitFinding], Sequence[str]]:
-    """What is found in runs of which `null` is the plain model, the runs as actuators must be read in them, those that are read to the other side
-    (which the model cannot tell of another ship than that of the file), and what is not asked of the model, `settled` and delays that the track rules
-    out."""
+    """Analysis of runs of which `null` is the plain model, with sign errors and errors of actuator records corrected.
+
+    Returns the analysis, the corrected runs, the sign errors (which the model cannot tell of another ship than that of
+    the file), and the effects that are not looked for: `settled`, and delays that the track rules out.
+    """
 
     def plain(read: Dataset) -> Fit:
         return plain_model(Plant.of(read, steps), settled=settled)
@@ -166,7 +168,7 @@ def _as_it_must_be_read(
 
 
 def _of_depth(dataset: Dataset, plant: Plant) -> list[str]:
-    """What a recorded depth is taken for."""
+    """Lines on how a recorded depth is used."""
     if plant.seg.depth is not None:
         draughts = plant.seg.depth / plant.ship.T
         return [
@@ -203,13 +205,17 @@ def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
     groups = [*members.values()]
     groups = [groups[i] for i in np.random.default_rng(seed).permutation(len(groups))]
     size = np.array([len(g) for g in groups])
-    part = np.repeat(np.arange(FOLDS), [len(p) for p in np.array_split(np.arange(len(dataset)), FOLDS)])[np.cumsum(size) - 1 - size // 2]
+    folds = THRESHOLDS.count("folds")
+    parts = [len(p) for p in np.array_split(np.arange(len(dataset)), folds)]
+    part = np.repeat(np.arange(folds), parts)[np.cumsum(size) - 1 - size // 2]
     return [np.sort(np.concatenate([g for g, k in zip(groups, part, strict=True) if k == fold])) for fold in np.unique(part)]
 
 
 def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, str]:
-    """What to do about an actuator that acts otherwise than its record says, by the name of the cause: the gears of the predictors end at the record,
-    so that the record has to be put right."""
+    """Advice on an actuator that acts otherwise than its record says, by the name of the cause.
+
+    The actuator dynamics of the predictors end at the record, so the record has to be corrected.
+    """
     if found.final.plant.seg.commanded:
         return {}
     in_record, told = {g.effect for g in found.gears}, {}
@@ -236,9 +242,9 @@ def _cross_validated(
     if not (found.final.model.terms or found.gears or hull) or found.unknown is not None:
         return Worth()
     ready = [ahead] if ahead is not None and found.threshold == THRESHOLD else []
-    rest = range(len(ready), len(_folds(dataset, seed)))
+    folds, rest = THRESHOLDS.count("folds"), range(len(ready), len(_folds(dataset, seed)))
     parts: list[FoldGain] = []
-    step(f"fit {FOLDS} training parts, score the runs left out", 2.0 * _WHOLE, 0.96)
+    step(f"fit {folds} training parts, score the runs left out", 2.0 * _WHOLE, 0.96)
     for part in (pool.map if pool else map)(partial(work, threshold=found.threshold, hull=hull), rest):
         parts.append(part)
         within(len(parts) / (len(rest) + len(ready)))

@@ -14,22 +14,15 @@ from ...ops import where
 from ...physics.actuators import Gear, gear_path, gear_step
 from ..budget import is_spent
 from ..model.forward import Plant, Segments, ordinary_gears
-from .kinds import DELAY, ORDINARY, GearFinding, Kind, kinds_of, least_rate
+from ..thresholds import THRESHOLDS
+from .kinds import ORDINARY, GearFinding, Kind, kinds_of, least_rate
 from .record_error import CHANNELS, FORMS, RecordError, readings
 
 if TYPE_CHECKING:
     from ...compiled import Lanes
 
-_SCAN, _HALVINGS = (4, 12, 24), 8
-_ROUNDS, _FINE, _WORTH_A_MOVE, _MOST, _STEP = 150, 1e-3, 3e-5, 200, 0.02
-_SECOND, _PARTS = 0.5, 4
-"""Greatest time constant of an ordinary second stage, as a share of the first's; parts of a sample in which it is followed."""
-_LEAST_SCORE, _LEAST_ERROR, _CORRECTIONS, _PROMISING = 10.0, 0.03, 3, 0.1
-"""Least score of an error of the record, least size that is told, relative, how often record and gear are corrected in turn, and the share of what
-the best effect explains from which they are: that may make ten times as much of it."""
-_OWN_SPREAD, _RECORD, _CLOCK = 0.25, 0.01, 0.02
-"""Standard deviations: of an ordinary gear's time constant, relative (a lag is reported beyond it); of the scale of a record, relative; of a time, in
-samples."""
+_SCAN, _STEP, _PARTS = (4, 12, 24), 0.02, 4
+"""Points of the grid per parameter; step of finite differences; parts of a sample in which a second stage runs."""
 
 
 def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear], list[RecordError]]:
@@ -70,7 +63,8 @@ class _Record:
     @classmethod
     def of(cls, seg: Segments, L: float, name: str, picked: np.ndarray) -> _Record:
         scale, (b, c) = (L / 130.0) ** 0.5, picked.T
-        late = np.arange(seg.states.shape[1] - 1) * seg.dt >= min(DELAY * scale, 0.25 * seg.states.shape[1] * seg.dt)
+        longest = min(THRESHOLDS.value("longest_delay") * scale, 0.25 * seg.states.shape[1] * seg.dt)
+        late = np.arange(seg.states.shape[1] - 1) * seg.dt >= longest
         return cls(name, scale, seg.dt, seg.commands[b, :-1, c], seg.states[b, :, 6 + c], seg.mask[b, 1:] & late, seg.run[b], seg.runs)
 
     def paths(self, z: np.ndarray, kind: Kind | None) -> np.ndarray:
@@ -95,7 +89,8 @@ class _Record:
         code = _follower(kind and kind.field)
         if code is not None:
             return self._followed(code, z, kind, 1)[:, 0, :, 2].sum(axis=1)
-        return np.concatenate([np.sum(self.errors(part, kind) ** 2, axis=(1, 2)) for part in np.array_split(z, len(z) // _MOST + 1)])
+        parts = np.array_split(z, len(z) // 200 + 1)  # keeps the arrays small
+        return np.concatenate([np.sum(self.errors(part, kind) ** 2, axis=(1, 2)) for part in parts])
 
     def _followed(self, code: Lanes, z: np.ndarray, kind: Kind | None, kept: int) -> np.ndarray:
         """Motor, position and sum of squared errors so far, (M, kept, P, 3): at every sample or, if 1 is kept, at the end."""
@@ -127,28 +122,30 @@ class _Record:
         if error is None:
             return found, ordinary, None
         found, ordinary, _ = replace(self, measured=error.taken_out(self.measured))._judged(usual)
-        return found, ordinary, error if error.size > _LEAST_ERROR else None
+        return found, ordinary, error if error.size > THRESHOLDS.value("least_record_error") else None
 
     def _judged(self, usual: Gear) -> tuple[list[GearFinding], Gear, RecordError | None]:
-        """The same of the record as it is, with an error that explains more than every effect.
+        """Findings of the record as it is, with an error that explains more than every effect.
 
         Two stages look like a delay, end stops like an error: they are fitted only where something is to be explained, since that takes as long as
         all the others.
         """
         kinds = kinds_of(self.name, self.scale, float(np.percentile(np.abs(self.command), 98)), usual)
+        asked = THRESHOLDS.value("actuator_evidence")
         ordinary, fits = self._fitted(None), [self._fitted(kind) for kind in kinds]
         gear, plain = Gear(*(float(v) for v in np.exp(ordinary))), self.errors(ordinary[None], None)[0]
         found = [self._finding(kind, z, ordinary, plain) for kind, z in zip(kinds, fits, strict=True)]
         stops, _ = self._ended(ordinary, None, float(np.sum(plain**2)))
-        if max(stops, self._misread(ordinary, None, plain).score, *(f.score for f in found)) < _LEAST_SCORE:
+        if max(stops, self._misread(ordinary, None, plain).score, *(f.score for f in found)) < asked:
             return found, gear, None
         second = self._second
         z = self._fitted(second, [ordinary, *fits])
         plain = min(plain, self.errors(z[None], second)[0], key=lambda e: float(np.sum(e**2)))
         found = [self._finding(kind, fit, ordinary, plain) for kind, fit in zip(kinds, fits, strict=True)]
         error = self._misread(z, second, plain)
-        least, before = max(_LEAST_SCORE, *(f.score for f in found)), float(np.sum(plain**2))
-        for _ in range(_CORRECTIONS if error.score > _PROMISING * least else 0):
+        least, before = max(asked, *(f.score for f in found)), float(np.sum(plain**2))
+        # record and actuator are corrected in turn where that may make the error the best explanation
+        for _ in range(3 if error.score > THRESHOLDS.value("record_error_promising") * least else 0):
             z = replace(self, measured=error.taken_out(self.measured))._fitted(second, [ordinary, *fits])
             error = self._misread(z, second, plain)
         worth, record = max((self._ended(fit, kind, before) for fit, kind in zip((ordinary, *fits), (None, *kinds), strict=True)), key=lambda x: x[0])
@@ -157,7 +154,7 @@ class _Record:
         return found, gear, error if error.score > least else None
 
     def _ended(self, z: np.ndarray, kind: Kind | None, before: float) -> tuple[float, _Record]:
-        """The same with orders ended where the record of a gear says that its stops are, and the score of these (and of `kind`)."""
+        """Score of end stops where the record of a gear shows them (and of `kind`), and the record with clipped orders."""
         from scipy.optimize import minimize_scalar
 
         def ended(limit: float) -> _Record:
@@ -173,7 +170,7 @@ class _Record:
         return self._worth(before, record.errors(z[None], kind)[0], 1 + (kind is not None)), record
 
     def _misread(self, z: np.ndarray, kind: Kind | None, plain: np.ndarray) -> RecordError:
-        """What the record reads beside the positions of a gear; score: against the errors `plain`."""
+        """Error of the record beside the positions of a gear; score: against the errors `plain`."""
         at = self.paths(z[None], kind)[0]
         off, forms = np.where(self.judged, self.measured[:, 1:] - at, 0.0), np.where(self.judged, readings(at), 0.0)
         factors = np.linalg.lstsq(forms.reshape(len(forms), -1).T, off.ravel(), rcond=None)[0]
@@ -209,8 +206,10 @@ class _Record:
         slopes = ((self.errors(z + steps, kind) - self.errors(z - steps, kind)) / (2.0 * _STEP)).reshape(len(z), -1)
         relative = np.linalg.inv(discount / variance * slopes @ slopes.T + np.eye(len(z)))[kind.at, kind.at] ** 0.5
         size = float(np.exp(z[kind.at]))
-        clock = _CLOCK * self.dt if kind.field in ("T", "delay") else 0.0
-        spread = 1.96 * float(np.sqrt((size * np.hypot(relative, _RECORD)) ** 2 + (_OWN_SPREAD * kind.beyond) ** 2 + clock**2))
+        clock = THRESHOLDS.value("time_uncertainty") * self.dt if kind.field in ("T", "delay") else 0.0
+        relative = np.hypot(relative, THRESHOLDS.value("record_scale_uncertainty"))
+        own = THRESHOLDS.value("time_constant_spread") * kind.beyond
+        spread = 1.96 * float(np.sqrt((size * relative) ** 2 + own**2 + clock**2))
         value = size - kind.beyond
         gear = replace(Gear(*(float(v) for v in np.exp(z[:2]))), **{kind.field: size})
         least = self._detectable(kind, ordinary, plain) - (float(np.exp(ordinary[0])) if kind.field == "T" else 0.0)
@@ -218,8 +217,9 @@ class _Record:
 
     @property
     def _second(self) -> Kind:
-        """An ordinary second stage."""
-        return Kind("", "T2", 0.02 * self.scale, _SECOND * ORDINARY[self.name].T * self.scale)
+        """Ordinary second stage."""
+        longest = THRESHOLDS.value("second_stage") * ORDINARY[self.name].T * self.scale
+        return Kind("", "T2", 0.02 * self.scale, longest)
 
     def _detectable(self, kind: Kind, ordinary: np.ndarray, plain: np.ndarray) -> float:
         """Size from which `kind` is expected to be found on a gear that is like the `ordinary` one otherwise, whose errors are `plain`: what its time
@@ -235,18 +235,20 @@ class _Record:
         def is_seen(size: float) -> bool:
             off = self.errors(kind.like(ordinary, size)[None], kind).ravel() - at_first
             off -= slopes @ np.linalg.lstsq(slopes, off, rcond=None)[0]
-            return self._worth(squares + float(off @ off), plain, 1) > _LEAST_SCORE
+            return self._worth(squares + float(off @ off), plain, 1) > THRESHOLDS.value("actuator_evidence")
 
         if not is_seen(most):
             return np.nan
-        for _ in range(_HALVINGS):
+        for _ in range(8):
             middle = float(np.sqrt(least * most))
             least, most = (least, middle) if is_seen(middle) else (middle, most)
         return most
 
     def _least(self, kind: Kind | None, low: np.ndarray, high: np.ndarray, near: Sequence[np.ndarray]) -> np.ndarray:
-        """Minimum of the squared error inside a box: a grid, and a pattern of neighbours of its best point that shrinks when none is much better
-        (else it creeps along a valley where the time constant hardly matters).
+        """Minimum of the squared error inside a box: a grid, then a pattern of neighbours of its best point.
+
+        The pattern shrinks when no neighbour is much better. Otherwise it would follow a valley where the time constant
+        hardly matters.
 
         Deadband and play leave the cost without a usable slope. The valley is narrow in the rate and in what is
         looked for: these are scanned closely.
@@ -256,21 +258,21 @@ class _Record:
         half = (high - low) / np.array(_SCAN[: len(low)])
         pattern = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(low))))
         best, center = np.inf, points[0]
-        for _ in range(_ROUNDS):
+        for _ in range(150):
             costs = self.costs(points, kind)
             least, before = float(costs.min()), best
             if least < best:
                 best, center = least, points[int(costs.argmin())]
-            if least > (1.0 - _WORTH_A_MOVE) * before:
+            if least > (1.0 - 3e-5) * before:
                 half = 0.5 * half
-                if np.all(half < _FINE):
+                if np.all(half < 1e-3):
                     break
             points = np.unique(np.clip(center + half * pattern, low, high), axis=0)
         return center
 
 
 def _discount(rest: np.ndarray) -> float:
-    """What a sample counts for, of errors (P, K) that are correlated from one to the next."""
+    """Weight of a sample of errors (P, K) that are correlated from one to the next."""
     rho = min(max(float(np.sum(rest[:, 1:] * rest[:, :-1]) / np.sum(rest**2)), 0.0), 0.98) if np.any(rest) else 0.0
     return (1.0 - rho) / (1.0 + rho)
 

@@ -1,4 +1,4 @@
-"""What may be wrong between command and actuator, and what an ordinary gear is."""
+"""Effects between command and actuator, and ordinary actuator dynamics."""
 
 from __future__ import annotations
 
@@ -8,24 +8,26 @@ import numpy as np
 
 from ...effects.base import EFFECTS
 from ...physics.actuators import Gear
+from ..thresholds import THRESHOLDS
 
 _RATE_POWER = {"n": 2, "delta": 1, "F": 0}
-DELAY = 10.0
-"""Longest delay [s] at 130 m that is looked for."""
-_LONGEST = 400.0
-"""Length [m] of the longest ships."""
+"""Power of the square root of the length by which a rate falls (Froude's law)."""
 
 
 @dataclass(frozen=True)
 class Ordinary:
-    """What an ordinary gear may be, at 130 m: greatest time constant [s] and smallest rate [actuator's unit per s]."""
+    """Bounds of ordinary actuator dynamics, at 130 m: greatest time constant [s], smallest rate [actuator's unit per s]."""
 
     T: float
     rate: float
 
 
-ORDINARY = {"n": Ordinary(12.0, 2.0), "delta": Ordinary(2.0, np.deg2rad(1.9)), "F": Ordinary(4.5, 0.0)}
-"""Shaft as for slow Diesels; rudder as SOLAS II-1 reg. 29 asks (65 deg in 28 s, 2.3 deg/s) less a margin; thrusters as for electric tunnels."""
+ORDINARY = {
+    "n": Ordinary(THRESHOLDS.value("shaft_time_constant"), THRESHOLDS.value("shaft_rate")),
+    "delta": Ordinary(THRESHOLDS.value("rudder_time_constant"), np.deg2rad(THRESHOLDS.value("rudder_rate"))),
+    "F": Ordinary(THRESHOLDS.value("thruster_time_constant"), 0.0),
+}
+"""Ordinary shaft, rudder and thrusters. The rate of thrusters has no bound."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Kind:
 
     @property
     def at(self) -> int:
-        """Where its value stands beside time constant and rate, or in place of one of them."""
+        """Place of its value beside time constant and rate, or in place of one of them."""
         return {"T": 0, "rate": 1}.get(self.field, 2)
 
     def like(self, ordinary: np.ndarray, size: float) -> np.ndarray:
@@ -72,8 +74,11 @@ def least_rate(actuator: str, scale: float) -> float:
 
 
 def slow_on_any_ship(found: GearFinding) -> bool:
-    """Whether a gear that is slower than those of its ship would be so on the longest ship, too; whatever does not go with the length is."""
-    scale = (_LONGEST / 130.0) ** 0.5
+    """Check whether a gear that is too slow for its ship is too slow for the longest ship as well.
+
+    What does not depend on the length counts as such.
+    """
+    scale = (THRESHOLDS.value("longest_ship") / 130.0) ** 0.5
     changed = EFFECTS.get(found.effect).traits.gear_field
     if changed == "T":
         return ORDINARY[found.actuator].T * scale < found.gear.T
@@ -81,10 +86,11 @@ def slow_on_any_ship(found: GearFinding) -> bool:
 
 
 def kinds_of(actuator: str, scale: float, span: float, ordinary: Gear) -> list[Kind]:
-    """What may be wrong with an actuator; `span` is the range of its commands."""
+    """Effects of an actuator; `span` is the range of its commands."""
     T, rate = ORDINARY[actuator].T * scale, least_rate(actuator, scale)
     bounds = {
-        "T": (T, 60.0 * scale, ordinary.T), "rate": (0.02 * rate, rate), "delay": (0.15 * scale, DELAY * scale),
+        "T": (T, 60.0 * scale, ordinary.T), "rate": (0.02 * rate, rate),
+        "delay": (0.15 * scale, THRESHOLDS.value("longest_delay") * scale),
         "deadband": (0.004 * span, 0.3 * span), "backlash": (0.004 * span, 0.3 * span),
     }  # fmt: skip
     found = [e for e in map(EFFECTS.get, EFFECTS.names()) if any(channel.startswith(actuator) for channel in e.acts_through)]

@@ -1,4 +1,4 @@
-"""What the record of an actuator errs by beside its commands, as a function of the position."""
+"""Error of the record of an actuator beside its commands, as a function of the position."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..thresholds import THRESHOLDS
+
 CHANNELS = {"n": (0,), "delta": (1,), "F": (2, 3)}
-"""Of the actuators that share a gear."""
+"""Channels of the actuators that share a gear."""
 FORMS = ("constant", "{}", "{0}|{0}|", "|{}|")
-"""What the error of a record may follow."""
+"""Functions of the position that the error of a record may follow."""
 _VARIABLES = {"n": "revolutions", "delta": "rudder", "F": "thrusters"}
-_BETTER = 10.0
-"""Least log evidence of the motion for another reading of a record, as for one of another sign."""
-_INVERSIONS, _LEAST_SLOPE = 8, 0.1
 
 
 def readings(at: np.ndarray) -> np.ndarray:
@@ -23,8 +22,9 @@ def readings(at: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class RecordError:
-    """What the record of an actuator reads beside where its commands bring the gear, and follows the position, best in this form: a scale that is
-    off, a sensor that is not linear.
+    """Error of the record beside where the commands bring the actuator, that follows the position, best in this form.
+
+    Such are a calibration error and a sensor that is not linear.
 
     score: 2 log likelihood ratio, as of a gear's effects; size: root mean square without the zero error, relative to that of the record; factors
     (4,): of `readings`; worth: log evidence of the motion for the record without it (where negative, the gear does not go where it is sent).
@@ -39,30 +39,30 @@ class RecordError:
 
     @property
     def variable(self) -> str:
-        """What it depends on."""
+        """Variable that it depends on."""
         return _VARIABLES[self.actuator]
 
     @property
     def undecided(self) -> bool:
-        """Whether the motion does not tell which of the two is wrong."""
-        return abs(self.worth) <= _BETTER
+        """Check whether the motion does not tell which of the two is wrong."""
+        return abs(self.worth) <= THRESHOLDS.value("record_reading_evidence")
 
     @property
     def axis(self) -> str:
-        """What is wrong, as far as the motion tells."""
+        """Signal that is wrong, as far as the motion tells."""
         which = "recorded or ordered" if self.undecided else "recorded" if self.contradicted else "ordered"
         return f"{which} {self.variable}"
 
     @property
     def contradicted(self) -> bool:
-        """Whether the motion speaks against the record."""
-        return self.worth > _BETTER
+        """Check whether the motion speaks against the record."""
+        return self.worth > THRESHOLDS.value("record_reading_evidence")
 
     def taken_out(self, recorded: np.ndarray) -> np.ndarray:
         """Positions that are recorded so (Newton's method; the record rises with the position)."""
         _, straight, bent, split = self.factors
         true = recorded
-        for _ in range(_INVERSIONS):
-            slope = np.maximum(1.0 + straight + 2.0 * bent * abs(true) + split * np.sign(true), _LEAST_SLOPE)
+        for _ in range(8):
+            slope = np.maximum(1.0 + straight + 2.0 * bent * abs(true) + split * np.sign(true), 0.1)
             true = true - (true + np.tensordot(self.factors, readings(true), 1) - recorded) / slope
         return true

@@ -1,4 +1,7 @@
-"""What a missing force follows: the share of its variance that a smooth curve of one variable takes, tested by giving runs each other's force."""
+"""Dependence of a missing force: the share of its variance that a smooth curve of one variable explains.
+
+The test gives runs each other's force.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..result import Trace
+from ..thresholds import THRESHOLDS
 
 AXES = ("surge", "sway", "yaw")
 UNITS = {
     "heading": "deg", "speed": "m/s", "drift angle": "deg", "rudder": "deg", "yaw rate": "deg/s", "revolutions": "rpm", "bow thruster": "kN",
     "stern thruster": "kN", "time": "s", "run": "",
 }  # fmt: skip
-_SURROGATES = 199
-_GRID = 181
-_STRONGER = 1.5
-_SAILED, _OPEN = 2.0, 1e-4
-"""Degrees from the nearest heading that was sailed, beyond which nothing is said of a force that follows the heading; and share of the greatest
-information below which a direction of the curve's coefficients is left at zero (two harmonics on two courses)."""
+_SURROGATES, _GRID = 199, 181
+"""Random forces of the test; points of a curve."""
 
 
 class Follows(NamedTuple):
@@ -40,7 +40,7 @@ class Curve(NamedTuple):
 
 
 def variables(trace: Trace) -> dict[str, np.ndarray]:
-    """What errors and forces are held against, (B, K + 1), in `UNITS`; thrusters only where they are used."""
+    """Variables on which errors and forces may depend, (B, K + 1), in `UNITS`; thrusters only where they are used."""
     psi, u, v, r = np.moveaxis(trace.measured[..., 2:], -1, 0)
     n, delta, F_b, F_s = np.moveaxis(trace.inputs, -1, 0)
     here = np.where(np.isfinite(u), 1.0, np.nan)
@@ -159,7 +159,7 @@ def curve(trace: Trace, axis: int, name: str) -> Curve | None:
     if known.sum() < 20:
         return None
     A = np.column_stack([np.ones(known.sum()), basis(name, x[known])])
-    bread = np.linalg.pinv(A.T @ A, rcond=_OPEN)
+    bread = np.linalg.pinv(A.T @ A, rcond=1e-4)  # two courses do not determine two harmonics
     q = bread @ (A.T @ y[known])
     run = np.broadcast_to(trace.run[:, None], x.shape)[known]
     scores = np.stack([A[run == k].T @ (y[known] - A @ q)[run == k] for k in np.unique(run)])
@@ -170,12 +170,12 @@ def curve(trace: Trace, axis: int, name: str) -> Curve | None:
     fitted, half = G @ q, 2.0 * np.sqrt(np.maximum(np.einsum("gi,ij,gj->g", G, cov, G), 0.0))
     if name == "heading":
         apart = (grid[:, None] - np.unique(np.round(x[known])) + 180.0) % 360.0 - 180.0
-        fitted[np.min(np.abs(apart), axis=1) > _SAILED] = np.nan
+        fitted[np.min(np.abs(apart), axis=1) > THRESHOLDS.value("heading_sailed")] = np.nan
     return Curve(grid, fitted, fitted - half, fitted + half)
 
 
 def with_speed(trace: Trace, axis: int, name: str, seed: int = 0) -> float:
-    """How many times stronger the force's dependence on `name` is in the faster half of the samples than in the slower one.
+    """Ratio of the force's dependence on `name` in the faster half of the samples to that in the slower one.
 
     One where the runs leave it open (bootstrap over runs, 95 %), where it changes by less than half, or with fewer than 8 runs.
     """
@@ -200,5 +200,6 @@ def with_speed(trace: Trace, axis: int, name: str, seed: int = 0) -> float:
     found = float(ratio(sums.sum(axis=0)))
     draws = ratio(sums[np.random.default_rng(seed).integers(len(runs), size=(400, len(runs)))].sum(axis=1))
     low, high = np.nanquantile(draws, (0.025, 0.975))
-    sure = (low > 1.0 and found > _STRONGER) or (0.0 < found < 1.0 / _STRONGER and high < 1.0)
+    least = THRESHOLDS.value("stronger_with_speed")
+    sure = (low > 1.0 and found > least) or (0.0 < found < 1.0 / least and high < 1.0)
     return found if sure and np.isfinite(found) else 1.0

@@ -14,7 +14,6 @@ from ..model.linearisation import Point, actives, parameters
 from ..model.rollout import Active
 
 AXES = ("surge", "sway", "yaw")
-_LEVEL = 0.99
 
 
 def force_of_term(found: Fit, index: int) -> dict[str, float]:
@@ -26,7 +25,7 @@ def force_of_term(found: Fit, index: int) -> dict[str, float]:
 
 
 def force_of_hull(found: Fit) -> dict[str, float]:
-    """The same of the hull's changes against the regressions."""
+    """Greatest force of the hull's changes against the regressions, see `_greatest`."""
     return _greatest(found, actives(found.plant, found.scales, _point(found)), plain_hull=True)
 
 
@@ -56,6 +55,6 @@ def _greatest(found: Fit, without: Sequence[Active], plain_hull: bool = False) -
     change = np.swapaxes(change[0], 0, 1)[plant.seg.mask[:, 1:]]
     c = plant.c
     inertia = np.array([[c.m + c.m_x, 0.0, 0.0], [0.0, c.m11, c.m12_Y], [0.0, c.m12_N, c.m22]])
-    acceleration, force = (np.quantile(np.abs(v), _LEVEL, axis=0) for v in (change, change @ inertia.T))
+    acceleration, force = (np.quantile(np.abs(v), 0.99, axis=0) for v in (change, change @ inertia.T))
     noticed = (acceleration >= NOTICEABLE * found.scales.w) & np.isfinite(force)
     return {axis: float(f) for axis, f, seen in zip(AXES, force, noticed, strict=True) if seen}

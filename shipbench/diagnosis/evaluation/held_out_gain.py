@@ -1,4 +1,7 @@
-"""What naming a cause is worth: open-loop rollouts of runs that were not fitted, with everything repeated on every training part."""
+"""Held-out gain of naming a cause: open-loop rollouts of runs that were not fitted.
+
+Everything is repeated on every training part.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +21,12 @@ from ..model.linearisation import FREE, NUM_BASE, Linearisation, Point, Scales
 from ..model.resampling import averaged
 from ..model.term import Term
 from ..result import Gain
-
-HORIZON = 120.0
-_STEPS = 8
-_BOOTSTRAP = 2000
+from ..thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
 class Extension:
-    """What a diagnosis of some runs adds to the plain model: terms with first guesses, the hull, and gears that differ from the ordinary ones."""
+    """Addition to the plain model by a diagnosis of some runs: terms with first guesses, the hull, gears that differ."""
 
     terms: tuple[Term, ...] = ()
     values: tuple[np.ndarray, ...] = ()
@@ -44,9 +44,13 @@ class Rollout:
 
 
 def rollout_plant(dataset: Dataset, gears: dict[str, Gear]) -> Plant:
-    """Segments of `HORIZON` (Froude-scaled), fast records averaged; driven by the commands through `gears` from where the actuators begin."""
+    """Plant with segments as long as the horizon of rollouts (Froude-scaled), fast records averaged.
+
+    The commands drive it through `gears`, from where the actuators begin.
+    """
     ship, dataset = complete(dataset.ship), averaged(dataset)
-    segments = cut(dataset, max(20, round(HORIZON * (ship.L / 130.0) ** 0.5 / dataset.dt)))
+    horizon = THRESHOLDS.value("rollout_horizon") * (ship.L / 130.0) ** 0.5
+    segments = cut(dataset, max(20, round(horizon / dataset.dt)))
     return Plant(ship, replace(segments, commanded=True), gears=gears, recorded=not segments.commanded)
 
 
@@ -68,7 +72,7 @@ def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
     start = tuple(v for t, v in zip(extension.terms, extension.values, strict=True) if not t.per_run)
     lin = _lin(plant, scales, Rollout(plain_base(), terms, start))
     weights = _weights(lin)
-    for _ in range(_STEPS):
+    for _ in range(8):
         if is_spent():
             break
         base, own = lin.parameter_columns(free)
@@ -187,7 +191,7 @@ def summarise(before: np.ndarray, after: np.ndarray, seed: int, groups: Sequence
     rng = np.random.default_rng(seed)
     place = {group: i for i, group in enumerate(dict.fromkeys(groups))}
     member = np.array([place[group] for group in groups])
-    draws = rng.integers(0, len(place), (_BOOTSTRAP, len(place)))
+    draws = rng.integers(0, len(place), (2000, len(place)))
     plain, extended = (np.bincount(member, ed)[draws].sum(axis=1) for ed in (before, after))
     relative = 1.0 - extended / np.maximum(plain, 1e-12)
     low, high = np.quantile(relative, [0.025, 0.975])

@@ -1,4 +1,4 @@
-"""What is wrong, before any name: where the plain model's error is, whether its residuals are white, and what the missing force follows."""
+"""Errors of the plain model, before any cause is named: their place, whether residuals are white, missing forces."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..result import Trace, Wrong
+from ..thresholds import THRESHOLDS
 from .dependence import AXES, UNITS, Follows, curve, follows, variables, with_speed
 
 CHANNELS = ("position", "heading", "surge", "sway", "yaw rate")
@@ -16,12 +17,8 @@ CHANNEL_UNITS = {"position": ("m", 1.0), "heading": ("deg", 57.29578), "surge": 
 RESIDUALS = ("x", "y", "heading", "surge", "sway", "yaw rate")
 INPUTS = ("revolutions", "rudder", "bow thruster", "stern thruster")
 FORCE_UNITS = (("mm/s^2", 1e3), ("mm/s^2", 1e3), ("mdeg/s^2", 57.29578e3))
-LAGS = 10
+LAGS = THRESHOLDS.count("correlation_lags")
 _AXES_OF = {"position": (0, 1, 2), "heading": (2,), "surge": (0,), "sway": (1,), "yaw rate": (2,)}
-_LEVEL, _LEAST_FOLLOWED = 0.02, 0.01
-_SMALLEST_SHARE = 0.05
-_WORTH_SAYING = 1.3
-_MOST_RUNS = 12
 
 
 class Slice(NamedTuple):
@@ -121,7 +118,7 @@ def _cuts(trace: Trace) -> list[tuple[str, np.ndarray, np.ndarray]]:
         values = x[np.isfinite(x)]
         if name == "heading":
             edges = np.arange(0.0, 361.0, 45.0)
-        elif name == "run" and len(trace.names) <= _MOST_RUNS:
+        elif name == "run" and len(trace.names) <= THRESHOLDS.count("single_run_slices"):
             edges = np.arange(len(trace.names) + 1.0) - 0.5
         elif name == "run":
             edges = np.unique(np.linspace(0, len(trace.names), 7).round()) - 0.5
@@ -143,11 +140,13 @@ def _slices(x: np.ndarray, squares: np.ndarray, edges: np.ndarray) -> list[Slice
 def what_is_wrong(trace: Trace) -> tuple[Wrong, ...]:
     """One line for every channel with more than 5 % of the normalised error, greatest first."""
     tables = error_tables(trace)
+    by_chance, least = THRESHOLDS.value("dependence_by_chance"), THRESHOLDS.value("dependence_share")
     lines = []
     for channel, share in sorted(tables.share.items(), key=lambda item: -item[1]):
-        if share < _SMALLEST_SHARE:
+        if share < THRESHOLDS.value("channel_share"):
             continue
-        known = [(f, axis) for axis in _AXES_OF[channel] for f in tables.follows[AXES[axis]] if f.p <= _LEVEL and f.share >= _LEAST_FOLLOWED]
+        found = ((f, axis) for axis in _AXES_OF[channel] for f in tables.follows[AXES[axis]])
+        known = [(f, axis) for f, axis in found if f.p <= by_chance and f.share >= least]
         best, axis = max(known, key=lambda item: item[0].share) if known else (None, 0)
         text = _error_words(tables, channel, best.variable if best else "")
         if best is not None:
@@ -159,8 +158,9 @@ def what_is_wrong(trace: Trace) -> tuple[Wrong, ...]:
 def _error_words(tables: ErrorTables, channel: str, variable: str) -> list[str]:
     """Size of a channel's error, its growth, and where it is greatest."""
     text = [f"root mean square {tables.size[channel]:.3g} {CHANNEL_UNITS[channel][0]}"]
+    larger = THRESHOLDS.value("error_ratio")
     growth = tables.by_channel[(channel, "horizon")]
-    if len(growth) > 1 and growth[-1].rms > _WORTH_SAYING * growth[0].rms > 0.0:
+    if len(growth) > 1 and growth[-1].rms > larger * growth[0].rms > 0.0:
         text.append(
             f"the {channel} error is {growth[-1].rms / growth[0].rms:.2g} times larger after {growth[-1].low:.0f} to {growth[-1].high:.0f} s "
             f"than in the first {growth[0].high:.0f} s"
@@ -168,14 +168,14 @@ def _error_words(tables: ErrorTables, channel: str, variable: str) -> list[str]:
     rows = tables.by_channel.get((channel, variable), [])
     if len(rows) > 1 and variable != "run":
         worst, least = max(rows, key=lambda r: r.rms), min(rows, key=lambda r: r.rms)
-        if worst.rms > _WORTH_SAYING * least.rms:
+        if worst.rms > larger * least.rms:
             text.append(f"error worst at {variable} {worst.low:.3g} to {worst.high:.3g} {UNITS[variable]} ({worst.rms / max(least.rms, 1e-12):.1f} "
                         "times the least)")  # fmt: skip
     return text
 
 
 def force_words(trace: Trace, axis: int, found: Follows) -> str:
-    """Where the missing force of one axis is greatest and smallest along the variable that it follows."""
+    """Sentence on where the missing force of one axis is greatest and smallest along the variable that it follows."""
     name, share, _ = found
     fitted = curve(trace, axis, name)
     what = f"missing {AXES[axis]} force follows {name} ({100 * share:.0f} % of its variance)"

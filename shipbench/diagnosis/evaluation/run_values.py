@@ -1,17 +1,15 @@
-"""What the values that single runs have of a cause go with: the place where a run was sailed, or its number."""
+"""Dependence of the values that single runs have of a cause: on the place where a run was sailed, or on its number."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..inference.laplace import Fit
-
-_SHARE, _CHANCE = 0.7, 1e-3
-"""Of the variance of the values that a straight line must explain, and the chance of as good a one for values that go with nothing."""
+from ..thresholds import THRESHOLDS
 
 
 def of_runs(fit: Fit, index: int) -> np.ndarray:
-    """(runs, components) of the index-th cause, which has a value for each run; a vector by its components."""
+    """Values (runs, components) of the index-th cause, which has one for each run; a vector by its components."""
     term = fit.model.terms[index]
     effect, value = term.effect, fit.values[index] * fit.scales.amplitudes(term, fit.plant.c.L)
     if effect.vector is None:
@@ -21,20 +19,20 @@ def of_runs(fit: Fit, index: int) -> np.ndarray:
 
 
 def goes_with(fit: Fit, values: np.ndarray) -> str:
-    """In words, with the share of the variance: what `values` (runs, components) go with, empty if nothing."""
+    """Sentence on what `values` (runs, components) go with, with the share of the variance; empty if nothing."""
     seg = fit.plant.seg
     weight = np.maximum(np.bincount(seg.run, seg.mask.sum(axis=1), minlength=seg.runs), 1.0)
     x, y = (np.bincount(seg.run, np.sum(seg.states[..., i] * seg.mask, axis=1), minlength=seg.runs) / weight for i in (0, 1))
     found = [(_chance(values, at), words) for at, words in ((np.stack([x, y], axis=1), "place"), (np.arange(seg.runs)[:, None], "number"))]
     (chance, share), words = min(found, key=lambda f: f[0][0])
-    if chance > _CHANCE or share < _SHARE:
+    if chance > THRESHOLDS.value("run_values_by_chance") or share < THRESHOLDS.value("run_values_share"):
         return ""
     told = "from place to place" if words == "place" else "with time"
     return f"it differs {told}: {share:.0%} of the variance of its values goes with the {words} of the runs"
 
 
 def _chance(values: np.ndarray, at: np.ndarray) -> tuple[float, float]:
-    """Of the F test for `values` (N, C) on a straight line in `at` (N, K), and the share of the variance that it explains."""
+    """Probability by the F test of `values` (N, C) on a line in `at` (N, K), and the share of the variance explained."""
     from scipy.stats import f
 
     (N, C), K = values.shape, at.shape[1]

@@ -1,4 +1,4 @@
-"""What the plots of a diagnosis are drawn from: rollouts before and after, the latent force and the residuals, along the runs."""
+"""Time series of the plots of a diagnosis: rollouts before and after, latent force and residuals, along the runs."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from ..model.linearisation import Scales
 from ..result import Trace
 from ..selection.analysis import Analysis
 from .held_out_gain import Extension, distance, fit_rollout, rollout_plant
-
-_EVERY = 5
 
 
 def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
@@ -36,7 +34,7 @@ def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
     white = null.scales.colour.whitened((short.seg.states[..., :6] - null.columns.predicted) / unit)
     white[..., ~short.seg.seen] = np.nan
     lines = [_along(short.seg, v, seg) for v in (force(null.estimate), force(sd), force(final.estimate), white)]
-    hide = seg.mask[..., None]
+    hide, knots = seg.mask[..., None], slice(None, None, 5)  # enough for plots
     t = np.arange(plain.steps + 1) * seg.dt
 
     def shown(values: np.ndarray) -> np.ndarray:
@@ -44,8 +42,9 @@ def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
 
     return Trace(
         run=seg.run, names=tuple(r.id for r in dataset.runs), start=seg.start, t=t, measured=shown(seg.states[..., :6]), before=shown(before),
-        after=shown(after), inputs=shown(seg.states[..., 6:]), knots=t[::_EVERY], force=shown(lines[0])[:, ::_EVERY],
-        force_sd=shown(lines[1])[:, ::_EVERY], force_after=shown(lines[2])[:, ::_EVERY], white=shown(lines[3]), held_out=False,
+        after=shown(after), inputs=shown(seg.states[..., 6:]), knots=t[knots], force=shown(lines[0])[:, knots],
+        force_sd=shown(lines[1])[:, knots], force_after=shown(lines[2])[:, knots],
+        white=shown(lines[3]), held_out=False,
     )  # fmt: skip
 
 

@@ -10,14 +10,10 @@ from ...signals import DELTA, F_B, F_S, STATES, N
 from ..inference.baseline import first_evidence, first_fit
 from ..inference.laplace import Fit
 from ..model.linearisation import CENTRE, FREE, SPREAD
+from ..thresholds import THRESHOLDS
 
 _LIFT = FREE.index(5)
 """Place of the slope of the rudder's lift among the fit's parameters."""
-_FALLS = 2.5
-"""Standard deviations by which the lift of a rudder falls with its angle. (28 sets of seven ships, nothing hidden: read rightly it rises by 4.4 and
-more; to the other side it falls by 3.4 and more, and the runs are likelier by 4 to 90 of log evidence read rightly.)"""
-_BETTER = 10.0
-"""Least log evidence of thrusters read otherwise. (36 readings of nine sets: what is right is likelier by 13 and more than what was recorded.)"""
 
 
 def turned_actuators(dataset: Dataset, null: Fit) -> list[UnitFinding]:
@@ -33,7 +29,7 @@ def turned_actuators(dataset: Dataset, null: Fit) -> list[UnitFinding]:
 
 def _rudder(null: Fit) -> list[UnitFinding]:
     slope, sd = CENTRE[_LIFT] + SPREAD[_LIFT] * null.solution.mean[_LIFT], SPREAD[_LIFT] * np.sqrt(null.solution.cov[_LIFT, _LIFT])
-    if slope > -_FALLS * sd:
+    if slope > -THRESHOLDS.value("falling_rudder_lift") * sd:
         return []
     gain = first_evidence(null.plant.turned([DELTA - N]), null) - null.evidence
     if gain < 0.0:
@@ -43,8 +39,12 @@ def _rudder(null: Fit) -> list[UnitFinding]:
 
 
 def _thrusters(null: Fit) -> list[UnitFinding]:
-    """Of the pieces in which they push: what a wrong reading does there is not to spoil the fit of the others, nor they its. As recorded they are
-    read also with the forces and the noise of the best other reading: of few pieces a fit may take for noise what another takes for forces."""
+    """Sign errors of the thrusters, by the pieces in which they push.
+
+    A sign error does not act on the fit of the other pieces, nor they on its own. The recorded signs are fitted also
+    with the forces and the noise of the best other signs. In few pieces one fit may take for noise what another takes
+    for forces.
+    """
     push = null.plant.seg.states[..., [F_B, F_S]] * null.plant.seg.mask[..., None]
     used = [c for c, pushes in zip((F_B, F_S), np.any(push != 0.0, axis=(0, 1)), strict=True) if pushes]
     if not used:
@@ -52,10 +52,10 @@ def _thrusters(null: Fit) -> list[UnitFinding]:
     plant = null.plant.where(np.any(push != 0.0, axis=(1, 2)))
     readings = [[c] for c in used] + ([used] if len(used) > 1 else [])
     best, turned = max(((first_fit(plant.turned([c - N for c in reading]), null), reading) for reading in readings), key=lambda x: x[0].evidence)
-    gain = best.evidence - first_evidence(plant, null)
-    if gain > _BETTER:
+    gain, least = best.evidence - first_evidence(plant, null), THRESHOLDS.value("thruster_sign_evidence")
+    if gain > least:
         gain = min(gain, best.evidence - first_fit(plant, null, like=best).evidence)
-    return [UnitFinding(STATES[c], "sign", -1.0, _better(gain)) for c in turned] if gain > _BETTER else []
+    return [UnitFinding(STATES[c], "sign", -1.0, _better(gain)) for c in turned] if gain > least else []
 
 
 def _better(gain: float) -> str:

@@ -40,7 +40,7 @@ class Prepared:
     late: LateVelocities | None = None
 
     def corrected(self, dataset: Dataset, *notes: str) -> Prepared:
-        """The same with other runs, and lines that say what was corrected."""
+        """Prepared data set with other runs, and lines that say what was corrected."""
         return replace(self, dataset=dataset, notes=(*self.notes, *notes))
 
 

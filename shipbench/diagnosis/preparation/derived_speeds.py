@@ -14,14 +14,8 @@ from scipy.stats import chi2
 from ...effects.base import EFFECTS
 from ...records import Dataset, Run
 from ...signals import PSI, R, U, V, X, Y
+from ..thresholds import THRESHOLDS
 from .base import Prepared
-
-_SLOW, _HOLLOW, _BY_CHANCE = 2, 0.5, 1e-4
-"""Half swings along a run that count as slow; the share of the power at quick ones below which there is none (independent sensors: from 1 on, 4 to 40
-in simulated trials, derived speeds 0.004 to 0.14), with few runs as low as chance alone hardly takes it."""
-_LEAST_TRACK, _LEAST_HEADING = 0.02, np.deg2rad(0.02)
-"""Quick errors [m at 130 m, rad] below which they are those of the integration."""
-_LEAST_SAMPLES = 20
 
 
 def marked(dataset: Dataset) -> Dataset:
@@ -31,9 +25,10 @@ def marked(dataset: Dataset) -> Dataset:
     are slow ones besides.
     """
     found = list(dataset.derived)
-    if _hollow([beside_track(run) for run in dataset.runs], _LEAST_TRACK * dataset.ship.L / 130.0):
+    least_track = THRESHOLDS.value("derived_least_track") * dataset.ship.L / 130.0
+    if _hollow([beside_track(run) for run in dataset.runs], least_track):
         found += ["u", "v"]
-    if _hollow([beside_heading(run) for run in dataset.runs], _LEAST_HEADING):
+    if _hollow([beside_heading(run) for run in dataset.runs], np.deg2rad(THRESHOLDS.value("derived_least_heading"))):
         found.append("r")
     return replace(dataset, derived=tuple(dict.fromkeys(found)))
 
@@ -56,7 +51,7 @@ def faults_of_derived_speeds(prepared: Prepared) -> Prepared:
 
 
 def has_speeds(dataset: Dataset) -> bool:
-    """Whether surge and sway are measured, so that the track can be held against them."""
+    """Check whether surge and sway are measured, so that the track can be compared with them."""
     return not {"u", "v"} & set(dataset.derived)
 
 
@@ -73,10 +68,12 @@ def beside_heading(run: Run) -> np.ndarray:
 
 
 def _hollow(errors: Sequence[np.ndarray], least: float) -> bool:
-    """Whether the slowest swings of these series, (samples, signals) each, have far less power than quick ones."""
-    powers = [dct(e, axis=0, norm="ortho") ** 2 for e in errors if len(e) >= _LEAST_SAMPLES]
+    """Check whether low frequencies of these series, (samples, signals) each, have far less power than high ones."""
+    least_samples, num_low = THRESHOLDS.count("derived_least_samples"), THRESHOLDS.count("derived_low_frequencies")
+    powers = [dct(e, axis=0, norm="ortho") ** 2 for e in errors if len(e) >= least_samples]
     if not powers:
         return False
-    slow, quick = np.array([p[1 : 1 + _SLOW] for p in powers]), np.mean([p[len(p) // 2 :].mean() for p in powers])
-    share = min(_HOLLOW, chi2.ppf(_BY_CHANCE, slow.size) / slow.size)
+    slow, quick = np.array([p[1 : 1 + num_low] for p in powers]), np.mean([p[len(p) // 2 :].mean() for p in powers])
+    by_chance = chi2.ppf(THRESHOLDS.value("derived_by_chance"), slow.size) / slow.size
+    share = min(THRESHOLDS.value("derived_power_ratio"), by_chance)
     return bool(quick > least**2 and slow.mean() < share * quick)

@@ -12,7 +12,7 @@ from .time_offsets import correct_late_velocities, correct_late_yaw_rate
 from .water_speeds import speeds_over_ground
 
 GIVEN: tuple[Pass, ...] = (split_long_runs, refuse_too_little, refuse_contradictions, sort_by_time, faults_of_derived_speeds)
-"""Where the causes are given (an oracle): the runs are taken as recorded."""
+"""Passes where the causes are given (an oracle): the runs are taken as recorded."""
 PASSES: tuple[Pass, ...] = (
     split_long_runs,
     refuse_too_little,
@@ -27,4 +27,4 @@ PASSES: tuple[Pass, ...] = (
     correct_late_velocities,
     faults_of_derived_speeds,
 )
-"""Whatever the record itself shows to be wrong is put right before any model is fitted."""
+"""All passes: errors that the record itself shows are corrected before any model is fitted."""

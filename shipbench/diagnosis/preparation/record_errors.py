@@ -22,13 +22,9 @@ from ...records import Run
 from ...ship import Particulars, complete
 from ...signals import COMMANDS, PSI, STATES, X, Y
 from ..model.forward import SEGMENT
+from ..thresholds import THRESHOLDS
 from .base import Prepared
 from .derived_speeds import beside_heading, beside_track
-
-_ROUNDS = 3
-"""After the unit of the speeds, that of the positions may be seen."""
-_LEAST = {"way": 0.1, "turn": np.deg2rad(15.0)}
-"""Way [lengths] and turn [rad] in a piece of `SEGMENT` below which noise, or a gyro's constant error, decides what the record says."""
 
 _KEEP = "To keep the correction: shipbench data check FOLDER --apply."
 
@@ -48,13 +44,13 @@ def correct_record_errors(prepared: Prepared) -> Prepared:
     dataset = prepared.dataset
     errors: list[UnitFinding] = []
     told: dict[str, str] = {}
-    ship = complete(dataset.ship)
-    for round_ in range(_ROUNDS + 1):
+    ship, rounds = complete(dataset.ship), THRESHOLDS.count("correction_rounds")
+    for round_ in range(rounds + 1):
         found = [f for f in check_dataset(dataset) if f.severity == "error" and f.line and f.text not in told and not _has_effect(f, ship)]
         if not found:
             break
         lines = laid({}, found)
-        if round_ == _ROUNDS or lines.refused:
+        if round_ == rounds or lines.refused:
             raise InputError(
                 f"data set '{dataset.name}': {found[0].text} This is left after {round_} corrections, so nothing is fitted. Accepted: a record "
                 "without errors. Correct dataset.toml by the lines of `shipbench data check`, one at a time."
@@ -74,9 +70,13 @@ def refuse_contradictions(prepared: Prepared) -> Prepared:
     dataset = prepared.dataset
     length = max(1, round(SEGMENT * (dataset.ship.L / 130.0) ** 0.5 / dataset.dt))
     track, turns = (np.concatenate(parts) for parts in zip(*(_ends(run, length) for run in dataset.runs), strict=True))
+    least_turn = np.deg2rad(THRESHOLDS.value("contradiction_least_turn"))
     for (made, said), least, what, by, unit, channels in (
-        (track.T, _LEAST["way"] * dataset.ship.L, "positions move", "heading and speeds say", "m", "x, y, psi, u, v"),
-        (np.rad2deg(turns.T), np.rad2deg(_LEAST["turn"]), "the heading turns", "the yaw rate says", "deg", "psi, r"),
+        (
+            track.T, THRESHOLDS.value("contradiction_least_way") * dataset.ship.L,
+            "positions move", "heading and speeds say", "m", "x, y, psi, u, v",
+        ),
+        (np.rad2deg(turns.T), np.rad2deg(least_turn), "the heading turns", "the yaw rate says", "deg", "psi, r"),
     ):
         larger = np.maximum(np.abs(made), np.abs(said))
         moving = larger > least
@@ -92,7 +92,10 @@ def refuse_contradictions(prepared: Prepared) -> Prepared:
 
 
 def _ends(run: Run, length: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of pieces of a run, way by positions and by speeds (east as imaginary part), and turn by heading and by yaw rate, (pieces, 2) each."""
+    """Way of pieces of a run by positions and by speeds (east as imaginary part), turn by heading and by yaw rate.
+
+    Both (pieces, 2), in m and rad.
+    """
     edges = np.linspace(0, len(run) - 1, max(1, -(-(len(run) - 1) // length)) + 1).round().astype(int)
     plane = np.array([1.0, 1j])
     pairs = ((run.states[:, [X, Y]] @ plane, beside_track(run) @ plane), (run.states[:, PSI], beside_heading(run)[:, 0]))
@@ -101,7 +104,7 @@ def _ends(run: Run, length: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _has_effect(found: Finding, ship: Particulars) -> bool:
-    """Whether an effect of the library is the fault that was found, of a size that it may have."""
+    """Check whether an effect of the library is the fault that was found, of a plausible size."""
     scales = tomllib.loads(found.line).get("scale", {})
     effects = [e for e in map(EFFECTS.get, EFFECTS.names()) if scales and set(scales) <= set(e.scales)]
     return any(e.plausible((value - 1.0,), ship) for e in effects for value in scales.values())

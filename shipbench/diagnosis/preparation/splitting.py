@@ -9,40 +9,38 @@ import numpy as np
 from ...errors import InputError
 from ...records import Dataset
 from ..model.forward import SEGMENT
+from ..thresholds import THRESHOLDS
 from .base import Prepared
 
-_SECONDS = 120.0
-"""Least length of a part, at 130 m."""
-FEW_RUNS, FEW_SAMPLES = 5, 300
-"""Runs and samples below which no cause is named."""
-_FEWEST, _MOST = 8, 24
-"""Parts in all: fewer say too little of whether they agree."""
+LEAST_RUNS, LEAST_SAMPLES = THRESHOLDS.count("least_runs"), THRESHOLDS.count("least_samples")
+"""Runs and samples from which a cause is named."""
 
 
 def runs_in_words(dataset: Dataset) -> str:
-    """Their number."""
+    """Number of the runs, in words."""
     return "1 run" if len(dataset) == 1 else f"{len(dataset)} runs"
 
 
 def is_too_little(dataset: Dataset) -> bool:
-    """Whether runs or samples are too few for any cause to be named."""
-    return len(dataset) < FEW_RUNS or sum(map(len, dataset.runs)) < FEW_SAMPLES
+    """Check whether runs or samples are too few for any cause to be named."""
+    return len(dataset) < LEAST_RUNS or sum(map(len, dataset.runs)) < LEAST_SAMPLES
 
 
 def split_long_runs(prepared: Prepared) -> Prepared:
     """Cut runs into parts that count as runs, where they are too few and long enough. Parts of one run are of one group: none is held out without the
     others."""
     dataset = prepared.dataset
-    if len(dataset) >= FEW_RUNS:
+    if len(dataset) >= LEAST_RUNS:
         return prepared
     seconds = [float(run.t[-1] - run.t[0]) for run in dataset.runs]
     total = sum(seconds)
-    length = max(_SECONDS * (dataset.ship.L / 130.0) ** 0.5, total / _MOST)
+    shortest = THRESHOLDS.value("part_seconds") * (dataset.ship.L / 130.0) ** 0.5
+    length = max(shortest, total / THRESHOLDS.count("most_parts"))
     parts = []
     for run, lasts in zip(dataset.runs, seconds, strict=True):
         edges = np.linspace(0, len(run) - 1, max(1, int(lasts / length)) + 1).round().astype(int)
         parts += [run.slice(a, b + 1, f" + {run.t[a] - run.t[0]:.0f} s") for a, b in pairwise(edges)]
-    if len(parts) < _FEWEST:
+    if len(parts) < THRESHOLDS.count("least_parts"):
         return prepared
     line = (
         f"{runs_in_words(dataset)} of {total:.0f} s in all: cut into {len(parts)} parts of about {total / len(parts):.0f} s, which count as runs. "
@@ -79,7 +77,7 @@ def refuse_too_little(prepared: Prepared) -> Prepared:
     warnings = []
     if is_too_little(dataset):
         warnings.append(
-            f"{runs_in_words(dataset)} and {samples} samples are too few to name a cause (at least {FEW_RUNS} runs and {FEW_SAMPLES} samples): "
+            f"{runs_in_words(dataset)} and {samples} samples are too few to name a cause (at least {LEAST_RUNS} runs and {LEAST_SAMPLES} samples): "
             "candidates are ranked, none is named."
         )
     if np.std(states[:, 7]) < 1e-3 and np.std(states[:, 5]) < 1e-5:

@@ -24,11 +24,9 @@ from ..inference.gram import by_run
 from ..inference.laplace import Fit, Model
 from ..model.forward import Plant
 from ..model.linearisation import Scales
+from ..thresholds import THRESHOLDS
 from .base import LateVelocities, Prepared
 from .derived_speeds import has_speeds
-
-_SURE = 2.0
-"""Standard errors over the runs."""
 
 
 def correct_late_velocities(prepared: Prepared) -> Prepared:
@@ -62,7 +60,8 @@ def late_velocities_of(dataset: Dataset) -> tuple[LateVelocities, Dataset] | Non
     best = max(("filtered", "late"), key=lambda name: np.sum(shares[name]))
     over, over_position = (shares[best] - shares[other] for other in ("as recorded", "position"))
     # a position cannot be early, only all else late: that is believed where the runs agree
-    if np.sum(over) < 0.0 or -np.sum(over_position) > _SURE * len(over) ** 0.5 * np.std(over_position):
+    sure = THRESHOLDS.value("late_velocity_doubt") * len(over) ** 0.5 * np.std(over_position)
+    if np.sum(over) < 0.0 or -np.sum(over_position) > sure:
         return None
     return LateVelocities(delay, sd, best == "filtered", 2.0 * float(np.sum(over)), 2.0 * float(np.sum(over_position))), ways[best]
 
@@ -78,8 +77,7 @@ def late_velocities_effect() -> Effect:
 
 
 def ruled_out(dataset: Dataset, found: Fit) -> tuple[str, ...]:
-    """Delays in a model that the track, which shows none, rules out by two standard errors: something else is late. (A supply vessel on a passage,
-    nothing hidden: 1.8 s by the forces; by the track 0.5 s, standard error 0.4.)"""
+    """Delays of a model that the track, which shows none, rules out: something else is late."""
     late = [i for i, t in enumerate(found.model.terms) if t.effect.late and t.since is None]
     seen = lags(Recording(dataset)) if late and has_speeds(dataset) else None
     if seen is None:
@@ -92,7 +90,7 @@ def ruled_out(dataset: Dataset, found: Fit) -> tuple[str, ...]:
         lag, sd = own if term.effect.traits.faults_of == {"u", "v"} else position
         if any(term.setting):  # velocities that are late in the earth's axes are a position that is early
             lag, sd = -position[0], position[1]
-        if may_be_none((lag, sd)) and abs(delay - lag) > 2.0 * sd:
+        if may_be_none((lag, sd)) and abs(delay - lag) > THRESHOLDS.value("delay_against_track") * sd:
             out.append(term.label)
     return tuple(out)
 

@@ -7,7 +7,7 @@ import pytest
 
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.preparation.base import Prepared
-from shipbench.diagnosis.preparation.splitting import FEW_RUNS, split_long_runs
+from shipbench.diagnosis.preparation.splitting import LEAST_RUNS, split_long_runs
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset, Run
@@ -39,7 +39,7 @@ def test_a_few_long_runs_are_cut_into_parts_of_equal_length(runs: int, seconds: 
         np.testing.assert_array_equal(np.concatenate([own[0].states, *(part.states[1:] for part in own[1:])]), run.states)
 
 
-@pytest.mark.parametrize(("runs", "seconds"), [(1, 900), (4, 230), (FEW_RUNS, 400)])
+@pytest.mark.parametrize(("runs", "seconds"), [(1, 900), (4, 230), (LEAST_RUNS, 400)])
 def test_short_runs_and_runs_enough_stay_as_they_are(runs: int, seconds: int):
     data = _logs(runs, seconds)
     assert split_long_runs(Prepared(data)) == Prepared(data)
