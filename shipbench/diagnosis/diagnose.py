@@ -43,7 +43,7 @@ from .selection.ship_file import doubts_of, odd_for, own_propeller
 from .thresholds import THRESHOLDS
 
 _WHOLE = 0.2
-"""Share of the time for the plain model of all runs, and as much for the search, where the gain is measured (progress)."""
+"""Share of the time for the plain model of all runs, and for the search, where the gain is measured (progress)."""
 
 
 @threadpool_limits.wrap(limits=1)  # its matrices are small: threads of several processes would wait for each other

@@ -154,7 +154,7 @@ class _Record:
         return found, gear, error if error.score > least else None
 
     def _ended(self, z: np.ndarray, kind: Kind | None, before: float) -> tuple[float, _Record]:
-        """Score of end stops where the record of a gear shows them (and of `kind`), and the record with clipped orders."""
+        """Score of end stops where the record of a gear shows them (and of `kind`), and its record."""
         from scipy.optimize import minimize_scalar
 
         def ended(limit: float) -> _Record:

@@ -16,7 +16,7 @@ _RATE_POWER = {"n": 2, "delta": 1, "F": 0}
 
 @dataclass(frozen=True)
 class Ordinary:
-    """Bounds of ordinary actuator dynamics, at 130 m: greatest time constant [s], smallest rate [actuator's unit per s]."""
+    """Bounds of ordinary dynamics, at 130 m: greatest time constant [s], smallest rate [actuator's unit per s]."""
 
     T: float
     rate: float

@@ -26,7 +26,7 @@ from ..thresholds import THRESHOLDS
 
 @dataclass(frozen=True)
 class Extension:
-    """Addition to the plain model by a diagnosis of some runs: terms with first guesses, the hull, gears that differ."""
+    """Addition to the plain model by a diagnosis: terms with first guesses, the hull, gears that differ."""
 
     terms: tuple[Term, ...] = ()
     values: tuple[np.ndarray, ...] = ()

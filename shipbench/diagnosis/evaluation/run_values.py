@@ -32,7 +32,7 @@ def goes_with(fit: Fit, values: np.ndarray) -> str:
 
 
 def _chance(values: np.ndarray, at: np.ndarray) -> tuple[float, float]:
-    """Probability by the F test of `values` (N, C) on a line in `at` (N, K), and the share of the variance explained."""
+    """Probability by the F test of `values` (N, C) on a line in `at` (N, K), and its share of the variance."""
     from scipy.stats import f
 
     (N, C), K = values.shape, at.shape[1]

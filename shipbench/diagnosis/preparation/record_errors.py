@@ -70,12 +70,10 @@ def refuse_contradictions(prepared: Prepared) -> Prepared:
     dataset = prepared.dataset
     length = max(1, round(SEGMENT * (dataset.ship.L / 130.0) ** 0.5 / dataset.dt))
     track, turns = (np.concatenate(parts) for parts in zip(*(_ends(run, length) for run in dataset.runs), strict=True))
+    least_way = THRESHOLDS.value("contradiction_least_way") * dataset.ship.L
     least_turn = np.deg2rad(THRESHOLDS.value("contradiction_least_turn"))
     for (made, said), least, what, by, unit, channels in (
-        (
-            track.T, THRESHOLDS.value("contradiction_least_way") * dataset.ship.L,
-            "positions move", "heading and speeds say", "m", "x, y, psi, u, v",
-        ),
+        (track.T, least_way, "positions move", "heading and speeds say", "m", "x, y, psi, u, v"),
         (np.rad2deg(turns.T), np.rad2deg(least_turn), "the heading turns", "the yaw rate says", "deg", "psi, r"),
     ):
         larger = np.maximum(np.abs(made), np.abs(said))

@@ -77,8 +77,8 @@ def refuse_too_little(prepared: Prepared) -> Prepared:
     warnings = []
     if is_too_little(dataset):
         warnings.append(
-            f"{runs_in_words(dataset)} and {samples} samples are too few to name a cause (at least {LEAST_RUNS} runs and {LEAST_SAMPLES} samples): "
-            "candidates are ranked, none is named."
+            f"{runs_in_words(dataset)} and {samples} samples are too few to name a cause "
+            f"(at least {LEAST_RUNS} runs and {LEAST_SAMPLES} samples): candidates are ranked, none is named."
         )
     if np.std(states[:, 7]) < 1e-3 and np.std(states[:, 5]) < 1e-5:
         warnings.append("the rudder is never used and the ship never turns: nothing can be said about rudder and hull.")
