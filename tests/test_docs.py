@@ -98,6 +98,7 @@ def session(tmp_path, cache, monkeypatch):
     return Session(work, os.environ | pip | paths)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
 def test_every_block_of_the_page_runs(page, session):
     found = blocks(page.read_text())

@@ -39,6 +39,7 @@ def stranger(tmp_path_factory):
     return run
 
 
+@pytest.mark.long
 def test_two_commands_take_it_to_the_leaderboard_with_the_readmes_figures(stranger):
     done = stranger(*shlex.split(RUN)[1:], "--json")
     assert done.returncode == 0, done.stderr

@@ -51,6 +51,7 @@ def test_a_notebook_is_short_and_committed_without_outputs(path):
             assert cell.execution_count is None
 
 
+@pytest.mark.long
 @PARAMETRIZED
 def test_a_notebook_runs_and_its_outputs_are_short(path, hook):
     before = processor_time()
@@ -88,6 +89,7 @@ def test_an_executed_notebook_is_kept_until_its_text_changes(tmp_path, hook, mon
     assert shown("import time\nprint('<', time.time_ns() )").split("output")[1] != first.split("output")[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("stem", "name"), [("pytorch-model", "MyNet"), ("own-simulation", "MySimulation")])
 def test_a_model_of_a_notebook_keeps_the_contract(stem, name, tmp_path):
     notebook = nbformat.read(ROOT / "docs" / "notebooks" / f"{stem}.ipynb", as_version=4)

@@ -103,6 +103,7 @@ def command(tmp_path, toy_folder):
     return start
 
 
+@pytest.mark.long
 def test_a_worker_killed_mid_run_changes_nothing_in_the_table(cluster, command, tmp_path):
     address, processes = cluster
     models = ["-m", "models.py:Drawn", "-m", "models.py:Together", "-m", "hold", "-m", "models.py:Raises", "--seeds", "0,1,2"]

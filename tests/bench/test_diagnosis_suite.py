@@ -68,6 +68,7 @@ def any_ship(monkeypatch):
     monkeypatch.setattr(case_ships, "steers", lambda ship: True)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("any_ship")
 def test_false_alarms_of_a_stub_that_always_names_are_all_counted(tmp_path):
     rows = run_suite(tmp_path, diagnose=always_current, seeds_per_effect=1, kinds=("none-other",), **QUICK)
@@ -96,6 +97,7 @@ def test_a_failing_case_is_a_row_with_its_error_and_counts_as_wrong(tmp_path):
     assert "no motion in the data" in tables(rows)[-1].markdown()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("any_ship")
 def test_resuming_keeps_finished_rows_and_repeats_failed_and_changed_ones(tmp_path):
     CALLS.clear()
@@ -113,6 +115,7 @@ def test_resuming_keeps_finished_rows_and_repeats_failed_and_changed_ones(tmp_pa
     assert len(CALLS) == 3 * len(first) + 2
 
 
+@pytest.mark.long
 def test_worker_processes_give_the_rows_of_one_process(tmp_path):
     one = run_suite(tmp_path / "one", diagnose=nothing, seeds_per_effect=1, kinds=("unit",), **QUICK)
     two = run_suite(tmp_path / "two", diagnose=nothing, seeds_per_effect=1, kinds=("unit",), **(QUICK | {"workers": 2}))

@@ -140,6 +140,7 @@ def test_models_get_one_memory_layout_wherever_the_data_come_from(toy, tmp_path,
     assert len(told) == 1
 
 
+@pytest.mark.long
 def test_a_model_that_hangs_eats_memory_or_crashes_fails_alone(study):
     limits = Limits(seconds=20, memory_gb=0.4)  # a process takes seconds to start where six start at once
     faulty = {
@@ -168,6 +169,7 @@ def test_in_this_process_too_an_exit_or_a_failing_skip_is_only_a_failed_row(stud
     assert rows.groupby("model", sort=False)["status"].first().tolist() == ["failed", "failed", "ok"]
 
 
+@pytest.mark.long
 def test_limits_put_a_local_study_into_child_processes(study):
     outcome = study("Hangs", "hold", execution=Execution(limits=Limits(seconds=2.5)))
     assert outcome.rows.groupby("model", sort=False)["status"].first().tolist() == ["failed", "ok"]

@@ -105,6 +105,7 @@ def test_what_a_model_does_to_its_process_harms_its_own_rows_only(study):
     assert found["Interrupts"] == ({"failed"}, "fit or prediction: KeyboardInterrupt")
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux gives orphans to the process that asks for them")
 def test_processes_that_a_model_leaves_behind_end_with_it(study):
     found = _status(study("Orphans", "OrphansAndCrashes"))
@@ -153,6 +154,7 @@ def helped(study, tmp_path):
     return run, folder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("change", ["helpers.py:GAIN = 1.5", "parts/sizes.py:SIZE = 5.0", "late.py:SHIFT = 7.0"])
 def test_resume_runs_again_where_a_module_of_the_model_changed(helped, change):
     run, folder = helped
@@ -179,6 +181,7 @@ def test_code_that_the_key_does_not_cover_is_told_and_run_again(helped):
     assert not np.allclose(run(resume=True).rows["ed"], outcome.rows["ed"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("when", ["import", "predict"])
 def test_a_data_file_that_a_model_reads_is_told_and_its_change_is_seen(helped, when):
     run, folder = helped

@@ -133,6 +133,7 @@ def environment() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, sys.path)]), "OMP_NUM_THREADS": "1"}
 
 
+@pytest.mark.long
 def test_a_study_killed_at_any_step_on_the_file_system_resumes_to_the_same_table(folder):
     (folder / "driver.py").write_text(KILLED_AT_EVERY_STEP)
     command = [sys.executable, "driver.py", str(folder), str(folder / "toyset"), "2", "14"]
@@ -141,6 +142,7 @@ def test_a_study_killed_at_any_step_on_the_file_system_resumes_to_the_same_table
     assert int(done.stdout) > 60  # as many steps were there to be killed at
 
 
+@pytest.mark.long
 def test_the_command_killed_again_and_again_resumes_to_the_same_table(folder, monkeypatch):
     (folder / "models.py").write_text(f"PAUSE = 0.2\n{MODELS}")
     options = ["-m", "models.py:Drawn", "-m", "models.py:Together", "-d", "toyset", "--horizon", "20", "--folds", "2", "--seeds", "0,1,2"]
@@ -191,6 +193,7 @@ def test_no_process_outlives_a_study_that_is_stopped(folder, sent):
     assert outlived == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGINT])
 def test_a_study_is_stopped_while_lightning_trains_and_counts_no_failure(folder, sent):
     (folder / "trained.py").write_text(TRAINED)

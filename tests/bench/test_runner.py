@@ -150,6 +150,7 @@ def test_a_failed_fit_gives_a_row_for_every_run_of_the_fold_and_stops_nothing(st
     assert len(outcome.failed) == 5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("model", "reason"), [("FailsToPredict", "predict: KeyError: 'u'"), ("ReturnsS0", "shape (2, 21, 10); accepted: (2, 20, 10)")]
 )
@@ -208,6 +209,7 @@ def test_resume_keeps_finished_cells_and_makes_the_missing_ones(study):
     pd.testing.assert_frame_equal(before[scores], after[scores])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("change", ["data", "file", "task"])
 def test_resume_runs_again_what_other_data_code_or_task_made(study, change):
     study("Spy")

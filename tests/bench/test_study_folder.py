@@ -134,6 +134,7 @@ def test_leftovers_of_killed_studies_are_taken_away_and_no_other_hidden_file(stu
     assert (study.out / ".mine").read_text() == "kept"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "content"),
     [
@@ -157,6 +158,7 @@ def test_a_damaged_cell_is_made_again_and_the_others_are_kept(study, name, conte
     assert study.fits() == 4 + 1
 
 
+@pytest.mark.long
 def test_one_changed_byte_of_the_rows_is_seen(study):
     before = study()
     path = study.cell(1, 0) / "rows.parquet"
@@ -166,6 +168,7 @@ def test_one_changed_byte_of_the_rows_is_seen(study):
     pd.testing.assert_frame_equal(before, study(resume=True), check_exact=True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["rows.parquet", "summary.json", "study.json", "truth/toyset/fold0.npz"])
 def test_a_damaged_table_of_the_study_is_refused_by_its_readers_and_mended_by_resume(study, name):
     before = study()
@@ -178,6 +181,7 @@ def test_a_damaged_table_of_the_study_is_refused_by_its_readers_and_mended_by_re
     assert len(read_results([study.out]).rows) == len(before)
 
 
+@pytest.mark.long
 def test_resume_tries_failed_cells_again(study):
     text = study.file.read_text()
     study.file.write_text(
@@ -189,6 +193,7 @@ def test_resume_tries_failed_cells_again(study):
     assert study.fits() == 4 + 2
 
 
+@pytest.mark.long
 def test_resume_sees_runs_that_moved_to_another_fold(study):
     study()
     toml = study.data / "dataset.toml"
@@ -200,6 +205,7 @@ def test_resume_sees_runs_that_moved_to_another_fold(study):
     assert study.fits() == 8
 
 
+@pytest.mark.long
 def test_a_study_that_finishes_nothing_leaves_the_older_table(study, monkeypatch):
     before = study()
 
@@ -212,6 +218,7 @@ def test_a_study_that_finishes_nothing_leaves_the_older_table(study, monkeypatch
     pd.testing.assert_frame_equal(read_results([study.out]).rows.drop(columns=["fit_s", "predict_s"]), before, check_exact=True)
 
 
+@pytest.mark.long
 def test_nothing_that_the_study_did_not_make_is_removed(study):
     study()
     mine = [

@@ -102,6 +102,7 @@ def test_a_submission_is_one_folder_of_three_files_that_renders_the_same_page(cl
     assert [x for x in again.splitlines() if "Rendered by" not in x] == [x for x in page.splitlines() if "Rendered by" not in x]
 
 
+@pytest.mark.long
 def test_every_format_is_written_and_holds_the_same_figure(cli, two, tmp_path):
     result = cli("leaderboard", two / "anna", two / "ben", "--format", "md,latex,csv,html", "--out", "pages", "-q")
     assert result.exit_code == 0, result.output
@@ -158,6 +159,7 @@ def test_a_models_name_cannot_break_the_page_or_the_tables(cli, two, tmp_path):
     assert r"$<$script$>$alert(1)$<$/script$>$\&\_\%\$\#$|$\{\}" in (tmp_path / "pages/toyset.tex").read_text()
 
 
+@pytest.mark.long
 def test_the_page_says_first_who_is_first_and_shows_intervals(cli, two, tmp_path):
     assert cli("leaderboard", two / "anna", two / "ben", "--format", "html,md", "--out", "pages", "-q").exit_code == 0
     html = (tmp_path / "pages/toyset.html").read_text()
@@ -373,6 +375,7 @@ def test_a_failed_model_with_predictions_is_noticed(cli, two):
     assert "toyset mine.py:Still fold 0 seed 0: status is 'failed' in the rows, and there are predictions." in result.stderr
 
 
+@pytest.mark.long
 def test_a_page_of_a_submission_says_in_one_line_that_there_are_no_plots(cli, two, tmp_path):
     assert cli("leaderboard", two / "anna", two / "ben", "--no-plots", "-q", "--submission", "sub").exit_code == 0
     result = cli("leaderboard", "sub", "--out", "pages")

@@ -25,6 +25,7 @@ def small(monkeypatch):
     monkeypatch.setattr(check_suite, "clean_sets", lambda seeds: [("good", lambda: data), ("bad", lambda: copied)])
 
 
+@pytest.mark.long
 def test_the_page_holds_the_counts(small, tmp_path):
     result = CliRunner().invoke(app, ["suite", "check", "--seeds", "1", "--out", str(tmp_path), "--quiet"])
     assert result.exit_code == 0, result.output

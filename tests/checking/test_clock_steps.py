@@ -30,6 +30,7 @@ def test_a_clock_set_ahead_in_a_gap_is_noted(tmp_path):
     assert (finding.severity, finding.line) == ("note", "")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["gaps", "jump of position", "jump of heading"])
 def test_what_no_clock_did_is_not_put_down_to_it(name, tmp_path):
     assert "clock step" not in {f.kind for f in found(name, tmp_path / "set")}

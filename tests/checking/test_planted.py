@@ -39,7 +39,7 @@ def case(tmp_path_factory) -> Callable[[str], tuple[Outcome, Path]]:
     return get
 
 
-@pytest.mark.parametrize("name", BY_NAME)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.long] if i % 3 else []) for i, name in enumerate(BY_NAME)])
 def test_a_planted_fault_is_found_and_healed(name: str, case):
     outcome, _ = case(name)
     assert outcome.found
@@ -63,6 +63,7 @@ def test_what_is_real_is_no_fault(kind: str):
     assert check_dataset(replace(make(), simulation=None)) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["MMG ships, rounded", pytest.param("port manoeuvres, rounded", marks=pytest.mark.long)])
 def test_values_that_repeat_themselves_for_their_last_digit_are_no_fault(kind: str):
     """Where there is little noise, a yaw rate in steps of a degree a minute stands still for half a minute, and runs agree for some samples."""
@@ -81,6 +82,7 @@ def test_what_stands_still_in_a_rounded_record_is_found(channels: tuple[str, ...
     assert [(f.kind, f.channels, f.runs) for f in found] == [("frozen", channels, (run.id,))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [4, 5])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_side_of_the_rudder_shows_in_a_single_log(sign: float, seed: int):

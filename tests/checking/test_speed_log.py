@@ -49,6 +49,7 @@ def drifting(slowly: float, water: tuple[float, float], noise: float = 0.02) -> 
     return replace(plan, dt=1.0, runs=tuple(runs))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("ship", "noise", "share"), [("container130", 1.0, 0.3), ("kcs", 1.0, 0.5), ("kvlcc2_l7", 0.0, 0.3)])
 def test_it_is_told_on_ships_of_any_size(ship, noise, share):
     data = trials(ship, noise)
@@ -84,6 +85,7 @@ def test_the_same_creep_with_a_log_that_does_not_see_it_is_told():
     assert silence(silent(seen, 1.0)) is not None
 
 
+@pytest.mark.long
 def test_the_diagnosis_takes_the_speeds_of_the_track():
     data = trials()
     ready = speeds_of_the_track(Prepared(silent(data)))

@@ -29,6 +29,7 @@ def named(data: Dataset) -> list[str]:
     return [f.channels[0] for f in check_dataset(data) if f.kind == "actuator never moves"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ship", ["container130", "kcs", "kvlcc2_l7"])
 def test_a_dead_channel_is_named_on_ships_of_any_size(ship):
     data = sea_trials(load_mmg_ship(ship), 5, (), Trials(runs=16, samples=150))
@@ -51,6 +52,7 @@ def moving(u: np.ndarray, r: float, delta: float = 0.0, n: float = 0.0) -> Datas
     return replace(plan, dt=1.0, runs=tuple(replace(run, t=t, states=states, inputs=inputs) for run in plan.runs))
 
 
+@pytest.mark.long
 def test_a_ship_that_coasts_or_is_held_in_a_turn_or_drifts_is_no_sign_of_a_dead_channel():
     t = np.arange(200.0)
     coasting = 6.0 / (1.0 + 6.0 * t / (18.0 * 130.0))
@@ -61,6 +63,7 @@ def test_a_ship_that_coasts_or_is_held_in_a_turn_or_drifts_is_no_sign_of_a_dead_
     assert named(moving(np.full(200, 6.0), 0.01, n=90.0)) == ["delta"]
 
 
+@pytest.mark.long
 def test_the_diagnosis_says_so_too():
     verdict = diagnose(dead(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=12, samples=80)), DELTA), gain=False)
     assert any(w.startswith("The rudder is recorded at 0 degrees throughout") for w in verdict.warnings)

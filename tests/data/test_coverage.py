@@ -77,6 +77,7 @@ CHANNELS = {"gusts, and wind that differs from run to run", "shallow water"}
 NEVER_SLOW = {REVERSING, STERNWAY, ZERO_SPEED}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "expected"),
     [

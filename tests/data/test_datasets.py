@@ -75,6 +75,7 @@ def test_another_seed_is_another_data_set(harbour90):
     assert load_dataset("harbour90[seed=20]").fingerprint != harbour90.fingerprint
 
 
+@pytest.mark.long
 def test_a_damaged_cache_is_made_anew_and_said_so(harbour90, cache, caplog):
     (cache / "harbour90-v1" / "fingerprint.txt").write_text("0")
     with caplog.at_level(logging.WARNING):
@@ -86,6 +87,7 @@ def test_a_damaged_cache_is_made_anew_and_said_so(harbour90, cache, caplog):
     assert "cannot be read" in caplog.text
 
 
+@pytest.mark.long
 def test_a_cache_that_cannot_be_written_costs_no_result(monkeypatch, tmp_path, caplog):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("SHIPBENCH_CACHE", str(tmp_path / "file"))
@@ -95,6 +97,7 @@ def test_a_cache_that_cannot_be_written_costs_no_result(monkeypatch, tmp_path, c
     assert "cannot be kept" in caplog.text
 
 
+@pytest.mark.long
 def test_noise_and_gusts_change_what_is_measured(harbour90):
     noisy = load_dataset("harbour90_noisy")
     psi = np.concatenate([np.diff(r.states[:, 2] - np.cumsum(r.states[:, 5])) for r in noisy.runs])

@@ -27,6 +27,7 @@ def states(data) -> np.ndarray:
     return np.stack([run.states for run in data.runs])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_case_is_drawn_again_from_seed_kind_and_index(kind):
     first, second = (draw_case(kind, 3, 11, plan=TINY) for _ in range(2))
@@ -96,6 +97,7 @@ def test_a_unit_error_touches_its_channels_alone():
     assert np.allclose(other.runs[1].inputs[:, 1], -data.runs[1].inputs[:, 1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cause", OUTSIDE, ids=lambda c: c.name)
 def test_causes_outside_the_library_move_the_ship_or_what_is_recorded_and_are_not_registered(cause):
     case = draw_case("outside", OUTSIDE.index(cause), 6, plan=TINY)

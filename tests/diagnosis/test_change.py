@@ -26,6 +26,7 @@ def changed(**meta: object) -> Dataset:
     return data.with_runs([replace(r, meta={**r.meta, **{k: v[i] for k, v in meta.items()}}) for i, r in enumerate(data.runs)])
 
 
+@pytest.mark.long
 def test_runs_are_taken_in_the_order_in_which_they_were_sailed():
     data = changed(**{"from": [f"2026-05-0{1 + i // 4} 1{i % 4}:30:00+02:00" for i in range(RUNS)]})
     shuffled = data.with_runs([data.runs[i] for i in np.random.default_rng(0).permutation(RUNS)])

@@ -57,6 +57,7 @@ CASES = [("kcs", 3.0, True, 12)] + [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("ship", "degrees", "velocities", "runs"), CASES)
 def test_a_compass_error_is_named_in_either_form_and_nothing_else_is(ship: str, degrees: float, velocities: bool, runs: int):
     """With the velocities it was a list of 12 degrees, and the ship file in doubt."""

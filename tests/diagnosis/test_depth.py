@@ -39,6 +39,7 @@ def unsounded(data: Dataset) -> Dataset:
     return data.with_runs([replace(run, inputs=run.inputs[:, :-1], inputs_names=run.inputs_names[:-1]) for run in data.runs])
 
 
+@pytest.mark.long
 def test_what_a_recorded_depth_does_is_in_the_model(trials):
     plants = [Plant.of(data) for data in (trials, unsounded(trials))]
     with_depth, without = (null_fit(plant, Scales(plant)) for plant in plants)

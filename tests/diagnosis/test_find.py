@@ -47,6 +47,7 @@ def _trials(*hidden: Hidden, runs: int = 12, samples: int = 90, seed: int = 3) -
     return sea_trials(load_mmg_ship("kcs"), seed, hidden, Trials(runs=runs, samples=samples))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("names", [DRAWN, pytest.param(CLEAR, marks=pytest.mark.long)], ids=["drawn", "all"])
 def test_fresh_draws_of_clear_effects_at_their_typical_size_are_named_first(names):
     found = {}
@@ -72,6 +73,7 @@ def drifting() -> tuple[Dataset, Diagnosis]:
     return data, diagnose(data, workers=1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("found", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_two_processes_say_what_one_says(drifting, found):
     """The first part is fitted beside the whole there, before it is known whether anything is found and what the threshold is."""
@@ -82,6 +84,7 @@ def test_two_processes_say_what_one_says(drifting, found):
     assert two == one
 
 
+@pytest.mark.long
 def test_nothing_is_named_on_most_fresh_ships_without_a_hidden_effect():
     named = {}
     for kind, index in (("none-same", 0), ("none-other", 0), ("none-published", 0), ("none-published", 1)):
@@ -90,6 +93,7 @@ def test_nothing_is_named_on_most_fresh_ships_without_a_hidden_effect():
     assert sum(bool(n) for n in named.values()) <= 1, f"seed {SEED}: {named}"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ship", random.Random(SEED).sample(range(len(PUBLISHED)), 2), ids=["drawn", "another"])
 def test_causes_are_found_on_ships_of_the_literature_in_their_own_equations(ship):
     """One of a current, a compass error and a speed log's: the three share no equation with the fit."""
@@ -110,6 +114,7 @@ def test_what_ships_differ_in_is_not_named_for_a_hull_of_another_form():
     assert not verdict.causes
 
 
+@pytest.mark.long
 def test_a_change_that_one_run_alone_speaks_for_is_none():
     """A container ship that heels, with nothing hidden: one run of 24 carries a score of 16 for a centre of gravity that moved."""
     data = published_trials(PUBLISHED["s175"], 25)
@@ -118,6 +123,7 @@ def test_a_change_that_one_run_alone_speaks_for_is_none():
     assert all(s.score < THRESHOLD for s in changes(null))
 
 
+@pytest.mark.long
 def test_a_current_shows_where_the_plain_model_rests_and_where_nothing_is_fitted_yet():
     """A hull damped the wrong way had absorbed it: nothing of it was left where the plain model rested, but for a refit from the origin."""
     plant = Plant.of(_trials(Hidden(EFFECTS.get("current"), (0.25, -0.2))))
@@ -154,12 +160,14 @@ def test_a_hidden_current_is_sized_and_pays_on_runs_that_were_not_fitted(driftin
     assert sum(w.share_of_error for w in verdict.what_is_wrong) <= 1.0
 
 
+@pytest.mark.long
 def test_two_effects_at_once_are_both_named():
     hidden = [Hidden(EFFECTS.get("heading_bias"), (0.03,)), Hidden(EFFECTS.get("current"), (-0.2, 0.2))]
     named = [c.effect for c in diagnose(_trials(*hidden), gain=False).causes]
     assert set(named) == {"heading_bias", "current"}
 
 
+@pytest.mark.long
 def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
     values = np.where(np.arange(12) >= 6, 0.04, 0.0)
     verdict = diagnose(_trials(Hidden(EFFECTS.get("heading_bias"), (values,))), gain=False)
@@ -171,6 +179,7 @@ def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
     assert not np.isfinite(cause.parameters["from_run"].ci95).any()  # none is known: no width of zero is claimed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("index", "plan"),
     [(1, SHORT), *(pytest.param(i, plan, marks=pytest.mark.long) for i, plan in ((3, Trials()), (6, SHORT), (8, SHORT)))],
@@ -194,6 +203,7 @@ def test_what_an_unknown_fault_replaces_raises_no_doubt_of_the_ship_file():
     assert (verdict.unknown["axis"], verdict.unknown["variable"]) == ("recorded sway", "speed")
 
 
+@pytest.mark.long
 def test_a_ship_file_of_another_ship_names_nothing():
     data = replace(_trials(), ship=load_mmg_ship("container130").particulars)
     verdict = diagnose(data, gain=False)
@@ -278,6 +288,7 @@ def test_twenty_samples_are_refused_or_name_nothing():
         diagnose(_trials(runs=1, samples=12))
 
 
+@pytest.mark.long
 def test_where_the_wind_is_measured_it_is_not_missing_but_its_coefficients_may_be():
     """A container ship in a strong measured wind that turns it the other way, twice as hard as the formula says; and as it says."""
     ship, plan = load_mmg_ship("container130"), Trials(runs=24, samples=120, gusts=9.0)

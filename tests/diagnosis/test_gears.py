@@ -69,6 +69,7 @@ def test_findings_do_not_depend_on_the_compiler(compiler, name, value, monkeypat
     assert ordinary.keys() == as_before.keys()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["rudder_delay", "rudder_backlash", "rudder_lag", "rudder_rate_limit", "shaft_lag"])
 def test_from_the_smallest_size_that_is_told_on_an_effect_is_found(name):
     """The same trials and noise with nothing hidden, with more than the size that they would have shown, and with less."""

@@ -171,6 +171,7 @@ def test_a_constant_ahead_is_no_part_of_a_pull(kcs):
     assert min(d.score for d in constants if d.axis != "sway") > 4.0
 
 
+@pytest.mark.long
 def test_errors_of_sensors_are_told_from_forces(kcs):
     calm = [d for d in dependences(kcs()) if d.of_sensor]
     assert {d.axis for d in calm} == set(SENSORS)
@@ -189,6 +190,7 @@ def test_an_error_that_the_noise_had_held_is_worth_more_once_the_noise_is_fitted
     assert search.settled(first).score > first.score + 10.0
 
 
+@pytest.mark.long
 def test_an_error_that_is_a_cause_of_the_library_is_worth_what_that_cause_is_worth_once_it_is_fitted(kcs):
     """Both are the same model, one taken out of the record, the other in the fit."""
     null = kcs(Hidden(EFFECTS.get("heading_bias"), (0.035,)))

@@ -47,6 +47,7 @@ def test_pieces_of_one_log_are_one_witness_of_the_gain():
     assert alone.ci95[1] < 0.45
 
 
+@pytest.mark.long
 def test_of_a_single_group_nothing_is_held_out_and_it_is_said():
     verdict = diagnose(grouped("aaaaaa", 80, Hidden(EFFECTS.get("heading_bias"), (0.06,))), gain=True)
     assert [c.effect for c in verdict.causes] == ["heading_bias"]

@@ -33,6 +33,7 @@ def with_commands_alone(data: Dataset) -> Dataset:
     return replace(data.with_runs(runs), actuators="commanded")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("ship", "known"),
     [
@@ -45,6 +46,7 @@ def test_nothing_is_named_where_nothing_is_hidden(ship, known):
     assert (verdict.verdict, [c.effect for c in verdict.causes]) == ("none", [])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("known", [with_main_dimensions_alone, pytest.param(with_commands_alone, marks=pytest.mark.long)])
 def test_a_current_is_found_with_its_size(known):
     verdict = diagnose(known(trials(CURRENT)), gain=False)
@@ -52,6 +54,7 @@ def test_a_current_is_found_with_its_size(known):
     assert verdict.causes[0].parameters["speed"].value == pytest.approx(np.hypot(0.25, 0.2), rel=0.1)
 
 
+@pytest.mark.long
 def test_a_warning_says_how_far_off_an_estimated_propeller_is():
     full, bare = trials(), with_main_dimensions_alone(trials())
     assert not diagnose(full, gain=False).warnings
@@ -68,6 +71,7 @@ def test_a_ship_that_goes_astern_for_long_has_nothing_missing():
     assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("typical", "named"), [(0.045, False), (0.1, True)])
 def test_what_is_certain_but_tiny_is_not_named(typical: float, named: bool):
     """Exact sensors in a calm see a gyro that is 0.1 deg off."""

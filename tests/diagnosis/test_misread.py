@@ -48,6 +48,7 @@ def named(data: Dataset) -> tuple[list[str], list[RecordError]]:
     return [f.effect for f in found if f.score > 10.0], errors
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("error", ERRORS.values(), ids=ERRORS)
 @pytest.mark.parametrize("ship", ["kcs", "mariner"])
 def test_an_error_of_the_record_is_no_deadband(ship, error):
@@ -72,6 +73,7 @@ def test_a_zero_error_is_none_of_them():
 CAUSES = {"rudder_deadband": 0.026, "rudder_backlash": 0.026, "rudder_lag": 3.0, "rudder_delay": 1.5, "rudder_rate_limit": 0.02}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "value"), CAUSES.items())
 def test_what_is_wrong_with_a_gear_is_no_error_of_its_record_and_is_seen_beside_one(name, value):
     data = trials(Hidden(EFFECTS.get(name), (value,)))
@@ -95,6 +97,7 @@ def followed(command: np.ndarray, dt: float, scale: float, **more: float) -> np.
     return gear_path(np.zeros(1), command[None], dt, Gear(scale, 0.044 / scale, **{k: np.full(1, v) for k, v in more.items()}))[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", [0.2, 0.005], ids=["noise", "almost exact"])
 def test_a_gear_of_two_stages_is_an_ordinary_one(noise):
     def two_stages(command, dt, scale):
@@ -107,6 +110,7 @@ def test_a_gear_of_two_stages_is_an_ordinary_one(noise):
     assert named(driven(two_stages, noise)) == ([], [])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("more", "names"), [({}, []), ({"deadband": 0.026}, ["rudder_deadband"]), ({"delay": 2.0}, ["rudder_delay"])])
 def test_orders_beyond_the_end_stops_are_ordinary(more, names):
     """Stops at 20 degrees, orders up to 35."""
@@ -114,6 +118,7 @@ def test_orders_beyond_the_end_stops_are_ordinary(more, names):
     assert (effects[:1], errors) == (names, [])
 
 
+@pytest.mark.long
 def test_a_late_record_is_named_once_and_told_from_a_late_rudder():
     """The gear seems late, and the rudder acts before its record: the same effect twice, which no spec takes."""
     data = sea_trials(load_mmg_ship("kcs"), 4, (), Trials(runs=12))

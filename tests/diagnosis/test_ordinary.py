@@ -150,6 +150,7 @@ def test_what_a_small_force_could_stand_for_is_not_asked_of_the_ship(exact_marin
     assert np.sum(less**2) < STRANGE_SUM
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("ship", "runs"), [pytest.param("mariner", 24, marks=pytest.mark.long), ("tanker", 12)])
 def test_exact_sensors_in_a_calm_make_no_cause_of_the_form_of_a_hull(ship, runs):
     """Before a least force both were `unknown` and their ship files doubted: a parameter at 12.5 spreads, a mass changed by 3.3 typical sizes."""
@@ -234,6 +235,7 @@ def test_a_propeller_whose_curve_is_not_given_is_not_named_for_what_it_does_besi
     np.testing.assert_allclose(surge(np.log(1.8), 1.0 / 1.8 - 1.0), surge(0.0, 0.0))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("diameter", [1.9, *(pytest.param(d, marks=pytest.mark.long) for d in (2.26, 2.6))])
 def test_a_fit_finds_its_way_from_regressions_that_are_far_off(diameter: float):
     """A small fast ship whose two screws the file gives as one: of the right size, or with up to three times the thrust. Her rudders have no race."""

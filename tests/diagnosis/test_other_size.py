@@ -39,6 +39,7 @@ def test_a_right_file_is_not_doubted(plant):
     assert better_size(null_fit(plant, Scales(plant))) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("factor", "better"), [(0.4, "2.5"), (2.5, "0.4")])
 def test_a_file_of_a_smaller_or_larger_similar_ship_is_doubted(plant, factor, better):
     wrong = plant.resized(factor)

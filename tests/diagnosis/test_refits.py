@@ -32,6 +32,7 @@ def null() -> Fit:
     return null_fit(plant, Scales(plant), candidates_for(plant, NAMES))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("actuators", ["measured", pytest.param("commanded", marks=pytest.mark.long)])
 def test_every_candidate_has_a_slope_at_whatever_size(actuators):
     """Else its fit rests where it begins: the delay of a recorded rudder had one at zero alone, and was never found."""

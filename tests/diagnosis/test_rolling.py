@@ -91,6 +91,7 @@ def test_machine_code_and_numpy_agree(compiler, plant, names, monkeypatch):
         assert_agree(getattr(code, name), getattr(loops, name), 1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FORCES)
 def test_every_force_of_the_library_becomes_machine_code(compiler, name, monkeypatch):
     made = sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=2, samples=30))

@@ -110,6 +110,7 @@ def _colour(data: Dataset) -> Colour:
     return colour_of(fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion))
 
 
+@pytest.mark.long
 def test_a_compass_whose_errors_last_is_told_from_independent_ones(trials):
     rng = np.random.default_rng(1)
 
@@ -134,6 +135,7 @@ def _low_passed(data: Dataset) -> Dataset:
     return _changed(data, change)
 
 
+@pytest.mark.long
 def test_what_a_cause_does_to_a_sensor_is_no_noise_once_it_is_named():
     """Beside the noise that a late position had been taken for, half of the delay was found in other sensors on a model."""
     late = Hidden(EFFECTS.get("position_delay"), (3.0,))
@@ -165,6 +167,7 @@ def test_noise_that_swings_has_nothing_at_frequency_zero():
     assert correlation[0] + 2.0 * np.sum(correlation[1:] * np.cos(2.0 * np.pi / 6.0 * lag[1:])) > 8.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [0, 1, 2])
 def test_a_log_through_water_is_seen_and_put_over_ground(number):
     """It had been a current, and three faults of sensors besides."""
@@ -188,6 +191,7 @@ def test_a_log_through_water_is_seen_and_put_over_ground(number):
         assert line in found.warnings
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ship", ["kcs", pytest.param("container130", marks=pytest.mark.long)])
 def test_motion_with_the_waves_is_told_from_the_ships_own(ship):
     data = sea_trials(load_mmg_ship(ship), 11, (), Trials(runs=12, samples=120, waves=1.0))
@@ -210,6 +214,7 @@ def test_a_cause_is_seen_through_the_motion_with_the_waves():
     assert f"  yaw rate: {told['yaw rate']}" in summary_lines(found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("ship", "period"), [pytest.param("container130", 16.0, marks=pytest.mark.long), ("kcs", 20.0)])
 def test_a_swell_is_told_from_the_ships_own_motion_though_the_latent_force_follows_it(ship, period, monkeypatch):
     """The force in yaw was 24 and 12 times the ordinary one, and hid whatever turns a ship."""
@@ -231,6 +236,7 @@ def test_a_cause_is_seen_through_a_swell(monkeypatch):
     assert cause.parameters["offset"].value == pytest.approx(0.03, abs=0.005)
 
 
+@pytest.mark.long
 def test_velocities_filtered_in_the_earths_axes_are_seen_and_put_back(trials, filtered):
     found = late_velocities_of(filtered)
     assert found is not None
@@ -246,6 +252,7 @@ def test_velocities_filtered_in_the_earths_axes_are_seen_and_put_back(trials, fi
         assert np.abs(mended.states[:, U] - fast).mean() < np.abs(recorded.states[edge:-edge, U] - fast).mean()
 
 
+@pytest.mark.long
 def test_velocities_that_are_late_without_a_filter_are_told_from_filtered_ones(trials):
     by = int(LATE / trials.dt)
 
@@ -282,6 +289,7 @@ def test_a_position_that_is_early_is_believed_only_where_the_runs_agree(filtered
     assert (late_velocities_of(filtered) is not None) is late
 
 
+@pytest.mark.long
 def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):
     verdict = diagnose(filtered, gain=False)
     assert verdict.causes[0].effect == "velocity_delay"
@@ -311,6 +319,7 @@ def test_a_delay_that_the_track_rules_out_is_none(trials, monkeypatch, name: str
     assert clocks.ruled_out(trials, fit) == ((name,) if out else ())
 
 
+@pytest.mark.long
 def test_an_antenna_whose_velocities_are_its_own_is_no_other_hull(trials):
     """Track and velocities agree, so that only the forces tell where on the ship they belong; on a barge it was another hull (2716), and none."""
 
@@ -328,6 +337,7 @@ def test_an_antenna_whose_velocities_are_its_own_is_no_other_hull(trials):
         assert low < truth < high < truth + 60.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("channels", "named"), [pytest.param((U, V, R), ["velocity_delay"], marks=pytest.mark.long), ((R,), [])])
 def test_a_late_yaw_rate_is_put_back_and_no_late_rudder(trials, channels: tuple[int, ...], named: list[str]):
     def change(S: np.ndarray) -> None:
@@ -340,6 +350,7 @@ def test_a_late_yaw_rate_is_put_back_and_no_late_rudder(trials, channels: tuple[
     assert not any("yaw rate" in w for w in diagnose(trials, gain=False).warnings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [3, pytest.param(7, marks=pytest.mark.long)])
 def test_a_piece_in_which_the_ship_was_pushed_is_left_out_and_said_so(monkeypatch, seed: int):
     """The push drags the first fit so far that nothing looks strange where it ends."""

@@ -108,6 +108,7 @@ def test_a_heading_in_degrees_is_found_without_a_track():
     assert [(f.channel, f.kind) for f in findings] == [("psi", "degrees")]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(10))
 def test_ordinary_effects_raise_no_finding(seed: int):
     rng = np.random.default_rng(100 + seed)

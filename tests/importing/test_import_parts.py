@@ -103,6 +103,7 @@ def wander(rng, n, h, sigma, time):
     return noise
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", NOISES)
 @pytest.mark.parametrize("h", [1.0, 0.2])
 def test_speeds_from_a_noisy_track_against_the_simulated_truth(kind, h):

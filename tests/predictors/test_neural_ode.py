@@ -121,6 +121,7 @@ def test_a_wrong_wind_force_is_learned_and_the_solvers_agree_on_it(windy, tmp_pa
     np.testing.assert_array_equal(NeuralODE.load(tmp_path / "m").predict(batch.s0, batch.U), model.predict(batch.s0, batch.U))
 
 
+@pytest.mark.long
 def test_effects_of_the_physics_act_in_training_and_in_rollouts(parts, tmp_path):
     train, valid, test = parts
     effects = [EffectSpec("current", {}), EffectSpec("race_gain", {}), EffectSpec("rudder_lag", {})]

@@ -56,12 +56,14 @@ def test_so_it_is_on_ships_in_other_equations_and_read_rightly_there_is_nothing(
     assert found(misread(data, (DELTA,), -1.0)) == {"delta": -1.0, "delta_c": -1.0}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("channels", [(F_B,), (F_S,), (F_B, F_S)], ids=["bow", "stern", "both"])
 def test_thrusters_to_port_are_told(channels: tuple[int, ...]):
     wanted = {STATES[c] + end: -1.0 for c in channels for end in ("", "_c")}
     assert found(misread(port_trials(4), channels, -1.0)) == wanted
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("as_recorded", [0.0, 54.0])
 def test_thrusters_are_not_turned_for_another_rest_of_the_fit(monkeypatch, as_recorded: float):
     """Of four runs a fit took swell for noise of the sway velocity; read to the other side, for forces, 54 better; as recorded with those, too."""

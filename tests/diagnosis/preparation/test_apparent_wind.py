@@ -64,6 +64,7 @@ def test_half_a_wind_is_none_and_said(windy, kept: int):
     assert line.startswith(f"{names[kept]} is recorded alone")
 
 
+@pytest.mark.long
 def test_a_wind_as_felt_makes_no_cause(windy):
     found = diagnose(_felt(windy, 1.0, 1.0), gain=False)
     assert found.verdict == "none"

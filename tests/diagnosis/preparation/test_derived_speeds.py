@@ -33,6 +33,7 @@ def with_derived_speeds(data: Dataset) -> Dataset:
     return data.with_runs([run(r) for r in data.runs])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ship", ["kcs", "container130", "tanker"])
 def test_sensors_are_told_from_derivatives(ship):
     def sail(**plan: float) -> Dataset:
@@ -54,6 +55,7 @@ def test_a_perfect_log_of_the_speed_beside_a_poor_position_is_a_sensor():
     assert marked(noisy).derived == ()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["", pytest.param("current", marks=pytest.mark.long)])
 def test_derived_speeds_are_no_evidence(name):
     """Counted as measured, they made Mariner's force unknown with a score of 160."""

@@ -45,6 +45,7 @@ def test_short_runs_and_runs_enough_stay_as_they_are(runs: int, seconds: int):
     assert split_long_runs(Prepared(data)) == Prepared(data)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hidden", [pytest.param((), marks=pytest.mark.long), ("current",)])
 def test_one_long_run_names_what_acted_in_it_and_says_that_it_was_one(hidden: tuple[str, ...]):
     causes = tuple(Hidden(EFFECTS.get(name), (0.3, 0.2)) for name in hidden)
