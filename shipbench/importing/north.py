@@ -9,26 +9,38 @@ import numpy as np
 
 LEAP = 10.0
 """Times the steps beside it, and the usual step, that a step of such a heading has at least: no ship turns so, then not, within a sample."""
+_EQUAL = 0.1
+"""Share by which steps of a straight line between two readings may differ: that of a rounded record."""
 _Series = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
 def interpolated(psi: np.ndarray, turn: float = 2.0 * np.pi) -> list[tuple[int, int]]:
-    """First and last samples of the stretches of psi (samples,) that were interpolated across the end of the scale; turn: a whole turn."""
+    """First and last samples of the stretches of psi (samples,) that were interpolated across the end of the scale; turn: a whole turn.
+
+    Such a stretch is a straight line: its steps are equal, but for the first and the last, where samples lie between the readings. It makes nearly a
+    whole turn and begins and ends at once. A ship that turns a circle goes on as she did, on either side of it.
+    """
     if len(psi) < 4:
         return []
-    size = np.abs(np.remainder(np.diff(psi) + 0.5 * turn, turn) - 0.5 * turn)
+    moved = np.remainder(np.diff(psi) + 0.5 * turn, turn) - 0.5 * turn
+    size = np.abs(moved)
     usual = float(np.median(size[size > 0.0])) if np.any(size > 0.0) else np.inf
     leaps = np.concatenate([[0], (size > LEAP * usual).astype(int), [0]])
     found: set[tuple[int, int]] = set()
     for begin in (0.0, 0.5 * turn):
         number = np.remainder(psi + begin, turn)  # as it was recorded
         for way in (1.0, -1.0):
-            edges = np.diff(leaps * np.concatenate([[0], way * np.diff(number) > 0.0, [0]]))
+            rises = way * np.diff(number)
+            edges = np.diff(leaps * np.concatenate([[0], rises > 0.0, [0]]))
             for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
-                step = abs(float(number[b] - number[a])) / (b - a)
-                beside = max([usual, *(s for s in (*size[max(a - 1, 0) : a], *size[b : b + 1]) if s <= LEAP * usual)])  # not a way back
-                if b - a >= 2 and abs(step - turn / (b - a)) < step / LEAP and step > LEAP * beside:
-                    found.add((int(a) + 1, int(b) - 1))
+                full = float(np.median(rises[a:b]))
+                first = a - 1 if a > 0 and 0.0 < rises[a - 1] < full else a  # a small part of a step
+                last = b + 1 if b < len(rises) and 0.0 < rises[b] < full else b
+                inner, whole = rises[first + 1 : last - 1], abs(float(number[last] - number[first]))
+                straight = last - first >= 2 and bool(np.all(np.abs(inner - full) < _EQUAL * full))
+                beside = [abs(s) for s in (*moved[max(first - 1, 0) : first], *moved[last : last + 1]) if way * s > 0.0 or abs(s) <= LEAP * usual]
+                if straight and abs(whole - turn) < whole / LEAP and full > LEAP * max([usual, *beside]):
+                    found.add((int(first) + 1, int(last) - 1))
     return sorted(found)
 
 

@@ -48,5 +48,31 @@ def test_a_turning_circle_is_none(rate):
     assert interpolated(np.remainder(turning + 1.0 + noise, 2.0 * np.pi)) == []
 
 
+@pytest.mark.parametrize("rate", [0.0087, 0.026, 0.05])
+def test_a_long_turn_in_a_record_that_is_mostly_straight_is_none(rate):
+    """A research vessel turned circles at 3 deg/s; most of her record was straight, and 230 good headings were replaced by a straight line."""
+    rng = np.random.default_rng(4)
+    turning = np.concatenate([np.full(1500, 1e-4), np.linspace(0.0, rate, 12), np.full(round(3.2 * 2.0 * np.pi / rate), rate), np.full(900, 1e-4)])
+    steps = turning * (1.0 + 0.03 * rng.standard_normal(len(turning)))
+    assert interpolated(np.remainder(np.cumsum(steps) + 0.2, 2.0 * np.pi)) == []
+    assert interpolated(np.remainder(np.cumsum(turning) + 0.2, 2.0 * np.pi)) == []  # at one rate, to the last digit
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.1, 0.2, 0.3, 0.4])
+def test_crossings_are_found_wherever_the_samples_lie_between_the_readings(offset):
+    """A circle at 3 deg/s, read every 2.5 s and resampled to 0.5 s."""
+    at = np.arange(offset, 600.0, 2.5)
+    psi = np.deg2rad(3.0) * at + 0.02 * np.sin(0.3 * at)
+    t = np.arange(5.0, 590.0, 0.5)
+    record = np.interp(t, at, np.remainder(psi, 2.0 * np.pi))
+    off = np.abs(np.angle(np.exp(1j * (record - np.interp(t, at, psi))))) > 0.02
+    bad = np.zeros(len(t), dtype=bool)
+    for a, b in interpolated(record):
+        bad[a : b + 1] = True
+    assert off.sum() >= 12
+    assert np.all(bad[off])
+    assert bad.sum() <= off.sum() + 10
+
+
 def test_a_wrapped_heading_is_none():
     assert interpolated(np.remainder(course(), 2.0 * np.pi)) == []
