@@ -22,6 +22,7 @@ SCRIPTS = {
 LONG = ("fit_scipy", "paper_study", "mlp_training", "neural_ode_training")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.long) if name in LONG else name for name in SCRIPTS])
 def test_a_script_runs_and_its_sides_agree(name: str, tmp_path: Path):
     if missing := [package for package in SCRIPTS[name] if importlib.util.find_spec(package) is None]:

@@ -119,6 +119,7 @@ def test_a_block_that_is_wrong_fails(text, session):
         session.run(last)
 
 
+@pytest.mark.long
 def test_the_site_builds_strictly_and_fetches_nothing(tmp_path):
     pytest.importorskip("mkdocs", reason="mkdocs is not installed (extra `docs`)")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]

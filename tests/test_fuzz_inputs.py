@@ -97,6 +97,7 @@ def test_a_data_set_of_drawn_values_is_read_rightly_or_refused(tmp_path, entries
         assert all(np.isfinite(run.states).all() for run in data.runs)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="forks")
 def test_mutated_inputs_of_every_kind_end_well_through_the_command_line(tmp_path):
     told: list[str] = []

@@ -104,6 +104,7 @@ def scores(outcome):
     return outcome.rows.drop(columns=["fit_s", "predict_s"])
 
 
+@pytest.mark.long
 def test_processes_give_the_numbers_of_this_process_bit_for_bit(study, capfd):
     models = ("hold", "Good", "Together", "mlp[epochs=2,seed=1]")
     here = study(*models, seeds=[0, 3])

@@ -144,6 +144,7 @@ def test_a_strong_wind_in_every_run_is_found_on_a_ship_far_from_the_regressions(
     assert cause.support == "24 of 24 runs"
 
 
+@pytest.mark.long
 def test_a_hidden_current_is_sized_and_pays_on_runs_that_were_not_fitted(drifting):
     _, verdict = drifting
     cause = verdict.causes[0]

@@ -32,6 +32,7 @@ def gpu(monkeypatch):
     monkeypatch.setattr(torch.cuda, "device_count", lambda: 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NETWORKS)
 def test_every_tensor_of_training_and_prediction_is_on_the_device(name):
     done = subprocess.run([sys.executable, Path(__file__).with_name("fake_gpu.py"), name], capture_output=True, text=True, check=False)

@@ -150,6 +150,7 @@ def test_effects_that_it_cannot_train_with_are_refused(name):
         NeuralODE().extend([EffectSpec(name, {})])
 
 
+@pytest.mark.long
 def test_members_of_a_group_come_out_as_they_would_alone(parts, model):
     train, valid, test = parts
     batch = test.batch()
