@@ -24,6 +24,7 @@ from . import leaderboard as cli_leaderboard
 from . import parts as cli_parts
 from . import report as cli_report
 from .common import (
+    HELP,
     SETTINGS,
     DatasetArgument,
     Device,
@@ -61,7 +62,7 @@ class _Group(TyperGroup):
         """The commands in the groups of `_GROUPS`; a command that is in none of them comes last."""
         left = dict.fromkeys(self.list_commands(ctx))
         for title, names in [*_GROUPS.items(), ("More", tuple(left))]:
-            rows = [(name, self.commands[name].get_short_help_str(200)) for name in names if name in left]
+            rows = [(name, self.commands[name].get_short_help_str(HELP)) for name in names if name in left]
             for name in names:
                 left.pop(name, None)
             if rows:

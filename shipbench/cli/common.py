@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from ..errors import InputError
 from ..names import shown
@@ -28,6 +29,19 @@ Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no n
 Full = Annotated[bool, typer.Option("--full", help="Print all tables, as on the written page.")]
 Device = Annotated[str | None, typer.Option(help="Where networks compute: cpu, cuda or cuda:1 (default cpu); physics stays on the CPU.")]
 DatasetArgument = Annotated[str, typer.Argument(metavar="DATASET", help="Registered name or folder.")]
+
+
+HELP = 200
+"""Characters of the help of one command in a list of commands: it wraps, and is not cut."""
+
+
+class Commands(TyperGroup):
+    """A group of commands whose list shows their help whole."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """The commands in their order."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, self.commands[name].get_short_help_str(HELP)) for name in self.list_commands(ctx)])
 
 
 def say(text: str, err: bool = False) -> None:

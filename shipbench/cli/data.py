@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from .common import SETTINGS, DatasetArgument, Full, Json, Quiet, print_json, say, say_wrapped, show_table
+from .common import SETTINGS, Commands, DatasetArgument, Full, Json, Quiet, print_json, say, say_wrapped, show_table
 
-data_app = typer.Typer(help="Data sets: list, get, make, check, describe, export, import.", **SETTINGS)
+data_app = typer.Typer(cls=Commands, help="Data sets: list, get, make, check, describe, export, import.", **SETTINGS)
 
 
 @data_app.command("list")

@@ -16,7 +16,7 @@ def demo(
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results and the page.")] = Path("demo"),
     quiet: Quiet = False,
 ) -> None:
-    """Make a small trial with a hidden current, score two models, diagnose, score the corrected model, and write one page.
+    """Make a small trial with a hidden current, score three models, diagnose it, and write one page.
 
     Takes under a minute on two cores. Nothing is read but the package itself.
     """

@@ -10,7 +10,7 @@ import typer
 
 from ..names import file_name
 from ..regular_files import make_folder
-from .common import DatasetArgument, Full, Json, Quiet, print_json, say, screen_width
+from .common import Commands, DatasetArgument, Full, Json, Quiet, print_json, say, screen_width
 
 
 def diagnose(
@@ -50,7 +50,7 @@ def diagnose(
     say(f"Written: {', '.join(str(p) for p in written)}")
 
 
-suite_app = typer.Typer(help="Test suites of the framework itself.", no_args_is_help=True)
+suite_app = typer.Typer(cls=Commands, help="Test suites of the framework itself.", no_args_is_help=True)
 
 
 @suite_app.command("diagnosis")

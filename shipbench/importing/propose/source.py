@@ -216,8 +216,9 @@ def missing_channels(sources: Sequence[SourceDraft]) -> list[str]:
         lines.append("MISSING: no shaft speed (n or n_c) was found; without it, it is taken as zero.")
     if not {"delta", "delta_c"} & seen:
         lines.append("MISSING: no rudder angle (delta or delta_c) was found; without it, it is taken as zero.")
-    if {"delta", "n"} & seen:
-        lines.append("delta and n are measured positions; where the column is a command, write delta_c and n_c.")
+    if measured := [name for name in ("delta", "n") if name in seen]:
+        commands = " and ".join(f"{name}_c" for name in measured)
+        lines.append(f"{' and '.join(measured)}: taken as measured; where the column is a command, write {commands}.")
     return lines
 
 

@@ -23,7 +23,7 @@ def dataset_facts(dataset: Dataset) -> dict[str, Any]:
     return {
         "name": dataset.name,
         "ship": f"{dataset.ship.name}, L = {dataset.ship.L:g} m, B = {dataset.ship.B:g} m, T = {dataset.ship.T:g} m",
-        "runs": f"{len(dataset)} in {len(groups)} groups, {sum(samples)} samples at {dataset.dt:g} s, {lengths} s long",
+        "runs": f"{len(dataset)} in {len(groups)} group{'s' * (len(groups) != 1)}, {sum(samples)} samples at {dataset.dt:g} s, {lengths} s long",
         "inputs": ", ".join(dataset.inputs),
         "actuators": dataset.actuators,
         "manoeuvres": counts("manoeuvre"),
