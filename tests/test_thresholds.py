@@ -7,12 +7,13 @@ from pathlib import Path
 import pytest
 from markdown.extensions.toc import slugify
 
+from shipbench.checking.thresholds import THRESHOLDS as CHECKING
 from shipbench.diagnosis.thresholds import THRESHOLDS
 from shipbench.thresholds import Thresholds
 
 ROOT = Path(__file__).parents[1]
 ANCHORS = {slugify(line.lstrip("# "), "-") for line in (ROOT / "docs" / "calibration.md").read_text("utf-8").splitlines() if line.startswith("#")}
-TABLES = {"diagnosis": THRESHOLDS}
+TABLES = {"checking": CHECKING, "diagnosis": THRESHOLDS}
 
 
 @pytest.mark.parametrize("package", TABLES)

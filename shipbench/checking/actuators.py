@@ -7,11 +7,9 @@ import numpy as np
 from ..signals import COMMANDS, DELTA, N
 from .finding import Curve, Finding, Picture, labelled, toml_line
 from .recording import Recording
-from .statistics import FEWEST
+from .thresholds import THRESHOLDS
 
 _NAMES = ("n", "delta", "F_b", "F_s")
-_LARGE, _SWEEP = 0.2, 3.0
-"""A large step, as a share of the range; s at 130 m for the whole range that no gear reaches (rules ask for 28 s from 35 to -30 deg)."""
 
 
 def check(recording: Recording) -> list[Finding]:
@@ -28,10 +26,10 @@ def check(recording: Recording) -> list[Finding]:
         if name not in recording.recorded:
             continue
         share, changes = _exact(recording, i) if COMMANDS[i] in recording.recorded else (0.0, 0)
-        if changes >= FEWEST and share > 0.98:
+        if changes >= THRESHOLDS.count("occurrences") and share > 0.98:
             exact[name] = f"{name} equals its command at {share:.1%} of {changes} changes"
         jumps, greatest = _sudden(recording, N + i)
-        if jumps >= FEWEST:
+        if jumps >= THRESHOLDS.count("occurrences"):
             sudden[name] = f"{name} changes {jumps} times within one sample of {recording.dt:g} s, by up to {greatest:.4g} {_unit(name)}"
         figures |= {f"{name}_exact": share, f"{name}_jumps": jumps, f"{name}_greatest": greatest}
     if "delta" not in sudden and "n" in sudden and figures.get("delta_jumps") and _held(recording) > 0.5:  # few leaps, beside those of the shaft
@@ -78,10 +76,11 @@ def _exact(recording: Recording, i: int) -> tuple[float, int]:
 
 
 def _sudden(recording: Recording, channel: int) -> tuple[int, float]:
-    """Number of steps within one sample, at a pace that would sweep the range in less than `_SWEEP`, that stay; and the greatest of them."""
+    """Number of steps within one sample that stay, at a pace that sweeps the range in `sudden_sweep`; the greatest."""
     values = np.concatenate([run.states[:, channel] for run in recording.runs])
     reach = float(np.ptp(np.quantile(values, [0.001, 0.999])))
-    least = reach * max(_LARGE, recording.dt / (_SWEEP * recording.froude))
+    sweep = THRESHOLDS.value("sudden_sweep") * recording.froude
+    least = reach * max(THRESHOLDS.value("sudden_step"), recording.dt / sweep)
     if reach <= 0.0 or least > reach:
         return 0, 0.0
     steps = [0.0]

@@ -19,7 +19,7 @@ from .recording import Recording
 
 _HELPERS = frozenset({
     "applying", "base", "finding", "gross", "held", "north", "placeholders", "reading", "recording", "rudder_side", "selection", "statistics",
-    "track", "units", "wind_reading",
+    "thresholds", "track", "units", "wind_reading",
 })  # fmt: skip
 CHECKS = Registry("check", "checking", "CHECK", helpers=_HELPERS, group="checks")
 

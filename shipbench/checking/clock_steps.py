@@ -15,9 +15,7 @@ from ..signals import PSI, R, U, V, X, Y
 from .finding import Finding, toml_line
 from .recording import Recording
 from .statistics import times
-
-_LEAST, _ALIKE = 1.0, 0.25
-"""Seconds that a clock is set by at least, and share of the leap within which the motion explains it."""
+from .thresholds import THRESHOLDS
 
 
 def _motion(before: np.ndarray, after: np.ndarray) -> tuple[complex, float, float]:
@@ -31,8 +29,9 @@ def set_back(run: Run, k: int, leap: complex, turned: float) -> float | None:
     """Seconds by which the clock was set back between samples k and k + 1, where position and heading both leap along the motion; else None."""
     way, rate, _ = _motion(run.states[max(0, k - 3) : k + 1], run.states[k + 1 : k + 5])
     seconds = float(np.real(leap * np.conj(way)) / max(abs(way) ** 2, 1e-12))
-    explained = abs(leap - seconds * way) < _ALIKE * abs(leap) and abs(turned - seconds * rate) < _ALIKE * abs(turned)
-    return seconds if explained and abs(seconds) >= _LEAST else None
+    share = THRESHOLDS.value("clock_step_misfit")
+    explained = abs(leap - seconds * way) < share * abs(leap) and abs(turned - seconds * rate) < share * abs(turned)
+    return seconds if explained and abs(seconds) >= THRESHOLDS.value("clock_step") else None
 
 
 def clock_finding(recording: Recording, steps: dict[tuple[str, int], float]) -> Finding:
@@ -91,7 +90,8 @@ def _ahead(before: np.ndarray, after: np.ndarray, gap: float, recording: Recordi
     early, beside = gap - seconds, abs(moved - seconds * way)
     doubt = (0.5 * change * gap + beside + 0.01 * recording.dataset.ship.L) / max(abs(way), 1e-12)
     alike = abs(turned - rate * seconds) <= abs(turned - rate * gap) or abs(rate * gap) < 0.01
-    return early if early >= _LEAST and early > 2.0 * doubt and seconds > 0.0 and alike else None
+    long = early >= THRESHOLDS.value("clock_step") and early > 2.0 * doubt
+    return early if long and seconds > 0.0 and alike else None
 
 
 CHECK = check

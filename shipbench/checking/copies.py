@@ -15,14 +15,10 @@ from ..signals import PSI, R, U, V, X, Y
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
 from .statistics import some, spread, stretches
+from .thresholds import THRESHOLDS
 
 _WINDOW = 8
-_DIGITS = 1e-5
-"""Rounding, as a share of the channel's spread."""
-_REST = 1e-3
-"""Froude number of a ship at rest."""
-_FEWEST = 20
-"""Equal samples without a break, each other than the one before, that make two runs copies."""
+"""Samples of a window that is hashed, fewer than `copied_samples`."""
 
 
 def _hashes(run: Run, size: np.ndarray) -> np.ndarray:
@@ -44,7 +40,8 @@ def overlaps(recording: Recording) -> dict[tuple[int, int], tuple[int, int]]:
     if len(runs) < 2:
         return {}
     S = np.concatenate([run.states[:, [U, V, R]] for _, run in runs])
-    size = np.maximum(S.std(axis=0) * _DIGITS, 1e-9 * np.max(np.abs(S), axis=0) + 1e-12)  # of a channel that never changes, too
+    floor = 1e-9 * np.max(np.abs(S), axis=0) + 1e-12  # of a channel that never changes, too
+    size = np.maximum(S.std(axis=0) * THRESHOLDS.value("equal_within"), floor)
     hashes = [(i, _hashes(run, size)) for i, run in runs]
     value = np.concatenate([h for _, h in hashes])
     owner = np.concatenate([np.full(len(h), i) for i, h in hashes])
@@ -57,10 +54,10 @@ def overlaps(recording: Recording) -> dict[tuple[int, int], tuple[int, int]]:
     for (a, b, shift), count in zip(*np.unique(pairs, axis=0, return_counts=True), strict=True):
         i, j, offset = (int(a), int(b), int(shift)) if a < b else (int(b), int(a), -int(shift))
         samples = int(count) + _WINDOW - 1
-        if samples >= _FEWEST // 2 and samples > found.get((i, j), (0, 0))[0]:
+        if samples >= THRESHOLDS.count("copied_samples") // 2 and samples > found.get((i, j), (0, 0))[0]:
             found[i, j] = (samples, offset)
     alike = {pair: (_alike(recording.runs[pair[0]], recording.runs[pair[1]], offset, size), offset) for pair, (_, offset) in found.items()}
-    return {pair: part for pair, part in alike.items() if part[0] >= _FEWEST}
+    return {pair: part for pair, part in alike.items() if part[0] >= THRESHOLDS.count("copied_samples")}
 
 
 def _alike(a: Run, b: Run, offset: int, size: np.ndarray) -> int:
@@ -74,7 +71,7 @@ def _alike(a: Run, b: Run, offset: int, size: np.ndarray) -> int:
     same = np.all(np.abs(mine - other) <= 2.0 * size, axis=1)
     changes = np.any(np.abs(np.diff(mine, axis=0)) > 2.0 * size, axis=1)
     most = max((int(changes[start : stop - 1].sum()) for start, stop in stretches(same)), default=0)
-    return int(same.sum()) if most >= _FEWEST - 1 else 0
+    return int(same.sum()) if most >= THRESHOLDS.count("copied_samples") - 1 else 0
 
 
 def check(recording: Recording) -> list[Finding]:
@@ -184,7 +181,8 @@ def _next(recording: Recording, runs: list[Run], i: int) -> int | None:
     rates = end[[U, V]] @ np.array([[np.cos(end[PSI]), np.sin(end[PSI])], [-np.sin(end[PSI]), np.cos(end[PSI])]])
     noise = _noise(recording)
     best, nearest = None, np.inf
-    if np.hypot(end[U], end[V]) < max(0.1 * recording.speed, _REST * (9.81 * recording.dataset.ship.L) ** 0.5):
+    at_rest = THRESHOLDS.value("speed_at_rest") * (9.81 * recording.dataset.ship.L) ** 0.5
+    if np.hypot(end[U], end[V]) < max(0.1 * recording.speed, at_rest):
         return None  # many runs end and begin at rest at one berth
     for j, run in enumerate(runs):
         S = run.states[0]

@@ -1,4 +1,4 @@
-"""What a check reports: what is wrong, the figures it rests on, a picture, and the lines of dataset.toml that mend it."""
+"""Findings of a check: the fault, its figures, a picture, and the lines of dataset.toml that correct it."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Finding:
 
 
 def toml_line(data: dict[str, Any]) -> str:
-    """As compact TOML: values first, then tables; numbers to six digits, lists on one line (tomli_w spreads intervals over four)."""
+    """Compact TOML: values first, then tables; numbers to six digits, lists on one line."""
     return "\n".join(_toml(data, ()))
 
 

@@ -17,8 +17,8 @@ from ..records import Dataset
 from ..signals import PSI, U, V, X, Y
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
-from .track import WINDOW
-from .units import BETTER, POOR, UnitFinding, check_units, corrected
+from .thresholds import THRESHOLDS
+from .units import UnitFinding, check_units, corrected
 from .wind_reading import mend_wind
 
 _HEMISPHERES = "Did the import leave N/S or E/W of latitude and longitude unread? Then import again with `hemisphere` in the mapping."
@@ -100,11 +100,11 @@ class _Misfit:
 
 
 def _misfit(recording: Recording, dataset: Dataset) -> _Misfit | None:
-    """How the track departs from heading and speeds, with a scale left free; None where the ship hardly moves."""
+    """Misfit of the track to heading and speeds, with a scale left free; None where the ship hardly moves."""
     dt = recording.dt
-    width = max(3, round(WINDOW * recording.froude / dt))
+    width = max(3, round(THRESHOLDS.value("track_window") * recording.froude / dt))
     pieces = [run.states[a : a + width + 1] for run in dataset.runs for a in range(0, len(run) - width, width)]
-    if len(pieces) < 12:
+    if len(pieces) < THRESHOLDS.count("windows"):
         return None
     S = np.stack(pieces)
     made = S[:, -1, X] - S[:, 0, X] + 1j * (S[:, -1, Y] - S[:, 0, Y])
@@ -119,7 +119,7 @@ def _misfit(recording: Recording, dataset: Dataset) -> _Misfit | None:
 
 
 def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
-    """The recording with gross errors taken out, and what they were."""
+    """Recording with gross errors taken out, and the findings on them."""
     findings: list[Finding] = []
     plain = _misfit(recording, recording.dataset)
     units = _units(recording)
@@ -147,7 +147,9 @@ def _best_reading(recording: Recording, plain: _Misfit, units: list[UnitFinding]
     for reading in READINGS:
         dataset = _mended(recording.dataset, reading.mend)
         left = _misfit(recording, dataset)
-        if left is None or BETTER * left.track**2 > plain.track**2 or left.track > POOR:
+        if left is None or left.track > THRESHOLDS.value("reading_misfit"):
+            continue
+        if THRESHOLDS.value("reading_gain") * left.track**2 > plain.track**2:
             continue
         further = check_units(dataset)
         options.append((1 + len(_errors(further)), left.track, reading, dataset, left))
@@ -207,7 +209,7 @@ def _side(recording: Recording, channel: str) -> str:
 
 
 def _unit_finding(recording: Recording, f: UnitFinding, units: list[UnitFinding]) -> Finding:
-    """In words and as lines."""
+    """Finding in words and as lines of dataset.toml."""
     if f.kind == "exchanged with y":
         text = f"x is east and y north. {f.evidence}"
         line = toml_line({"frame": "east-north"})
@@ -241,7 +243,7 @@ def _unit_finding(recording: Recording, f: UnitFinding, units: list[UnitFinding]
 
 
 def _channel(recording: Recording, channel: str) -> Picture:
-    """The channel in the longest run, and what it would have to agree with."""
+    """Picture of the channel in the longest run, beside the channels that it would have to agree with."""
     run = max(recording.runs, key=len)
     t, S = run.t - run.t[0], run.states
     names = dict(zip(("x", "y", "psi", "u", "v", "r", "n", "delta", "F_b", "F_s"), S.T, strict=True)) | dict(

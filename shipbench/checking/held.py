@@ -15,7 +15,8 @@ from ..records import Run
 from ..signals import PSI, STATES, R, U, V, X, Y
 from .finding import Curve, Finding, Picture, labelled, toml_line
 from .recording import Recording
-from .statistics import FEWEST, stretches
+from .statistics import stretches
+from .thresholds import THRESHOLDS
 
 
 def _digit(changes: np.ndarray) -> float:
@@ -35,7 +36,7 @@ def _moved(run: Run, dt: float) -> dict[int, np.ndarray]:
 def _held(recording: Recording, channel: int) -> int:
     """Samples for which most values are held; 0 where they are not."""
     changes = np.concatenate([np.diff(run.states[:, channel]) for run in recording.runs])
-    if np.sum(changes != 0.0) < FEWEST:
+    if np.sum(changes != 0.0) < THRESHOLDS.count("occurrences"):
         return 0
     digit, lengths, values = _digit(changes), [], 0
     for run in recording.runs:
@@ -43,7 +44,7 @@ def _held(recording: Recording, channel: int) -> int:
         holds = stretches(np.diff(run.states[:, channel]) == 0.0)
         lengths += [b - a + 1 for a, b in holds if abs(moved[b] - moved[a]) > 2.0 * digit]
         values += int(np.sum(np.diff(run.states[:, channel]) != 0.0))
-    return round(float(np.median(lengths))) if len(lengths) > max(0.5 * values, FEWEST) else 0
+    return round(float(np.median(lengths))) if len(lengths) > max(0.5 * values, THRESHOLDS.count("occurrences")) else 0
 
 
 def mend_held(recording: Recording) -> tuple[Recording, list[Finding]]:

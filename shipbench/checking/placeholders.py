@@ -14,9 +14,7 @@ from ..signals import DELTA, PSI, STATES, R, U, V, X, Y
 from .finding import Curve, Finding, Picture, labelled, toml_line
 from .recording import Recording
 from .statistics import stretches, times
-
-RUDDER_MOST = 1.3
-"""Angle [rad] beyond every rudder's."""
+from .thresholds import THRESHOLDS
 
 
 def _blocks(z: np.ndarray, limit: float) -> list[tuple[int, int]]:
@@ -47,7 +45,8 @@ def _impossible(recording: Recording, found: dict[str, list[tuple[int, int]]]) -
     """Those blocks of rudder angles that no rudder reaches, unless it goes there otherwise too: then the unit is another one."""
     kept = {}
     for run in recording.runs:
-        beyond, explained = np.abs(run.states[:, DELTA]) > RUDDER_MOST, np.zeros(len(run), dtype=bool)
+        beyond = np.abs(run.states[:, DELTA]) > THRESHOLDS.value("largest_rudder_angle")
+        explained = np.zeros(len(run), dtype=bool)
         blocks = [(a, b) for a, b in found.get(run.id, []) if beyond[a : b + 1].any()]
         for a, b in blocks:
             explained[a : b + 1] = True

@@ -19,9 +19,8 @@ from ..toml_files import read_toml
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
 from .statistics import some
+from .thresholds import THRESHOLDS
 
-_MOST = 1e12
-"""Of any channel in its own unit."""
 _SPLIT = toml_line({"gaps": "split"})
 
 
@@ -105,11 +104,12 @@ def _clean(table: pd.DataFrame, description: Description, found: list[Finding]) 
 
 def _possible(table: pd.DataFrame, where: str) -> None:
     """Refuse numbers that no sensor reads, at which arithmetic ends."""
+    accepted = THRESHOLDS.value("greatest_value")
     for column in ("t", *(c for c in SIGNALS if c in table)):
         values = table[column].to_numpy()
         most = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
-        if most > _MOST:
-            message = f"{where}: {column} holds values up to {most:.3g}; accepted: up to {_MOST:g}."
+        if most > accepted:
+            message = f"{where}: {column} holds values up to {most:.3g}; accepted: up to {accepted:g}."
             raise InputError(f"{message} Leave the cell empty where the sensor gave nothing.")
 
 

@@ -1,4 +1,4 @@
-"""What the checks look at: the data set as far as it can be read, how its raw table looked, and how much time means to a ship of its size."""
+"""Recording that is checked: the data set as far as it can be read, its raw table, and the time scale of its ship."""
 
 from __future__ import annotations
 

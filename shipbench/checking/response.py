@@ -17,16 +17,8 @@ from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
 from .standing import standing
 from .statistics import inliers
+from .thresholds import THRESHOLDS
 
-_AHEAD, _EDGE = 8.0, 2.0
-"""Seconds at 130 m: over which the effect changes, and over which each end is averaged against noise."""
-_SEARCH, _STEP = 10.0, 0.5
-"""Seconds at 130 m: greatest lag that is looked for, and the step of the search."""
-_FEWEST = 100
-"""Windows."""
-_WAITS, _WAITS_GAIN = 2.0, 20.0
-"""A rudder or shaft whose record is late waits for its order, too: by so many s at 130 m, with that gain."""
-_SHARES = (0.005, 0.02, 0.05, 0.1, 0.2, 0.5)
 _MOTION = ("x", "y", "psi", "u", "v", "r")
 _Shift = Callable[[np.ndarray], np.ndarray]
 _Columns = Callable[[np.ndarray, np.ndarray, _Shift], tuple[np.ndarray, list[np.ndarray]]]
@@ -68,19 +60,26 @@ def _surge(S: np.ndarray, orders: np.ndarray, shift: _Shift) -> tuple[np.ndarray
 def _gear(actuator: int) -> _Columns:
     """Pace of an actuator by what is left to its order, with limits of the pace at several shares of its range."""
 
+    shares = (0.005, 0.02, 0.05, 0.1, 0.2, 0.5)
+
     def columns(S: np.ndarray, orders: np.ndarray, shift: _Shift) -> tuple[np.ndarray, list[np.ndarray]]:
         left = shift(orders[:, actuator - N]) - S[:, actuator]
         reach = float(np.ptp(S[:, actuator])) + 1e-12
-        return S[:, actuator], [left, *(np.clip(left, -share * reach, share * reach) for share in _SHARES)]
+        return S[:, actuator], [left, *(np.clip(left, -share * reach, share * reach) for share in shares)]
 
     return columns
 
 
+_RUDDER_LAG = (THRESHOLDS.value("rudder_lag"), THRESHOLDS.value("rudder_lag_gain"))
+_RUDDER_LEAD = (THRESHOLDS.value("motion_lag_rudder"), THRESHOLDS.value("motion_lag_rudder_gain"))
+_SHAFT_LAG = (THRESHOLDS.value("shaft_lag"), THRESHOLDS.value("shaft_lag_gain"))
+_SHAFT_LEAD = (THRESHOLDS.value("motion_lag_shaft"), THRESHOLDS.value("motion_lag_shaft_gain"))
+_ORDER_LAG = (THRESHOLDS.value("order_lag"), THRESHOLDS.value("order_lag_gain"))
 _PAIRS = (
-    _Pair("delta", "yaw rate", "r", _yaw, (3.5, 20.0), 10.0, (3.0, 6.0), False),
-    _Pair("n", "surge", "u", _surge, (5.0, 6.0), 2.0, (4.0, 10.0), False),
-    _Pair("delta_c", "rudder", "delta", _gear(DELTA), (1.5, 10.0), 10.0, None, True),
-    _Pair("n_c", "shaft", "n", _gear(N), (1.5, 10.0), 10.0, None, True),
+    _Pair("delta", "yaw rate", "r", _yaw, _RUDDER_LAG, THRESHOLDS.value("rudder_lag_gain_agreed"), _RUDDER_LEAD, False),
+    _Pair("n", "surge", "u", _surge, _SHAFT_LAG, THRESHOLDS.value("shaft_lag_gain_agreed"), _SHAFT_LEAD, False),
+    _Pair("delta_c", "rudder", "delta", _gear(DELTA), _ORDER_LAG, _ORDER_LAG[1], None, True),
+    _Pair("n_c", "shaft", "n", _gear(N), _ORDER_LAG, _ORDER_LAG[1], None, True),
 )
 
 
@@ -108,14 +107,15 @@ class _Search:
 
 def _search(recording: Recording, pair: _Pair) -> _Search | None:
     """None where there are too few windows."""
-    ahead, edge = (max(1, round(seconds * recording.froude / recording.dt)) for seconds in (_AHEAD, _EDGE))
-    half = round(_SEARCH / _STEP)
-    lags = np.arange(-half, half + 1) * _STEP * recording.froude
+    times = THRESHOLDS.value("lag_interval"), THRESHOLDS.value("lag_mean")
+    ahead, edge = (max(1, round(seconds * recording.froude / recording.dt)) for seconds in times)
+    half = round(THRESHOLDS.value("longest_lag") / THRESHOLDS.value("lag_step"))
+    lags = np.arange(-half, half + 1) * THRESHOLDS.value("lag_step") * recording.froude
     margin = int(np.ceil(lags[-1] / recording.dt))
     lengths = np.array([len(run) for run in recording.runs])
     ends = np.cumsum(lengths)
     windows = np.concatenate([np.arange(b - n + margin, b - margin - ahead - edge + 1, ahead) for n, b in zip(lengths, ends, strict=True)])
-    if len(windows) < _FEWEST:
+    if len(windows) < THRESHOLDS.count("lag_windows"):
         return None
     S, orders = np.concatenate([run.states for run in recording.runs]), np.concatenate([run.inputs for run in recording.runs])
     place, first, last = np.arange(len(S)), np.repeat(ends - lengths, lengths), np.repeat(ends - 1, lengths)
@@ -156,7 +156,8 @@ def check(recording: Recording) -> list[Finding]:
     made = {pair.cause for pair in _PAIRS if pair.of in recording.dataset.derived}
     asked = [pair for pair in _PAIRS if pair.cause in recording.recorded - made and (pair.order or not missing)]
     searches = {pair.cause: _search(recording, pair) for pair in asked}
-    waits = {cause: -float(s.lags[s.best]) for cause, s in searches.items() if s is not None and s.gain >= _WAITS_GAIN}
+    least = THRESHOLDS.value("agreed_lag_gain")
+    waits = {cause: -float(s.lags[s.best]) for cause, s in searches.items() if s is not None and s.gain >= least}
     found = [
         f for pair in asked
         if (s := searches[pair.cause]) is not None and (f := _judge(recording, pair, s, waits.get(f"{pair.cause}_c", 0.0))) is not None
@@ -174,7 +175,7 @@ def _judge(recording: Recording, pair: _Pair, found: _Search, waits: float) -> F
     at_130 = lag / recording.froude
     if found.best in (0, len(found.lags) - 1):
         return None
-    if at_130 >= pair.late[0] and waits >= _WAITS * recording.froude:
+    if at_130 >= pair.late[0] and waits >= THRESHOLDS.value("agreed_lag") * recording.froude:
         lag, late_gain = min(lag, waits), pair.agreed
     if at_130 >= pair.late[0] and found.gain >= late_gain:
         line = {pair.cause: lag}

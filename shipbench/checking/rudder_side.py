@@ -9,14 +9,8 @@ import numpy as np
 
 from ..records import Dataset, Run
 from ..signals import DELTA, F_B, F_S, N, R, U
-from .statistics import FEWEST, stretches
-
-_WINDOW = 6.0
-"""Seconds after the rudder at 130 m, Froude-scaled."""
-_TURN, _TURN_WINDOW, _TURN_LAG = np.deg2rad(10.0), 30.0, 5.0
-"""Least turn that shows the side of the rudder, within so many seconds at 130 m, which begin so long after those of the rudder."""
-_ALIKE_TURNS, _SURE = 0.6, 5.0
-"""Cosine of their angles and their rudder that makes a side, and deviations of the slope just after the rudder."""
+from .statistics import stretches
+from .thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -28,12 +22,15 @@ class Side:
 
 
 def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
-    """Which way the ship turns under a rudder, ahead and without thrusters: in turns by a visible angle, which no gust makes against the rudder, and
-    just after it, r(t + 6 s) - r(t) against delta(t), given r(t). On a straight course the rudder answers the motion, and that alone would mislead.
-    unit: of the recorded yaw rate, over rad/s.
+    """Side to which the ship turns under a rudder, ahead and without thrusters.
+
+    It must show in turns by a visible angle, which no gust makes against the rudder, and just after the rudder:
+    r(t + 6 s) - r(t) against delta(t), given r(t). On a straight course the rudder answers the motion, which alone
+    would mislead. unit: of the recorded yaw rate, over rad/s.
     """
     froude = (dataset.ship.L / 130.0) ** 0.5
-    ahead, width, lag = (max(1, round(seconds * froude / dataset.dt)) for seconds in (_WINDOW, _TURN_WINDOW, _TURN_LAG))
+    times = THRESHOLDS.value("rudder_answer"), THRESHOLDS.value("side_turn_time"), THRESHOLDS.value("side_turn_delay")
+    ahead, width, lag = (max(1, round(seconds * froude / dataset.dt)) for seconds in times)
     rows, turns = [], []
     for S in (run.states for run in runs):
         idle = (S[:, F_B] == 0.0) & (S[:, F_S] == 0.0) & (S[:, U] * np.sign(np.median(S[:, U])) > 0.0) & (S[:, N] >= 0.0)
@@ -46,13 +43,14 @@ def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
             turned, helm = (np.concatenate([[0.0], np.cumsum(S[:, channel])]) for channel in (R, DELTA))
             turns.append(np.stack([(turned[at + width] - turned[at]) * dataset.dt, (helm[at + width - lag] - helm[at - lag]) / width], axis=-1))
     turn, helm = np.concatenate(turns).T if turns else np.zeros((2, 0))
-    turn, helm = turn[np.abs(turn) > _TURN * unit], helm[np.abs(turn) > _TURN * unit]
-    if len(turn) < FEWEST or not np.any(helm):
+    clear = np.abs(turn) > np.deg2rad(THRESHOLDS.value("side_turn")) * unit
+    turn, helm = turn[clear], helm[clear]
+    if len(turn) < THRESHOLDS.count("occurrences") or not np.any(helm):
         return Side()
     likeness = float(turn @ helm / np.sqrt((turn @ turn) * (helm @ helm)))
     slope, sd = _slopes(np.concatenate(rows))
     sign = float(np.sign(likeness))
-    if abs(likeness) < _ALIKE_TURNS or slope[0] * sign < _SURE * sd:
+    if abs(likeness) < THRESHOLDS.value("side_correlation") or slope[0] * sign < THRESHOLDS.value("side_slope") * sd:
         return Side()
     against = int(np.sum(turn * helm < 0.0))
     text = (

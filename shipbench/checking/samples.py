@@ -10,18 +10,9 @@ from ..records import Run
 from ..signals import DELTA, PSI, STATES, N, R, U, V, X, Y
 from .finding import Curve, Finding, Picture, labelled, toml_line
 from .recording import Recording
-from .statistics import FEWEST, spread, stretches, times
+from .statistics import spread, stretches, times
+from .thresholds import THRESHOLDS
 
-_REPEATED = 0.005
-"""Share of repeated samples that is reported."""
-_FROZEN = 3.0
-"""Seconds at 130 m for which a channel must stand still to be frozen."""
-_HIDES, _SURE = 2.0, 5.0
-"""Steps of a record within which a channel may move unseen; deviations of the noise of position or heading beyond them."""
-_RARE = 1e-6
-"""Chance of as many repeats in a row, from the channel's usual share of repeats, that makes them a standstill."""
-_RARELY, _OFTEN = 0.02, 0.4
-"""Shares of a noisy record: of samples that repeat the one before, at most, and of steps back on the one before, at least (2/3 in white noise)."""
 _CHANNELS = {"x, y": (X, Y), "psi": (PSI,), "u": (U,), "v": (V,), "r": (R,)}
 
 
@@ -66,7 +57,7 @@ def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[F
     steps = sum(int(m.sum()) for m in moving)
     if not steps:
         return []
-    needed = max(FEWEST, round(_FROZEN * recording.froude / recording.dt))
+    needed = _needed(recording, THRESHOLDS.value("frozen_time"))
     still = [_standstills(r, m, needed) for r, m in zip(repeats, moving, strict=True)]
     single, shares = 0, {}
     for run, r, m, stops in zip(recording.runs, repeats, moving, still, strict=True):
@@ -77,13 +68,14 @@ def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[F
         if m.sum() >= 20:
             shares[recording.name_of(run)] = float(alone.sum() / m.sum())
     usual = single / steps
-    allowed = max(needed, int(np.ceil(np.log(_RARE) / np.log(usual))) if 0.0 < usual < 1.0 else 0)
+    rare = np.log(THRESHOLDS.value("repeats_by_chance"))
+    allowed = max(needed, int(np.ceil(rare / np.log(usual))) if 0.0 < usual < 1.0 else 0)
     frozen = {
         run.id: [(a, b) for a, b in stops if b - a >= allowed and _visible(recording, run, channels, a, b)]
         for run, stops in zip(recording.runs, still, strict=True)
     }
     findings = _frozen(recording, name, channels, frozen)
-    if usual > _REPEATED and name == "x, y":
+    if usual > THRESHOLDS.value("repeated_share") and name == "x, y":
         worst = max(shares, key=lambda k: shares[k]) if shares else ""
         text = (
             f"{usual:.1%} of the samples of {name} repeat the one before while the ship moves"
@@ -97,6 +89,11 @@ def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[F
     return findings
 
 
+def _needed(recording: Recording, seconds: float) -> int:
+    """Least number of repeats of a standstill of so many seconds at 130 m."""
+    return max(THRESHOLDS.count("occurrences"), round(seconds * recording.froude / recording.dt))
+
+
 def _standstills(repeated: np.ndarray, moving: np.ndarray, needed: int) -> list[tuple[int, int]]:
     """Stretches of at least `needed` repeats, most of them while the ship moves."""
     return [(a, b) for a, b in stretches(repeated) if b - a >= needed and np.mean(moving[a:b]) > 0.7]
@@ -105,10 +102,11 @@ def _standstills(repeated: np.ndarray, moving: np.ndarray, needed: int) -> list[
 def _visible(recording: Recording, run: Run, channels: Sequence[int], a: int, b: int) -> bool:
     """Whether more happened from sample a to b than a record in such steps hides, as the other channels have it."""
     S, dt, step = run.states, recording.dt, float(np.max(recording.steps[list(channels)]))
+    hides, sure = THRESHOLDS.value("hidden_steps"), THRESHOLDS.value("hidden_noise")
     if X in channels:
-        return float(np.sum(np.hypot(S[a:b, U], S[a:b, V])) * dt) > _HIDES * step
+        return float(np.sum(np.hypot(S[a:b, U], S[a:b, V])) * dt) > hides * step
     if PSI in channels:
-        return float(np.ptp(np.cumsum(S[a:b, R]) * dt)) > _HIDES * step
+        return float(np.ptp(np.cumsum(S[a:b, R]) * dt)) > hides * step
     if not recording.rounded(channels[0]):
         return True
     way = np.diff(S[:, X] + 1j * S[:, Y]) * np.exp(-1j * S[:-1, PSI])
@@ -119,7 +117,7 @@ def _visible(recording: Recording, run: Run, channels: Sequence[int], a: int, b:
     beside = last - b + a - first
     usual = float(apart[last] - apart[b] + apart[a] - apart[first]) / max(beside, 1)  # of a current, of a bias
     ends = 1.0 + 2.0 * (b - a) / max(beside, 1)
-    hidden = _HIDES * step * (b - a) * dt + ends * (rounding + _SURE * spread(np.diff(apart, 2)) / np.sqrt(6.0))
+    hidden = hides * step * (b - a) * dt + ends * (rounding + sure * spread(np.diff(apart, 2)) / np.sqrt(6.0))
     return abs(float(apart[b] - apart[a]) - (b - a) * usual) > hidden
 
 
@@ -161,7 +159,7 @@ def _stuck(recording: Recording, channel: int) -> list[Finding]:
     """An actuator that stays at one value while its command is far from it, or while noise would move its record."""
     values = np.concatenate([run.states[:, channel] for run in recording.runs])
     reach = float(np.ptp(values))
-    needed = max(FEWEST, round(10.0 * recording.froude / recording.dt))
+    needed = _needed(recording, THRESHOLDS.value("stuck_time"))
     noisy = _noisy(recording, channel)
     stops: dict[str, list[tuple[int, int]]] = {}
     for run in recording.runs if reach > 0.0 else ():
@@ -174,7 +172,9 @@ def _noisy(recording: Recording, channel: int) -> bool:
     """Whether noise moves the record at every sample."""
     steps = [np.diff(run.states[:, channel]) for run in recording.runs]
     back = np.concatenate([s[1:] * s[:-1] < 0.0 for s in steps])
-    return bool(np.mean(np.concatenate(steps) == 0.0) < _RARELY and len(back) and np.mean(back) > _OFTEN)
+    repeats = np.mean(np.concatenate(steps) == 0.0)
+    rarely, often = THRESHOLDS.value("noisy_repeats"), THRESHOLDS.value("noisy_reversals")
+    return bool(repeats < rarely and len(back) and np.mean(back) > often)
 
 
 def _quantised(recording: Recording) -> list[Finding]:

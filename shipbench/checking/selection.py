@@ -1,4 +1,4 @@
-"""Which of several explanations the data ask for: forward selection of groups of columns by their likelihood and their clustered t."""
+"""Choice among explanations of the data: forward selection of groups of columns by likelihood and clustered t."""
 
 from __future__ import annotations
 
@@ -7,13 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .statistics import CHANCE, Fit, clustered_fit, clusters, inliers
-
-UNEXPLAINED = 0.7
-"""Share of the squares, in runs held out, above which an explanation explains nothing: planted faults leave 0.6 or less under ordinary noise,
-accidents 0.9 or more."""
-_MARGIN = 10.0
-"""Twice the log likelihood, less the penalty of the Bayesian criterion, that an explanation must gain."""
+from .statistics import Fit, clustered_fit, clusters, inliers
+from .thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -61,6 +56,13 @@ def select(
         odd = np.unique(cluster, return_inverse=True)[1] % 2 == 1
         return sum(float(np.sum((y[~a] - X[~a] @ np.linalg.lstsq(X[a], y[a], rcond=None)[0]) ** 2)) for a in (odd, ~odd))
 
+    least = THRESHOLDS.value("explanation_gain")
+
+    def significant(name: str, fitted: Fit) -> bool:
+        """Whether one or two columns differ from zero beyond chance; more columns are judged by their gain alone."""
+        width = groups[name].shape[1]
+        return width > 2 or bool(fitted.p[-width:].min() < THRESHOLDS.value("chance"))
+
     now = fit(())
     names: list[str] = []
     left = {"plain": share(now.squares)} | {name: share(fit((name,)).squares) for name in groups}
@@ -68,7 +70,7 @@ def select(
         barred = {other for s in exclusive if s & set(names) for other in s}
         tried = {name: fit((*names, name)) for name in groups if name not in names and name not in barred}
         gains = {name: _gain(now, f, groups[name].shape[1]) for name, f in tried.items()}
-        sure = {n: g for n, g in gains.items() if g > _MARGIN and (groups[n].shape[1] > 2 or tried[n].p[-groups[n].shape[1] :].min() < CHANCE)}
+        sure = {name: gain for name, gain in gains.items() if gain > least and significant(name, tried[name])}
         if not sure:
             break
         best = max(sure, key=lambda n: sure[n])

@@ -17,13 +17,7 @@ from ..signals import PSI, U, V, X, Y
 from .finding import Curve, Finding, Picture, labelled
 from .recording import Recording
 from .statistics import stretches
-
-_NOISES, _LEAST = 6.0, 0.002
-"""Standard deviations of a channel's noise, and Froude number, up to which it says nothing."""
-_DEPARTURE, _UNEXPLAINED = 0.03, 0.7
-"""Lengths by which the track departs at least, more than positions wander, and the share of it that the log must leave."""
-_FEWEST, _SHORTEST, _LONGEST = 3, 20.0, 120.0
-"""Pieces that show it, and seconds of each at 130 m: in a longer one a current may change."""
+from .thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -40,30 +34,33 @@ class Silence:
 
 
 def silence(dataset: Dataset) -> Silence | None:
-    """Where u and v are recorded as nothing though the ship makes way; None where they are not."""
+    """Speed-log dropout: u and v read nothing though the ship makes way; None where there is none."""
     L, dt = dataset.ship.L, dataset.dt
-    shortest, longest = (max(round(seconds * (L / 130.0) ** 0.5 / dt), 5) for seconds in (_SHORTEST, _LONGEST))
+    limits = THRESHOLDS.value("silent_shortest"), THRESHOLDS.value("silent_longest")
+    shortest, longest = (max(round(seconds * (L / 130.0) ** 0.5 / dt), 5) for seconds in limits)
     runs = [run for run in dataset.runs if len(run) >= shortest]
     if not runs:
         return None
     noise = {c: float(np.median([white_noise(run.states[:, c]) for run in runs])) for c in (X, Y, U, V)}
-    u, v = (max(_NOISES * noise[c], _LEAST * (9.81 * L) ** 0.5) for c in (U, V))
+    noises, speed = THRESHOLDS.value("silent_noise"), THRESHOLDS.value("silent_speed") * (9.81 * L) ** 0.5
+    u, v = (max(noises * noise[c], speed) for c in (U, V))
+    least = max(THRESHOLDS.value("silent_departure") * L, noises * noise[X], noises * noise[Y])
     found, samples = [], 0
     for run in runs:
         for begin, end in stretches((np.abs(run.states[:, U]) < u) & (np.abs(run.states[:, V]) < v)):
             for a in range(begin, end, longest):
                 S = run.states[a : min(a + longest, end)]
                 departure, left = _departures(S, dt) if len(S) >= shortest else (0.0, 0.0)
-                if departure > max(_DEPARTURE * L, _NOISES * noise[X], _NOISES * noise[Y]) and left > _UNEXPLAINED * departure:
+                if departure > least and left > THRESHOLDS.value("silent_unexplained") * departure:
                     found.append((departure, len(S) * dt, run))
                     samples += len(S)
-    if len(found) < _FEWEST:
+    if len(found) < THRESHOLDS.count("silent_pieces"):
         return None
     return Silence(float(np.hypot(u, v)), len(found), samples / sum(map(len, dataset.runs)), *max(found, key=lambda shown: shown[0]))
 
 
 def in_words(found: Silence) -> str:
-    """What is wrong, with its figures."""
+    """Sentence on the dropout, with its figures."""
     return (
         f"u and v read nothing (below {found.level:.2g} m/s) in {found.pieces} pieces, {found.share:.0%} of the samples, but the ship makes way "
         f"there: the track departs from a steady drift by up to {found.departure:.3g} m in {found.seconds:.3g} s."

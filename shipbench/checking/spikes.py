@@ -19,14 +19,9 @@ from .clock_steps import set_back as clock_set_back
 from .finding import Curve, Finding, Picture, labelled, toml_line
 from .recording import Recording
 from .statistics import some, spread, times
+from .thresholds import THRESHOLDS
 
-_FAR, _NEIGHBOURS = 8.0, 6.0
-_JUMP = 10.0
 _PLACES = ((X, Y), (PSI,))
-_LEAST = {X: 0.01, Y: 0.01, PSI: 0.01}
-"""Least spike or jump: of the length of the ship, and rad."""
-_LEAST_SHARE = 0.03
-"""Of the other channels: share of the range that the data set covers."""
 
 
 def _levels(recording: Recording, run: Run, actuators: bool = False) -> dict[int, np.ndarray]:
@@ -44,11 +39,12 @@ def _levels(recording: Recording, run: Run, actuators: bool = False) -> dict[int
 def _least(recording: Recording, channel: int, values: list[np.ndarray]) -> float:
     """Smallest spike: above one step of a record in steps, which may go to and fro between two of them."""
     if channel in (X, Y):
-        own = _LEAST[channel] * recording.dataset.ship.L
+        own = THRESHOLDS.value("outlier_position") * recording.dataset.ship.L
     elif channel == PSI:
-        own = _LEAST[PSI]
+        own = THRESHOLDS.value("outlier_heading")
     else:
-        own = _LEAST_SHARE * float(np.ptp(np.concatenate([np.quantile(v, [0.02, 0.98]) for v in values])))
+        reach = float(np.ptp(np.concatenate([np.quantile(v, [0.02, 0.98]) for v in values])))
+        own = THRESHOLDS.value("outlier_share") * reach
     return max(own, 1.5 * float(recording.steps[channel]))
 
 
@@ -67,11 +63,13 @@ def find_spikes(recording: Recording) -> dict[int, dict[str, np.ndarray]]:
         values = {name: each[channel] for name, each in levels.items() if channel in each}
         if not values:
             continue
-        limit = max(_FAR * spread(np.concatenate([_off(v) for v in values.values()])), _least(recording, channel, list(values.values())))
+        usual = spread(np.concatenate([_off(v) for v in values.values()]))
+        limit = max(THRESHOLDS.value("outlier_size") * usual, _least(recording, channel, list(values.values())))
         for name, v in values.items():
             d = np.abs(np.diff(v))
             near = np.maximum(np.maximum(d[:-3], d[3:]), np.abs(v[3:-1] - v[1:-3]))  # neighbours among themselves, without the sample
-            at = np.flatnonzero((np.abs(_off(v)) > limit) & (np.abs(_off(v)) > _NEIGHBOURS * near)) + 2
+            off = np.abs(_off(v))
+            at = np.flatnonzero((off > limit) & (off > THRESHOLDS.value("outlier_ratio") * near)) + 2
             at = at[~_held(states[name], channel)[at]]
             if len(at):
                 found.setdefault(channel, {})[name] = at
@@ -165,7 +163,7 @@ def _places(recording: Recording, channels: tuple[int, ...], levels: dict[str, n
     """Run id -> last samples before the jumps of position or heading."""
     steps = np.concatenate([np.diff(v) for v in levels.values()])
     noise = float(np.hypot(spread(steps.real), spread(steps.imag)))
-    limit = max(_JUMP * noise, 2.0 * _least(recording, channels[0], []))
+    limit = max(THRESHOLDS.value("jump_size") * noise, 2.0 * _least(recording, channels[0], []))
     made = {"u", "v"} if X in channels else {"r"}
     found = {}
     for run in recording.runs:

@@ -13,39 +13,32 @@ from ..records import Dataset
 from ..signals import DELTA, F_B, F_S, N, R, U
 from .finding import Finding
 from .recording import Recording
-from .statistics import FEWEST, stretches
+from .statistics import stretches
+from .thresholds import THRESHOLDS
 
-_STILL, _MIDSHIPS = np.deg2rad(0.5), np.deg2rad(5.0)
-"""Range of a rudder that never moves, and the angle beyond which it may well be held to turn."""
-_WINDOW, _WAY = 30.0, 0.07
-"""Seconds at 130 m of the windows that are judged, and the Froude number of a ship that has way on."""
-_TURN = np.deg2rad(5.0)
-"""What a rudder turns a ship by in a window."""
-_STOPPING, _LOSS = 25.0, 0.3
-"""Lengths in which a ship without thrust loses a factor e of her speed at most (2 m / (rho S C_T) of full ships at C_T = 0.004 gives 14 to 19), and
-share of that loss below which she is driven."""
-_SHARE = 0.2
-"""Of the windows that show it."""
 _Shown = tuple[str, dict[str, float]]
 
 
 def standing(dataset: Dataset) -> dict[str, _Shown]:
-    """Of "n" and "delta" those that never move though the ship is driven or turns: what shows it, in words and figures."""
+    """Actuators ("n", "delta") that never move though the ship is driven or turns: name -> words and figures."""
     shown = {"n": _driven(dataset), "delta": _turned(dataset)}
     return {channel: found for channel, found in shown.items() if found is not None}
 
 
 def _turned(dataset: Dataset) -> _Shown | None:
     delta = np.concatenate([run.states[:, DELTA] for run in dataset.runs])
-    if np.ptp(delta) > _STILL:
+    if np.ptp(delta) > np.deg2rad(THRESHOLDS.value("still_rudder")):
         return None
     turns = np.array([np.sum(part[:-1, R]) * dataset.dt for part in _windows(dataset)])
-    hard, angle = turns[np.abs(turns) > _TURN], float(np.median(delta))
-    if len(hard) < max(FEWEST, _SHARE * len(turns)) or (abs(angle) > _MIDSHIPS and abs(np.sum(np.sign(hard))) == len(hard)):
+    least = THRESHOLDS.value("still_turn")
+    hard, angle = turns[np.abs(turns) > np.deg2rad(least)], float(np.median(delta))
+    held = abs(angle) > np.deg2rad(THRESHOLDS.value("still_midships")) and abs(np.sum(np.sign(hard))) == len(hard)
+    if held or len(hard) < _fewest(len(turns)):
         return None
     text = (
-        f"The rudder is recorded at {np.rad2deg(angle):.3g} degrees throughout, and the ship turns by more than {np.rad2deg(_TURN):.0f} degrees in "
-        f"{_seconds(dataset):.3g} s, {len(hard)} times in {len(turns)}, ahead and without thrusters."
+        f"The rudder is recorded at {np.rad2deg(angle):.3g} degrees throughout, and the ship turns by more than "
+        f"{least:.0f} degrees in {_seconds(dataset):.3g} s, {len(hard)} times in {len(turns)}, ahead and "
+        "without thrusters."
     )
     return text, {"turns": len(hard), "windows": len(turns)}
 
@@ -56,9 +49,10 @@ def _driven(dataset: Dataset) -> _Shown | None:
     ends = np.array([part[[0, -1], U] for part in _windows(dataset)]).reshape(-1, 2)
     seconds = _seconds(dataset)
     way = ends[:, 0] * seconds
-    lost, expected = ends[:, 0] - ends[:, 1], ends[:, 0] * way / (way + _STOPPING * dataset.ship.L)
-    driven = lost < _LOSS * expected
-    if np.sum(driven) < max(FEWEST, _SHARE * len(ends)):
+    stopping = THRESHOLDS.value("stopping_length") * dataset.ship.L
+    lost, expected = ends[:, 0] - ends[:, 1], ends[:, 0] * way / (way + stopping)
+    driven = lost < THRESHOLDS.value("driven_loss") * expected
+    if np.sum(driven) < _fewest(len(ends)):
         return None
     speed, loss, least = float(np.mean(ends[driven, 0])), float(np.mean(lost[driven])), float(np.mean(expected[driven]))
     text = (
@@ -68,14 +62,19 @@ def _driven(dataset: Dataset) -> _Shown | None:
     return text, {"lost": loss, "without_thrust": least, "driven": int(np.sum(driven)), "windows": len(ends)}
 
 
+def _fewest(windows: int) -> float:
+    """Least number of windows that show it."""
+    return max(THRESHOLDS.count("occurrences"), THRESHOLDS.value("still_share") * windows)
+
+
 def _seconds(dataset: Dataset) -> float:
-    return float(_WINDOW * (dataset.ship.L / 130.0) ** 0.5)
+    return float(THRESHOLDS.value("still_window") * (dataset.ship.L / 130.0) ** 0.5)
 
 
 def _windows(dataset: Dataset) -> Iterator[np.ndarray]:
     """States of windows in which the ship has way on ahead and the thrusters rest."""
     width = max(2, round(_seconds(dataset) / dataset.dt))
-    slowest = _WAY * (9.81 * dataset.ship.L) ** 0.5
+    slowest = THRESHOLDS.value("still_way") * (9.81 * dataset.ship.L) ** 0.5
     for S in (run.states for run in dataset.runs):
         for start, stop in stretches((S[:, U] > slowest) & (S[:, F_B] == 0.0) & (S[:, F_S] == 0.0)):
             for at in range(start, stop - width, width):

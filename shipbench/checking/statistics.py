@@ -7,13 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-CHANCE = 1e-4
-"""Probability of a finding by chance that is allowed per test; a data set is tested some dozens of times."""
-
-
-FEWEST = 5
-"""Times that something must be seen to be no accident: steps, turns, standstills."""
-
 
 @dataclass(frozen=True)
 class Fit:

@@ -1,6 +1,6 @@
 """Position against integrated speed: what explains their difference. The findings are in `track_findings`.
 
-Over windows of 30 s (at 130 m, Froude-scaled) the way made good is compared with the integral of surge and sway along the heading.
+Over windows of `track_window` the way made good is compared with the integral of surge and sway along the heading.
 Explanations are chosen one after another by how much of the difference each takes away.
 """
 
@@ -15,22 +15,13 @@ from ..signals import PSI, U, V, X, Y
 from .recording import Recording
 from .selection import Chosen, select
 from .statistics import clustered_fit, clusters
+from .thresholds import THRESHOLDS
 
-WINDOW = 30.0
-"""Seconds at 130 m."""
-LEAST_ARM = 0.02
-"""Share of the ship's length."""
-LEAST_SCALE, LEAST_SWAY_SCALE, LEAST_HEADING, LEAST_CURRENT, LEAST_LAG = 0.02, 0.15, np.deg2rad(1.0), 0.03, 0.8
-"""What matters at all: shares, rad, share of the speed, s at 130 m (and a quarter of a sample)."""
-_SURE, _SMALL = 6.0, 3.0
-"""Standard errors from which a drift is taken out unasked, and below which a lag may be none."""
-_NO_LAG = 0.7
-"""Seconds at 130 m, which the track must rule out by two standard errors where no lag is to be looked for by other means."""
 LAGS = {"lag of u, v": (U, V), "lag of position": (X, Y), "lag of heading": (PSI,)}
 _SCALES = frozenset({"scale of u and v", "scale of u", "scale of v"})
 _LATE = frozenset({"lag of u, v", "lag of position"})
 _OVER_GROUND = ("scale of u and v", "lag of position", "off midship")
-"""What velocities over ground, turned into the ship's axes by psi, can have: the track tells nothing of psi or of one axis alone."""
+"""Errors that velocities over ground can have. Once psi turned them, neither psi nor one axis shows in the track."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +60,9 @@ def shifted(recording: Recording, late: dict[int, float]) -> list[tuple[int, np.
 
 def windows(recording: Recording, late: dict[int, float]) -> Windows | None:
     """All windows of the data set, each half over the next, or None where there are fewer than 12."""
-    width = max(3, round(WINDOW * recording.froude / recording.dt))
+    width = max(3, round(THRESHOLDS.value("track_window") * recording.froude / recording.dt))
     pieces = [(i, S[a : a + width + 1]) for i, S in shifted(recording, late) for a in range(0, len(S) - width, width // 2)]
-    if len(pieces) < 12:
+    if len(pieces) < THRESHOLDS.count("windows"):
         return None
     S, dt = np.stack([p for _, p in pieces]), recording.dt
     e, z = np.exp(1j * S[..., PSI]), S[..., X] + 1j * S[..., Y]
@@ -116,7 +107,7 @@ class Explained:
 
 
 def explain(recording: Recording) -> Explained | None:
-    """What the track needs beside heading and speeds; None where the ship hardly moves or too little is recorded."""
+    """Explanations of the track beside heading and speeds; None where the ship hardly moves or records are short."""
     late: dict[int, float] = {}
     w = plain = windows(recording, late)
     if w is None or plain is None or np.sqrt(np.mean(np.abs(w.moved) ** 2)) < 0.02 * recording.dataset.ship.L:
@@ -158,13 +149,13 @@ def lags(recording: Recording) -> tuple[tuple[float, float], tuple[float, float]
 
 def keeps_time(recording: Recording) -> bool:
     """Whether the track shows that neither the velocities nor the position are late against the other."""
-    found = lags(recording)
-    return found is not None and all(may_be_none(f) and abs(f[0]) + 2.0 * f[1] < _NO_LAG * recording.froude for f in found)
+    found, least = lags(recording), THRESHOLDS.value("no_lag") * recording.froude
+    return found is not None and all(may_be_none(f) and abs(f[0]) + 2.0 * f[1] < least for f in found)
 
 
 def may_be_none(lag: tuple[float, float]) -> bool:
     """Whether a lag and its standard error are no lag."""
-    return abs(lag[0]) < _SMALL * lag[1]
+    return abs(lag[0]) < THRESHOLDS.value("lag_doubt") * lag[1]
 
 
 def through_water(recording: Recording) -> tuple[float, float] | None:
@@ -173,13 +164,14 @@ def through_water(recording: Recording) -> tuple[float, float] | None:
     if found is None or "through water" not in found.chosen.names:
         return None
     (north, east), sd = found.chosen.value["through water"], found.chosen.sd["through water"]
-    sure = max(LEAST_CURRENT * recording.speed, _SURE * float(np.hypot(*sd)))
+    doubt = THRESHOLDS.value("current_doubt") * float(np.hypot(*sd))
+    sure = max(THRESHOLDS.value("least_current") * recording.speed, doubt)
     return (float(north), float(east)) if np.hypot(north, east) > sure else None
 
 
 def least_lag(recording: Recording) -> float:
     """Seconds below which a lag of a channel is not told."""
-    return max(0.25 * recording.dt, LEAST_LAG * recording.froude)
+    return max(0.25 * recording.dt, THRESHOLDS.value("least_lag") * recording.froude)
 
 
 def possible_scale(factor: float) -> bool:

@@ -9,22 +9,9 @@ import numpy as np
 from ..data.units import LENGTHS
 from .finding import Curve, Finding, Picture, Severity, toml_line
 from .recording import Recording
-from .selection import UNEXPLAINED, Chosen
-from .track import (
-    LAGS,
-    LEAST_ARM,
-    LEAST_CURRENT,
-    LEAST_HEADING,
-    LEAST_SCALE,
-    LEAST_SWAY_SCALE,
-    Explained,
-    Windows,
-    explain,
-    explain_windows,
-    least_lag,
-    possible_scale,
-    windows,
-)  # fmt: skip
+from .selection import Chosen
+from .thresholds import THRESHOLDS
+from .track import LAGS, Explained, Windows, explain, explain_windows, least_lag, possible_scale, windows
 
 
 def check(recording: Recording) -> list[Finding]:
@@ -32,7 +19,8 @@ def check(recording: Recording) -> list[Finding]:
     x = None if {"u", "v"} & set(recording.dataset.derived) else explain(recording)
     if x is None:
         return []
-    others = [name for name in x.chosen.names if name not in LAGS and x.chosen.held[name] < UNEXPLAINED]
+    most = THRESHOLDS.value("unexplained")
+    others = [name for name in x.chosen.names if name not in LAGS and x.chosen.held[name] < most]
     return _lag_findings(recording, x) + [f for name in others for f in _finding(recording, x.mended, x.chosen, name)]
 
 
@@ -43,7 +31,9 @@ def _possible_lag(recording: Recording, x: Explained, name: str) -> bool:
         return False
     without = windows(recording, {c: seconds for c, seconds in x.late.items() if c not in LAGS[name]})
     kept = [n for n in x.chosen.names if n not in LAGS]
-    return without is not None and x.chosen.out < UNEXPLAINED * explain_windows(without, recording.turned, kept).out
+    if without is None:
+        return False
+    return x.chosen.out < THRESHOLDS.value("unexplained") * explain_windows(without, recording.turned, kept).out
 
 
 def _lag_findings(recording: Recording, x: Explained) -> list[Finding]:
@@ -90,7 +80,7 @@ def _finding(recording: Recording, w: Windows, chosen: Chosen, name: str) -> lis
         return _through_water(recording, w, chosen, shares, evidence)
     if name == "off midship":
         ahead, abeam = map(float, value)
-        if np.hypot(ahead, abeam) < LEAST_ARM * recording.dataset.ship.L:
+        if np.hypot(ahead, abeam) < THRESHOLDS.value("least_antenna") * recording.dataset.ship.L:
             return []
         text = (
             f"x, y are of a point {ahead:+.3g} m ahead (standard error {sd[0]:.2g}), {abeam:+.3g} m to starboard ({sd[1]:.2g}) of where u, v are: "
@@ -103,7 +93,7 @@ def _finding(recording: Recording, w: Windows, chosen: Chosen, name: str) -> lis
         )]  # fmt: skip
     if name == "heading reference":
         angle = float(value[0])
-        if abs(angle) < LEAST_HEADING:
+        if abs(angle) < np.deg2rad(THRESHOLDS.value("least_heading")):
             return []
         text = (
             f"the heading reads {np.rad2deg(-angle):+.2f} deg (standard error {np.rad2deg(sd[0]):.2f}) off the track with drift taken off: {shares}."
@@ -121,7 +111,8 @@ def _finding(recording: Recording, w: Windows, chosen: Chosen, name: str) -> lis
         line = toml_line({"signs": {"v": positive}})
         figures = {"factor": factor, "sd": sd[0], **evidence}
         return [Finding("track", "error", "sign", text, line, channels=channels, evidence=figures, picture=_sway_picture(w))]
-    if abs(factor - 1.0) < (LEAST_SWAY_SCALE if name == "scale of v" else LEAST_SCALE):
+    least = THRESHOLDS.value("least_sway_scale") if name == "scale of v" else THRESHOLDS.value("least_scale")
+    if abs(factor - 1.0) < least:
         return []
     gross = next((unit for unit, size in LENGTHS.items() if unit != "m" and abs(factor / size - 1.0) < 0.03), None)
     if not (gross or possible_scale(factor)):
@@ -144,7 +135,7 @@ def _finding(recording: Recording, w: Windows, chosen: Chosen, name: str) -> lis
 def _through_water(recording: Recording, w: Windows, chosen: Chosen, shares: str, evidence: dict[str, Any]) -> list[Finding]:
     north, east = chosen.value["through water"]
     speed = float(np.hypot(north, east))
-    if speed < LEAST_CURRENT * recording.speed:
+    if speed < THRESHOLDS.value("least_current") * recording.speed:
         return []
     towards = float(np.rad2deg(np.arctan2(east, north)) % 360.0)
     left, own = w.moved - w.surge - w.sway, {}

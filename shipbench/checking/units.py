@@ -1,4 +1,4 @@
-"""Gross errors of unit and sign, found before any model is fitted: what the channels say of one another by kinematics.
+"""Gross errors of unit and sign, found before any model is fitted, by kinematics between the channels.
 
 Increments over windows of some seconds are compared with integrals, never with differences of neighbours. Track against heading and
 speeds, heading against yaw rate: every combination of units and signs is tried with the ordinary faults of sensors left free (a scale of 15 %, a
@@ -18,26 +18,9 @@ import numpy as np
 from ..effects.unit_or_sign_error import FACTORS
 from ..records import Dataset, Run
 from ..signals import COMMANDS, DELTA, F_B, F_S, PSI, STATES, N, R, U, V, X, Y
-from .placeholders import RUDDER_MOST
 from .rudder_side import Side, rudder_side
-from .statistics import FEWEST
+from .thresholds import THRESHOLDS
 
-BETTER = 4.0
-"""How much larger the plain reading's sum of squares must be than that of the reading believed."""
-_SWAY_BETTER, _LOG_ODDS = 1.3, 60.0
-"""The same for a reading that changes the sway alone, which is a small part of the way; and least twice the log likelihood ratio of it."""
-_ALIKE = 1.1
-_WINDOW = 15.0
-"""Seconds at 130 m, Froude-scaled."""
-_LAGS = (0.0, 2.0, 5.0, 10.0)
-"""Seconds by which an actuator may follow its command."""
-_LEAST_PUSH = 0.05
-"""Of the greatest force, which a thruster that is used reaches."""
-_MOST_WINDOWS, _FEWEST_WINDOWS = 1500, 12
-POOR = 0.15
-_KEEPING, _KEPT, _MORE_KEPT = 30.0, 0.99, 3
-"""Seconds (Froude-scaled, 130 m) over which a ship keeps her speed, share of it that she keeps, and number of such stretches, at least, for each
-with the revolutions. (A ship that stops by her engine does not keep it, unless a current carries her.)"""
 _SWAPPED = "exchanged with y"
 _REVERSED = "x and y reversed"
 
@@ -135,8 +118,6 @@ def _signed(channel: str) -> list[float]:
 _FRAMES = {
     "plain": np.eye(2), "y reversed": np.diag([1.0, -1.0]), "x reversed": np.diag([-1.0, 1.0]), _SWAPPED: np.array([[0.0, 1.0], [1.0, 0.0]]),
 }  # fmt: skip
-_LIMITS = np.array([0.15, 0.1, 0.7, 0.7, 6.0, 6.0, 1.0, 1.0])
-"""Of scale [1], compass error [rad], antenna [L], delay in the earth's axes and in the ship's [s at 130 m], and drift [m/s at 130 m]."""
 
 
 @dataclass(frozen=True)
@@ -158,20 +139,22 @@ class _Motion:
 
     def _tracks(self, plain: _Reading) -> list[_Reading]:
         """Readings of the track that suit."""
-        sane = {k: s for k, s in self.track.items() if k.v in (1.0, k.u) or _SWAY_BETTER * s < self.track[replace(k, v=np.inf)]}
+        gain, poor = THRESHOLDS.value("sway_gain"), THRESHOLDS.value("reading_misfit")
+        sane = {k: s for k, s in self.track.items() if k.v in (1.0, k.u) or gain * s < self.track[replace(k, v=np.inf)]}
         best, as_read = min(sane.values()), self.track[plain]
-        if as_read > BETTER * best and best < POOR:
-            return [k for k, s in sane.items() if s <= _ALIKE * best]
+        if as_read > THRESHOLDS.value("reading_gain") * best and best < poor:
+            return [k for k, s in sane.items() if s <= THRESHOLDS.value("similar_readings") * best]
         sway = min((k for k in sane if k == replace(plain, v=k.v)), key=lambda k: sane[k])
         better = as_read / sane[sway]
-        return [sway] if better > _SWAY_BETTER and 2.0 * self.windows * np.log(better) > _LOG_ODDS and sane[sway] < POOR else [plain]
+        sure = better > gain and 2.0 * self.windows * np.log(better) > THRESHOLDS.value("sway_evidence")
+        return [sway] if sure and sane[sway] < poor else [plain]
 
     def _headings(self) -> list[float]:
         """Readings of psi that suit, without a track."""
-        best = min(self.yaw.values(), default=np.inf)
-        if best > POOR or self.yaw[1.0, 1.0] <= BETTER * best:
+        best, gain = min(self.yaw.values(), default=np.inf), THRESHOLDS.value("reading_gain")
+        if best > THRESHOLDS.value("reading_misfit") or self.yaw[1.0, 1.0] <= gain * best:
             return [1.0]
-        return sorted({psi for (psi, _), s in self.yaw.items() if s <= BETTER * best})
+        return sorted({psi for (psi, _), s in self.yaw.items() if s <= gain * best})
 
     def _rates(self, psi: float) -> list[float]:
         """Readings of r that suit a reading of psi."""
@@ -179,12 +162,12 @@ class _Motion:
             return [1.0]
         here = {r: s for (p, r), s in self.yaw.items() if p == psi}
         best = min(here.values())
-        if here[1.0] <= BETTER * best or best > POOR:
+        if here[1.0] <= THRESHOLDS.value("reading_gain") * best or best > THRESHOLDS.value("reading_misfit"):
             return [1.0]
-        return [r for r, s in here.items() if s <= _ALIKE * best]
+        return [r for r, s in here.items() if s <= THRESHOLDS.value("similar_readings") * best]
 
     def findings(self, chosen: _Reading) -> list[UnitFinding]:
-        """What is wrong under the reading chosen."""
+        """Findings under the reading chosen."""
         found = []
         text = "Yaw rate and heading agree only if it is read so."
         if self.track:
@@ -209,12 +192,12 @@ def _motion(dataset: Dataset, runs: Sequence[Run]) -> _Motion:
     """Compare track, heading, speeds and yaw rate under all readings."""
     L, dt = dataset.ship.L, dataset.dt
     froude = (L / 130.0) ** 0.5
-    width = max(3, round(_WINDOW * froude / dt))
+    width = max(3, round(THRESHOLDS.value("unit_window") * froude / dt))
     pieces = [run.states[a : a + width + 1] for run in runs for a in range(0, len(run) - width, width)]
-    if len(pieces) < _FEWEST_WINDOWS:
+    if len(pieces) < THRESHOLDS.count("windows"):
         return _Motion({}, {}, width * dt, len(pieces))
-    S = np.stack(pieces[:: max(1, -(-len(pieces) // _MOST_WINDOWS))])
-    limits = _LIMITS * np.array([1.0, 1.0, L, L, froude, froude, froude, froude])
+    S = np.stack(pieces[:: max(1, -(-len(pieces) // THRESHOLDS.count("unit_windows")))])
+    limits = _limits(L, froude)
     moved, turned = S[:, -1, [X, Y]] - S[:, 0, [X, Y]], S[:, -1, PSI] - S[:, 0, PSI]
     track: dict[_Reading, float] = {}
     whole = float(np.sum(moved**2))
@@ -229,22 +212,31 @@ def _motion(dataset: Dataset, runs: Sequence[Run]) -> _Motion:
     for k in [k for k in track if k.frame == "plain"]:  # the same way is made with both speeds reversed
         track[replace(k, frame=_REVERSED, u=-k.u, v=k.v if np.isinf(k.v) else -k.v)] = track[k]
     yaw: dict[tuple[float, float], float] = {}
+    yaw_limits = np.array([limits[0], 0.1 / froude, limits[4]])
     rate, jump = np.trapezoid(S[:, :, R], dx=dt, axis=1), S[:, -1, R] - S[:, 0, R]
     for psi, r in itertools.product(headings, _signed("r")) if np.sum(turned**2) > len(S) * 0.01**2 else ():
         columns = np.stack([rate / r, np.full(len(S), width * dt), jump / r], axis=-1)
-        left = _bounded_squares((turned / psi - rate / r)[None], columns[None], np.array([0.15, 0.1 / froude, limits[4]]))[0]
+        left = _bounded_squares((turned / psi - rate / r)[None], columns[None], yaw_limits)[0]
         yaw[psi, r] = (float(left) + len(S) * 0.003**2) / float(np.sum((turned / psi) ** 2))
     return _Motion(track, yaw, width * dt, len(S))
 
 
+def _limits(L: float, froude: float) -> np.ndarray:
+    """Bounds (8,) of scale [1], heading [rad], antenna [m], delays in earth and ship axes [s], drift [m/s]."""
+    antenna, delay = THRESHOLDS.value("fault_antenna") * L, THRESHOLDS.value("fault_delay") * froude
+    drift = THRESHOLDS.value("fault_drift") * froude
+    scale, heading = THRESHOLDS.value("fault_scale"), THRESHOLDS.value("fault_heading")
+    return np.array([scale, heading, antenna, antenna, delay, delay, drift, drift])
+
+
 def _track_parts(S: np.ndarray, psi: float, dt: float) -> dict[str, np.ndarray]:
-    """Of windows S (W, samples, 10) whose heading is read with the factor psi: surge and sway's part of the way, (W, 2) each, and what faults do."""
+    """Parts of the way by surge, sway, faults, (W, 2) each, in windows S (W, samples, 10); psi: heading's factor."""
     c, s = np.cos(S[..., PSI] / psi), np.sin(S[..., PSI] / psi)
     ahead, abeam = np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)
     surge, sway = S[..., U, None] * ahead, S[..., V, None] * abeam
 
     def gained(speed: np.ndarray, axis: np.ndarray) -> np.ndarray:
-        """What a speed changes by along an axis that turns with the ship."""
+        """Change of a speed along an axis that turns with the ship."""
         return np.sum(np.diff(speed, axis=1)[..., None] * 0.5 * (axis[:, 1:] + axis[:, :-1]), axis=1)
 
     return {
@@ -283,7 +275,7 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
     S, ship = np.concatenate([run.states for run in runs]), dataset.ship
     found = []
     rudder = float(np.quantile(np.abs(S[:, DELTA]), 0.99))
-    if RUDDER_MOST < rudder < 75.0:
+    if THRESHOLDS.value("largest_rudder_angle") < rudder < 75.0:
         found.append(_finding("delta", FACTORS["delta"]["degrees"], f"The rudder goes to {rudder:.3g}, which no rudder does in rad."))
     turning = S[np.abs(S[:, N]) > 0.7 * np.max(np.abs(S[:, N]))]
     diameter = ship.propeller.diameter if ship.propeller else 0.6 * ship.T
@@ -299,7 +291,8 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
     for channel in (F_B, F_S):
         push = float(np.max(np.abs(S[:, channel])))
         ordered = any(np.any(run.inputs[:, channel - N]) for run in runs)  # else it is the noise of a thruster at rest
-        if ordered and _LEAST_PUSH * greatest < push * 1e3 and push < 1.5e-3 * greatest:
+        used = THRESHOLDS.value("thruster_used") * greatest
+        if ordered and used < push * 1e3 and push < 1.5e-3 * greatest:
             text = f"The greatest force recorded is {push:.3g}, that of the ship file {greatest:.4g} N."
             found.append(_finding(STATES[channel], FACTORS["F_b"]["kN"], text))
     return found
@@ -315,15 +308,16 @@ def _lagged(runs: Sequence[Run], i: int, lag: int) -> tuple[float, np.ndarray, n
 
 def _shaft_sign(runs: Sequence[Run], dt: float, froude: float, ahead: float) -> list[UnitFinding]:
     """Revolutions of the other sign: the ship keeps her speed against what is recorded, and hardly ever with it. ahead: sign of the recorded u."""
-    width = max(1, round(_KEEPING * froude / dt))
+    width = max(1, round(THRESHOLDS.value("keeping_time") * froude / dt))
     pieces = [run.states[a : a + width + 1] for run in runs for a in range(0, len(run) - width, width)]
     if not pieces:
         return []
     n, u = (np.stack(pieces)[..., channel] for channel in (N, U))
-    keeps = (np.abs(u[:, -1]) > _KEPT * np.abs(u[:, 0])) & (np.abs(u[:, 0]) > 0.2 * np.max(np.abs(u))) & (u[:, -1] * u[:, 0] > 0.0)
+    keeps = np.abs(u[:, -1]) > THRESHOLDS.value("keeping_share") * np.abs(u[:, 0])
+    keeps &= (np.abs(u[:, 0]) > 0.2 * np.max(np.abs(u))) & (u[:, -1] * u[:, 0] > 0.0)
     along = np.sign(u[:, :1] * n * ahead)[keeps & np.all(np.abs(n) > 0.3 * np.max(np.abs(n)), axis=1)]
     with_it, against = (int(np.sum(np.all(along == side, axis=1))) for side in (1.0, -1.0))
-    if against < FEWEST or against < _MORE_KEPT * with_it:
+    if against < THRESHOLDS.count("occurrences") or against < THRESHOLDS.count("keeping_ratio") * with_it:
         return []
     text = f"In {against} stretches of {width * dt:.3g} s the ship keeps her speed against her revolutions as recorded, in {with_it} with them."
     return [_finding("n", -1.0, text)]
@@ -332,10 +326,10 @@ def _shaft_sign(runs: Sequence[Run], dt: float, froude: float, ahead: float) -> 
 def check_commands(runs: Sequence[Run], dt: float, findings: Sequence[UnitFinding]) -> list[UnitFinding]:
     """Commands that share their actuator's error, or have one of their own."""
     own = {f.channel: f.factor for f in merged(findings)}
-    found = []
+    found, lags = [], (0.0, 2.0, 5.0, 10.0)  # s by which an actuator may follow its command
     for i, command in enumerate(COMMANDS):
         actuator = command.removesuffix("_c")
-        like, wanted, is_ = max((_lagged(runs, i, round(lag / dt)) for lag in _LAGS), key=lambda found: abs(found[0]))
+        like, wanted, is_ = max((_lagged(runs, i, round(lag / dt)) for lag in lags), key=lambda found: abs(found[0]))
         if abs(like) < 0.7:
             continue
         ratio = float(wanted @ is_) / float(is_ @ is_) * own.get(actuator, 1.0)

@@ -14,17 +14,15 @@ from ..physics.wind import apparent_wind
 from ..signals import DELTA, F_B, F_S, PSI, N, R, U, V
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
-from .statistics import CHANCE, Fit, clustered_fit, clusters
-
-_AHEAD, _EDGE = 10.0, 4.0
-"""Seconds at 130 m: over which surge and sway change, and over which each end is averaged against noise."""
+from .statistics import Fit, clustered_fit, clusters
+from .thresholds import THRESHOLDS
 
 
 def _rows(recording: Recording, turn: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """run (W,), change of (u, v) (W, 2), other columns of u's and of v's equation, wind's (along, across) (W, 2), with the direction turned."""
-    ahead = max(1, round(_AHEAD * recording.froude / recording.dt))
+    ahead = max(1, round(THRESHOLDS.value("wind_push_time") * recording.froude / recording.dt))
     speed, direction = (recording.dataset.inputs.index(name) for name in ("wind_speed", "wind_from"))
-    edge = max(1, round(_EDGE * recording.froude / recording.dt))
+    edge = max(1, round(THRESHOLDS.value("wind_push_mean") * recording.froude / recording.dt))
     owner, changes, surge, sway, wind = [], [], [], [], []
     for i, run in enumerate(recording.runs):
         S, W = run.states, run.inputs
@@ -68,12 +66,14 @@ def blows_to(recording: Recording) -> _Turned | None:
     """Evidence that wind_from is where the wind blows to; None if it is not, without wind channels or where the wind does too little."""
     if not {"wind_speed", "wind_from"} <= set(recording.dataset.inputs):
         return None
-    if len(_rows(recording, 0.0)[0]) < 60:
+    if len(_rows(recording, 0.0)[0]) < THRESHOLDS.count("wind_push_windows"):
         return None
     (as_from, wind, changes), (as_to, _, _) = _fits(recording, 0.0), _fits(recording, np.pi)
     t_from, t_to = (np.array([f.value[-1] / f.sd[-1] for f in fits]) for fits in (as_from, as_to))
     clear = int(np.argmax(np.abs(t_from)))
-    if t_to[clear] < 5.0 or as_to[clear].p[-1] > CHANCE or t_from[clear] > -3.0 or t_to[1 - clear] < -2.0:
+    unsure = t_to[clear] < THRESHOLDS.value("leeward_t") or as_to[clear].p[-1] > THRESHOLDS.value("chance")
+    suits = t_from[clear] > THRESHOLDS.value("windward_t") or t_to[1 - clear] < THRESHOLDS.value("leeward_t_other")
+    if unsure or suits:
         return None
     return _Turned(t_from, t_to, wind[:, 1], changes[:, 1])
 

@@ -1,8 +1,9 @@
 """Wind as an instrument on board shows it, in place of the true wind: the true wind does not change because the ship turns or speeds up.
 
-Every way to record a wind (off the bow or from north, with the ship's own motion in it or without, clockwise or not, where it comes from or blows to,
-m/s, knots, km/h) is turned back into a true wind. One is believed if it changes less than the wind as recorded, within 40 s (at 130 m, Froude-scaled)
-and from run to run, by what heading and motion of the ship would have put in, and beyond doubt. A ship on one steady course tells nothing.
+Every way to record a wind (off the bow or from north, with the ship's own motion in it or without, clockwise or not,
+where it comes from or blows to, m/s, knots, km/h) is turned back into a true wind. One is believed if it changes less
+than the wind as recorded, within `wind_window` and from run to run, by what heading and motion of the ship would have
+put in, and beyond doubt. A ship on one steady course tells nothing.
 """
 
 from __future__ import annotations
@@ -20,14 +21,9 @@ from ..signals import PSI, U, V
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
 from .statistics import clustered_fit, clusters
+from .thresholds import THRESHOLDS
 
 CHANNELS = ("wind_speed", "wind_from")
-_WINDOW = 40.0
-_ALIKE, _SURE, _AGAINST = 0.1, 3.0, -1.0
-"""Log of the ratio of squares within which readings are alike; joint t of what is believed (true winds read otherwise: negative, or up to 1.6 on
-63 sets of development ships); least t of changes and of departures each."""
-_FEWEST, _LEAST = 20, 0.05
-"""Windows, and root mean square change of the recorded wind [m/s]."""
 _WORDS = {
     "true": "the true wind from north", "true-bow": "the true wind off the bow", "apparent": "the wind felt on board, off the bow",
     "apparent-north": "the wind felt on board, from north",
@@ -93,7 +89,7 @@ def _readings(angle: str) -> list[WindReading]:
 
 @dataclass(frozen=True)
 class _Windows:
-    """Of windows (W,) that overlap by half: wind at their beginnings and ends (east as imaginary part, by any reading), heading there, and run."""
+    """Windows (W,) that overlap by half: wind at both ends (east as imaginary part), heading at the beginning, run."""
 
     begin: np.ndarray
     end: np.ndarray
@@ -111,8 +107,8 @@ class _Windows:
 
 
 def _ends(recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What is recorded at the beginnings and at the ends of all windows, (5, W) each, and the run of each, (W,)."""
-    ahead = max(1, round(_WINDOW * recording.froude / recording.dt))
+    """Records at the beginnings and at the ends of all windows, (5, W) each, and the run of each, (W,)."""
+    ahead = max(1, round(THRESHOLDS.value("wind_window") * recording.froude / recording.dt))
     begins, ends, owner = [], [], []
     for i, run in enumerate(recording.runs):
         at = np.arange(0, len(run) - ahead, max(1, ahead // 2))
@@ -135,7 +131,8 @@ def _evidence(plain: _Windows, reading: WindReading, read: _Windows) -> tuple[fl
     between = clustered_fit(gain, np.ones((len(gain), 1)), cluster)
     t = [float(f.value[0] / f.sd[0]) for f in (within, between)]
     ratios = [_squares(size * a) / max(_squares(b), 1e-12) for a, b in ((plain.changes, read.changes), (plain.departures, read.departures))]
-    return float(np.sum(np.log(ratios))), float(np.sum(t) / 2.0**0.5) if min(t) > _AGAINST else 0.0
+    joint = float(np.sum(t) / 2.0**0.5) if min(t) > THRESHOLDS.value("wind_t_each") else 0.0
+    return float(np.sum(np.log(ratios))), joint
 
 
 def _squares(change: np.ndarray) -> float:
@@ -143,7 +140,7 @@ def _squares(change: np.ndarray) -> float:
 
 
 def wind_reading(recording: Recording) -> tuple[WindReading, _Windows, _Windows] | None:
-    """How the wind channels are to be read, and their windows as recorded and so; None where that is as ours."""
+    """Reading of the wind channels, their windows as recorded and read so; None where they are true wind in SI."""
     if not set(CHANNELS) <= set(recording.dataset.inputs):
         return None
     first = [run.inputs[0, run.inputs_names.index("wind_from")] for run in recording.runs]  # later it may be continuous beyond a turn
@@ -155,28 +152,31 @@ def wind_reading(recording: Recording) -> tuple[WindReading, _Windows, _Windows]
         return _Windows(reading.wind(*begin), reading.wind(*end), begin[0], owner)
 
     plain = windows(ours)
-    if len(plain.changes) >= _FEWEST and _squares(plain.changes) > _LEAST**2:
+    enough = len(plain.changes) >= THRESHOLDS.count("wind_windows")
+    if enough and _squares(plain.changes) > THRESHOLDS.value("wind_change") ** 2:
         read = {reading: windows(reading) for reading in _readings(angle)}
         found = {reading: _evidence(plain, reading, w) for reading, w in read.items() if reading != ours}
         best = max(log for log, _ in found.values())
-        chosen = min((k for k, (log, _) in found.items() if log > best - _ALIKE), key=lambda k: (k.errors, -found[k][0]))
-        if found[chosen][1] > _SURE:
+        alike = best - THRESHOLDS.value("similar_winds")
+        chosen = min((k for k, (log, _) in found.items() if log > alike), key=lambda k: (k.errors, -found[k][0]))
+        if found[chosen][1] > THRESHOLDS.value("wind_t"):
             return chosen, plain, read[chosen]
     return None if angle == "rad" else (ours, plain, plain)
 
 
 def mend_wind(recording: Recording) -> tuple[Recording, list[Finding]]:
-    """The recording with the true wind in its channels, and what was there."""
+    """Recording with the true wind in its channels, and the finding."""
     found = wind_reading(recording)
     if found is None:
         return recording, []
     reading, plain, read = found
-    size = unit_factor("wind_speed", reading.speed)
+    size, window = unit_factor("wind_speed", reading.speed), THRESHOLDS.value("wind_window") * recording.froude
     text = f"wind_speed and wind_from are {said(reading)}"
     if reading.kind != "true":
         text += f": as the ship turns and speeds up, the wind as recorded changes by {size * _squares(plain.changes) ** 0.5:.3g} m/s over "
-        text += f"{_WINDOW * recording.froude:.3g} s, read so by {_squares(read.changes) ** 0.5:.3g} m/s, and departs from its mean over all runs "
-        text += f"by {size * _squares(plain.departures) ** 0.5:.3g} m/s, read so by {_squares(read.departures) ** 0.5:.3g} m/s"
+        text += f"{window:.3g} s, read so by {_squares(read.changes) ** 0.5:.3g} m/s, and departs from its mean over "
+        text += f"all runs by {size * _squares(plain.departures) ** 0.5:.3g} m/s, "
+        text += f"read so by {_squares(read.departures) ** 0.5:.3g} m/s"
     declared = _declared(recording, reading)
     todo = f"dataset.toml says {' and '.join(declared)}, which the data contradict: try without that first." if declared else ""
     curves = tuple(Curve(label, c.begin.imag, c.begin.real, ".") for label, c in (("as recorded", plain), ("as proposed", read)))
@@ -188,7 +188,7 @@ def mend_wind(recording: Recording) -> tuple[Recording, list[Finding]]:
 
 
 def _declared(recording: Recording, reading: WindReading) -> list[str]:
-    """What dataset.toml says already of what the reading changes."""
+    """Entries of dataset.toml that the reading contradicts, as TOML."""
     given = {"wind": recording.given.get("wind")}
     given |= {f"[{table}] {c}": recording.given.get(table, {}).get(c) for table in ("units", "signs") for c in CHANNELS}
     lines = reading.lines()
@@ -197,7 +197,7 @@ def _declared(recording: Recording, reading: WindReading) -> list[str]:
 
 
 def said(reading: WindReading) -> str:
-    """In words, with the units that are not ours."""
+    """Words for a reading, with the units that are not ours."""
     units = [u for u, ours in ((reading.angle, "rad"), (reading.speed, "m/s")) if u != ours]
     sense = {"counterclockwise": " counterclockwise", "to": ", where it blows to"}.get(reading.sign, "")
     return _WORDS[reading.kind] + sense + (f", in {' and '.join(units)}" if units else "")

@@ -1,6 +1,6 @@
 """Yaw rate against heading rate: bias (of all runs, or of single ones), scale, lag.
 
-Over windows of 30 s (at 130 m, Froude-scaled) the change of the heading is compared with the integral of the yaw rate.
+Over windows of `track_window` the change of the heading is compared with the integral of the yaw rate.
 """
 
 from __future__ import annotations
@@ -12,22 +12,18 @@ import numpy as np
 from ..signals import PSI, R
 from .finding import Curve, Finding, Picture, Severity, toml_line
 from .recording import Recording
-from .selection import UNEXPLAINED, Chosen, select
+from .selection import Chosen, select
 from .statistics import some, spread
-from .track import WINDOW, least_lag, possible_scale, shifted
-
-_LEAST_SCALE, _LEAST_BIAS = 0.02, 0.01
-"""Shares: of the rate, and of the typical yaw rate (root mean square)."""
-_BLOCKS, _SURE = 12, 5.0
-"""Blocks of a run whose scatter counts where it is greater than usual; deviations that make a bias of a single run."""
+from .thresholds import THRESHOLDS
+from .track import least_lag, possible_scale, shifted
 
 
 def _windows(recording: Recording, lag: float) -> tuple[np.ndarray, np.ndarray, float] | None:
     """(run (W,), columns (W, 3): heading's change, integral of r, change of r; span [s]), r put back by `lag` s. Windows overlap by half: whatever is
     chosen is judged by runs, which are independent."""
-    width = max(3, round(WINDOW * recording.froude / recording.dt))
+    width = max(3, round(THRESHOLDS.value("track_window") * recording.froude / recording.dt))
     pieces = [(i, S[a : a + width + 1]) for i, S in shifted(recording, {R: lag} if lag else {}) for a in range(0, len(S) - width, width // 2)]
-    if len(pieces) < 12:
+    if len(pieces) < THRESHOLDS.count("windows"):
         return None
     S = np.stack([p for _, p in pieces])
     integral = np.trapezoid(S[..., R], dx=recording.dt, axis=1)
@@ -81,7 +77,7 @@ def check(recording: Recording) -> list[Finding]:
     found = None if "r" in recording.dataset.derived else _settled(recording)
     if found is None:
         return []
-    if found.chosen.left["all chosen"] ** 2 > UNEXPLAINED:
+    if found.chosen.left["all chosen"] ** 2 > THRESHOLDS.value("unexplained"):
         return [_unrelated(found)]
     made, first, chosen, lag, lag_sd = found
     return _lag(recording, made, first, chosen, lag, lag_sd) + _scale(made, first, chosen) + _biases(recording, made, first, chosen)
@@ -119,7 +115,9 @@ def _shares(first: Chosen, chosen: Chosen) -> str:
 
 def _lag(recording: Recording, made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Chosen, lag: float, sd: float) -> list[Finding]:
     plain = _windows(recording, 0.0) or made
-    if not least_lag(recording) <= abs(lag) <= 0.5 * made[2] or chosen.out > UNEXPLAINED * _explain(*plain, lag=False).out:
+    if not least_lag(recording) <= abs(lag) <= 0.5 * made[2]:
+        return []
+    if chosen.out > THRESHOLDS.value("unexplained") * _explain(*plain, lag=False).out:
         return []
     late, other = ("r", "the heading") if lag > 0.0 else ("psi", "the yaw rate")  # sensors are late, not early
     text = f"{late} lags {other} by {abs(lag):.2g} s (standard error {sd:.1g} s): {_shares(first, chosen)}."
@@ -130,10 +128,10 @@ def _lag(recording: Recording, made: tuple[np.ndarray, np.ndarray, float], first
 
 
 def _scale(made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Chosen) -> list[Finding]:
-    if chosen.held.get("scale", 1.0) > UNEXPLAINED:
+    if chosen.held.get("scale", 1.0) > THRESHOLDS.value("unexplained"):
         return []
     factor, sd = 1.0 / (1.0 + float(chosen.value["scale"][0])), float(chosen.sd["scale"][0])
-    if abs(factor - 1.0) < _LEAST_SCALE or not possible_scale(factor):
+    if abs(factor - 1.0) < THRESHOLDS.value("least_scale") or not possible_scale(factor):
         return []
     text = f"r reads {factor:.3f} of the heading's rate (standard error {sd:.3f}): {_shares(first, chosen)}."
     line = toml_line({"scale": {"r": round(factor, 4)}})
@@ -148,7 +146,8 @@ def _biases(recording: Recording, made: tuple[np.ndarray, np.ndarray, float], fi
     left = rows[:, 0] - rows[:, 1] - known
     drifts = {int(i): -left[run == i] / span for i in np.unique(run) if np.sum(run == i) >= 3}
     shared = float(np.median([d.mean() for d in drifts.values()])) if drifts else np.inf
-    least = max(_LEAST_BIAS * recording.turning, 0.5 * float(recording.steps[R]))  # a record in steps is off by half of one for as long as it stands
+    half_step = 0.5 * float(recording.steps[R])  # a record in steps is off by half of one for as long as it stands
+    least = max(THRESHOLDS.value("least_yaw_bias") * recording.turning, half_step)
     if "bias" in chosen.names and abs(shared) > 0.5 * abs(float(chosen.value["bias"][0])):
         bias, sd = -float(chosen.value["bias"][0]), float(chosen.sd["bias"][0])
         if abs(bias) < least:
@@ -161,10 +160,11 @@ def _biases(recording: Recording, made: tuple[np.ndarray, np.ndarray, float], fi
     usual = spread(np.concatenate([d - d.mean() for d in drifts.values()])) if drifts else 0.0
     found: dict[str, float] = {}
     for i, mine in drifts.items():
-        blocks = np.array([part.mean() for part in np.array_split(mine, min(len(mine), _BLOCKS))])
+        parts = min(len(mine), THRESHOLDS.count("yaw_bias_blocks"))
+        blocks = np.array([part.mean() for part in np.array_split(mine, parts)])
         mean = float(np.mean(mine))
         sd = max(usual / np.sqrt(len(mine)), float(np.std(blocks, ddof=1)) / np.sqrt(len(blocks)) / 2.0)
-        if abs(mean) > _SURE * sd and abs(mean) > least:
+        if abs(mean) > THRESHOLDS.value("yaw_bias_doubt") * sd and abs(mean) > least:
             found[recording.name_of(recording.runs[i])] = mean
     if not found:
         return []
