@@ -85,6 +85,7 @@ def render(rows: Sequence[Row], about: dict[str, Any]) -> str:
         f"{', '.join(ships)} ({about['which']} ships). A cause is drawn (effect, size, sign, direction, ship) and hidden in data of the MMG",
         "simulator, which differs in structure from the model that is fitted; sets of the kind `none-same` are made by the fitted model itself,",
         "those with `published` by four ships of the literature in their authors' equations (Mariner, a tanker, S175 and a navy ship with heel).",
+        "Those four are development ships, too: thresholds were set with them in view (docs/calibration.md), so their figures are no test.",
         "Any set is drawn again from (seed, kind, index).", "",
         f"- Command: `{about['command']}` (seed {about['seed']}, {about['per_effect']} draws of each effect and size)",
         f"- Code: shipbench {code['shipbench']}, source {code['source']}" + (f", {code['git']}" if code["git"] else ""),
