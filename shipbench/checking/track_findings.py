@@ -166,7 +166,7 @@ def _picture(w: Windows, title: str, column: np.ndarray, label: str) -> Picture:
 
 
 def _sway_picture(w: Windows) -> Picture:
-    """Across the ship: what the position says beside surge, against sway."""
+    """Picture of the way across the ship: by position less surge, against sway."""
     turn = np.where(np.abs(w.sway) > 0.0, w.sway / np.maximum(np.abs(w.sway), 1e-300), 1.0)
     made = np.real((w.moved - w.surge) * np.conj(turn))
     top = float(np.max(np.abs(w.sway)))
