@@ -102,9 +102,12 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
                 ahead, work = None, partial(work, dataset=dataset, settled=no_cause)
         doubts = doubts_of(found) if only is None and rests else []
         share = used.part(folds)
-        worth = (
-            _cross_validated(dataset, found, seed, partial(work, budget=share), pool, ahead) if wanted and not doubts and not is_spent() else Worth()
-        )
+        if not wanted or is_spent():
+            worth = Worth()
+        elif doubts:
+            worth = Worth(told=("no gain is measured while the ship file is in doubt: correct it, or confirm it, and diagnose again.",))
+        else:
+            worth = _cross_validated(dataset, found, seed, partial(work, budget=share), pool, ahead)
     lines = warnings + used.said(nothing=not rests) + list(worth.told)
     lines += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + doubts
     lines += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
