@@ -57,7 +57,7 @@ class KillOne(Silent):
     def start(self, total: int) -> None:
         self.total, self.began = total, time.monotonic()
 
-    def done(self, label: str, outcome: str) -> None:
+    def done(self, label: str, outcome: str, kind: str = "", cost: float = 1.0) -> None:
         self.count += 1
         if self.count % 100 == 0:
             print(f"{self.count} of {self.total} cells after {time.monotonic() - self.began:.0f} s", flush=True)

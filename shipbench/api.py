@@ -8,6 +8,7 @@ import tempfile
 import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from .bench.submissions import Results, read_results
 from .checking.finding import SEVERITIES, Finding
 from .data.base import load_dataset
 from .diagnosis.result import Diagnosis
-from .errors import InputError
+from .errors import InputError, unknown_parameter
 from .names import brief
 from .records import Dataset
 from .scores import Scores
@@ -40,6 +41,7 @@ def benchmark(
     folds: int = 5,
     seeds: int | Sequence[int] = 0,
     out: Place | None = None,
+    resume: bool = False,
     executor: str = "local",
     workers: int | None = None,
     device: str | None = None,
@@ -58,6 +60,7 @@ def benchmark(
         folds: number of folds by run, from 2.
         seeds: seed or seeds of the models' random draws.
         out: folder for the results; None: they are kept until the scores are no longer used.
+        resume: keep what the same code, data and task scored in `out` before; models in memory are always fitted anew.
         executor: "local", "processes" or "dask"; only "local" takes models in memory.
         workers: number of processes of the executor "processes".
         device: where networks compute: "cpu", "cuda" or "cuda:1".
@@ -65,14 +68,18 @@ def benchmark(
         options: other keys of a `Task`, such as history_s=10, split="kind", stride_s=30, max_runs=20, metrics=["ed"].
 
     Raises:
-        InputError: a model, data set or option cannot be used; nothing has been fitted then.
+        InputError: a model, data set or option cannot be used, or `out` holds another study; nothing has been fitted then.
         WorkError: the study had to stop.
     """
     from .bench.executors import Execution
     from .bench.progress import make_progress
     from .bench.runner import Memory, run_tasks
-    from .bench.task import make_task
+    from .bench.task import Task, make_task
 
+    own = [name for name, known in signature(benchmark).parameters.items() if known.kind is not Parameter.VAR_KEYWORD]
+    keys = [key for key in Task.model_fields if key not in _SET_BY_ARGUMENTS]
+    if unknown := [name for name in options if name not in keys]:
+        raise unknown_parameter("benchmark", unknown[0], [*own, *keys])
     specs = _named(models)
     named = {d.name if isinstance(d, Dataset) else os.fspath(d): d for d in _several(data)}
     if len(named) < len(_several(data)):
@@ -84,8 +91,9 @@ def benchmark(
     folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="shipbench-"))
     try:
         outcome = run_tasks(
-            tasks, folder, execution=Execution(executor, workers, device=device), progress=make_progress(quiet), command=_COMMAND, memory=memory
-        )
+            tasks, folder, resume=resume, execution=Execution(executor, workers, device=device), progress=make_progress(quiet),
+            command=_COMMAND, memory=memory,
+        )  # fmt: skip
     except BaseException:
         if out is None:
             shutil.rmtree(folder, ignore_errors=True)
@@ -96,6 +104,8 @@ def benchmark(
     return scores
 
 
+_SET_BY_ARGUMENTS = ("dataset", "models", "horizon_s", "folds", "seeds")
+"""Keys of a task that `benchmark` takes under names of its own."""
 _COMMAND = "shipbench.benchmark(...) in Python"
 
 

@@ -6,7 +6,11 @@ Every message says what is wrong, the value received, what is accepted and what 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+_on_command_line: ContextVar[bool] = ContextVar("on_command_line", default=False)
 
 
 class ShipbenchError(Exception):
@@ -19,6 +23,21 @@ class InputError(ShipbenchError):
 
 class WorkError(ShipbenchError):
     """The work itself failed on valid input (exit code 1, or a `failed` row in a study)."""
+
+
+@contextmanager
+def command_line() -> Iterator[None]:
+    """Let the messages of the work inside name options of the command line."""
+    before = _on_command_line.set(True)
+    try:
+        yield
+    finally:
+        _on_command_line.reset(before)
+
+
+def option(command: str, python: str) -> str:
+    """Spelling of an option for whoever called: `command` such as "--out" on the command line, else `python` such as "out="."""
+    return command if _on_command_line.get() else python
 
 
 def unknown_parameter(owner: str, name: str, names: Iterable[str]) -> InputError:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .names import shown
+from .names import brief, shown
 from .signals import X, Y
 
 _WIDTH, _HEIGHT, _MARGIN = 300.0, 220.0, 8.0
@@ -20,6 +20,13 @@ def run_text(run: Any) -> str:
     """A run in one line."""
     kind = f", {run.kind}" if run.kind else ""
     return f"<Run '{run.id}': {len(run)} samples, t = {run.t[0]:g} to {run.t[-1]:g} s{kind}; inputs {', '.join(run.inputs_names)}>"
+
+
+class Runs(tuple[Any, ...]):
+    """Runs of a data set: a tuple that shows their names, not their samples."""
+
+    def __repr__(self) -> str:
+        return brief(f"<{len(self)} runs: {', '.join(str(getattr(run, 'id', run)) for run in self)}>")
 
 
 def dataset_text(data: Any) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 from .arrays import numbers
 from .errors import InputError, unknown_name
 from .names import brief, check_name, check_run
-from .notebook import dataset_html, dataset_text, run_text
+from .notebook import Runs, dataset_html, dataset_text, run_text
 from .ship import Ship
 from .signals import COMMANDS, STATES
 
@@ -192,7 +192,7 @@ class Dataset:
 
     def __post_init__(self) -> None:
         check_name(self.name, "name")
-        object.__setattr__(self, "runs", tuple(self.runs))
+        object.__setattr__(self, "runs", Runs(self.runs))
         if isinstance(self.dt, bool) or not isinstance(self.dt, Real) or not 0.0 < self.dt < np.inf:
             raise InputError(f"data set '{self.name}': dt = {self.dt!r}; accepted: a number of seconds above 0.")
         if not all(isinstance(run, Run) for run in self.runs):
@@ -267,6 +267,8 @@ class Dataset:
         if isinstance(key, slice):
             return self.with_runs(self.runs[key])
         if not isinstance(key, str):
+            if not -len(self) <= key < len(self):
+                raise IndexError(f"data set '{self.name}' has no run {key}; it has {len(self)} runs, 0 to {len(self) - 1}.")
             return self.runs[key]
         if found := [run for run in self.runs if run.id == key]:
             return found[0]

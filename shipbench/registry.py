@@ -19,6 +19,7 @@ from typing import Any
 
 from .errors import InputError, unknown_name
 from .extras import needed_by
+from .names import brief
 
 _PACKAGE = __name__.rsplit(".", 1)[0]
 _log = logging.getLogger(__name__)
@@ -94,6 +95,10 @@ class Registry:
     helpers: frozenset[str] = frozenset()
     group: str = ""
     lazy: bool = False
+
+    def __repr__(self) -> str:
+        """The names, of plug-ins too; nothing is imported for it."""
+        return brief(f"<Registry of {self.kind}s: {', '.join(sorted({*self._files(), *self.plugins()}))}>")
 
     def _files(self) -> dict[str, str]:
         root = Path(__file__).parent / self.folder

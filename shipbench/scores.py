@@ -59,7 +59,8 @@ class Scores:
         """A row for each model, best first: scored of expected predictions, and the mean of each metric with its 95 % interval (bootstrap over runs).
 
         Args:
-            metrics: columns of `results.rows`, such as "ed", "final_displacement" or "rmse_r"; those by default that the study has.
+            metrics: columns of `results.rows`, such as "ed", "final_displacement" or "rmse_r", or their labels, such as "ED"; those by default that
+                the study has.
 
         Returns:
             Columns dataset (of several), model, scored, then `ED`, `ED low`, `ED high` and so on; their units are in `attrs["units"]`.
@@ -72,7 +73,8 @@ class Scores:
         wanted = [metrics] if isinstance(metrics, str) else list(metrics)
         lines, units = [], dict[str, str]()
         for dataset, board in self._boards.items():
-            chosen = [name for name in wanted if name in board.columns or metrics is not TABLE_III]
+            by_label = {column["label"]: name for name, column in board.columns.items()}
+            chosen = [name for name in (by_label.get(name, name) for name in wanted) if name in board.columns or metrics is not TABLE_III]
             if unknown := [name for name in chosen if name not in board.columns]:
                 raise unknown_name("metric", unknown[0], board.columns)
             figures = {name: board.figures(name) for name in chosen}

@@ -63,8 +63,8 @@ def test_a_data_set_is_a_sequence_of_runs(harbour):
     assert np.array_equal(harbour[0].commands, harbour[0].inputs[:, :4])
     with pytest.raises(InputError, match=r"unknown run 'run77'\. Did you mean 'run7'"):
         harbour["run77"]
-    with pytest.raises(IndexError):
-        harbour[16]
+    with pytest.raises(IndexError, match="has no run 99; it has 16 runs, 0 to 15"):
+        harbour[99]
 
 
 def test_a_frame_gives_back_the_same_samples(harbour):
@@ -145,6 +145,7 @@ def test_models_in_memory_stand_in_the_table_beside_others(scores):
     assert table.loc["hold", "ED"] == pytest.approx(rows[rows["model"] == "hold"].groupby("fold")["ed"].mean().mean())
     assert scores.table().attrs["units"]["ED"] == "m"
     assert list(scores.table("rmse_r").columns) == ["model", "scored", "RMSE r", "RMSE r low", "RMSE r high"]
+    assert scores.table(["ED"]).equals(scores.table(["ed"]))
     with pytest.raises(InputError, match="unknown metric 'eed'"):
         scores.table(["eed"])
 
@@ -190,6 +191,41 @@ def test_cells_of_a_model_in_memory_are_never_taken_for_finished(harbour, tmp_pa
     assert {summary["key"] for summary in found.results.summaries} == {""}
 
 
+def test_a_second_call_goes_on_where_resume_says_so(harbour, tmp_path):
+    sb.benchmark("hold", harbour, out=tmp_path, **OPTIONS)
+    began = {path: path.stat().st_mtime_ns for path in tmp_path.glob("cells/*/*/*/rows.parquet")}
+    with pytest.raises(InputError, match=r"holds the results of another study.*resume=True"):
+        sb.benchmark(["hold", Drift], harbour, out=tmp_path, **OPTIONS)
+    both = sb.benchmark(["hold", Drift], harbour, out=tmp_path, resume=True, **OPTIONS)
+    assert set(both.table()["model"]) == {"hold", "Drift"}
+    assert {path: path.stat().st_mtime_ns for path in began} == began
+
+
+def test_a_task_that_is_not_accepted_is_told_in_one_line():
+    with pytest.raises(InputError, match=r'^Task: no model is given; name at least one \(models=\["physics"\]\)'):
+        sb.Task(dataset="demo")
+    with pytest.raises(InputError, match=r"^Task: folds: "):
+        sb.Task(dataset="demo", models=["hold"], folds=1)
+    assert sb.Task(dataset="demo", models=["hold"]).horizon_s == 120.0
+
+
+def test_runs_and_registries_show_their_names_in_brief(harbour):
+    assert isinstance(harbour.runs, tuple)
+    assert repr(harbour.runs).startswith("<16 runs: run0, run1,")
+    many = harbour.with_runs(replace(harbour[0], id=f"run{k:04d}") for k in range(200))
+    assert len(repr(many.runs)) <= 1000
+    assert "hold, lstm, mlp" in repr(sb.PREDICTORS)
+    assert "demo, esso_osaka" in repr(sb.DATASETS)
+    assert "cvdm, ed" in repr(sb.METRICS)
+
+
+def test_a_predictor_says_whether_it_is_fitted(harbour):
+    model = sb.make_predictor("mlp[hidden=8]")
+    assert repr(model).startswith("<MLP(hidden=8, ")
+    assert repr(model).endswith("not fitted>")
+    assert repr(sb.make_predictor("hold").fit(harbour)) == "<Hold(), fitted>"
+
+
 def test_a_data_set_by_folder_and_several_at_once(harbour, tmp_path):
     from shipbench.data.files import write_dataset
 
@@ -215,7 +251,10 @@ class NeedsSize(Drift):
         ("hodl", {}, "Did you mean 'hold'"),
         ({"mine": "hold"}, {}, "'mine' names a spec, which is its own name"),
         ([], {}, "no model is given"),
-        ("hold", {"hurry": True}, "unknown key 'hurry'"),
+        ("hold", {"hurry": True}, "benchmark has no parameter 'hurry'. Accepted: data, device"),
+        ("hold", {"horizon_s": 30}, "no parameter 'horizon_s'. Did you mean 'horizon'"),
+        ("hold", {"horizn": 30}, "no parameter 'horizn'. Did you mean 'horizon'"),
+        ("hold", {"dataset": "demo"}, "no parameter 'dataset'"),
         ("hold", {"horizon": 400}, "Shorten the horizon"),
     ],
 )
@@ -309,12 +348,16 @@ def test_a_log_becomes_a_data_set(harbour, tmp_path):
     assert "mapping.toml" not in " ".join(draft.remarks)  # nothing was written
     written = sb.propose_mapping([log], tmp_path / "draft.toml")
     assert (tmp_path / "draft.toml").read_text() == written.text == draft.text
+    with pytest.raises(InputError, match="another name with out=FILE, or force=True to replace it"):
+        sb.propose_mapping(log, tmp_path / "draft.toml")
     (tmp_path / "mapping.toml").write_text(MAPPING)
     summary = sb.import_log(log, tmp_path / "mapping.toml", tmp_path / "ship.toml", tmp_path / "trial", name="mine")
     assert "1 run" in repr(summary)
     data = sb.load_dataset(tmp_path / "trial")
     assert data.name == "mine"
     assert data[0].states[:, 0] == pytest.approx(harbour["run0"].states[:, 0], abs=1e-5)
+    with pytest.raises(InputError, match="another folder with out=FOLDER, or force=True to replace that data set"):
+        sb.import_log(log, tmp_path / "mapping.toml", tmp_path / "ship.toml", tmp_path / "trial")
 
 
 @pytest.fixture(scope="module")

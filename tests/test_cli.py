@@ -99,6 +99,25 @@ def test_quiet_keeps_the_result_and_what_was_written(cli, toy_folder):
     assert "Leaderboard: runs/toyset/toyset.md" in result.stdout
 
 
+def test_only_the_equations_of_this_study_are_counted(cli, toy_folder):
+    arguments = ("-d", toy_folder(), *QUICK, "--out", "r")
+    cli("run", "-m", "physics", "-m", "physics+current", *arguments)
+    assert "Fitted equations of 1 model, for example:\n  r/cells/toyset/physics/fold0" in cli("run", "-m", "physics", *arguments, "--resume").stdout
+    assert "Fitted equations" not in cli("run", "-m", "hold", *arguments, "--resume").stdout
+
+
+def test_half_of_a_model_file_is_answered_with_the_whole(cli, toy_folder, tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "raise RuntimeError('imported')\nclass Helper: pass\nclass Mine:\n    def fit(self): pass\n    def predict(self): pass\n"
+    )
+    folder = toy_folder()
+    for given, lacks in (("mine.py", "a file without its class"), ("mine.py[gain=2]", "a file without"), ("Mine", "a class without its file")):
+        result = cli("run", "-m", given, "-d", folder, *QUICK, "-q")
+        assert result.exit_code == 2
+        assert f"names {lacks}" in result.stderr
+        assert "Give mine.py:Mine." in result.stderr
+
+
 def test_resume_keeps_what_is_finished(cli, toy_folder):
     arguments = ("run", "-m", "hold", "-d", toy_folder(), *QUICK, "--out", "r")
     cli(*arguments)
@@ -117,7 +136,7 @@ def test_a_users_own_class_runs_and_its_failure_is_exit_code_one(cli, toy_folder
     )
     folder = toy_folder()
     assert cli("run", "-m", "mine.py:Mine", "-d", folder, *QUICK, "-q").exit_code == 0
-    result = cli("run", "-m", "hold", "-m", "mine.py:Broken", "-d", folder, *QUICK, "-q")
+    result = cli("run", "-m", "hold", "-m", "mine.py:Broken", "-d", folder, *QUICK, "-q", "--out", "r")
     assert result.exit_code == 1
     assert "2 of 4 fits failed:" in result.stderr
     assert "toyset mine.py:Broken fold 0 seed 0: predict: RuntimeError: boom" in result.stderr

@@ -6,16 +6,22 @@ import errno
 import os
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import InputError, WorkError
+from ..errors import InputError, WorkError, option
+from ..regular_files import read_json
+from .task import Task, make_task
 
 _LEFTOVERS = {
     "": r"(writable|study\.json|rows\.parquet|summary\.json|windows\.parquet)", "truth/*": r"fold\d+\.npz", "cells/*/*": r"fold\d+-seed\d+",
 }  # fmt: skip
 """What a killed study leaves half-written, by folder: `.NAME.PID.tmp` of these names. Everything else is not ours to remove."""
+
+
+def _elsewhere() -> str:
+    return f"another folder with {option('--out', 'out=FOLDER')}"
 
 
 @contextmanager
@@ -33,7 +39,7 @@ def claimed(out: Path) -> Iterator[None]:
         probe.unlink()
         handle = os.open(out, os.O_RDONLY)
     except OSError as error:
-        raise InputError(f"cannot write to {out}: {error.strerror}. Give another folder with --out.") from None
+        raise InputError(f"cannot write to {out}: {error.strerror}. Give {_elsewhere()}.") from None
     try:
         _lock(handle, out)
         _refuse_links(out)
@@ -43,17 +49,38 @@ def claimed(out: Path) -> Iterator[None]:
         where = f"{error.filename}: " if error.filename else ""
         raise WorkError(
             f"the study stopped: {where}{error.strerror or error}. What is finished is kept in {out}; "
-            "make room (or mend the folder) and run the same command again with --resume."
+            f"make room (or mend the folder) and run the same command again with {option('--resume', 'resume=True')}."
         ) from error
     finally:
         os.close(handle)  # and with it the lock, which the system also takes from a killed process
+
+
+def refuse_other_study(out: Path, tasks: Sequence[Task]) -> None:
+    """Keep the results of another study from being replaced: a folder holds the tables of one.
+
+    Raises:
+        InputError: `out` holds results of other tasks, or results that do not tell of which.
+    """
+    if not any((out / name).exists() for name in ("study.json", "rows.parquet", "summary.json")):
+        return
+    try:
+        same = [make_task(task) for task in read_json(out / "study.json")["tasks"]] == list(tasks)
+    except (InputError, KeyError, TypeError):  # a damaged file may hold anything
+        same = False
+    if not same:
+        raise InputError(
+            f"{out} holds the results of another study, which would be replaced. Give {_elsewhere()}. To go on there, give "
+            f"{option('--resume', 'resume=True')}: finished fits of these models are kept, and the tables become those of this study."
+        )
 
 
 def _refuse_links(out: Path) -> None:
     """A folder of another's may hold links: what is written through one lands outside `out`."""
     for pattern in ("cells", "truth", "cells/*", "cells/*/*"):
         if link := next((path for path in out.glob(pattern) if path.is_symlink()), None):
-            raise InputError(f"{link} is a link; accepted: folders, so that a study writes only below {out}. Remove the link, or give another --out.")
+            raise InputError(
+                f"{link} is a link; accepted: folders, so that a study writes only below {out}. Remove the link, or give {_elsewhere()}."
+            )
 
 
 def _take_away_leftovers(out: Path) -> None:
@@ -73,5 +100,5 @@ def _lock(handle: int, out: Path) -> None:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
-            raise InputError(f"another study is being written to {out} at this moment; wait for it, or give another folder with --out.") from None
+            raise InputError(f"another study is being written to {out} at this moment; wait for it, or give {_elsewhere()}.") from None
         # file systems without locks (some of clusters): the user keeps two studies apart

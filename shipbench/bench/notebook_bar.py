@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 
 from ..names import shown
-from .durations import duration
+from .durations import Remaining, duration
 
 
 def in_notebook() -> bool:
@@ -64,10 +64,12 @@ class NotebookBar:
     def __init__(self) -> None:
         self.place = _Place()
         self.total, self.count, self.began, self.label = 0, 0, time.monotonic(), ""
+        self.remaining = Remaining({})
         self.lines: list[str] = []
 
-    def start(self, total: int) -> None:
+    def start(self, total: int, kinds: Mapping[str, int] | None = None) -> None:
         self.total, self.count, self.began = total, 0, time.monotonic()
+        self.remaining = Remaining(kinds or {"": total})
         self._draw("")
 
     def working(self, label: str) -> None:
@@ -78,8 +80,9 @@ class NotebookBar:
         if self.place.due:
             self._draw(f"{self.label}: {what}")
 
-    def done(self, label: str, outcome: str) -> None:
+    def done(self, label: str, outcome: str, kind: str = "", cost: float = 1.0) -> None:
         self.count += 1
+        self.remaining.done(kind, cost)
         if not outcome.startswith("ok"):
             self.lines.append(f"{label}: {outcome}")
         self._draw("")
@@ -93,7 +96,7 @@ class NotebookBar:
         self._draw(f"{how} {duration(time.monotonic() - self.began)}", ended=True)
 
     def _draw(self, text: str, ended: bool = False) -> None:
-        if self.count and not ended:
-            left = (time.monotonic() - self.began) / self.count * (self.total - self.count)
+        left = self.remaining.seconds(time.monotonic() - self.began)
+        if left is not None and not ended:
             text = f"about {duration(left)} left {text}"
         self.place.draw(self.count, max(self.total, 1), f"{self.count}/{self.total} {text}", self.lines[-10:])

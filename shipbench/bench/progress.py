@@ -4,25 +4,28 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Protocol, TextIO
 
 from ..names import shown
 from ..steps import listening
-from .durations import duration
+from .durations import Remaining, duration
 
 
 class Progress(Protocol):
-    """What the runner tells: `total` cells; which model is worked on; at which step its fit is; each cell as it ends; what is wrong meanwhile."""
+    """What the runner tells: how many cells there are, which model is worked on, at which step its fit is, each cell as it ends, and what is wrong.
 
-    def start(self, total: int) -> None: ...
+    `kinds`: number of cells of each kind; cells of one kind cost about the same. `cost` of a cell [s]: 0 where it was kept.
+    """
+
+    def start(self, total: int, kinds: Mapping[str, int] | None = None) -> None: ...
 
     def working(self, label: str) -> None: ...
 
     def step(self, what: str, share: float) -> None: ...
 
-    def done(self, label: str, outcome: str) -> None: ...
+    def done(self, label: str, outcome: str, kind: str = "", cost: float = 1.0) -> None: ...
 
     def warn(self, text: str) -> None: ...
 
@@ -32,13 +35,13 @@ class Progress(Protocol):
 class Silent:
     """Says nothing but warnings."""
 
-    def start(self, total: int) -> None: ...
+    def start(self, total: int, kinds: Mapping[str, int] | None = None) -> None: ...
 
     def working(self, label: str) -> None: ...
 
     def step(self, what: str, share: float) -> None: ...
 
-    def done(self, label: str, outcome: str) -> None: ...
+    def done(self, label: str, outcome: str, kind: str = "", cost: float = 1.0) -> None: ...
 
     def warn(self, text: str) -> None:
         print(f"warning: {text}", file=sys.stderr, flush=True)
@@ -108,15 +111,17 @@ def steps_shown(quiet: bool) -> Iterator[None]:
 
 
 class Lines:
-    """One line per finished cell, with the time that is left at the mean pace so far."""
+    """One line per finished cell, with the time that is left."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self.stream = stream or sys.stderr
         self.total, self.count, self.began = 0, 0, time.monotonic()
+        self.remaining = Remaining({})
         self.steps: StepLines | None = None
 
-    def start(self, total: int) -> None:
+    def start(self, total: int, kinds: Mapping[str, int] | None = None) -> None:
         self.total, self.count, self.began = total, 0, time.monotonic()
+        self.remaining = Remaining(kinds or {"": total})
 
     def working(self, label: str) -> None:
         self.steps = StepLines(self.stream, f"{label}: ")
@@ -126,10 +131,11 @@ class Lines:
         if self.steps is not None:
             self.steps(what, share)
 
-    def done(self, label: str, outcome: str) -> None:
+    def done(self, label: str, outcome: str, kind: str = "", cost: float = 1.0) -> None:
         self.count += 1
-        left = (time.monotonic() - self.began) / self.count * (self.total - self.count)
-        after = f"; about {duration(left)} left" if self.count < self.total else ""
+        self.remaining.done(kind, cost)
+        left = self.remaining.seconds(time.monotonic() - self.began)
+        after = f"; about {duration(left)} left" if left is not None and self.count < self.total else ""
         print(shown(f"{f'[{self.count}/{self.total}]':>8s} {label}: {outcome}{after}"), file=self.stream, flush=True)
 
     def warn(self, text: str) -> None:
@@ -145,17 +151,18 @@ class Bar:
 
     def __init__(self) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
         self.progress = Progress(
-            SpinnerColumn(), BarColumn(bar_width=24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("left"),
-            TimeRemainingColumn(), TextColumn("{task.description}", markup=False), console=Console(stderr=True), speed_estimate_period=3600,
+            SpinnerColumn(), BarColumn(bar_width=24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.fields[left]}"),
+            TextColumn("{task.description}", markup=False), console=Console(stderr=True),
         )  # fmt: skip
         self.bar: Any = None
-        self.label = ""
+        self.label, self.began, self.remaining = "", time.monotonic(), Remaining({})
 
-    def start(self, total: int) -> None:
-        self.bar = self.progress.add_task("", total=total)
+    def start(self, total: int, kinds: Mapping[str, int] | None = None) -> None:
+        self.began, self.remaining = time.monotonic(), Remaining(kinds or {"": total})
+        self.bar = self.progress.add_task("", total=total, left="")
         self.progress.start()
 
     def working(self, label: str) -> None:
@@ -165,8 +172,10 @@ class Bar:
     def step(self, what: str, share: float) -> None:
         self.progress.update(self.bar, description=shown(f"{self.label}: {what}"))
 
-    def done(self, label: str, outcome: str) -> None:
-        self.progress.advance(self.bar)
+    def done(self, label: str, outcome: str, kind: str = "", cost: float = 1.0) -> None:
+        self.remaining.done(kind, cost)
+        left = self.remaining.seconds(time.monotonic() - self.began)
+        self.progress.update(self.bar, advance=1, left=f"about {duration(left)} left" if left is not None else "")
         if not outcome.startswith("ok"):
             self.progress.console.print(shown(f"{label}: {outcome}"), highlight=False, markup=False)
 
@@ -174,7 +183,7 @@ class Bar:
         self.progress.console.print(f"warning: {text}", highlight=False, markup=False)
 
     def finish(self) -> None:
-        self.progress.update(self.bar, description="")
+        self.progress.update(self.bar, description="", left="")
         self.progress.stop()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import asdict, dataclass, field
@@ -22,7 +22,7 @@ from ..steps import listening
 from ..storage import Frame, write_json
 from .executors import Execution, Workers, answers_of, open_workers
 from .folds import make_folds, select_runs
-from .lock import claimed
+from .lock import claimed, refuse_other_study
 from .models import facts_of
 from .patience import Patience
 from .progress import Progress, Silent
@@ -56,6 +56,16 @@ class Outcome:
         return brief(f"<Outcome in {self.out}: {len(self.summaries)} fits, {len(self.failed)} failed>")
 
     @property
+    def equations(self) -> dict[tuple[str, str], Path]:
+        """By data set and model of this study the first file of fitted equations."""
+        found: dict[tuple[str, str], Path] = {}
+        for s in self.summaries:
+            path = self.out / Cell(s["dataset"], s["model"], s["fold"], s["seed"]).folder / "equations.txt"
+            if path.is_file():
+                found.setdefault((s["dataset"], s["model"]), path)
+        return found
+
+    @property
     def results(self) -> Results:
         """As `read_results` would read them back."""
         return Results(self.rows, self.summaries, [self.out] * len(self.summaries))
@@ -75,15 +85,16 @@ def run_tasks(
 
     Args:
         tasks: one per data set.
-        out: folder of the study; cells of an earlier study there are replaced when they are run again.
-        resume: keep the scored cells that the same code, data and task made; failed and skipped ones are tried again.
+        out: folder of the study; run again, the same tasks replace what they made there.
+        resume: keep the scored cells that the same code, data and task made; failed and skipped ones are tried again. The results of another study
+            in `out` are replaced only then.
         execution: where the cells run and what each may use; it changes no number (a GPU rounds otherwise than a CPU).
         progress: told of every cell.
         command: the command line, kept in the results.
         memory: data sets and models that are no files, by the names that the tasks give them.
 
     Raises:
-        InputError: a task, data set, model, folder or executor cannot be used. Nothing has been fitted then.
+        InputError: a task, data set, model, folder or executor cannot be used, or `out` holds another study. Nothing has been fitted then.
         WorkError: the study had to stop (disk full, workers lost). What is finished is kept.
     """
     out, progress, execution = Path(out), progress or Silent(), execution or Execution()
@@ -94,10 +105,12 @@ def run_tasks(
     began = datetime.now(UTC)
     about = {"command": command, "code": code_version(), "began": began.isoformat(timespec="seconds")}
     with open_workers(execution) as workers, listening(progress.step), claimed(out):
+        if not resume:
+            refuse_other_study(out, tasks)
         for study in studies:
             for fold, batch in zip(study.folds, study.batches, strict=True):
                 write_truth(out, study.data.name, fold.index, batch)
-        progress.start(sum(len(part.cells) for part in parts))
+        progress.start(sum(len(part.cells) for part in parts), Counter(_kind(cell) for part in parts for cell in part.cells))
         finished: set[Cell] = set()
         try:
             todo = [part for part in parts if not (resume and _kept(part, out, progress, finished))]
@@ -107,7 +120,7 @@ def run_tasks(
                     summary = record.summary | about | _identity(part, key, answer)
                     write_cell(out, cell, record.rows, summary, answer.S, answer.files)
                     finished.add(cell)
-                    progress.done(cell.label, _outcome_text(summary))
+                    progress.done(cell.label, _outcome_text(summary), _kind(cell), answer.fit_s + answer.predict_s)
         finally:
             progress.finish()
             if finished:  # also of a study that stops early; one that finished nothing leaves an older table as it is
@@ -159,8 +172,13 @@ def _kept(part: Part, out: Path, progress: Progress, finished: set[Cell]) -> boo
         return False
     for cell, status in zip(part.cells, statuses, strict=True):
         finished.add(cell)
-        progress.done(cell.label, f"{status} (kept)")
+        progress.done(cell.label, f"{status} (kept)", _kind(cell), 0.0)
     return True
+
+
+def _kind(cell: Cell) -> str:
+    """Cells that cost about the same: those of one model on one data set."""
+    return f"{cell.dataset} {cell.model}"
 
 
 def _answers(parts: Sequence[Part], workers: Workers, progress: Progress, how: Execution) -> Iterator[tuple[Part, list[Answer]]]:
@@ -257,7 +275,7 @@ def _summary(study: Study, spec: Spec, cell: Cell, answer: Answer, times: dict[s
 def _outcome_text(summary: dict[str, Any]) -> str:
     """One line on a finished cell, for the progress."""
     statuses = summary["run_status"]
-    shared = f" ({summary['fit_shared_by']} fits together)" if summary["fit_shared_by"] > 1 else ""
+    shared = f" (its share of {summary['fit_shared_by']} fits together)" if summary["fit_shared_by"] > 1 else ""
     if summary["status"] == "ok":
         return f"ok, {len(statuses)} runs, fit {summary['fit_s']:.2f} s{shared}"
     count = sum(s == summary["status"] for s in statuses)

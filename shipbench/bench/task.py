@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, option, unknown_name
 from ..metrics.base import METRICS
 from ..names import LONGEST_LABEL, brief, check_label
 from ..toml_files import Number, Whole, fault, read_toml
@@ -31,6 +31,17 @@ class Task(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def __init__(self, where: str = "Task", /, **data: Any) -> None:
+        """Check the keys above; `where` names their source in messages.
+
+        Raises:
+            InputError: a key is missing or unknown, or a value is not accepted.
+        """
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise _refusal(error, where) from None
 
     dataset: str
     models: tuple[str, ...] = Field(min_length=1)
@@ -105,16 +116,18 @@ def make_task(data: dict[str, Any], where: str = "task") -> Task:
     Raises:
         InputError: a key is missing or unknown, or a value is not accepted; `where` names the source in the message.
     """
-    try:
-        return Task.model_validate(data)
-    except ValidationError as error:
-        place, kind, wrong = fault(error)
-        key = ".".join(place)
-        if kind == "extra_forbidden":
-            raise InputError(f"{where}: {unknown_name('key', key, [*Task.model_fields, 'datasets'])}") from None
-        if key == "models" and kind in ("missing", "too_short"):
-            raise InputError(f"{where}: no model is given; name at least one (--model physics). `shipbench models` lists them.") from None
-        raise InputError(f"{where}: {key}: {wrong}. Keys: {', '.join(Task.model_fields)}.") from None
+    return Task(where, **data)
+
+
+def _refusal(error: ValidationError, where: str) -> InputError:
+    place, kind, wrong = fault(error)
+    key = ".".join(place)
+    if kind == "extra_forbidden":
+        return InputError(f"{where}: {unknown_name('key', key, [*Task.model_fields, 'datasets'])}")
+    if key == "models" and kind in ("missing", "too_short"):
+        example = option("--model physics", 'models=["physics"]')
+        return InputError(f"{where}: no model is given; name at least one ({example}). `shipbench models` lists them.")
+    return InputError(f"{where}: {key}: {wrong}. Keys: {', '.join(Task.model_fields)}.")
 
 
 def configs_folder() -> Path:

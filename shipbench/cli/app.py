@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from ..errors import InputError, ShipbenchError
+from ..errors import InputError, ShipbenchError, command_line
 from ..names import file_name
 from ..regular_files import check_output
 from . import check as cli_check
@@ -71,7 +71,8 @@ class _Group(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         try:
-            return super().invoke(ctx)
+            with command_line():
+                return super().invoke(ctx)
         except InputError as error:
             code, text = 2, str(error)
         except ShipbenchError as error:
@@ -165,8 +166,9 @@ def run(
     else:
         show_boards(written, full)
         say(f"Results: {folder}\nLeaderboard: {', '.join(str(path) for _, path in written)}")
-        if not quiet and (equations := sorted(folder.glob("cells/*/*/*/equations.txt"))):
-            say(f"Fitted equations of {len(equations)} models, for example:\n  {equations[0]}")
+        if not quiet and (equations := outcome.equations):
+            models = "1 model" if len(equations) == 1 else f"{len(equations)} models"
+            say(f"Fitted equations of {models}, for example:\n  {next(iter(equations.values()))}")
     for (name, model_name), note in fit_notes(outcome.summaries).items():
         say_wrapped(f"warning: {name}, {model_name}: {note}", err=True)
     exit_if_failed(outcome.failed, f"{len(outcome.failed)} of {len(outcome.summaries)} fits")

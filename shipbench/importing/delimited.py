@@ -12,7 +12,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.csv
 
-from ..errors import InputError
+from ..errors import InputError, option
 from .blanks import Collapsed
 from .mapping import Layout
 from .table import BLANKS, DELIMITERS, KINDS, TEXT_BLOCK, Table, check_number, uncompressed
@@ -164,8 +164,9 @@ def find_encoding(path: Path, head: bytes, layout: Layout) -> tuple[str, list[st
         )
     if "encoding" in layout.model_fields_set or _decodes(head, given):
         return layout.encoding, []
+    given_by = option("--encoding NAME with --propose", "propose_mapping(..., encoding=NAME)")
     name = "cp1252" if _decodes(head, "cp1252") else "latin-1"
-    return name, [f"{path.name} is not UTF-8; read as Latin-1 ({name}). To choose another: --encoding NAME with --propose, or [file] encoding"]
+    return name, [f"{path.name} is not UTF-8; read as Latin-1 ({name}). To choose another: {given_by}, or [file] encoding"]
 
 
 def check_encoding(name: str) -> str:
@@ -202,7 +203,7 @@ def _first_lines(path: Path, head: bytes, encoding: str, layout: Layout) -> tupl
         place = f" (byte {error.start})" if isinstance(error, UnicodeDecodeError) else ""
         raise InputError(
             f"{path} is not {encoding} text{place}; if it is text, set [file] encoding = 'latin-1' (or what it is) in the mapping, "
-            "or --encoding with --propose."
+            f"or {option('--encoding with --propose', 'propose_mapping(..., encoding=NAME)')}."
         ) from None
     lines = io.StringIO(decoded, newline=None)
     first = [line.rstrip("\n") for line, _ in zip(lines, range(layout.header + layout.skip + 1), strict=False)]

@@ -11,7 +11,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from ..errors import InputError
+from ..errors import InputError, option
 from ..extras import needed_by
 from .mapping import Layout
 from .table import MOST_COLUMNS, Table, as_batch
@@ -89,7 +89,8 @@ def _rows(path: Path, layout: Layout) -> Iterator[tuple[Any, ...]]:
             raise InputError(f"{path} has no sheet, or is damaged. Save it anew as .xlsx, or as CSV.")
         if layout.sheet is None and len(book.sheetnames) > 1:
             raise InputError(
-                f'{path} has the sheets {", ".join(book.sheetnames)}. Name one: [file] sheet = "..." in the mapping, or --sheet with --propose.'
+                f'{path} has the sheets {", ".join(book.sheetnames)}. Name one: [file] sheet = "..." in the mapping, or '
+                f"{option('--sheet with --propose', 'propose_mapping(..., sheet=NAME)')}."
             )
         if layout.sheet is not None and layout.sheet not in book.sheetnames:
             raise InputError(f"{path} has no sheet '{layout.sheet}'; it has {', '.join(book.sheetnames)}.")

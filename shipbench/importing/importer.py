@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, option
 from ..ship import Ship
 from ..signals import COMMANDS
 from ..steps import step
@@ -71,7 +71,7 @@ def import_logs(
     if twice := [str(path) for k, path in enumerate(logs) if places[k] in places[:k]]:
         raise InputError(f"{twice[0]} is given twice; a run that stands twice would be on both sides of a fold. Give each log once.")
     if inside := [str(p) for p in logs if out.resolve() in p.resolve().parents]:
-        raise InputError(f"{inside[0]} lies in the folder that --out names ({out}). Give another --out.")
+        raise InputError(f"{inside[0]} lies in the folder of the data set ({out}). Give another folder with {option('--out', 'out=FOLDER')}.")
     taken: Counter[str] = Counter()
     with FolderWriter(out, force) as writer:
         for log in _recordings(logs, mapping, met):

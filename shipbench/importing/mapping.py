@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError
 
-from ..errors import InputError
+from ..errors import InputError, option
 from ..names import check_name
 from ..toml_files import read_toml
 from .entries import Channel, Part, check_channel
@@ -176,7 +176,8 @@ def _explained(error: ValidationError, path: str | Path, single: bool) -> InputE
         hint = f" Did you mean '{near[0]}'?" if near else ""
         return InputError(f"{path}: unknown key '{shown}'.{hint} Accepted there: {', '.join(accepted)}.{more}")
     value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:80]})"
-    return InputError(f"{path}: {shown}: {first['msg']}{value}{more}. `shipbench data import LOG --propose mapping.toml` writes a draft.")
+    draft = option("shipbench data import LOG --propose mapping.toml", 'shipbench.propose_mapping(LOG, "mapping.toml")')
+    return InputError(f"{path}: {shown}: {first['msg']}{value}{more}. `{draft}` writes a draft.")
 
 
 def _accepted(loc: list[str], single: bool) -> list[str]:

@@ -17,7 +17,7 @@ import pyarrow.parquet
 import tomli_w
 
 from ..data.files import BEFORE_CHECK, TABLES
-from ..errors import InputError
+from ..errors import InputError, option
 from ..ship import Ship
 from ..storage import exchange
 
@@ -45,7 +45,7 @@ class FolderWriter:
             raise self._unwritable(error) from None
 
     def _unwritable(self, error: OSError) -> InputError:
-        return InputError(f"cannot write the data set to {self.out}: {error.strerror}. Give --out a folder that can be written.")
+        return InputError(f"cannot write the data set to {self.out}: {error.strerror}. Give another folder with {option('--out', 'out=FOLDER')}.")
 
     def add(self, run: str, t: np.ndarray, columns: dict[str, np.ndarray]) -> None:
         """Write one run."""
@@ -91,15 +91,16 @@ class FolderWriter:
 
 
 def _check_target(out: Path, force: bool) -> None:
+    place, replacing = f"another folder with {option('--out', 'out=FOLDER')}", option("--force", "force=True")
     if out.exists() and not out.is_dir():
-        raise InputError(f"{out} is a file; give --out a folder that is not there yet.")
+        raise InputError(f"{out} is a file; accepted: a folder that is not there yet. Give {place}.")
     if not out.is_dir():
         return
     held = sorted(p.name for p in out.iterdir())
     if held and not force:
-        raise InputError(f"folder {out} is there already ({', '.join(held[:4])}). Give another --out, or --force to replace that data set.")
+        raise InputError(f"folder {out} is there already ({', '.join(held[:4])}). Give {place}, or {replacing} to replace that data set.")
     if others := [name for name in held if name not in _OURS and not name.startswith(BEFORE_CHECK)]:
-        raise InputError(f"folder {out} holds more than a data set ({', '.join(others[:4])}); --force replaces only a data set. Give another --out.")
+        raise InputError(f"folder {out} holds more than a data set ({', '.join(others[:4])}); {replacing} replaces only a data set. Give {place}.")
 
 
 def run_name(text: str) -> str:

@@ -12,14 +12,18 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from ..errors import InputError, unknown_name
 from ..extras import needed_by
+from ..regular_files import read_text
 
 _listens: list[bool] = []
+_MOST_FILES = 200
+"""Python files of the working folder that are searched for a class."""
 _brought: set[str] = set()
 """Modules of users that earlier model files imported: the next file imports its own, changed or of another folder."""
 
@@ -50,6 +54,24 @@ def class_from_file(path: Path, class_name: str) -> Any:
     if not hasattr(module, class_name):
         raise unknown_name(f"class in {path}", class_name, [k for k, v in vars(module).items() if isinstance(v, type) and v.__module__ == name])
     return getattr(module, class_name)
+
+
+def models_in(path: Path) -> list[str]:
+    """Classes of a Python file that have `fit` and `predict`, or else all its classes; read, not imported. None where it is not Python."""
+    try:
+        found = [node for node in ast.parse(read_text(path, "Python file")).body if isinstance(node, ast.ClassDef)]
+    except (InputError, SyntaxError, ValueError):
+        return []
+    methods = [{part.name for part in node.body if isinstance(part, ast.FunctionDef)} for node in found]
+    return [node.name for node, own in zip(found, methods, strict=True) if {"fit", "predict"} <= own] or [node.name for node in found]
+
+
+def spec_in_file(name: str) -> str:
+    """The spec that was meant by the name of a file without its class, or of a class without its file; "" where there is no such file here."""
+    if name.endswith(".py"):
+        return " or ".join(f"{name}:{model}" for model in models_in(Path(name)))
+    files = islice(Path().glob("*.py"), _MOST_FILES) if name.isidentifier() else ()
+    return " or ".join(f"{file}:{name}" for file in sorted(files) if name in models_in(file))
 
 
 @contextmanager

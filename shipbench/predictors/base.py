@@ -15,11 +15,12 @@ from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 import numpy as np
 
 from ..errors import InputError, unknown_parameter
+from ..names import brief
 from ..records import Dataset
 from ..signals import COMMANDS, STATES
 from ..specs import Spec, parse_spec, spec_of
 from ._saved import Origin, damaged, described, origin_of, read_arrays, read_meta, remembers_origin, remembers_origins, write_saved
-from ._user_file import class_from_file
+from ._user_file import class_from_file, spec_in_file
 from .device import check_device
 from .registered import PREDICTORS
 
@@ -56,10 +57,17 @@ class PredictorBase(ABC):
     def __init_subclass__(cls, **options: Any) -> None:
         """Every `fit` and `fit_group` remembers what it was given: a saved model can then refuse other data."""
         super().__init_subclass__(**options)
+        if "__repr__" not in cls.__dict__:
+            cls.__repr__ = PredictorBase.__repr__  # type: ignore[method-assign]  # a dataclass would write one that does not say whether it is fitted
         if "fit" in cls.__dict__:
             cls.fit = remembers_origin(cls.__dict__["fit"])  # type: ignore[method-assign]
         if "fit_group" in cls.__dict__:
             cls.fit_group = classmethod(remembers_origins(cls.__dict__["fit_group"].__func__))  # type: ignore[attr-defined]
+
+    def __repr__(self) -> str:
+        """The class with its parameters, and whether it is fitted."""
+        given = ", ".join(f"{f.name}={getattr(self, f.name)!r}" for f in fields(self) if f.repr) if is_dataclass(self) else ""
+        return brief(f"<{type(self).__name__}({given}), {'fitted' if self.fitted else 'not fitted'}>")
 
     @property
     def fitted(self) -> bool:
@@ -220,6 +228,9 @@ def _made(spec: Spec) -> Any:
             raise _no_effects(spec)
         return PREDICTORS.get(read_meta(spec.path)["predictor"]).load(spec.path)
     family, _, member = (spec.name, "", "") if spec.path is not None else spec.name.partition(":")
+    if spec.path is None and family not in PREDICTORS and (meant := spec_in_file(family)):
+        half = "a file without its class" if family.endswith(".py") else "a class without its file"
+        raise InputError(f"model spec '{spec.text}' names {half}. Give {meant}.")
     cls = class_from_file(spec.path, str(spec.class_name)) if spec.path is not None else PREDICTORS.get(family)
     if spec.effects and not hasattr(cls, "extend"):
         raise _no_effects(spec)

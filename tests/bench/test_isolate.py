@@ -111,7 +111,7 @@ def test_processes_that_a_model_leaves_behind_end_with_it(study):
     found = _status(study("Orphans", "OrphansAndCrashes"))
     assert found["Orphans"][0] == {"ok"}
     assert "SIGSEGV" in found["OrphansAndCrashes"][1]
-    found = _status(study("OrphansAndHangs", execution=Execution(limits=Limits(seconds=3))))
+    found = _status(study("OrphansAndHangs", resume=True, execution=Execution(limits=Limits(seconds=3))))
     assert "time limit of 3 s" in found["OrphansAndHangs"][1]
     left = [p for p in psutil.process_iter(["cmdline"]) if "# orphan of a test" in str(p.info["cmdline"])]
     assert not left

@@ -8,6 +8,7 @@ import types
 
 import pytest
 
+from shipbench.bench.durations import Remaining
 from shipbench.bench.progress import Bar, Lines, Silent, duration, make_progress, steps_shown
 from shipbench.steps import step
 
@@ -26,6 +27,19 @@ def test_lines_count_and_tell_the_remaining_time(monkeypatch):
     lines.done("a", "ok")
     lines.done("b", "failed, 1 of 2 runs: no")
     assert stream.getvalue().splitlines() == ["   [1/3] a: ok; about 20 s left", "   [2/3] b: failed, 1 of 2 runs: no; about 10 s left"]
+
+
+def test_the_remaining_time_counts_each_kind_at_its_own_cost():
+    left = Remaining({"hold": 5, "physics": 2, "mlp": 5})
+    assert left.seconds(1.0) is None
+    for _ in range(5):
+        left.done("hold", 0.1)
+    assert left.seconds(1.0) == pytest.approx(0.7 / 0.5)  # 7 pieces at the mean; half of the time is none of theirs
+    left.done("physics", 2.0)
+    left.done("mlp", 10.0)
+    left.done("mlp", 0.0)  # kept: it cost nothing
+    assert left.seconds(12.5) == pytest.approx(2.0 + 3 * 10.0)
+    assert left.seconds(6.25) == pytest.approx((2.0 + 3 * 10.0) / 2)  # two at a time
 
 
 @pytest.mark.parametrize(("cells", "said"), [(1, "stopped after 5 s"), (2, "finished in 5 s")])

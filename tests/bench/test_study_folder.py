@@ -101,7 +101,7 @@ def test_a_read_only_folder_is_refused_before_anything_is_fitted(study, request)
         folder.chmod(folder.stat().st_mode | 0o755)
     study.out.chmod(0o555)
     request.getfixturevalue("somebody_else")
-    with pytest.raises(InputError, match=r"cannot write to .*out: Permission denied. Give another folder with --out."):
+    with pytest.raises(InputError, match=r"cannot write to .*out: Permission denied. Give another folder with out=FOLDER."):
         study(model="hold")  # a model file would need a process, and Python here may not be somebody else's to run
     assert study.fits() == 4
 
@@ -240,6 +240,21 @@ def test_nothing_that_the_study_did_not_make_is_removed(study):
     assert [path.read_text() for path in mine] == ["precious"] * len(mine)
     assert not leftover.exists()
     assert not (study.out / ".rows.parquet.77.tmp").is_symlink()
+
+
+def test_another_study_is_replaced_only_where_resume_is_asked_for(study):
+    before = study()
+    with pytest.raises(InputError, match=r"out holds the results of another study.*another folder with out=FOLDER.*resume=True"):
+        study(horizon_s=10)
+    refused = command(study, "--folds", "3", limit=10**9)
+    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
+    assert "another folder with --out. To go on there, give --resume" in refused.stderr
+    assert study.fits() == 4
+    pd.testing.assert_frame_equal(before, study(), check_exact=True)  # the same study may be run again
+    assert len(study(resume=True, seeds=[0])) == len(before) / 2
+    (study.out / "study.json").unlink()
+    with pytest.raises(InputError, match="another study"):
+        study(seeds=[0])
 
 
 @pytest.mark.parametrize("link", ["cells", "truth", "cells/toyset", "truth/toyset"])

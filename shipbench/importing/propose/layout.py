@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...errors import InputError
+from ...errors import InputError, option
 from ..delimited import find_encoding
 from ..excel import first_rows
 from ..mapping import Layout
@@ -64,7 +64,8 @@ def find_form(path: Path, given: dict[str, Any]) -> Form:
     try:
         text = codecs.getincrementaldecoder(encoding)().decode(head, final=False)
     except UnicodeError:
-        raise InputError(f"{path} is not {encoding} text. Accepted: Python's names of encodings, such as --encoding latin-1.") from None
+        example = option("--encoding latin-1", 'encoding="latin-1"')
+        raise InputError(f"{path} is not {encoding} text. Accepted: Python's names of encodings, such as {example}.") from None
     lines = [line.rstrip("\n") for line, _ in zip(io.StringIO(text, newline=None), range(_LINES), strict=False)]
     delimiter = given.get("delimiter") or _delimiter(lines)
     return _form(path, [_split(line, delimiter or ",") for line in lines], found, tuple(notes), delimiter, lines)

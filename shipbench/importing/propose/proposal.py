@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...errors import InputError
+from ...errors import InputError, option
 from ...regular_files import check_output
 from ...storage import put
 from ..mapping import SOURCE_KEYS
@@ -37,11 +37,12 @@ def write_proposal(
     Raises:
         InputError: a log cannot be read, or `path` is there already and `force` is not set, or is one of the logs.
     """
+    draft = option("--propose", "out=FILE")
     if path.exists() and not force:
-        raise InputError(f"{path} is there already. Give --propose another name, or --force to replace it.")
+        raise InputError(f"{path} is there already. Give another name with {draft}, or {option('--force', 'force=True')} to replace it.")
     if partial is not None and path.exists() and partial.resolve() == path.resolve():
-        raise InputError(f"--propose and --map are both {path}; accepted: two files. Give --propose another name.")
-    check_output(path, logs, "--propose")
+        raise InputError(f"the draft and {option('--map', 'partial')} are both {path}; accepted: two files. Give another name with {draft}.")
+    check_output(path, logs, option("--propose", "out"))
     known = read_partial(partial) if partial is not None else {}
     sources, notes = _sources(logs, known, file or {})
     top, split = _top(sources, known, logs[0])
@@ -56,7 +57,7 @@ def write_proposal(
         try:
             fresh.write_text(draft_text(top, split, kept, sources, notes), encoding="utf-8")
         except OSError as error:
-            raise InputError(f"cannot write {path}: {error.strerror}. Give --propose a path that can be written.") from None
+            raise InputError(f"cannot write {path}: {error.strerror}. Give another name with {draft}.") from None
         return fresh
 
     try:
