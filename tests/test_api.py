@@ -156,7 +156,13 @@ def test_scores_tell_of_fits_that_failed(scores):
         assert "fit: ValueError: out of luck" in text
     lines = repr(scores).splitlines()
     assert lines[1].startswith("'hold' is first")
+    assert "(after Holm for 3 pairs), 16 runs." in lines[1]
     assert lines[2].startswith("  hold: ")
+
+
+def test_scores_without_a_score_say_where_the_reasons_stand(harbour):
+    text = repr(sb.benchmark(Broken, harbour, **OPTIONS))
+    assert "in Python in scores.results.rows" in text
 
 
 def test_scores_draw_and_write_a_page(scores, tmp_path):
@@ -348,6 +354,7 @@ def test_a_log_becomes_a_data_set(harbour, tmp_path):
     assert "mapping.toml" not in " ".join(draft.remarks)  # nothing was written
     written = sb.propose_mapping([log], tmp_path / "draft.toml")
     assert (tmp_path / "draft.toml").read_text() == written.text == draft.text
+    assert 'shipbench.import_log(LOG, "' in written.remarks[-1]
     with pytest.raises(InputError, match="another name with out=FILE, or force=True to replace it"):
         sb.propose_mapping(log, tmp_path / "draft.toml")
     (tmp_path / "mapping.toml").write_text(MAPPING)

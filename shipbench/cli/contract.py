@@ -39,9 +39,9 @@ def check(
             TableColumn("rule", "rule"),
             TableColumn("", "status"),
             TableColumn("what it says", "says"),
-            TableColumn("evidence, or why not applicable", "evidence"),
+            TableColumn("evidence", "evidence"),
         ]
-        rows = [vars(v) | {"status": shown[v.status]} for v in report.verdicts]
+        rows = [vars(v) | {"status": shown[v.status], "says": "" if v.status == PASSED else v.says} for v in report.verdicts]
         counts = [len(report.of(status)) for status in (PASSED, BROKEN, NOT_APPLICABLE)]
         verdict = "breaks the contract" if counts[1] else "keeps the contract"
         say_wrapped(f"'{report.model}' {verdict}: {{}} rules passed, {{}} broken, {{}} not applicable; {report.seconds:.1f} s.\n".format(*counts))

@@ -9,6 +9,7 @@ import numpy as np
 from ..render.html import Tile, short_name
 from ..render.table import Table, number
 from .scores import Scores
+from .statistics import Pair
 
 _CERTAIN = 0.05
 """p (after Holm) below which two models are told apart."""
@@ -18,7 +19,7 @@ def lead(scores: Scores) -> str:
     """Who is first, by how much against the second, and how sure."""
     ranked = [model for model in scores.ranked if scores.shares[model][0]]
     if not ranked:
-        return "No model has a score; the reasons stand with the statuses."
+        return "No model has a score; the reasons stand in the table Status and cost, in Python in scores.results.rows."
     first, errors = ranked[0], scores.figures("ed")
     mean = f"'{first}' has a mean position error (ED) of {_metres(errors[first]['ed_mean'])}"
     if len(ranked) == 1:
@@ -39,7 +40,7 @@ def lead_tiles(scores: Scores, horizon: float) -> list[Tile]:
     if pair is not None and np.isfinite(pair.p_holm) and pair.difference != 0.0:
         sure = "significant" if pair.p_holm < _CERTAIN else "not significant"
         found.append(
-            Tile("Difference in ED", sure, f"{_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, p {_p(pair.p_holm)}")
+            Tile("Difference in ED", sure, f"{_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, {_p(scores, pair)}")
         )
     windows = len(scores.rows[["fold", "run"]].drop_duplicates())
     missing = sum(expected - scored for scored, expected in scores.shares.values())
@@ -59,11 +60,14 @@ def _certainty(scores: Scores, first: str, second: str) -> str:
     if pair.difference == 0.0:
         return f"They do not differ on {_runs(scores)}."
     sure = "The difference is significant" if pair.p_holm < _CERTAIN else "The difference is not significant"
-    return f"{sure}: {_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, p {_p(pair.p_holm)}, {_runs(scores)}."
+    return f"{sure}: {_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, {_p(scores, pair)}, {_runs(scores)}."
 
 
-def _p(value: float) -> str:
-    return "< 0.001" if value < 0.001 else f"= {value:.3f}"
+def _p(scores: Scores, pair: Pair) -> str:
+    """The p of a pair; of several pairs it is Holm's, which says more caution than the interval beside it."""
+    value = "p < 0.001" if pair.p_holm < 0.001 else f"p = {pair.p_holm:.3f}"
+    pairs = sum(np.isfinite(p.p) for p in scores.pairs)
+    return f"{value} (after Holm for {pairs} pairs)" if pairs > 1 else value
 
 
 def _between(low: float, high: float) -> str:

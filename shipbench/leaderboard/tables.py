@@ -64,7 +64,8 @@ def table_iii(scores: Scores) -> Table:
         ]
         notes.append("In italics: Table III of the source paper, on its own 90 runs (not public); same metrics, other data.")
     head = [TableColumn("#", "rank"), TableColumn("model", "model"), TableColumn("runs", "runs")]
-    shown = [TableColumn(f"{columns[m]['label']} {SYMBOLS[s]}", f"{m}_{s}", number(2), interval=True) for m in metrics for s in STATISTICS]
+    heads = {f"{m}_{s}": f"{columns[m]['label']} {SYMBOLS[s]} [{columns[m]['unit']}]" for m in metrics for s in STATISTICS}
+    shown = [TableColumn(text, key, number(2), interval=True) for key, text in heads.items()]
     return Table("Errors over the horizon (layout of the paper's Table III)", head + shown, lines, notes)
 
 

@@ -112,6 +112,9 @@ def test_the_command_prints_every_rule_and_the_exit_code_says_what_came_of_it(st
         assert f"{rule.name}  passed" in good.stdout
     assert f"{len(RULES)} rules passed, 0 broken, 0 not applicable" in " ".join(good.stdout.split())
     assert "BROKEN" in bad.stdout
+    assert good.stdout.count("evidence: ") == len(RULES)
+    assert "what it says: " not in good.stdout
+    assert bad.stdout.count("what it says: ") == 1
     assert "raised ValueError: give a batch" in " ".join(bad.stdout.split())
 
 

@@ -25,7 +25,7 @@ def write_proposal(
     logs: Sequence[Path], path: Path, force: bool = False, *, file: dict[str, Any] | None = None, partial: Path | None = None
 ) -> list[str]:  # fmt: skip
     """Write a draft mapping for `logs` to `path`; return lines that say what is guessed, what is not sure and what is missing,
-    and, last, the command of the import.
+    and, last, the command or the call of the import.
 
     Args:
         logs: files of one kind, or of several instruments; each kind becomes a source.
@@ -66,7 +66,10 @@ def write_proposal(
         put(write(), path)
     finally:
         fresh.unlink(missing_ok=True)
-    command = f"shipbench data import LOG --map {shlex.quote(str(path))} --ship ship.toml --out FOLDER"
+    command = option(
+        f"shipbench data import LOG --map {shlex.quote(str(path))} --ship ship.toml --out FOLDER",
+        f'shipbench.import_log(LOG, "{path}", "ship.toml", out=FOLDER)',
+    )
     return [*map(one_line, notes), f"Draft: {path}. Check every line marked GUESS, then:", command]
 
 
