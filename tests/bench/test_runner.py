@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from shipbench.bench.results import PROTOCOL, Cell, read_truth, rescore
-from shipbench.bench.runner import run_tasks
+from shipbench.bench.runner import _outcome_text, run_tasks
 from shipbench.bench.submissions import read_results
 from shipbench.bench.task import make_task
 from shipbench.errors import InputError
@@ -274,3 +274,9 @@ def test_the_same_cell_in_two_folders_is_refused(study):
     study("hold", out="b")
     with pytest.raises(InputError, match=r"'hold' on 'toy', fold 0, seed 0 stands in .*a and in .*b"):
         read_results([study.out.parent / "a", study.out.parent / "b"])
+
+
+def test_the_time_of_fits_that_ran_together_is_said_to_be_a_share():
+    summary = {"status": "ok", "run_status": ["ok"] * 4, "fit_s": 0.22, "fit_shared_by": 3}
+    assert _outcome_text(summary) == "ok, 4 runs, fit 0.22 s (its share of 3 fits together)"
+    assert _outcome_text(summary | {"fit_shared_by": 1}) == "ok, 4 runs, fit 0.22 s"
