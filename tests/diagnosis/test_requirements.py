@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,10 +12,12 @@ from test_robust import RUNS, fit_of
 
 from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection import requirements
-from shipbench.diagnosis.selection.requirements import REQUIREMENTS, Requirement, Standard, Verdict, detection_limit, first_unmet
+from shipbench.diagnosis.selection.requirements import REQUIREMENTS, SURE, Requirement, Standard, Verdict, detection_limit, first_unmet
 from shipbench.diagnosis.selection.screening import Score
 from shipbench.effects.base import EFFECTS, Effect
 from shipbench.effects.traits import Traits
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "shipbench-example"
 
 
 class Never(Requirement):
@@ -69,6 +73,21 @@ def test_an_effect_of_a_plug_in_is_asked_the_same_as_one_of_the_library():
     fit = SimpleNamespace(plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS)), model=SimpleNamespace(terms=()))
     seen = Score(theirs, 50.0, np.zeros(1), np.nan, 1e9 * np.eye(1), np.zeros(RUNS))
     assert detection_limit(seen, Standard(fit, 10.0)) == 0.4
+
+
+def test_the_effect_of_the_example_package_is_a_candidate_and_meets_the_same_requirements(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLE))
+    effect = importlib.import_module("shipbench_example.barge_alongside").EFFECT
+    term, standard = Term(effect), Standard(fit_of(np.zeros(RUNS)), 10.0, off_form=5.0)
+    assert standard.asked_besides(term) == standard.asked_besides(Term(EFFECTS.get("current"))) == 0.0  # neither differs between ships
+    assert standard.asked_besides(Term(effect, since=3)) == 5.0
+    own = fit_of(np.full(RUNS, 0.5))
+    own.model.terms = (term,)
+    met = first_unmet(SURE[1:], own, 0, standard)
+    assert met == Verdict(True)
+    scattered = fit_of(0.5 + 3.0 * np.resize([1.0, -1.0], RUNS))
+    scattered.model.terms = (term,)
+    assert first_unmet(SURE[1:], scattered, 0, standard) == Verdict(False, "the runs do not agree that its size differs from zero")
 
 
 def test_whoever_is_told_the_names_asks_for_no_evidence():
