@@ -110,7 +110,7 @@ def test_what_ships_differ_in_is_not_named_for_a_hull_of_another_form():
     verdict = diagnose(published_trials(PUBLISHED["s175"], 40), gain=False)
     late = next(c for c in verdict.candidates if c.effect == "rudder_delay")
     assert late.score > THRESHOLD
-    assert "asked of what ships differ in" in late.rejected_because
+    assert "for effects in which ships differ" in late.rejected_because
     assert not verdict.causes
 
 
