@@ -81,3 +81,10 @@ def test_a_sensor_error_comes_with_the_line_that_corrects_it():
     assert alone.correction({"scale": 0.05}) == "[scale] u = 1.05"
     assert EFFECTS.get("speed_scale").correction({"scale": 0.05}) == "[scale] u = 1.05 and v = 1.05"
     assert EFFECTS.get("rudder_offset").correction({"offset": 0.02}) == "[bias] delta = -0.02"
+
+
+def test_a_headline_leaves_out_a_size_whose_interval_holds_zero():
+    """An antenna -0.55 m forward stood beside very strong evidence; only how far to starboard it is was determined."""
+    sizes = {"forward": Estimate(-0.55, "m", (-1.84, 0.74)), "starboard": Estimate(-0.041, "m", (-0.05, -0.03))}
+    words = in_words(Cause("antenna_offset", 1, 160.0, 0.0, sizes, (), "12 of 12 runs", None, ""))
+    assert words.startswith("a position antenna an undetermined distance forward and -0.041 m to starboard")

@@ -206,10 +206,14 @@ def correlation(a: np.ndarray, b: np.ndarray, lag: int) -> tuple[float, int]:
     return float(np.sum(x * y) / max(float(np.sqrt(np.sum(x**2) * np.sum(y**2))), 1e-300)), int(ok.sum())
 
 
+_BAND = 2.576
+"""Standard deviations of a 99 % band, as MATLAB's `resid` draws it."""
+
+
 def correlogram(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Correlations of a(t + lag) with b(t) at lags 0 to `LAGS`, and their 95 % bounds if a is white."""
+    """Correlations of a(t + lag) with b(t) at lags 0 to `LAGS`, and their 99 % bounds if a is white."""
     found = [correlation(a, b, lag) for lag in range(LAGS + 1)]
-    return np.array([rho for rho, _ in found]), np.array([1.96 / np.sqrt(max(num, 1)) for _, num in found])
+    return np.array([rho for rho, _ in found]), np.array([_BAND / np.sqrt(max(num, 1)) for _, num in found])
 
 
 def _whiteness(trace: Trace) -> dict[str, float]:

@@ -75,11 +75,14 @@ def in_words(c: Cause) -> str:
 
 
 def _size(part: Effect, name: str, e: Estimate) -> str:
-    """A value alone, with two significant digits."""
+    """A value alone, with two significant digits; none where its interval holds zero."""
     if e.value is None or not math.isfinite(e.value):
         return "unknown size"
     if part.vector is not None and name == part.vector[1]:
         return _bearing(e.value)
+    low, high = e.ci95
+    if part.vector is None and low is not None and high is not None and low < 0.0 < high:
+        return "an undetermined distance" if e.unit == "m" else "an undetermined size"
     parameter = _parameter(part, name)
     if parameter is not None and parameter.relative:
         return _changed(e.value)
