@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
-
 from ..inference.baseline import REFIT_ITERATIONS
 from ..inference.gauss_newton import fit
 from ..inference.laplace import Fit
@@ -26,10 +24,9 @@ def needed_only(found: Fit, standard: Standard, spare_last: bool = True) -> Fit:
     """Drop terms that are no longer worth what is asked of them, judged on the linearisation, then by a refit."""
     index = 0
     while index < len(found.model.terms) - spare_last:
-        least = standard.threshold + standard.asked_besides(found.model.terms[index], np.max(np.abs(found.values[index])))
         if not EVIDENCE.check(found, index, standard).met:
             less = without(found, index)
-            if 2.0 * (found.evidence - less.evidence) < least:
+            if 2.0 * (found.evidence - less.evidence) < EVIDENCE.asked(found, index, standard):
                 found = less
                 continue
         index += 1

@@ -71,9 +71,13 @@ class Requirement:
 class Evidence(Requirement):
     """The cause is worth the threshold, and what is asked of its kind besides. Selection checks it by refits; here it is the linearised model's."""
 
+    @staticmethod
+    def asked(fit: Fit, index: int, standard: Standard) -> float:
+        """Gain that the cause must be worth."""
+        return standard.threshold + standard.asked_besides(fit.model.terms[index], np.max(np.abs(fit.values[index])))
+
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
-        asked = standard.threshold + standard.asked_besides(fit.model.terms[index], np.max(np.abs(fit.values[index])))
-        worth = fit.worth(index)
+        asked, worth = self.asked(fit, index, standard), fit.worth(index)
         return Verdict(bool(worth >= asked), f"score {worth:.1f} below {asked:.1f}")
 
     def least_size(self, seen: Score, standard: Standard) -> np.ndarray | float:
