@@ -354,7 +354,7 @@ def test_a_log_becomes_a_data_set(harbour, tmp_path):
     assert "mapping.toml" not in " ".join(draft.remarks)  # nothing was written
     written = sb.propose_mapping([log], tmp_path / "draft.toml")
     assert (tmp_path / "draft.toml").read_text() == written.text == draft.text
-    assert 'shipbench.import_log(LOG, "' in written.remarks[-1]
+    assert written.remarks[-1].strip() == f'shipbench.import_log({str(log)!r}, {str(tmp_path / "draft.toml")!r}, "ship.toml", out="my_trial")'
     with pytest.raises(InputError, match="another name with out=FILE, or force=True to replace it"):
         sb.propose_mapping(log, tmp_path / "draft.toml")
     (tmp_path / "mapping.toml").write_text(MAPPING)

@@ -48,7 +48,7 @@ def test_the_draft_of_a_clear_log_imports_as_it_is(propose, tmp_path):
     }  # fmt: skip
     for line in re.findall(r"(?m)^\w+ = \{.*$", text):
         assert "# GUESS" in line
-    assert "1 columns were not taken: remark" in result.stdout
+    assert "1 column was not taken: remark" in result.stdout
     done = CliRunner().invoke(app, ["data", "import", "log.csv", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"])
     assert done.exit_code == 0, done.output
     assert len(load_dataset("out")) == 1

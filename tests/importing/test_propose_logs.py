@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import tomllib
 import zipfile
 
@@ -335,7 +336,9 @@ def test_a_workbook_without_a_sheet_is_one_message(propose, tmp_path):
 
 
 def test_the_import_can_be_pasted_into_a_shell(propose, tmp_path):
-    done, _, _ = propose(write(tmp_path, "log.csv", logged(T)))
+    log = write(tmp_path, "log.csv", logged(T))
+    done, _, _ = propose(log)
     shown = done.stdout.split("then:", 1)[1]
-    assert " ".join(shown.replace("\\\n", " ").split()) == "shipbench data import LOG --map draft.toml --ship ship.toml --out FOLDER"
+    words = ["shipbench", "data", "import", str(log), "--map", "draft.toml", "--ship", "ship.toml", "--out", "my_trial"]
+    assert shlex.split(shown.replace("\\\n", " ")) == words
     assert all(line.endswith("\\") for line in shown.strip().splitlines()[:-1])

@@ -66,9 +66,10 @@ def write_proposal(
         put(write(), path)
     finally:
         fresh.unlink(missing_ok=True)
+    given = list(dict.fromkeys(str(log) for source in sources for log in source.logs))
     command = option(
-        f"shipbench data import LOG --map {shlex.quote(str(path))} --ship ship.toml --out FOLDER",
-        f'shipbench.import_log(LOG, "{path}", "ship.toml", out=FOLDER)',
+        f"shipbench data import {shlex.join(given)} --map {shlex.quote(str(path))} --ship ship.toml --out my_trial",
+        f'shipbench.import_log({(given[0] if len(given) == 1 else given)!r}, {str(path)!r}, "ship.toml", out="my_trial")',
     )
     return [*map(one_line, notes), f"Draft: {path}. Check every line marked GUESS, then:", command]
 
@@ -77,7 +78,8 @@ def _left_notes(source: SourceDraft) -> list[str]:
     names = [c.name for c in source.left]
     if not names:
         return []
-    return [f"{source.sample.path.name}: {len(names)} columns were not taken: {', '.join(names[:8])}{' ...' if len(names) > 8 else ''}."]
+    count, listed = "1 column was" if len(names) == 1 else f"{len(names)} columns were", ", ".join(names[:8])
+    return [f"{source.sample.path.name}: {count} not taken: {listed}{' ...' if len(names) > 8 else ''}."]
 
 
 def _sources(logs: Sequence[Path], known: dict[str, Any], file: dict[str, Any]) -> tuple[list[SourceDraft], list[str]]:
