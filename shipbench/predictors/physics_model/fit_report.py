@@ -55,7 +55,7 @@ class FitReport:
         """What a reader must know, "" where the physics fits."""
         if self.fits:
             return ""
-        hint = "See `shipbench data check` for signs and units."
+        hint = "`shipbench data check` looks at signs and units, `shipbench diagnose` at what the physics lacks."
         if self.reversed_error is not None and self.reversed_error < 0.5 * self.error:
             hint = f"With the opposite sign of n the training error is {self.reversed_error:.3g} m: the shaft speed looks reversed."
         return f"physics does not fit these runs: {self.summary}. {hint}"
