@@ -125,6 +125,19 @@ def test_resume_keeps_what_is_finished(cli, toy_folder):
     assert "(kept)" not in cli(*arguments).stderr
 
 
+def test_commands_that_pages_suggest_one_after_another_stand_beside_each_other(cli, toy_folder, tmp_path):
+    """The second had been refused, or had replaced the first: without --out both went into the folder of the data set."""
+    folder = toy_folder()
+    name = folder.name
+    first, second = ("run", "-m", "hold", "-d", folder, *QUICK), ("run", "-m", "hold", "-m", "physics[iterations=2]", "-d", folder, *QUICK)
+    assert f"Results: runs/{name}\n" in cli(*first).stdout
+    assert f"Results: runs/{name}-2\n" in cli(*second).stdout
+    assert f"Results: runs/{name}\n" in cli(*first).stdout  # the same study again
+    resumed = cli(*second, "--resume")
+    assert f"Results: runs/{name}-2\n" in resumed.stdout
+    assert "ok (kept)" in resumed.stderr
+
+
 def test_a_users_own_class_runs_and_its_failure_is_exit_code_one(cli, toy_folder, tmp_path):
     (tmp_path / "mine.py").write_text(
         "import numpy as np\n"

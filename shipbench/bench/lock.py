@@ -55,23 +55,38 @@ def claimed(out: Path) -> Iterator[None]:
         os.close(handle)  # and with it the lock, which the system also takes from a killed process
 
 
+def free_folder(base: Path, tasks: Sequence[Task], resume: bool) -> Path:
+    """Folder for a study for which none was given: `base`, or `base-2` and so on where another study is there. `resume`: that of the same tasks,
+    `base` where there is none."""
+    number, folder = 1, base
+    while (there := _tasks_of(folder)) is not None and there != list(tasks):
+        number += 1
+        folder = base.with_name(f"{base.name}-{number}")
+    return base if resume and there is None else folder
+
+
 def refuse_other_study(out: Path, tasks: Sequence[Task]) -> None:
     """Keep the results of another study from being replaced: a folder holds the tables of one.
 
     Raises:
         InputError: `out` holds results of other tasks, or results that do not tell of which.
     """
-    if not any((out / name).exists() for name in ("study.json", "rows.parquet", "summary.json")):
-        return
-    try:
-        same = [make_task(task) for task in read_json(out / "study.json")["tasks"]] == list(tasks)
-    except (InputError, KeyError, TypeError):  # a damaged file may hold anything
-        same = False
-    if not same:
+    there = _tasks_of(out)
+    if there is not None and there != list(tasks):
         raise InputError(
             f"{out} holds the results of another study, which would be replaced. Give {_elsewhere()}. To go on there, give "
             f"{option('--resume', 'resume=True')}: finished fits of these models are kept, and the tables become those of this study."
         )
+
+
+def _tasks_of(out: Path) -> list[Task] | None:
+    """Tasks of the study in `out`; none of results that do not tell; None where there are no results."""
+    if not any((out / name).exists() for name in ("study.json", "rows.parquet", "summary.json")):
+        return None
+    try:
+        return [make_task(task) for task in read_json(out / "study.json")["tasks"]]
+    except (InputError, KeyError, TypeError):  # a damaged file may hold anything
+        return []
 
 
 def _refuse_links(out: Path) -> None:

@@ -128,7 +128,9 @@ def run(
     history: Annotated[float | None, typer.Option(help="Seconds before the start that models may use (default 0).")] = None,
     stride: Annotated[float | None, typer.Option(help="Seconds between scored windows (default: the horizon).")] = None,
     max_runs: Annotated[int | None, typer.Option(help="Use only that many runs, evenly spread.")] = None,
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for the results (default runs/<name>).")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for the results (default runs/<name>; <name>-2 beside another study).")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Keep what the same code, data and task scored before.")] = False,
     executor: Annotated[str, typer.Option(help="Where the cells run: local, processes or dask; the numbers are the same.")] = "local",
     workers: Annotated[int | None, typer.Option(help="Number of processes at a time (default: one for each CPU).")] = None,
@@ -144,6 +146,7 @@ def run(
     """Fit, roll out and score models; print the leaderboard."""
     from ..bench.executors import Execution
     from ..bench.isolate import Limits
+    from ..bench.lock import free_folder
     from ..bench.progress import make_progress
     from ..bench.runner import run_tasks
     from ..bench.task import load_tasks
@@ -156,7 +159,8 @@ def run(
     }  # fmt: skip
     execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit), device, wait)
     tasks = load_tasks(config, overrides)
-    folder = out or Path("runs") / (Path(config).stem if config else file_name(Path(tasks[0].dataset).name))
+    name = Path(config).stem if config else file_name(Path(tasks[0].dataset).name)
+    folder = out or free_folder(Path("runs") / name, tasks, resume)
     outcome = run_tasks(tasks, folder, resume=resume, execution=execution, progress=make_progress(quiet or as_json), command=str(ctx.obj))
     tell = say if not quiet and not as_json else lambda line: None
     written = write_boards(outcome.results, folder, str(ctx.obj), tell=tell)
