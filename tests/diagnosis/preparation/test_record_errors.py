@@ -113,9 +113,11 @@ def test_samples_rarer_than_a_turn_are_refused():
 def test_noise_of_a_ship_at_rest_and_a_gyro_s_constant_error_are_no_contradiction():
     rng = np.random.default_rng(0)
     still = [replace(run, states=run.states * 0.0 + 0.5 * rng.standard_normal(run.states.shape) * (np.arange(10) < 2)) for run in trials().runs]
-    refuse_contradictions(Prepared(trials().with_runs(still)))
+    prepared = Prepared(trials().with_runs(still))
+    assert refuse_contradictions(prepared) is prepared
     drifting = [replace(run, states=run.states + 0.002 * (np.arange(10) == R)) for run in trials().runs]
-    refuse_contradictions(Prepared(trials().with_runs(drifting)))
+    prepared = Prepared(trials().with_runs(drifting))
+    assert refuse_contradictions(prepared) is prepared
 
 
 def test_a_data_set_is_read_again_as_its_folder_would_be():
