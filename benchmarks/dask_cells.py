@@ -2,9 +2,11 @@
 
     python benchmarks/dask_cells.py [CELLS=1000] [WORKERS=2]
 
-Starts a scheduler and workers of one thread on this machine (needs `shipbench[dask]`), runs CELLS cells (5 folds, CELLS / 5 seeds) of a cheap
-seeded model on them, kills one worker (`kill -9`) when a third is done and starts another in its place, then runs the same cells locally.
-Prints the number of cells, how many were lost or differ, the seconds of both and the machine. Exit code 1: a cell was lost or differs.
+Starts a scheduler and workers of one thread on this machine (needs `shipbench[dask]`), runs CELLS cells (5 folds, CELLS
+/ 5 seeds) of a cheap seeded model on them, kills one worker (`kill -9`) when a third is done and starts another in its
+place, then runs the same cells locally.
+Prints the number of cells, how many were lost or differ, the seconds of both and the machine. Exit code 1: a cell was
+lost or differs.
 """
 
 from __future__ import annotations
@@ -73,13 +75,20 @@ def main() -> int:
         file = Path(folder, "drawn.py")
         file.write_text(MODEL)
         seeds = range(cells // 5)
-        task = make_task({"dataset": "harbour90", "models": [f"{file}:Drawn"], "max_runs": 10, "horizon_s": 30, "seeds": seeds})
+        task = make_task(
+            {"dataset": "harbour90", "models": [f"{file}:Drawn"], "max_runs": 10, "horizon_s": 30, "seeds": seeds}
+        )
         processes = [start("dask_scheduler", "--host", "127.0.0.1", "--port", str(PORT))]
         try:
             time.sleep(5)
             processes += [start_worker() for _ in range(workers)]
             began = time.monotonic()
-            there = run_tasks([task], Path(folder, "dask"), execution=Execution("dask", scheduler=SCHEDULER), progress=KillOne(processes))
+            there = run_tasks(
+                [task],
+                Path(folder, "dask"),
+                execution=Execution("dask", scheduler=SCHEDULER),
+                progress=KillOne(processes),
+            )
             seconds = time.monotonic() - began
         finally:
             for process in processes:
@@ -88,10 +97,19 @@ def main() -> int:
         here = run_tasks([task], Path(folder, "local"))
         local = time.monotonic() - began
     times = ["fit_s", "predict_s"]
-    by_cell = [dict(list(o.rows.drop(columns=times).reset_index(drop=True).groupby(["fold", "seed"]))) for o in (there, here)]
+    by_cell = [
+        dict(list(o.rows.drop(columns=times).reset_index(drop=True).groupby(["fold", "seed"]))) for o in (there, here)
+    ]
     lost = [cell for cell in by_cell[1] if cell not in by_cell[0]]
-    different = [c for c in by_cell[1] if c not in lost and not by_cell[0][c].reset_index(drop=True).equals(by_cell[1][c].reset_index(drop=True))]
-    print(f"cells: {len(by_cell[1])}; lost: {len(lost)}; different from local: {len(different)}; failed: {len(there.failed)}; one worker killed")
+    different = [
+        c
+        for c in by_cell[1]
+        if c not in lost and not by_cell[0][c].reset_index(drop=True).equals(by_cell[1][c].reset_index(drop=True))
+    ]
+    print(
+        f"cells: {len(by_cell[1])}; lost: {len(lost)}; different from local: {len(different)}; failed: "
+        f"{len(there.failed)}; one worker killed"
+    )
     print(f"Dask: {seconds:.0f} s with {workers} workers; local: {local:.0f} s; {machine()}")
     return 1 if lost or different or there.failed else 0
 

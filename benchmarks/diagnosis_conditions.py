@@ -1,9 +1,11 @@
-"""The diagnosis under other conditions than those of its suite: another quality or length of the record, less known of the ship. About 20 minutes.
+"""The diagnosis under other conditions than those of its suite: another quality or length of the record, less known of
+the ship. About 20 minutes.
 
     python benchmarks/diagnosis_conditions.py [--runs DRAWS] [--only CONDITION ...] [--quick] [--json FILE]
 
-Seven ships (drawn variants of KCS and KVLCC2; Mariner, a tanker, S175 and a navy ship in their authors' equations). Under every condition each of
-them sails once with nothing hidden, where nothing must be named, and once with a cause that any ship shows, which must be named first.
+Seven ships (drawn variants of KCS and KVLCC2; Mariner, a tanker, S175 and a navy ship in their authors' equations).
+Under every condition each of them sails once with nothing hidden, where nothing must be named, and once with a cause
+that any ship shows, which must be named first.
 """
 
 from __future__ import annotations
@@ -57,7 +59,10 @@ def quick_samples(data: Dataset) -> Dataset:
     def finer(run: Run) -> Run:
         t = np.arange(5 * (len(run) - 1) + 1) * data.dt / 5
         held = np.minimum(np.arange(len(t)) // 5, len(run) - 1)
-        motion, actuators = CubicSpline(run.t, run.states[:, :6])(t), [np.interp(t, run.t, a) for a in run.states[:, 6:].T]
+        motion, actuators = (
+            CubicSpline(run.t, run.states[:, :6])(t),
+            [np.interp(t, run.t, a) for a in run.states[:, 6:].T],
+        )
         states = np.column_stack([motion, *actuators]) + noise * rng.standard_normal((len(t), 10))
         return replace(run, t=t, states=states, inputs=run.inputs[held])
 
@@ -98,7 +103,10 @@ def low_passed(data: Dataset) -> Dataset:
 def bare(data: Dataset) -> Dataset:
     """A ship file of main dimensions (and places of thrusters)."""
     own = data.ship
-    return replace(data, ship=Ship(name=own.name, L=own.L, B=own.B, T=own.T, displacement=own.displacement, thrusters=own.thrusters))
+    return replace(
+        data,
+        ship=Ship(name=own.name, L=own.L, B=own.B, T=own.T, displacement=own.displacement, thrusters=own.thrusters),
+    )
 
 
 def commands(data: Dataset) -> Dataset:
@@ -152,9 +160,19 @@ def main() -> None:
                 odd = [j for j in jobs if j not in silent and j not in right]
                 wrong = [f"ship {j[1]}, {j[2] or 'nothing'}: {', '.join(found[j][1]) or found[j][0]}" for j in odd]
                 measure.record(
-                    given, {"condition": condition, "draw": draw, "silent": len(silent), "right": len(right), "of": len(SHIPS), "wrong": wrong}
+                    given,
+                    {
+                        "condition": condition,
+                        "draw": draw,
+                        "silent": len(silent),
+                        "right": len(right),
+                        "of": len(SHIPS),
+                        "wrong": wrong,
+                    },
                 )
-                score = f"of {len(SHIPS)} without a cause {len(silent)} none, of {len(SHIPS)} with one {len(right)} right"
+                score = (
+                    f"of {len(SHIPS)} without a cause {len(silent)} none, of {len(SHIPS)} with one {len(right)} right"
+                )
                 print(f"{condition}: {score}", *wrong, sep="; ", flush=True)
 
 

@@ -1,11 +1,13 @@
-"""The search for causes in 24 runs beside one with a full refit of every candidate: the same plain fit, candidates, evidence and causes.
+"""The search for causes in 24 runs beside one with a full refit of every candidate: the same plain fit, candidates,
+evidence and causes.
 
     python benchmarks/diagnosis_refits.py [--runs N] [--quick] [--json FILE]
 
-Both sides start from the fitted plain model and add causes until none gains more than the threshold. Ours is the whole `select` of a diagnosis: the
-sensitivities of all candidates at once, the score of each on the one Gram matrix, refits of the few that are worth one, given up where they promise
-far less than the best, beginnings at single runs, and the backward pass. Peer: in every round the same refit for each candidate in turn, as one would
-do without the Gram matrix; nothing else is looked for. The target is 20 times.
+Both sides start from the fitted plain model and add causes until none gains more than the threshold. Ours is the whole
+`select` of a diagnosis: the sensitivities of all candidates at once, the score of each on the one Gram matrix, refits
+of the few that are worth one, given up where they promise
+far less than the best, beginnings at single runs, and the backward pass. Peer: in every round the same refit for each
+candidate in turn, as one would do without the Gram matrix; nothing else is looked for. The target is 20 times.
 """
 
 from __future__ import annotations
@@ -45,7 +47,9 @@ def compare(title: str, hidden: tuple[Hidden, ...], given: measure.Options) -> N
     trials = Trials(runs=6, samples=60) if given.quick else Trials(runs=24, samples=120)
     plant = Plant.of(sea_trials(load_mmg_ship("kcs"), 3, hidden, trials))
     candidates = candidates_for(plant, QUICK if given.quick else None)
-    plain = select(null_fit(plant, Scales(plant), candidates), THRESHOLD).null  # beside the noise that suits the causes, too
+    plain = select(
+        null_fit(plant, Scales(plant), candidates), THRESHOLD
+    ).null  # beside the noise that suits the causes, too
     best: dict[str, Fit] = {}
 
     def ours() -> None:
@@ -54,15 +58,22 @@ def compare(title: str, hidden: tuple[Hidden, ...], given: measure.Options) -> N
     def peer() -> None:
         best["peer"] = refit_everything(plain)
 
-    print(f"{len(candidates)} candidates (shapes counted), {len(plant.seg.run)} pieces of {trials.runs} runs of {trials.samples} s")
+    print(
+        f"{len(candidates)} candidates (shapes counted), {len(plant.seg.run)} pieces of {trials.runs} runs of "
+        f"{trials.samples} s"
+    )
     measure.compare(
-        title, measure.Side("select(plain fit, threshold)", ours), measure.Side("refit of every candidate in every round", peer), given, target=20.0,
+        title, measure.Side("select(plain fit, threshold)", ours),
+        measure.Side("refit of every candidate in every "
+                     "round", peer), given, target=20.0,
         warm=False,
     )  # fmt: skip
     named = {side: [term.label for term in found.model.terms] for side, found in best.items()}
     if named["ours"] != named["peer"]:
         raise SystemExit(f"the sides do not agree: {named['ours']} and {named['peer']}.")
-    measure.agree(f"log evidence of {named['ours'] or 'the plain model'}", abs(best["ours"].evidence - best["peer"].evidence), 0.5)
+    measure.agree(
+        f"log evidence of {named['ours'] or 'the plain model'}", abs(best["ours"].evidence - best["peer"].evidence), 0.5
+    )
 
 
 def main() -> None:
@@ -74,7 +85,11 @@ def main() -> None:
     cause = compass if given.quick else Hidden(EFFECTS.get("current"), (0.25, -0.2))
     compare(f"causes of a diagnosis, {cause.effect.name} hidden", (cause,), given)
     if not given.quick:
-        compare("causes of a diagnosis, heading_bias and rudder_offset hidden", (compass, Hidden(EFFECTS.get("rudder_offset"), (0.03,))), given)
+        compare(
+            "causes of a diagnosis, heading_bias and rudder_offset hidden",
+            (compass, Hidden(EFFECTS.get("rudder_offset"), (0.03,))),
+            given,
+        )
     compare("causes of a diagnosis, nothing hidden", (), given)
 
 

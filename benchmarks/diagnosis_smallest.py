@@ -1,10 +1,11 @@
-"""Whether "the smallest size that would have been named" is true: effects hidden at a share of that size and at more than it. About 10 minutes.
+"""Whether "the smallest size that would have been named" is true: effects hidden at a share of that size and at more
+than it. About 10 minutes.
 
     python benchmarks/diagnosis_smallest.py [--runs DRAWS] [--only SHIP ...] [--quick] [--json FILE]
 
-A ship sails with nothing hidden, and the diagnosis says what it would have seen. Then she sails the same trials, with the same noise, with one effect
-after another at half and at one and a half times that size (one amplitude of it; of a wind or a current to the north; normal where each run has its
-own; of a bank, whose place would have to be drawn, none).
+A ship sails with nothing hidden, and the diagnosis says what it would have seen. Then she sails the same trials, with
+the same noise, with one effect after another at half and at one and a half times that size (one amplitude of it; of a
+wind or a current to the north; normal where each run has its own; of a bank, whose place would have to be drawn, none).
 """
 
 from __future__ import annotations
@@ -30,9 +31,14 @@ LEFT_OUT = ("bank_suction",)
 
 
 def smallest(ship: int, draw: int) -> dict[str, float]:
-    """Size of the first amplitude of every effect from which on it would have been named; without those that could not have been."""
+    """Size of the first amplitude of every effect from which on it would have been named; without those that could not
+    have been."""
     found = diagnose(trials(ship, draw, draw), gain=False)
-    sizes = {c.effect: next(iter(c.detectable.values())) for c in found.candidates if c.detectable and c.effect not in LEFT_OUT}
+    sizes = {
+        c.effect: next(iter(c.detectable.values()))
+        for c in found.candidates
+        if c.detectable and c.effect not in LEFT_OUT
+    }
     return {name: size for name, size in sizes.items() if isfinite(size)}
 
 
@@ -71,10 +77,19 @@ def main() -> None:
                 jobs = [(name, size, factor) for factor in FACTORS for name, size in kept.items()]
                 outcomes = list(pool.map(partial(named, ship=ship, draw=draw), jobs))
                 for factor in FACTORS:
-                    here = [(job, seen) for job, seen in zip(jobs, outcomes, strict=True) if job[2] == factor and seen is not None]
-                    against = [f"{job[0]} ({', '.join(seen[1]) or 'none'})" for job, seen in here if seen[0] != (factor > 1.0)]
+                    here = [
+                        (job, seen)
+                        for job, seen in zip(jobs, outcomes, strict=True)
+                        if job[2] == factor and seen is not None
+                    ]
+                    against = [
+                        f"{job[0]} ({', '.join(seen[1]) or 'none'})" for job, seen in here if seen[0] != (factor > 1.0)
+                    ]
                     total[factor] += [seen[0] for _, seen in here]
-                    line = f"{SHIPS[ship]}, {factor:g} times the smallest size: named {sum(seen[0] for _, seen in here)} of {len(here)}"
+                    line = (
+                        f"{SHIPS[ship]}, {factor:g} times the smallest size: named "
+                        f"{sum(seen[0] for _, seen in here)} of {len(here)}"
+                    )
                     measure.record(given, {"ship": SHIPS[ship], "factor": factor, "line": line, "against": against})
                     print(line, *against, sep="; ", flush=True)
     print(*(f"all, {factor:g} times: named {sum(seen)} of {len(seen)}" for factor, seen in total.items()), sep="; ")

@@ -1,8 +1,10 @@
-"""Whole diagnoses, selection and fits repeated on every training part: 24 runs of 120 s within 60 s on two cores, 90 runs within three minutes.
+"""Whole diagnoses, selection and fits repeated on every training part: 24 runs of 120 s within 60 s on two cores, 90
+runs within three minutes.
 
     python benchmarks/diagnosis_time.py [--quick] [--json FILE]
 
-Trials of KCS with nothing hidden, with a current, and with a compass error beside a slow rudder. One run of each, machine code in the cache folder.
+Trials of KCS with nothing hidden, with a current, and with a compass error beside a slow rudder. One run of each,
+machine code in the cache folder.
 """
 
 from __future__ import annotations
@@ -21,7 +23,10 @@ LIMITS = {24: 60.0, 90: 180.0}
 HIDDEN = {
     "nothing": (),
     "current": (Hidden(EFFECTS.get("current"), (0.25, -0.2)),),
-    "heading_bias, rudder_rate_limit": (Hidden(EFFECTS.get("heading_bias"), (0.03,)), Hidden(EFFECTS.get("rudder_rate_limit"), (0.02,))),
+    "heading_bias, rudder_rate_limit": (
+        Hidden(EFFECTS.get("heading_bias"), (0.03,)),
+        Hidden(EFFECTS.get("rudder_rate_limit"), (0.02,)),
+    ),
 }
 
 
@@ -37,8 +42,21 @@ def main() -> None:
             seconds = time.perf_counter() - began
             named = [c.effect for c in found.causes]
             gain = None if found.gain is None else round(found.gain.relative, 3)
-            measure.record(given, {"runs": runs, "hidden": name, "named": named, "gain": gain, "seconds": round(seconds, 1), "limit": limit})
-            print(f"{runs} runs, hidden: {name}; named: {', '.join(named) or 'none'}; gain: {gain}; {seconds:.0f} s (limit {limit:.0f} s)")
+            measure.record(
+                given,
+                {
+                    "runs": runs,
+                    "hidden": name,
+                    "named": named,
+                    "gain": gain,
+                    "seconds": round(seconds, 1),
+                    "limit": limit,
+                },
+            )
+            print(
+                f"{runs} runs, hidden: {name}; named: {', '.join(named) or 'none'}; gain: {gain}; {seconds:.0f} s "
+                f"(limit {limit:.0f} s)"
+            )
 
 
 if __name__ == "__main__":

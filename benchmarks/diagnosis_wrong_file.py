@@ -1,9 +1,10 @@
-"""The diagnosis with the ship file of another ship, which may be a slip of the user: what it says of it, and what it names. About 6 minutes.
+"""The diagnosis with the ship file of another ship, which may be a slip of the user: what it says of it, and what it
+names. About 6 minutes.
 
     python benchmarks/diagnosis_wrong_file.py [--runs DRAWS] [--only SHIP ...] [--quick] [--json FILE]
 
-Seven ships sail with nothing hidden (drawn variants of KCS and KVLCC2; Mariner, a tanker, S175 and a navy ship in their authors' equations) and are
-diagnosed with the file of each of the six others.
+Seven ships sail with nothing hidden (drawn variants of KCS and KVLCC2; Mariner, a tanker, S175 and a navy ship in their
+authors' equations) and are diagnosed with the file of each of the six others.
 """
 
 from __future__ import annotations
@@ -34,7 +35,10 @@ def summary(found: Sequence[tuple[str, list[str]]]) -> str:
     of = Counter(said for said, _ in found)
     unsaid = sum(said == "no word" and bool(names) for said, names in found)
     silent = sum(not names for _, names in found)
-    return f"of {len(found)} files doubted {of['doubted']}, warned of {of['a warning']}; nothing named {silent}, named without a word {unsaid}"
+    return (
+        f"of {len(found)} files doubted {of['doubted']}, warned of {of['a warning']}; nothing named {silent}, "
+        f"named without a word {unsaid}"
+    )
 
 
 def main() -> None:
@@ -44,9 +48,18 @@ def main() -> None:
     total: list[tuple[str, list[str]]] = []
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         for ship in given.only or (SHIPS[:1] if given.quick else SHIPS):
-            jobs = [(SHIPS.index(ship), file, draw) for draw in range(given.runs) for file in range(len(SHIPS)) if SHIPS[file] != ship]
+            jobs = [
+                (SHIPS.index(ship), file, draw)
+                for draw in range(given.runs)
+                for file in range(len(SHIPS))
+                if SHIPS[file] != ship
+            ]
             found = list(pool.map(outcome, jobs))
-            named = [f"file of {SHIPS[job[1]]}, {said}: {', '.join(names)}" for job, (said, names) in zip(jobs, found, strict=True) if names]
+            named = [
+                f"file of {SHIPS[job[1]]}, {said}: {', '.join(names)}"
+                for job, (said, names) in zip(jobs, found, strict=True)
+                if names
+            ]
             measure.record(given, {"ship": ship, "summary": summary(found), "named": named})
             total += found
             print(f"{ship}: {summary(found)}", *named, sep="; ", flush=True)

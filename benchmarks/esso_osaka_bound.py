@@ -1,9 +1,10 @@
-"""What the extended physics of `leaderboards/esso_osaka.md` could reach at best: fitted to the very windows that it is scored on.
+"""What the extended physics of `leaderboards/esso_osaka.md` could reach at best: fitted to the very windows that it is
+scored on.
 
     python benchmarks/esso_osaka_bound.py  # half a minute; reads the local copy of the data
 
-No score: a model that has seen the truth. Where even that one is not below a target, no choice of its parameters is. Position RMSE [m], the mean over
-windows of 100 s, as on the leaderboard (`make_folds` of `configs/esso_osaka.toml`).
+No score: a model that has seen the truth. Where even that one is not below a target, no choice of its parameters is.
+Position RMSE [m], the mean over windows of 100 s, as on the leaderboard (`make_folds` of `configs/esso_osaka.toml`).
 """
 
 from __future__ import annotations
@@ -40,9 +41,16 @@ def main() -> None:
     extended = next(m for m in task.models if m.startswith("physics[piece="))
     for piece in PIECES:
         model = extended.replace("piece=50", f"piece={piece}")
-        for name, train in {"the training files": fold.train.merged(fold.valid), "the scored windows": fold.test}.items():
+        for name, train in {
+            "the training files": fold.train.merged(fold.valid),
+            "the scored windows": fold.test,
+        }.items():
             found = errors(model, train, fold.test)
-            print(f"pieces of {piece} s, fitted to {name}: " + ", ".join(f"{kind} {value:.2f}" for kind, value in found.items()), flush=True)
+            print(
+                f"pieces of {piece} s, fitted to {name}: "
+                + ", ".join(f"{kind} {value:.2f}" for kind, value in found.items()),
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -2,8 +2,9 @@
 
     python benchmarks/esso_osaka_wind.py  # 15 to 40 minutes of one core; reads the local copy of the data
 
-The diagnosis is given the runs without their wind channels. Where it names a wind per run, its value for every run (north and east, of where the wind
-comes from) is compared with the mean of the anemometer over that run, which it has not seen.
+The diagnosis is given the runs without their wind channels. Where it names a wind per run, its value for every run
+(north and east, of where the wind comes from) is compared with the mean of the anemometer over that run, which it has
+not seen.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ def measured(data: Dataset) -> np.ndarray:
 def seen(data: Dataset) -> np.ndarray | None:
     """The same from the motion alone, or None where no wind per run is named."""
     late = late_velocities_of(data)
-    found = analyse(plain_model(Plant.of(data if late is None else late[1]), settled=() if late is None else late_effects())).final
+    found = analyse(
+        plain_model(Plant.of(data if late is None else late[1]), settled=() if late is None else late_effects())
+    ).final
     for term, value in zip(found.model.terms, found.values, strict=True):
         if term.label == "wind_per_run":
             public = [term.effect.public(row) for row in value * found.scales.amplitudes(term, found.plant.c.L)]
@@ -52,7 +55,8 @@ def main() -> None:
     print("                                     north   east")
     for name, values in rows.items():
         print(f"{name:35} {values[0]:6.2f} {values[1]:6.2f}")
-    print(f"direction off by [deg], median of {len(turned)} runs: {np.median(turned):.0f}; of the {strong.sum()} with the most wind seen: "
+    print(f"direction off by [deg], median of {len(turned)} runs: {np.median(turned):.0f}; of the {strong.sum()} "
+          "with the most wind seen: "
           f"{np.median(turned[strong]):.0f} (90 would be chance)")  # fmt: skip
 
 

@@ -1,17 +1,20 @@
-"""The physics fit (72 runs of 120 s, 11 parameters) beside `scipy.optimize.least_squares` with finite differences on `solve_ivp` rollouts.
+"""The physics fit (72 runs of 120 s, 11 parameters) beside `scipy.optimize.least_squares` with finite differences on
+`solve_ivp` rollouts.
 
     python benchmarks/fit_scipy.py [--runs N] [--quick] [--json FILE]
 
-Both minimise the same weighted trajectory error of x, y, psi, u, v, r (eq. 9) within the same bounds, to the same relative decrease of the cost
-(1e-4).
+Both minimise the same weighted trajectory error of x, y, psi, u, v, r (eq. 9) within the same bounds, to the same
+relative decrease of the cost (1e-4).
 
-- scipy: `least_squares(method="trf", jac="2-point")`, one `solve_ivp` (RK45, rtol 1e-6) a run. Its right-hand side is eq. (2) to (8) as straight
-  Python floats, made from the one formula, which is much faster than the formula on numpy scalars. Every parameter goes from 1 to 2 between its
-  bounds, from a start 2 % inside them, with differences of 0.1 %: other steps end in the noise of the adaptive solver, far from the optimum. It is
-  given the actuators for nothing, and it has no nonlinear constraints.
+- scipy: `least_squares(method="trf", jac="2-point")`, one `solve_ivp` (RK45, rtol 1e-6) a run. Its right-hand side is
+  eq. (2) to (8) as straight Python floats, made from the one formula, which is much faster than the formula on numpy
+  scalars. Every parameter goes from 1 to 2 between its bounds, from a start 2 % inside them, with differences of 0.1 %:
+  other steps end in the noise of the adaptive solver, far from the optimum. It is given the actuators for nothing, and
+  it has no nonlinear constraints.
 - shipbench: `Physics().fit(train)`, all of it: actuators, parameters under bounds and constraints, intervals.
 
-Checked: the cost at scipy's solution, by shipbench's rollouts, is within 3 % of ours (10 % with the 6 runs of `--quick`).
+Checked: the cost at scipy's solution, by shipbench's rollouts, is within 3 % of ours (10 % with the 6 runs of
+`--quick`).
 """
 
 from __future__ import annotations
@@ -35,18 +38,23 @@ from shipbench.records import Batch
 from shipbench.signals import MOTION
 
 _PYTHON = {
-    "ADD": "{0}+{1}", "SUB": "{0}-{1}", "MUL": "{0}*{1}", "DIV": "{0}/{1}", "NEG": "-{0}", "SQ": "{0}*{0}", "TWICE": "{0}+{0}", "INV": "1.0/{0}",
-    "FABS": "abs({0})", "SQRT": "sqrt({0})", "SIN": "sin({0})", "COS": "cos({0})", "EXP": "exp({0})", "ATAN2": "atan2({0},{1})",
+    "ADD": "{0}+{1}", "SUB": "{0}-{1}", "MUL": "{0}*{1}", "DIV": "{0}/{1}", "NEG": "-{0}", "SQ": "{0}*{0}",
+    "TWICE": "{0}+{0}", "INV": "1.0/{0}",
+    "FABS": "abs({0})", "SQRT": "sqrt({0})", "SIN": "sin({0})", "COS": "cos({0})", "EXP": "exp({0})",
+    "ATAN2": "atan2({0},{1})",
     "FMIN": "{0} if {0}<{1} else {1}", "FMAX": "{0} if {0}>{1} else {1}",
 }  # fmt: skip
 
 
 def right_hand_side(c: eq2.Coefficients) -> Callable[..., tuple[float, ...]]:
-    """d(x, y, psi, u, v, r)/dt = f(state, actuators, p) in plain Python floats, made from the instructions of the one formula."""
+    """d(x, y, psi, u, v, r)/dt = f(state, actuators, p) in plain Python floats, made from the instructions of the one
+    formula."""
     x, a, p = ca.SX.sym("x", 6), ca.SX.sym("a", 4), ca.SX.sym("p", eq2.NUM_PARAMETERS)
     _, _, psi, u, v, r = ca.vertsplit(x)
     n, delta, F_b, F_s = ca.vertsplit(a)
-    rates = ca.vertcat(*kinematics(psi, u, v, r), *eq2.accelerations(u, v, r, n, delta, F_b, F_s, None, c, ca.vertsplit(p)))
+    rates = ca.vertcat(
+        *kinematics(psi, u, v, r), *eq2.accelerations(u, v, r, n, delta, F_b, F_s, None, c, ca.vertsplit(p))
+    )
     formula = ca.Function("rates", [x, a, p], [rates], {"cse": True})
     names = {number: name[3:] for name, number in vars(ca).items() if name.startswith("OP_")}
     lines = ["def rates(x, a, p):"]
@@ -87,13 +95,24 @@ def scipy_fit(model: Physics, batch: Batch) -> np.ndarray:
 
     def residual(q: np.ndarray) -> np.ndarray:
         p = (q * scale).tolist()
-        return np.concatenate([((rollout(p, s, a) - y) * weight).ravel() for s, a, y in zip(batch.s0[:, MOTION], known, truth, strict=True)])
+        return np.concatenate(
+            [
+                ((rollout(p, s, a) - y) * weight).ravel()
+                for s, a, y in zip(batch.s0[:, MOTION], known, truth, strict=True)
+            ]
+        )
 
     low, high = (b / scale for b in bounds(scale))
     width = high - low
     start = 1.0 + (np.clip(_START, low + 0.02 * width, high - 0.02 * width) - low) / width
     found = least_squares(
-        lambda z: residual(low + (z - 1.0) * width), start, bounds=(1.0, 2.0), method="trf", jac="2-point", diff_step=1e-3, ftol=1e-4
+        lambda z: residual(low + (z - 1.0) * width),
+        start,
+        bounds=(1.0, 2.0),
+        method="trf",
+        jac="2-point",
+        diff_step=1e-3,
+        ftol=1e-4,
     )
     print(f"  scipy: {found.nfev} steps, {found.njev} Jacobians, {found.message}")
     return (low + (found.x - 1.0) * width) * scale
@@ -113,8 +132,13 @@ def main() -> None:
     model, batch = Physics().fit(train), train.batch()
     found: list[np.ndarray] = []
     ours = Side("Physics().fit(train)", lambda: Physics().fit(train))
-    peer = Side("least_squares(residual, start, bounds=..., jac='2-point'), a solve_ivp a run", lambda: found.append(scipy_fit(model, batch)))
-    result = measure.compare(f"fit of 11 parameters to {len(train)} runs of 120 s", ours, peer, given, target=100, warm=False)
+    peer = Side(
+        "least_squares(residual, start, bounds=..., jac='2-point'), a solve_ivp a run",
+        lambda: found.append(scipy_fit(model, batch)),
+    )
+    result = measure.compare(
+        f"fit of 11 parameters to {len(train)} runs of 120 s", ours, peer, given, target=100, warm=False
+    )
     if not given.quick:
         print(f"  under 3 s: {'reached' if result.ours_s < 3.0 else 'NOT reached'} ({result.ours_s:.2f} s)")
     ours_cost, peer_cost = cost(model, batch, model.p), cost(model, batch, found[-1])

@@ -1,11 +1,14 @@
-"""Fuzzing of the command line: small valid inputs are mutated, and each is given to its commands in a process with limits.
+"""Fuzzing of the command line: small valid inputs are mutated, and each is given to its commands in a process with
+limits.
 
     python benchmarks/fuzz_inputs.py --each 130 --seed 0 [--only "saved model"] [--keep FOLDER]
 
-Kinds: data set, ship, csv, mapping, mat, xlsx, task, results, saved model, diagnosis. Mutations: bytes flipped, cut, doubled; values of other types,
-huge, not finite, nested without end; names with separators and escapes; wrong shapes. Per kind it counts what came: ok (exit 0), refused (2), failed
-(1, work that failed), and what must never come: traceback, crash (ended by a signal), hang (over 60 s), memory (over 2 GB), outside (written
-elsewhere than --out). A case at fault is kept, and printed with its command. POSIX only: processes are forked, so that libraries are loaded once.
+Kinds: data set, ship, csv, mapping, mat, xlsx, task, results, saved model, diagnosis. Mutations: bytes flipped, cut,
+doubled; values of other types, huge, not finite, nested without end; names with separators and escapes; wrong shapes.
+Per kind it counts what came: ok (exit 0), refused (2), failed (1, work that failed), and what must never come:
+traceback, crash (ended by a signal), hang (over 60 s), memory (over 2 GB), outside (written elsewhere than --out). A
+case at fault is kept, and printed with its command. POSIX only: processes are forked, so that libraries are loaded
+once.
 """
 
 from __future__ import annotations
@@ -53,10 +56,45 @@ TEXTS = [
     "%s%n",
     "NaN",
 ]
-TOML = ["nan", "inf", "-inf", "1e308", "-1", "0", "1e-320", "9" * 30, "0x" + "f" * 5000, "true", "[]", "{}", "[[1, 2], [3]]", "[1e308, nan]", DEEP,
-        "1979-05-27T07:32:00Z", '"text"', "{a = {b = {c = 1}}}", "[true, \"1\"]", *(json.dumps(t) for t in TEXTS)]  # fmt: skip
-JSON = [None, float("nan"), float("inf"), 1e308, -1, 0, 10**30, True, [], {}, [[1, 2], [3]], {"a": {"b": [1]}}, "text", [None], *TEXTS]
-CELLS = ["nan", "inf", "1e308", "-1e308", "", "text", "9" * 400, "1,5", '"', "\x00", "0x10", "2024-01-01", "true", "-", "1e", *TEXTS]
+TOML = ["nan", "inf", "-inf", "1e308", "-1", "0", "1e-320", "9" * 30, "0x" + "f" * 5000, "true", "[]", "{}",
+    "[[1, 2], [3]]", "[1e308, nan]", DEEP,
+        "1979-05-27T07:32:00Z", '"text"', "{a = {b = {c = 1}}}", "[true, \"1\"]",
+        *(json.dumps(t) for t in TEXTS)]  # fmt: skip
+JSON = [
+    None,
+    float("nan"),
+    float("inf"),
+    1e308,
+    -1,
+    0,
+    10**30,
+    True,
+    [],
+    {},
+    [[1, 2], [3]],
+    {"a": {"b": [1]}},
+    "text",
+    [None],
+    *TEXTS,
+]
+CELLS = [
+    "nan",
+    "inf",
+    "1e308",
+    "-1e308",
+    "",
+    "text",
+    "9" * 400,
+    "1,5",
+    '"',
+    "\x00",
+    "0x10",
+    "2024-01-01",
+    "true",
+    "-",
+    "1e",
+    *TEXTS,
+]
 
 
 def flipped(content: bytes, rng: Rng) -> bytes:
@@ -157,8 +195,10 @@ def arrays(content: bytes, rng: Rng) -> bytes:
     name = str(rng.choice(list(found)))
     array = np.asarray(found[name])
     changes: list[Callable[[], object]] = [
-        lambda: array[..., None], lambda: array.ravel()[:1], lambda: np.full(array.shape, np.nan), lambda: np.full(array.shape, 1e308),
-        lambda: array.astype(str), lambda: np.zeros((0, *array.shape)), lambda: np.zeros(array.shape, dtype=complex), lambda: np.float64(3.0),
+        lambda: array[..., None], lambda: array.ravel()[:1], lambda: np.full(array.shape, np.nan),
+        lambda: np.full(array.shape, 1e308),
+        lambda: array.astype(str), lambda: np.zeros((0, *array.shape)), lambda: np.zeros(array.shape, dtype=complex),
+        lambda: np.float64(3.0),
     ]  # fmt: skip
     roll = int(rng.integers(len(changes) + 2))
     if roll == len(changes):
@@ -193,14 +233,20 @@ def parquet(content: bytes, rng: Rng) -> bytes:
         case 3:
             found = found.append_column(name, found.column(j))
         case 4:
-            found = found.rename_columns([str(rng.choice(TEXTS)) if k == j else c for k, c in enumerate(found.column_names)])
+            found = found.rename_columns(
+                [str(rng.choice(TEXTS)) if k == j else c for k, c in enumerate(found.column_names)]
+            )
         case 5:
             found = found.slice(0, int(rng.integers(n)))
         case 6:
             found = found.set_column(j, name, pa.array([[1.0]] * n) if rng.random() < 0.5 else pa.nulls(n))
         case _:
             found = found.replace_schema_metadata(
-                {"pandas": str(rng.choice(["{", "[]", '{"index_columns": [3]}', '{"columns": 1}', '{"index_columns": ["t"]}']))}
+                {
+                    "pandas": str(
+                        rng.choice(["{", "[]", '{"index_columns": [3]}', '{"columns": 1}', '{"index_columns": ["t"]}'])
+                    )
+                }
             )
     pq.write_table(found, made := io.BytesIO())
     return made.getvalue()
@@ -237,8 +283,10 @@ IMPORT = ["data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ds/sh
 REPORT = ["report", "res", "--out", "out/r.html", "-q"]
 EXPORT = ["data", "export", "ds", "--format", "csv", "--out", "out/d"]
 LOADED = (
-    "matplotlib.pyplot", "pyarrow.parquet", "scipy.io", "shipbench.cli.app", "shipbench.bench.runner", "shipbench.leaderboard.pages",
-    "shipbench.reports.study.page", "shipbench.checking", "shipbench.importing.importer", "shipbench.importing.propose", "shipbench.data.files",
+    "matplotlib.pyplot", "pyarrow.parquet", "scipy.io", "shipbench.cli.app", "shipbench.bench.runner",
+    "shipbench.leaderboard.pages",
+    "shipbench.reports.study.page", "shipbench.checking", "shipbench.importing.importer", "shipbench.importing.propose",
+    "shipbench.data.files",
     "shipbench.predictors.physics",
 )  # fmt: skip
 KINDS: dict[str, tuple[list[str], list[list[str]]]] = {
@@ -250,13 +298,19 @@ KINDS: dict[str, tuple[list[str], list[list[str]]]] = {
     "csv": (["log.csv"], [IMPORT, ["data", "import", "log.csv", "--propose", "out/m.toml"]]),
     "mapping": (["mapping.toml"], [IMPORT]),
     "mat": (["log.mat", "set.mat"], [["MAT"]]),
-    "xlsx": (["log.xlsx"], [["data", "import", "log.xlsx", *IMPORT[3:]], ["data", "import", "log.xlsx", "--propose", "out/m.toml"]]),
+    "xlsx": (
+        ["log.xlsx"],
+        [["data", "import", "log.xlsx", *IMPORT[3:]], ["data", "import", "log.xlsx", "--propose", "out/m.toml"]],
+    ),
     "task": (["task.toml"], [["run", "--config", "task.toml", "--out", "out/r", "-q"]]),
     "results": (
         ["res/*.json", "res/*.parquet", "res/cells/*/*/*/*.*", "res/truth/*/*"],
         [["leaderboard", "res", "--verify", "--out", "out/l"], REPORT],
     ),
-    "saved model": (["res/cells/*/*/fold0-seed0/model/*"], [["predict", "MODEL", "ds", "--out", "out/p.csv"], [*HOLD[:2], "MODEL", *HOLD[3:]]]),
+    "saved model": (
+        ["res/cells/*/*/fold0-seed0/model/*"],
+        [["predict", "MODEL", "ds", "--out", "out/p.csv"], [*HOLD[:2], "MODEL", *HOLD[3:]]],
+    ),
     "diagnosis": (["diagnosis/diagnosis.json"], [[*REPORT, "--diagnosis", "diagnosis"]]),
 }
 
@@ -290,11 +344,13 @@ def make_base(folder: Path) -> None:
     write_mat(data, folder / "set.mat")
     with (folder / "ds" / "dataset.toml").open("a") as file:
         file.write(
-            'cut = [[3.0, 4.0]]\nfill = {r = [[5.0, 6.0]]}\n[units]\nu = "m/s"\n[signs]\ndelta = "starboard"\n[scale]\nv = 1.0\n[delay]\nr = 0.0\n'
+            'cut = [[3.0, 4.0]]\nfill = {r = [[5.0, 6.0]]}\n[units]\nu = "m/s"\n[signs]\ndelta = "starboard"\n'
+            "[scale]\nv = 1.0\n[delay]\nr = 0.0\n"
         )
     states = runs[1].states
     log = {
-        "time": t, "lat": 52 + states[:, 0] / 111e3, "lon": 4 + states[:, 1] / 69e3, "heading": np.rad2deg(states[:, 2]) % 360,
+        "time": t, "lat": 52 + states[:, 0] / 111e3, "lon": 4 + states[:, 1] / 69e3,
+        "heading": np.rad2deg(states[:, 2]) % 360,
         "rpm": states[:, 6], "rudder": np.rad2deg(states[:, 7]),
     }  # fmt: skip
     lines = [",".join(log), *(",".join(f"{v:.7f}" for v in row) for row in zip(*log.values(), strict=True))]
@@ -307,14 +363,17 @@ def make_base(folder: Path) -> None:
         book.active.append([cell if cell.isalpha() else float(cell) for cell in line.split(",")])
     book.save(folder / "log.xlsx")
     (folder / "mapping.toml").write_text(
-        'name = "trial"\ndt = 1.0\nactuators = "measured"\n[time]\ncolumn = "time"\nformat = "s"\n[file]\ndecimal = "."\n'
+        'name = "trial"\ndt = 1.0\nactuators = "measured"\n[time]\ncolumn = "time"\nformat = "s"\n[file]\n'
+        'decimal = "."\n'
         "[split]\ngap = 5.0\nshortest = 2.0\n"
         '[channels.lat]\ncolumn = "lat"\nunit = "deg"\n[channels.lon]\ncolumn = "lon"\nunit = "deg"\n'
         '[channels.psi]\ncolumn = "heading"\nunit = "deg"\n'
-        '[channels.n]\ncolumn = "rpm"\nunit = "rpm"\n[channels.delta]\ncolumn = "rudder"\nunit = "deg"\nsign = "starboard"\n'
+        '[channels.n]\ncolumn = "rpm"\nunit = "rpm"\n[channels.delta]\ncolumn = "rudder"\nunit = "deg"\n'
+        'sign = "starboard"\n'
     )
     (folder / "task.toml").write_text(
-        'dataset = "ds"\nmodels = ["hold"]\nhorizon_s = 5.0\nhistory_s = 1.0\nfolds = 2\nsplit = "folds"\nstride_s = 5.0\n'
+        'dataset = "ds"\nmodels = ["hold"]\nhorizon_s = 5.0\nhistory_s = 1.0\nfolds = 2\nsplit = "folds"\n'
+        "stride_s = 5.0\n"
         'seeds = [0]\nmetrics = ["ed", "edh"]\n'
         'valid_runs = 1\nmax_runs = 4\nfold_seed = 0\ntitle = "a title"\n'
     )
@@ -334,13 +393,15 @@ def make_base(folder: Path) -> None:
     }
     (folder / "diagnosis").mkdir()
     (folder / "diagnosis" / "diagnosis.json").write_text(json.dumps({
-        "schema": 1, "dataset": "circles", "base_model": "physics", "verdict": "found", "causes": [cause], "candidates": [], "what_is_wrong": [],
+        "schema": 1, "dataset": "circles", "base_model": "physics", "verdict": "found", "causes": [cause],
+        "candidates": [], "what_is_wrong": [],
         "extended_model": "physics+current", "fingerprint": data.fingerprint, "seconds": 1.0,
     }))  # fmt: skip
 
 
 def run_alone(arguments: list[str], folder: Path, case: Path) -> tuple[int, float, str]:
-    """Exit code (negative: the signal; 124: a hang), greatest memory [bytes] and last words of a command that runs in `folder`, forked."""
+    """Exit code (negative: the signal; 124: a hang), greatest memory [bytes] and last words of a command that runs in
+    `folder`, forked."""
     said = case / "said.txt"
     process = os.fork()
     if process == 0:
@@ -365,7 +426,11 @@ def _child(arguments: list[str], folder: Path, said: Path) -> None:
         out = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(out, 1)
         os.dup2(out, 2)
-        used = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE") if Path("/proc/self/statm").exists() else 0
+        used = (
+            int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+            if Path("/proc/self/statm").exists()
+            else 0
+        )
         resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         from shipbench.cli.app import main
@@ -395,8 +460,11 @@ def files_of(case: Path) -> dict[str, tuple[int, int]]:
     return found
 
 
-def one(base: Path, case: Path, kind: str, rng: Rng, mutate: Callable[[Path, Rng], bytes] = mutated) -> tuple[str, list[str], str]:
-    """Mutate one file of a kind in a fresh copy, run one of its commands, and tell what came, the command, and its last words."""
+def one(
+    base: Path, case: Path, kind: str, rng: Rng, mutate: Callable[[Path, Rng], bytes] = mutated
+) -> tuple[str, list[str], str]:
+    """Mutate one file of a kind in a fresh copy, run one of its commands, and tell what came, the command, and its last
+    words."""
     work = case / "work"
     shutil.copytree(base, work)
     (work / "out").mkdir()
@@ -410,7 +478,14 @@ def one(base: Path, case: Path, kind: str, rng: Rng, mutate: Callable[[Path, Rng
     name = path.relative_to(work).parts[0]
     if command == ["MAT"]:
         command = ["data", "import", name, *IMPORT[3:]] if name == "log.mat" else ["data", "export", name, *EXPORT[3:]]
-    command = [name if word == "ds" and name in ("dz", "dp") else str(path.parent.relative_to(work)) if word == "MODEL" else word for word in command]
+    command = [
+        name
+        if word == "ds" and name in ("dz", "dp")
+        else str(path.parent.relative_to(work))
+        if word == "MODEL"
+        else word
+        for word in command
+    ]
     before, around = files_of(case), sorted(os.listdir(case.parent))
     os.environ |= {"HOME": str(case), "TMPDIR": str(case / "tmp")}
     tempfile.tempdir = None
@@ -426,10 +501,16 @@ def one(base: Path, case: Path, kind: str, rng: Rng, mutate: Callable[[Path, Rng
     return {0: "ok", 1: "failed", 2: "refused"}.get(code, "crash"), command, said
 
 
-def fuzz(each: int, seed: int, folder: Path, kinds: list[str] | None = None, tell: Callable[[str], None] = print) -> dict[str, Counter[str]]:
+def fuzz(
+    each: int, seed: int, folder: Path, kinds: list[str] | None = None, tell: Callable[[str], None] = print
+) -> dict[str, Counter[str]]:
     """Counts per kind; `folder` is empty, and keeps the cases that are at fault, of which `tell` gets a line each."""
     # What commands keep for the user, and must be able to write, lies apart from the cases.
-    os.environ |= {"SHIPBENCH_CACHE": str(folder / "cache"), "MPLCONFIGDIR": str(folder / "matplotlib"), "SHIPBENCH_COMPILER": "none"}
+    os.environ |= {
+        "SHIPBENCH_CACHE": str(folder / "cache"),
+        "MPLCONFIGDIR": str(folder / "matplotlib"),
+        "SHIPBENCH_COMPILER": "none",
+    }
     for library in LOADED:  # before the processes fork
         importlib.import_module(library)
     home = {name: os.environ.get(name) for name in ("HOME", "TMPDIR")}
@@ -465,7 +546,9 @@ def main() -> None:
     options.add_argument("--each", type=int, default=130, help="inputs of each kind")
     options.add_argument("--seed", type=int, default=0)
     options.add_argument("--only", action="append", choices=list(KINDS))
-    options.add_argument("--keep", type=Path, help="folder for the cases at fault (default: a new one among the temporary files)")
+    options.add_argument(
+        "--keep", type=Path, help="folder for the cases at fault (default: a new one among the temporary files)"
+    )
     given = options.parse_args()
     folder = given.keep or Path(tempfile.mkdtemp(prefix="fuzz-"))
     folder.mkdir(parents=True, exist_ok=True)

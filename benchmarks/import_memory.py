@@ -2,8 +2,9 @@
 
     python benchmarks/import_memory.py [megabytes=1000] [csv|parquet] [measured|derived]
 
-Writes the log to a temporary folder, imports it in a process of its own, prints the figures and deletes everything. `derived` leaves the speeds
-out of the mapping, so that they come from the smoother. The peak must stay below 2 GB and must not grow with the log.
+Writes the log to a temporary folder, imports it in a process of its own, prints the figures and deletes everything.
+`derived` leaves the speeds out of the mapping, so that they come from the smoother. The peak must stay below 2 GB and
+must not grow with the log.
 """
 
 from __future__ import annotations
@@ -20,7 +21,18 @@ import pyarrow as pa
 import pyarrow.parquet
 
 SHIP = 'name = "bench"\nL = 130.0\nB = 20.0\nT = 7.0\nmass = 1.2e7\n'
-UNITS = {"x": "m", "y": "m", "psi": "deg", "u": "m/s", "v": "m/s", "r": "deg/s", "n": "rpm", "delta": "deg", "n_c": "rpm", "delta_c": "deg"}
+UNITS = {
+    "x": "m",
+    "y": "m",
+    "psi": "deg",
+    "u": "m/s",
+    "v": "m/s",
+    "r": "deg/s",
+    "n": "rpm",
+    "delta": "deg",
+    "n_c": "rpm",
+    "delta_c": "deg",
+}
 RATE, BLOCK = 10.0, 200_000
 IMPORT = (
     "import resource, sys\n"
@@ -62,7 +74,11 @@ def write_log(path: Path, megabytes: float) -> None:
 
 def main() -> None:
     """Generate, import, print."""
-    size, suffix, speeds = float((sys.argv[1:2] or ["1000"])[0]), (sys.argv[2:3] or ["csv"])[0], (sys.argv[3:4] or ["measured"])[0]
+    size, suffix, speeds = (
+        float((sys.argv[1:2] or ["1000"])[0]),
+        (sys.argv[2:3] or ["csv"])[0],
+        (sys.argv[3:4] or ["measured"])[0],
+    )
     units = {k: v for k, v in UNITS.items() if speeds == "measured" or k not in ("u", "v", "r")}
     with tempfile.TemporaryDirectory() as folder:
         log, mapping, ship = (Path(folder, name) for name in (f"log.{suffix}", "mapping.toml", "ship.toml"))
@@ -71,11 +87,24 @@ def main() -> None:
         mapping.write_text(f'name = "bench"\ndt = 1.0\n[time]\ncolumn = "t"\n[channels]\n{channels}')
         ship.write_text(SHIP)
         began = time.perf_counter()
-        command = ["data", "import", str(log), "--map", str(mapping), "--ship", str(ship), "--out", str(Path(folder, "out"))]
+        command = [
+            "data",
+            "import",
+            str(log),
+            "--map",
+            str(mapping),
+            "--ship",
+            str(ship),
+            "--out",
+            str(Path(folder, "out")),
+        ]
         done = subprocess.run([sys.executable, "-c", IMPORT, *command], capture_output=True, text=True, check=False)
         seconds = time.perf_counter() - began
         peak = int(done.stderr.rsplit("peak ", 1)[1]) * (1 if sys.platform == "darwin" else 1024)
-        print(f"{suffix}, {log.stat().st_size / 1e6:.0f} MB, {speeds} speeds: exit {done.returncode}, {seconds:.0f} s, peak {peak / 1e6:.0f} MB")
+        print(
+            f"{suffix}, {log.stat().st_size / 1e6:.0f} MB, {speeds} speeds: exit {done.returncode}, {seconds:.0f} "
+            f"s, peak {peak / 1e6:.0f} MB"
+        )
         print(done.stdout.splitlines()[0] if done.stdout else done.stderr)
 
 

@@ -1,7 +1,7 @@
 """How often the leaderboard's intervals hold the truth and its paired test rejects models that are equally good.
 
-Errors are drawn for runs (clusters) with some windows each: a part that the windows of a run share and a part of their own, standard deviation 0.7
-each, as they are (normal) or exponentiated (lognormal, skewed as errors are).
+Errors are drawn for runs (clusters) with some windows each: a part that the windows of a run share and a part of their
+own, standard deviation 0.7 each, as they are (normal) or exponentiated (lognormal, skewed as errors are).
 
     python benchmarks/interval_coverage.py  # 5 s
 """
@@ -41,4 +41,7 @@ if __name__ == "__main__":
         for windows in (1, 3):
             for lognormal in (False, True):
                 covered, rejected = shares(rng, runs, windows, lognormal)
-                print(f"{runs:4d}  {windows:7d}  {'lognormal' if lognormal else 'normal':9s}  {100 * covered:22.1f} %  {100 * rejected:26.1f} %")
+                print(
+                    f"{runs:4d}  {windows:7d}  {'lognormal' if lognormal else 'normal':9s}  {100 * covered:22.1f} % "
+                    f" {100 * rejected:26.1f} %"
+                )

@@ -1,8 +1,10 @@
-"""`shipbench run -m hold` on a data set of many short runs, beside a plain reading of its table by pandas: seconds, processor seconds, most memory.
+"""`shipbench run -m hold` on a data set of many short runs, beside a plain reading of its table by pandas: seconds,
+processor seconds, most memory.
 
     python benchmarks/many_runs.py [--only csv|parquet]
 
-The data set: 10,000 runs of 61 to 121 samples, 2 s apart, so that the horizon of 120 s fits once or twice. Each side runs in a process of its own;
+The data set: 10,000 runs of 61 to 121 samples, 2 s apart, so that the horizon of 120 s fits once or twice. Each side
+runs in a process of its own;
 both must find all runs. Target: 30 s and 1 GB, on one idle core.
 """
 
@@ -34,9 +36,26 @@ def write_set(folder: Path, runs: int, suffix: str) -> Path:
     run, k = np.repeat(np.arange(runs), length), np.concatenate([np.arange(n) for n in length])
     t, rate, u = DT * k, rng.uniform(0.02, 0.08, runs)[run], rng.uniform(3.0, 8.0, runs)[run]
     psi, delta = 0.4 * np.sin(rate * t), 0.2 * np.sign(np.cos(rate * t))
-    motion = {"x": u * t, "y": 20.0 * psi, "psi": psi, "u": u, "v": -5.0 * psi * rate, "r": 0.4 * rate * np.cos(rate * t)}
+    motion = {
+        "x": u * t,
+        "y": 20.0 * psi,
+        "psi": psi,
+        "u": u,
+        "v": -5.0 * psi * rate,
+        "r": 0.4 * rate * np.cos(rate * t),
+    }
     noisy = {name: value + 0.001 * rng.standard_normal(len(t)) for name, value in motion.items()}
-    table = pd.DataFrame({"trajectory": [f"run{i:05d}" for i in run], "t": t, **noisy, "n": 1.5, "delta": delta, "n_c": 1.5, "delta_c": delta})
+    table = pd.DataFrame(
+        {
+            "trajectory": [f"run{i:05d}" for i in run],
+            "t": t,
+            **noisy,
+            "n": 1.5,
+            "delta": delta,
+            "n_c": 1.5,
+            "delta_c": delta,
+        }
+    )
     path = folder / f"trajectories.{suffix}"
     table.to_parquet(path, index=False) if suffix == "parquet" else table.to_csv(path, index=False)
     (folder / "dataset.toml").write_text(f'name = "many_runs"\ndt = {DT}\nactuators = "measured"\n')
@@ -59,7 +78,11 @@ def child(*arguments: str) -> tuple[str, dict[str, float]]:
     if process.returncode:
         raise SystemExit(f"{' '.join(arguments)}: exit code {process.returncode}")
     memory = used.ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e9
-    return said, {"seconds": time.perf_counter() - began, "processor_s": used.ru_utime + used.ru_stime, "memory_GB": memory}
+    return said, {
+        "seconds": time.perf_counter() - began,
+        "processor_s": used.ru_utime + used.ru_stime,
+        "memory_GB": memory,
+    }
 
 
 def beside_pandas(folder: Path, suffix: str, given: measure.Options) -> None:
@@ -75,12 +98,21 @@ def beside_pandas(folder: Path, suffix: str, given: measure.Options) -> None:
     scored = pd.read_parquet(out / "rows.parquet")["parent"].nunique()
     measure.agree("the number of runs", max(abs(scored - runs), abs(int(counted) - runs)), 0)
     assert json.loads(said)["failed"] == []
-    print(f"{runs} runs of 61 to 121 samples, {path.stat().st_size / 1e6:.0f} MB of {suffix}  (median of {given.runs} interleaved runs)")
+    print(
+        f"{runs} runs of 61 to 121 samples, {path.stat().st_size / 1e6:.0f} MB of {suffix}  (median of {given.runs} "
+        "interleaved runs)"
+    )
     found = {what: {key: median(t[key] for t in taken) for key in taken[0]} for what, taken in sides.items()}
     for what, figures in found.items():
-        print(f"  {figures['seconds']:8.2f} s, of the processor {figures['processor_s']:8.2f} s, {figures['memory_GB']:6.3f} GB  {what}")
+        print(
+            f"  {figures['seconds']:8.2f} s, of the processor {figures['processor_s']:8.2f} s, "
+            f"{figures['memory_GB']:6.3f} GB  {what}"
+        )
     ours, plain = found.values()
-    print(f"  ratio of processor seconds {ours['processor_s'] / plain['processor_s']:.1f}; of memory {ours['memory_GB'] / plain['memory_GB']:.1f}")
+    print(
+        f"  ratio of processor seconds {ours['processor_s'] / plain['processor_s']:.1f}; of memory "
+        f"{ours['memory_GB'] / plain['memory_GB']:.1f}"
+    )
     measure.record(given, {"runs": runs, "table": suffix, "sides": found})
 
 

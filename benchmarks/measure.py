@@ -2,10 +2,12 @@
 
     options = measure.options(__doc__)
     measure.header(options, "shipmmg", "scipy")
-    measure.compare("batch of rollouts", ours=Side("simulator.rollout(s0, U, 1.0)", ours), peer=Side("simulate_mmg_3dof(...)", peer), given=options)
+    measure.compare("batch of rollouts", ours=Side("simulator.rollout(s0, U, 1.0)", ours),
+    peer=Side("simulate_mmg_3dof(...)", peer), given=options)
 
-The sides run in turn (ours, peer, ours, peer ...), so that whatever else the machine does falls on both; the first call of each is not counted
-unless `warm=False`. A ratio is the median of the ratios of neighbouring runs; beside it stand the smallest and the largest of them.
+The sides run in turn (ours, peer, ours, peer ...), so that whatever else the machine does falls on both; the first call
+of each is not counted unless `warm=False`. A ratio is the median of the ratios of neighbouring runs; beside it stand
+the smallest and the largest of them.
 """
 
 from __future__ import annotations
@@ -30,8 +32,8 @@ ALWAYS = ("shipbench", "numpy", "scipy", "casadi", "torch")
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line asked for: interleaved runs of both sides, a small case for a test of the script itself, a file for the figures, and some
-    of the cases (none: all)."""
+    """What the command line asked for: interleaved runs of both sides, a small case for a test of the script itself, a
+    file for the figures, and some of the cases (none: all)."""
 
     runs: int
     quick: bool
@@ -41,7 +43,8 @@ class Options:
 
 @dataclass(frozen=True)
 class Side:
-    """One of two sides: its call as a user would write it, and the function that makes it; `calls` is how many a run of `call` makes."""
+    """One of two sides: its call as a user would write it, and the function that makes it; `calls` is how many a run of
+    `call` makes."""
 
     command: str
     call: Callable[[], Any]
@@ -50,7 +53,8 @@ class Side:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Seconds of one call of each side (medians) and peer over ours: median, smallest and largest ratio of neighbouring runs."""
+    """Seconds of one call of each side (medians) and peer over ours: median, smallest and largest ratio of neighbouring
+    runs."""
 
     title: str
     ours_command: str
@@ -65,15 +69,26 @@ class Comparison:
 
 
 def options(doc: str | None, runs: int = 5, cases: Sequence[str] = ()) -> Options:
-    """`--runs N`, `--quick`, `--json FILE`, and `--only CASE ...` where there are `cases`; `doc` is the script's docstring, shown by `--help`."""
+    """`--runs N`, `--quick`, `--json FILE`, and `--only CASE ...` where there are `cases`; `doc` is the script's
+    docstring, shown by `--help`."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=runs, help=f"interleaved runs of both sides (default {runs})")
-    parser.add_argument("--quick", action="store_true", help="a small case, to see that the script runs and both sides agree; its times say nothing")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="append machine and figures to FILE, one JSON document a line")
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="a small case, to see that the script runs and both sides agree; its times say nothing",
+    )
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="append machine and figures to FILE, one JSON document a line"
+    )
     if cases:
-        parser.add_argument("--only", nargs="+", choices=cases, default=[], metavar="CASE", help=f"some of: {'; '.join(cases)}")
+        parser.add_argument(
+            "--only", nargs="+", choices=cases, default=[], metavar="CASE", help=f"some of: {'; '.join(cases)}"
+        )
     given = parser.parse_args()
-    return Options(1 if given.quick else max(1, given.runs), given.quick, given.json, tuple(given.only) if cases else ())
+    return Options(
+        1 if given.quick else max(1, given.runs), given.quick, given.json, tuple(given.only) if cases else ()
+    )
 
 
 def machine() -> dict[str, Any]:
@@ -81,7 +96,9 @@ def machine() -> dict[str, Any]:
     name = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.is_file():
-        models = [line.partition(":")[2].strip() for line in info.read_text().splitlines() if line.startswith("model name")]
+        models = [
+            line.partition(":")[2].strip() for line in info.read_text().splitlines() if line.startswith("model name")
+        ]
         name = models[0] if models else name
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
@@ -123,7 +140,9 @@ def seconds(call: Callable[[], Any]) -> float:
     return time.perf_counter() - begin
 
 
-def compare(title: str, ours: Side, peer: Side, given: Options, *, target: float | None = None, warm: bool = True) -> Comparison:
+def compare(
+    title: str, ours: Side, peer: Side, given: Options, *, target: float | None = None, warm: bool = True
+) -> Comparison:
     """Time both sides in turn, `given.runs` times, print what came out, and append it to `given.json`.
 
     Args:
@@ -145,7 +164,11 @@ def compare(title: str, ours: Side, peer: Side, given: Options, *, target: float
     print(f"{title}  (median of {found.runs} interleaved runs)")
     print(f"  ours  {found.ours_s:12.6f} s  {found.ours_command}")
     print(f"  peer  {found.peer_s:12.6f} s  {found.peer_command}")
-    aim = "" if target is None or given.quick else f"; target {target:g}: {'reached' if found.ratio >= target else 'NOT reached'}"
+    aim = (
+        ""
+        if target is None or given.quick
+        else f"; target {target:g}: {'reached' if found.ratio >= target else 'NOT reached'}"
+    )
     print(f"  ratio {found.ratio:10.2f}    ({found.ratio_min:.2f} .. {found.ratio_max:.2f}){aim}")
     record(given, asdict(found))
     return found
@@ -154,7 +177,13 @@ def compare(title: str, ours: Side, peer: Side, given: Options, *, target: float
 def record(given: Options, figures: dict[str, Any]) -> None:
     """Append the script's name, machine, versions and `figures` to `given.json`, if one was asked for."""
     if given.json is not None:
-        line = {"script": Path(sys.argv[0]).name, "quick": given.quick, "machine": machine(), "versions": versions(), **figures}
+        line = {
+            "script": Path(sys.argv[0]).name,
+            "quick": given.quick,
+            "machine": machine(),
+            "versions": versions(),
+            **figures,
+        }
         with given.json.open("a") as file:
             file.write(json.dumps(line) + "\n")
 
@@ -166,5 +195,8 @@ def agree(what: str, difference: float, accepted: float, unit: str = "") -> None
         SystemExit: they do not; the ratio of two different results would mean nothing.
     """
     if not difference <= accepted:
-        raise SystemExit(f"the sides do not agree in {what}: they differ by {difference:.3g} {unit}, accepted: {accepted:.3g} {unit}.")
+        raise SystemExit(
+            f"the sides do not agree in {what}: they differ by {difference:.3g} {unit}, accepted: {accepted:.3g} "
+            f"{unit}."
+        )
     print(f"agree: {what} within {difference:.3g} {unit} (accepted {accepted:.3g})")

@@ -2,10 +2,12 @@
 
     python benchmarks/mlp_training.py [--runs 5] [--quick] [--json FILE]
 
-The peer is what Lightning's documentation shows: a LightningModule, `DataLoader(TensorDataset(x, y), batch_size=32, shuffle=True)` and a Trainer,
-here without logging, checkpoints, progress bar, model summary and sanity check. A second peer yields its shuffled batches from tensors in memory. All
-sides have the same samples, standardised alike, the same layers, Adam 1e-3, batches of 32, the same number of epochs without early stopping, and keep
-the weights of the lowest validation loss. Ours trains all five folds in every run, a peer one fold, another in each: times are seconds a fold.
+The peer is what Lightning's documentation shows: a LightningModule, `DataLoader(TensorDataset(x, y), batch_size=32,
+shuffle=True)` and a Trainer, here without logging, checkpoints, progress bar, model summary and sanity check. A second
+peer yields its shuffled batches from tensors in memory. All sides have the same samples, standardised alike, the same
+layers, Adam 1e-3, batches of 32, the same number of epochs without early stopping, and keep
+the weights of the lowest validation loss. Ours trains all five folds in every run, a peer one fold, another in each:
+times are seconds a fold.
 """
 
 from __future__ import annotations
@@ -33,15 +35,22 @@ from shipbench.records import Dataset
 
 EPOCHS = 200
 TARGET, ACCEPTED = 6.0, 0.15
-"""Ratio to be reached, and by how much our losses may exceed the peer's in the mean over folds: seeds make that much, folds more."""
+"""Ratio to be reached, and by how much our losses may exceed the peer's in the mean over folds: seeds make that much,
+folds more."""
 Samples = tuple[Tensor, Tensor, Tensor, Tensor]
 
 
 def samples(train: Dataset, valid: Dataset) -> Samples:
     """Standardised inputs and outputs of training and validation (x, z, x, z)."""
-    part, held = (transitions(*StackedRuns.of([side]).members()[0], InputFeatures(side.inputs)) for side in (train, valid))
+    part, held = (
+        transitions(*StackedRuns.of([side]).members()[0], InputFeatures(side.inputs)) for side in (train, valid)
+    )
     scale_x, scale_z = Scaler.fit([torch.cat(part[:2], dim=-1)]), Scaler.fit([part[2]])
-    found = [scale(x[None])[0] for y, u, after in (part, held) for scale, x in ((scale_x, torch.cat([y, u], dim=-1)), (scale_z, after))]
+    found = [
+        scale(x[None])[0]
+        for y, u, after in (part, held)
+        for scale, x in ((scale_x, torch.cat([y, u], dim=-1)), (scale_z, after))
+    ]
     return found[0], found[1], found[2], found[3]
 
 
@@ -120,7 +129,9 @@ def network(arrays: dict[str, Any]) -> nn.Module:
 @torch.no_grad()
 def losses(nets: Sequence[nn.Module], data: Sequence[Samples]) -> tuple[float, float]:
     """Mean squared error on training and validation, mean over folds."""
-    found = [[float((net(x) - z).square().mean()) for x, z in (d[:2], d[2:])] for net, d in zip(nets, data, strict=True)]
+    found = [
+        [float((net(x) - z).square().mean()) for x, z in (d[:2], d[2:])] for net, d in zip(nets, data, strict=True)
+    ]
     mean = torch.tensor(found).mean(0)
     return float(mean[0]), float(mean[1])
 
@@ -146,7 +157,11 @@ def main() -> None:
         def plain(kept: dict[int, nn.Module] = peers, in_memory: bool = in_memory) -> None:
             kept[len(kept) % len(pairs)] = train_peer(data[len(kept) % len(pairs)], epochs, in_memory)
 
-        loader = "batches from tensors in memory" if in_memory else "DataLoader(TensorDataset(x, z), batch_size=32, shuffle=True)"
+        loader = (
+            "batches from tensors in memory"
+            if in_memory
+            else "DataLoader(TensorDataset(x, z), batch_size=32, shuffle=True)"
+        )
         measure.compare(
             f"mlp, {epochs} epochs of {len(data[0][0])} samples, seconds a fold",
             measure.Side("MLP.fit_group(5 models, 5 folds)", stacked, calls=len(pairs)),
@@ -156,11 +171,17 @@ def main() -> None:
             warm=False,
         )
         done = sorted(peers)
-        a, b = losses([ours[i] for i in done], [data[i] for i in done]), losses([peers[i] for i in done], [data[i] for i in done])
+        a, b = (
+            losses([ours[i] for i in done], [data[i] for i in done]),
+            losses([peers[i] for i in done], [data[i] for i in done]),
+        )
         for side, pair in (("ours", a), ("peer", b)):
             print(f"  {side} loss, mean of folds {done}: training {pair[0]:.6f}, validation {pair[1]:.6f}")
-        # the weights kept are those of the best validation; how far training went on is a matter of the epoch that this was
-        measure.agree("validation loss, ours above the peer's by a share of", a[1] / b[1] - 1.0, 1.0 if given.quick else ACCEPTED)
+        # the weights kept are those of the best validation; how far training went on is a matter of the epoch that this
+        # was
+        measure.agree(
+            "validation loss, ours above the peer's by a share of", a[1] / b[1] - 1.0, 1.0 if given.quick else ACCEPTED
+        )
 
 
 if __name__ == "__main__":

@@ -1,12 +1,14 @@
-"""Training of the neural ODE on five folds, all together, beside torchdiffeq used as its README shows, a fold at a time.
+"""Training of the neural ODE on five folds, all together, beside torchdiffeq used as its README shows, a fold at a
+time.
 
     python benchmarks/neural_ode_training.py [--runs 3] [--quick] [--json FILE]
 
-The peer is the README's loop: a module with `forward(t, y)`, `odeint(func, y0, t)` over a batch of windows, the loss of the states, `backward`, one
-step of the optimiser; with the solver that odeint takes by default (dopri5, its own tolerances), and with `method="rk4"` on our grid. All sides have
-the same equations (our physics and a network of the same size), windows, stages, loss, AdamW, clipping, learning rates and validation, and keep the
-weights of the best validation rollout; each fits the physics of its folds first. Ours trains five folds in every run, a peer one, another in each:
-times are seconds a fold. dopri5 has fewer epochs (it takes hours else), ours then as many.
+The peer is the README's loop: a module with `forward(t, y)`, `odeint(func, y0, t)` over a batch of windows, the loss of
+the states, `backward`, one step of the optimiser; with the solver that odeint takes by default (dopri5, its own
+tolerances), and with `method="rk4"` on our grid. All sides have the same equations (our physics and a network of the
+same size), windows, stages, loss, AdamW, clipping, learning rates and validation, and keep the weights of the best
+validation rollout; each fits the physics of its folds first. Ours trains five folds in every run, a peer one, another
+in each: times are seconds a fold. dopri5 has fewer epochs (it takes hours else), ours then as many.
 """
 
 from __future__ import annotations
@@ -25,7 +27,14 @@ from torchdiffeq import odeint
 from shipbench.data.base import load_dataset
 from shipbench.predictors import neural_ode
 from shipbench.predictors.networks.residual import Drive, Grid, Residual, features, typical_accelerations
-from shipbench.predictors.networks.stacked import Scaler, generators, hold_error, position_score, random_windows, trapezoid_pose
+from shipbench.predictors.networks.stacked import (
+    Scaler,
+    generators,
+    hold_error,
+    position_score,
+    random_windows,
+    trapezoid_pose,
+)
 from shipbench.predictors.physics import Physics
 from shipbench.records import Dataset
 from shipbench.signals import PSI, R, U, V, X, Y
@@ -43,7 +52,9 @@ class Rates(nn.Module):
         super().__init__()
         self.model, self.step = model, step
         last = path[:, -1, 1:]
-        self.knots = torch.cat([path.flatten(1, 2), last], dim=1).unbind(1)  # at the beginnings and middles of the steps, half a step apart
+        self.knots = torch.cat([path.flatten(1, 2), last], dim=1).unbind(
+            1
+        )  # at the beginnings and middles of the steps, half a step apart
 
     def forward(self, t: Tensor, y: Tensor) -> Tensor:
         place = min(2.0 * float(t.detach()) / self.step, len(self.knots) - 1.0)
@@ -85,7 +96,11 @@ class Peer:
         runs, starts = random_windows(self.runs.counts, self.runs.S.shape[1] - steps, batch, self.draw)
         y, pose, truth = self.roll(self.runs, runs[0], starts[0], steps)
         error = ((y - truth[..., U : R + 1]) / scale[:3]).square().sum(-1)
-        error = error + ((pose[..., :2] - truth[..., X : Y + 1]) / scale[3]).square().sum(-1) + ((pose[..., 2] - truth[..., PSI]) / scale[4]).square()
+        error = (
+            error
+            + ((pose[..., :2] - truth[..., X : Y + 1]) / scale[3]).square().sum(-1)
+            + ((pose[..., 2] - truth[..., PSI]) / scale[4]).square()
+        )
         small = self.model.learned(features(truth[:, -1], None)[None]).square().sum(-1)
         return error.mean() + self.spec.penalty * small.mean()
 
@@ -128,7 +143,9 @@ def train_ours(pairs: list[Pair], epochs: int) -> list[float]:
     return found
 
 
-def against(title: str, pairs: list[Pair], epochs: int, method: str | None, given: measure.Options, accepted: float) -> None:
+def against(
+    title: str, pairs: list[Pair], epochs: int, method: str | None, given: measure.Options, accepted: float
+) -> None:
     """One peer."""
     ours: list[float] = []
     peers: list[float] = []

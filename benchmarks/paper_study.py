@@ -1,9 +1,11 @@
-"""The whole study of the paper: `shipbench run --config configs/paper.toml`, where its time goes, and whether its scores are the published ones.
+"""The whole study of the paper: `shipbench run --config configs/paper.toml`, where its time goes, and whether its
+scores are the published ones.
 
     python benchmarks/paper_study.py [--quick] [--json FILE]
 
-Target: under 6 minutes on two cores. `--quick` runs configs/smoke.toml and compares nothing. The largest change of a run's ED is printed for each
-model; that of models which draw nothing must stay below 1e-6 m, networks round differently from machine to machine.
+Target: under 6 minutes on two cores. `--quick` runs configs/smoke.toml and compares nothing. The largest change of a
+run's ED is printed for each model; that of models which draw nothing must stay below 1e-6 m, networks round differently
+from machine to machine.
 """
 
 from __future__ import annotations
@@ -40,14 +42,20 @@ def main() -> None:
     print(f"shipbench run --config {config}  {wall:.1f} s{aim}")
     for model, seconds in sorted(spent.items(), key=lambda item: -item[1]):
         print(f"  {model:24s} {seconds:8.2f} s fit and prediction")
-    print(f"  {'everything else':24s} {wall - sum(spent.values()):8.2f} s (start, data, scoring, tables, plots; less where cells run side by side)")
+    print(
+        f"  {'everything else':24s} {wall - sum(spent.values()):8.2f} s (start, data, scoring, tables, plots; less "
+        "where cells run side by side)"
+    )
     measure.record(given, {"title": config, "ours_s": wall, "target_s": TARGET_S, "models": dict(spent)})
     if given.quick:
         return
     published = pd.read_parquet(ROOT / "leaderboards" / "results" / "paper" / "rows.parquet")
     both = published.merge(rows, on=["dataset", "model", "fold", "seed", "run"], suffixes=("", "_now"))
     change = (both["ed"] - both["ed_now"]).abs().groupby(both["model"]).max()
-    print(f"largest change of a run's ED against leaderboards/results/paper [m], {len(both)} of {len(published)} rows:\n{change.to_string()}")
+    print(
+        f"largest change of a run's ED against leaderboards/results/paper [m], {len(both)} of {len(published)} "
+        f"rows:\n{change.to_string()}"
+    )
     measure.agree("ED of the models that draw nothing", float(change[list(UNSEEDED)].max()), 1e-6, "m")
 
 

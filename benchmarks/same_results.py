@@ -1,7 +1,7 @@
 """Compares the results of two versions of the code: `python benchmarks/same_results.py OLD NEW`.
 
-OLD and NEW are folders with the rows of `suite diagnosis` or `suite check` (one JSON file a row), folders of studies (`summary.json`), or JSON files.
-Times, versions and paths are left out. Exit status 1 where anything else differs.
+OLD and NEW are folders with the rows of `suite diagnosis` or `suite check` (one JSON file a row), folders of studies
+(`summary.json`), or JSON files. Times, versions and paths are left out. Exit status 1 where anything else differs.
 """
 
 from __future__ import annotations
@@ -11,7 +11,22 @@ import sys
 from pathlib import Path
 from typing import Any
 
-IGNORED = frozenset({"seconds", "signature", "warnings", "source", "git", "machine", "code", "command", "created", "fit_s", "predict_s", "memory_mb"})
+IGNORED = frozenset(
+    {
+        "seconds",
+        "signature",
+        "warnings",
+        "source",
+        "git",
+        "machine",
+        "code",
+        "command",
+        "created",
+        "fit_s",
+        "predict_s",
+        "memory_mb",
+    }
+)
 """Fields that say when, where and by which code a row was made, or how fast."""
 
 
@@ -20,7 +35,12 @@ def differences(old: Any, new: Any, place: str = "") -> list[str]:
     if isinstance(old, dict) and isinstance(new, dict):
         keys = [*old, *(key for key in new if key not in old)]
         missing = object()
-        return [d for key in keys if key not in IGNORED for d in differences(old.get(key, missing), new.get(key, missing), f"{place}/{key}")]
+        return [
+            d
+            for key in keys
+            if key not in IGNORED
+            for d in differences(old.get(key, missing), new.get(key, missing), f"{place}/{key}")
+        ]
     if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         return [d for i, (a, b) in enumerate(zip(old, new, strict=True)) for d in differences(a, b, f"{place}/{i}")]
     return [] if old == new else [f"{place}: {_shown(old)} -> {_shown(new)}"]
@@ -53,5 +73,7 @@ def main(old: Path, new: Path) -> int:
 
 if __name__ == "__main__":
     if len(sys.argv) != 3:
-        sys.exit(f"two folders or files are needed, {len(sys.argv) - 1} given: python benchmarks/same_results.py OLD NEW")
+        sys.exit(
+            f"two folders or files are needed, {len(sys.argv) - 1} given: python benchmarks/same_results.py OLD NEW"
+        )
     sys.exit(main(Path(sys.argv[1]), Path(sys.argv[2])))

@@ -1,10 +1,11 @@
-"""How cost grows: rollouts with the number of runs and with the horizon, the fit with the number of runs, the diagnosis with its candidates.
+"""How cost grows: rollouts with the number of runs and with the horizon, the fit with the number of runs, the diagnosis
+with its candidates.
 
     python benchmarks/scaling.py [--runs N] [--quick] [--json FILE]
 
-Prints a table and writes `benchmarks/scaling.png` (`--quick` writes nothing). Times are processor seconds of this process, the smallest of N repeats,
-so that other work on the machine hardly shows; set OMP_NUM_THREADS=1, or they add up over threads.
-What bends the curves is explained in `benchmarks/README.md`.
+Prints a table and writes `benchmarks/scaling.png` (`--quick` writes nothing). Times are processor seconds of this
+process, the smallest of N repeats, so that other work on the machine hardly shows; set OMP_NUM_THREADS=1, or they add
+up over threads. What bends the curves is explained in `benchmarks/README.md`.
 """
 
 from __future__ import annotations
@@ -65,7 +66,11 @@ def rollouts(data: Dataset, model: Physics, sizes: Sequence[int], repeats: int) 
     """120 s of 1 to 10,000 runs."""
     batch, sim = data.batch(), Simulator(load_mmg_ship("container130"), 1.0)
     panel = ("rollouts of 120 s", "runs")
-    physics, fast, plain = Curve(*panel, "physics.predict"), Curve(*panel, "Simulator.fast_rollout"), Curve(*panel, "Simulator.rollout (numpy)")
+    physics, fast, plain = (
+        Curve(*panel, "physics.predict"),
+        Curve(*panel, "Simulator.fast_rollout"),
+        Curve(*panel, "Simulator.rollout (numpy)"),
+    )
     for size in sizes:
         rows = np.arange(size) % len(data)
         s0, U = batch.s0[rows], batch.U[rows]
@@ -99,11 +104,14 @@ def fits(data: Dataset, sizes: Sequence[int], repeats: int) -> list[Curve]:
 
 
 def diagnoses(data: Dataset, sizes: Sequence[int]) -> list[Curve]:
-    """24 runs, the first effects of the library by name as candidates; without the held-out gain, which repeats it for every fold."""
+    """24 runs, the first effects of the library by name as candidates; without the held-out gain, which repeats it for
+    every fold."""
     curve, names = Curve("diagnosis of 24 runs", "candidates", "diagnose(data, only=..., gain=False)"), EFFECTS.names()
     names = [name for name in names if name not in NOT_CANDIDATES]
     for size in sizes:
-        curve.add(min(size, len(names)), lambda size=size: diagnose(data.subset(range(24)), gain=False, only=names[:size]), 1)
+        curve.add(
+            min(size, len(names)), lambda size=size: diagnose(data.subset(range(24)), gain=False, only=names[:size]), 1
+        )
     return [curve]
 
 
@@ -136,14 +144,25 @@ def main() -> None:
     model, quick = Physics().fit(data.subset(range(72))), given.quick
     curves: list[Curve] = []
     for question in (
-        lambda: rollouts(data, model, (1, 9) if quick else (1, 2, 4, 8, 16, 32, 100, 316, 1000, 3162, 10000), given.runs),
-        lambda: horizons(data, model, (10, 130) if quick else (10, 30, 100, 300, 1000, 3000), (1, 3) if quick else (1, 100, 1000), given.runs),
+        lambda: rollouts(
+            data, model, (1, 9) if quick else (1, 2, 4, 8, 16, 32, 100, 316, 1000, 3162, 10000), given.runs
+        ),
+        lambda: horizons(
+            data,
+            model,
+            (10, 130) if quick else (10, 30, 100, 300, 1000, 3000),
+            (1, 3) if quick else (1, 100, 1000),
+            given.runs,
+        ),
         lambda: fits(data, (4, 8) if quick else (10, 32, 100, 316, 1000, 3162, 10000), given.runs),
         lambda: diagnoses(data, (1,) if quick else (1, 2, 5, 10, 20, 100)),
     ):
         for curve in question():
             curves.append(curve)
-            print(f"\n{curve.panel}: {curve.label}\n  {curve.axis:>14s} {'seconds':>12s} {'microseconds each':>18s}", flush=True)
+            print(
+                f"\n{curve.panel}: {curve.label}\n  {curve.axis:>14s} {'seconds':>12s} {'microseconds each':>18s}",
+                flush=True,
+            )
             for size, seconds in zip(curve.sizes, curve.seconds, strict=True):
                 print(f"  {size:14d} {seconds:12.6f} {1e6 * seconds / size:18.2f}", flush=True)
             measure.record(given, vars(curve))

@@ -1,4 +1,5 @@
-"""The seven ships of the checks of the diagnosis: three drawn variants of KCS and KVLCC2, and those of the literature in their authors' equations."""
+"""The seven ships of the checks of the diagnosis: three drawn variants of KCS and KVLCC2, and those of the literature
+in their authors' equations."""
 
 from __future__ import annotations
 

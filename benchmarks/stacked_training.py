@@ -2,8 +2,9 @@
 
     python benchmarks/stacked_training.py [--runs 5] [--quick] [--json FILE]
 
-The peer is the same predictor, fitted to one fold at a time (another in each run). Early stopping is off, so that both do the same number of steps a
-fold. Both sides give the same model up to rounding; what training makes of rounding is printed as the difference of the mean position errors.
+The peer is the same predictor, fitted to one fold at a time (another in each run). Early stopping is off, so that both
+do the same number of steps a fold. Both sides give the same model up to rounding; what training makes of rounding is
+printed as the difference of the mean position errors.
 """
 
 from __future__ import annotations
@@ -46,7 +47,9 @@ def position_error(model: Any, data: Dataset) -> float:
     return float(np.linalg.norm(apart, axis=-1).mean())
 
 
-def sides(spec: str, pairs: list[tuple[Dataset, Dataset]]) -> tuple[Callable[[], None], Callable[[], None], list[Any], list[Any]]:
+def sides(
+    spec: str, pairs: list[tuple[Dataset, Dataset]]
+) -> tuple[Callable[[], None], Callable[[], None], list[Any], list[Any]]:
     """Both sides' calls, and where they leave their models."""
     together: list[Any] = []
     alone: list[Any] = []
@@ -77,9 +80,14 @@ def main() -> None:
             target=TARGET,
             warm=False,
         )
-        errors = [[position_error(m, valid) for m, (_, valid) in zip(side, pairs, strict=False)] for side in (together[: len(alone)], alone)]
+        errors = [
+            [position_error(m, valid) for m, (_, valid) in zip(side, pairs, strict=False)]
+            for side in (together[: len(alone)], alone)
+        ]
         apart = abs(np.mean(errors[0]) / np.mean(errors[1]) - 1.0)
-        measure.agree(f"relative position error, {len(errors[1])} folds, {np.mean(errors[1]):.2f} m", float(apart), ACCEPTED)
+        measure.agree(
+            f"relative position error, {len(errors[1])} folds, {np.mean(errors[1]):.2f} m", float(apart), ACCEPTED
+        )
 
 
 if __name__ == "__main__":

@@ -40,14 +40,35 @@ def main() -> None:
         run("-c", f"import sys\n{_MODULES}\nassert not {_HEAVY}, {_HEAVY}", *words)
         pairs, before = [], processor_seconds()
         for _ in range(given.runs):
-            pairs.append((measure.seconds(lambda words=words: run("-m", "shipbench", *words)), measure.seconds(lambda: run("-c", "pass"))))
+            pairs.append(
+                (
+                    measure.seconds(lambda words=words: run("-m", "shipbench", *words)),
+                    measure.seconds(lambda: run("-c", "pass")),
+                )
+            )
         used = (processor_seconds() - before) / given.runs
         ours, bare = median(a for a, _ in pairs), median(b for _, b in pairs)
-        aim = f"target {TARGET_S:g} s: {'reached' if ours < TARGET_S else 'NOT reached'}" if command in COMMANDS[:2] and not given.quick else ""
+        aim = (
+            f"target {TARGET_S:g} s: {'reached' if ours < TARGET_S else 'NOT reached'}"
+            if command in COMMANDS[:2] and not given.quick
+            else ""
+        )
         smallest, largest = min(a for a, _ in pairs), max(a for a, _ in pairs)
-        print(f"shipbench {command:10s} {ours:6.3f} s ({smallest:.3f} .. {largest:.3f})   python -c pass {bare:6.3f} s   {aim}")
+        print(
+            f"shipbench {command:10s} {ours:6.3f} s ({smallest:.3f} .. {largest:.3f})   python -c pass {bare:6.3f} "
+            f"s   {aim}"
+        )
         print(f"{'':20s} {used:6.3f} s of processor time for both")
-        measure.record(given, {"title": f"shipbench {command}", "ours_s": ours, "peer_s": bare, "processor_s": used, "target_s": TARGET_S})
+        measure.record(
+            given,
+            {
+                "title": f"shipbench {command}",
+                "ours_s": ours,
+                "peer_s": bare,
+                "processor_s": used,
+                "target_s": TARGET_S,
+            },
+        )
     print("agree: no command imports torch, casadi, lightning, pandas, scipy or matplotlib")
 
 

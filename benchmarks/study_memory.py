@@ -1,10 +1,13 @@
-"""Peak memory of a whole study of 1,000 runs of 1,000 s, with 1, 3 and 6 models: it must stay below 4 GB and must not grow with the models.
+"""Peak memory of a whole study of 1,000 runs of 1,000 s, with 1, 3 and 6 models: it must stay below 4 GB and must not
+grow with the models.
 
     python benchmarks/study_memory.py [--dt 1.0] [--models 1 3 6] [--quick] [--json FILE]
 
-Makes the data set (the simulator's harbour runs, 1 s apart; a smaller --dt interpolates them), writes it as Parquet, and runs `shipbench run` on
-it in a process of its own for each number of models: five folds, windows of 120 s, every network for one epoch, since epochs take time and no memory.
-The figure is the greatest sum of the resident memory of that process and all that it started, looked at every 50 ms, or the most that the system saw
+Makes the data set (the simulator's harbour runs, 1 s apart; a smaller --dt interpolates them), writes it as Parquet,
+and runs `shipbench run` on
+it in a process of its own for each number of models: five folds, windows of 120 s, every network for one epoch, since
+epochs take time and no memory. The figure is the greatest sum of the resident memory of that process and all that it
+started, looked at every 50 ms, or the most that the system saw
 one of them hold, if that is more: the fit of the physics needs its memory for a moment only.
 """
 
@@ -50,7 +53,14 @@ def make(runs: int, seconds: int, dt: float) -> Dataset:
         states = np.stack([np.interp(t, knots, S[i, :, j]) for j in range(S.shape[2])], axis=1)
         return Run(f"run{i:04d}", t, states, C[i, held])
 
-    return Dataset(name="memory", ship=ship.particulars, dt=dt, runs=tuple(run(i) for i in range(runs)), source="shipbench simulator", licence="MIT")
+    return Dataset(
+        name="memory",
+        ship=ship.particulars,
+        dt=dt,
+        runs=tuple(run(i) for i in range(runs)),
+        source="shipbench simulator",
+        licence="MIT",
+    )
 
 
 def peak_of(command: list[str]) -> tuple[float, float, int]:
@@ -81,7 +91,9 @@ def _children(process: psutil.Popen) -> list[psutil.Process]:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dt", type=float, default=1.0, help="sample time [s]")
-    parser.add_argument("--models", type=int, nargs="+", default=[1, 3, 6], help=f"numbers of models, each at most {len(MODELS)}")
+    parser.add_argument(
+        "--models", type=int, nargs="+", default=[1, 3, 6], help=f"numbers of models, each at most {len(MODELS)}"
+    )
     parser.add_argument("--quick", action="store_true", help="20 runs, to see that the script works")
     parser.add_argument("--json", type=Path, help="append machine and figures to FILE")
     return parser.parse_args()
@@ -98,20 +110,52 @@ def main() -> int:
         write_in_own_process(data, runs, seconds, given.dt)
         samples = runs * (round(seconds / given.dt) + 1)
         size = samples * 15 * 8 / 1e9
-        print(f"data: {runs} runs x {seconds} s, dt {given.dt:g} s: {samples} samples, {size:.2f} GB as 15 columns of float64")
+        print(
+            f"data: {runs} runs x {seconds} s, dt {given.dt:g} s: {samples} samples, {size:.2f} GB as 15 columns of "
+            "float64"
+        )
         found = {}
         for number in [1, 2] if given.quick else given.models:
             models = [word for spec in MODELS[:number] for word in ("--model", spec)]
-            command = [sys.executable, "-m", "shipbench", "run", "-q", "--dataset", str(data), *models, "--out", str(Path(folder, f"out{number}"))]
+            command = [
+                sys.executable,
+                "-m",
+                "shipbench",
+                "run",
+                "-q",
+                "--dataset",
+                str(data),
+                *models,
+                "--out",
+                str(Path(folder, f"out{number}")),
+            ]
             peak, took, code = peak_of(command)
             if code:
-                raise SystemExit(f"`shipbench run` with {number} models ended with exit code {code}; the figure would mean nothing.")
+                raise SystemExit(
+                    f"`shipbench run` with {number} models ended with exit code {code}; the figure would mean nothing."
+                )
             found[number] = peak
-            print(f"{number} models: peak {peak:.2f} GB, {took:.0f} s   shipbench run -q --dataset DATA {' '.join(models)}", flush=True)
-            measure.record(options, {"title": "memory of a study", "models": number, "peak_GB": peak, "seconds": took, "runs": runs, "dt": given.dt})
+            print(
+                f"{number} models: peak {peak:.2f} GB, {took:.0f} s   shipbench run -q --dataset DATA "
+                f"{' '.join(models)}",
+                flush=True,
+            )
+            measure.record(
+                options,
+                {
+                    "title": "memory of a study",
+                    "models": number,
+                    "peak_GB": peak,
+                    "seconds": took,
+                    "runs": runs,
+                    "dt": given.dt,
+                },
+            )
     growth = found[max(found)] / found[min(found)]
     reached = max(found.values()) < LIMIT_GB and growth < GROWTH
-    print(f"peak with {max(found)} models over {min(found)}: {growth:.2f} (flat: below {GROWTH}); limit {LIMIT_GB:g} GB")
+    print(
+        f"peak with {max(found)} models over {min(found)}: {growth:.2f} (flat: below {GROWTH}); limit {LIMIT_GB:g} GB"
+    )
     print("quick: says nothing of the target" if given.quick else f"target {'reached' if reached else 'NOT reached'}")
     return 0 if reached or given.quick else 1
 

@@ -2,8 +2,8 @@
 
     python benchmarks/training_scaling.py [--runs N] [--quick] [--json FILE]
 
-Prints a table and writes `benchmarks/training_scaling.png` (`--quick` writes nothing). Every time is the smallest of N repeats of a whole fit: a busy
-machine only adds. What bends the curves is explained in `benchmarks/README.md`.
+Prints a table and writes `benchmarks/training_scaling.png` (`--quick` writes nothing). Every time is the smallest of N
+repeats of a whole fit: a busy machine only adds. What bends the curves is explained in `benchmarks/README.md`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ PICTURE = Path(__file__).with_name("training_scaling.png")
 EPOCHS = {"mlp": 3, "lstm": 4, "neural_ode": 4}
 
 
-def swept(panel: str, axis: str, label: str, cases: Iterable[tuple[int, str, list[tuple[Dataset, Dataset]]]], repeats: int) -> Curve:
+def swept(
+    panel: str, axis: str, label: str, cases: Iterable[tuple[int, str, list[tuple[Dataset, Dataset]]]], repeats: int
+) -> Curve:
     """A fit for every (size, spec, folds)."""
     curve = Curve(panel, axis, label)
     for size, spec, pairs in cases:
@@ -40,12 +42,19 @@ def curves(data: Dataset, quick: bool, repeats: int) -> Iterator[Curve]:
     for name, spec in specs.items():
         sizes = (8, 16) if quick else (10, 32, 100, 316, 1000)
         yield swept(
-            "one fold", "training runs of 120 s", spec, ((n, spec, [(repeated(data, n), valid)]) for n in sizes), 1 if name != "mlp" else repeats
+            "one fold",
+            "training runs of 120 s",
+            spec,
+            ((n, spec, [(repeated(data, n), valid)]) for n in sizes),
+            1 if name != "mlp" else repeats,
         )
     for spec in ("mlp[epochs={},patience=1000]", "lstm[epochs={}]"):
         cases = ((n, spec.format(n), [pair]) for n in ((1, 2) if quick else (1, 3, 10, 30)))
         yield swept("one fold, 64 runs", "epochs", spec.partition("[")[0], cases, repeats)
-    cases = ((n, f"mlp[epochs=2,patience=1000,batch={n}]", [pair]) for n in ((32, 64) if quick else (8, 16, 32, 64, 128, 512, 2048)))
+    cases = (
+        (n, f"mlp[epochs=2,patience=1000,batch={n}]", [pair])
+        for n in ((32, 64) if quick else (8, 16, 32, 64, 128, 512, 2048))
+    )
     yield swept("one fold, 64 runs, two epochs", "batch size", "mlp", cases, repeats)
     for spec in specs.values():
         cases = ((n, spec, [pair] * n) for n in ((1, 2) if quick else (1, 2, 5, 10, 20)))

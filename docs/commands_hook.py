@@ -1,4 +1,5 @@
-"""Writes the reference of all commands into commands.md when the site is built, from the command line itself: it cannot fall behind."""
+"""Writes the reference of all commands into commands.md when the site is built, from the command line itself: it cannot
+fall behind."""
 
 from __future__ import annotations
 

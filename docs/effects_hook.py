@@ -1,4 +1,5 @@
-"""Writes the catalogue of causes into effects.md when the site is built: what each is, and a picture of what it does to two manoeuvres."""
+"""Writes the catalogue of causes into effects.md when the site is built: what each is, and a picture of what it does to
+two manoeuvres."""
 
 from __future__ import annotations
 
@@ -44,7 +45,8 @@ def _prose(module: Any) -> str:
 
 
 def _commands(effect: Any) -> tuple[Any, Any]:
-    """Start states (2, 10) and commands (2, steps, 4): a turn, and what shows the family best: a zig-zag, a stop, or a push of the thrusters."""
+    """Start states (2, 10) and commands (2, steps, 4): a turn, and what shows the family best: a zig-zag, a stop, or a
+    push of the thrusters."""
     import numpy as np
 
     t = np.arange(_STEPS) * _DT
@@ -74,7 +76,9 @@ def _picture(effect: Any) -> str | None:
         return None
     ship = load_mmg_ship("container130")
     s0, U = _commands(effect)
-    wind = np.tile([8.0, np.deg2rad(60.0)], (2, _STEPS, 1)) if effect.family == "environment" and effect.channels else None
+    wind = (
+        np.tile([8.0, np.deg2rad(60.0)], (2, _STEPS, 1)) if effect.family == "environment" and effect.channels else None
+    )
     q = tuple(p.typical for p in effect.sized(ship.L))
     hidden = [Hidden(effect, q)]
     rng = np.random.default_rng(0)
@@ -83,8 +87,12 @@ def _picture(effect: Any) -> str | None:
     changed = record(true, _DT, hidden, np.zeros(10), rng)
     if np.array_equal(plain, changed):
         return None
-    names = {"thruster": ("bow thruster", "both thrusters"), "propulsion": ("turn, 20°", "stop")}.get(effect.family, ("turn, 20°", "zig-zag, 15°"))
-    channel, label, scale = (2, "heading [deg]", np.rad2deg(1.0)) if effect.family != "propulsion" else (3, "surge speed [m/s]", 1.0)
+    names = {"thruster": ("bow thruster", "both thrusters"), "propulsion": ("turn, 20°", "stop")}.get(
+        effect.family, ("turn, 20°", "zig-zag, 15°")
+    )
+    channel, label, scale = (
+        (2, "heading [deg]", np.rad2deg(1.0)) if effect.family != "propulsion" else (3, "surge speed [m/s]", 1.0)
+    )
     with mpl.rc_context({"svg.fonttype": "none", "font.size": 9, "svg.hashsalt": "shipbench"}):
         figure = Figure(figsize=(7.2, 2.5), layout="constrained")
         for axes, run, name in zip(figure.subplots(1, 3)[:2], range(2), names, strict=True):

@@ -1,4 +1,5 @@
-"""Turns formulas between dollar signs into MathML when the site is built, so that a page needs no script and no network."""
+"""Turns formulas between dollar signs into MathML when the site is built, so that a page needs no script and no
+network."""
 
 from __future__ import annotations
 
@@ -23,4 +24,6 @@ def _mathml(found: re.Match[str]) -> str:
     formula = (found["display"] or found["inline"]).strip()
     made = convert(formula, display="block" if display else "inline")
     made = made.replace("<math ", f'<math alttext="{escape(formula, quote=True)}" ', 1)
-    return f"\n\n<div>{made}</div>\n\n" if display else f"<span>{made}</span>"  # a line that begins with <math> would be a block of its own
+    return (
+        f"\n\n<div>{made}</div>\n\n" if display else f"<span>{made}</span>"
+    )  # a line that begins with <math> would be a block of its own

@@ -1,4 +1,5 @@
-"""Runs the notebooks of docs/notebooks when the site is built and shows them with their outputs; an executed notebook is kept in the cache."""
+"""Runs the notebooks of docs/notebooks when the site is built and shows them with their outputs; an executed notebook
+is kept in the cache."""
 
 from __future__ import annotations
 
@@ -105,9 +106,14 @@ def _parts(cell: Any) -> Iterator[str]:
 def _shown(data: Any) -> str:
     """The richest form of a result: picture, HTML, text."""
     if "image/png" in data:
-        return f'<div class="output"><img alt="{escape(data["text/plain"])}" src="data:image/png;base64,{data["image/png"].strip()}"></div>'
+        return (
+            f'<div class="output"><img alt="{escape(data["text/plain"])}" '
+            f'src="data:image/png;base64,{data["image/png"].strip()}"></div>'
+        )
     if "text/html" in data:
-        table = data["text/html"].replace(' class="dataframe"', "").replace(' border="1"', "")  # pandas' own style; the theme's is used
+        table = (
+            data["text/html"].replace(' class="dataframe"', "").replace(' border="1"', "")
+        )  # pandas' own style; the theme's is used
         return f'<div class="output">{table}</div>'
     return _text(data["text/plain"])
 

@@ -1,4 +1,5 @@
-"""Draws the pictures of the README, light and dark, from the folder that `shipbench demo` writes: `python docs/pictures.py demo`."""
+"""Draws the pictures of the README, light and dark, from the folder that `shipbench demo` writes: `python
+docs/pictures.py demo`."""
 
 from __future__ import annotations
 
@@ -25,12 +26,16 @@ STYLES = {
 
 
 def tracks_and_errors(folder: Path, style: dict[str, Any]) -> Figure:
-    """One measured track with three predicted ones, and the growth of the position error with its quartiles over runs."""
+    """One measured track with three predicted ones, and the growth of the position error with its quartiles over
+    runs."""
     models = list(dict.fromkeys(cell.parent.name for cell in sorted((folder / "cells").glob("*/*/*"))))
     order = sorted(models, key=lambda name: (name != "hold", len(name)))
     predicted = {name: _predictions(folder, name) for name in order}
     truth = _truth(folder)
-    errors = {name: np.array([np.hypot(*(S - truth[run])[:, :2].T) for run, S in found.items()]) for name, found in predicted.items()}
+    errors = {
+        name: np.array([np.hypot(*(S - truth[run])[:, :2].T) for run, S in found.items()])
+        for name, found in predicted.items()
+    }
     run = max(truth, key=lambda key: float(errors_of(predicted["physics"][key], truth[key])[-1]))
     figure = Figure(figsize=(8.6, 3.4), layout="constrained")
     left, right = figure.subplots(1, 2)
@@ -43,7 +48,9 @@ def tracks_and_errors(folder: Path, style: dict[str, Any]) -> Figure:
         right.fill_between(time, low, high, color=colour, alpha=0.2, linewidth=0)
     title = f"60 s predicted from the orders ({run.split('@')[0]})"
     left.set(xlabel="east [m]", ylabel="north [m]", title=title, aspect="equal", adjustable="datalim")
-    right.set(xlabel="time predicted [s]", ylabel="position error [m]", title="median and quartiles of 12 held-out runs")
+    right.set(
+        xlabel="time predicted [s]", ylabel="position error [m]", title="median and quartiles of 12 held-out runs"
+    )
     left.legend(frameon=False)
     return figure
 
@@ -53,7 +60,9 @@ def verdict(folder: Path, style: dict[str, Any]) -> Figure:
     found = json.loads((folder / "diagnosis" / "diagnosis.json").read_text())
     named = [cause["effect"] for cause in found["causes"]]
     scores = {cause["effect"]: cause["score"] for cause in found["causes"]}
-    scores |= {c["effect"]: c["score"] for c in found["candidates"] if c["effect"] not in scores and c["score"] is not None}
+    scores |= {
+        c["effect"]: c["score"] for c in found["candidates"] if c["effect"] not in scores and c["score"] is not None
+    }
     best = sorted(scores, key=lambda name: -scores[name])[:6][::-1]
     rows = read_results([folder]).rows
     error = rows.groupby("model").ed.mean()
@@ -80,7 +89,9 @@ def _truth(folder: Path) -> dict[str, np.ndarray]:
 
 def _predictions(folder: Path, model: str) -> dict[str, np.ndarray]:
     """Predicted states (K, 10) by run, each from the fold that did not see it."""
-    return _by_run(folder, {p.parent.name.split("-")[0]: p for p in folder.glob(f"cells/*/{model}/*/predictions.npz")}, "S")
+    return _by_run(
+        folder, {p.parent.name.split("-")[0]: p for p in folder.glob(f"cells/*/{model}/*/predictions.npz")}, "S"
+    )
 
 
 def _by_run(folder: Path, files: dict[str, Path], key: str) -> dict[str, np.ndarray]:
@@ -97,8 +108,10 @@ def draw(folder: Path, out: Path) -> list[Path]:
     written = []
     for name, style in STYLES.items():
         with mpl.rc_context({
-            "text.color": style["text"], "axes.labelcolor": style["text"], "axes.edgecolor": style["grid"], "axes.titlesize": 10,
-            "xtick.color": style["text"], "ytick.color": style["text"], "axes.grid": True, "grid.color": style["grid"], "font.size": 9,
+            "text.color": style["text"], "axes.labelcolor": style["text"], "axes.edgecolor": style["grid"],
+            "axes.titlesize": 10,
+            "xtick.color": style["text"], "ytick.color": style["text"], "axes.grid": True, "grid.color": style["grid"],
+            "font.size": 9,
             "axes.spines.top": False, "axes.spines.right": False, "axes.axisbelow": True,
         }):  # fmt: skip
             for stem, picture in (("tracks", tracks_and_errors), ("verdict", verdict)):
@@ -118,7 +131,11 @@ def photograph(page: Path, out: Path) -> list[Path]:
         path = out / f"page-{style}.png"
         with tempfile.TemporaryDirectory() as profile:
             options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--user-data-dir={profile}"]
-            options += [f"--blink-settings=preferredColorScheme={preferred}", "--window-size=1200,900", f"--screenshot={path}"]
+            options += [
+                f"--blink-settings=preferredColorScheme={preferred}",
+                "--window-size=1200,900",
+                f"--screenshot={path}",
+            ]
             subprocess.run([chromium, *options, page.resolve().as_uri()], check=True, capture_output=True, timeout=60)
         written.append(path)
     return written

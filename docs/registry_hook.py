@@ -1,6 +1,8 @@
-"""Writes the tables of models, data sets, metrics, checks, trials, extras and the citation into their pages when the site is built.
+"""Writes the tables of models, data sets, metrics, checks, trials, extras and the citation into their pages when the
+site is built.
 
-A comment such as `<!-- models -->` on a page is replaced. Every word comes from the registries, pyproject.toml or CITATION.cff.
+A comment such as `<!-- models -->` on a page is replaced. Every word comes from the registries, pyproject.toml or
+CITATION.cff.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ ROOT = Path(__file__).parents[1]
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     """Called by mkdocs for every page."""
-    return re.sub(r"<!-- (\w+) -->", lambda found: "\n".join(WRITERS[found[1]]()) if found[1] in WRITERS else found[0], markdown)
+    return re.sub(
+        r"<!-- (\w+) -->", lambda found: "\n".join(WRITERS[found[1]]()) if found[1] in WRITERS else found[0], markdown
+    )
 
 
 def _prose(words: str | None) -> str:
@@ -62,7 +66,10 @@ def _models() -> Iterator[str]:
             for key, default in parameters.items():
                 meaning = meanings.get(key, "")
                 unit = re.search(r"\[([^\]]+)\]", meaning)
-                yield f"| `{key}` | {f'`{default}`' if default else 'must be given'} | {unit[1] if unit else '-'} | {one_line(meaning)} |"
+                yield (
+                    f"| `{key}` | {f'`{default}`' if default else 'must be given'} | {unit[1] if unit else '-'} | "
+                    f"{one_line(meaning)} |"
+                )
             yield ""
         extras = sorted({EXTRAS[need][1] for need in needs})
         yield f"Needs: {' and '.join(f'the extra `{extra}`' for extra in extras) or 'nothing beyond the core'}.\n"
@@ -94,10 +101,15 @@ def _metrics() -> Iterator[str]:
         metric = METRICS.get(name)
         yield f"## `{name}`\n\n{_prose(_first(inspect.getdoc(inspect.getmodule(metric.function))))}\n"
         yield "| column | label | unit | value of a run | formula |\n|---|---|---|---|---|"
-        formula = one_line(re.sub(r",? \(batch[^)]*\)", "", _first(inspect.getdoc(metric.function))))  # shapes are for programmers
+        formula = one_line(
+            re.sub(r",? \(batch[^)]*\)", "", _first(inspect.getdoc(metric.function)))
+        )  # shapes are for programmers
         per_run = "mean over time steps" if metric.per_knot else "one value"
         for number, column in enumerate(metric.columns):
-            yield f"| `{column.name}` | {column.label} | {column.unit} | {per_run} | {'the same' if number else formula} |"
+            yield (
+                f"| `{column.name}` | {column.label} | {column.unit} | {per_run} | "
+                f"{'the same' if number else formula} |"
+            )
         yield ""
 
 
@@ -135,14 +147,20 @@ def _citation() -> Iterator[str]:
 
     about = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
     yield f"{_prose(about['message'])}\n"
-    for kind, key, entry in [("software", about["title"], about), *((r["type"], f"source{i}", r) for i, r in enumerate(about["references"], 1))]:
+    for kind, key, entry in [
+        ("software", about["title"], about),
+        *((r["type"], f"source{i}", r) for i, r in enumerate(about["references"], 1)),
+    ]:
         fields = {"title": entry["title"], "author": " and ".join(f"{{{a['name']}}}" for a in entry["authors"])}
         fields |= {name: entry[name] for name in ("version", "license", "year", "doi") if name in entry}
         lines = ",\n".join(f"  {name} = {{{value}}}" for name, value in fields.items())
-        yield f"{_prose(entry.get('abstract', entry.get('notes', '')))}\n\n```bibtex\n@{kind}{{{key},\n{lines}\n}}\n```\n"
+        yield (
+            f"{_prose(entry.get('abstract', entry.get('notes', '')))}\n\n```bibtex\n@{kind}{{{key},\n{lines}\n}}\n```\n"
+        )
 
 
 WRITERS: dict[str, Callable[[], Iterator[str]]] = {
-    "extras": _extras, "models": _models, "datasets": _datasets, "metrics": _metrics, "checks": _checks, "trials": _trials, "citation": _citation,
+    "extras": _extras, "models": _models, "datasets": _datasets, "metrics": _metrics, "checks": _checks,
+    "trials": _trials, "citation": _citation,
 }  # fmt: skip
 """What each comment stands for."""

@@ -1,4 +1,5 @@
-"""shipbench: a benchmark of ship-motion prediction. Names below are loaded when they are first used; importing costs nothing."""
+"""shipbench: a benchmark of ship-motion prediction. Names below are loaded when they are first used; importing costs
+nothing."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOME = {
-    "benchmark": "api", "check_data": "api", "diagnose": "api", "import_log": "api", "propose_mapping": "api", "report": "api", "Scores": "scores",
+    "benchmark": "api", "check_data": "api", "diagnose": "api", "import_log": "api", "propose_mapping": "api",
+    "report": "api", "Scores": "scores",
     "build_board": "leaderboard.pages", "write_boards": "leaderboard.pages", "read_results": "bench.submissions",
     "run_tasks": "bench.runner", "Task": "bench.task", "load_tasks": "bench.task", "check_model": "contract.check",
     "DATASETS": "data.base", "load_dataset": "data.base",
@@ -35,9 +37,12 @@ _HOME = {
 }  # fmt: skip
 
 __all__ = [
-    "DATASETS", "METRICS", "PREDICTORS", "Batch", "Dataset", "InputError", "Predictor", "PredictorBase", "Run", "Scores", "Ship",
-    "ShipbenchError", "Task", "WorkError", "__version__", "benchmark", "build_board", "check_data", "check_model", "diagnose", "import_log",
-    "load_dataset", "load_tasks", "make_predictor", "parse_spec", "propose_mapping", "read_results", "report", "run_tasks", "write_boards",
+    "DATASETS", "METRICS", "PREDICTORS", "Batch", "Dataset", "InputError", "Predictor", "PredictorBase", "Run",
+    "Scores", "Ship",
+    "ShipbenchError", "Task", "WorkError", "__version__", "benchmark", "build_board", "check_data", "check_model",
+    "diagnose", "import_log",
+    "load_dataset", "load_tasks", "make_predictor", "parse_spec", "propose_mapping", "read_results", "report",
+    "run_tasks", "write_boards",
 ]  # fmt: skip
 
 

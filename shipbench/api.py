@@ -1,4 +1,5 @@
-"""shipbench from Python, in a notebook or a script: the commands as functions that take names, paths and objects alike."""
+"""shipbench from Python, in a notebook or a script: the commands as functions that take names, paths and objects
+alike."""
 
 from __future__ import annotations
 
@@ -50,10 +51,12 @@ def benchmark(
 ) -> Scores:
     """Fit, roll out and score models on held-out runs, as `shipbench run` does.
 
-    A class in memory is made anew for every fold. An object is copied for every fold before `fit`, so give it unfitted. Both run in this process.
+    A class in memory is made anew for every fold. An object is copied for every fold before `fit`, so give it unfitted.
+    Both run in this process.
 
     Args:
-        models: one or several: "physics+current", "my_model.py:MyNet", a folder of a saved model, a class or an object with `fit` and `predict`.
+        models: one or several: "physics+current", "my_model.py:MyNet", a folder of a saved model, a class or an object
+        with `fit` and `predict`.
             A mapping names them: {"my net": MyNet(), "physics": "physics"}.
         data: one or several data sets: objects, registered names or folders.
         horizon: time to predict [s].
@@ -68,7 +71,8 @@ def benchmark(
         options: other keys of a `Task`, such as history_s=10, split="kind", stride_s=30, max_runs=20, metrics=["ed"].
 
     Raises:
-        InputError: a model, data set or option cannot be used, or `out` holds another study; nothing has been fitted then.
+        InputError: a model, data set or option cannot be used, or `out` holds another study; nothing has been fitted
+        then.
         WorkError: the study had to stop.
     """
     from .bench.executors import Execution
@@ -83,15 +87,22 @@ def benchmark(
     specs = _named(models)
     named = {d.name if isinstance(d, Dataset) else os.fspath(d): d for d in _several(data)}
     if len(named) < len(_several(data)):
-        raise InputError(f"data: two data sets have one name ({', '.join(named)}). Accepted: different names. Rename one, or score them apart.")
+        raise InputError(
+            f"data: two data sets have one name ({', '.join(named)}). Accepted: different names. Rename one, or "
+            "score them apart."
+        )
     seeds = (seeds,) if isinstance(seeds, int) else tuple(seeds)
     common = {"models": tuple(specs), "horizon_s": horizon, "folds": folds, "seeds": seeds, **options}
     tasks = [make_task({**common, "dataset": name}, "benchmark") for name in named]
-    memory = Memory({name: d for name, d in named.items() if isinstance(d, Dataset)}, {text: s for text, s in specs.items() if s.given is not None})
+    memory = Memory(
+        {name: d for name, d in named.items() if isinstance(d, Dataset)},
+        {text: s for text, s in specs.items() if s.given is not None},
+    )
     folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="shipbench-"))
     try:
         outcome = run_tasks(
-            tasks, folder, resume=resume, execution=Execution(executor, workers, device=device), progress=make_progress(quiet),
+            tasks, folder, resume=resume, execution=Execution(executor, workers, device=device),
+            progress=make_progress(quiet),
             command=_COMMAND, memory=memory,
         )  # fmt: skip
     except BaseException:
@@ -119,27 +130,40 @@ def _named(models: Any) -> dict[str, Spec]:
     if isinstance(models, Mapping):
         found = [(str(label), spec_of(model, str(label))) for label, model in models.items()]
         if strange := [label for label, spec in found if spec.given is None and label != spec.text]:
-            raise InputError(f"models: '{strange[0]}' names a spec, which is its own name. Accepted: names of classes and objects.")
+            raise InputError(
+                f"models: '{strange[0]}' names a spec, which is its own name. Accepted: names of classes and objects."
+            )
     else:
         found = [(spec.text, spec) for spec in map(spec_of, _several(models))]
     specs: dict[str, Spec] = {}
     for label, spec in sorted(found, key=lambda pair: pair[1].given is not None):  # a spec in text keeps its name
-        free = next(name for name in (label, *(f"{label}-{k}" for k in range(2, len(found) + 2))) if name not in specs or spec.given is None)
+        free = next(
+            name
+            for name in (label, *(f"{label}-{k}" for k in range(2, len(found) + 2)))
+            if name not in specs or spec.given is None
+        )
         specs[free] = replace(spec, text=free, name=free) if spec.given is not None else spec
     return specs
 
 
 class Verdict(Diagnosis):
-    """A diagnosis that shows its verdict in words; `verdict`, `causes`, `extended_model` and `gain` are the main fields."""
+    """A diagnosis that shows its verdict in words; `verdict`, `causes`, `extended_model` and `gain` are the main
+    fields."""
 
     def __repr__(self) -> str:
         from .reports.diagnosis.text import headline
 
-        compare = f'Compare: shipbench.benchmark(["physics", "{self.extended_model}"], data)' if self.extended_model != "physics" else ""
+        compare = (
+            f'Compare: shipbench.benchmark(["physics", "{self.extended_model}"], data)'
+            if self.extended_model != "physics"
+            else ""
+        )
         return brief("\n".join([f"Diagnosis of {self.dataset}", headline(self), compare]).rstrip())
 
 
-def diagnose(data: Data, *, gain: bool = True, seed: int = 0, workers: int = 2, thorough: bool = False, quiet: bool = False) -> Verdict:
+def diagnose(
+    data: Data, *, gain: bool = True, seed: int = 0, workers: int = 2, thorough: bool = False, quiet: bool = False
+) -> Verdict:
     """Show what the physics model gets wrong on measured runs and name the causes, as `shipbench diagnose` does.
 
     Args:
@@ -187,7 +211,8 @@ class Findings(tuple[Finding, ...]):
 
 
 def check_data(data: Data) -> Findings:
-    """Find faults of a data set from the data themselves, as `shipbench data check` does: units, signs, frames, clocks, samples, copies.
+    """Find faults of a data set from the data themselves, as `shipbench data check` does: units, signs, frames, clocks,
+    samples, copies.
 
     Raises:
         InputError: neither a known name nor a folder, or nothing in it can be read.
@@ -198,7 +223,8 @@ def check_data(data: Data) -> Findings:
 
 
 def import_log(
-    logs: Place | Sequence[Place], mapping: Place | LogMapping, ship: Place | Ship, out: Place, *, force: bool = False, **overrides: Any
+    logs: Place | Sequence[Place], mapping: Place | LogMapping, ship: Place | Ship, out: Place, *, force: bool = False,
+    **overrides: Any
 ) -> Summary:  # fmt: skip
     """Make a data set of logs of a trial, as `shipbench data import` does; load it with `load_dataset(out)`.
 
@@ -233,11 +259,19 @@ class Proposal:
     remarks: tuple[str, ...]
 
     def __repr__(self) -> str:
-        return brief("\n".join(["Draft of a mapping, in .text. Check every line marked GUESS.", *(f"  {remark}" for remark in self.remarks)]))
+        return brief(
+            "\n".join(
+                [
+                    "Draft of a mapping, in .text. Check every line marked GUESS.",
+                    *(f"  {remark}" for remark in self.remarks),
+                ]
+            )
+        )
 
 
 def propose_mapping(
-    logs: Place | Sequence[Place], out: Place | None = None, *, force: bool = False, partial: Place | None = None, **file: Any
+    logs: Place | Sequence[Place], out: Place | None = None, *, force: bool = False, partial: Place | None = None,
+    **file: Any
 ) -> Proposal:  # fmt: skip
     """Draft the mapping of logs, as `shipbench data import --propose` does.
 
@@ -256,12 +290,21 @@ def propose_mapping(
     with tempfile.TemporaryDirectory(prefix="shipbench-") as scratch:
         path = Path(out) if out is not None else Path(scratch, "mapping.toml")
         remarks = write_proposal(
-            [Path(log) for log in _several(logs)], path, force, file=file, partial=Path(partial) if partial is not None else None
+            [Path(log) for log in _several(logs)],
+            path,
+            force,
+            file=file,
+            partial=Path(partial) if partial is not None else None,
         )
         return Proposal(path.read_text(encoding="utf-8"), tuple(remarks if out is not None else remarks[:-2]))
 
 
-def report(results: Results | Scores | Place | Sequence[Place], out: Place = "report.html", *, diagnosis: Place | Sequence[Place] = ()) -> Path:
+def report(
+    results: Results | Scores | Place | Sequence[Place],
+    out: Place = "report.html",
+    *,
+    diagnosis: Place | Sequence[Place] = (),
+) -> Path:
     """Write the page of results, as `shipbench report` does, and return its path.
 
     Args:

@@ -13,7 +13,8 @@ def cache_folder() -> Path:
 
 
 def make_private(*parts: str) -> Path:
-    """The folder `parts` of the cache, made with the mode 0700 like all folders of the cache above it; those that are there keep theirs.
+    """The folder `parts` of the cache, made with the mode 0700 like all folders of the cache above it; those that are
+    there keep theirs.
 
     Raises:
         OSError: it cannot be made.
@@ -29,7 +30,8 @@ def make_private(*parts: str) -> Path:
 def stranger(path: Path) -> str | None:
     """Why a file or folder of the cache is not the user's alone, or None where it is.
 
-    All folders up to the cache's are looked at: who can write in one of them can put another file in the place of this one.
+    All folders up to the cache's are looked at: who can write in one of them can put another file in the place of this
+    one.
     """
     if not hasattr(os, "geteuid"):  # Windows: the profile's folder is the user's
         return None

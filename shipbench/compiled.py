@@ -1,9 +1,10 @@
 """Rollouts of a step that is written once, as machine code, and single steps over many lanes.
 
-A step x' = f(x, w, p) comes as a CasADi function, traced from the one formula. Where a C compiler is at hand its instructions are written as C in
-which every number is a vector over runs (CasADi's own C code treats one run at a time and calls scalar sine and cosine), compiled once, and kept in
-the cache folder under the digest of source, compiler and processor. Elsewhere CasADi interprets the same instructions: slower, the same numbers to
-rounding.
+A step x' = f(x, w, p) comes as a CasADi function, traced from the one formula. Where a C compiler is at hand its
+instructions are written as C in which every number is a vector over runs (CasADi's own C code treats one run at a time
+and calls scalar sine and cosine), compiled once, and kept in
+the cache folder under the digest of source, compiler and processor. Elsewhere CasADi interprets the same instructions:
+slower, the same numbers to rounding.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ typedef long long m __attribute__((vector_size(8 * W)));
 #if defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
 #if __GLIBC_PREREQ(2, 35)
 #define SIMD __attribute__((simd("notinbranch")))
-SIMD double sin(double); SIMD double cos(double); SIMD double exp(double); SIMD double log(double); SIMD double tanh(double);
+SIMD double sin(double); SIMD double cos(double); SIMD double exp(double);
+SIMD double log(double); SIMD double tanh(double);
 SIMD double atan2(double, double); SIMD double pow(double, double);
 #endif
 #endif
@@ -66,23 +68,32 @@ void lanes(const num *shape, num carried, const double *const *in, const num (*b
         for (num j = 0; j < NI; to += SIZES[j++]) {
           const num other = (!k && !s) || by[j][3] || (!s && by[j][1]);  // what is the same as before is not read again
           if (j ? other : !s && (!k || !carried))
-            fetch(to, in[j] + d * by[j][0] + k * by[j][1] + b * by[j][2] + s * by[j][3], SIZES[j], by[j][2], by[j][4], n);
+            fetch(to, in[j] + d * by[j][0] + k * by[j][1] + b * by[j][2] + s * by[j][3], SIZES[j], by[j][2], by[j][4],
+                  n);
         }
         step(g, y);
         if (NY == SIZES[0]) for (num i = 0; i < NY; i++) g[i] = y[i];
       }
-      for (num l = 0; l < n; l++) for (num i = 0; i < NY; i++) out[d * out_by[0] + k * out_by[1] + (b + l) * out_by[2] + i * out_by[3]] = y[i][l];
+      for (num l = 0; l < n; l++)
+        for (num i = 0; i < NY; i++)
+          out[d * out_by[0] + k * out_by[1] + (b + l) * out_by[2] + i * out_by[3]] = y[i][l];
     }
   }
 }
 """
 _C = {
-    "ASSIGN": "{0}", "ADD": "{0} + {1}", "SUB": "{0} - {1}", "MUL": "{0} * {1}", "DIV": "{0} / {1}", "NEG": "-{0}", "INV": "1.0 / {0}",
-    "SQ": "{0} * {0}", "TWICE": "{0} + {0}", "FABS": "SEL({0} < 0, -{0}, {0})", "SQRT": "vsqrt({0})", "SIN": "vsin({0})", "COS": "vcos({0})",
-    "EXP": "vexp({0})", "LOG": "vlog({0})", "TANH": "vtanh({0})", "ATAN2": "vatan2({0}, {1})", "POW": "vpow({0}, {1})", "CONSTPOW": "vpow({0}, {1})",
-    "FMIN": "SEL(({0} < {1}) | ({0} != {0}), {0}, {1})", "FMAX": "SEL(({0} > {1}) | ({0} != {0}), {0}, {1})",  # not a number stays so
+    "ASSIGN": "{0}", "ADD": "{0} + {1}", "SUB": "{0} - {1}", "MUL": "{0} * {1}", "DIV": "{0} / {1}", "NEG": "-{0}",
+    "INV": "1.0 / {0}",
+    "SQ": "{0} * {0}", "TWICE": "{0} + {0}", "FABS": "SEL({0} < 0, -{0}, {0})", "SQRT": "vsqrt({0})",
+    "SIN": "vsin({0})", "COS": "vcos({0})",
+    "EXP": "vexp({0})", "LOG": "vlog({0})", "TANH": "vtanh({0})", "ATAN2": "vatan2({0}, {1})", "POW": "vpow({0}, {1})",
+    "CONSTPOW": "vpow({0}, {1})",
+    # not a number stays so
+    "FMIN": "SEL(({0} < {1}) | ({0} != {0}), {0}, {1})", "FMAX": "SEL(({0} > {1}) | ({0} != {0}), {0}, {1})",
     "LT": "SEL({0} < {1}, K(1), K(0))", "LE": "SEL({0} <= {1}, K(1), K(0))", "EQ": "SEL({0} == {1}, K(1), K(0))",
-    "NE": "SEL({0} != {1}, K(1), K(0))", "NOT": "SEL({0} == 0, K(1), K(0))", "AND": "SEL(({0} != 0) & ({1} != 0), K(1), K(0))",
+    "NE": "SEL({0} != {1}, K(1), K(0))", "NOT": "SEL({0} == 0, K(1), K(0))",
+    "AND": ("SEL(({0} != 0) & ({1} != 0), "
+            "K(1), K(0))"),
     "OR": "SEL(({0} != 0) | ({1} != 0), K(1), K(0))", "IF_ELSE_ZERO": "SEL({0} != 0, {1}, K(0))",
     "SIGN": "SEL({0} > 0, K(1), SEL({0} < 0, K(-1), K(0)))",
 }  # fmt: skip
@@ -108,22 +119,33 @@ class Rollout:
         return self._lanes is not None
 
     def __call__(self, x0: np.ndarray, w: np.ndarray, p: np.ndarray, substeps: int = 1) -> np.ndarray:
-        """States (runs, K, nx) at t_1..t_K from x0 (runs, nx), `substeps` steps a sample under inputs w (runs, K, nw) held over it; p (num,)."""
+        """States (runs, K, nx) at t_1..t_K from x0 (runs, nx), `substeps` steps a sample under inputs w (runs, K, nw)
+        held over it; p (num,)."""
         x0, w, p = (np.ascontiguousarray(a, dtype=float) for a in (x0, w, p))
         runs, samples = w.shape[:2]
         if x0.shape != (runs, self.nx) or w.shape[2] != self.nw or p.shape != (self.num,):
-            raise ValueError(f"shapes {x0.shape}, {w.shape}, {p.shape}; accepted: (runs, {self.nx}), (runs, samples, {self.nw}), ({self.num},)")
+            raise ValueError(
+                f"shapes {x0.shape}, {w.shape}, {p.shape}; accepted: (runs, {self.nx}), (runs, samples, {self.nw}), "
+                f"({self.num},)"
+            )
         if self._lanes is None:
             return self._interpret(x0, np.repeat(w, substeps, axis=1), p)[:, substeps - 1 :: substeps]
         X = np.empty((runs, samples, self.nx))
-        self._lanes([x0[:, None], np.swapaxes(w, 0, 1)[:, :, None], p], (1, samples, runs, substeps), np.swapaxes(X, 0, 1)[None], carried=True)
+        self._lanes(
+            [x0[:, None], np.swapaxes(w, 0, 1)[:, :, None], p],
+            (1, samples, runs, substeps),
+            np.swapaxes(X, 0, 1)[None],
+            carried=True,
+        )
         return X
 
     def _interpret(self, x0: np.ndarray, w: np.ndarray, p: np.ndarray) -> np.ndarray:
         """States (runs, steps, nx) after every step."""
         X, values = np.empty((*w.shape[:2], self.nx)), np.tile(p, w.shape[1])
         made: Any = self._interpreted(w.shape[1])
-        buffer, trigger = made.buffer()  # reads and writes arrays in place; a call with arrays would copy number by number
+        buffer, trigger = (
+            made.buffer()
+        )  # reads and writes arrays in place; a call with arrays would copy number by number
         buffer.set_arg(2, values.data)
         for start, inputs, out in zip(x0, w, X, strict=True):
             buffer.set_arg(0, start.data)
@@ -134,9 +156,11 @@ class Rollout:
 
 
 class Lanes:
-    """A function of bundles of numbers, evaluated over lanes (D, K, B) in S parts each: what numpy's broadcasting does, without its loops.
+    """A function of bundles of numbers, evaluated over lanes (D, K, B) in S parts each: what numpy's broadcasting does,
+    without its loops.
 
-    Where it has as many results as the first bundle has numbers it is a step: the parts follow each other, and so do the K where they are `carried`.
+    Where it has as many results as the first bundle has numbers it is a step: the parts follow each other, and so do
+    the K where they are `carried`.
 
     Args:
         sizes: of the bundles.
@@ -149,20 +173,35 @@ class Lanes:
 
     @classmethod
     def of(cls, function: casadi.Function) -> Lanes | None:
-        """Of a function in SX, one vector per bundle, to one vector. None where there is no compiler, or it holds an operation that is not known: use
-        the formula itself."""
+        """Of a function in SX, one vector per bundle, to one vector. None where there is no compiler, or it holds an
+        operation that is not known: use the formula itself."""
         compiled = machine_code(c_source(function), "lanes", _LANES_ARGUMENTS)
-        return None if compiled is None else cls(tuple(function.numel_in(i) for i in range(function.n_in())), function.numel_out(0), compiled)
+        return (
+            None
+            if compiled is None
+            else cls(tuple(function.numel_in(i) for i in range(function.n_in())), function.numel_out(0), compiled)
+        )
 
-    def __call__(self, given: Sequence[np.ndarray], shape: tuple[int, int, int, int], out: np.ndarray, carried: bool = False) -> None:
-        """Write `out` (D, K, B, num) from bundles that spread over (D, K, B, S, size), shape = (D, K, B, S); (D, 1, B, num) keeps the last of K."""
-        spread = [np.broadcast_to(np.asarray(a, dtype=float), (*shape, size)) for a, size in zip(given, self.sizes, strict=True)]
+    def __call__(
+        self, given: Sequence[np.ndarray], shape: tuple[int, int, int, int], out: np.ndarray, carried: bool = False
+    ) -> None:
+        """Write `out` (D, K, B, num) from bundles that spread over (D, K, B, S, size), shape = (D, K, B, S); (D, 1, B,
+        num) keeps the last of K."""
+        spread = [
+            np.broadcast_to(np.asarray(a, dtype=float), (*shape, size))
+            for a, size in zip(given, self.sizes, strict=True)
+        ]
         if out.shape not in ((*shape[:3], self.num), (shape[0], 1, shape[2], self.num)) or out.dtype != float:
             raise ValueError(f"out: {out.dtype} {out.shape}; accepted: float64 {(*shape[:3], self.num)}")
         pointers = np.array([a.ctypes.data for a in spread], dtype=np.uintp)
-        by = np.array([[s // 8 for s in a.strides] for a in (*spread, np.broadcast_to(out, (*shape[:3], self.num))[..., None])], dtype=np.int64)
+        by = np.array(
+            [[s // 8 for s in a.strides] for a in (*spread, np.broadcast_to(out, (*shape[:3], self.num))[..., None])],
+            dtype=np.int64,
+        )
         size = np.array(shape, dtype=np.int64)
-        self._compiled(size.ctypes.data, carried, pointers.ctypes.data, by.ctypes.data, out.ctypes.data, by[-1].ctypes.data)
+        self._compiled(
+            size.ctypes.data, carried, pointers.ctypes.data, by.ctypes.data, out.ctypes.data, by[-1].ctypes.data
+        )
 
 
 def c_source(function: casadi.Function) -> str | None:
@@ -171,7 +210,10 @@ def c_source(function: casadi.Function) -> str | None:
     body = _instructions(function, [f"g[{sum(sizes[:i])} + {{}}]" for i in range(len(sizes))])
     if body is None:
         return None
-    head = f"#define NI {len(sizes)}\n#define NG {sum(sizes)}\n#define NY {function.numel_out(0)}\n#define SIZES_IN {', '.join(map(str, sizes))}\n"
+    head = (
+        f"#define NI {len(sizes)}\n#define NG {sum(sizes)}\n#define NY {function.numel_out(0)}\n"
+        f"#define SIZES_IN {', '.join(map(str, sizes))}\n"
+    )
     return f"{_HEAD}{head}static void step(const v *g, v *y) {{\n{body}\n}}\n{_LANES}"
 
 
@@ -182,7 +224,11 @@ def _instructions(function: casadi.Function, places: Sequence[str]) -> str | Non
     names = {number: name[3:] for name, number in vars(casadi).items() if name.startswith("OP_")}
     lines = [f"v {', '.join(f'a{i}' for i in range(function.sz_w()))};"]
     for k in range(function.n_instructions()):
-        name, given, out = names[function.instruction_id(k)], function.instruction_input(k), function.instruction_output(k)
+        name, given, out = (
+            names[function.instruction_id(k)],
+            function.instruction_input(k),
+            function.instruction_output(k),
+        )
         if name == "CONST" and math.isfinite(value := function.instruction_constant(k)):
             lines.append(f"a{out[0]} = K({value!r});")
         elif name == "INPUT":
@@ -197,5 +243,6 @@ def _instructions(function: casadi.Function, places: Sequence[str]) -> str | Non
 
 
 def c_function(code: str, name: str, arguments: Sequence[Any]) -> Callable[..., Any] | None:
-    """A C function of other code that treats vectors `v` of W numbers, with what the code above has; None where there is no compiler."""
+    """A C function of other code that treats vectors `v` of W numbers, with what the code above has; None where there
+    is no compiler."""
     return machine_code(_HEAD + code, name, arguments)

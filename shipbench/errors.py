@@ -36,7 +36,8 @@ def command_line() -> Iterator[None]:
 
 
 def option(command: str, python: str) -> str:
-    """Spelling of an option for whoever called: `command` such as "--out" on the command line, else `python` such as "out="."""
+    """Spelling of an option for whoever called: `command` such as "--out" on the command line, else `python` such as
+    "out="."""
     return command if _on_command_line.get() else python
 
 

@@ -10,15 +10,18 @@ from .errors import InputError
 
 EXTRAS = {
     "torch": ("torch", "networks"), "lightning": ("lightning", "networks"), "torchdiffeq": ("torchdiffeq", "networks"),
-    "sklearn": ("scikit-learn", "sklearn"), "pysindy": ("pysindy", "pysindy"), "scikit_posthocs": ("scikit-posthocs", "diagrams"),
+    "sklearn": ("scikit-learn", "sklearn"), "pysindy": ("pysindy", "pysindy"),
+    "scikit_posthocs": ("scikit-posthocs", "diagrams"),
     "nonlinear_benchmarks": ("nonlinear_benchmarks", "nonlinear-benchmarks"), "distributed": ("distributed", "dask"),
     "openpyxl": ("openpyxl", "excel"), "h5py": ("h5py", "matlab"), "matio": ("mat-io", "matlab"),
 }  # fmt: skip
-"""Name on the package index and extra of each optional package, by the name under which it is imported (pyproject.toml has the versions)."""
+"""Name on the package index and extra of each optional package, by the name under which it is imported (pyproject.toml
+has the versions)."""
 
 
 def not_installed(packages: Iterable[str]) -> str:
-    """The first of `packages` (import names) that is missing, and the command that installs it; "" where all are here. Imports none of them."""
+    """The first of `packages` (import names) that is missing, and the command that installs it; "" where all are here.
+    Imports none of them."""
     return next((_lack(package) for package in packages if find_spec(package) is None), "")
 
 
@@ -44,4 +47,7 @@ def needed_by(what: str, instead: str = "") -> Iterator[None]:
 
 def _lack(package: str, instead: str = "") -> str:
     distribution, extra = EXTRAS[package]
-    return f"needs {distribution}, which is not installed. {f'{instead}, or install' if instead else 'Install'} it: pip install 'shipbench[{extra}]'"
+    return (
+        f"needs {distribution}, which is not installed. {f'{instead}, or install' if instead else 'Install'} it: "
+        f"pip install 'shipbench[{extra}]'"
+    )

@@ -1,4 +1,5 @@
-"""The long table of a data set: one row per sample, with the columns trajectory, t, the states, the commands and the environment channels."""
+"""The long table of a data set: one row per sample, with the columns trajectory, t, the states, the commands and the
+environment channels."""
 
 from __future__ import annotations
 
@@ -24,7 +25,9 @@ def long_table(runs: Iterable[Any]) -> pd.DataFrame:
     """The samples of runs of the same inputs, one below the other."""
     frames = []
     for run in runs:
-        frame = pd.DataFrame(np.column_stack([run.t, run.states, run.inputs]), columns=["t", *STATES, *run.inputs_names])
+        frame = pd.DataFrame(
+            np.column_stack([run.t, run.states, run.inputs]), columns=["t", *STATES, *run.inputs_names]
+        )
         frame.insert(0, "trajectory", run.id)
         frames.append(frame)
     return pd.concat(frames, ignore_index=True)
@@ -43,7 +46,9 @@ def check_columns(table: pd.DataFrame, where: object, first_row: int = 2) -> Non
     nameless = (table["trajectory"].isna() | (table["trajectory"].astype(str).str.strip() == "")).to_numpy()
     if nameless.any():
         row = int(np.argmax(nameless)) + first_row
-        raise InputError(f"{where}: row {row} has no run name in 'trajectory' ({nameless.sum()} such rows); every row needs one.")
+        raise InputError(
+            f"{where}: row {row} has no run name in 'trajectory' ({nameless.sum()} such rows); every row needs one."
+        )
     table["trajectory"] = table["trajectory"].astype(str)
     block = (table["trajectory"] != table["trajectory"].shift()).cumsum()
     starts = table["trajectory"].groupby(block).first()
@@ -51,7 +56,8 @@ def check_columns(table: pd.DataFrame, where: object, first_row: int = 2) -> Non
     if twice:
         name = twice[0]
         raise InputError(
-            f"{where}: the rows of run '{name}' are in {int((starts == name).sum())} places; accepted: each run's rows together, in order of t. "
+            f"{where}: the rows of run '{name}' are in {int((starts == name).sum())} places; accepted: each run's "
+            "rows together, in order of t. "
             "Sort the rows by trajectory and t, or give the second run its own name."
         )
     for column in ("t", *(c for c in SIGNALS if c in table)):
@@ -59,7 +65,10 @@ def check_columns(table: pd.DataFrame, where: object, first_row: int = 2) -> Non
             unread = ~np.isfinite(np.asarray(pd.to_numeric(table[column], errors="coerce"), dtype=float))
             row = int(np.argmax(unread & table[column].notna().to_numpy()))
             value = str(table[column].iloc[row])[:80]
-            raise InputError(f"{where}, row {row + first_row}: {column} is '{value}', not a number. Accepted: decimal numbers with a point.")
+            raise InputError(
+                f"{where}, row {row + first_row}: {column} is '{value}', not a number. Accepted: decimal numbers "
+                "with a point."
+            )
         table[column] = table[column].astype(float)
 
 
@@ -102,16 +111,30 @@ def samples_of(frame: Any) -> tuple[dict[str, tuple[np.ndarray, np.ndarray, np.n
         InputError: no DataFrame, a column is missing or given twice, or as `check_columns`.
     """
     if not isinstance(frame, pd.DataFrame):
-        raise InputError(f"frame is of the type {type(frame).__name__}; accepted: a pandas DataFrame with the columns {', '.join(KNOWN[:8])}, ...")
+        raise InputError(
+            f"frame is of the type {type(frame).__name__}; accepted: a pandas DataFrame with the columns "
+            f"{', '.join(KNOWN[:8])}, ..."
+        )
     names = [name for name in frame.columns if name in KNOWN]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise InputError(f"frame: {names.count(twice[0])} columns are '{twice[0]}'; accepted: one. Drop the others.")
     if missing := [name for name in ("trajectory", "t", *MOTION_STATES) if name not in names]:
-        add = ' Name the run: frame.assign(trajectory="run1").' if missing == ["trajectory"] else " Rename: frame.rename(columns={'theirs': 'ours'})."
-        raise InputError(f"frame lacks {', '.join(missing)}; accepted: the columns {', '.join(('trajectory', 't', *MOTION_STATES))}.{add}")
+        add = (
+            ' Name the run: frame.assign(trajectory="run1").'
+            if missing == ["trajectory"]
+            else " Rename: frame.rename(columns={'theirs': 'ours'})."
+        )
+        raise InputError(
+            f"frame lacks {', '.join(missing)}; accepted: the columns "
+            f"{', '.join(('trajectory', 't', *MOTION_STATES))}.{add}"
+        )
     if not len(frame):
         raise InputError("frame has no rows; accepted: one row per sample.")
     table, notes = frame[names].reset_index(drop=True).infer_objects(), list[str]()
     check_columns(table, "frame", first_row=0)
     inputs = complete_columns(table, notes)
-    return {name: (rows["t"].copy(), samples(rows, STATES), samples(rows, inputs)) for name, rows in blocks(table)}, inputs, notes
+    return (
+        {name: (rows["t"].copy(), samples(rows, STATES), samples(rows, inputs)) for name, rows in blocks(table)},
+        inputs,
+        notes,
+    )

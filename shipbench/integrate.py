@@ -15,8 +15,8 @@ State = tuple[Array, ...]
 def rk4_step(rhs: Callable[[State, int], State], state: State, dt: Array) -> State:
     """One classical Runge-Kutta step of order 4.
 
-    `rhs(state, stage)` returns the derivatives; `stage` is 0 at the beginning, 1 at the middle and 2 at the end of the step, for
-    inputs that are known at those times.
+    `rhs(state, stage)` returns the derivatives; `stage` is 0 at the beginning, 1 at the middle and 2 at the end of the
+    step, for inputs that are known at those times.
     """
 
     def ahead(slope: State, factor: float) -> State:
@@ -34,7 +34,9 @@ def kinematics(psi: Array, u: Array, v: Array, r: Array) -> State:
     return u * cos(psi) - v * sin(psi), u * sin(psi) + v * cos(psi), r
 
 
-def motion_rhs(accelerations: Callable[[Array, Array, Array, Array, int], Sequence[Array]]) -> Callable[[State, int], State]:
+def motion_rhs(
+    accelerations: Callable[[Array, Array, Array, Array, int], Sequence[Array]],
+) -> Callable[[State, int], State]:
     """Right-hand side of (x, y, psi, u, v, r) from `accelerations(psi, u, v, r, stage) -> (du, dv, dr)`."""
 
     def rhs(state: State, stage: int) -> State:

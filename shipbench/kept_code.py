@@ -83,7 +83,8 @@ def compiler() -> tuple[tuple[str, ...], str]:
 def _give_up(command: tuple[str, ...]) -> None:
     """Say that the compiler hangs, and ask it no more: neither this process nor those that it starts."""
     _log.warning(
-        "the C compiler '%s' did not end within %d s and was stopped; CasADi interprets instead: slower, the same numbers. "
+        "the C compiler '%s' did not end within %d s and was stopped; CasADi interprets instead: slower, the same "
+        "numbers. "
         "To name another: SHIPBENCH_COMPILER=gcc; to use none: SHIPBENCH_COMPILER=none.",
         " ".join(command), _SECONDS,
     )  # fmt: skip
@@ -92,14 +93,16 @@ def _give_up(command: tuple[str, ...]) -> None:
 
 
 def _run(command: Sequence[str], folder: Path | None) -> str:
-    """Standard output of a command, with its temporary files in `folder`; one that hangs is stopped with all that it started.
+    """Standard output of a command, with its temporary files in `folder`; one that hangs is stopped with all that it
+    started.
 
     Raises:
         OSError, subprocess.SubprocessError: it cannot be started, fails, or hangs.
     """
     where = None if folder is None else {**os.environ, "TMPDIR": str(folder)}
     with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, errors="replace", env=where,
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        errors="replace", env=where,
         start_new_session=True,
     ) as process:  # fmt: skip
         try:
@@ -114,7 +117,8 @@ def _run(command: Sequence[str], folder: Path | None) -> str:
 
 
 def _folder() -> Path | None:
-    """The folder of the code, made if there is none; None where others could write in it (said once), so that nothing of it may be loaded."""
+    """The folder of the code, made if there is none; None where others could write in it (said once), so that nothing
+    of it may be loaded."""
     folder = cache_folder() / "compiled"
     with contextlib.suppress(OSError):
         make_private("compiled")
@@ -148,7 +152,8 @@ def _digest(path: Path) -> str:
 
 
 def _compile(command: tuple[str, ...], source: str, folder: Path, key: str) -> Path:
-    """Write the shared library into `folder` in one step: processes that compile the same at the same time do not meet."""
+    """Write the shared library into `folder` in one step: processes that compile the same at the same time do not
+    meet."""
     _sweep(folder)
     with tempfile.TemporaryDirectory(prefix=".", dir=folder) as work, _locked(Path(work)):
         written, made = Path(work) / "rollout.c", Path(work) / "rollout.so"

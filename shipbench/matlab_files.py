@@ -1,4 +1,5 @@
-"""MATLAB files of versions 5 to 7, looked through before scipy reads them: it trusts sizes and nesting, and ends the process on deep ones."""
+"""MATLAB files of versions 5 to 7, looked through before scipy reads them: it trusts sizes and nesting, and ends the
+process on deep ones."""
 
 from __future__ import annotations
 
@@ -29,7 +30,11 @@ def check_matlab(file: IO[bytes]) -> None:
     total = parts = 0
     while order and len(tag := file.read(8)) == 8:
         kind, size = struct.unpack(f"{order}II", tag)
-        data = _unpacked(file, size, MOST_MATLAB - total) if kind == _COMPRESSED else tag + file.read(min(size, MOST_MATLAB + 1))
+        data = (
+            _unpacked(file, size, MOST_MATLAB - total)
+            if kind == _COMPRESSED
+            else tag + file.read(min(size, MOST_MATLAB + 1))
+        )
         total += len(data)
         if total > MOST_MATLAB:
             raise ValueError(f"it holds more than {MOST_MATLAB / 1e6:.0f} MB unpacked; accepted: up to that")
@@ -63,7 +68,9 @@ def _check_parts(data: memoryview, order: str) -> int:
                 at += 8
                 continue
             if depth and at + 8 + size > end:  # scipy would take the memory before it reads
-                raise ValueError(f"it is damaged or cut short: an element declares {size} bytes and holds {end - at - 8}")
+                raise ValueError(
+                    f"it is damaged or cut short: an element declares {size} bytes and holds {end - at - 8}"
+                )
             if kind == _COMPRESSED:
                 raise ValueError("an element is packed twice")
             if kind == _MATRIX:

@@ -18,15 +18,18 @@ LONGEST_LABEL = 1000
 LONGEST_REPR = 1000
 """Characters that an object shows of itself in a notebook."""
 _FILE_BYTES = 200
-"""Bytes of a file name; file systems take 255, and a temporary file's name is longer than that of the file that it becomes."""
+"""Bytes of a file name; file systems take 255, and a temporary file's name is longer than that of the file that it
+becomes."""
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
-"""Unicode categories without a glyph: control characters, direction marks and zero widths, lone surrogates, line and paragraph separators."""
+"""Unicode categories without a glyph: control characters, direction marks and zero widths, lone surrogates, line and
+paragraph separators."""
 _WINDOWS = re.compile(r"@[-+.\de]+s")
 """What `Dataset.windows` adds to the name of a run."""
 
 
 def unseen(text: str) -> bool:
-    """Whether a text holds a character that nobody sees: a terminal, a page or a spreadsheet may take it for a command."""
+    """Whether a text holds a character that nobody sees: a terminal, a page or a spreadsheet may take it for a
+    command."""
     return not text.isprintable() and any(unicodedata.category(c) in _UNSEEN for c in text)
 
 
@@ -35,7 +38,12 @@ def shown(text: object, keep: str = "") -> str:
     text = str(text)
     if not unseen(text):
         return text
-    return "".join(c if c in keep or unicodedata.category(c) not in _UNSEEN else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
+    return "".join(
+        c
+        if c in keep or unicodedata.category(c) not in _UNSEEN
+        else c.encode("unicode_escape", "surrogatepass").decode()
+        for c in text
+    )
 
 
 def brief(text: str, longest: int = LONGEST_REPR) -> str:
@@ -47,7 +55,8 @@ def brief(text: str, longest: int = LONGEST_REPR) -> str:
 def check_label(text: object, key: str, longest: int = LONGEST) -> str:
     """`text`, if it can stand in a table: text without unseen characters, of at most `longest` characters.
 
-    Labels are the names of runs, groups, kinds of manoeuvre and models; "zigzag 20/20" is one. `key` names the entry in the message.
+    Labels are the names of runs, groups, kinds of manoeuvre and models; "zigzag 20/20" is one. `key` names the entry in
+    the message.
 
     Raises:
         InputError: it cannot.
@@ -55,9 +64,13 @@ def check_label(text: object, key: str, longest: int = LONGEST) -> str:
     if not isinstance(text, str):
         raise InputError(f"{key} = {shown(text)[:80]} is no text; accepted: a name in quotation marks.")
     if unseen(text):
-        raise InputError(f"{key} = '{shown(text)[:80]}' holds control characters; accepted: visible characters. Rename it.")
+        raise InputError(
+            f"{key} = '{shown(text)[:80]}' holds control characters; accepted: visible characters. Rename it."
+        )
     if len(text) > longest:
-        raise InputError(f"{key} = '{text[:40]}...' has {len(text)} characters; accepted: at most {longest}. Shorten it.")
+        raise InputError(
+            f"{key} = '{text[:40]}...' has {len(text)} characters; accepted: at most {longest}. Shorten it."
+        )
     return text
 
 
@@ -72,14 +85,18 @@ def check_run(text: object, key: str) -> str:
 
 
 def check_name(text: object, key: str) -> str:
-    """`text`, if it can be the name of a data set: a label (see `check_label`) that is not empty and has nothing of a path.
+    """`text`, if it can be the name of a data set: a label (see `check_label`) that is not empty and has nothing of a
+    path.
 
     Raises:
         InputError: it cannot.
     """
     name = check_label(text, key)
     if not name.strip() or name.startswith(".") or ".." in name or "/" in name or "\\" in name:
-        raise InputError(f"{key} = '{name}' is no name; accepted: text without '/', '\\', '..' or a dot at its beginning, such as 'my-trial'.")
+        raise InputError(
+            f"{key} = '{name}' is no name; accepted: text without '/', '\\', '..' or a dot at its beginning, such "
+            "as 'my-trial'."
+        )
     return name
 
 

@@ -19,7 +19,10 @@ _TRACKS, _POINTS = 60, 80
 def run_text(run: Any) -> str:
     """A run in one line."""
     kind = f", {run.kind}" if run.kind else ""
-    return f"<Run '{run.id}': {len(run)} samples, t = {run.t[0]:g} to {run.t[-1]:g} s{kind}; inputs {', '.join(run.inputs_names)}>"
+    return (
+        f"<Run '{run.id}': {len(run)} samples, t = {run.t[0]:g} to {run.t[-1]:g} s{kind}; inputs "
+        f"{', '.join(run.inputs_names)}>"
+    )
 
 
 class Runs(tuple[Any, ...]):
@@ -49,9 +52,12 @@ def _facts(data: Any) -> dict[str, str]:
     least, most = f"{min(seconds):g}", f"{max(seconds):g}"
     each = f"{least} s each" if least == most else f"{least} to {most} s each"
     facts = {
-        "Length": f"{each}, {sum(seconds):g} s in all, a sample every {data.dt:g} s", "Ship": f"{data.ship.name[:80]}, L = {data.ship.L:g} m",
-        "Runs": _listed([run.id for run in data.runs]), "Manoeuvres": _listed(sorted({run.kind for run in data.runs} - {""})),
-        "Inputs": ", ".join(data.inputs), "Actuators": data.actuators, "Source": data.source[:200], "Licence": data.licence[:100],
+        "Length": f"{each}, {sum(seconds):g} s in all, a sample every {data.dt:g} s",
+        "Ship": f"{data.ship.name[:80]}, L = {data.ship.L:g} m",
+        "Runs": _listed([run.id for run in data.runs]),
+        "Manoeuvres": _listed(sorted({run.kind for run in data.runs} - {""})),
+        "Inputs": ", ".join(data.inputs), "Actuators": data.actuators, "Source": data.source[:200],
+        "Licence": data.licence[:100],
         "Notes": f"{len(data.notes)}, in .notes" if data.notes else "",
     }  # fmt: skip
     return {key: text for key, text in facts.items() if text}
@@ -66,20 +72,27 @@ def _listed(names: Sequence[str], most: int = 4) -> str:
 def facts_html(title: str, facts: Mapping[str, str], beside: str = "") -> str:
     """A table of facts under a title, with a picture at its side."""
     rows = "".join(
-        f'<tr><th style="text-align:left">{escape(shown(key))}</th><td style="text-align:left">{escape(shown(value))}</td></tr>'
+        f'<tr><th style="text-align:left">{escape(shown(key))}</th><td '
+        f'style="text-align:left">{escape(shown(value))}</td></tr>'
         for key, value in facts.items()
     )
-    table = f"<table><caption style='text-align:left'><b>{escape(shown(title))}</b></caption><tbody>{rows}</tbody></table>"
+    table = (
+        f"<table><caption style='text-align:left'><b>{escape(shown(title))}</b></caption><tbody>{rows}</tbody></table>"
+    )
     return f'<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:flex-start">{table}{beside}</div>'
 
 
 def tracks_svg(tracks: Iterable[tuple[str, np.ndarray]]) -> str:
-    """Tracks, each a name and positions (samples, 2) [m] north and east, at one scale with north up; the name shows under the mouse.
+    """Tracks, each a name and positions (samples, 2) [m] north and east, at one scale with north up; the name shows
+    under the mouse.
 
     Of many tracks some are drawn, evenly spread.
     """
     drawn = _spread(list(tracks), _TRACKS)
-    points = [(name, positions[np.linspace(0, len(positions) - 1, min(len(positions), _POINTS)).round().astype(int)]) for name, positions in drawn]
+    points = [
+        (name, positions[np.linspace(0, len(positions) - 1, min(len(positions), _POINTS)).round().astype(int)])
+        for name, positions in drawn
+    ]
     every = np.concatenate([positions for _, positions in points])
     low, high = every.min(axis=0), every.max(axis=0)
     north, east = high - low
@@ -93,7 +106,8 @@ def tracks_svg(tracks: Iterable[tuple[str, np.ndarray]]) -> str:
         f'<text x="{_MARGIN:g}" y="{foot - 4:g}" font-size="11" fill="currentColor" stroke="none">{bar:g} m</text>'
     )
     return (
-        f'<svg width="{_WIDTH:g}" height="{_HEIGHT:g}" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" fill="none" stroke="currentColor" '
+        f'<svg width="{_WIDTH:g}" height="{_HEIGHT:g}" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" fill="none" '
+        'stroke="currentColor" '
         f'role="img" aria-label="Tracks, north up">{"".join(lines)}{scale_bar}</svg>'
     )
 

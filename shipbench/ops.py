@@ -1,6 +1,7 @@
 """Elementwise maths on numpy arrays, torch tensors and casadi expressions.
 
-Physics is written once with these functions; the argument's type picks the back end. Only operations that all three have are
+Physics is written once with these functions; the argument's type picks the back end. Only operations that all three
+have are
 here. torch and casadi are never imported by this module: a value of theirs can only arrive once they are loaded.
 """
 
@@ -12,7 +13,8 @@ from typing import Any
 import numpy as np
 
 Array = Any
-"""A float, numpy array, torch tensor or casadi SX/MX; all operands of one formula come from one back end (or are floats)."""
+"""A float, numpy array, torch tensor or casadi SX/MX; all operands of one formula come from one back end (or are
+floats)."""
 
 
 _NUMPY = frozenset({np.ndarray, np.float64, float, int})
@@ -33,7 +35,9 @@ def _tensors(*args: Array) -> list[Any]:
     """Floats and numpy arrays lifted to tensors of the dtype and device of the first tensor among `args`."""
     torch = sys.modules["torch"]
     like = next(a for a in args if isinstance(a, torch.Tensor))
-    return [a if isinstance(a, torch.Tensor) else torch.as_tensor(a, dtype=like.dtype, device=like.device) for a in args]
+    return [
+        a if isinstance(a, torch.Tensor) else torch.as_tensor(a, dtype=like.dtype, device=like.device) for a in args
+    ]
 
 
 def _unary(numpy_name: str, torch_name: str, casadi_name: str):
@@ -87,7 +91,8 @@ maximum = _binary("maximum", "maximum", "fmax")
 def where(condition: Array, yes: Array, no: Array) -> Array:
     """`yes` where `condition` holds, else `no`. Both sides are evaluated: keep both finite.
 
-    With a torch condition at least one side must be a tensor: two plain numbers have no dtype, and torch would round them to float32.
+    With a torch condition at least one side must be a tensor: two plain numbers have no dtype, and torch would round
+    them to float32.
     """
     if type(condition) in _NUMPY and type(yes) in _NUMPY and type(no) in _NUMPY:
         return np.where(condition, yes, no)

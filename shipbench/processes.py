@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 
 
 class _Process(SpawnProcess):
-    """A process that does not run the main script again: nothing of it is needed, and it would start the same work once more."""
+    """A process that does not run the main script again: nothing of it is needed, and it would start the same work once
+    more."""
 
     def start(self) -> None:
         main = sys.modules["__main__"]

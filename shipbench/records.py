@@ -60,12 +60,17 @@ class Run:
         object.__setattr__(self, "inputs_names", tuple(self.inputs_names))
         names = self.inputs_names
         if names[: len(COMMANDS)] != COMMANDS or len(set(names)) != len(names):
-            raise InputError(f"run '{self.id}': inputs_names are {names}; accepted: {', '.join(COMMANDS)}, then other names, each once.")
+            raise InputError(
+                f"run '{self.id}': inputs_names are {names}; accepted: {', '.join(COMMANDS)}, then other names, "
+                "each once."
+            )
         n = len(self.t) if self.t.ndim == 1 else 0
         if n == 0 or self.states.shape != (n, len(STATES)) or self.inputs.shape != (n, len(names)):
             raise InputError(
-                f"run '{self.id}': t has the shape {self.t.shape}, states {self.states.shape}, inputs {self.inputs.shape}; "
-                f"accepted: t (samples,), states (samples, {len(STATES)}), inputs (samples, {len(names)}), and one sample at least."
+                f"run '{self.id}': t has the shape {self.t.shape}, states {self.states.shape}, inputs "
+                f"{self.inputs.shape}; "
+                f"accepted: t (samples,), states (samples, {len(STATES)}), inputs (samples, {len(names)}), and one "
+                "sample at least."
             )
         self._check_values(self.states, STATES)
         self._check_values(self.inputs, names)
@@ -90,7 +95,8 @@ class Run:
         typical = float(np.nanmedian(steps)) if len(steps) else 1.0  # of most steps: some may be far off
         k = int(np.argmax(~(np.abs(steps - typical) <= _UNEVEN * abs(typical)))) if len(steps) else 0
         raise InputError(
-            f"run '{self.id}': t goes from {self.t[k]:g} s to {self.t[min(k + 1, len(steps))]:g} s; accepted: t that grows by the same step"
+            f"run '{self.id}': t goes from {self.t[k]:g} s to {self.t[min(k + 1, len(steps))]:g} s; accepted: t "
+            "that grows by the same step"
             f"{f', {typical:g} s here' if typical > 0.0 else ''}. Resample the run."
         )
 
@@ -112,7 +118,8 @@ class Run:
 
     @property
     def group(self) -> str:
-        """Runs of one group (pieces of one log, copies of one manoeuvre, windows of one run) must not be split; a run without one is its own."""
+        """Runs of one group (pieces of one log, copies of one manoeuvre, windows of one run) must not be split; a run
+        without one is its own."""
         return str(self.meta.get("group", self.meta.get("parent", self.id)))
 
     @property
@@ -145,9 +152,11 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Runs of equal length, stacked for a rollout: what a predictor gets (s0, U, history) and the truth that it must not see.
+    """Runs of equal length, stacked for a rollout: what a predictor gets (s0, U, history) and the truth that it must
+    not see.
 
-    Shapes: s0 (batch, 10), U (batch, K, inputs), truth (batch, K, 10), history ((batch, H, 10), (batch, H, inputs)) or None.
+    Shapes: s0 (batch, 10), U (batch, K, inputs), truth (batch, K, 10), history ((batch, H, 10), (batch, H, inputs)) or
+    None.
     """
 
     ids: tuple[str, ...]
@@ -158,12 +167,15 @@ class Batch:
 
     def __repr__(self) -> str:
         past = f", history of {self.history[0].shape[1]} samples" if self.history else ""
-        return brief(f"<Batch of {len(self.ids)} runs: s0 {self.s0.shape}, U {self.U.shape}, truth {self.truth.shape}{past}>")
+        return brief(
+            f"<Batch of {len(self.ids)} runs: s0 {self.s0.shape}, U {self.U.shape}, truth {self.truth.shape}{past}>"
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """Runs of one ship with one sample time and one list of inputs: a sequence of runs, `data["run07"]`, `data[3]`, `for run in data`.
+    """Runs of one ship with one sample time and one list of inputs: a sequence of runs, `data["run07"]`, `data[3]`,
+    `for run in data`.
 
     A slice, `data[:5]`, is a data set of those runs.
 
@@ -196,30 +208,41 @@ class Dataset:
         if isinstance(self.dt, bool) or not isinstance(self.dt, Real) or not 0.0 < self.dt < np.inf:
             raise InputError(f"data set '{self.name}': dt = {self.dt!r}; accepted: a number of seconds above 0.")
         if not all(isinstance(run, Run) for run in self.runs):
-            raise InputError(f"data set '{self.name}': runs holds {type(self.runs[0]).__name__}; accepted: objects of shipbench.records.Run.")
+            raise InputError(
+                f"data set '{self.name}': runs holds {type(self.runs[0]).__name__}; accepted: objects of "
+                "shipbench.records.Run."
+            )
         if not self.runs:
             raise InputError(f"data set '{self.name}' has no runs; at least one is needed.")
         if self.actuators not in ("measured", "commanded"):
-            raise InputError(f"data set '{self.name}': actuators = '{self.actuators}'; accepted: 'measured' or 'commanded'.")
+            raise InputError(
+                f"data set '{self.name}': actuators = '{self.actuators}'; accepted: 'measured' or 'commanded'."
+            )
         ids = [r.id for r in self.runs]
         if len(set(ids)) != len(ids):
             twice = sorted({i for i in ids if ids.count(i) > 1})
             raise InputError(f"data set '{self.name}': run ids are not unique: {', '.join(twice[:5])}. Rename them.")
         for run in self.runs:
             if run.inputs_names != self.inputs:
-                raise InputError(f"run '{run.id}' has inputs {run.inputs_names}, the data set {self.inputs}; they must agree.")
+                raise InputError(
+                    f"run '{run.id}' has inputs {run.inputs_names}, the data set {self.inputs}; they must agree."
+                )
             if len(run) > 1 and abs(run.dt - self.dt) > 1e-3 * self.dt:
-                raise InputError(f"run '{run.id}' is sampled at {run.dt:g} s, the data set at {self.dt:g} s; resample one of them.")
+                raise InputError(
+                    f"run '{run.id}' is sampled at {run.dt:g} s, the data set at {self.dt:g} s; resample one of them."
+                )
 
     @classmethod
     def from_frame(
-        cls, frame: pd.DataFrame, ship: Ship | str | Path, dt: float | None = None, *, name: str = "trial", actuators: str = "measured",
+        cls, frame: pd.DataFrame, ship: Ship | str | Path, dt: float | None = None, *, name: str = "trial",
+        actuators: str = "measured",
         meta: Mapping[str, dict[str, Any]] | None = None, **about: Any,
     ) -> Dataset:  # fmt: skip
         """The data set of a long table, one row per sample, in SI units and our signs.
 
         Args:
-            frame: columns trajectory, t [s], the ten states, the four commands, then wind_speed, wind_from, depth where they are measured; others
+            frame: columns trajectory, t [s], the ten states, the four commands, then wind_speed, wind_from, depth where
+            they are measured; others
                 are ignored. Missing actuators are filled in as for a file; `notes` say how.
             ship: the vessel's particulars, or the path of a ship.toml.
             dt: sample time [s]; None: that of t.
@@ -228,7 +251,8 @@ class Dataset:
             about: source, licence, simulation, notes or derived of the data set.
 
         Raises:
-            InputError: a column is missing, a value is no number, time is not uniform, or the ship's file cannot be read.
+            InputError: a column is missing, a value is no number, time is not uniform, or the ship's file cannot be
+            read.
         """
         from .frames import samples_of
 
@@ -243,7 +267,8 @@ class Dataset:
         return cls(name, ship if isinstance(ship, Ship) else Ship.load(ship), step, runs, actuators, **about)
 
     def to_frame(self) -> pd.DataFrame:
-        """The long table, one row per sample: trajectory, t, the states, the inputs. `from_frame` gives back the same samples, bit for bit."""
+        """The long table, one row per sample: trajectory, t, the states, the inputs. `from_frame` gives back the same
+        samples, bit for bit."""
         from .frames import long_table
 
         return long_table(self.runs)
@@ -268,7 +293,9 @@ class Dataset:
             return self.with_runs(self.runs[key])
         if not isinstance(key, str):
             if not -len(self) <= key < len(self):
-                raise IndexError(f"data set '{self.name}' has no run {key}; it has {len(self)} runs, 0 to {len(self) - 1}.")
+                raise IndexError(
+                    f"data set '{self.name}' has no run {key}; it has {len(self)} runs, 0 to {len(self) - 1}."
+                )
             return self.runs[key]
         if found := [run for run in self.runs if run.id == key]:
             return found[0]
@@ -288,7 +315,9 @@ class Dataset:
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 (first 16 digits) over every sample, the run names, dt, the inputs and the ship."""
-        digest = hashlib.sha256(repr((float(self.dt), self.inputs, self.actuators, self.ship.model_dump_json())).encode())
+        digest = hashlib.sha256(
+            repr((float(self.dt), self.inputs, self.actuators, self.ship.model_dump_json())).encode()
+        )
         for run in self.runs:
             digest.update(run.id.encode())
             for array in (run.t, run.states, run.inputs):
@@ -308,14 +337,20 @@ class Dataset:
         return self if other is None else self.with_runs((*self.runs, *other.runs))
 
     def windows(self, steps: int, stride: int | None = None, history: int = 0) -> Dataset:
-        """Cut every run into windows of `history + steps` transitions, `stride` samples apart (default: non-overlapping).
+        """Cut every run into windows of `history + steps` transitions, `stride` samples apart (default:
+        non-overlapping).
 
-        A run of exactly `history + steps + 1` samples gives one window; a run that gives one window only keeps its name.
+        A run of exactly `history + steps + 1` samples gives one window; a run that gives one window only keeps its
+        name.
 
         Raises:
             InputError: no run is long enough, or a number is not one of samples.
         """
-        for what, value, least in (("steps", steps, 1), ("stride", 1 if stride is None else stride, 1), ("history", history, 0)):
+        for what, value, least in (
+            ("steps", steps, 1),
+            ("stride", 1 if stride is None else stride, 1),
+            ("history", history, 0),
+        ):
             if not isinstance(value, (int, np.integer)) or value < least:
                 raise InputError(f"{what} = {value}; accepted: a whole number of samples, {least} or more.")
         need = history + steps + 1
@@ -323,7 +358,8 @@ class Dataset:
         if not windows:
             longest = max(self.runs, key=len)
             raise InputError(
-                f"data set '{self.name}': no run is as long as the horizon: {steps} steps + {history} of history need {need} samples "
+                f"data set '{self.name}': no run is as long as the horizon: {steps} steps + {history} of history "
+                f"need {need} samples "
                 f"({(need - 1) * self.dt:g} s); the longest run '{longest.id}' has {len(longest)}. Shorten the horizon."
             )
         return self.with_runs(windows)
@@ -336,9 +372,14 @@ class Dataset:
         """
         lengths = {len(r) for r in self.runs}
         if len(lengths) > 1:
-            raise InputError(f"data set '{self.name}': runs have {min(lengths)} to {max(lengths)} samples; cut them with windows().")
+            raise InputError(
+                f"data set '{self.name}': runs have {min(lengths)} to {max(lengths)} samples; cut them with windows()."
+            )
         if not isinstance(history, (int, np.integer)) or not 0 <= history < len(self.runs[0]):
-            raise InputError(f"history = {history}; accepted: 0 to {len(self.runs[0]) - 1} samples, since the runs have {len(self.runs[0])}.")
+            raise InputError(
+                f"history = {history}; accepted: 0 to {len(self.runs[0]) - 1} samples, since the runs have "
+                f"{len(self.runs[0])}."
+            )
         S = np.stack([r.states for r in self.runs])
         U = np.stack([r.inputs for r in self.runs])
         past = (S[:, :history], U[:, :history]) if history else None

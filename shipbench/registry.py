@@ -1,7 +1,8 @@
 """Parts found by file name: `predictors/lstm.py` is the predictor "lstm"; listing imports none of them.
 
-Outside packages add parts through the entry-point group of the registry (for example `shipbench.predictors`). A plug-in that cannot be
-used is told of in one line of the log and left out; asked for by its name, it raises an `InputError` with the reason. A name that two
+Outside packages add parts through the entry-point group of the registry (for example `shipbench.predictors`). A plug-in
+that cannot be used is told of in one line of the log and left out; asked for by its name, it raises an `InputError`
+with the reason. A name that two
 parts claim is given to neither: shipbench cannot know which one is meant.
 """
 
@@ -30,7 +31,8 @@ _OFFERS = {
     "datasets": ("make", "summary", "licence", "cached"),
     "metrics": ("function", "columns", "per_run"),
 }
-"""What the object behind an entry point of each group must have; without it other commands would stumble over it later."""
+"""What the object behind an entry point of each group must have; without it other commands would stumble over it later.
+"""
 
 _problems: dict[tuple[str, str, str], str] = {}
 """Why a plug-in (group, name, value) could not be used: a failed import is not tried again."""
@@ -39,13 +41,14 @@ _told: set[str] = set()
 
 @cache
 def scanned(group: str) -> tuple[EntryPoint, ...]:
-    """The entry points of a group. Going through all installed packages takes about 0.1 s, so it is done once: `scanned.cache_clear()` where packages
-    were installed meanwhile."""
+    """The entry points of a group. Going through all installed packages takes about 0.1 s, so it is done once:
+    `scanned.cache_clear()` where packages were installed meanwhile."""
     return tuple(entry_points(group=group))
 
 
 def package_digest(name: str) -> str:
-    """SHA-256 (first 12 digits) over the Python files of an importable package or module; "" where it is not installed."""
+    """SHA-256 (first 12 digits) over the Python files of an importable package or module; "" where it is not
+    installed."""
     found = find_spec(name)
     if found is None or found.origin is None:
         return ""
@@ -85,7 +88,8 @@ class Registry:
         attribute: the name that each module defines ("PREDICTOR").
         helpers: modules of the folder that are not parts.
         group: entry-point group `shipbench.<group>` for outside packages; the folder's name unless given.
-        lazy: a plug-in is imported only when it is asked for by name. Else listing imports the plug-ins (never shipbench's own parts), so
+        lazy: a plug-in is imported only when it is asked for by name. Else listing imports the plug-ins (never
+        shipbench's own parts), so
             that commands which go through all parts meet only those that work.
     """
 
@@ -135,7 +139,8 @@ class Registry:
         """Import the one module behind `name` and return its part.
 
         Raises:
-            InputError: the name is not registered, claimed twice, needs a package that is not installed, or its plug-in cannot be used.
+            InputError: the name is not registered, claimed twice, needs a package that is not installed, or its plug-in
+            cannot be used.
         """
         files, plugins = self._files(), self.plugins()
         if name not in files and name not in plugins:
@@ -163,10 +168,13 @@ class Registry:
         self.get(name)
         parts = self.plugins()[name][0].module.split(".")
         above = (".".join(parts[:depth]) for depth in range(1, len(parts)))
-        return next((p for p in above if (found := find_spec(p)) and found.origin), ".".join(parts))  # folders of several packages have no origin
+        return next(
+            (p for p in above if (found := find_spec(p)) and found.origin), ".".join(parts)
+        )  # folders of several packages have no origin
 
     def digest(self, name: str) -> str:
-        """What tells one version of a plug-in from another: its package's Python files, and the list of all installed files with their hashes.
+        """What tells one version of a plug-in from another: its package's Python files, and the list of all installed
+        files with their hashes.
 
         "" for a part of shipbench's own, whose version is that of shipbench.
 
@@ -182,10 +190,16 @@ class Registry:
 
     def _clash(self, name: str, points: list[EntryPoint]) -> str:
         """What is wrong with a name that two parts claim, or ""."""
-        claims = [*(["shipbench itself"] if name in self._files() else []), *(f"the plug-in {_origin(p)}" for p in points)]
+        claims = [
+            *(["shipbench itself"] if name in self._files() else []),
+            *(f"the plug-in {_origin(p)}" for p in points),
+        ]
         if len(claims) < 2:
             return ""
-        return f"{self.kind} '{name}' is defined twice: in {' and in '.join(claims)}. Rename the plug-in's entry point, or uninstall its package."
+        return (
+            f"{self.kind} '{name}' is defined twice: in {' and in '.join(claims)}. Rename the plug-in's entry "
+            "point, or uninstall its package."
+        )
 
     def _load(self, point: EntryPoint) -> tuple[Any, str]:
         """The part behind an entry point, or None and why it cannot be used."""
@@ -195,7 +209,10 @@ class Registry:
         part, wrong = None, ""
         try:
             part = point.load()
-        except (Exception, SystemExit) as error:  # a stranger's module may raise anything, and must not take the command down
+        except (
+            Exception,
+            SystemExit,
+        ) as error:  # a stranger's module may raise anything, and must not take the command down
             wrong = f"cannot be imported: {reason(error)}"
         else:
             missing = [a for a in _OFFERS.get(self.group or self.folder, ()) if not hasattr(part, a)]

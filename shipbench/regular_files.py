@@ -1,8 +1,10 @@
 """Files of strangers, opened safely: regular files only, and their size known before memory is taken.
 
-A named pipe would wait for ever, a device such as /dev/zero never ends, and opening a device may set it in motion. Every reader of shipbench opens
-its files here: `open_regular` for readers that take an open file, `check_regular` for those that insist on a path, `read_text`, `read_json` and
-`read_npz` for files that are read whole. `check_output` keeps what is written from what is read.
+A named pipe would wait for ever, a device such as /dev/zero never ends, and opening a device may set it in motion.
+Every reader of shipbench opens
+its files here: `open_regular` for readers that take an open file, `check_regular` for those that insist on a path,
+`read_text`, `read_json` and `read_npz` for files that are read whole. `check_output` keeps what is written from what is
+read.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ MOST_TEXT = 64_000_000
 MOST_ARRAYS = 1_000_000_000
 """Bytes of arrays that are read whole."""
 _DAMAGED = (
-    OSError, ValueError, KeyError, TypeError, EOFError, SyntaxError, MemoryError, RecursionError, RuntimeError, NotImplementedError,
+    OSError, ValueError, KeyError, TypeError, EOFError, SyntaxError, MemoryError, RecursionError, RuntimeError,
+    NotImplementedError,
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, tokenize.TokenError,
 )  # fmt: skip
 """What zipfile and numpy raise on a damaged .npz file."""
@@ -40,7 +43,8 @@ _KINDS: dict[str, Callable[[int], bool]] = {
 
 
 def check_regular(path: str | Path, what: str = "file") -> int:
-    """Size [bytes] of a regular file, or of the one that a link points to; `what` names the kind of file in messages ("TOML file").
+    """Size [bytes] of a regular file, or of the one that a link points to; `what` names the kind of file in messages
+    ("TOML file").
 
     Raises:
         InputError: there is no such file, or it is a folder, a named pipe, a device or a socket.
@@ -52,7 +56,8 @@ def check_regular(path: str | Path, what: str = "file") -> int:
 
 
 def open_regular(path: str | Path, what: str = "file") -> IO[bytes]:
-    """Open a regular file for reading. Looked at before and after opening: what is put in its place in between is refused, too.
+    """Open a regular file for reading. Looked at before and after opening: what is put in its place in between is
+    refused, too.
 
     Raises:
         InputError: as `check_regular`, or the file may not be read.
@@ -60,7 +65,9 @@ def open_regular(path: str | Path, what: str = "file") -> IO[bytes]:
     check_regular(path, what)
     try:
         # Without O_NONBLOCK, opening a pipe waits for a writer.
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0))
+        handle = os.open(
+            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+        )
         try:
             _size(os.fstat(handle), path, what)
             return os.fdopen(handle, "rb")
@@ -84,7 +91,9 @@ def read_bytes(path: str | Path, what: str = "file", most: int = MOST_TEXT) -> b
         except OSError as error:
             raise _unreadable(path, what, error) from None
     if max(size, len(content)) > most:
-        raise InputError(f"{path} has {max(size, len(content)) / 1e6:.3g} MB; accepted: a {what} of up to {most / 1e6:.3g} MB.")
+        raise InputError(
+            f"{path} has {max(size, len(content)) / 1e6:.3g} MB; accepted: a {what} of up to {most / 1e6:.3g} MB."
+        )
     return content
 
 
@@ -97,7 +106,10 @@ def read_text(path: str | Path, what: str = "text file", most: int = MOST_TEXT) 
     try:
         return read_bytes(path, what, most).decode("utf-8")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not UTF-8 text (byte {error.start}); accepted: a {what} in UTF-8. Save it again in that encoding.") from None
+        raise InputError(
+            f"{path} is not UTF-8 text (byte {error.start}); accepted: a {what} in UTF-8. Save it again in that "
+            "encoding."
+        ) from None
 
 
 def read_json(path: str | Path, what: str = "JSON file", most: int = MOST_TEXT) -> Any:
@@ -115,10 +127,12 @@ def read_json(path: str | Path, what: str = "JSON file", most: int = MOST_TEXT) 
 
 
 def read_npz(path: str | Path, what: str = "file of arrays (.npz)", most: int = MOST_ARRAYS) -> dict[str, np.ndarray]:
-    """The arrays of a .npz file. Nothing is unpickled, and no array is made before its declared size is known to be in the file.
+    """The arrays of a .npz file. Nothing is unpickled, and no array is made before its declared size is known to be in
+    the file.
 
     Raises:
-        InputError: as `open_regular`, the file is damaged or holds other things than arrays of numbers or text, or more than `most` bytes.
+        InputError: as `open_regular`, the file is damaged or holds other things than arrays of numbers or text, or more
+        than `most` bytes.
     """
     import numpy as np
 
@@ -159,7 +173,8 @@ def _check_array(packed: zipfile.ZipFile, part: zipfile.ZipInfo) -> None:
 def check_output(path: Path, inputs: Iterable[str | Path] = (), option: str = "--out") -> None:
     """Refuse to write a file over what the same command reads, or in the place of a device, a named pipe or a folder.
 
-    `inputs` are files, and folders whose files are not replaced; a link counts as what it leads to. A path where nothing is yet is accepted.
+    `inputs` are files, and folders whose files are not replaced; a link counts as what it leads to. A path where
+    nothing is yet is accepted.
 
     Raises:
         InputError: as said.
@@ -168,9 +183,14 @@ def check_output(path: Path, inputs: Iterable[str | Path] = (), option: str = "-
         return
     if not path.is_file():
         kind = next((name for name, is_it in _KINDS.items() if is_it(path.stat().st_mode)), "of another kind")
-        raise InputError(f"{option} {path} is {kind}; accepted: a new name, or a file to replace. Give another {option}.")
+        raise InputError(
+            f"{option} {path} is {kind}; accepted: a new name, or a file to replace. Give another {option}."
+        )
     if any(path.resolve().is_relative_to(Path(given).resolve()) for given in inputs):
-        raise InputError(f"{option} {path} is there already, among the inputs of this command; it would be overwritten. Give another {option}.")
+        raise InputError(
+            f"{option} {path} is there already, among the inputs of this command; it would be overwritten. Give "
+            f"another {option}."
+        )
 
 
 def make_folder(path: Path, option: str = "--out") -> None:
@@ -183,7 +203,9 @@ def make_folder(path: Path, option: str = "--out") -> None:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = "it is a file" if path.is_file() else error.strerror
-        raise InputError(f"{option} {path} cannot be made: {reason}; accepted: a folder. Give another {option}.") from None
+        raise InputError(
+            f"{option} {path} cannot be made: {reason}; accepted: a folder. Give another {option}."
+        ) from None
 
 
 def _size(found: os.stat_result, path: str | Path, what: str) -> int:
@@ -194,7 +216,8 @@ def _size(found: os.stat_result, path: str | Path, what: str) -> int:
 
 
 def _unreadable(path: str | Path, what: str, error: OSError | ValueError) -> InputError:
-    """The message of what the system says; a ValueError comes of a path that no file can have (with a zero byte, or no text)."""
+    """The message of what the system says; a ValueError comes of a path that no file can have (with a zero byte, or no
+    text)."""
     if isinstance(error, OSError):
         dangling = isinstance(error, FileNotFoundError) and os.path.islink(path)
         reason = "it is a link to a file that does not exist" if dangling else error.strerror or type(error).__name__

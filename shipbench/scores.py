@@ -36,7 +36,9 @@ class Scores:
 
     def __init__(self, results: Results) -> None:
         self.results = results
-        self._boards: dict[str, BoardScores] = {name: scores_of(results, name) for name in dict.fromkeys(s["dataset"] for s in results.summaries)}
+        self._boards: dict[str, BoardScores] = {
+            name: scores_of(results, name) for name in dict.fromkeys(s["dataset"] for s in results.summaries)
+        }
 
     @property
     def datasets(self) -> list[str]:
@@ -47,7 +49,9 @@ class Scores:
     def failed(self) -> list[str]:
         """The fits that failed, each with its reason."""
         return [
-            f"{s['dataset']} {s['model']} fold {s['fold']} seed {s['seed']}: {s['reason']}" for s in self.results.summaries if s["status"] == "failed"
+            f"{s['dataset']} {s['model']} fold {s['fold']} seed {s['seed']}: {s['reason']}"
+            for s in self.results.summaries
+            if s["status"] == "failed"
         ]
 
     @property
@@ -56,14 +60,17 @@ class Scores:
         return [f"{dataset}, {model}: {note}" for (dataset, model), note in fit_notes(self.results.summaries).items()]
 
     def table(self, metrics: Sequence[str] = TABLE_III) -> pd.DataFrame:
-        """A row for each model, best first: scored of expected predictions, and the mean of each metric with its 95 % interval (bootstrap over runs).
+        """A row for each model, best first: scored of expected predictions, and the mean of each metric with its 95 %
+        interval (bootstrap over runs).
 
         Args:
-            metrics: columns of `results.rows`, such as "ed", "final_displacement" or "rmse_r", or their labels, such as "ED"; those by default that
+            metrics: columns of `results.rows`, such as "ed", "final_displacement" or "rmse_r", or their labels, such as
+            "ED"; those by default that
                 the study has.
 
         Returns:
-            Columns dataset (of several), model, scored, then `ED`, `ED low`, `ED high` and so on; their units are in `attrs["units"]`.
+            Columns dataset (of several), model, scored, then `ED`, `ED low`, `ED high` and so on; their units are in
+            `attrs["units"]`.
 
         Raises:
             InputError: the study has no such metric.
@@ -74,7 +81,11 @@ class Scores:
         lines, units = [], dict[str, str]()
         for dataset, board in self._boards.items():
             by_label = {column["label"]: name for name, column in board.columns.items()}
-            chosen = [name for name in (by_label.get(name, name) for name in wanted) if name in board.columns or metrics is not TABLE_III]
+            chosen = [
+                name
+                for name in (by_label.get(name, name) for name in wanted)
+                if name in board.columns or metrics is not TABLE_III
+            ]
             if unknown := [name for name in chosen if name not in board.columns]:
                 raise unknown_name("metric", unknown[0], board.columns)
             figures = {name: board.figures(name) for name in chosen}
@@ -85,7 +96,10 @@ class Scores:
                 line |= {"model": model, "scored": f"{scored}/{expected}"}
                 for name in chosen:
                     label = board.columns[name]["label"]
-                    line |= {f"{label}{end.replace('_', ' ')}": figures[name][model][f"{name}_mean{end}"] for end in ("", "_low", "_high")}
+                    line |= {
+                        f"{label}{end.replace('_', ' ')}": figures[name][model][f"{name}_mean{end}"]
+                        for end in ("", "_low", "_high")
+                    }
                 lines.append(line)
         table = pd.DataFrame(lines)
         table.attrs["units"] = units
@@ -136,7 +150,8 @@ class Scores:
         return _shown_in_notebooks(against_horizon(self.results, name, models, summary["dt"]))
 
     def report(self, path: str | os.PathLike[str], *, diagnosis: Sequence[Path] = ()) -> Path:
-        """Write the page of these scores, one HTML file that needs no network, and return its path; `diagnosis`: folders of diagnoses to link.
+        """Write the page of these scores, one HTML file that needs no network, and return its path; `diagnosis`:
+        folders of diagnoses to link.
 
         Raises:
             InputError: the file cannot be written, or a folder holds no diagnosis of these data.
@@ -154,14 +169,20 @@ class Scores:
             raise unknown_name("data set", name, self.datasets)
         models, _ = drawable(self.results, name, self._boards[name].models)
         if not models:
-            raise InputError(f"data set '{name}': no model has saved predictions of a scored run. Give the folder that `shipbench run` wrote, whole.")
+            raise InputError(
+                f"data set '{name}': no model has saved predictions of a scored run. Give the folder that "
+                "`shipbench run` wrote, whole."
+            )
         return name, models, next(s for s in self.results.summaries if s["dataset"] == name)
 
     def _lines(self) -> Iterator[str]:
         for dataset, board in self._boards.items():
             summary = next(s for s in self.results.summaries if s["dataset"] == dataset)
             windows = len(board.rows[["fold", "run"]].drop_duplicates())
-            yield f"Scores on {dataset}: {windows} held-out predictions of {summary['task']['horizon_s']:g} s; mean position error ED (95 % interval)"
+            yield (
+                f"Scores on {dataset}: {windows} held-out predictions of {summary['task']['horizon_s']:g} s; mean "
+                "position error ED (95 % interval)"
+            )
             yield lead(board)
             figures = board.figures("ed")
             for model in board.models:
@@ -180,7 +201,9 @@ class Scores:
         told = [*(f"failed: {line}" for line in self.failed[:10]), *(f"note: {line}" for line in self.notes[:10])]
         units = ", ".join(f"{label} in {unit}" for label, unit in self.table().attrs["units"].items())
         first = "".join(f"<p>{escape(shown(lead(board)))}</p>" for board in self._boards.values())
-        return f"{first}{table}<p>{escape(units)}; low and high: 95 % interval</p>" + "".join(f"<p>{escape(shown(line))}</p>" for line in told)
+        return f"{first}{table}<p>{escape(units)}; low and high: 95 % interval</p>" + "".join(
+            f"<p>{escape(shown(line))}</p>" for line in told
+        )
 
 
 def _shown_in_notebooks(figure: Figure) -> Figure:

@@ -1,4 +1,5 @@
-"""Specs: one string names a part and sets its parameters, `mlp[hidden=64,seed=3]`, `physics+current[speed=0.3,to=1.0]`, `path.py:Class`."""
+"""Specs: one string names a part and sets its parameters, `mlp[hidden=64,seed=3]`, `physics+current[speed=0.3,to=1.0]`,
+`path.py:Class`."""
 
 from __future__ import annotations
 
@@ -91,7 +92,8 @@ def parse_spec(text: str) -> Spec:
     match = _FILE.fullmatch(wanted) or _NAME.fullmatch(wanted)
     if match is None:
         raise InputError(
-            f"model spec '{text}' cannot be read; accepted: name, name[key=value,...], physics+effect, physics+effect[key=value,...], path.py:Class, "
+            f"model spec '{text}' cannot be read; accepted: name, name[key=value,...], physics+effect, "
+            "physics+effect[key=value,...], path.py:Class, "
             "a saved folder."
         )
     base, params = match["base"], _params(text, match["params"])
@@ -106,7 +108,8 @@ def parse_spec(text: str) -> Spec:
 
 
 def spec_of(model: Any, label: str = "") -> Spec:
-    """The spec of a model: text as `parse_spec` takes it, a path, a Spec, or a class or object in memory with `fit` and `predict`.
+    """The spec of a model: text as `parse_spec` takes it, a path, a Spec, or a class or object in memory with `fit` and
+    `predict`.
 
     Args:
         label: name of a model in memory; default its class with what differs from its defaults, `MyNet[hidden=64]`.
@@ -120,7 +123,8 @@ def spec_of(model: Any, label: str = "") -> Spec:
         return parse_spec(os.fspath(model))
     if lacking := [method for method in ("fit", "predict") if not callable(getattr(model, method, None))]:
         raise InputError(
-            f"the model {_class_name(model)} has no method {' and no '.join(lacking)}. Accepted: a spec such as 'physics', or a class or object with "
+            f"the model {_class_name(model)} has no method {' and no '.join(lacking)}. Accepted: a spec such as "
+            "'physics', or a class or object with "
             "fit(train, valid=None, *, seed=0) and predict(s0, U, history=None)."
         )
     text = label or _label(model)
@@ -138,5 +142,9 @@ def _label(model: Any) -> str:
         return name
     changed = [(f.name, getattr(model, f.name, f.default)) for f in fields(model) if f.init and f.repr]
     defaults = {f.name: f.default for f in fields(model)}
-    told = [f"{key}={value}" for key, value in changed if isinstance(value, bool | int | float | str) and value != defaults[key]]
+    told = [
+        f"{key}={value}"
+        for key, value in changed
+        if isinstance(value, bool | int | float | str) and value != defaults[key]
+    ]
     return name + (f"[{','.join(told)}]" if told and len(",".join(told)) <= _LONGEST_TOLD else "")

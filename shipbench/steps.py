@@ -1,4 +1,5 @@
-"""Progress of long work: whoever works says at which step it is, whoever shows that listens. Without a listener nothing happens."""
+"""Progress of long work: whoever works says at which step it is, whoever shows that listens. Without a listener nothing
+happens."""
 
 from __future__ import annotations
 

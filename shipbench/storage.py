@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 Frame = Any
-"""A pandas DataFrame. pandas' own annotations are unions of all that a method can return, which no checker can follow."""
+"""A pandas DataFrame. pandas' own annotations are unions of all that a method can return, which no checker can follow.
+"""
 
 
 @contextmanager
@@ -32,7 +33,8 @@ def in_one_step(path: Path, suffix: str = ".tmp") -> Iterator[Path]:
 
 
 def put(made: Path, path: Path) -> None:
-    """Move a file or folder that is complete to its place, in one step; both on one file system. A folder in its place must be empty."""
+    """Move a file or folder that is complete to its place, in one step; both on one file system. A folder in its place
+    must be empty."""
     os.replace(made, path)
 
 

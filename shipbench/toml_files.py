@@ -1,4 +1,5 @@
-"""TOML files that people write (dataset.toml, ship.toml, a task, a mapping): parsed within bounds, with strict types and one form of message."""
+"""TOML files that people write (dataset.toml, ship.toml, a task, a mapping): parsed within bounds, with strict types
+and one form of message."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ _DEEPEST = 32
 """Levels of tables and lists inside each other; the files of shipbench have 4."""
 _PART = r"""(?:"[^"\n]*+"|'[^'\n]*+'|[\w-]++)\s*+"""
 _CHAIN = re.compile(rf"(?<![\w-])(?:{_PART}\.\s*+){{{_DEEPEST},}}+(?:{_PART}([=\]]))?")
-"""Words and dots in turn, and what follows if it makes a key of them. The parser's time grows with the square of a key's parts."""
+"""Words and dots in turn, and what follows if it makes a key of them. The parser's time grows with the square of a
+key's parts."""
 _LONGEST_SHOWN = 80
 
 
@@ -27,12 +29,16 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     """Parse a TOML file.
 
     Raises:
-        InputError: the file is missing, not a regular file, too large, not TOML, nested too deeply, or holds an integer beyond 64 bits.
+        InputError: the file is missing, not a regular file, too large, not TOML, nested too deeply, or holds an integer
+        beyond 64 bits.
     """
     text = read_text(path, "TOML file", MOST_TOML)
     try:
         if any(chain[1] for chain in _CHAIN.finditer(text)):
-            raise InputError(f"{path} is not valid TOML: a key has more than {_DEEPEST} parts; accepted: up to {_DEEPEST}. Shorten the key.")
+            raise InputError(
+                f"{path} is not valid TOML: a key has more than {_DEEPEST} parts; accepted: up to {_DEEPEST}. "
+                "Shorten the key."
+            )
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path} is not valid TOML: {error}. Correct the line that the message names.") from None
@@ -45,7 +51,8 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 
 def _check_bounds(data: dict[str, Any], path: str | Path) -> None:
-    """Refuse nesting and integers that TOML does not promise to hold. A loop, not a recursion: a table may be nested without end."""
+    """Refuse nesting and integers that TOML does not promise to hold. A loop, not a recursion: a table may be nested
+    without end."""
     levels = [iter(data.values())]
     while levels:
         for value in levels[-1]:
@@ -61,11 +68,17 @@ def _check_bounds(data: dict[str, Any], path: str | Path) -> None:
 
 
 def _too_deep(path: str | Path) -> InputError:
-    return InputError(f"{path} is not valid TOML: it is nested too deeply; accepted: up to {_DEEPEST} levels. Put the entries into fewer tables.")
+    return InputError(
+        f"{path} is not valid TOML: it is nested too deeply; accepted: up to {_DEEPEST} levels. Put the entries "
+        "into fewer tables."
+    )
 
 
 def _too_large(path: str | Path) -> InputError:
-    return InputError(f"{path} is not valid TOML: an integer does not fit into 64 bits; accepted: -2^63 to 2^63 - 1. Write it as 1e30, or shorter.")
+    return InputError(
+        f"{path} is not valid TOML: an integer does not fit into 64 bits; accepted: -2^63 to 2^63 - 1. Write it as "
+        "1e30, or shorter."
+    )
 
 
 def _number(value: Any) -> Any:
@@ -82,7 +95,8 @@ def _switch(value: Any) -> Any:
 
 
 Number = Annotated[float, BeforeValidator(_number)]
-"""A number that was written as one; infinite and not-a-number are the model's choice (`allow_inf_nan` of its config)."""
+"""A number that was written as one; infinite and not-a-number are the model's choice (`allow_inf_nan` of its config).
+"""
 Whole = Annotated[int, BeforeValidator(_number)]
 """A whole number (2 or 2.0)."""
 Switch = Annotated[bool, BeforeValidator(_switch)]
@@ -90,7 +104,8 @@ Switch = Annotated[bool, BeforeValidator(_switch)]
 
 
 def fault(error: ValidationError) -> tuple[tuple[str, ...], str, str]:
-    """The first fault that pydantic found: the place as keys, the kind of fault, and what is wrong with the value received, in words."""
+    """The first fault that pydantic found: the place as keys, the kind of fault, and what is wrong with the value
+    received, in words."""
     first = error.errors()[0]
     place = tuple(str(key) for key in first["loc"])
     received = first["input"]

@@ -1,8 +1,9 @@
-"""Drives a real Chromium (Qt WebEngine, from the wheel PyQt6-WebEngine of the extra `browser`) without a display, in a process of its own.
+"""Drives a real Chromium (Qt WebEngine, from the wheel PyQt6-WebEngine of the extra `browser`) without a display, in a
+process of its own.
 
 `browse` takes steps and returns one result for each:
-    ["open", file, width, "light" or "dark"]  load a local file in a window that wide; gives the messages of the console since the start
-    ["js", code]                              the value of an expression in the page
+    ["open", file, width, "light" or "dark"]  load a local file in a window that wide; gives the messages of the console
+    since the start ["js", code]                              the value of an expression in the page
     ["click", selector]                       a mouse click on the middle of the first such element, scrolled into view
     ["hover", selector, x, y]                 the mouse on a point of that element, in parts of its width and height
     ["drag", selector, x0, y0, x1, y1]        a drag from one such point to another
@@ -31,7 +32,8 @@ CONTRAST = """(() => {
   const paper = lum(getComputedStyle(document.body).backgroundColor);
   const ratio = (c) => { const l = lum(c); return (Math.max(l, paper) + .05) / (Math.min(l, paper) + .05); };
   const of = (s, what) => [...document.querySelectorAll(s)].map((e) => ratio(getComputedStyle(e)[what]));
-  return [Math.min(...of('p, td, th, a, dt, dd, .small, figcaption, summary', 'color')), Math.min(...of('.line', 'stroke')), paper];
+  const text = of('p, td, th, a, dt, dd, .small, figcaption, summary', 'color');
+  return [Math.min(...text), Math.min(...of('.line', 'stroke')), paper];
 })()"""
 """Least ratio of luminances of a text to the page, and of a line of a drawing; luminance of the page."""
 
@@ -39,10 +41,18 @@ CONTRAST = """(() => {
 def browse(steps: list[list[Any]], scheme: str = "light") -> list[Any]:
     """Results of the steps; skips the test with the reason where the browser cannot be loaded."""
     flags = f"--no-sandbox --disable-gpu --blink-settings=preferredColorScheme={0 if scheme == 'dark' else 1}"
-    env = os.environ | {"QT_QPA_PLATFORM": "offscreen", "QTWEBENGINE_DISABLE_SANDBOX": "1", "QTWEBENGINE_CHROMIUM_FLAGS": flags}
-    done = subprocess.run([sys.executable, __file__, json.dumps(steps)], capture_output=True, text=True, env=env, timeout=120, check=False)
+    env = os.environ | {
+        "QT_QPA_PLATFORM": "offscreen",
+        "QTWEBENGINE_DISABLE_SANDBOX": "1",
+        "QTWEBENGINE_CHROMIUM_FLAGS": flags,
+    }
+    done = subprocess.run(
+        [sys.executable, __file__, json.dumps(steps)], capture_output=True, text=True, env=env, timeout=120, check=False
+    )
     if done.returncode == 77:
-        assert not os.environ.get("SHIPBENCH_NEEDS_BROWSER"), f"SHIPBENCH_NEEDS_BROWSER is set and no browser starts: {done.stdout.strip()}"
+        assert not os.environ.get("SHIPBENCH_NEEDS_BROWSER"), (
+            f"SHIPBENCH_NEEDS_BROWSER is set and no browser starts: {done.stdout.strip()}"
+        )
         pytest.skip(f"no browser: {done.stdout.strip()}")
     assert done.returncode == 0, done.stderr[-3000:]
     return json.loads(done.stdout)
@@ -105,15 +115,19 @@ def _main(steps: list[list[Any]]) -> int:
         js(f"document.querySelector({quoted}).scrollIntoView({{block: 'center', inline: 'center'}})")
         QTest.qWait(60)
         x, y = js(
-            f"(() => {{ const b = document.querySelector({quoted}).getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; }})()"
+            f"(() => {{ const b = document.querySelector({quoted}).getBoundingClientRect(); return [b.x + b.width / "
+            "2, b.y + b.height / 2]; })()"
         )
-        QTest.mouseClick(view.focusProxy(), Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(round(x), round(y)))
+        QTest.mouseClick(
+            view.focusProxy(), Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(round(x), round(y))
+        )
         QTest.qWait(100)
 
     def point(selector: str, x: float, y: float) -> QPoint:
         quoted = json.dumps(selector)
         box = js(
-            f"(() => {{ const e = document.querySelector({quoted}); e.scrollIntoView({{block: 'center', behavior: 'instant'}}); "
+            f"(() => {{ const e = document.querySelector({quoted}); e.scrollIntoView({{block: 'center', behavior: "
+            "'instant'}); "
             "const b = e.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()"
         )
         QTest.qWait(60)
@@ -157,7 +171,8 @@ def _main(steps: list[list[Any]]) -> int:
         return [url for url in asked if url not in opened]
 
     actions = {
-        "open": load, "js": js, "click": click, "key": key, "shot": shot, "hover": hover, "drag": drag, "double": double, "requests": requests,
+        "open": load, "js": js, "click": click, "key": key, "shot": shot, "hover": hover, "drag": drag,
+        "double": double, "requests": requests,
     }  # fmt: skip
     results = [actions[name](*values) for name, *values in steps]
     print(json.dumps(results))

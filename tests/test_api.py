@@ -251,7 +251,11 @@ class NeedsSize(Drift):
 @pytest.mark.parametrize(
     ("models", "options", "message"),
     [
-        (Drift, {"executor": "processes"}, "runs in this process only; executor 'processes' needs a class that can be imported"),
+        (
+            Drift,
+            {"executor": "processes"},
+            "runs in this process only; executor 'processes' needs a class that can be imported",
+        ),
         (np.eye(3), {}, "the model ndarray has no method fit and no predict"),
         (NeedsSize, {}, "Give an object, such as MyNet(hidden=64)"),
         ("hodl", {}, "Did you mean 'hold'"),
@@ -325,7 +329,10 @@ def test_a_check_of_data_shows_its_findings(harbour):
 def _log(folder: Path, harbour: sb.Dataset) -> Path:
     frame = harbour["run0"].states
     columns = dict(zip(["x", "y", "psi", "u", "v", "r"], frame[:, :6].T, strict=True))
-    lines = [",".join(["t", *columns]), *(",".join(f"{v:.6f}" for v in (t, *row)) for t, row in zip(harbour["run0"].t, frame[:, :6], strict=True))]
+    lines = [
+        ",".join(["t", *columns]),
+        *(",".join(f"{v:.6f}" for v in (t, *row)) for t, row in zip(harbour["run0"].t, frame[:, :6], strict=True)),
+    ]
     (folder / "bridge.csv").write_text("\n".join(lines))
     (folder / "ship.toml").write_text(harbour.ship.to_toml())
     return folder / "bridge.csv"
@@ -354,7 +361,10 @@ def test_a_log_becomes_a_data_set(harbour, tmp_path):
     assert "mapping.toml" not in " ".join(draft.remarks)  # nothing was written
     written = sb.propose_mapping([log], tmp_path / "draft.toml")
     assert (tmp_path / "draft.toml").read_text() == written.text == draft.text
-    assert written.remarks[-1].strip() == f'shipbench.import_log({str(log)!r}, {str(tmp_path / "draft.toml")!r}, "ship.toml", out="my_trial")'
+    assert (
+        written.remarks[-1].strip()
+        == f'shipbench.import_log({str(log)!r}, {str(tmp_path / "draft.toml")!r}, "ship.toml", out="my_trial")'
+    )
     with pytest.raises(InputError, match="another name with out=FILE, or force=True to replace it"):
         sb.propose_mapping(log, tmp_path / "draft.toml")
     (tmp_path / "mapping.toml").write_text(MAPPING)
@@ -375,14 +385,51 @@ def shown(harbour, scores) -> dict[str, object]:
     from shipbench.diagnosis.result import Candidate, Cause, Estimate
     from shipbench.specs import parse_spec
 
-    long = harbour.with_runs([replace(run, id=f"{run.id} {'long ' * 14}", meta={"manoeuvre": f"{run.id} turn"}) for run in harbour])
-    cause = Cause("current", 1, 30.0, 0.001, {f"size{i}": Estimate(0.3, "m/s", (0.2, 0.4)) for i in range(60)}, evidence="evidence " * 300)
+    long = harbour.with_runs(
+        [replace(run, id=f"{run.id} {'long ' * 14}", meta={"manoeuvre": f"{run.id} turn"}) for run in harbour]
+    )
+    cause = Cause(
+        "current",
+        1,
+        30.0,
+        0.001,
+        {f"size{i}": Estimate(0.3, "m/s", (0.2, 0.4)) for i in range(60)},
+        evidence="evidence " * 300,
+    )
     candidate = Candidate("wind", 1.0, 0.5, "because " * 300)
-    verdict = Verdict("demo", "found", (cause,) * 20, (candidate,) * 40, (), {}, "physics+current", "0" * 16, 1.0, ("a warning " * 20,) * 20)
+    verdict = Verdict(
+        "demo",
+        "found",
+        (cause,) * 20,
+        (candidate,) * 40,
+        (),
+        {},
+        "physics+current",
+        "0" * 16,
+        1.0,
+        ("a warning " * 20,) * 20,
+    )
     board = sb.build_board(scores.results, "small_harbour")
     task = sb.load_tasks(overrides={"models": [f"mlp[hidden={i}]" for i in range(200)]})[0]
-    objects = [long, long[0], harbour.batch(10), harbour.ship, scores, scores.results, board, Outcome(Path("x" * 2000), None, [], []), task, cause]
-    objects += [candidate, verdict, sb.check_data(harbour), parse_spec(f"mlp[hidden=8]{'+current' * 300}"), sb.make_predictor("physics+current")]
+    objects = [
+        long,
+        long[0],
+        harbour.batch(10),
+        harbour.ship,
+        scores,
+        scores.results,
+        board,
+        Outcome(Path("x" * 2000), None, [], []),
+        task,
+        cause,
+    ]
+    objects += [
+        candidate,
+        verdict,
+        sb.check_data(harbour),
+        parse_spec(f"mlp[hidden=8]{'+current' * 300}"),
+        sb.make_predictor("physics+current"),
+    ]
     objects += [sb.make_predictor(name) for name in ("hold", "mlp", "lstm", "neural_ode", "sklearn:Ridge")]
     return {f"{type(thing).__name__}{k}": thing for k, thing in enumerate(objects)}
 

@@ -1,4 +1,5 @@
-"""Machine code made of a CasADi step: the same numbers as the interpreter, kept safely, and done without where it cannot be made."""
+"""Machine code made of a CasADi step: the same numbers as the interpreter, kept safely, and done without where it
+cannot be made."""
 
 from __future__ import annotations
 
@@ -18,7 +19,12 @@ def every_operation() -> ca.Function:
     a, b, c = ca.vertsplit(x)
     first = ca.sin(a) + ca.cos(b) * p[0] - ca.sqrt(c * c + 1.0) / (2.0 + ca.exp(-a * a)) + ca.tanh(w[0])
     first += ca.atan2(b, c) + ca.fmin(a, b) * ca.fmax(b, c)
-    second = ca.if_else(a < b, a * w[1], -b) + ca.sign(c) * ca.fabs(b) + ca.if_else(ca.logic_or(a <= c, ca.logic_not(b < 0)), 0.1, p[1]) + 1.0 / c
+    second = (
+        ca.if_else(a < b, a * w[1], -b)
+        + ca.sign(c) * ca.fabs(b)
+        + ca.if_else(ca.logic_or(a <= c, ca.logic_not(b < 0)), 0.1, p[1])
+        + 1.0 / c
+    )
     third = ca.log(1.0 + a * a) + (1.5 + c * c) ** 0.7 + ca.if_else(ca.logic_and(a > 0, w[0] != w[1]), 2.0 * b, c)
     return ca.Function("step", [x, w, p], [ca.vertcat(first, ca.tanh(second), 0.1 * third)], {"cse": True})
 

@@ -58,7 +58,9 @@ def test_a_batch_gives_s0_then_the_samples_after_it():
     np.testing.assert_array_equal(batch.history[0][0, :, 0], [0.0, 1.0, 2.0])
 
 
-@pytest.mark.parametrize(("steps", "stride", "history"), [(0, None, 0), (-5, None, 0), (2.5, None, 0), (2, 0, 0), (2, -3, 0), (2, None, -1)])
+@pytest.mark.parametrize(
+    ("steps", "stride", "history"), [(0, None, 0), (-5, None, 0), (2.5, None, 0), (2, 0, 0), (2, -3, 0), (2, None, -1)]
+)
 def test_windows_of_no_whole_number_of_samples_are_refused(harbour, steps, stride, history):
     with pytest.raises(InputError, match=r"accepted: a whole number of samples"):
         harbour.windows(steps, stride, history)
@@ -95,7 +97,10 @@ def test_specs_of_every_form_are_read(tmp_path):
     assert [e.name for e in parse_spec("physics+current+wind").effects] == ["current", "wind"]
     several = parse_spec("physics[iterations=3]+current[speed=0.3,to=1.0]+bank_suction[line=1e+3]")
     assert several.params == {"iterations": 3}
-    assert several.effects == (EffectSpec("current", {"speed": 0.3, "to": 1.0}), EffectSpec("bank_suction", {"line": 1000.0}))
+    assert several.effects == (
+        EffectSpec("current", {"speed": 0.3, "to": 1.0}),
+        EffectSpec("bank_suction", {"line": 1000.0}),
+    )
     assert parse_spec("a/b.py:Model[x=true]").class_name == "Model"
     assert parse_spec("a+c/b.py:Model+current").effects == (EffectSpec("current"),)
     saved = tmp_path / "physics+current[speed=0.3,to=1.0]"
@@ -144,15 +149,30 @@ def test_a_ship_in_other_units_is_refused_with_the_figures(wrong):
     [
         ({"propeller": Propeller(diameter=4600.0)}, "propeller.diameter is 4600 m; accepted: up to 2 T = 12"),
         ({"rudder": Rudder(area=215.0)}, "rudder.area is 215 m^2; accepted: up to 0.15 L T = 90"),
-        ({"rudder": Rudder(area=10.0, x=50.0)}, "rudder.x is 50 m; accepted: -60 to 0 (from midship, forward positive)"),
+        (
+            {"rudder": Rudder(area=10.0, x=50.0)},
+            "rudder.x is 50 m; accepted: -60 to 0 (from midship, forward positive)",
+        ),
         ({"B": 6.0, "T": 16.0}, "L, B, T are 100, 6, 16 m; accepted: L >= B >= T"),
         ({"thrusters": Thrusters(x_bow=110.0, x_stern=10.0)}, "thrusters.x_bow is 110 m; accepted: -60 to 60"),
         ({"Izz": 6e6}, "Izz is 6e+06 kg m^2; accepted: 6.15e+08 to 1.54e+10"),
-        ({"xG": 1e9, "Izz": 1.0}, "xG is 1e+09 m; accepted: -60 to 60 (from midship, forward positive); Izz is 1 kg m^2"),
-        ({"propeller": Propeller(diameter=4.0, kt=(0.4, -0.3, 1e6))}, "propeller.kt is [0.4, -0.3, 1000000.0]; accepted: -5 to 5 each"),
+        (
+            {"xG": 1e9, "Izz": 1.0},
+            "xG is 1e+09 m; accepted: -60 to 60 (from midship, forward positive); Izz is 1 kg m^2",
+        ),
+        (
+            {"propeller": Propeller(diameter=4.0, kt=(0.4, -0.3, 1e6))},
+            "propeller.kt is [0.4, -0.3, 1000000.0]; accepted: -5 to 5 each",
+        ),
         ({"rudder": Rudder(area=10.0, height=5000.0)}, "rudder.height is 5000 m; accepted: up to 2 T = 12"),
-        ({"wind": Wind(frontal_area=3e8, lateral_area=1e9)}, "wind.frontal_area is 3e+08 m^2; accepted: up to 10 B^2 = 2560; wind.lateral_area"),
-        ({"thrusters": Thrusters(max_force=6e8)}, "thrusters.max_force is 6e+08 N; accepted: up to the weight of the ship, 6.033e+07"),
+        (
+            {"wind": Wind(frontal_area=3e8, lateral_area=1e9)},
+            "wind.frontal_area is 3e+08 m^2; accepted: up to 10 B^2 = 2560; wind.lateral_area",
+        ),
+        (
+            {"thrusters": Thrusters(max_force=6e8)},
+            "thrusters.max_force is 6e+08 N; accepted: up to the weight of the ship, 6.033e+07",
+        ),
     ],
     ids=[
         "diameter in mm",
@@ -169,7 +189,8 @@ def test_a_ship_in_other_units_is_refused_with_the_figures(wrong):
     ],
 )
 def test_what_no_ship_has_is_refused_with_what_is_accepted(wrong, told):
-    """A propeller in mm once ended in an OverflowError of the diagnosis, a rudder at the bow in `none`. It is refused where the file is read."""
+    """A propeller in mm once ended in an OverflowError of the diagnosis, a rudder at the bow in `none`. It is refused
+    where the file is read."""
     ship = SHIP.model_copy(update=wrong)
     with pytest.raises(InputError, match=re.escape(told)):
         complete(ship)
@@ -179,19 +200,39 @@ def test_what_no_ship_has_is_refused_with_what_is_accepted(wrong, told):
 
 INF, NAN, HUGE = float("inf"), float("nan"), 10**400
 NO_PARTICULARS: dict[str, dict[str, list]] = {
-    "": {"L": ["100", True, INF, 1e300, HUGE], "T": [1e-300], "mass": [-1.0], "rho": [1.0], "xG": [NAN], "Cb": ["0.6"], "Izz": [INF], "name": [3]},
+    "": {
+        "L": ["100", True, INF, 1e300, HUGE],
+        "T": [1e-300],
+        "mass": [-1.0],
+        "rho": [1.0],
+        "xG": [NAN],
+        "Cb": ["0.6"],
+        "Izz": [INF],
+        "name": [3],
+    },
     "propeller": {"kt.0": [NAN, "1"], "pitch_ratio": [INF, 50.0], "blades": ["4", True, 3.5]},
     "rudder": {"height": [INF]},
     "wind": {"frontal_area": [INF]},
     "thrusters": {"max_force": [INF, "9"]},
 }
-NEEDED = {"": {}, "propeller": {"diameter": 4.0}, "rudder": {"area": 10.0}, "wind": {"lateral_area": 1.0}, "thrusters": {}}
+NEEDED = {
+    "": {},
+    "propeller": {"diameter": 4.0},
+    "rudder": {"area": 10.0},
+    "wind": {"lateral_area": 1.0},
+    "thrusters": {},
+}
 
 
-@pytest.mark.parametrize(("table", "key", "value"), [(t, k, v) for t, keys in NO_PARTICULARS.items() for k, values in keys.items() for v in values])
+@pytest.mark.parametrize(
+    ("table", "key", "value"),
+    [(t, k, v) for t, keys in NO_PARTICULARS.items() for k, values in keys.items() for v in values],
+)
 def test_text_truth_values_and_infinities_are_no_particulars(table, key, value):
     given = {**NEEDED[table], "kt": [value, 0, 0]} if key == "kt.0" else {**NEEDED[table], key: value}
-    with pytest.raises(InputError, match=rf"^her.toml: {re.escape('.'.join(filter(None, (table, key))))}: .+ \(value: .+\)"):
+    with pytest.raises(
+        InputError, match=rf"^her.toml: {re.escape('.'.join(filter(None, (table, key))))}: .+ \(value: .+\)"
+    ):
         Ship.from_dict(SHIP.model_dump(exclude_none=True) | ({table: given} if table else given), "her.toml")
 
 
@@ -212,7 +253,9 @@ def test_a_key_that_a_ship_file_does_not_know_is_told_with_those_it_knows(wrong,
 
 def wrong_run(t=None, states=None, inputs=None, **others) -> Run:
     given = {"id": "r1", "t": np.arange(4.0), "states": np.zeros((4, 10)), "inputs": np.zeros((4, 4))}
-    return Run(**given | {k: v for k, v in {"t": t, "states": states, "inputs": inputs}.items() if v is not None} | others)
+    return Run(
+        **given | {k: v for k, v in {"t": t, "states": states, "inputs": inputs}.items() if v is not None} | others
+    )
 
 
 MASKED = np.ma.array(np.zeros((4, 10)), mask=np.eye(4, 10))

@@ -1,4 +1,5 @@
-"""The documentation: every block of code runs, every printed line comes out, and the site builds without a warning and without the network."""
+"""The documentation: every block of code runs, every printed line comes out, and the site builds without a warning and
+without the network."""
 
 from __future__ import annotations
 
@@ -18,13 +19,16 @@ from shipbench.cache import cache_folder
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted((ROOT / "docs").glob("*.md"))
-_BLOCK = re.compile(r"(?:^`(?P<file>[\w./-]+)`:\n\n)?^```(?P<language>\w*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
+_BLOCK = re.compile(
+    r"(?:^`(?P<file>[\w./-]+)`:\n\n)?^```(?P<language>\w*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE
+)
 _SHIMS = {"shipbench": "-m shipbench", "pip": "-m pip", "python": ""}
 
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block: the file that it is written to ("" where it is run instead), its language, its text, its line in the page."""
+    """A fenced block: the file that it is written to ("" where it is run instead), its language, its text, its line in
+    the page."""
 
     file: str
     language: str
@@ -33,11 +37,15 @@ class Block:
 
 
 def blocks(text: str) -> list[Block]:
-    return [Block(m["file"] or "", m["language"], m["text"], text[: m.start()].count("\n") + 1) for m in _BLOCK.finditer(text)]
+    return [
+        Block(m["file"] or "", m["language"], m["text"], text[: m.start()].count("\n") + 1)
+        for m in _BLOCK.finditer(text)
+    ]
 
 
 class Session:
-    """Runs the blocks of one page in one folder: Python shares its names, files stay, `text` is what the block before must have printed."""
+    """Runs the blocks of one page in one folder: Python shares its names, files stay, `text` is what the block before
+    must have printed."""
 
     def __init__(self, folder: Path, environment: dict[str, str]) -> None:
         self.folder, self.environment = folder, environment
@@ -56,7 +64,9 @@ class Session:
             self.output = printed.getvalue()
         elif block.language == "bash":
             command = ["bash", "-euo", "pipefail", "-c", block.text]
-            done = subprocess.run(command, cwd=self.folder, env=self.environment, capture_output=True, text=True, check=False)
+            done = subprocess.run(
+                command, cwd=self.folder, env=self.environment, capture_output=True, text=True, check=False
+            )
             self.output = done.stdout
             assert done.returncode == 0, f"{block.text}\n{done.stdout[-2000:]}\n{done.stderr[-3000:]}"
         elif block.language == "toml":
@@ -64,14 +74,18 @@ class Session:
         elif block.language == "text":
             self.compare(block.text)
         else:
-            pytest.fail(f"line {block.line}: a block of '{block.language}' cannot be run; accepted: python, bash, toml, text")
+            pytest.fail(
+                f"line {block.line}: a block of '{block.language}' cannot be run; accepted: python, bash, toml, text"
+            )
 
     def compare(self, expected: str) -> None:
         """Every line must come in the output, in order; words between its words may be more."""
         lines = iter(self.output.splitlines())
         for line in expected.splitlines():
             pattern = r".*".join(re.escape(word) for word in line.split())
-            assert any(re.search(pattern, found) for found in lines), f"'{line}' was not printed (in this order) in:\n{self.output}"
+            assert any(re.search(pattern, found) for found in lines), (
+                f"'{line}' was not printed (in this order) in:\n{self.output}"
+            )
 
 
 @pytest.fixture(scope="session")
@@ -93,8 +107,18 @@ def session(tmp_path, cache, monkeypatch):
         (shims / name).chmod(0o755)
     monkeypatch.chdir(work)
     monkeypatch.setenv("SHIPBENCH_CACHE", cache)
-    pip = {"PIP_TARGET": str(site), "PIP_NO_DEPS": "1", "PIP_NO_BUILD_ISOLATION": "0", "PIP_NO_INDEX": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
-    paths = {"PATH": f"{shims}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": os.pathsep.join([str(site), str(ROOT)]), "OMP_NUM_THREADS": "1"}
+    pip = {
+        "PIP_TARGET": str(site),
+        "PIP_NO_DEPS": "1",
+        "PIP_NO_BUILD_ISOLATION": "0",
+        "PIP_NO_INDEX": "1",
+        "PIP_DISABLE_PIP_VERSION_CHECK": "1",
+    }
+    paths = {
+        "PATH": f"{shims}{os.pathsep}{os.environ['PATH']}",
+        "PYTHONPATH": os.pathsep.join([str(site), str(ROOT)]),
+        "OMP_NUM_THREADS": "1",
+    }
     return Session(work, os.environ | pip | paths)
 
 
@@ -109,7 +133,13 @@ def test_every_block_of_the_page_runs(page, session):
 
 @pytest.mark.parametrize(
     "text",
-    ["```python\n1 / 0\n```\n", "```bash\nfalse\n```\n", "```toml\nx =\n```\n", "```bash\necho a b\n```\n\n```text\nb a\n```\n", "```ruby\n1\n```\n"],
+    [
+        "```python\n1 / 0\n```\n",
+        "```bash\nfalse\n```\n",
+        "```toml\nx =\n```\n",
+        "```bash\necho a b\n```\n\n```text\nb a\n```\n",
+        "```ruby\n1\n```\n",
+    ],
 )
 def test_a_block_that_is_wrong_fails(text, session):
     *before, last = blocks(text)
@@ -123,7 +153,9 @@ def test_a_block_that_is_wrong_fails(text, session):
 def test_the_site_builds_strictly_and_fetches_nothing(tmp_path):
     pytest.importorskip("mkdocs", reason="mkdocs is not installed (extra `docs`)")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False)
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False
+    )
     assert done.returncode == 0, done.stderr
     pages = list((tmp_path / "site").rglob("*.html"))
     assert len(pages) >= len(PAGES)

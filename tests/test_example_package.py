@@ -1,4 +1,5 @@
-"""The example package as a stranger would use it: installed into a folder of its own, then the README's command, in fresh processes."""
+"""The example package as a stranger would use it: installed into a folder of its own, then the README's command, in
+fresh processes."""
 
 from __future__ import annotations
 
@@ -26,7 +27,15 @@ def stranger(tmp_path_factory):
     base = tmp_path_factory.mktemp("stranger")
     site, work = base / "site", base / "work"
     shutil.copytree(EXAMPLE, work / "examples" / "shipbench-example")
-    options = ["--quiet", "--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check", "--target", str(site)]
+    options = [
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "--no-index",
+        "--disable-pip-version-check",
+        "--target",
+        str(site),
+    ]
     pip = shlex.split(INSTALL)
     subprocess.run([sys.executable, "-m", *pip[:2], *options, *pip[2:]], cwd=work, check=True, capture_output=True)
     paths = [str(site), str(Path(shipbench.__file__).parent.parent)]
@@ -45,7 +54,9 @@ def test_two_commands_take_it_to_the_leaderboard_with_the_readmes_figures(strang
     assert done.returncode == 0, done.stderr
     tables = json.loads(done.stdout)["leaderboards"]["barge_trial"]["tables"]
     found = {row["model"]: row for row in tables[0]["rows"]}
-    across = next({row["model"]: row["cross_track"] for row in t["rows"]} for t in tables if "cross_track" in t["columns"])
+    across = next(
+        {row["model"]: row["cross_track"] for row in t["rows"]} for t in tables if "cross_track" in t["columns"]
+    )
     printed = re.findall(r"^ \d  (\S+) +12/12 +([\d.]+)", README, re.MULTILINE)
     assert [model for model, _ in printed] == list(found)
     for model, ed in printed:
@@ -66,7 +77,11 @@ def test_its_parts_are_listed_with_where_they_come_from(stranger):
     assert model["from"] == "shipbench_example.nomoto:Nomoto"
     assert model["parameters"] == {"by_speed": "True"}
     assert model["unusable"] == ""
-    assert [p["parameters"][0]["name"] for p in json.loads(stranger("effects", "--json").stdout) if p["name"] == "barge_alongside"] == ["drag"]
+    assert [
+        p["parameters"][0]["name"]
+        for p in json.loads(stranger("effects", "--json").stdout)
+        if p["name"] == "barge_alongside"
+    ] == ["drag"]
     assert "barge_trial" in [p["name"] for p in json.loads(stranger("data", "list", "--json").stdout)]
 
 
@@ -81,12 +96,17 @@ def test_a_broken_package_is_told_of_in_one_line_and_the_others_go_on(stranger, 
     info = tmp_path / "broken-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
-    groups = "\n".join(f"[shipbench.{g}]\nbroken = broken_package:Part" for g in ("predictors", "effects", "datasets", "metrics"))
+    groups = "\n".join(
+        f"[shipbench.{g}]\nbroken = broken_package:Part" for g in ("predictors", "effects", "datasets", "metrics")
+    )
     (info / "entry_points.txt").write_text(groups)
     (tmp_path / "broken_package.py").write_text("raise RuntimeError('half written')")
     paths = os.pathsep.join([str(tmp_path), *sys.path])
     done = stranger("effects", PYTHONPATH=paths)
-    why = "plug-in broken_package:Part of package broken 1.0, cannot be imported: RuntimeError: half written. Mend it or uninstall it.\n"
+    why = (
+        "plug-in broken_package:Part of package broken 1.0, cannot be imported: RuntimeError: half written. Mend "
+        "it or uninstall it.\n"
+    )
     assert (done.returncode, done.stderr) == (0, f"warning: effect 'broken', {why}")
     assert stranger("models", PYTHONPATH=paths).returncode == 0
     done = stranger("check", "hold", PYTHONPATH=paths)

@@ -1,4 +1,5 @@
-"""A part of benchmarks/fuzz_inputs.py: mutated inputs end in a result or in one message, in the readers and through the command line."""
+"""A part of benchmarks/fuzz_inputs.py: mutated inputs end in a result or in one message, in the readers and through the
+command line."""
 
 from __future__ import annotations
 
@@ -21,13 +22,17 @@ from shipbench.errors import InputError
 from shipbench.regular_files import read_json, read_npz
 from shipbench.toml_files import read_toml
 
-spec = importlib.util.spec_from_file_location("fuzz_inputs", Path(__file__).parent.parent / "benchmarks" / "fuzz_inputs.py")
+spec = importlib.util.spec_from_file_location(
+    "fuzz_inputs", Path(__file__).parent.parent / "benchmarks" / "fuzz_inputs.py"
+)
 fuzz_inputs = importlib.util.module_from_spec(spec)
 sys.modules["fuzz_inputs"] = fuzz_inputs
 if sys.platform != "win32":
     spec.loader.exec_module(fuzz_inputs)
 
-DRAWN = settings(derandomize=True, deadline=None, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+DRAWN = settings(
+    derandomize=True, deadline=None, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 SHIP = 'name = "toy"\nL = 50.0\nB = 8.0\nT = 3.0\nmass = 9e5\n'
 HEAD = "trajectory,t,x,y,psi,u,v,r\n"
 
@@ -66,11 +71,29 @@ def test_a_reader_of_flipped_bytes_gives_a_result_or_one_message(tmp_path, name,
 
 
 WORDS = some.one_of(
-    some.floats().map(repr), some.integers().map(str), some.booleans().map(lambda b: str(b).lower()), some.sampled_from(fuzz_inputs.TOML[:14]),
-    some.lists(some.floats(width=16), max_size=3).map(lambda values: f"[{', '.join(map(repr, values))}]"), some.just('"text"'),
+    some.floats().map(repr), some.integers().map(str), some.booleans().map(lambda b: str(b).lower()),
+    some.sampled_from(fuzz_inputs.TOML[:14]),
+    some.lists(some.floats(width=16), max_size=3).map(lambda values: f"[{', '.join(map(repr, values))}]"),
+    some.just('"text"'),
 )  # fmt: skip
 KEYS = some.sampled_from(
-    ["dt", "current", "antenna", "notes", "ship", "derived", "scale", "bias", "delay", "units", "signs", "columns", "runs", "gaps", "frame"]
+    [
+        "dt",
+        "current",
+        "antenna",
+        "notes",
+        "ship",
+        "derived",
+        "scale",
+        "bias",
+        "delay",
+        "units",
+        "signs",
+        "columns",
+        "runs",
+        "gaps",
+        "frame",
+    ]
 )
 
 
@@ -84,13 +107,17 @@ KEYS = some.sampled_from(
 @example(entries={}, cell="1e308", packed=True)
 def test_a_data_set_of_drawn_values_is_read_rightly_or_refused(tmp_path, entries, cell, packed):
     keys = {"name": '"toy"', "dt": "1.0", "actuators": '"measured"'} | entries
-    (tmp_path / "dataset.toml").write_text("".join(f"{key} = {value}\n" for key, value in keys.items()), encoding="utf-8")
+    (tmp_path / "dataset.toml").write_text(
+        "".join(f"{key} = {value}\n" for key, value in keys.items()), encoding="utf-8"
+    )
     (tmp_path / "ship.toml").write_text(SHIP)
     rows = "".join(f"a,{t},{cell if t == 2 else t},0,0,1,0,0\n" for t in range(5))
     for old in tmp_path.glob("trajectories*"):
         old.unlink()
     text = (HEAD + rows).encode("utf-8", "surrogatepass")
-    (tmp_path / ("trajectories.csv.gz" if packed else "trajectories.csv")).write_bytes(gzip.compress(text) if packed else text)
+    (tmp_path / ("trajectories.csv.gz" if packed else "trajectories.csv")).write_bytes(
+        gzip.compress(text) if packed else text
+    )
     with contextlib.suppress(InputError):
         data = read_dataset(tmp_path)
         assert data.dt == 1.0

@@ -1,4 +1,5 @@
-"""Compiled code in the cache folder: only what is whole and the user's alone is loaded, and no compiler is waited for without end."""
+"""Compiled code in the cache folder: only what is whole and the user's alone is loaded, and no compiler is waited for
+without end."""
 
 from __future__ import annotations
 

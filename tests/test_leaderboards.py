@@ -25,7 +25,12 @@ FINGERPRINTS = {
     "harbour90": "e102babe79cc29d8", "harbour90_noisy": "10a8bd89a404cf35", "esso_osaka": "97bfd8cf5c3a1622",
     "esso_osaka_no_wind": "f82dbf16459d1fd4",
 }  # fmt: skip
-KNOWN = {task.dataset: task for path in (FOLDER.parent / "configs").glob("*.toml") for task in load_tasks(path) if path.stem != "smoke"}
+KNOWN = {
+    task.dataset: task
+    for path in (FOLDER.parent / "configs").glob("*.toml")
+    for task in load_tasks(path)
+    if path.stem != "smoke"
+}
 """The tasks of the shipped configs, by data set: what a committed submission may be of."""
 ALLOWED = {"rows.parquet", "summary.json", "windows.parquet"}
 MOST_BYTES = 2_000_000
@@ -97,7 +102,11 @@ def test_the_windows_are_those_of_the_data_set(dataset):
     windows = read_results([FOLDER / "results/paper"]).windows
     for fold in make_folds(data, task):
         batch = fold.test.batch()
-        there = windows[(windows["dataset"] == dataset) & (windows["fold"] == fold.index)].set_index("run").loc[list(batch.ids)]
+        there = (
+            windows[(windows["dataset"] == dataset) & (windows["fold"] == fold.index)]
+            .set_index("run")
+            .loc[list(batch.ids)]
+        )
         for name, values in window_features(batch, data.ship.L).items():
             np.testing.assert_allclose(there[name], values, rtol=1e-9, err_msg=name)
 
@@ -120,14 +129,20 @@ def short_table(results_folder: Path, dataset: str) -> list[str]:
     return lines
 
 
-@pytest.mark.parametrize(("study", "dataset"), [("paper", "harbour90"), ("paper", "harbour90_noisy"), ("esso_osaka", "esso_osaka")])
+@pytest.mark.parametrize(
+    ("study", "dataset"), [("paper", "harbour90"), ("paper", "harbour90_noisy"), ("esso_osaka", "esso_osaka")]
+)
 def test_the_short_tables_are_the_committed_rows(study, dataset):
     assert "\n".join(short_table(FOLDER / "results" / study, dataset)) in (FOLDER / "README.md").read_text()
 
 
-@pytest.mark.parametrize(("column", "study", "dataset"), [(2, "paper", "harbour90_noisy"), (3, "esso_osaka", "esso_osaka")])
+@pytest.mark.parametrize(
+    ("column", "study", "dataset"), [(2, "paper", "harbour90_noisy"), (3, "esso_osaka", "esso_osaka")]
+)
 def test_the_readmes_figures_are_the_committed_rows(column, study, dataset):
-    lines = [line.split("|") for line in (FOLDER.parent / "README.md").read_text().splitlines() if line.startswith("| `")]
+    lines = [
+        line.split("|") for line in (FOLDER.parent / "README.md").read_text().splitlines() if line.startswith("| `")
+    ]
     said = {re.match(r" `([^`]+)`", cells[1])[1]: cells[column].strip() for cells in lines}
     board = build_board(read_results([FOLDER / "results" / study]), dataset)
     ranking = {row["model"]: row for row in next(t for t in board.tables if t.title.startswith("Ranking")).rows}

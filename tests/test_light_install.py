@@ -23,7 +23,9 @@ NETWORKS = ("lightning", "torch", "torchdiffeq")
 WITHOUT = f"""import sys
 from importlib.machinery import PathFinder
 found = PathFinder.find_spec
-PathFinder.find_spec = lambda name, path=None, target=None: None if name.partition(".")[0] in {NETWORKS} else found(name, path, target)
+def without(name, path=None, target=None):
+    return None if name.partition(".")[0] in {NETWORKS} else found(name, path, target)
+PathFinder.find_spec = without
 """
 
 
@@ -56,9 +58,14 @@ def test_the_core_fits_scores_checks_and_draws(folder):
 
 @pytest.mark.parametrize("name", ["mlp", "lstm", "neural_ode", "neural_ode+current"])
 def test_a_network_is_refused_before_the_study_with_the_one_command(folder, name):
-    done = without_networks(command("run", "-d", "toy", "-m", "hold", "-m", name, "--horizon", "20", "-o", "out"), folder)
+    done = without_networks(
+        command("run", "-d", "toy", "-m", "hold", "-m", name, "--horizon", "20", "-o", "out"), folder
+    )
     assert done.returncode == 2
-    assert re.search(r"needs torch\w*, which is not installed\.\s+Install it: pip install\s+'shipbench\[networks\]'", done.stderr + done.stdout)
+    assert re.search(
+        r"needs torch\w*, which is not installed\.\s+Install it: pip install\s+'shipbench\[networks\]'",
+        done.stderr + done.stdout,
+    )
     assert "Traceback" not in done.stderr
     assert not (folder / "out").exists()
 
@@ -82,7 +89,9 @@ def test_models_marks_the_networks_and_no_other(folder):
 def test_every_extra_of_the_table_brings_its_package():
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     for distribution, extra in EXTRAS.values():
-        assert any(re.match(rf"{re.escape(distribution)}\b", requirement) for requirement in extras[extra]), distribution
+        assert any(re.match(rf"{re.escape(distribution)}\b", requirement) for requirement in extras[extra]), (
+            distribution
+        )
 
 
 def test_the_core_does_not_depend_on_an_extra():
@@ -94,6 +103,10 @@ def test_the_core_does_not_depend_on_an_extra():
 def test_what_a_predictor_needs_is_in_the_table():
     for name in PREDICTORS.built_in():
         tree = ast.parse((ROOT / "shipbench" / "predictors" / f"{name}.py").read_text())
-        needs = [n.value for n in ast.walk(tree) if isinstance(n, ast.AnnAssign) and getattr(n.target, "id", "") == "needs" and n.value]
+        needs = [
+            n.value
+            for n in ast.walk(tree)
+            if isinstance(n, ast.AnnAssign) and getattr(n.target, "id", "") == "needs" and n.value
+        ]
         for value in needs:
             assert set(ast.literal_eval(value)) <= set(EXTRAS)

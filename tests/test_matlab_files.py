@@ -25,7 +25,13 @@ def element(kind: int, data: bytes) -> bytes:
 
 
 def matrix(kind: int, dims: tuple[int, ...], inside: bytes, name: bytes = b"") -> bytes:
-    return element(14, element(6, struct.pack("<II", kind, 0)) + element(5, struct.pack(f"<{len(dims)}i", *dims)) + element(1, name) + inside)
+    return element(
+        14,
+        element(6, struct.pack("<II", kind, 0))
+        + element(5, struct.pack(f"<{len(dims)}i", *dims))
+        + element(1, name)
+        + inside,
+    )
 
 
 def nested(levels: int, kind: int = 1) -> bytes:
@@ -47,11 +53,17 @@ HOSTILE = {
     "deep functions": (nested(40, 16), "nested in more than 32 levels"),
     "deep in an object": (OPAQUE, "nested in more than 32 levels"),
     "many cells": (matrix(1, (2**30, 1), b"", b"runs"), "declares 1073741824 elements"),
-    "many structs": (matrix(2, (2**28, 1), element(5, struct.pack("<i", 8)) + element(1, b"a".ljust(8, b"\0")), b"runs"), "declares"),
+    "many structs": (
+        matrix(2, (2**28, 1), element(5, struct.pack("<i", 8)) + element(1, b"a".ljust(8, b"\0")), b"runs"),
+        "declares",
+    ),
     "less than none": (matrix(1, (-1, 5), b"", b"runs"), "declares -5 elements"),
     "unknown kind": (matrix(4, (1, 1), element(152, b"a"), b"runs"), "unknown kind 152"),
     "packed twice": (packed(packed(nested(1))), "packed twice"),
-    "numbers that are not there": (matrix(6, (1, 1), struct.pack("<II", 9, 2**31)), "declares 2147483648 bytes and holds 0"),
+    "numbers that are not there": (
+        matrix(6, (1, 1), struct.pack("<II", 9, 2**31)),
+        "declares 2147483648 bytes and holds 0",
+    ),
 }
 
 

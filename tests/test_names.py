@@ -1,4 +1,5 @@
-"""Names from outside: what is refused on load, what becomes of a label on disk, and that nothing unseen reaches a terminal."""
+"""Names from outside: what is refused on load, what becomes of a label on disk, and that nothing unseen reaches a
+terminal."""
 
 from __future__ import annotations
 
@@ -21,7 +22,9 @@ def run(name="r0", **meta):
     return Run(name, np.arange(21.0), S, C, meta=meta)
 
 
-@pytest.mark.parametrize("name", [*PATHS, ESCAPE, C1, BIDI, ZERO_WIDTH, SURROGATE, "x" * 81, "a\nb", "a\tb", "a\u2028b"])
+@pytest.mark.parametrize(
+    "name", [*PATHS, ESCAPE, C1, BIDI, ZERO_WIDTH, SURROGATE, "x" * 81, "a\nb", "a\tb", "a\u2028b"]
+)
 def test_the_name_of_a_data_set_is_no_path_and_has_nothing_unseen(name):
     with pytest.raises(InputError, match="name = ") as caught:
         Dataset(name, TOY_SHIP, 1.0, (run(),))
@@ -30,7 +33,9 @@ def test_the_name_of_a_data_set_is_no_path_and_has_nothing_unseen(name):
         check_name(name, "mapping.toml: name")
 
 
-@pytest.mark.parametrize("name", ["harbour90", "my trial", "x" * 80, "Zürich-7 (noisy)", "试航", "v1.2", "single-current[0.3]"])
+@pytest.mark.parametrize(
+    "name", ["harbour90", "my trial", "x" * 80, "Zürich-7 (noisy)", "试航", "v1.2", "single-current[0.3]"]
+)
 def test_names_that_people_use_are_accepted(name):
     assert Dataset(name, TOY_SHIP, 1.0, (run(),)).name == name
 
@@ -55,14 +60,20 @@ def test_a_name_is_text(number):
 
 @pytest.mark.parametrize(
     ("label", "name"),
-    [("mlp[epochs=3]", "mlp[epochs=3]"), ("physics+current", "physics+current"), ("./mine.py:Still", ".-mine.py-Still-0487a0")],
+    [
+        ("mlp[epochs=3]", "mlp[epochs=3]"),
+        ("physics+current", "physics+current"),
+        ("./mine.py:Still", ".-mine.py-Still-0487a0"),
+    ],
 )
 def test_labels_keep_the_folders_that_they_had(label, name):
     """Studies on disk are found and resumed under these names."""
     assert file_name(label) == name
 
 
-@pytest.mark.parametrize("label", [*PATHS, "../" * 40 + "x", "\U0001d400" * 80, ESCAPE, SURROGATE, "a\0b", "CON:x", "x" * 5000])
+@pytest.mark.parametrize(
+    "label", [*PATHS, "../" * 40 + "x", "\U0001d400" * 80, ESCAPE, SURROGATE, "a\0b", "CON:x", "x" * 5000]
+)
 def test_a_file_name_is_one_part_of_a_path_and_tells_labels_apart(label):
     name = file_name(label)
     assert name not in ("", ".", "..")
@@ -85,7 +96,9 @@ def test_run_refuses_the_name_before_anything_is_fitted(tmp_path, monkeypatch, n
     lines = [f"name = {name}" if line.startswith("name = ") else line for line in description.read_text().splitlines()]
     description.write_text("\n".join(lines))
     before = sorted(tmp_path.rglob("*"))
-    result = CliRunner().invoke(app, ["run", "-m", "hold", "-d", "toyset", "--horizon", "10", "--folds", "2", "--out", "o"])
+    result = CliRunner().invoke(
+        app, ["run", "-m", "hold", "-d", "toyset", "--horizon", "10", "--folds", "2", "--out", "o"]
+    )
     assert result.exit_code == 2, result.output
     assert result.stderr.startswith("error: toyset/dataset.toml: name = ")
     assert result.stderr.rstrip("\n").isprintable()

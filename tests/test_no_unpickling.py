@@ -44,7 +44,9 @@ def test_pickles_in_saved_models_and_results_are_refused_and_not_run(tmp_path, m
     monkeypatch.chdir(tmp_path)
     trap = np.array([Bomb()], dtype=object)
     Path("saved").mkdir()
-    Path("saved/model.json").write_text(json.dumps({"predictor": "hold", "params": {}, "inputs": [], "meta": {"dt": 1.0}}))
+    Path("saved/model.json").write_text(
+        json.dumps({"predictor": "hold", "params": {}, "inputs": [], "meta": {"dt": 1.0}})
+    )
     np.savez("saved/arrays.npz", trap=trap)
     with pytest.raises(InputError, match=r"saved is not a saved model, or it is damaged: .* holds Python objects"):
         make_predictor(parse_spec("saved"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import resource
 from pathlib import Path
 
 import pytest
@@ -15,8 +14,6 @@ nbformat = pytest.importorskip("nbformat", reason="nbclient is not installed (ex
 ROOT = Path(__file__).parent.parent
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 MOST_CELLS, MOST_TEXT = 14, 1000
-MOST_CPU_S = 24.0
-"""Most processor time [s] of one notebook with its processes; other work on the machine hardly changes it. The slowest takes 15 s, the three 37 s."""
 PARAMETRIZED = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
 
 
@@ -26,12 +23,6 @@ def hook():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-def processor_time() -> float:
-    """Of all processes that this one started and that have ended [s]."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def test_there_are_three():
@@ -54,9 +45,7 @@ def test_a_notebook_is_short_and_committed_without_outputs(path):
 @pytest.mark.long
 @PARAMETRIZED
 def test_a_notebook_runs_and_its_outputs_are_short(path, hook):
-    before = processor_time()
     notebook = hook.executed(path, again=True)
-    assert processor_time() - before < MOST_CPU_S
     outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     assert outputs
     for output in outputs:

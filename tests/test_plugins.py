@@ -1,4 +1,5 @@
-"""Parts of outside packages: found by their entry points; a broken one or a name clash never takes another command down."""
+"""Parts of outside packages: found by their entry points; a broken one or a name clash never takes another command
+down."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ class Mine:
 
 @pytest.fixture
 def installed(monkeypatch, tmp_path):
-    """`installed("group", name="module:object")`: as if a package had registered these; `stranger` is a module with the model `Mine`."""
+    """`installed("group", name="module:object")`: as if a package had registered these; `stranger` is a module with the
+    model `Mine`."""
     points: list[EntryPoint] = []
     (tmp_path / "stranger.py").write_text(GOOD)
     for module in ("stranger", "tank", "raises", "leaves", "kit"):  # of an earlier test's folder
@@ -65,7 +67,8 @@ def test_a_model_of_an_installed_package_is_found_by_its_entry_point(installed):
 
 def test_data_sets_of_packages_use_the_group_of_the_contract(installed, tmp_path):
     (tmp_path / "tank.py").write_text(
-        "from dataclasses import replace\nfrom shipbench.data.harbour90 import DATASET\nD = replace(DATASET, name='tank')"
+        "from dataclasses import replace\nfrom shipbench.data.harbour90 import DATASET\n"
+        "D = replace(DATASET, name='tank')"
     )
     installed("datasets", tank="tank:D")
     assert "tank" in DATASETS.names()
@@ -74,7 +77,9 @@ def test_data_sets_of_packages_use_the_group_of_the_contract(installed, tmp_path
 
 @pytest.mark.parametrize("parts", [PREDICTORS, EFFECTS, DATASETS, METRICS], ids=lambda r: r.kind)
 @pytest.mark.parametrize("value", ["no_such_package:Thing", "raises:Thing", "leaves:Thing", "stranger:np"])
-def test_a_plug_in_that_cannot_be_used_is_told_of_once_and_says_why_when_asked_for(installed, parts, value, tmp_path, caplog):
+def test_a_plug_in_that_cannot_be_used_is_told_of_once_and_says_why_when_asked_for(
+    installed, parts, value, tmp_path, caplog
+):
     (tmp_path / "raises.py").write_text("raise RuntimeError('two\\nlines')")
     (tmp_path / "leaves.py").write_text("import sys\nsys.exit('bye')")
     installed(parts.group or parts.folder, broken=value)
@@ -181,7 +186,10 @@ def test_installed_packages_are_gone_through_once_in_a_process(monkeypatch):
 
 
 def test_a_changed_plug_in_is_another_data_set_for_the_cache(installed, tmp_path):
-    source = "from dataclasses import replace\nfrom shipbench.data.harbour90 import DATASET\nD = replace(DATASET, name='tank')"
+    source = (
+        "from dataclasses import replace\nfrom shipbench.data.harbour90 import DATASET\n"
+        "D = replace(DATASET, name='tank')"
+    )
     (tmp_path / "tank.py").write_text(source)
     installed("datasets", tank="tank:D")
     before = _cache_key(DATASETS.get("tank"), {})

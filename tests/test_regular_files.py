@@ -12,7 +12,16 @@ import numpy as np
 import pytest
 
 from shipbench.errors import InputError
-from shipbench.regular_files import check_output, check_regular, make_folder, open_regular, read_bytes, read_json, read_npz, read_text
+from shipbench.regular_files import (
+    check_output,
+    check_regular,
+    make_folder,
+    open_regular,
+    read_bytes,
+    read_json,
+    read_npz,
+    read_text,
+)
 
 
 def special(kind: str, folder: Path) -> Path:
@@ -40,7 +49,8 @@ def special(kind: str, folder: Path) -> Path:
 
 @pytest.mark.parametrize(
     ("kind", "named"),
-    [("pipe", "a named pipe"), ("link to a pipe", "a named pipe"), ("device", "a device"), ("link to a device", "a device"),
+    [("pipe", "a named pipe"), ("link to a pipe", "a named pipe"), ("device", "a device"),
+        ("link to a device", "a device"),
      ("folder", "a folder"), ("socket", "a socket"), ("dangling link", "a link to a file that does not exist"),
      ("link to itself", "Too many levels"), ("none", "No such file")],
 )  # fmt: skip
@@ -92,7 +102,12 @@ def test_a_text_beyond_the_limit_is_refused_with_both_sizes(tmp_path):
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [(b"\xff{}", "not UTF-8"), (b"{", "not valid JSON"), (b"[" * 100_000, "nested too deeply"), (b"9" * 5000, "not valid JSON")],
+    [
+        (b"\xff{}", "not UTF-8"),
+        (b"{", "not valid JSON"),
+        (b"[" * 100_000, "nested too deeply"),
+        (b"9" * 5000, "not valid JSON"),
+    ],
 )
 def test_what_is_no_json_is_refused(tmp_path, content, message):
     (tmp_path / "d.json").write_bytes(content)
@@ -157,7 +172,9 @@ def test_what_is_written_never_replaces_what_is_read(tmp_path):
     for accepted in ("new.csv", "old.csv", "set/new.csv", "nowhere/new.csv"):
         check_output(tmp_path / accepted, inputs)
     for name in ("log.csv", "link.csv", "set/trajectories.csv", "set/../log.csv"):
-        with pytest.raises(InputError, match=r"among the inputs of this command; it would be overwritten\. Give another --out\."):
+        with pytest.raises(
+            InputError, match=r"among the inputs of this command; it would be overwritten\. Give another --out\."
+        ):
             check_output(tmp_path / name, inputs)
 
 

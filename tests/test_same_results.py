@@ -12,7 +12,9 @@ SCRIPT = Path(__file__).parents[1] / "benchmarks" / "same_results.py"
 
 def compared(old: Path, new: Path) -> tuple[int, str]:
     """Exit status and output of the comparison."""
-    done = subprocess.run([sys.executable, str(SCRIPT), str(old), str(new)], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, str(SCRIPT), str(old), str(new)], capture_output=True, text=True, check=False
+    )
     return done.returncode, done.stdout
 
 

@@ -11,7 +11,11 @@ from markdown.extensions.toc import slugify
 from shipbench.effects.base import EFFECTS
 
 ROOT = Path(__file__).parents[1]
-ANCHORS = {slugify(line.lstrip("# "), "-") for line in (ROOT / "docs" / "theory.md").read_text("utf-8").splitlines() if line.startswith("#")}
+ANCHORS = {
+    slugify(line.lstrip("# "), "-")
+    for line in (ROOT / "docs" / "theory.md").read_text("utf-8").splitlines()
+    if line.startswith("#")
+}
 CITED = re.compile(r"docs/theory\.md#([\w-]+)")
 LITERATURE = re.compile(r"\(\d{4}\)|SOLAS|source paper")
 
@@ -23,7 +27,11 @@ def test_an_effect_names_a_section_of_the_theory_or_literature(name: str) -> Non
 
 
 def test_every_section_that_the_code_cites_exists() -> None:
-    cited = {(path.name, anchor) for path in (ROOT / "shipbench").rglob("*.py") for anchor in CITED.findall(path.read_text("utf-8"))}
+    cited = {
+        (path.name, anchor)
+        for path in (ROOT / "shipbench").rglob("*.py")
+        for anchor in CITED.findall(path.read_text("utf-8"))
+    }
     assert {anchor for _, anchor in cited} <= ANCHORS, sorted(c for c in cited if c[1] not in ANCHORS)
     assert len(cited) > 20
 

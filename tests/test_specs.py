@@ -31,7 +31,18 @@ def test_a_seed_that_no_generator_takes_is_refused(seed):
 
 
 @pytest.mark.parametrize(
-    "value", ["hidden=0", "hidden=x", "hidden=1e3", "hidden=1000000000", "epochs=NaN", "lr=Infinity", "lr=-1", "layers=true", "batch=null"]
+    "value",
+    [
+        "hidden=0",
+        "hidden=x",
+        "hidden=1e3",
+        "hidden=1000000000",
+        "epochs=NaN",
+        "lr=Infinity",
+        "lr=-1",
+        "layers=true",
+        "batch=null",
+    ],
 )
 def test_numbers_of_a_model_have_bounds(value):
     key = value.partition("=")[0]
@@ -40,7 +51,9 @@ def test_numbers_of_a_model_have_bounds(value):
 
 
 def test_a_mistyped_parameter_gets_the_nearest():
-    with pytest.raises(InputError, match=r"^'mlp' has no parameter 'epoch'. Did you mean 'epochs'\? Accepted: batch, device"):
+    with pytest.raises(
+        InputError, match=r"^'mlp' has no parameter 'epoch'. Did you mean 'epochs'\? Accepted: batch, device"
+    ):
         make_predictor(parse_spec("mlp[epoch=3]"))
 
 

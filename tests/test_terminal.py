@@ -1,4 +1,5 @@
-"""The terminal: at 80, 100 and 120 columns no line is too long, no name and no number is cut; what is said first; what -q keeps."""
+"""The terminal: at 80, 100 and 120 columns no line is too long, no name and no number is cut; what is said first; what
+-q keeps."""
 
 from __future__ import annotations
 
@@ -70,7 +71,9 @@ def whole(table: Table, text: str) -> None:
 def test_a_leaderboard_begins_with_a_sentence_and_cuts_neither_names_nor_numbers(cli, board, monkeypatch, width):
     monkeypatch.setenv("COLUMNS", str(width))
     short, full = (cli("leaderboard", "r", "--no-plots", "-o", "pages", *option).stdout for option in ((), ("--full",)))
-    assert " ".join(short.split()).startswith(f"Leaderboard: toyset '{board.ranking[0]}' is first: mean position error (ED) ")
+    assert " ".join(short.split()).startswith(
+        f"Leaderboard: toyset '{board.ranking[0]}' is first: mean position error (ED) "
+    )
     assert len(short.splitlines()) < 35 < len(full.splitlines())
     assert board.short is not None
     for text, tables in ((short, [board.short]), (full, board.tables)):
@@ -82,13 +85,25 @@ def test_a_leaderboard_begins_with_a_sentence_and_cuts_neither_names_nor_numbers
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize(
     "command",
-    ["run -m hold -d ./toyset --horizon 10 --folds 2 -o again", "data check ./toyset --full", "data describe ./toyset --full", "data list", "models",
-     "models mlp", "effects", "effects current", "validate", "check hold", "--help", "run --help", "data import --help", "diagnose --help"],
+    ["run -m hold -d ./toyset --horizon 10 --folds 2 -o again", "data check ./toyset --full",
+        "data describe ./toyset --full", "data list", "models",
+     "models mlp", "effects", "effects current", "validate", "check hold", "--help", "run --help", "data import --help",
+     "diagnose --help"],
 )  # fmt: skip
 def test_no_line_of_a_command_is_too_long(cli, monkeypatch, command, width):
     if command == "validate":  # simulates for seconds
-        row = {"ship": "kvlcc2_l7", "quantity": "tactical diameter, +35 deg", "computed": 3.347, "published": 3.36, "unit": "L", "tolerance": "3 %"}
-        monkeypatch.setattr("shipbench.simulate.validation.table", lambda: [row | {"passed": True, "source": "Yasukawa and Yoshimura, 2015, " * 3}])
+        row = {
+            "ship": "kvlcc2_l7",
+            "quantity": "tactical diameter, +35 deg",
+            "computed": 3.347,
+            "published": 3.36,
+            "unit": "L",
+            "tolerance": "3 %",
+        }
+        monkeypatch.setattr(
+            "shipbench.simulate.validation.table",
+            lambda: [row | {"passed": True, "source": "Yasukawa and Yoshimura, 2015, " * 3}],
+        )
     if width != WIDTHS[0] and command.startswith(("run -m", "check", "data describe")):
         pytest.skip("slow; its tables are the same at every width")
     monkeypatch.setenv("COLUMNS", str(width))
@@ -103,7 +118,10 @@ def test_a_name_of_any_length_and_every_figure_are_whole():
     row: dict = {"model": name}
     for f in figures:
         row |= {f: 1234.5, f"{f}_low": 1000.25, f"{f}_high": 2000.75}
-    columns = [TableColumn("model", "model"), *[TableColumn(f"figure of {f} [m]", f, number(2), interval=f < "f7") for f in figures]]
+    columns = [
+        TableColumn("model", "model"),
+        *[TableColumn(f"figure of {f} [m]", f, number(2), interval=f < "f7") for f in figures],
+    ]
     table, stream = Table("Title", columns, [row, row | {"model": "hold"}]), io.StringIO()
     show_table(table, Console(file=stream, width=80))
     fits(stream.getvalue(), 80)
@@ -114,20 +132,26 @@ def test_a_name_of_any_length_and_every_figure_are_whole():
 def test_a_table_of_words_that_does_not_fit_becomes_a_list():
     stream = io.StringIO()
     columns = [TableColumn("what", "a"), TableColumn("why", "b"), TableColumn("then", "c")]
-    show_table(Table("Title", columns, [{"a": "one", "b": "long words " * 9, "c": "short"}]), Console(file=stream, width=80))
+    show_table(
+        Table("Title", columns, [{"a": "one", "b": "long words " * 9, "c": "short"}]), Console(file=stream, width=80)
+    )
     fits(stream.getvalue(), 80)
     assert stream.getvalue().splitlines()[1:3] == ["one", "  why: " + ("long words " * 6).strip() + " long"]
 
 
 def test_a_diagnosis_is_short_unless_all_is_asked_for_and_its_command_can_be_pasted():
     sizes = {"speed": Estimate(0.31, "m/s", (0.28, 0.34))}
-    causes = tuple(Cause(f"current_per_run_{i}", i, 44.0, 0.01, sizes, "12 of 12 runs support it", (), None) for i in range(3))
+    causes = tuple(
+        Cause(f"current_per_run_{i}", i, 44.0, 0.01, sizes, "12 of 12 runs support it", (), None) for i in range(3)
+    )
     found = Diagnosis("toy", "found", causes, (), (), {}, "physics+current", "0", 1.0)
     for width in WIDTHS:
         for full in (False, True):
             fits("\n".join(summary_lines(found, width, full)), width)
     assert "--full" in summary_lines(found, 80, full=False)[-1]
-    command = "shipbench run --model physics --model 'physics+current[speed=0.3]' --dataset 'my trial' --horizon 60 --folds 5"
+    command = (
+        "shipbench run --model physics --model 'physics+current[speed=0.3]' --dataset 'my trial' --horizon 60 --folds 5"
+    )
     lines = command_lines(command, 80)
     assert len(lines) > 1
     assert shlex.split("\n".join(lines).replace("\\\n", "")) == shlex.split(command)
@@ -142,7 +166,9 @@ def test_quiet_keeps_the_result_and_what_was_written(cli):
 
 
 @pytest.mark.parametrize(
-    "command", ["diagnose {}", "data check {}", "data describe {}", "data export {} -o x", "data make {}", "run -m hold -d {}", "check hold -d {}",
+    "command",
+    ["diagnose {}", "data check {}", "data describe {}", "data export {} -o x", "data make {}", "run -m hold -d {}",
+        "check hold -d {}",
                 "predict model {}", "learning-curve -m hold -d {}"],
 )  # fmt: skip
 @pytest.mark.parametrize("name", ["bridge.csv", "my log.xlsx", "bridge.mat"])
@@ -152,7 +178,10 @@ def test_a_log_where_a_data_set_is_asked_for_is_answered_with_the_import_command
         savemat(folder / name, {"speed": [1.0, 2.0]})
     done = cli(*[part.format(name) for part in command.split()])
     assert done.exit_code == 2
-    expected = f"error: '{name}' is a log, not a data set yet. Start with: shipbench data import {shlex.quote(name)} --propose mapping.toml\n"
+    expected = (
+        f"error: '{name}' is a log, not a data set yet. Start with: shipbench data import "
+        f"{shlex.quote(name)} --propose mapping.toml\n"
+    )
     assert done.stderr == expected
 
 

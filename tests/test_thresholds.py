@@ -12,7 +12,11 @@ from shipbench.diagnosis.thresholds import THRESHOLDS
 from shipbench.thresholds import Thresholds
 
 ROOT = Path(__file__).parents[1]
-ANCHORS = {slugify(line.lstrip("# "), "-") for line in (ROOT / "docs" / "calibration.md").read_text("utf-8").splitlines() if line.startswith("#")}
+ANCHORS = {
+    slugify(line.lstrip("# "), "-")
+    for line in (ROOT / "docs" / "calibration.md").read_text("utf-8").splitlines()
+    if line.startswith("#")
+}
 TABLES = {"checking": CHECKING, "diagnosis": THRESHOLDS}
 
 

@@ -18,7 +18,8 @@ TOY_SHIP = Ship(name="toy", L=50.0, B=8.0, T=3.0, mass=9e5)
 
 
 def sail(steps: int, seed: int, dt: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """States (steps + 1, 10) and commands (steps + 1, 4) of a first-order (Nomoto) ship at constant speed under a random rudder."""
+    """States (steps + 1, 10) and commands (steps + 1, 4) of a first-order (Nomoto) ship at constant speed under a
+    random rudder."""
     rng = np.random.default_rng(seed)
     S, C = np.zeros((steps + 1, 10)), np.zeros((steps + 1, 4))
     C[:, 0] = 90.0
@@ -36,7 +37,9 @@ def sail(steps: int, seed: int, dt: float = 1.0) -> tuple[np.ndarray, np.ndarray
 def toy() -> Callable[..., Dataset]:
     """Makes a data set of `runs` runs; `meta(i)` gives the metadata of run i."""
 
-    def make(runs: int = 10, steps: int = 20, meta: Callable[[int], dict] = lambda i: {}, name: str = "toy", **options) -> Dataset:
+    def make(
+        runs: int = 10, steps: int = 20, meta: Callable[[int], dict] = lambda i: {}, name: str = "toy", **options
+    ) -> Dataset:
         made = []
         for i in range(runs):
             S, C = sail(steps, i)
@@ -46,15 +49,21 @@ def toy() -> Callable[..., Dataset]:
     return make
 
 
-def write_toy_folder(folder: Path, runs: int = 6, steps: int = 40, *, drop: str = "", spoil: tuple[int, str, str] | None = None) -> Path:
-    """A data set folder named after `folder`: `drop` leaves a column out, `spoil` puts a value (row, column, text) into the table."""
+def write_toy_folder(
+    folder: Path, runs: int = 6, steps: int = 40, *, drop: str = "", spoil: tuple[int, str, str] | None = None
+) -> Path:
+    """A data set folder named after `folder`: `drop` leaves a column out, `spoil` puts a value (row, column, text) into
+    the table."""
     folder.mkdir()
     header = [c for c in ("trajectory", "t", *STATES, *COMMANDS) if c != drop]
     rows = []
     for i in range(runs):
         S, C = sail(steps, i)
         for k in range(steps + 1):
-            row = dict(zip((*STATES, *COMMANDS), [*S[k], *C[k]], strict=True)) | {"trajectory": f"r{i:02d}", "t": float(k)}
+            row = dict(zip((*STATES, *COMMANDS), [*S[k], *C[k]], strict=True)) | {
+                "trajectory": f"r{i:02d}",
+                "t": float(k),
+            }
             rows.append([row[c] for c in header])
     if spoil is not None:
         rows[spoil[0]][header.index(spoil[1])] = spoil[2]
@@ -62,7 +71,8 @@ def write_toy_folder(folder: Path, runs: int = 6, steps: int = 40, *, drop: str 
         csv.writer(file).writerows([header, *rows])
     (folder / "ship.toml").write_text(TOY_SHIP.to_toml())
     (folder / "dataset.toml").write_text(
-        f'name = "{folder.name}"\nship = "ship.toml"\ndt = 1.0\nactuators = "measured"\nsource = "formula"\nlicence = "MIT"\n'
+        f'name = "{folder.name}"\nship = "ship.toml"\ndt = 1.0\nactuators = "measured"\nsource = "formula"\n'
+        'licence = "MIT"\n'
     )
     return folder
 

@@ -1,15 +1,17 @@
-"""shipbench's data and models for code written for the package `nonlinear_benchmarks` (needs the extra `nonlinear-benchmarks`).
+"""shipbench's data and models for code written for the package `nonlinear_benchmarks` (needs the extra
+`nonlinear-benchmarks`).
 
-There a record is `Input_output_data(u, y, sampling_time, name, state_initialization_window_length)`; here u are the inputs U (samples, inputs) and y
-states (samples, outputs), both at the same times, units and signs of `signals`. A model may see the first n samples of a test record
-(`state_initialization_window_length`) and is scored on the rest:
+There a record is `Input_output_data(u, y, sampling_time, name, state_initialization_window_length)`; here u are the
+inputs U (samples, inputs) and y states (samples, outputs), both at the same times, units and signs of `signals`. A
+model may see the first n samples of a test record (`state_initialization_window_length`) and is scored on the rest:
 
     train, test = ship_benchmark("harbour90")
     model = InputOutputModel("physics", ship=ship_of("harbour90")).fit(train)
     for record in test:
         print(RMSE(record, model.simulate(record.u, record.y[: record.state_initialization_window_length])))
 
-Sample n - 1 is s0, the samples before it are the history, and sample n is the first that is scored: the same figures as in a study.
+Sample n - 1 is s0, the samples before it are the history, and sample n is the first that is scored: the same figures as
+in a study.
 """
 
 from __future__ import annotations
@@ -40,9 +42,16 @@ def ship_of(dataset: str) -> Ship:
 
 
 def ship_benchmark(
-    dataset: str | Dataset, *, fold: int = 0, folds: int = 5, horizon_s: float = 120.0, history_s: float = 0.0, split: str = "folds"
+    dataset: str | Dataset,
+    *,
+    fold: int = 0,
+    folds: int = 5,
+    horizon_s: float = 120.0,
+    history_s: float = 0.0,
+    split: str = "folds",
 ) -> tuple[list[Any], list[Any]]:
-    """(train, test) of a data set as lists of `Input_output_data`, one per window: exactly the runs of that fold of `shipbench run`.
+    """(train, test) of a data set as lists of `Input_output_data`, one per window: exactly the runs of that fold of
+    `shipbench run`.
 
     Args:
         dataset: registered name, folder or data set.
@@ -54,7 +63,14 @@ def ship_benchmark(
         InputError: nonlinear_benchmarks is not installed, or there is no such data set or fold.
     """
     data = load_dataset(dataset) if isinstance(dataset, str) else dataset
-    settings = {"dataset": data.name, "models": ["hold"], "folds": folds, "horizon_s": horizon_s, "history_s": history_s, "split": split}
+    settings = {
+        "dataset": data.name,
+        "models": ["hold"],
+        "folds": folds,
+        "horizon_s": horizon_s,
+        "history_s": history_s,
+        "split": split,
+    }
     task = make_task(settings, "ship_benchmark")
     parts = make_folds(select_runs(data, task)[0], task)
     if not 0 <= fold < len(parts):
@@ -65,9 +81,11 @@ def ship_benchmark(
 
 
 def to_records(data: Dataset, window: int = 1) -> list[Any]:
-    """Every run as an `Input_output_data`: u (samples, inputs), y (samples, 10), named like the run; copies, so that nobody writes into `data`.
+    """Every run as an `Input_output_data`: u (samples, inputs), y (samples, 10), named like the run; copies, so that
+    nobody writes into `data`.
 
-    `window`: number of first samples that a model may see; at least 1, since a rollout needs the state that it starts from.
+    `window`: number of first samples that a model may see; at least 1, since a rollout needs the state that it starts
+    from.
     """
     with needed_by("to_records"):
         from nonlinear_benchmarks import Input_output_data
@@ -75,12 +93,18 @@ def to_records(data: Dataset, window: int = 1) -> list[Any]:
 
 
 def from_records(
-    records: Iterable[Any], ship: Ship, *, outputs: Sequence[str] = STATES, inputs: Sequence[str] = COMMANDS, name: str = "records"
+    records: Iterable[Any],
+    ship: Ship,
+    *,
+    outputs: Sequence[str] = STATES,
+    inputs: Sequence[str] = COMMANDS,
+    name: str = "records",
 ) -> Dataset:
-    """A data set of records whose columns are `outputs` (of y) and `inputs` (of u), in the units and signs of `signals`.
+    """A data set of records whose columns are `outputs` (of y) and `inputs` (of u), in the units and signs of
+    `signals`.
 
-    y must hold x, y, psi, u, v, r; actuators that it lacks are taken from their commands, commands that u lacks are zero, and the notes say so.
-    A record is anything with u, y and sampling_time.
+    y must hold x, y, psi, u, v, r; actuators that it lacks are taken from their commands, commands that u lacks are
+    zero, and the notes say so. A record is anything with u, y and sampling_time.
 
     Raises:
         InputError: a column is unknown, missing or of another number than the names; records are sampled differently.
@@ -92,15 +116,28 @@ def from_records(
                 raise unknown_name("channel", column, known)
     lacking = [s for s in _MOTION if s not in outputs]
     if lacking:
-        raise InputError(f"outputs = {', '.join(outputs)}; {', '.join(lacking)} is missing, without which a rollout cannot start. Add it to y.")
+        raise InputError(
+            f"outputs = {', '.join(outputs)}; {', '.join(lacking)} is missing, without which a rollout cannot "
+            "start. Add it to y."
+        )
     used = (*COMMANDS, *[c for c in inputs if c not in COMMANDS])
     runs = [_run(i, record, outputs, inputs, used) for i, record in enumerate(records)]
     times = {float(record.sampling_time or np.nan) for record in records}
     if len(times) != 1 or not times.copy().pop() > 0.0:
-        raise InputError(f"sampling_time = {', '.join(str(r.sampling_time) for r in records[:5])}; accepted: one time [s] for all records.")
+        raise InputError(
+            f"sampling_time = {', '.join(str(r.sampling_time) for r in records[:5])}; accepted: one time [s] for "
+            "all records."
+        )
     notes = [f"{s} is not in y: taken from {c}" for s, c in zip(STATES[6:], COMMANDS, strict=True) if s not in outputs]
     notes += [f"{c} is not in u: taken as zero" for c in COMMANDS if c not in inputs]
-    return Dataset(name, ship, times.pop(), tuple(runs), actuators="measured" if set(STATES) <= set(outputs) else "commanded", notes=tuple(notes))
+    return Dataset(
+        name,
+        ship,
+        times.pop(),
+        tuple(runs),
+        actuators="measured" if set(STATES) <= set(outputs) else "commanded",
+        notes=tuple(notes),
+    )
 
 
 def _run(index: int, record: Any, outputs: Sequence[str], inputs: Sequence[str], used: tuple[str, ...]) -> Run:
@@ -119,7 +156,8 @@ def _run(index: int, record: Any, outputs: Sequence[str], inputs: Sequence[str],
 
 
 class InputOutputModel:
-    """A shipbench model with the two calls of `nonlinear_benchmarks`-style code: `fit(train)` and `simulate(u, y_init)`.
+    """A shipbench model with the two calls of `nonlinear_benchmarks`-style code: `fit(train)` and `simulate(u,
+    y_init)`.
 
     Args:
         spec: model spec, such as "physics", "mlp[hidden=64]" or "path/to/model.py:ClassName".
@@ -128,7 +166,9 @@ class InputOutputModel:
         seed: of the fit.
     """
 
-    def __init__(self, spec: str, ship: Ship, *, outputs: Sequence[str] = STATES, inputs: Sequence[str] = COMMANDS, seed: int = 0) -> None:
+    def __init__(
+        self, spec: str, ship: Ship, *, outputs: Sequence[str] = STATES, inputs: Sequence[str] = COMMANDS, seed: int = 0
+    ) -> None:
         self.predictor = make_predictor(parse_spec(spec))
         self.ship, self.outputs, self.inputs, self.seed = ship, tuple(outputs), tuple(inputs), seed
 
@@ -143,7 +183,8 @@ class InputOutputModel:
         return self
 
     def simulate(self, u: np.ndarray, y_init: np.ndarray) -> np.ndarray:
-        """y (samples, outputs) under the inputs u (samples, inputs), of which the first n are `y_init` (n, outputs), n >= 1, as given.
+        """y (samples, outputs) under the inputs u (samples, inputs), of which the first n are `y_init` (n, outputs), n
+        >= 1, as given.
 
         Raises:
             InputError: `fit` was not called, or the shapes do not fit.
@@ -154,7 +195,9 @@ class InputOutputModel:
         if not 1 <= n < len(u):
             raise InputError(f"y_init has {n} samples, u {len(u)}; accepted: at least 1 and fewer than u.")
         known = SimpleNamespace(u=np.asarray(u)[:n], y=np.asarray(y_init), sampling_time=self._dt)
-        later = SimpleNamespace(u=np.asarray(u)[n - 1 :], y=np.zeros((len(u) - n + 1, len(self.outputs))), sampling_time=self._dt)
+        later = SimpleNamespace(
+            u=np.asarray(u)[n - 1 :], y=np.zeros((len(u) - n + 1, len(self.outputs))), sampling_time=self._dt
+        )
         run, rest = from_records([known, later], self.ship, outputs=self.outputs, inputs=self.inputs).runs
         U = rest.inputs[:-1]
         history = (run.states[None, :-1], run.inputs[None, :-1]) if n > 1 else None

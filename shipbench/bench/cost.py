@@ -10,9 +10,9 @@ _NO_PARAMETERS = ("ci95", "scale_")
 def count_parameters(model: Any) -> int | None:
     """Numbers that `fit` set in `model`; None where that cannot be told.
 
-    A model may say it itself: `num_parameters`, a number or a method (None: it cannot tell). Of others of ours the saved arrays are counted,
-    without intervals, scales of inputs and outputs, and a hybrid's copy of its physics. Torch modules held as attributes are counted for any
-    other model.
+    A model may say it itself: `num_parameters`, a number or a method (None: it cannot tell). Of others of ours the
+    saved arrays are counted, without intervals, scales of inputs and outputs, and a hybrid's copy of its physics. Torch
+    modules held as attributes are counted for any other model.
     """
     try:
         return _count(model)
@@ -29,7 +29,9 @@ def _count(model: Any) -> int | None:
         found = arrays()
         counted = [n for n in found if not any(word in n for word in _NO_PARAMETERS) and f"physics.{n}" not in found]
         return sum(int(found[n].size) for n in counted)
-    modules = [value for value in getattr(model, "__dict__", {}).values() if callable(getattr(value, "named_parameters", None))]
+    modules = [
+        value for value in getattr(model, "__dict__", {}).values() if callable(getattr(value, "named_parameters", None))
+    ]
     return sum(p.numel() for module in modules for p in module.parameters()) if modules else None
 
 

@@ -11,14 +11,17 @@ def duration(seconds: float) -> str:
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"
-    return f"{whole // 60} min {whole % 60:02d} s" if whole < 3600 else f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    return (
+        f"{whole // 60} min {whole % 60:02d} s" if whole < 3600 else f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    )
 
 
 class Remaining:
     """Time that is left of pieces of work of several kinds.
 
-    A piece costs what the finished ones of its kind cost on average; of a kind without one, what all finished pieces cost on average. Several at a
-    time, and the work between them, count by the ratio of the elapsed time to the finished cost.
+    A piece costs what the finished ones of its kind cost on average; of a kind without one, what all finished pieces
+    cost on average. Several at a time, and the work between them, count by the ratio of the elapsed time to the
+    finished cost.
 
     Args:
         todo: number of pieces of each kind.
@@ -40,5 +43,7 @@ class Remaining:
         if not known:
             return None
         mean = sum(known) / len(known)
-        cost_left = sum(n * (sum(own) / len(own) if (own := self.costs.get(kind)) else mean) for kind, n in self.todo.items())
+        cost_left = sum(
+            n * (sum(own) / len(own) if (own := self.costs.get(kind)) else mean) for kind, n in self.todo.items()
+        )
         return elapsed * cost_left / sum(known)

@@ -1,4 +1,5 @@
-"""One entry of summary.json and the columns of rows.parquet and windows.parquet as pages read them: types and values, checked in one place."""
+"""One entry of summary.json and the columns of rows.parquet and windows.parquet as pages read them: types and values,
+checked in one place."""
 
 from __future__ import annotations
 
@@ -114,7 +115,9 @@ def check_entry(summary: Any, refuse: Refuse) -> None:
             raise refuse(f"an entry of summary.json lacks {', '.join(missing)}") from None
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"])) or "an entry"
-        raise refuse(f"summary.json: {key} = {shown(repr(first['input']))[:60]}; accepted: {_accepted(first['msg'])}") from None
+        raise refuse(
+            f"summary.json: {key} = {shown(repr(first['input']))[:60]}; accepted: {_accepted(first['msg'])}"
+        ) from None
     try:
         check_name(entry.dataset, "dataset")
         check_label(entry.model, "model", LONGEST_LABEL)
@@ -123,7 +126,9 @@ def check_entry(summary: Any, refuse: Refuse) -> None:
     except InputError as error:
         raise refuse(f"summary.json: {error}") from None
     if len(entry.run_status) != len(entry.runs.test):
-        raise refuse(f"summary.json: {len(entry.run_status)} statuses in run_status for {len(entry.runs.test)} scored runs")
+        raise refuse(
+            f"summary.json: {len(entry.run_status)} statuses in run_status for {len(entry.runs.test)} scored runs"
+        )
 
 
 def _accepted(message: str) -> str:
@@ -142,13 +147,17 @@ def check_task_of(summary: dict[str, Any], refuse: Refuse) -> None:
     task = make_task(summary["task"])
     dt = summary["dt"]
     if not 0.5 <= task.horizon_s / dt <= _MOST_STEPS:
-        raise refuse(f"summary.json: dt = {dt:g} s for a horizon of {task.horizon_s:g} s; accepted: the sample time of the data")
+        raise refuse(
+            f"summary.json: dt = {dt:g} s for a horizon of {task.horizon_s:g} s; accepted: the sample time of the data"
+        )
     expected = [asdict(c) for c in columns(task.metrics, task.horizon_s, dt)]
     if [dict(c) for c in summary["columns"]] != expected:
         raise refuse("summary.json: columns are not those of task.metrics: " + ", ".join(c["name"] for c in expected))
 
 
-def check_columns(rows: Frame, refuse: Refuse, texts: Iterable[str], whole: Iterable[str], numbers: Iterable[str]) -> None:
+def check_columns(
+    rows: Frame, refuse: Refuse, texts: Iterable[str], whole: Iterable[str], numbers: Iterable[str]
+) -> None:
     """Refuse a table that lacks one of these columns, has one twice, or has one of another type.
 
     Raises:
@@ -188,7 +197,8 @@ def check_labels(rows: Frame, refuse: Refuse) -> None:
 
 
 def check_scores(rows: Frame, metrics: Iterable[str], scores: Iterable[str], refuse: Refuse) -> None:
-    """Refuse scores that no prediction gives: not finite, negative, missing in a scored row, or there in a row that was not scored.
+    """Refuse scores that no prediction gives: not finite, negative, missing in a scored row, or there in a row that was
+    not scored.
 
     Args:
         rows: of one folder.
@@ -201,7 +211,9 @@ def check_scores(rows: Frame, metrics: Iterable[str], scores: Iterable[str], ref
     if unknown:
         raise refuse(f"unknown status '{shown(unknown[0])[:40]}'; accepted: {', '.join(STATUSES)}")
     scored = (rows["status"] == "ok").to_numpy()
-    own = {c.name for name in metrics if name in METRICS.built_in() for c in METRICS.get(name).columns} | {f"ed_at_{h:g}s" for h in HORIZONS_S}
+    own = {c.name for name in metrics if name in METRICS.built_in() for c in METRICS.get(name).columns} | {
+        f"ed_at_{h:g}s" for h in HORIZONS_S
+    }
     for name in scores:
         values = rows[name].to_numpy(float, na_value=np.nan)
         label, known = "ED" if name == "ed" else name, np.isfinite(values)
@@ -216,7 +228,8 @@ def check_scores(rows: Frame, metrics: Iterable[str], scores: Iterable[str], ref
             first = rows.iloc[int(np.argmax(bad))]
             where = f"{first['model']} on {first['dataset']}, fold {first['fold']}, run {first['run']}"
             raise refuse(
-                f"{where}: status '{first['status']}' with {label} = {first[name]}; a finite score goes with 'ok', at least 0 if it is an error, "
+                f"{where}: status '{first['status']}' with {label} = {first[name]}; a finite score goes with 'ok', "
+                "at least 0 if it is an error, "
                 "and none with all others"
             )
     for name in TIMES:
@@ -235,4 +248,7 @@ def check_windows(windows: Frame, refuse: Refuse) -> None:
     check_columns(windows, refuse, ("dataset", "fingerprint", "task", "run"), ("fold",), FEATURES)
     values = windows[list(FEATURES)].to_numpy(float, na_value=np.nan)
     if not (values[:, :5] >= 0).all() or (np.abs(values) > LARGEST).any():
-        raise refuse("holds values that no window has; accepted: finite numbers, at least 0 for speed, drift, rudder, astern and thrusters")
+        raise refuse(
+            "holds values that no window has; accepted: finite numbers, at least 0 for speed, drift, rudder, astern "
+            "and thrusters"
+        )

@@ -1,4 +1,5 @@
-"""Where the jobs of a study run: in this process, in processes of this machine, or on a Dask cluster; all behind `concurrent.futures`."""
+"""Where the jobs of a study run: in this process, in processes of this machine, or on a Dask cluster; all behind
+`concurrent.futures`."""
 
 from __future__ import annotations
 
@@ -37,17 +38,21 @@ class Execution:
     """Where the jobs run and what each may use.
 
     Args:
-        executor: "local" (one after another in this process; in a child process if there are limits, or if the code of the model is not
-            shipbench's), "processes" (`workers` child processes at a time) or "dask" (the workers of the Dask cluster at `scheduler`).
+        executor: "local" (one after another in this process; in a child process if there are limits, or if the code of
+        the model is not
+            shipbench's), "processes" (`workers` child processes at a time) or "dask" (the workers of the Dask cluster
+            at `scheduler`).
         workers: number of processes; None: one for each CPU.
         scheduler: address, such as "tcp://host:8786".
         limits: of each cell.
-        device: where networks train and predict ("cpu", "cuda", "cuda:1"); None: where their specs say, else on the CPU.
+        device: where networks train and predict ("cpu", "cuda", "cuda:1"); None: where their specs say, else on the
+        CPU.
 
         wait_s: give up when the Dask cluster has had no workers for so long [s]; None: wait for them.
 
     Raises:
-        InputError: an unknown executor, an option that it lacks or does not take, or a device that is not here (with Dask, each worker looks itself).
+        InputError: an unknown executor, an option that it lacks or does not take, or a device that is not here (with
+        Dask, each worker looks itself).
     """
 
     executor: str = "local"
@@ -66,21 +71,31 @@ class Execution:
         if self.workers is not None and not 1 <= self.workers <= _MOST_WORKERS:
             raise InputError(f"--workers {self.workers}; accepted: 1 or more, at most {_MOST_WORKERS}.")
         if self.executor == "dask" and not self.scheduler:
-            raise InputError("--executor dask needs --scheduler, the address of a running Dask scheduler, such as --scheduler tcp://host:8786.")
+            raise InputError(
+                "--executor dask needs --scheduler, the address of a running Dask scheduler, such as --scheduler "
+                "tcp://host:8786."
+            )
         if self.executor != "dask" and self.scheduler:
-            raise InputError(f"--scheduler {self.scheduler} belongs to --executor dask, not to --executor {self.executor}.")
+            raise InputError(
+                f"--scheduler {self.scheduler} belongs to --executor dask, not to --executor {self.executor}."
+            )
         if self.device is not None:
             check_device(self.device, here=self.executor != "dask")
         if self.wait_s is not None and self.executor != "dask":
             raise InputError(f"--wait {self.wait_s:g} belongs to --executor dask, not to --executor {self.executor}.")
-        options = (("--time-limit", self.limits.seconds), ("--memory-limit", self.limits.memory_gb), ("--wait", self.wait_s))
+        options = (
+            ("--time-limit", self.limits.seconds),
+            ("--memory-limit", self.limits.memory_gb),
+            ("--wait", self.wait_s),
+        )
         for option, value in options:
             if value is not None and not 0 < value < math.inf:
                 raise InputError(f"{option} {value:g}; accepted: more than 0, and finite.")
 
 
 class Workers(ABC):
-    """Takes jobs. `room`: how many at once at most (None: all, the cluster queues them); `about`: who they are, for the progress.
+    """Takes jobs. `room`: how many at once at most (None: all, the cluster queues them); `about`: who they are, for the
+    progress.
 
     `sends_files`: the workers may not see this machine's files, so that a job must bring those of the model.
     """
@@ -114,7 +129,9 @@ class _Local(Workers):
         super().__init__(_Here(), room=1)
 
     def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
-        if job.foreign:  # a stranger's code never runs beside the truth, nor in this process's folder, threads and streams
+        if (
+            job.foreign
+        ):  # a stranger's code never runs beside the truth, nor in this process's folder, threads and streams
             return self.executor.submit(work_isolated, job, folds, Limits(), thread_settings())
         # Copies, as a child process gets them, each fold's apart: what a model writes into them stays its own.
         answer = self.executor.submit(work, job, [pickle.loads(pickle.dumps(fold)) for fold in folds])
@@ -134,7 +151,8 @@ class _Processes(Workers):
 
 
 class _Dask(Workers):
-    """Jobs go to the cluster by value: neither files nor caches are shared. A fold's data go once to each worker that needs them."""
+    """Jobs go to the cluster by value: neither files nor caches are shared. A fold's data go once to each worker that
+    needs them."""
 
     def __init__(self, client: Any, limits: Limits) -> None:
         about = f"{client.scheduler.address}, {len(client.scheduler_info(n_workers=-1)['workers'])} workers now"
@@ -154,7 +172,8 @@ class _Dask(Workers):
         return f"no workers at {address}; start one with `dask worker {address}`"
 
     def _shared(self, fold: FoldData) -> Any:
-        """As a task of the cluster, not as data scattered to it: the scheduler gives it to another worker where one is lost."""
+        """As a task of the cluster, not as data scattered to it: the scheduler gives it to another worker where one is
+        lost."""
         if id(fold) not in self.shared:
             self.shared[id(fold)] = fold, self.client.submit(_itself, fold, pure=False)
         return self.shared[id(fold)][1]
@@ -173,7 +192,9 @@ def _on_dask(job: Job, limits: Limits, threads: Mapping[str, str], *folds: FoldD
     for package, digest in job.code.items():
         if (here := _digest_here(package)) != digest:
             found = f"other code of {package} (source {here}; of the study: {digest})" if here else f"no {package}"
-            raise InputError(f"the Dask worker on {platform.node()} has {found}; install the same version on all workers.")
+            raise InputError(
+                f"the Dask worker on {platform.node()} has {found}; install the same version on all workers."
+            )
     return work_isolated(job, folds, limits, threads)
 
 
@@ -221,9 +242,12 @@ def _client(scheduler: str) -> Any:
 
     try:
         asyncio.run(reach())
-    except Exception as error:  # an address that cannot be read, nobody there, or somebody who is no scheduler and answers anything
+    except (
+        Exception
+    ) as error:  # an address that cannot be read, nobody there, or somebody who is no scheduler and answers anything
         raise InputError(
-            f"no Dask scheduler answers at {scheduler} ({one_line(error)}); start one (`dask scheduler`) or correct the address, such as "
+            f"no Dask scheduler answers at {scheduler} ({one_line(error)}); start one (`dask scheduler`) or correct "
+            "the address, such as "
             "tcp://host:8786."
         ) from None
     return Client(scheduler, timeout=CONNECT_S, set_as_default=False)
@@ -244,5 +268,8 @@ def answers_of(future: Future[list[Answer]], cells: int) -> list[Answer]:
         raise WorkError(f"the connection to the Dask scheduler is lost. {_GO_ON}") from None
     except Exception as error:
         if type(error).__name__ == "KilledWorker":  # known without importing distributed
-            return [Answer("failed", "fit or prediction: all Dask workers that took it died, one after another") for _ in range(cells)]
+            return [
+                Answer("failed", "fit or prediction: all Dask workers that took it died, one after another")
+                for _ in range(cells)
+            ]
         raise WorkError(f"the workers cannot do their work: {one_line(error)}. {_GO_ON}") from error

@@ -22,8 +22,8 @@ from .submissions import read_results
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """One cell: its summary, the windows that it was scored on, and S (batch, K, 10), not-a-number where nothing was predicted; ed (batch,) [m]
-    is ED as it stands in the rows, not-a-number where it was not scored."""
+    """One cell: its summary, the windows that it was scored on, and S (batch, K, 10), not-a-number where nothing was
+    predicted; ed (batch,) [m] is ED as it stands in the rows, not-a-number where it was not scored."""
 
     summary: dict[str, Any]
     batch: Batch
@@ -54,10 +54,16 @@ def predictions(folder: Path) -> Iterator[Predicted]:
             batch, S = read_truth(folder, cell.dataset, cell.fold), read_predictions(folder, cell)
         except InputError as error:
             raise InputError(
-                f"{folder}: the saved predictions of {cell.label} cannot be read ({error}). Give the folder that `shipbench run` wrote, whole."
+                f"{folder}: the saved predictions of {cell.label} cannot be read ({error}). Give the folder that "
+                "`shipbench run` wrote, whole."
             ) from None
         rows = results.rows
-        own = rows[(rows.dataset == cell.dataset) & (rows.model == cell.model) & (rows.fold == cell.fold) & (rows.seed == cell.seed)]
+        own = rows[
+            (rows.dataset == cell.dataset)
+            & (rows.model == cell.model)
+            & (rows.fold == cell.fold)
+            & (rows.seed == cell.seed)
+        ]
         ed = own.set_index("run")["ed"].reindex(list(batch.ids)).to_numpy(float)
         yield Predicted(summary, batch, np.full_like(batch.truth, np.nan) if S is None else S, ed)
 
@@ -65,8 +71,9 @@ def predictions(folder: Path) -> Iterator[Predicted]:
 def export_predictions(folder: Path, out: Path, format: str) -> list[Path]:
     """Write every prediction of the study in `folder`; returns what was written.
 
-    csv, parquet: into the folder `out`: `predictions`, one row per cell, window and knot with the prediction (`x` .. `F_s`), the truth (`true_x` ..)
-    and the inputs held on the step that ends there; `starts`, the state s0 of every window; `summary.json`, which identifies every cell.
+    csv, parquet: into the folder `out`: `predictions`, one row per cell, window and knot with the prediction (`x` ..
+    `F_s`), the truth (`true_x` ..) and the inputs held on the step that ends there; `starts`, the state s0 of every
+    window; `summary.json`, which identifies every cell.
     mat: one file with the struct array `predictions`, one element per cell.
 
     Raises:
@@ -105,7 +112,11 @@ def _table(found: list[Predicted]) -> Frame:
     for p in found:
         runs, steps = p.S.shape[:2]
         about = {key: p.summary[key] for key in ("dataset", "model", "fold", "seed")}
-        windows = {"run": np.repeat(p.batch.ids, steps), "status": np.repeat(p.summary["run_status"], steps), "t": np.tile(p.t, runs)}
+        windows = {
+            "run": np.repeat(p.batch.ids, steps),
+            "status": np.repeat(p.summary["run_status"], steps),
+            "t": np.tile(p.t, runs),
+        }
         values = np.concatenate([p.S, p.batch.truth, p.batch.U], axis=2).reshape(runs * steps, -1)
         columns = [*STATES, *(f"true_{name}" for name in STATES), *p.summary["inputs"]]
         frame = pd.concat([pd.DataFrame(windows), pd.DataFrame(values, columns=columns)], axis=1)
@@ -121,7 +132,9 @@ def _starts(found: list[Predicted]) -> Frame:
     frames = {}
     for p in found:
         frame = pd.DataFrame(p.batch.s0, columns=list(STATES))
-        for place, (key, value) in enumerate((("dataset", p.summary["dataset"]), ("fold", p.summary["fold"]), ("run", list(p.batch.ids)))):
+        for place, (key, value) in enumerate(
+            (("dataset", p.summary["dataset"]), ("fold", p.summary["fold"]), ("run", list(p.batch.ids)))
+        ):
             frame.insert(place, key, value)
         frames[p.summary["dataset"], p.summary["fold"]] = frame  # the same for every model
     return pd.concat(frames.values(), ignore_index=True)

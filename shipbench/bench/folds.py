@@ -1,4 +1,5 @@
-"""Folds by run: never by window and never by sample; runs of one group stay on one side; windows are cut after the split."""
+"""Folds by run: never by window and never by sample; runs of one group stay on one side; windows are cut after the
+split."""
 
 from __future__ import annotations
 
@@ -37,7 +38,9 @@ def select_runs(dataset: Dataset, task: Task) -> tuple[Dataset, tuple[str, ...]]
         dataset.windows(steps, history=history)  # raises with the figures
     if len(usable) < len(dataset):
         short = [r.id for r in dataset.runs if len(r) <= steps + history]
-        notes.append(f"{len(short)} of {len(dataset)} runs are shorter than the horizon and left out: {', '.join(short[:8])}")
+        notes.append(
+            f"{len(short)} of {len(dataset)} runs are shorter than the horizon and left out: {', '.join(short[:8])}"
+        )
     if task.max_runs is not None and len(usable) > task.max_runs:
         notes.append(f"max_runs = {task.max_runs}: {task.max_runs} of {len(usable)} runs are used, evenly spread")
         usable = [usable[i] for i in np.linspace(0, len(usable) - 1, task.max_runs).round().astype(int)]
@@ -59,7 +62,8 @@ def _groups(runs: Sequence[Run], rng: np.random.Generator) -> list[list[Run]]:
 
 
 def _deal(groups: list[list[Run]], folds: int) -> list[list[Run]]:
-    """Whole groups into `folds` parts of nearly equal numbers of runs: the greatest first, each to the smallest part."""
+    """Whole groups into `folds` parts of nearly equal numbers of runs: the greatest first, each to the smallest
+    part."""
     parts: list[list[Run]] = [[] for _ in range(folds)]
     for group in sorted(groups, key=len, reverse=True):
         min(parts, key=len).extend(group)
@@ -87,7 +91,8 @@ def _published(dataset: Dataset) -> list[tuple[list[Run], list[Run]]]:
     for side, runs in sides.items():
         if not runs:
             raise InputError(
-                f"split = 'published', but no usable run of data set '{dataset.name}' has split = \"{side}\" in its metadata; "
+                f"split = 'published', but no usable run of data set '{dataset.name}' has split = \"{side}\" in its "
+                "metadata; "
                 "use split = 'folds', or add it under [runs.<id>] in dataset.toml."
             )
     return [(sides["train"], sides["test"])]
@@ -99,10 +104,15 @@ def _by_folds(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]
         what = "runs" if len(groups) == len(dataset) else "groups of runs"
         if len(groups) == 1:
             raise InputError(
-                f"data set '{dataset.name}' is one run or one group of runs, which no fold may part: nothing could be held out. "
-                "Cut a long log into windows (shipbench data import --window 300), remove `group` from dataset.toml, or add runs."
+                f"data set '{dataset.name}' is one run or one group of runs, which no fold may part: nothing could "
+                "be held out. "
+                "Cut a long log into windows (shipbench data import --window 300), remove `group` from "
+                "dataset.toml, or add runs."
             )
-        raise InputError(f"folds = {task.folds}, but data set '{dataset.name}' has {len(groups)} {what}; give at most {len(groups)} folds.")
+        raise InputError(
+            f"folds = {task.folds}, but data set '{dataset.name}' has {len(groups)} {what}; give at most "
+            f"{len(groups)} folds."
+        )
     parts = [{r.id for r in part} for part in _deal(groups, task.folds)]
     return [([r for r in dataset.runs if r.id not in ids], [r for r in dataset.runs if r.id in ids]) for ids in parts]
 
@@ -123,9 +133,14 @@ def _by_kind(dataset: Dataset) -> list[tuple[list[Run], list[Run]]]:
     pairs = [_parted(dataset, [r for r in dataset.runs if r.kind == kind]) for kind in kinds]
     empty = [kind for kind, (rest, _) in zip(kinds, pairs, strict=True) if not rest]
     if len(kinds) < 2 or empty:
-        why = f"without '{empty[0]}' no run is left to train on" if empty and len(kinds) > 1 else f"every run has manoeuvre = '{kinds[0]}'"
+        why = (
+            f"without '{empty[0]}' no run is left to train on"
+            if empty and len(kinds) > 1
+            else f"every run has manoeuvre = '{kinds[0]}'"
+        )
         raise InputError(
-            f"split = 'kind', but in data set '{dataset.name}' {why}; name the kinds (two or more) with manoeuvre = \"..\" under [runs.<id>] "
+            f"split = 'kind', but in data set '{dataset.name}' {why}; name the kinds (two or more) with manoeuvre = "
+            '".." under [runs.<id>] '
             "in dataset.toml, or use split = 'folds'."
         )
     return pairs
@@ -143,7 +158,8 @@ def _by_speed(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]
         groups.setdefault(run.group, []).append(run)
     if len(groups) < 2:
         raise InputError(
-            f"split = 'speed', but data set '{dataset.name}' has one group of runs only; two or more are needed. Use split = 'published'."
+            f"split = 'speed', but data set '{dataset.name}' has one group of runs only; two or more are needed. "
+            "Use split = 'published'."
         )
     fastest = sorted(groups.values(), key=lambda group: -float(np.mean([mean_speed(r) for r in group])))
     test: list[Run] = []
@@ -155,18 +171,22 @@ def _by_speed(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]
 
 
 def _fewer(rest: list[Run], task: Task, index: int) -> tuple[list[Run], int | None]:
-    """The training runs of a task with `train_runs`, whole groups in a random order that is the same for every number, and its `valid_runs`."""
+    """The training runs of a task with `train_runs`, whole groups in a random order that is the same for every number,
+    and its `valid_runs`."""
     if task.train_runs is None:
         return rest, task.valid_runs
     if task.train_runs > len(rest):
-        raise InputError(f"train_runs = {task.train_runs}, but fold {index} has {len(rest)} training runs; give at most {len(rest)}.")
+        raise InputError(
+            f"train_runs = {task.train_runs}, but fold {index} has {len(rest)} training runs; give at most {len(rest)}."
+        )
     kept: list[Run] = []
     for group in _groups(rest, np.random.default_rng([task.fold_seed, index, 2])):
         if len(kept) + len(group) <= task.train_runs:
             kept += group
     if len({r.group for r in kept}) < 2:
         raise InputError(
-            f"train_runs = {task.train_runs}: in fold {index} that is fewer than two groups of runs, one to fit and one for early stopping; "
+            f"train_runs = {task.train_runs}: in fold {index} that is fewer than two groups of runs, one to fit and "
+            "one for early stopping; "
             "give more runs."
         )
     valid = task.valid_runs
@@ -203,10 +223,12 @@ def _pairs(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]:
 def make_folds(dataset: Dataset, task: Task) -> list[Fold]:
     """The folds of a task, the same for every model. The published split and the split by speed are a single fold.
 
-    `dataset` holds whole runs (see `select_runs`). Training and validation windows do not overlap; scored windows are `stride_s` apart.
+    `dataset` holds whole runs (see `select_runs`). Training and validation windows do not overlap; scored windows are
+    `stride_s` apart.
 
     Raises:
-        InputError: more folds than groups, too many training or validation runs, or no published split, or no kinds to tell apart.
+        InputError: more folds than groups, too many training or validation runs, or no published split, or no kinds to
+        tell apart.
     """
     steps, history, stride = task.steps(dataset.dt), task.history(dataset.dt), task.stride(dataset.dt)
     cut = cache(lambda run, every: run.windows(history + steps + 1, every))  # the folds share the windows of a run

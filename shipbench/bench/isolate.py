@@ -1,7 +1,8 @@
-"""A job in a process of its own, which can be killed: where a model hangs, eats memory or crashes, only the cells of its job fail.
+"""A job in a process of its own, which can be killed: where a model hangs, eats memory or crashes, only the cells of
+its job fail.
 
-The process is a plain `python -c`, not one of `multiprocessing`: workers of Dask are daemons, which may not have such children, and a user's
-script needs no `if __name__ == "__main__"`.
+The process is a plain `python -c`, not one of `multiprocessing`: workers of Dask are daemons, which may not have such
+children, and a user's script needs no `if __name__ == "__main__"`.
 """
 
 from __future__ import annotations
@@ -27,14 +28,16 @@ THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """Sums in another number of threads round differently: the study's settings go with its jobs."""
 
 _LOOK_EVERY = 0.1
-"""Seconds between two looks at the memory: what is filled meanwhile (about 0.2 GB) is what a model may exceed its limit by."""
+"""Seconds between two looks at the memory: what is filled meanwhile (about 0.2 GB) is what a model may exceed its limit
+by."""
 
 _running: set[subprocess.Popen[bytes]] = set()
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Most time [s] and memory [GB, 1e9 bytes] of one cell, or None; cells that are fitted together share the sum of their times."""
+    """Most time [s] and memory [GB, 1e9 bytes] of one cell, or None; cells that are fitted together share the sum of
+    their times."""
 
     seconds: float | None = None
     memory_gb: float | None = None
@@ -62,7 +65,11 @@ def _work_on(job: Job, *folds: FoldData) -> list[Answer]:
 
 
 def call_isolated(
-    function: Callable[..., Any], parts: Sequence[Any], limits: Limits | None = None, threads: Mapping[str, str] | None = None, cells: int = 1
+    function: Callable[..., Any],
+    parts: Sequence[Any],
+    limits: Limits | None = None,
+    threads: Mapping[str, str] | None = None,
+    cells: int = 1,
 ) -> tuple[Any, str]:
     """What `function(*parts)` returns in a process of its own, or None and why it did not answer.
 
@@ -76,7 +83,8 @@ def call_isolated(
         try:
             process = subprocess.Popen(
                 [sys.executable, "-P", "-c", f"from {supervise.__name__} import main; main({alive})"],
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=[alive], start_new_session=True, env=environment,
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=[alive], start_new_session=True,
+                env=environment,
             )  # fmt: skip
         except OSError as error:
             os.close(alive)
@@ -113,7 +121,9 @@ def _attend(process: subprocess.Popen[bytes], question: bytes, limits: Limits, c
     return answer, "" if process.returncode == 0 and answer else (exceeded or [_ending(process.returncode)])[0]
 
 
-def _watch(process: subprocess.Popen[bytes], limits: Limits, cells: int, ended: threading.Event, exceeded: list[str]) -> None:
+def _watch(
+    process: subprocess.Popen[bytes], limits: Limits, cells: int, ended: threading.Event, exceeded: list[str]
+) -> None:
     """Kill the process when it exceeds a limit, and say which."""
     end = math.inf if limits.seconds is None else time.monotonic() + limits.seconds * cells
     look_every = math.inf if limits.memory_gb is None else _LOOK_EVERY

@@ -1,4 +1,5 @@
-"""The folder of a study while it runs: one study at a time, no leftovers of killed ones, and one clear message where it cannot be written."""
+"""The folder of a study while it runs: one study at a time, no leftovers of killed ones, and one clear message where it
+cannot be written."""
 
 from __future__ import annotations
 
@@ -15,9 +16,11 @@ from ..regular_files import read_json
 from .task import Task, make_task
 
 _LEFTOVERS = {
-    "": r"(writable|study\.json|rows\.parquet|summary\.json|windows\.parquet)", "truth/*": r"fold\d+\.npz", "cells/*/*": r"fold\d+-seed\d+",
+    "": r"(writable|study\.json|rows\.parquet|summary\.json|windows\.parquet)", "truth/*": r"fold\d+\.npz",
+    "cells/*/*": r"fold\d+-seed\d+",
 }  # fmt: skip
-"""What a killed study leaves half-written, by folder: `.NAME.PID.tmp` of these names. Everything else is not ours to remove."""
+"""What a killed study leaves half-written, by folder: `.NAME.PID.tmp` of these names. Everything else is not ours to
+remove."""
 
 
 def _elsewhere() -> str:
@@ -26,10 +29,12 @@ def _elsewhere() -> str:
 
 @contextmanager
 def claimed(out: Path) -> Iterator[None]:
-    """Make `out`, see that it can be written and that no other study writes there now, and take away what killed studies left half-written.
+    """Make `out`, see that it can be written and that no other study writes there now, and take away what killed
+    studies left half-written.
 
     Raises:
-        InputError: the folder cannot be made or written, or holds links in the place of its folders, or another study is at work in it.
+        InputError: the folder cannot be made or written, or holds links in the place of its folders, or another study
+        is at work in it.
         WorkError: writing failed later (disk full, a folder that has gone).
     """
     try:
@@ -56,8 +61,8 @@ def claimed(out: Path) -> Iterator[None]:
 
 
 def free_folder(base: Path, tasks: Sequence[Task], resume: bool) -> Path:
-    """Folder for a study for which none was given: `base`, or `base-2` and so on where another study is there. `resume`: that of the same tasks,
-    `base` where there is none."""
+    """Folder for a study for which none was given: `base`, or `base-2` and so on where another study is there.
+    `resume`: that of the same tasks, `base` where there is none."""
     number, folder = 1, base
     while (there := _tasks_of(folder)) is not None and there != list(tasks):
         number += 1
@@ -74,8 +79,10 @@ def refuse_other_study(out: Path, tasks: Sequence[Task]) -> None:
     there = _tasks_of(out)
     if there is not None and there != list(tasks):
         raise InputError(
-            f"{out} holds the results of another study, which would be replaced. Give {_elsewhere()}. To go on there, give "
-            f"{option('--resume', 'resume=True')}: finished fits of these models are kept, and the tables become those of this study."
+            f"{out} holds the results of another study, which would be replaced. Give {_elsewhere()}. To go on "
+            "there, give "
+            f"{option('--resume', 'resume=True')}: finished fits of these models are kept, and the tables become "
+            "those of this study."
         )
 
 
@@ -94,7 +101,8 @@ def _refuse_links(out: Path) -> None:
     for pattern in ("cells", "truth", "cells/*", "cells/*/*"):
         if link := next((path for path in out.glob(pattern) if path.is_symlink()), None):
             raise InputError(
-                f"{link} is a link; accepted: folders, so that a study writes only below {out}. Remove the link, or give {_elsewhere()}."
+                f"{link} is a link; accepted: folders, so that a study writes only below {out}. Remove the link, or "
+                f"give {_elsewhere()}."
             )
 
 
@@ -115,5 +123,7 @@ def _lock(handle: int, out: Path) -> None:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
-            raise InputError(f"another study is being written to {out} at this moment; wait for it, or give {_elsewhere()}.") from None
+            raise InputError(
+                f"another study is being written to {out} at this moment; wait for it, or give {_elsewhere()}."
+            ) from None
         # file systems without locks (some of clusters): the user keeps two studies apart

@@ -7,7 +7,8 @@ import sys
 
 
 def give_back_memory() -> None:
-    """What is freed goes back to the system, where the C library can do that: what comes next would else need its memory on top of it."""
+    """What is freed goes back to the system, where the C library can do that: what comes next would else need its
+    memory on top of it."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
     if trim is not None:
         trim(0)

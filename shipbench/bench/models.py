@@ -1,4 +1,5 @@
-"""What a study knows of a model before it fits it: whose code it is, which files it is made of, and how it wants to be fitted."""
+"""What a study knows of a model before it fits it: whose code it is, which files it is made of, and how it wants to be
+fitted."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ class ModelFacts:
     """What is known of the model of a spec.
 
     Args:
-        foreign: it runs code that is not shipbench's (a model file, a plug-in), which is loaded in processes of its own only.
+        foreign: it runs code that is not shipbench's (a model file, a plug-in), which is loaded in processes of its own
+        only.
         seeded: it draws random numbers.
         together: its class fits several folds at once.
         files: content by relative name of the user's code, or of the saved folder.
@@ -84,7 +86,12 @@ def _made(spec: Spec) -> tuple[bool, bool, dict[str, bytes], Origin | None] | Sh
     """seeded, together, files and origin; or why the model cannot be made."""
     try:
         model: Any = make_predictor(spec)
-        return getattr(model, "seeded", True) is not False, hasattr(type(model), "fit_group"), _files(spec), getattr(model, "origin", None)
+        return (
+            getattr(model, "seeded", True) is not False,
+            hasattr(type(model), "fit_group"),
+            _files(spec),
+            getattr(model, "origin", None),
+        )
     except ShipbenchError as error:
         return error
     except (Exception, SystemExit) as error:  # a user's own module is imported here
@@ -96,4 +103,6 @@ def _files(spec: Spec) -> dict[str, bytes]:
         return {}
     if spec.class_name is not None:
         return code_of(spec.path)
-    return {p.relative_to(spec.path.parent).as_posix(): p.read_bytes() for p in sorted(spec.path.rglob("*")) if p.is_file()}
+    return {
+        p.relative_to(spec.path.parent).as_posix(): p.read_bytes() for p in sorted(spec.path.rglob("*")) if p.is_file()
+    }

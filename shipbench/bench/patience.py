@@ -1,4 +1,5 @@
-"""Waiting for workers: what is missing is told after some seconds and then every minute, and there may be an end to it."""
+"""Waiting for workers: what is missing is told after some seconds and then every minute, and there may be an end to
+it."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ LOOK_S, FIRST_S, AGAIN_S = 1.0, 5.0, 60.0
 
 
 class Patience:
-    """Waits for the answers of `workers`, and tells `progress` where they have been unable to work for some seconds; gives up after `wait_s`."""
+    """Waits for the answers of `workers`, and tells `progress` where they have been unable to work for some seconds;
+    gives up after `wait_s`."""
 
     def __init__(self, workers: Workers, progress: Progress, wait_s: float | None = None) -> None:
         self.workers, self.progress, self.limit = workers, progress, math.inf if wait_s is None else wait_s
@@ -46,7 +48,8 @@ class Patience:
         waited = now - self.since
         if waited >= self.limit:
             raise WorkError(
-                f"gave up after {duration(waited)} (--wait {self.limit:g}): {missing}. What is finished is kept; run the same command again with "
+                f"gave up after {duration(waited)} (--wait {self.limit:g}): {missing}. What is finished is kept; "
+                "run the same command again with "
                 "--resume."
             )
         if now >= self.next_word:

@@ -21,17 +21,23 @@ Rollout = tuple[str, np.ndarray, np.ndarray]
 """Run id, t (K + 1,) [s] and states (K + 1, 10), the first being the recorded start."""
 
 
-def predict_runs(model: str, dataset: Dataset, horizon_s: float | None = None, device: str | None = None) -> list[Rollout]:
-    """Roll the saved model in the folder `model` out from the first sample of every run, to its end or over `horizon_s` seconds, on
-    `device` (see `check_device`).
+def predict_runs(
+    model: str, dataset: Dataset, horizon_s: float | None = None, device: str | None = None
+) -> list[Rollout]:
+    """Roll the saved model in the folder `model` out from the first sample of every run, to its end or over `horizon_s`
+    seconds, on `device` (see `check_device`).
 
     Raises:
-        InputError: the folder is no saved model, its inputs or sample time are not those of the data set, a run is shorter than the
+        InputError: the folder is no saved model, its inputs or sample time are not those of the data set, a run is
+        shorter than the
             horizon, or the device is not here.
     """
     spec = parse_spec(model)
     if spec.path is None or spec.class_name is not None:
-        raise InputError(f"'{model}' is not a saved model; give a folder that holds model.json (cells/<dataset>/<model>/fold0-seed0/model).")
+        raise InputError(
+            f"'{model}' is not a saved model; give a folder that holds model.json "
+            "(cells/<dataset>/<model>/fold0-seed0/model)."
+        )
     predictor = make_predictor(spec, device)
     check_origin(model, getattr(predictor, "origin", None), dataset)
     if horizon_s is not None and not 0.0 < horizon_s < np.inf:
@@ -42,7 +48,8 @@ def predict_runs(model: str, dataset: Dataset, horizon_s: float | None = None, d
         steps = asked or len(run) - 1
         if not 0 < steps < len(run):
             raise InputError(
-                f"run '{run.id}' lasts {(len(run) - 1) * dataset.dt:g} s, the horizon is {steps * dataset.dt:g} s; give a positive --horizon "
+                f"run '{run.id}' lasts {(len(run) - 1) * dataset.dt:g} s, the horizon is {steps * dataset.dt:g} s; "
+                "give a positive --horizon "
                 "that no run falls short of."
             )
         S = predictor.predict(run.states[0], run.inputs[:steps])
@@ -57,4 +64,7 @@ def write_csv(rollouts: list[Rollout], path: str | Path) -> None:
         writer = csv.writer(file)
         writer.writerow(["trajectory", "t", *STATES])
         for run, t, states in rollouts:
-            writer.writerows([csv_text(run), f"{time:.10g}", *(f"{value:.10g}" for value in state)] for time, state in zip(t, states, strict=True))
+            writer.writerows(
+                [csv_text(run), f"{time:.10g}", *(f"{value:.10g}" for value in state)]
+                for time, state in zip(t, states, strict=True)
+            )

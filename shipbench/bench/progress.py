@@ -1,4 +1,5 @@
-"""Progress of a study and of other long work: a bar with remaining time on a terminal, plain lines elsewhere, nothing when quiet. All on stderr."""
+"""Progress of a study and of other long work: a bar with remaining time on a terminal, plain lines elsewhere, nothing
+when quiet. All on stderr."""
 
 from __future__ import annotations
 
@@ -14,9 +15,11 @@ from .durations import Remaining, duration
 
 
 class Progress(Protocol):
-    """What the runner tells: how many cells there are, which model is worked on, at which step its fit is, each cell as it ends, and what is wrong.
+    """What the runner tells: how many cells there are, which model is worked on, at which step its fit is, each cell as
+    it ends, and what is wrong.
 
-    `kinds`: number of cells of each kind; cells of one kind cost about the same. `cost` of a cell [s]: 0 where it was kept.
+    `kinds`: number of cells of each kind; cells of one kind cost about the same. `cost` of a cell [s]: 0 where it was
+    kept.
     """
 
     def start(self, total: int, kinds: Mapping[str, int] | None = None) -> None: ...
@@ -77,11 +80,21 @@ class StepBar:
 
     def __init__(self) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import (
+            BarColumn,
+            Progress,
+            SpinnerColumn,
+            TaskProgressColumn,
+            TextColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
 
         self.progress = Progress(
-            SpinnerColumn(), BarColumn(bar_width=16), TaskProgressColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(),
-            TextColumn("{task.description}", markup=False), console=Console(stderr=True), speed_estimate_period=3600, transient=True,
+            SpinnerColumn(), BarColumn(bar_width=16), TaskProgressColumn(), TimeElapsedColumn(), TextColumn("left"),
+            TimeRemainingColumn(),
+            TextColumn("{task.description}", markup=False), console=Console(stderr=True), speed_estimate_period=3600,
+            transient=True,
         )  # fmt: skip
         self.bar = self.progress.add_task("", total=1.0)
         self.progress.start()
@@ -154,7 +167,8 @@ class Bar:
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
         self.progress = Progress(
-            SpinnerColumn(), BarColumn(bar_width=24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.fields[left]}"),
+            SpinnerColumn(), BarColumn(bar_width=24), MofNCompleteColumn(), TimeElapsedColumn(),
+            TextColumn("{task.fields[left]}"),
             TextColumn("{task.description}", markup=False), console=Console(stderr=True),
         )  # fmt: skip
         self.bar: Any = None

@@ -1,6 +1,8 @@
-"""What the true ship does in each scored window: speed, drift, rudder, astern, thrusters, and the indices of standard manoeuvres.
+"""What the true ship does in each scored window: speed, drift, rudder, astern, thrusters, and the indices of standard
+manoeuvres.
 
-These are properties of the data, the same for every model. A study keeps them in `windows.parquet`, so that slices can be rendered from rows alone.
+These are properties of the data, the same for every model. A study keeps them in `windows.parquet`, so that slices can
+be rendered from rows alone.
 Whole windows are sorted, not knots: in a rollout the error at a knot is the sum of all that came before.
 """
 
@@ -25,9 +27,11 @@ RPM_C, THRUSTERS_C = 0, slice(2, 4)
 def window_features(batch: Batch, L: float) -> dict[str, np.ndarray]:
     """By name, one value per window (batch,).
 
-    speed: mean resultant speed [m/s]. drift: mean drift angle atan2(|v|, |u|) [rad], weighted with the speed, for at rest it means nothing.
-    rudder: mean |delta| [rad]. astern, thrusters: share of the samples with orders of astern revolutions, of a thruster. Then the true ship's
-    `trial_indices`, in ship lengths and rad, not-a-number where the window is no such manoeuvre.
+    speed: mean resultant speed [m/s]. drift: mean drift angle atan2(|v|, |u|) [rad], weighted with the speed, for at
+    rest it means nothing.
+    rudder: mean |delta| [rad]. astern, thrusters: share of the samples with orders of astern revolutions, of a
+    thruster. Then the true ship's `trial_indices`, in ship lengths and rad, not-a-number where the window is no such
+    manoeuvre.
     """
     u, v = batch.truth[..., U], batch.truth[..., V]
     speed = np.hypot(u, v)
@@ -36,7 +40,8 @@ def window_features(batch: Batch, L: float) -> dict[str, np.ndarray]:
     indices = trial_indices(s0=batch.s0, states=batch.truth, true=batch.truth, U=batch.U, L=L)
     return {
         "speed": speed.mean(axis=1), "drift": drift, "rudder": np.abs(batch.truth[..., DELTA]).mean(axis=1),
-        "astern": (batch.U[..., RPM_C] < 0).mean(axis=1), "thrusters": (batch.U[..., THRUSTERS_C] != 0).any(axis=2).mean(axis=1),
+        "astern": (batch.U[..., RPM_C] < 0).mean(axis=1),
+        "thrusters": (batch.U[..., THRUSTERS_C] != 0).any(axis=2).mean(axis=1),
         **dict(zip(NAMES, indices.T, strict=True)),
     }  # fmt: skip
 
@@ -47,7 +52,8 @@ _UNITS = {"speed": "m/s", "drift": "rad", "rudder": "rad"}
 
 @dataclass(frozen=True, eq=False)
 class Slice:
-    """Windows of one regime: what it is of ("speed"), its label with bounds and units, and which windows (windows,) are in it."""
+    """Windows of one regime: what it is of ("speed"), its label with bounds and units, and which windows (windows,) are
+    in it."""
 
     regime: str
     label: str
@@ -55,7 +61,8 @@ class Slice:
 
 
 def slices(windows: Frame) -> Iterator[Slice]:
-    """Thirds of the windows by speed, drift and rudder; with and without astern orders and thrusters. Regimes without a difference are left out."""
+    """Thirds of the windows by speed, drift and rudder; with and without astern orders and thrusters. Regimes without a
+    difference are left out."""
     for regime, unit in _UNITS.items():
         name, factor = display_unit(unit)
         values = windows[regime].to_numpy(float) * factor

@@ -1,9 +1,11 @@
-"""Results on disk: one folder per study, one sub-folder per cell (data set, model, fold, seed), written whole or not at all.
+"""Results on disk: one folder per study, one sub-folder per cell (data set, model, fold, seed), written whole or not at
+all.
 
 - `study.json`: tasks, command, code, machine, times.
 - `rows.parquet`: one row per (dataset, model, fold, seed, run) of the study.
 - `summary.json`: one entry per cell that alone identifies its experiment.
-- `windows.parquet`: one row per scored window: what the true ship does there (see `regimes`). These three files are a submission.
+- `windows.parquet`: one row per scored window: what the true ship does there (see `regimes`). These three files are a
+  submission.
 - `truth/<dataset>/fold0.npz`: ids, s0, U and truth of the scored windows (the same for all models).
 - `cells/<dataset>/<model>/fold0-seed0/`: rows.parquet, summary.json, predictions.npz (S), equations.txt, model/.
 """
@@ -30,7 +32,8 @@ from .regimes import window_features
 from .scoring import measure
 
 PROTOCOL = 1
-"""Version of what a score means. A change that moves a published score raises it; rows of different protocols are never ranked together."""
+"""Version of what a score means. A change that moves a published score raises it; rows of different protocols are never
+ranked together."""
 
 STATUSES = ("ok", "diverged", "failed", "skipped")
 _MOST_ROWS = 10_000_000
@@ -62,7 +65,9 @@ def write_truth(out: Path, dataset: str, fold: int, batch: Batch) -> None:
     """Save what every model of this fold is scored against."""
     path = truth_path(out, dataset, fold)
     if path.parent.is_symlink():
-        raise InputError(f"{path.parent} is a link; accepted: a folder, so that a study writes only below {out}. Remove the link.")
+        raise InputError(
+            f"{path.parent} is a link; accepted: a folder, so that a study writes only below {out}. Remove the link."
+        )
     with in_one_step(path) as part, part.open("wb") as file:
         np.savez_compressed(file, ids=np.array(batch.ids), s0=batch.s0, U=batch.U, truth=batch.truth)
 
@@ -82,9 +87,23 @@ def read_truth(out: Path, dataset: str, fold: int) -> Batch:
     found = _arrays(path, ("ids", "s0", "U", "truth"))
     ids, s0, U, truth = (found[name] for name in ("ids", "s0", "U", "truth"))
     steps = (ids.size, truth.shape[1]) if ids.ndim == 1 and truth.ndim == 3 else (0, 0)
-    shapes = s0.shape == (ids.size, len(STATES)) and truth.shape == (*steps, len(STATES)) and U.shape[:2] == steps and U.ndim == 3
-    if not shapes or 0 in steps or U.shape[2] < len(COMMANDS) or ids.dtype.kind != "U" or any(a.dtype.kind != "f" for a in (s0, U, truth)):
-        raise InputError(f"{path}: ids {ids.shape}, s0 {s0.shape}, U {U.shape}, truth {truth.shape} are no truth of windows. {_WHOLE}")
+    shapes = (
+        s0.shape == (ids.size, len(STATES))
+        and truth.shape == (*steps, len(STATES))
+        and U.shape[:2] == steps
+        and U.ndim == 3
+    )
+    if (
+        not shapes
+        or 0 in steps
+        or U.shape[2] < len(COMMANDS)
+        or ids.dtype.kind != "U"
+        or any(a.dtype.kind != "f" for a in (s0, U, truth))
+    ):
+        raise InputError(
+            f"{path}: ids {ids.shape}, s0 {s0.shape}, U {U.shape}, truth {truth.shape} are no truth of windows. "
+            f"{_WHOLE}"
+        )
     if not all(np.isfinite(a).all() for a in (s0, U, truth)):
         raise InputError(f"{path}: the truth holds values that are not finite. {_WHOLE}")
     return Batch(tuple(ids.tolist()), s0, U, truth)
@@ -101,7 +120,9 @@ def read_predictions(out: Path, cell: Cell) -> np.ndarray | None:
         return None
     S = _arrays(path, ("S",))["S"]
     if S.ndim != 3 or S.shape[2] != len(STATES) or S.dtype.kind != "f":
-        raise InputError(f"{path}: S {S.shape} of {S.dtype} is no prediction; accepted: numbers (batch, K, {len(STATES)}). {_WHOLE}")
+        raise InputError(
+            f"{path}: S {S.shape} of {S.dtype} is no prediction; accepted: numbers (batch, K, {len(STATES)}). {_WHOLE}"
+        )
     return S
 
 
@@ -117,8 +138,11 @@ _CELL_FILES = ("rows.parquet", "summary.json", "predictions.npz", "equations.txt
 """What a study writes into the folder of a cell."""
 
 
-def write_cell(out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, files: Mapping[str, bytes]) -> None:
-    """Write a finished cell in one step (an older one is replaced); `files` are further ones, by relative name (saved model, equations)."""
+def write_cell(
+    out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, files: Mapping[str, bytes]
+) -> None:
+    """Write a finished cell in one step (an older one is replaced); `files` are further ones, by relative name (saved
+    model, equations)."""
     final = out / cell.folder
     old = final.with_name(f".{final.name}.{os.getpid()}.old.tmp")
     with in_one_step(final) as part:
@@ -151,7 +175,8 @@ def read_summary(out: Path, cell: Cell) -> dict[str, Any] | None:
 
 
 def scored_before(out: Path, cell: Cell, key: str) -> str:
-    """The status of a cell that need not be run again ("ok", "diverged"), or "": it is not there, damaged, of another key, failed or skipped."""
+    """The status of a cell that need not be run again ("ok", "diverged"), or "": it is not there, damaged, of another
+    key, failed or skipped."""
     try:
         summary = read_summary(out, cell) or {}
         whole = summary.get("key") == key and summary["files"] == _digests(out / cell.folder)
@@ -176,14 +201,21 @@ def assemble(out: Path, cells: Iterable[Cell]) -> tuple[Frame, list[dict[str, An
 
 
 def window_table(out: Path, summaries: Sequence[dict[str, Any]]) -> Frame:
-    """Motion of the true ship in every scored window of a study, from its saved truth: dataset, fingerprint, fold, run and `window_features`."""
+    """Motion of the true ship in every scored window of a study, from its saved truth: dataset, fingerprint, fold, run
+    and `window_features`."""
     import pandas as pd
 
     frames = []
     for dataset, fold in dict.fromkeys((s["dataset"], s["fold"]) for s in summaries):
         summary = next(s for s in summaries if s["dataset"] == dataset)
         batch = read_truth(out, dataset, fold)
-        identity = {"dataset": dataset, "fingerprint": summary["fingerprint"], "task": summary["task_key"], "fold": fold, "run": list(batch.ids)}
+        identity = {
+            "dataset": dataset,
+            "fingerprint": summary["fingerprint"],
+            "task": summary["task_key"],
+            "fold": fold,
+            "run": list(batch.ids),
+        }
         frames.append(pd.DataFrame(identity | window_features(batch, summary["ship_L"])))
     return pd.concat(frames, ignore_index=True)
 

@@ -1,4 +1,5 @@
-"""Runs a study: for every data set, model, fold and seed fit, roll out, score and save; one failure never stops the others."""
+"""Runs a study: for every data set, model, fold and seed fit, roll out, score and save; one failure never stops the
+others."""
 
 from __future__ import annotations
 
@@ -45,7 +46,8 @@ class Memory:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result of a study: its folder, the rows, the summaries of its cells, and the cells that failed with their reasons."""
+    """Result of a study: its folder, the rows, the summaries of its cells, and the cells that failed with their
+    reasons."""
 
     out: Path
     rows: Frame
@@ -86,7 +88,8 @@ def run_tasks(
     Args:
         tasks: one per data set.
         out: folder of the study; run again, the same tasks replace what they made there.
-        resume: keep the scored cells that the same code, data and task made; failed and skipped ones are tried again. The results of another study
+        resume: keep the scored cells that the same code, data and task made; failed and skipped ones are tried again.
+        The results of another study
             in `out` are replaced only then.
         execution: where the cells run and what each may use; it changes no number (a GPU rounds otherwise than a CPU).
         progress: told of every cell.
@@ -94,7 +97,8 @@ def run_tasks(
         memory: data sets and models that are no files, by the names that the tasks give them.
 
     Raises:
-        InputError: a task, data set, model, folder or executor cannot be used, or `out` holds another study. Nothing has been fitted then.
+        InputError: a task, data set, model, folder or executor cannot be used, or `out` holds another study. Nothing
+        has been fitted then.
         WorkError: the study had to stop (disk full, workers lost). What is finished is kept.
     """
     out, progress, execution = Path(out), progress or Silent(), execution or Execution()
@@ -110,7 +114,9 @@ def run_tasks(
         for study in studies:
             for fold, batch in zip(study.folds, study.batches, strict=True):
                 write_truth(out, study.data.name, fold.index, batch)
-        progress.start(sum(len(part.cells) for part in parts), Counter(_kind(cell) for part in parts for cell in part.cells))
+        progress.start(
+            sum(len(part.cells) for part in parts), Counter(_kind(cell) for part in parts for cell in part.cells)
+        )
         finished: set[Cell] = set()
         try:
             todo = [part for part in parts if not (resume and _kept(part, out, progress, finished))]
@@ -127,8 +133,14 @@ def run_tasks(
                 rows, summaries = assemble(out, [cell for part in parts for cell in part.cells if cell in finished])
                 seconds = round((datetime.now(UTC) - began).total_seconds(), 1)
                 facts = {"machine": machine(), "execution": asdict(execution), "seconds": seconds}
-                write_json(out / "study.json", about | facts | {"tasks": [task.model_dump(mode="json") for task in tasks]})
-    failed = [f"{s['dataset']} {s['model']} fold {s['fold']} seed {s['seed']}: {s['reason']}" for s in summaries if s["status"] == "failed"]
+                write_json(
+                    out / "study.json", about | facts | {"tasks": [task.model_dump(mode="json") for task in tasks]}
+                )
+    failed = [
+        f"{s['dataset']} {s['model']} fold {s['fold']} seed {s['seed']}: {s['reason']}"
+        for s in summaries
+        if s["status"] == "failed"
+    ]
     return Outcome(out, rows, summaries, failed)
 
 
@@ -139,9 +151,13 @@ def check_task(task: Task) -> None:
 
 def _prepare(task: Task, memory: Memory) -> Study:
     specs = [memory.models[text] if text in memory.models else parse_spec(text) for text in task.models]
-    facts = [facts_of(spec) for spec in specs]  # an unknown model or parameter is told before anything is loaded or fitted
+    facts = [
+        facts_of(spec) for spec in specs
+    ]  # an unknown model or parameter is told before anything is loaded or fitted
     data, notes = select_runs(memory.data.get(task.dataset) or load_dataset(task.dataset), task)
-    notes += tuple(note for spec, known in zip(specs, facts, strict=True) for note in check_origin(spec.text, known.origin, data))
+    notes += tuple(
+        note for spec, known in zip(specs, facts, strict=True) for note in check_origin(spec.text, known.origin, data)
+    )
     folds = make_folds(data, task)
     batches = [fold.test.batch(task.history(data.dt)) for fold in folds]
     found = [asdict(c) for c in columns(task.metrics, task.horizon_s, data.dt)]
@@ -154,7 +170,8 @@ def _refuse_elsewhere(studies: Sequence[Study], execution: Execution) -> None:
     if here and (execution.executor != "local" or execution.limits):
         how = f"executor '{execution.executor}'" if execution.executor != "local" else "a limit of time or memory"
         raise InputError(
-            f"model '{here[0]}' is an object in memory and runs in this process only; {how} needs a class that can be imported. "
+            f"model '{here[0]}' is an object in memory and runs in this process only; {how} needs a class that can "
+            "be imported. "
             "Save it in a file and give 'my_model.py:MyNet'."
         )
 
@@ -162,7 +179,9 @@ def _refuse_elsewhere(studies: Sequence[Study], execution: Execution) -> None:
 def _refuse_same_names(names: list[str]) -> None:
     twice = sorted({n for n in names if names.count(n) > 1})
     if twice:
-        raise InputError(f"two data sets of this study are named '{twice[0]}'; rename one in its dataset.toml, or run them apart.")
+        raise InputError(
+            f"two data sets of this study are named '{twice[0]}'; rename one in its dataset.toml, or run them apart."
+        )
 
 
 def _kept(part: Part, out: Path, progress: Progress, finished: set[Cell]) -> bool:
@@ -181,11 +200,17 @@ def _kind(cell: Cell) -> str:
     return f"{cell.dataset} {cell.model}"
 
 
-def _answers(parts: Sequence[Part], workers: Workers, progress: Progress, how: Execution) -> Iterator[tuple[Part, list[Answer]]]:
+def _answers(
+    parts: Sequence[Part], workers: Workers, progress: Progress, how: Execution
+) -> Iterator[tuple[Part, list[Answer]]]:
     """Each part with the answers for its cells, as they come."""
     if workers.room is None and parts:
         progress.working(f"{len(parts)} jobs sent to {workers.about}")
-    waiting, running, patience = deque(parts), dict[Future[list[Answer]], Part](), Patience(workers, progress, how.wait_s)
+    waiting, running, patience = (
+        deque(parts),
+        dict[Future[list[Answer]], Part](),
+        Patience(workers, progress, how.wait_s),
+    )
     while waiting or running:
         while waiting and (workers.room is None or len(running) < workers.room):
             part = waiting.popleft()
@@ -199,12 +224,19 @@ def _answers(parts: Sequence[Part], workers: Workers, progress: Progress, how: E
 
 
 def _identity(part: Part, key: str, answer: Answer) -> dict[str, Any]:
-    """The cell's key and the digests of the user's code behind it; no key where the model loaded code or read files that the key does not cover."""
-    identity: dict[str, Any] = {"key": key, "model_code": {name: digest[:16] for name, digest in digests(part.facts.files).items()}}
+    """The cell's key and the digests of the user's code behind it; no key where the model loaded code or read files
+    that the key does not cover."""
+    identity: dict[str, Any] = {
+        "key": key,
+        "model_code": {name: digest[:16] for name, digest in digests(part.facts.files).items()},
+    }
     if part.spec.given is not None:
         return identity | {"key": "", "key_note": "the model was an object in memory; --resume runs this cell again"}
     if unknown := part.uncovered(answer):
-        more = f"the model loaded or read {', '.join(unknown[:3])} while it ran; --resume cannot tell whether that changes, and runs this cell again"
+        more = (
+            f"the model loaded or read {', '.join(unknown[:3])} while it ran; --resume cannot tell whether that "
+            "changes, and runs this cell again"
+        )
         identity |= {"key": "", "key_note": more}
     return identity
 
@@ -234,7 +266,14 @@ def _score(study: Study, spec: Spec, cell: Cell, answer: Answer) -> _Record:
     return _Record(rows, _summary(study, spec, cell, answer, times) | outcome)
 
 
-def _rows(study: Study, cell: Cell, statuses: list[str], reasons: list[str], values: dict[str, np.ndarray], times: dict[str, float]) -> Frame:
+def _rows(
+    study: Study,
+    cell: Cell,
+    statuses: list[str],
+    reasons: list[str],
+    values: dict[str, np.ndarray],
+    times: dict[str, float],
+) -> Frame:
     import pandas as pd
 
     runs = study.folds[cell.fold].test.runs
@@ -260,12 +299,15 @@ def _summary(study: Study, spec: Spec, cell: Cell, answer: Answer, times: dict[s
     """What alone identifies the cell's experiment."""
     data, fold = study.data, study.folds[cell.fold]
     return {
-        "protocol": PROTOCOL, "dataset": data.name, "fingerprint": data.fingerprint, "task_key": study.task.key(data.fingerprint),
+        "protocol": PROTOCOL, "dataset": data.name, "fingerprint": data.fingerprint,
+        "task_key": study.task.key(data.fingerprint),
         "task": study.task.model_dump(mode="json"), "model": cell.model, "name": spec.name,
         "params": spec.params if answer.params is None else answer.params,
         "parameters": answer.parameters,
-        "fold": cell.fold, "seed": cell.seed, "ship": data.ship.name, "ship_L": data.ship.L, "ship_B": data.ship.B, "dt": data.dt,
-        "inputs": list(data.inputs), "columns": study.columns, "notes": list(study.notes), "source": data.source, "licence": data.licence,
+        "fold": cell.fold, "seed": cell.seed, "ship": data.ship.name, "ship_L": data.ship.L, "ship_B": data.ship.B,
+        "dt": data.dt,
+        "inputs": list(data.inputs), "columns": study.columns, "notes": list(study.notes), "source": data.source,
+        "licence": data.licence,
         "runs": {side: [r.id for r in part.runs] if part else [] for side, part in
                  (("train", fold.train), ("valid", fold.valid), ("test", fold.test))},
         "finished": datetime.now(UTC).isoformat(timespec="seconds"), **times,

@@ -18,7 +18,11 @@ DIVERGED_DISTANCE = 1e5
 
 def horizons(horizon_s: float, dt: float) -> dict[str, int]:
     """Column name -> index of the knot, for those of `HORIZONS_S` that the task reaches and the sampling hits."""
-    return {f"ed_at_{h:g}s": round(h / dt) - 1 for h in HORIZONS_S if h <= horizon_s + 1e-9 and abs(round(h / dt) * dt - h) < 1e-3 * dt}
+    return {
+        f"ed_at_{h:g}s": round(h / dt) - 1
+        for h in HORIZONS_S
+        if h <= horizon_s + 1e-9 and abs(round(h / dt) * dt - h) < 1e-3 * dt
+    }
 
 
 def columns(metrics: Sequence[str], horizon_s: float, dt: float) -> list[Column]:
@@ -48,7 +52,9 @@ def divergence(truth: np.ndarray, S: np.ndarray, dt: float) -> list[str]:
     return reasons
 
 
-def measure(metrics: Sequence[str], batch: Batch, S: np.ndarray, *, L: float, dt: float, ok: np.ndarray) -> dict[str, np.ndarray]:
+def measure(
+    metrics: Sequence[str], batch: Batch, S: np.ndarray, *, L: float, dt: float, ok: np.ndarray
+) -> dict[str, np.ndarray]:
     """Every column (batch,); NaN for the runs that are not `ok` (batch,), which must not be scored."""
     steps = S.shape[1]
     values: dict[str, np.ndarray] = {}

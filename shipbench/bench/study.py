@@ -1,4 +1,5 @@
-"""What a study has to do: its cells, in parts that run together, each cell under the key by which `--resume` knows it."""
+"""What a study has to do: its cells, in parts that run together, each cell under the key by which `--resume` knows
+it."""
 
 from __future__ import annotations
 
@@ -38,7 +39,13 @@ class Study:
         """What models may see of each fold; a window that several folds train on is kept once."""
         kept: dict[str, Run] = {}
         return [
-            FoldData(_column_by_column(f.train, kept), _column_by_column(f.valid, kept) if f.valid else None, b.s0, b.U, b.history)
+            FoldData(
+                _column_by_column(f.train, kept),
+                _column_by_column(f.valid, kept) if f.valid else None,
+                b.s0,
+                b.U,
+                b.history,
+            )
             for f, b in zip(self.folds, self.batches, strict=True)
         ]
 
@@ -48,7 +55,8 @@ class Study:
         return [METRICS.digest(name) for name in self.task.metrics]
 
     def parts(self) -> list[Part]:
-        """All cells: the folds of a model and seed as one part where its class fits them together, else each cell as its own."""
+        """All cells: the folds of a model and seed as one part where its class fits them together, else each cell as
+        its own."""
         parts = []
         for spec, facts in zip(self.specs, self.facts, strict=True):
             seeds = spec.seeds or list(self.task.seeds)
@@ -56,7 +64,10 @@ class Study:
                 seeds = seeds[:1]
             for seed in seeds:
                 cells = [Cell(self.data.name, spec.text, fold.index, seed) for fold in self.folds]
-                parts += [Part(self, spec, group, facts) for group in ([cells] if facts.together else [[cell] for cell in cells])]
+                parts += [
+                    Part(self, spec, group, facts)
+                    for group in ([cells] if facts.together else [[cell] for cell in cells])
+                ]
         return parts
 
 
@@ -73,17 +84,25 @@ class Part:
     def label(self) -> str:
         """For messages."""
         first = self.cells[0]
-        return first.label if len(self.cells) == 1 else f"{first.dataset} {first.model} seed {first.seed}: {len(self.cells)} fits together"
+        return (
+            first.label
+            if len(self.cells) == 1
+            else f"{first.dataset} {first.model} seed {first.seed}: {len(self.cells)} fits together"
+        )
 
     @cached_property
     def keys(self) -> list[str]:
-        """For each cell the digest of everything that decides its content; `--resume` keeps a cell only where it agrees."""
+        """For each cell the digest of everything that decides its content; `--resume` keeps a cell only where it
+        agrees."""
         task, data = self.study.task, self.study.data
         files, facts = digests(self.facts.files), self.facts
         keys = []
         for cell in self.cells:
             fold = self.study.folds[cell.fold]
-            runs = [[(run.id, run.meta) for run in side.runs] if side else [] for side in (fold.train, fold.valid, fold.test)]
+            runs = [
+                [(run.id, run.meta) for run in side.runs] if side else []
+                for side in (fold.train, fold.valid, fold.test)
+            ]
             parts = [
                 PROTOCOL, task.key(data.fingerprint), task.metrics, runs, cell.model, cell.fold, cell.seed, files,
                 facts.plugins, facts.code, self.study.metric_plugins,
@@ -99,10 +118,13 @@ class Part:
     def job(self, send_files: bool, device: str | None) -> Job:
         """What a worker is given beside `fold_data`."""
         facts = self.facts
-        return Job(self.spec, self.cells[0].seed, facts.code, facts.files if send_files else None, device, facts.foreign)
+        return Job(
+            self.spec, self.cells[0].seed, facts.code, facts.files if send_files else None, device, facts.foreign
+        )
 
     def uncovered(self, answer: Answer) -> list[str]:
-        """Code that the model loaded, and files that it read, while it was fitted or asked, and that the keys do not cover.
+        """Code that the model loaded, and files that it read, while it was fitted or asked, and that the keys do not
+        cover.
 
         Raises:
             WorkError: a file of its code is no longer the one that the keys were made of.
@@ -111,14 +133,16 @@ class Part:
         changed = [name for name, digest in answer.code.items() if known.get(name, digest) != digest]
         if changed:
             raise WorkError(
-                f"{changed[0]} of {self.spec.path} was changed while the study ran, so that cells of two versions would stand side by side. "
+                f"{changed[0]} of {self.spec.path} was changed while the study ran, so that cells of two versions "
+                "would stand side by side. "
                 "What was finished before is kept; run the same command again with --resume."
             )
         return sorted(set(answer.code) - set(known))
 
 
 def _column_by_column(data: Dataset, kept: dict[str, Run]) -> Dataset:
-    """Samples in the memory layout of data read from files, which copies keep: sums over another layout round differently.
+    """Samples in the memory layout of data read from files, which copies keep: sums over another layout round
+    differently.
 
     `kept` holds, by name, the windows that were converted before; their names are unique in a study.
     """

@@ -1,4 +1,5 @@
-"""What a result folder must be before it is ranked beside others: types and values (see `entry`), and rows and summaries that belong together."""
+"""What a result folder must be before it is ranked beside others: types and values (see `entry`), and rows and
+summaries that belong together."""
 
 from __future__ import annotations
 
@@ -13,7 +14,17 @@ from ..errors import InputError
 from ..names import brief, shown
 from ..regular_files import read_json
 from ..storage import Frame, write_json, write_rows
-from .entry import TEXTS, TIMES, WHOLE, check_columns, check_entry, check_labels, check_scores, check_task_of, check_windows
+from .entry import (
+    TEXTS,
+    TIMES,
+    WHOLE,
+    check_columns,
+    check_entry,
+    check_labels,
+    check_scores,
+    check_task_of,
+    check_windows,
+)
 from .results import PROTOCOL, Cell, read_frame, truth_path, window_table
 from .task import make_task
 
@@ -24,10 +35,12 @@ _GIVE = "Give the folder as `shipbench run` wrote it."
 
 
 def check_submission(folder: Path, rows: Frame, summaries: Any) -> Frame:
-    """Refuse rows and summaries that contradict themselves or cannot be ranked here; the rows without columns that no entry speaks of.
+    """Refuse rows and summaries that contradict themselves or cannot be ranked here; the rows without columns that no
+    entry speaks of.
 
     Raises:
-        InputError: a column or key is missing or of another type, a row stands twice, the protocol or the task is not known here, rows and summaries
+        InputError: a column or key is missing or of another type, a row stands twice, the protocol or the task is not
+        known here, rows and summaries
             do not belong together, a status is unknown, or a score is none.
     """
 
@@ -41,7 +54,8 @@ def check_submission(folder: Path, rows: Frame, summaries: Any) -> Frame:
         if isinstance(summary, dict) and isinstance(summary.get("protocol"), int) and summary["protocol"] != PROTOCOL:
             label = " ".join(shown(summary.get(key))[:80] for key in ("dataset", "model"))
             raise refuse(
-                f"{label} is of protocol {summary['protocol']}, this version ranks protocol {PROTOCOL}", "Run the models again with this version."
+                f"{label} is of protocol {summary['protocol']}, this version ranks protocol {PROTOCOL}",
+                "Run the models again with this version.",
             )
         check_entry(summary, refuse)
         _check_task(summary, keys, refuse)
@@ -55,7 +69,8 @@ def check_submission(folder: Path, rows: Frame, summaries: Any) -> Frame:
     if len(twice):
         first = twice.iloc[0]
         raise refuse(
-            f"the row of {first['model']} on {first['dataset']}, fold {first['fold']}, seed {first['seed']}, run {first['run']} stands twice"
+            f"the row of {first['model']} on {first['dataset']}, fold {first['fold']}, seed {first['seed']}, run "
+            f"{first['run']} stands twice"
         )
     cells = _cells(rows, summaries, refuse)
     check_scores(rows, dict.fromkeys(name for s in summaries for name in s["task"]["metrics"]), scores, refuse)
@@ -72,9 +87,14 @@ def _check_task(summary: dict[str, Any], keys: dict[str, str], refuse: Any) -> N
         if first:
             keys[text] = make_task(summary["task"]).key(summary["fingerprint"])
     except InputError as error:
-        raise refuse(f"{label}: this version does not know the task ({error})", "Update shipbench, or run the models again.") from None
+        raise refuse(
+            f"{label}: this version does not know the task ({error})", "Update shipbench, or run the models again."
+        ) from None
     if keys[text] != summary["task_key"]:
-        raise refuse(f"{label}: unknown task '{shown(summary['task_key'])[:40]}'; the task that is written beside it has the key '{keys[text]}'")
+        raise refuse(
+            f"{label}: unknown task '{shown(summary['task_key'])[:40]}'; the task that is written beside it has the "
+            f"key '{keys[text]}'"
+        )
     if first:
         check_task_of(summary, refuse)
 
@@ -96,9 +116,14 @@ def _cells(rows: Frame, summaries: Sequence[dict[str, Any]], refuse: Any) -> lis
         for column, name in (("protocol", "protocol"), ("fingerprint", "fingerprint"), ("task", "task_key")):
             different = set(part[column]) - {summary[name]}
             if different:
-                raise refuse(f"{label}: {column} is {shown(sorted(different)[0])} in the rows and {shown(summary[name])} in summary.json")
+                raise refuse(
+                    f"{label}: {column} is {shown(sorted(different)[0])} in the rows and {shown(summary[name])} in "
+                    "summary.json"
+                )
         if sorted(part["run"]) != sorted(test):
-            raise refuse(f"{label}: the runs of the rows are not the scored runs of summary.json ({len(part)} and {len(test)})")
+            raise refuse(
+                f"{label}: the runs of the rows are not the scored runs of summary.json ({len(part)} and {len(test)})"
+            )
         found.append((summary, part.set_index("run").loc[test]))
     return found
 
@@ -122,7 +147,8 @@ def _check_cell(summary: dict[str, Any], part: Frame, scores: Iterable[str], ref
 
 
 def check_together(rows: Frame, summaries: Sequence[dict[str, Any]], sources: Sequence[Path]) -> None:
-    """Refuse studies that say different things of the same data: of the ship, of the runs of a fold, or of where a window was cut from.
+    """Refuse studies that say different things of the same data: of the ship, of the runs of a fold, or of where a
+    window was cut from.
 
     Raises:
         InputError: see above, or the same cell stands twice.
@@ -134,7 +160,8 @@ def check_together(rows: Frame, summaries: Sequence[dict[str, Any]], sources: Se
         cell = (*data, summary["model"], summary["fold"], summary["seed"])
         if cell in seen:
             raise InputError(
-                f"'{summary['model']}' on '{summary['dataset']}', fold {summary['fold']}, seed {summary['seed']} stands in {seen[cell]} "
+                f"'{summary['model']}' on '{summary['dataset']}', fold {summary['fold']}, seed {summary['seed']} "
+                f"stands in {seen[cell]} "
                 f"and in {source}; leave one of them out."
             )
         seen[cell] = source
@@ -148,7 +175,8 @@ def check_together(rows: Frame, summaries: Sequence[dict[str, Any]], sources: Se
         if len(twice):
             first = twice.iloc[0]
             raise InputError(
-                f"{', '.join(map(str, dict.fromkeys(sources)))}: rows of run {first['run']} of '{first['dataset']}', fold {first['fold']}, "
+                f"{', '.join(map(str, dict.fromkeys(sources)))}: rows of run {first['run']} of "
+                f"'{first['dataset']}', fold {first['fold']}, "
                 f"differ in {name}. {_GIVE}"
             )
 
@@ -157,7 +185,8 @@ def _agree(facts: dict[tuple[Any, ...], tuple[Any, Path]], key: tuple[Any, ...],
     other, where = facts.setdefault(key, (value, source))
     if other != value:
         raise InputError(
-            f"{source}: {key[2]} of '{key[0]}' is {shown(value)[:60]}; another entry, of {where}, says {shown(other)[:60]} for the same data. {_GIVE}"
+            f"{source}: {key[2]} of '{key[0]}' is {shown(value)[:60]}; another entry, of {where}, says "
+            f"{shown(other)[:60]} for the same data. {_GIVE}"
         )
 
 
@@ -172,12 +201,17 @@ def check_windows_of(folder: Path, windows: Frame, summaries: Sequence[dict[str,
         return InputError(f"{folder}: windows.parquet {what}. {_GIVE}")
 
     check_windows(windows, refuse)
-    scored = {(s["dataset"], s["fingerprint"], s["task_key"], s["fold"], run) for s in summaries for run in s["runs"]["test"]}
+    scored = {
+        (s["dataset"], s["fingerprint"], s["task_key"], s["fold"], run) for s in summaries for run in s["runs"]["test"]
+    }
     there = list(zip(*(windows[name] for name in _WINDOW), strict=True))
     if len(set(there)) < len(there):
         raise refuse("holds a window twice")
     if others := [key for key in there if key not in scored]:
-        raise refuse(f"holds a window that was not scored: run {shown(others[0][-1])[:80]} of '{shown(others[0][0])[:80]}', fold {others[0][3]}")
+        raise refuse(
+            f"holds a window that was not scored: run {shown(others[0][-1])[:80]} of '{shown(others[0][0])[:80]}', "
+            f"fold {others[0][3]}"
+        )
 
 
 @dataclass(frozen=True)
@@ -190,14 +224,19 @@ class Results:
 
     def __repr__(self) -> str:
         models, sets = ({s[key]: None for s in self.summaries} for key in ("model", "dataset"))
-        return brief(f"<Results: {len(self.rows)} rows, {len(self.summaries)} fits of {', '.join(models)} on {', '.join(sets)}>")
+        return brief(
+            f"<Results: {len(self.rows)} rows, {len(self.summaries)} fits of {', '.join(models)} on {', '.join(sets)}>"
+        )
 
     @cached_property
     def windows(self) -> Frame | None:
         """Motion of the true ship in every scored window, from all folders that hold it; None where none does."""
         import pandas as pd
 
-        folders = {source: [s for s, at in zip(self.summaries, self.sources, strict=True) if at == source] for source in dict.fromkeys(self.sources)}
+        folders = {
+            source: [s for s, at in zip(self.summaries, self.sources, strict=True) if at == source]
+            for source in dict.fromkeys(self.sources)
+        }
         found = [frame for folder, own in folders.items() if (frame := _read_windows(folder, own)) is not None]
         keys = ["dataset", "fingerprint", "task", "fold", "run"]
         return pd.concat(found, ignore_index=True).drop_duplicates(keys, ignore_index=True) if found else None
@@ -207,7 +246,8 @@ def read_results(folders: str | Path | Sequence[str | Path]) -> Results:
     """Read one or several result folders of `shipbench run`.
 
     Raises:
-        InputError: a folder holds no results, they contradict themselves or one another (see `submissions`), or the same cell stands in two of
+        InputError: a folder holds no results, they contradict themselves or one another (see `submissions`), or the
+        same cell stands in two of
             them.
     """
     import pandas as pd
@@ -216,7 +256,10 @@ def read_results(folders: str | Path | Sequence[str | Path]) -> Results:
     folders = [folders] if isinstance(folders, str | Path) else folders
     for folder in map(Path, folders):
         if missing := [name for name in ("rows.parquet", "summary.json") if not (folder / name).exists()]:
-            raise InputError(f"{folder} holds no results: it has no {' and no '.join(missing)}. Give a folder that `shipbench run --out` wrote.")
+            raise InputError(
+                f"{folder} holds no results: it has no {' and no '.join(missing)}. Give a folder that `shipbench "
+                "run --out` wrote."
+            )
         try:
             rows, found = read_frame(folder / "rows.parquet"), read_json(folder / "summary.json")
         except InputError as error:
@@ -225,7 +268,9 @@ def read_results(folders: str | Path | Sequence[str | Path]) -> Results:
         summaries += found
         sources += [folder] * len(found)
     if not summaries:
-        raise InputError(f"no finished cell in {', '.join(map(str, folders))}; run `shipbench run` (again, with --resume) first.")
+        raise InputError(
+            f"no finished cell in {', '.join(map(str, folders))}; run `shipbench run` (again, with --resume) first."
+        )
     rows = pd.concat(frames, ignore_index=True)
     check_together(rows, summaries, sources)
     return Results(rows, summaries, sources)
@@ -244,7 +289,8 @@ def check_target(results: Results, folder: Path) -> None:
 
 
 def write_submission(results: Results, folder: Path) -> None:
-    """Write `rows.parquet`, `summary.json` and, where the windows are known, `windows.parquet`: all that a leaderboard is rendered from.
+    """Write `rows.parquet`, `summary.json` and, where the windows are known, `windows.parquet`: all that a leaderboard
+    is rendered from.
 
     Raises:
         InputError: the folder cannot be written.
@@ -255,7 +301,9 @@ def write_submission(results: Results, folder: Path) -> None:
         write_rows(folder / "rows.parquet", results.rows)
         write_json(folder / "summary.json", results.summaries)
     except OSError as error:
-        raise InputError(f"cannot write to {folder}: {error.strerror}. Give a folder that can be written with --submission.") from None
+        raise InputError(
+            f"cannot write to {folder}: {error.strerror}. Give a folder that can be written with --submission."
+        ) from None
 
 
 def _read_windows(folder: Path, summaries: list[dict[str, Any]]) -> Frame | None:

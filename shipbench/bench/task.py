@@ -14,7 +14,16 @@ from ..metrics.base import METRICS
 from ..names import LONGEST_LABEL, brief, check_label
 from ..toml_files import Number, Whole, fault, read_toml
 
-DEFAULT_METRICS = ("ed", "edh", "cvdm", "final_displacement", "heading_error", "position_rmse", "signal_rmse", "trial_indices")
+DEFAULT_METRICS = (
+    "ed",
+    "edh",
+    "cvdm",
+    "final_displacement",
+    "heading_error",
+    "position_rmse",
+    "signal_rmse",
+    "trial_indices",
+)
 _Seed = Annotated[Whole, Field(ge=0, lt=2**32)]
 _NOT_IDENTITY = {"models", "metrics", "seeds", "title"}
 
@@ -22,11 +31,12 @@ _NOT_IDENTITY = {"models", "metrics", "seeds", "title"}
 class Task(BaseModel):
     """One data set, the split, the horizon, and the models and metrics to run. Times in s.
 
-    `history_s`: recorded time before s0 that every predictor may use. `split`: "folds" (by run, seeded by `fold_seed`), "published"
-    (the data set's own `split` of each run), "kind" (each fold scores one kind of manoeuvre and trains on all others) or "speed" (trains on the
-    slower runs and scores the fastest 1/`folds` of them). `stride_s`: distance of the scored windows in runs longer than the horizon (default: they
-    do not overlap). `valid_runs`: training runs set aside for early stopping (default: one ninth, 8 of 72). `train_runs`: use only that many
-    runs for fitting and early stopping together, the same scored runs (`valid_runs` shrinks in proportion, to one at least). `max_runs`: use only
+    `history_s`: recorded time before s0 that every predictor may use. `split`: "folds" (by run, seeded by `fold_seed`),
+    "published" (the data set's own `split` of each run), "kind" (each fold scores one kind of manoeuvre and trains on
+    all others) or "speed" (trains on the slower runs and scores the fastest 1/`folds` of them). `stride_s`: distance of
+    the scored windows in runs longer than the horizon (default: they do not overlap). `valid_runs`: training runs set
+    aside for early stopping (default: one ninth, 8 of 72). `train_runs`: use only that many runs for fitting and early
+    stopping together, the same scored runs (`valid_runs` shrinks in proportion, to one at least). `max_runs`: use only
     that many runs, evenly spread over the data set.
     """
 
@@ -103,10 +113,13 @@ class Task(BaseModel):
 
 
 def samples(seconds: float, dt: float, name: str) -> int:
-    """Number of samples of a time [s]; raises InputError where it is no whole number of them. `name` is that of the setting."""
+    """Number of samples of a time [s]; raises InputError where it is no whole number of them. `name` is that of the
+    setting."""
     count = round(min(seconds / dt, 1e18))  # the quotient of a huge number may be infinite
     if count < 1 or abs(count * dt - seconds) > 1e-3 * dt:
-        raise InputError(f"{name} = {seconds:g} s is not a whole number of samples of {dt:g} s; give a multiple of {dt:g} s.")
+        raise InputError(
+            f"{name} = {seconds:g} s is not a whole number of samples of {dt:g} s; give a multiple of {dt:g} s."
+        )
     return count
 
 
@@ -150,7 +163,8 @@ def read_config(path: str | Path) -> dict[str, Any]:
 def load_tasks(config: str | Path | None = None, overrides: dict[str, Any] | None = None) -> list[Task]:
     """The tasks of a config, one per data set; entries of `overrides` that are not None replace those of the file.
 
-    A config names one `dataset` or several `datasets`; all other keys are those of `Task`. Without either, harbour90 is meant.
+    A config names one `dataset` or several `datasets`; all other keys are those of `Task`. Without either, harbour90 is
+    meant.
 
     Raises:
         InputError: as `read_config` and `make_task`.

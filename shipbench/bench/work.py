@@ -1,8 +1,10 @@
-"""What a worker does: fit the cells of one job and predict. It scores nothing and writes no result; no truth reaches it.
+"""What a worker does: fit the cells of one job and predict. It scores nothing and writes no result; no truth reaches
+it.
 
-A job holds the cells that are fitted together: all folds of one model, data set and seed where the model's class offers `fit_group`, else one
-cell. Stacked training rounds differently with other members beside it, so a job is the unit that is sent, killed and resumed: its numbers then do
-not depend on where and in which order jobs run.
+A job holds the cells that are fitted together: all folds of one model, data set and seed where the model's class offers
+`fit_group`, else one
+cell. Stacked training rounds differently with other members beside it, so a job is the unit that is sent, killed and
+resumed: its numbers then do not depend on where and in which order jobs run.
 """
 
 from __future__ import annotations
@@ -31,12 +33,14 @@ from .cost import count_parameters
 from .provenance import machine
 
 _RAISED = BaseException
-"""What a model may raise, and only its own rows say so (after `_let_stop_through`): also asyncio's CancelledError and an exit."""
+"""What a model may raise, and only its own rows say so (after `_let_stop_through`): also asyncio's CancelledError and
+an exit."""
 
 
 @dataclass(frozen=True, eq=False)
 class FoldData:
-    """What a model may see of a fold: windows for fitting and for early stopping, and start, inputs and history of the scored windows."""
+    """What a model may see of a fold: windows for fitting and for early stopping, and start, inputs and history of the
+    scored windows."""
 
     train: Dataset
     valid: Dataset | None
@@ -49,9 +53,9 @@ class FoldData:
 class Job:
     """A model and a seed, to be fitted on one or several folds.
 
-    `code`: digests of the packages that it takes (`package_digest`). `files`: content by relative name of the user's code or saved
-    folder, where the worker may not have it; None: it is read in place. `device`: where it computes, unless its spec says. `foreign`: it runs code
-    that is not shipbench's, so that it needs a process of its own.
+    `code`: digests of the packages that it takes (`package_digest`). `files`: content by relative name of the user's
+    code or saved folder, where the worker may not have it; None: it is read in place. `device`: where it computes,
+    unless its spec says. `foreign`: it runs code that is not shipbench's, so that it needs a process of its own.
     """
 
     spec: Spec
@@ -76,7 +80,8 @@ class Answer:
         files: saved model and fitted equations, content by relative name.
         notes: why the model could not be saved or described, and how it follows its own training runs (`fit_report`).
         machine: where it was computed.
-        code: digests by relative name of the user's code that was loaded in the end, and of the files that the model read; empty for other
+        code: digests by relative name of the user's code that was loaded in the end, and of the files that the model
+        read; empty for other
             models.
     """
 
@@ -100,7 +105,10 @@ def work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
         with _at_hand(job) as spec:
             if spec.path is None or spec.class_name is None:
                 return _work(replace(job, spec=spec), folds)
-            with on_import_path(spec.path), files_read(spec.path.parent.absolute(), Path.cwd()) as read:  # a model may import as late as in `predict`
+            with (
+                on_import_path(spec.path),
+                files_read(spec.path.parent.absolute(), Path.cwd()) as read,
+            ):  # a model may import as late as in `predict`
                 answers = _work(replace(job, spec=spec), folds)
             code = {name: file_digest(file) for name, file in read.items()} | digests(code_of(spec.path))
             return [replace(answer, code=code) for answer in answers]
@@ -121,7 +129,8 @@ def file_digest(file: Path) -> str:
 
 
 def _let_stop_through(error: BaseException) -> None:
-    """Raise KeyboardInterrupt where that is behind the exception: Lightning makes a SystemExit of it, which would count as a failed model."""
+    """Raise KeyboardInterrupt where that is behind the exception: Lightning makes a SystemExit of it, which would count
+    as a failed model."""
     behind: BaseException | None = error
     while behind is not None:
         if isinstance(behind, KeyboardInterrupt):
@@ -178,7 +187,8 @@ class _Fit:
 
 
 def _fit(job: Job, folds: Sequence[FoldData]) -> list[_Fit]:
-    """The fitted models of the folds: together where the class can, else one by one; one model's failure stays its own."""
+    """The fitted models of the folds: together where the class can, else one by one; one model's failure stays its
+    own."""
     spec, seed = job.spec, job.seed
     models = [make_predictor(spec, job.device) for _ in folds]
     if spec.path is not None and spec.class_name is None:
@@ -211,7 +221,11 @@ def _predicted(fit: _Fit, fold: FoldData) -> Answer:
     try:
         S = _predict(fit.model, fold)
         predict_s = (time.perf_counter() - began) / len(S)
-        params = json.loads(json.dumps(asdict(fit.model), default=str)) if is_dataclass(fit.model) and not isinstance(fit.model, type) else None
+        params = (
+            json.loads(json.dumps(asdict(fit.model), default=str))
+            if is_dataclass(fit.model) and not isinstance(fit.model, type)
+            else None
+        )
     except _RAISED as error:
         _let_stop_through(error)
         return Answer("failed", f"predict: {one_line(error)}", fit_s=fit.seconds, shared_by=fit.shared_by)
@@ -222,7 +236,8 @@ def _predicted(fit: _Fit, fold: FoldData) -> Answer:
 
 
 def _predict(model: Any, fold: FoldData) -> np.ndarray:
-    """The model's prediction of copies of what it may see: writing into them, or looking behind them, never reaches the truth."""
+    """The model's prediction of copies of what it may see: writing into them, or looking behind them, never reaches the
+    truth."""
     history = None if fold.history is None else (fold.history[0].copy(), fold.history[1].copy())
     S = np.array(model.predict(fold.s0.copy(), fold.U.copy(), history), dtype=float)
     expected = (*fold.U.shape[:2], fold.s0.shape[1])
@@ -232,14 +247,17 @@ def _predict(model: Any, fold: FoldData) -> np.ndarray:
 
 
 def _kept(model: Any) -> tuple[dict[str, bytes], dict[str, Any]]:
-    """The saved model and its equations as files, and a note where a foreign model fails to save or to describe itself."""
+    """The saved model and its equations as files, and a note where a foreign model fails to save or to describe
+    itself."""
     files: dict[str, bytes] = {}
     notes: dict[str, Any] = {}
     if callable(getattr(model, "save", None)):
         try:
             with tempfile.TemporaryDirectory(prefix="shipbench-") as folder:
                 model.save(Path(folder, "model"))
-                own = (p for p in sorted(Path(folder).rglob("*")) if p.is_file() and not p.is_symlink())  # a link may lead anywhere
+                own = (
+                    p for p in sorted(Path(folder).rglob("*")) if p.is_file() and not p.is_symlink()
+                )  # a link may lead anywhere
                 files = {p.relative_to(folder).as_posix(): p.read_bytes() for p in own}
         except _RAISED as error:  # its predictions are good all the same
             notes["save_failed"] = one_line(error)

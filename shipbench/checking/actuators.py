@@ -1,4 +1,5 @@
-"""Actuators that are said to be measured but are commands: they jump through their range inside one sample, or repeat their command exactly."""
+"""Actuators that are said to be measured but are commands: they jump through their range inside one sample, or repeat
+their command exactly."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ _NAMES = ("n", "delta", "F_b", "F_s")
 def check(recording: Recording) -> list[Finding]:
     """One finding for all actuators that look like commands; none where the data set says that they are.
 
-    Every rudder has a gear that takes its time, so its jumps alone are a sign; those of shafts and thrusters are so only beside such a rudder.
+    Every rudder has a gear that takes its time, so its jumps alone are a sign; those of shafts and thrusters are so
+    only beside such a rudder.
     """
     if recording.dataset.actuators != "measured":
         return []
@@ -30,16 +32,24 @@ def check(recording: Recording) -> list[Finding]:
             exact[name] = f"{name} equals its command at {share:.1%} of {changes} changes"
         jumps, greatest = _sudden(recording, N + i)
         if jumps >= THRESHOLDS.count("occurrences"):
-            sudden[name] = f"{name} changes {jumps} times within one sample of {recording.dt:g} s, by up to {greatest:.4g} {_unit(name)}"
+            sudden[name] = (
+                f"{name} changes {jumps} times within one sample of {recording.dt:g} s, by up to {greatest:.4g} "
+                f"{_unit(name)}"
+            )
         figures |= {f"{name}_exact": share, f"{name}_jumps": jumps, f"{name}_greatest": greatest}
-    if "delta" not in sudden and "n" in sudden and figures.get("delta_jumps") and _held(recording) > 0.5:  # few leaps, beside those of the shaft
-        sudden["delta"] = f"delta changes within one sample of {recording.dt:g} s by {figures['delta_greatest']:.4g} rad"
+    if (
+        "delta" not in sudden and "n" in sudden and figures.get("delta_jumps") and _held(recording) > 0.5
+    ):  # few leaps, beside those of the shaft
+        sudden["delta"] = (
+            f"delta changes within one sample of {recording.dt:g} s by {figures['delta_greatest']:.4g} rad"
+        )
     said = exact | ({k: v for k, v in sudden.items() if k not in exact} if "delta" in sudden else {})
     if not said:
         return []
     suspect = [name for name in _NAMES if name in said]
     text = (
-        f"{', '.join(suspect)} behave{'s' * (len(suspect) == 1)} like commands, not like measured positions: {'; '.join(said[k] for k in suspect)}."
+        f"{', '.join(suspect)} behave{'s' * (len(suspect) == 1)} like commands, not like measured positions: "
+        f"{'; '.join(said[k] for k in suspect)}."
     )
     channel = N + _NAMES.index(suspect[-1])
     run = max(recording.runs, key=lambda r: float(np.max(np.abs(np.diff(r.states[:, channel])))))
@@ -49,7 +59,15 @@ def check(recording: Recording) -> list[Finding]:
     picture = Picture(f"{suspect[-1]} in run {recording.name_of(run)}", "time [s]", labelled(suspect[-1]), curves)
     return [
         Finding(
-            "actuators", "warning", "commands", text, toml_line({"actuators": "commanded"}), "", tuple(suspect), evidence=figures, picture=picture
+            "actuators",
+            "warning",
+            "commands",
+            text,
+            toml_line({"actuators": "commanded"}),
+            "",
+            tuple(suspect),
+            evidence=figures,
+            picture=picture,
         )
     ]
 
@@ -64,7 +82,8 @@ def _unit(name: str) -> str:
 
 
 def _exact(recording: Recording, i: int) -> tuple[float, int]:
-    """Share of the command's changes at which the actuator takes exactly the new value, in the same sample or the next; and their number."""
+    """Share of the command's changes at which the actuator takes exactly the new value, in the same sample or the next;
+    and their number."""
     same = changes = 0
     for run in recording.runs:
         command, actuator = run.inputs[:, i], run.states[:, N + i]
@@ -88,7 +107,9 @@ def _sudden(recording: Recording, channel: int) -> tuple[int, float]:
         v = run.states[:, channel]
         for k in np.flatnonzero(np.abs(np.diff(v)) > least):
             after = v[k + 1 : k + 4]
-            if len(after) == 3 and np.all(np.abs(after - v[k]) > 0.7 * least):  # one sample that comes back is an outlier
+            if len(after) == 3 and np.all(
+                np.abs(after - v[k]) > 0.7 * least
+            ):  # one sample that comes back is an outlier
                 steps.append(float(abs(v[k + 1] - v[k])))
     return len(steps) - 1, max(steps)
 

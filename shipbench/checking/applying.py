@@ -1,4 +1,5 @@
-"""Lines of findings laid into dataset.toml: they add to what stands there, and those that contradict it or one another are left out."""
+"""Lines of findings laid into dataset.toml: they add to what stands there, and those that contradict it or one another
+are left out."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ _KEPT = ("units", "frame", "velocities", "wind")
 
 @dataclass(frozen=True)
 class Laid:
-    """description: dataset.toml with the lines in it; changed: those of its entries that are new; refused: what was left out, and why."""
+    """description: dataset.toml with the lines in it; changed: those of its entries that are new; refused: what was
+    left out, and why."""
 
     description: dict[str, Any]
     changed: dict[str, Any] = field(default_factory=dict)
@@ -35,16 +37,23 @@ class Laid:
 
 
 def laid(given: dict[str, Any], findings: Sequence[Finding]) -> Laid:
-    """Lay the lines of all findings into `given`, a parsed dataset.toml ({}: none). They were found in the data as `given` has them read."""
+    """Lay the lines of all findings into `given`, a parsed dataset.toml ({}: none). They were found in the data as
+    `given` has them read."""
     entries = [(f, dict(_leaves(tomllib.loads(f.line)))) for f in findings if f.line]
     clashes: dict[int, str] = {}
     for i, (finding, mine) in enumerate(entries):
         for key in mine:
             if key[0] in _KEPT and _at(given, key) not in (None, mine[key]):
-                clashes[i] = f"{_said(key, mine[key])} ({finding.kind}) contradicts {_said(key, _at(given, key))} in dataset.toml"
+                clashes[i] = (
+                    f"{_said(key, mine[key])} ({finding.kind}) contradicts {_said(key, _at(given, key))} in "
+                    "dataset.toml"
+                )
             for j, (other, theirs) in enumerate(entries[:i]):
                 if key in theirs and not _alike(mine[key], theirs[key]):
-                    words = f"{_said(key, theirs[key])} ({other.kind}) and {_said(key, mine[key])} ({finding.kind}) contradict each other"
+                    words = (
+                        f"{_said(key, theirs[key])} ({other.kind}) and {_said(key, mine[key])} ({finding.kind}) "
+                        "contradict each other"
+                    )
                     clashes |= {i: words, j: words}
     found: dict[_Path, Any] = {}
     for mine in (mine for i, (_, mine) in enumerate(entries) if i not in clashes):
@@ -90,7 +99,8 @@ def _intervals(value: Any) -> bool:
 
 
 def _alike(a: Any, b: Any) -> bool:
-    """Whether two findings say the same of one entry: intervals add up, and estimates of one number may differ by their error."""
+    """Whether two findings say the same of one entry: intervals add up, and estimates of one number may differ by their
+    error."""
     if _intervals(a) and _intervals(b):
         return True
     if isinstance(a, list) and isinstance(b, list):
@@ -103,7 +113,8 @@ def _joined(old: list[Any], new: list[Any]) -> list[Any]:
 
 
 def _composed(given: dict[str, Any], path: _Path, value: Any) -> Any:
-    """The entry that stands for what is given and then what was found: (reading - bias) / scale twice over, delays and vectors added."""
+    """The entry that stands for what is given and then what was found: (reading - bias) / scale twice over, delays and
+    vectors added."""
     old, kind = _at(given, path), path[-2] if len(path) > 1 else path[0]
     if _intervals(value):
         return _joined(old or [], value)

@@ -18,7 +18,8 @@ from .reading import read_recording
 from .recording import Recording
 
 _HELPERS = frozenset({
-    "applying", "base", "finding", "gross", "held", "north", "placeholders", "reading", "recording", "rudder_side", "selection", "statistics",
+    "applying", "base", "finding", "gross", "held", "north", "placeholders", "reading", "recording", "rudder_side",
+    "selection", "statistics",
     "thresholds", "track", "units", "wind_reading",
 })  # fmt: skip
 CHECKS = Registry("check", "checking", "CHECK", helpers=_HELPERS, group="checks")
@@ -30,7 +31,8 @@ def _checks() -> tuple[Callable[[Recording], list[Finding]], ...]:
 
 
 def check_recording(recording: Recording) -> list[Finding]:
-    """Findings of the gross checks, then those of every other on the data with the gross errors taken out; errors first. None is about a channel
+    """Findings of the gross checks, then those of every other on the data with the gross errors taken out; errors
+    first. None is about a channel
     that import made of others: it is as good as these."""
     mended, found = recording, []
     mends = (mend_placeholders, mend_north, mend_held, mend_gross)
@@ -51,19 +53,28 @@ def check_recording(recording: Recording) -> list[Finding]:
 
 
 def _without_consequences(found: list[Finding]) -> list[Finding]:
-    """Speeds or a yaw rate that are late against the other motion are late against rudder and shaft, too; a stuck rudder seems late; of a log that
-    falls silent the track tells nothing else, and a yaw rate that is none tells nothing of the rudder. Said once."""
+    """Speeds or a yaw rate that are late against the other motion are late against rudder and shaft, too; a stuck
+    rudder seems late; of a log that falls silent the track tells nothing else, and a yaw rate that is none tells
+    nothing of the rudder. Said once."""
     if any(f.kind == "log reads nothing" for f in found):
         found = [f for f in found if f.check not in ("track", "spikes") or not set(f.channels) <= {"x", "y", "u", "v"}]
     if any(f.kind == "unrelated" for f in found):
         found = [f for f in found if f.check != "response" or "r" not in f.channels]
-    known = {c for f in found if (f.kind, f.check) in (("lag", "track"), ("lag", "yaw"), ("frozen", "samples")) for c in f.channels}
+    known = {
+        c
+        for f in found
+        if (f.kind, f.check) in (("lag", "track"), ("lag", "yaw"), ("frozen", "samples"))
+        for c in f.channels
+    }
     return [f for f in found if f.check != "response" or not known & {c.removesuffix("_c") for c in f.channels}]
 
 
 def _wrapped(recording: Recording) -> Finding:
     names, total = recording.wrapped, len(set(recording.parent.values())) or len(recording.runs)
-    text = f"the heading is wrapped (it jumps by a whole turn) in {len(names)} of {total} runs; it is made continuous on loading."
+    text = (
+        f"the heading is wrapped (it jumps by a whole turn) in {len(names)} of {total} runs; it is made "
+        "continuous on loading."
+    )
     return Finding("reading", "note", "wrapped heading", text, todo="Nothing.", channels=("psi",), runs=names)
 
 

@@ -1,7 +1,7 @@
 """Clocks that were set while the log went on: the ship moves on by more, or by less, than the time stamps say.
 
-Set back (the rows that would stand twice are gone), position and heading leap ahead along the motion. Set ahead, a gap in time is longer than the way
-across it.
+Set back (the rows that would stand twice are gone), position and heading leap ahead along the motion. Set ahead, a gap
+in time is longer than the way across it.
 """
 
 from __future__ import annotations
@@ -19,14 +19,16 @@ from .thresholds import THRESHOLDS
 
 
 def _motion(before: np.ndarray, after: np.ndarray) -> tuple[complex, float, float]:
-    """Velocity in the earth's axes, yaw rate, and the greatest change of the velocity from the one to the other (samples, 10)."""
+    """Velocity in the earth's axes, yaw rate, and the greatest change of the velocity from the one to the other
+    (samples, 10)."""
     way = [np.mean((S[:, U] + 1j * S[:, V]) * np.exp(1j * S[:, PSI])) for S in (before, after)]
     rate = 0.5 * float(np.mean(before[:, R]) + np.mean(after[:, R]))
     return complex(0.5 * (way[0] + way[1])), rate, float(abs(way[1] - way[0]))
 
 
 def set_back(run: Run, k: int, leap: complex, turned: float) -> float | None:
-    """Seconds by which the clock was set back between samples k and k + 1, where position and heading both leap along the motion; else None."""
+    """Seconds by which the clock was set back between samples k and k + 1, where position and heading both leap along
+    the motion; else None."""
     way, rate, _ = _motion(run.states[max(0, k - 3) : k + 1], run.states[k + 1 : k + 5])
     seconds = float(np.real(leap * np.conj(way)) / max(abs(way) ** 2, 1e-12))
     share = THRESHOLDS.value("clock_step_misfit")
@@ -44,12 +46,15 @@ def clock_finding(recording: Recording, steps: dict[tuple[str, int], float]) -> 
         cuts.setdefault(recording.name_of(runs[other]), {"cut": []})["cut"].append([t, t])
     run = runs[name]
     text = (
-        f"the clock is set {'back' if seconds > 0.0 else 'ahead'} {times(len(steps), len(cuts))}: from {run.t[k]:g} s to {run.t[k + 1]:g} s of "
+        f"the clock is set {'back' if seconds > 0.0 else 'ahead'} {times(len(steps), len(cuts))}: from {run.t[k]:g} "
+        f"s to {run.t[k + 1]:g} s of "
         f"'{recording.name_of(run)}' position and heading move on as in {seconds + recording.dt:.3g} s."
     )
     todo = "The cut splits the run there. What follows is a recording of its own."
     figures = {"seconds": seconds, "steps": len(steps)}
-    return Finding("spikes", "warning", "clock step", text, toml_line({"runs": cuts}), todo, ("t",), tuple(cuts), figures)
+    return Finding(
+        "spikes", "warning", "clock step", text, toml_line({"runs": cuts}), todo, ("t",), tuple(cuts), figures
+    )
 
 
 def check(recording: Recording) -> list[Finding]:
@@ -74,13 +79,22 @@ def check(recording: Recording) -> list[Finding]:
     )
     return [
         Finding(
-            "clock_steps", "note", "clock step", text, "", "Nothing: no sample is made up in the gap.", ("t",), tuple(found), {"seconds": seconds}
+            "clock_steps",
+            "note",
+            "clock step",
+            text,
+            "",
+            "Nothing: no sample is made up in the gap.",
+            ("t",),
+            tuple(found),
+            {"seconds": seconds},
         )
     ]
 
 
 def _ahead(before: np.ndarray, after: np.ndarray, gap: float, recording: Recording) -> float | None:
-    """Seconds by which the stamps of a gap are longer than the ship's way across it; None where the motion tells no such thing."""
+    """Seconds by which the stamps of a gap are longer than the ship's way across it; None where the motion tells no
+    such thing."""
     if gap < 1.5 * recording.dt:
         return None
     way, rate, change = _motion(before[-4:], after[:4])

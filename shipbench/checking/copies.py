@@ -1,6 +1,8 @@
-"""Runs that hold the same samples as another (copies, pieces), and runs that go on where another ends: neither may straddle a fold.
+"""Runs that hold the same samples as another (copies, pieces), and runs that go on where another ends: neither may
+straddle a fold.
 
-Windows of rounded samples of u, v, r are hashed, so that the cost grows with the number of samples and shifted positions do not hide a copy.
+Windows of rounded samples of u, v, r are hashed, so that the cost grows with the number of samples and shifted
+positions do not hide a copy.
 """
 
 from __future__ import annotations
@@ -22,10 +24,13 @@ _WINDOW = 8
 
 
 def _hashes(run: Run, size: np.ndarray) -> np.ndarray:
-    """(windows,) 64-bit hash of each window of samples, 0 for windows in which nothing changes (ships at rest are all alike)."""
+    """(windows,) 64-bit hash of each window of samples, 0 for windows in which nothing changes (ships at rest are all
+    alike)."""
     rounded = np.round(run.states[:, [U, V, R]] / size).astype(np.int64).astype(np.uint64)
     with np.errstate(over="ignore"):
-        sample = (rounded * np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)).sum(axis=1, dtype=np.uint64)
+        sample = (
+            rounded * np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+        ).sum(axis=1, dtype=np.uint64)
         sample ^= sample >> np.uint64(29)
         windows = np.lib.stride_tricks.sliding_window_view(sample, _WINDOW)
         weights = np.array([pow(0x100000001B3, i, 2**64) for i in range(_WINDOW)], dtype=np.uint64)
@@ -48,7 +53,9 @@ def overlaps(recording: Recording) -> dict[tuple[int, int], tuple[int, int]]:
     place = np.concatenate([np.arange(len(h)) for _, h in hashes])
     order = np.argsort(value, kind="stable")
     value, owner, place = value[order], owner[order], place[order]
-    same = np.flatnonzero((value[1:] == value[:-1]) & (value[1:] != 0) & (owner[1:] != owner[:-1]))  # neighbours: copies of copies chain up
+    same = np.flatnonzero(
+        (value[1:] == value[:-1]) & (value[1:] != 0) & (owner[1:] != owner[:-1])
+    )  # neighbours: copies of copies chain up
     pairs = np.column_stack([owner[same], owner[same + 1], place[same] - place[same + 1]])
     found: dict[tuple[int, int], tuple[int, int]] = {}
     for (a, b, shift), count in zip(*np.unique(pairs, axis=0, return_counts=True), strict=True):
@@ -56,12 +63,16 @@ def overlaps(recording: Recording) -> dict[tuple[int, int], tuple[int, int]]:
         samples = int(count) + _WINDOW - 1
         if samples >= THRESHOLDS.count("copied_samples") // 2 and samples > found.get((i, j), (0, 0))[0]:
             found[i, j] = (samples, offset)
-    alike = {pair: (_alike(recording.runs[pair[0]], recording.runs[pair[1]], offset, size), offset) for pair, (_, offset) in found.items()}
+    alike = {
+        pair: (_alike(recording.runs[pair[0]], recording.runs[pair[1]], offset, size), offset)
+        for pair, (_, offset) in found.items()
+    }
     return {pair: part for pair, part in alike.items() if part[0] >= THRESHOLDS.count("copied_samples")}
 
 
 def _alike(a: Run, b: Run, offset: int, size: np.ndarray) -> int:
-    """Number of samples that are equal to rounding where `a` begins `offset` samples before `b` (a hash breaks where rounding falls on an edge).
+    """Number of samples that are equal to rounding where `a` begins `offset` samples before `b` (a hash breaks where
+    rounding falls on an edge).
 
     0 where no unbroken part of them holds enough changes: records in coarse steps agree here and there by chance.
     """
@@ -75,14 +86,17 @@ def _alike(a: Run, b: Run, offset: int, size: np.ndarray) -> int:
 
 
 def check(recording: Recording) -> list[Finding]:
-    """Copies and pieces, then logs that were cut; what shares a group already is not reported. All runs that hang together get one group."""
+    """Copies and pieces, then logs that were cut; what shares a group already is not reported. All runs that hang
+    together get one group."""
     shared = {pair: part for pair, part in overlaps(recording).items() if _apart([recording.runs[i] for i in pair])}
     chains = [chain for chain in _chains(recording) if _apart(chain) and not _cut_by_import(chain)]
     families = _families(recording, [*([recording.runs[i] for i in pair] for pair in shared), *chains])
     together: dict[tuple[str, ...], list[tuple[int, int]]] = {}
     for pair in shared:
         together.setdefault(families[recording.name_of(recording.runs[pair[0]])], []).append(pair)
-    return [_cluster(recording, pairs, shared, families) for pairs in together.values()] + [_log(recording, chain, families) for chain in chains]
+    return [_cluster(recording, pairs, shared, families) for pairs in together.values()] + [
+        _log(recording, chain, families) for chain in chains
+    ]
 
 
 def _apart(runs: list[Run]) -> bool:
@@ -90,13 +104,17 @@ def _apart(runs: list[Run]) -> bool:
 
 
 def _cut_by_import(chain: list[Run]) -> bool:
-    """Whether the runs are windows that import cut from one recording, as its description says: their owner chose so."""
+    """Whether the runs are windows that import cut from one recording, as its description says: their owner chose
+    so."""
     files = {run.meta.get("file") for run in chain}
     return len(files) == 1 and None not in files and all({"from", "to"} <= run.meta.keys() for run in chain)
 
 
 def _cluster(
-    recording: Recording, pairs: list[tuple[int, int]], shared: dict[tuple[int, int], tuple[int, int]], families: dict[str, tuple[str, ...]]
+    recording: Recording,
+    pairs: list[tuple[int, int]],
+    shared: dict[tuple[int, int], tuple[int, int]],
+    families: dict[str, tuple[str, ...]],
 ) -> Finding:
     """One finding on runs that share samples with one another, with the pair that shares most."""
     i, j = max(pairs, key=lambda pair: shared[pair][0])
@@ -110,7 +128,8 @@ def _cluster(
 
 
 def _families(recording: Recording, sets: list[list[Run]]) -> dict[str, tuple[str, ...]]:
-    """Name of a run -> names of all runs that hang together with it by these sets and by the groups that are given, in the order of the data set."""
+    """Name of a run -> names of all runs that hang together with it by these sets and by the groups that are given, in
+    the order of the data set."""
     family: dict[str, set[str]] = {}
     given: dict[str, list[Run]] = {}
     for run in recording.runs:
@@ -132,7 +151,9 @@ def _kind(recording: Recording, pair: tuple[int, int], part: tuple[int, int]) ->
     return "duplicate run" if whole >= longest else "piece of a run" if whole >= shortest else "overlapping runs"
 
 
-def _copy(recording: Recording, pair: tuple[int, int], part: tuple[int, int], families: dict[str, tuple[str, ...]]) -> Finding:
+def _copy(
+    recording: Recording, pair: tuple[int, int], part: tuple[int, int], families: dict[str, tuple[str, ...]]
+) -> Finding:
     a, b = (recording.runs[i] for i in pair)
     samples, offset = part
     names = (recording.name_of(a), recording.name_of(b))
@@ -144,7 +165,8 @@ def _copy(recording: Recording, pair: tuple[int, int], part: tuple[int, int], fa
     elif kind == "piece of a run":
         where = max(start, 0) * recording.dt
         text = (
-            f"run '{recording.name_of(shorter)}' ({samples} samples) is a piece of '{recording.name_of(longer)}' ({len(longer)} samples), from "
+            f"run '{recording.name_of(shorter)}' ({samples} samples) is a piece of '{recording.name_of(longer)}' "
+            f"({len(longer)} samples), from "
             f"{where:g} s to {where + (samples - 1) * recording.dt:g} s of it"
         )
     else:
@@ -156,7 +178,8 @@ def _copy(recording: Recording, pair: tuple[int, int], part: tuple[int, int], fa
         Curve(names[0], t, a.states[i : i + n, U], "-"), Curve(names[1], t, b.states[j : j + n, U], "--"),
     ))  # fmt: skip
     return Finding(
-        "copies", "error", kind, f"{text}: one in training and the other in test would leak.", _lines(families[names[0]]), "Or remove one of them.",
+        "copies", "error", kind, f"{text}: one in training and the other in test would leak.",
+        _lines(families[names[0]]), "Or remove one of them.",
         runs=names, evidence={"samples": samples}, picture=picture,
     )  # fmt: skip
 
@@ -176,7 +199,8 @@ def _chains(recording: Recording) -> list[list[Run]]:
 
 
 def _next(recording: Recording, runs: list[Run], i: int) -> int | None:
-    """The run that begins where run i ends, within a few samples: state carried on by its rates, to within noise and a sample's change."""
+    """The run that begins where run i ends, within a few samples: state carried on by its rates, to within noise and a
+    sample's change."""
     end, dt = runs[i].states[-1], recording.dt
     rates = end[[U, V]] @ np.array([[np.cos(end[PSI]), np.sin(end[PSI])], [-np.sin(end[PSI]), np.cos(end[PSI])]])
     noise = _noise(recording)
@@ -199,24 +223,38 @@ def _next(recording: Recording, runs: list[Run], i: int) -> int | None:
 
 
 def _noise(recording: Recording) -> np.ndarray:
-    """(5,) tolerances of position, heading, u, v, r: six deviations of the change of slope within runs; of the rates a tenth of what is usual."""
-    second = np.concatenate([run.states[2:] - 2.0 * run.states[1:-1] + run.states[:-2] for run in recording.runs if len(run) >= 4])
-    own = 6.0 * np.array([np.hypot(spread(second[:, X]), spread(second[:, Y])), *(spread(second[:, c]) for c in (PSI, U, V, R))])
+    """(5,) tolerances of position, heading, u, v, r: six deviations of the change of slope within runs; of the rates a
+    tenth of what is usual."""
+    second = np.concatenate(
+        [run.states[2:] - 2.0 * run.states[1:-1] + run.states[:-2] for run in recording.runs if len(run) >= 4]
+    )
+    own = 6.0 * np.array(
+        [np.hypot(spread(second[:, X]), spread(second[:, Y])), *(spread(second[:, c]) for c in (PSI, U, V, R))]
+    )
     step, turn = recording.speed * recording.dt, recording.turning * recording.dt
-    return np.maximum(own, [0.6 * step, 0.6 * turn, 0.1 * recording.speed, 0.1 * recording.speed, 0.1 * recording.turning])
+    return np.maximum(
+        own, [0.6 * step, 0.6 * turn, 0.1 * recording.speed, 0.1 * recording.speed, 0.1 * recording.turning]
+    )
 
 
 def _log(recording: Recording, pieces: list[Run], families: dict[str, tuple[str, ...]]) -> Finding:
     names = recording.names(pieces)
     gaps = [float(b.t[0] - a.t[-1]) for a, b in pairwise(pieces)]
     clock = f", {min(gaps):g} to {max(gaps):g} s later by their own t" if min(gaps) > 0.0 else ""
-    text = f"runs {some(names, 8)} follow one another: each begins where the one before ends{clock}. They are pieces of one log."
+    text = (
+        f"runs {some(names, 8)} follow one another: each begins where the one before ends{clock}. They are "
+        "pieces of one log."
+    )
     family = families[names[0]]
     alone = len(family) == len(recording.runs)
-    todo = "Nothing: it is the only log, and as one group nothing of it could be held out. What is held out has the same day, weather and load."
+    todo = (
+        "Nothing: it is the only log, and as one group nothing of it could be held out. What is held out has the "
+        "same day, weather and load."
+    )
     curves = tuple(Curve(recording.name_of(run), run.states[:, Y], run.states[:, X]) for run in pieces)
     return Finding(
-        "copies", "note" if alone else "warning", "pieces of one log", text, "" if alone else _lines(family), todo if alone else "", runs=names,
+        "copies", "note" if alone else "warning", "pieces of one log", text, "" if alone else _lines(family),
+        todo if alone else "", runs=names,
         evidence={"pieces": len(pieces)}, picture=Picture("Tracks", "y [m]", "x [m]", curves),
     )  # fmt: skip
 

@@ -74,7 +74,8 @@ class Finding:
         """Everything but the picture, with plain numbers."""
         figures = {k: v.item() if hasattr(v, "item") else v for k, v in self.evidence.items()}
         return {
-            "check": self.check, "severity": self.severity, "kind": self.kind, "text": self.text, "line": self.line, "todo": self.todo,
+            "check": self.check, "severity": self.severity, "kind": self.kind, "text": self.text, "line": self.line,
+            "todo": self.todo,
             "channels": list(self.channels), "runs": list(self.runs), "evidence": figures,
         }  # fmt: skip
 

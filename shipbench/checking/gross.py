@@ -1,7 +1,9 @@
-"""Errors that touch every figure: frames (ENU, heading from east), earth-fixed velocities, units, signs. They are taken out before finer checks.
+"""Errors that touch every figure: frames (ENU, heading from east), earth-fixed velocities, units, signs. They are taken
+out before finer checks.
 
-Readings of frame and velocities are compared by the share of the track, and of the heading's change, that they leave unexplained; a reading other
-than ours is believed only if it leaves a quarter or less of the squares. Units and signs are `units`, those of the wind `wind_reading`.
+Readings of frame and velocities are compared by the share of the track, and of the heading's change, that they leave
+unexplained; a reading other than ours is believed only if it leaves a quarter or less of the squares. Units and signs
+are `units`, those of the wind `wind_reading`.
 """
 
 from __future__ import annotations
@@ -21,20 +23,27 @@ from .thresholds import THRESHOLDS
 from .units import UnitFinding, check_units, corrected
 from .wind_reading import mend_wind
 
-_HEMISPHERES = "Did the import leave N/S or E/W of latitude and longitude unread? Then import again with `hemisphere` in the mapping."
+_HEMISPHERES = (
+    "Did the import leave N/S or E/W of latitude and longitude unread? Then import again with "
+    "`hemisphere` in the mapping."
+)
 _FLIPPED = {
-    "x": ("south", "north"), "y": ("west", "east"), "psi": ("counterclockwise", "clockwise"), "u": ("astern", "ahead"), "v": ("port", "starboard"),
-    "r": ("port", "starboard"), "delta": ("port", "starboard"), "n": ("astern", "ahead"), "F_b": ("port", "starboard"), "F_s": ("port", "starboard"),
+    "x": ("south", "north"), "y": ("west", "east"), "psi": ("counterclockwise", "clockwise"), "u": ("astern", "ahead"),
+    "v": ("port", "starboard"),
+    "r": ("port", "starboard"), "delta": ("port", "starboard"), "n": ("astern", "ahead"), "F_b": ("port", "starboard"),
+    "F_s": ("port", "starboard"),
 }  # fmt: skip
 _UNITS = {
-    "degrees": "deg", "knots": "kn", "km/h": "km/h", "kN": "kN", "degrees per second": "deg/s", "degrees per minute": "deg/min", "rev/s": "rev/s",
+    "degrees": "deg", "knots": "kn", "km/h": "km/h", "kN": "kN", "degrees per second": "deg/s",
+    "degrees per minute": "deg/min", "rev/s": "rev/s",
     "rad/s": "rad/s",
 }  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _Reading:
-    """A way to read frame and velocities: what it is called, the change of the states (a copy) that makes them ours, and its lines."""
+    """A way to read frame and velocities: what it is called, the change of the states (a copy) that makes them ours,
+    and its lines."""
 
     kind: str
     text: str
@@ -66,13 +75,15 @@ def _earth_swapped(S: np.ndarray) -> None:
 
 
 READINGS = (
-    _Reading("ENU", "x, y, psi are of an ENU frame (x east, y north, psi counterclockwise from east)", _enu, {"frame": "ENU"}),
+    _Reading("ENU", "x, y, psi are of an ENU frame (x east, y north, psi counterclockwise from east)", _enu,
+        {"frame": "ENU"}),
     _Reading("ENU", "x is east and y north, with a compass heading", _swap, {"frame": "east-north"}),
     _Reading(
         "heading from east", "the heading is counted counterclockwise from east", _from_east,
         {"signs": {"psi": "counterclockwise"}, "bias": {"psi": -math.pi / 2.0}},
     ),
-    _Reading("earth-fixed velocities", "u, v are velocities to the north and east, not along the ship", _earth, {"velocities": "earth"}),
+    _Reading("earth-fixed velocities", "u, v are velocities to the north and east, not along the ship", _earth,
+        {"velocities": "earth"}),
     _Reading(
         "earth-fixed velocities", "u, v are velocities to the east and north, not along the ship", _earth_swapped,
         {"velocities": "earth-east-north"},
@@ -91,7 +102,8 @@ def _mended(dataset: Dataset, mend: Callable[[np.ndarray], None]) -> Dataset:
 
 @dataclass(frozen=True)
 class _Misfit:
-    """track: root share of the track's squares that heading and speeds leave; scale: of the speeds to the track; pairs: way said and made (W,)."""
+    """track: root share of the track's squares that heading and speeds leave; scale: of the speeds to the track; pairs:
+    way said and made (W,)."""
 
     track: float
     scale: float
@@ -138,10 +150,14 @@ def _units(recording: Recording) -> list[UnitFinding]:
     """Errors of unit and sign; of two speeds that come from one velocity over ground none has a unit of its own."""
     found = check_units(recording.dataset)
     factors = {f.channel: f.factor for f in found}
-    return [f for f in found if not (recording.turned and f.channel in ("u", "v") and factors.get("u") != factors.get("v"))]
+    return [
+        f for f in found if not (recording.turned and f.channel in ("u", "v") and factors.get("u") != factors.get("v"))
+    ]
 
 
-def _best_reading(recording: Recording, plain: _Misfit, units: list[UnitFinding]) -> tuple[_Reading, Dataset, _Misfit] | None:
+def _best_reading(
+    recording: Recording, plain: _Misfit, units: list[UnitFinding]
+) -> tuple[_Reading, Dataset, _Misfit] | None:
     """A reading of the frame that explains the track, unless units and signs explain it with as few errors."""
     options = []
     for reading in READINGS:
@@ -170,7 +186,9 @@ def _follows(f: UnitFinding, units: list[UnitFinding]) -> bool:
     """A command with its actuator's error, and y where both axes of the position are reversed."""
     if f.channel == "y":
         return _reversed(units)
-    return f.channel.endswith("_c") and any(o.channel == f.channel.removesuffix("_c") and abs(o.factor / f.factor - 1.0) < 0.02 for o in units)
+    return f.channel.endswith("_c") and any(
+        o.channel == f.channel.removesuffix("_c") and abs(o.factor / f.factor - 1.0) < 0.02 for o in units
+    )
 
 
 def _reversed(units: list[UnitFinding]) -> bool:
@@ -192,7 +210,8 @@ def _picture(plain: _Misfit, left: _Misfit) -> Picture:
 
 def _frame_finding(reading: _Reading, plain: _Misfit, left: _Misfit) -> Finding:
     text = (
-        f"{reading.text}: the track departs from heading and speeds by {plain.track:.1%} of its length as recorded, by {left.track:.1%} read so "
+        f"{reading.text}: the track departs from heading and speeds by {plain.track:.1%} of its length as recorded, "
+        f"by {left.track:.1%} read so "
         f"({len(left.made)} windows)."
     )
     channels = ("u", "v") if "velocities" in reading.line else ("x", "y", "psi")
@@ -214,13 +233,25 @@ def _unit_finding(recording: Recording, f: UnitFinding, units: list[UnitFinding]
         text = f"x is east and y north. {f.evidence}"
         line = toml_line({"frame": "east-north"})
         return Finding(
-            "gross", "error", "ENU", text, line, channels=("x", "y"), evidence={"factor": f.factor}, picture=_channel(recording, f.channel)
+            "gross",
+            "error",
+            "ENU",
+            text,
+            line,
+            channels=("x", "y"),
+            evidence={"factor": f.factor},
+            picture=_channel(recording, f.channel),
         )
     if f.channel == "x" and _reversed(units):
         line = toml_line({"signs": {axis: _side(recording, axis) for axis in ("x", "y")}})
         text = f"x and y are both reversed: x grows to the south and y to the west. {f.evidence}"
-        todo = f"{_HEMISPHERES} A heading that is off by 180 degrees looks the same: then write [bias] psi = {math.pi:.5f} instead."
-        return Finding("gross", "error", "position reversed", text, line, todo, ("x", "y"), picture=_channel(recording, "x"))
+        todo = (
+            f"{_HEMISPHERES} A heading that is off by 180 degrees looks the same: then write [bias] psi = "
+            f"{math.pi:.5f} instead."
+        )
+        return Finding(
+            "gross", "error", "position reversed", text, line, todo, ("x", "y"), picture=_channel(recording, "x")
+        )
     lines, kinds, todo = {}, [], _HEMISPHERES if f.channel in ("x", "y") else ""
     for part in f.kind.split(", "):
         if part == "sign":
@@ -231,13 +262,15 @@ def _unit_finding(recording: Recording, f: UnitFinding, units: list[UnitFinding]
             kinds.append("unit")
     if f.channel == "delta" and "sign" in kinds and len(_errors(units)) == 1:
         todo = (
-            "If the rudder is right, all else is a mirror image, as of an ENU frame with v and r to port: then write frame = \"ENU\" and "
+            "If the rudder is right, all else is a mirror image, as of an ENU frame with v and r to port: then "
+            "write frame = \"ENU\" and "
             "[signs] v = \"port\", r = \"port\" instead. Nothing else in the data tells the two apart."
         )  # fmt: skip
     wrong = " and ".join(dict.fromkeys(kinds)) or "size"
     text = f"{f.channel} is recorded with another {wrong} ({f.kind or f'{f.factor:.4g} times ours'}). {f.evidence}"
     return Finding(
-        "gross", "error", " and ".join(dict.fromkeys(kinds)) or "unit", text, toml_line(lines), todo, (f.channel,), evidence={"factor": f.factor},
+        "gross", "error", " and ".join(dict.fromkeys(kinds)) or "unit", text, toml_line(lines), todo, (f.channel,),
+        evidence={"factor": f.factor},
         picture=_channel(recording, f.channel),
     )  # fmt: skip
 
@@ -258,5 +291,13 @@ def _channel(recording: Recording, channel: str) -> Picture:
         by = {"u": own.real, "v": own.imag, "psi": np.unwrap(np.angle(z)), "x": S[:, X], "y": S[:, Y]}
         curves.append(Curve(f"{channel} by the track", t, by[channel]))
     elif channel == "delta":
-        curves.append(Curve("r, to the same height", t, S[:, 5] / max(float(np.max(np.abs(S[:, 5]))), 1e-12) * float(np.max(np.abs(S[:, 7])))))
-    return Picture(f"{channel} in run {recording.name_of(run)}", "time [s]", f"{channel}, in the unit of the file", tuple(curves))
+        curves.append(
+            Curve(
+                "r, to the same height",
+                t,
+                S[:, 5] / max(float(np.max(np.abs(S[:, 5]))), 1e-12) * float(np.max(np.abs(S[:, 7]))),
+            )
+        )
+    return Picture(
+        f"{channel} in run {recording.name_of(run)}", "time [s]", f"{channel}, in the unit of the file", tuple(curves)
+    )

@@ -1,7 +1,7 @@
 """Fixes that are held: a receiver or compass gives a value now and then, and a faster record repeats it until the next.
 
-Each value is right when it comes and late until the next. It is a held one if the ship moves on, by the other channels, further than the record's
-last digit hides, and if that is so of most values.
+Each value is right when it comes and late until the next. It is a held one if the ship moves on, by the other channels,
+further than the record's last digit hides, and if that is so of most values.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from .thresholds import THRESHOLDS
 
 
 def _digit(changes: np.ndarray) -> float:
-    """Last digit of a record: the least of its changes and of their differences (of numbers in full precision nearly nothing)."""
+    """Last digit of a record: the least of its changes and of their differences (of numbers in full precision nearly
+    nothing)."""
     size = np.unique(np.abs(changes[changes != 0.0]))
     size = size[np.concatenate([[True], np.diff(size) > 1e-6 * size[-1]])]
     return float(np.min(np.concatenate([size[:1], np.diff(size)])))
@@ -49,7 +50,9 @@ def _held(recording: Recording, channel: int) -> int:
 
 def mend_held(recording: Recording) -> tuple[Recording, list[Finding]]:
     """The recording with straight lines from fix to fix, and one finding."""
-    made = {PSI} if "r" in recording.dataset.derived else {X, Y} if {"u", "v"} & set(recording.dataset.derived) else set()
+    made = (
+        {PSI} if "r" in recording.dataset.derived else {X, Y} if {"u", "v"} & set(recording.dataset.derived) else set()
+    )
     held = {channel: length for channel in (X, Y, PSI) if channel not in made and (length := _held(recording, channel))}
     if not held:
         return recording, []
@@ -66,16 +69,20 @@ def _finding(recording: Recording, held: dict[int, int], runs: list[Run]) -> Fin
     names, dt = tuple(STATES[c] for c in held), recording.dt
     late = ", ".join(f"{STATES[c]} {0.5 * (length - 1) * dt:.2g} s" for c, length in held.items())
     text = (
-        f"{', '.join(names)} hold{'s' * (len(names) == 1)} each value for {max(held.values())} samples while the ship moves on: the sensor gives one "
+        f"{', '.join(names)} hold{'s' * (len(names) == 1)} each value for {max(held.values())} samples while the "
+        "ship moves on: the sensor gives one "
         f"every {max(held.values()) * dt:.3g} s, the record has one every {dt:g} s. It is late by {late} on average."
     )
     given = [c for c in recording.given.get("held", []) if c not in names]
     run, after = recording.runs[0], runs[0]
     channel, part = next(iter(held)), slice(0, 8 * max(held.values()))
     curves = (
-        Curve("as recorded", run.t[part], run.states[part, channel], ".-"), Curve("from fix to fix", after.t[part], after.states[part, channel]),
+        Curve("as recorded", run.t[part], run.states[part, channel], ".-"),
+        Curve("from fix to fix", after.t[part], after.states[part, channel]),
     )  # fmt: skip
-    picture = Picture(f"{STATES[channel]} in run {recording.name_of(run)}", "time [s]", labelled(STATES[channel]), curves)
+    picture = Picture(
+        f"{STATES[channel]} in run {recording.name_of(run)}", "time [s]", labelled(STATES[channel]), curves
+    )
     return Finding(
         "held", "warning", "held fixes", text, toml_line({"held": [*given, *names]}), "", names,
         evidence={"samples": max(held.values()), "seconds": max(held.values()) * dt}, picture=picture,

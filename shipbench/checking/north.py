@@ -1,4 +1,5 @@
-"""A heading that was interpolated linearly across 360/0 or 180/-180: named as that, and not as the jumps or the yaw-rate scale that it makes."""
+"""A heading that was interpolated linearly across 360/0 or 180/-180: named as that, and not as the jumps or the
+yaw-rate scale that it makes."""
 
 from __future__ import annotations
 
@@ -41,12 +42,16 @@ def _finding(recording: Recording, found: dict[str, list[tuple[int, int]]], fill
     total, samples = sum(map(len, found.values())), sum(b - a + 1 for places in found.values() for a, b in places)
     text = (
         f"psi was interpolated linearly across 360/0, {times(total, len(fills))}, in {samples} samples. "
-        f"The first: from {number[0]:.0f} to {number[-1]:.0f} degrees by {', '.join(f'{v:.0f}' for v in number[1:-1][:3])}, "
+        f"The first: from {number[0]:.0f} to {number[-1]:.0f} degrees by "
+        f"{', '.join(f'{v:.0f}' for v in number[1:-1][:3])}, "
         f"from {run.t[a - 1]:g} s to {run.t[b + 1]:g} s of '{recording.name_of(run)}'."
     )
     part = slice(max(0, a - 20), b + 21)
     picture = Picture(
-        f"psi in run {recording.name_of(run)}", "time [s]", "psi, as recorded", (Curve("psi", run.t[part], run.states[part, PSI], ".-"),)
+        f"psi in run {recording.name_of(run)}",
+        "time [s]",
+        "psi, as recorded",
+        (Curve("psi", run.t[part], run.states[part, PSI], ".-"),),
     )
     todo = "Or resample the log again with the heading unwrapped first."
     return Finding(

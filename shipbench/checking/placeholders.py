@@ -1,6 +1,8 @@
-"""Values that stand for "not available" (a heading of 511, a position of 0, 0): a channel leaps to one, holds it exactly, and leaps back.
+"""Values that stand for "not available" (a heading of 511, a position of 0, 0): a channel leaps to one, holds it
+exactly, and leaps back.
 
-No motion does that: a sensor that freezes stays where it was, and a ship that stops comes to rest. These samples are cut before anything else.
+No motion does that: a sensor that freezes stays where it was, and a ship that stops comes to rest. These samples are
+cut before anything else.
 """
 
 from __future__ import annotations
@@ -18,21 +20,30 @@ from .thresholds import THRESHOLDS
 
 
 def _blocks(z: np.ndarray, limit: float) -> list[tuple[int, int]]:
-    """First and last samples of the blocks in z (samples,): equal values between two leaps, out and back, with the samples between on the slopes."""
+    """First and last samples of the blocks in z (samples,): equal values between two leaps, out and back, with the
+    samples between on the slopes."""
     steps, found = np.abs(np.diff(z)), []
     for a, b in stretches(steps == 0.0):
         while a > 1 and steps[a - 1] > limit and steps[a - 2] > limit:
             a -= 1
         while b < len(z) - 2 and steps[b] > limit and steps[b + 1] > limit:
             b += 1
-        if a > 0 and b < len(z) - 1 and min(steps[a - 1], steps[b]) > limit and abs(z[b + 1] - z[a - 1]) < 0.5 * abs(z[b] - z[a - 1]):
+        if (
+            a > 0
+            and b < len(z) - 1
+            and min(steps[a - 1], steps[b]) > limit
+            and abs(z[b + 1] - z[a - 1]) < 0.5 * abs(z[b] - z[a - 1])
+        ):
             found.append((a, b))
     return found
 
 
 def _channel(recording: Recording, channels: Sequence[int]) -> dict[str, list[tuple[int, int]]]:
     """Run id -> blocks."""
-    z = {run.id: run.states[:, channels[0]] + (1j * run.states[:, channels[1]] if len(channels) > 1 else 0.0) for run in recording.runs}
+    z = {
+        run.id: run.states[:, channels[0]] + (1j * run.states[:, channels[1]] if len(channels) > 1 else 0.0)
+        for run in recording.runs
+    }
     steps = np.concatenate([np.abs(np.diff(values)) for values in z.values()])
     if not np.any(steps > 0.0):
         return {}
@@ -42,7 +53,8 @@ def _channel(recording: Recording, channels: Sequence[int]) -> dict[str, list[tu
 
 
 def _impossible(recording: Recording, found: dict[str, list[tuple[int, int]]]) -> dict[str, list[tuple[int, int]]]:
-    """Those blocks of rudder angles that no rudder reaches, unless it goes there otherwise too: then the unit is another one."""
+    """Those blocks of rudder angles that no rudder reaches, unless it goes there otherwise too: then the unit is
+    another one."""
     kept = {}
     for run in recording.runs:
         beyond = np.abs(run.states[:, DELTA]) > THRESHOLDS.value("largest_rudder_angle")
@@ -60,7 +72,11 @@ def mend_placeholders(recording: Recording) -> tuple[Recording, list[Finding]]:
     """The recording without such samples, and one finding for each channel."""
     findings, bad = [], {run.id: np.zeros(len(run), dtype=bool) for run in recording.runs}
     for channels in ((X, Y), (PSI,), (U,), (V,), (R,), (DELTA,)):
-        found = _impossible(recording, _channel(recording, channels)) if channels == (DELTA,) else _channel(recording, channels)
+        found = (
+            _impossible(recording, _channel(recording, channels))
+            if channels == (DELTA,)
+            else _channel(recording, channels)
+        )
         if found:
             findings.append(_finding(recording, channels, found))
         for name, blocks in found.items():
@@ -74,15 +90,19 @@ def _finding(recording: Recording, channels: Sequence[int], found: dict[str, lis
     keys = tuple(STATES[c] for c in channels)
     cuts: dict[str, dict[str, list[list[float]]]] = {}
     for name, blocks in found.items():
-        cuts.setdefault(recording.name_of(runs[name]), {"cut": []})["cut"].extend([float(runs[name].t[a]), float(runs[name].t[b])] for a, b in blocks)
+        cuts.setdefault(recording.name_of(runs[name]), {"cut": []})["cut"].extend(
+            [float(runs[name].t[a]), float(runs[name].t[b])] for a, b in blocks
+        )
     run = next(iter(runs.values()))
     a, b = found[run.id][0]
     middle = (a + b) // 2
     value = ", ".join(f"{run.states[middle, c]:.6g}" for c in channels)
     total, samples = sum(map(len, found.values())), sum(b - a + 1 for blocks in found.values() for a, b in blocks)
     text = (
-        f"{', '.join(keys)} leap{'s' * (len(keys) == 1)} to a constant and back {times(total, len(cuts))}, in {samples} samples. "
-        f"The first is {value} from {run.t[a]:g} s to {run.t[b]:g} s of '{recording.name_of(run)}': a value that stands for 'not available'."
+        f"{', '.join(keys)} leap{'s' * (len(keys) == 1)} to a constant and back {times(total, len(cuts))}, in "
+        f"{samples} samples. "
+        f"The first is {value} from {run.t[a]:g} s to {run.t[b]:g} s of '{recording.name_of(run)}': a value that "
+        "stands for 'not available'."
     )
     part = slice(max(0, a - 20), b + 21)
     curves = tuple(Curve(key, run.t[part], run.states[part, c], ".-") for key, c in zip(keys, channels, strict=True))

@@ -1,4 +1,5 @@
-"""Read a data set's folder as far as it goes: what the loader refuses at its first sight becomes findings here, all at once."""
+"""Read a data set's folder as far as it goes: what the loader refuses at its first sight becomes findings here, all at
+once."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
     """A registered data set, or a folder read tolerantly, with what is wrong in its table.
 
     Raises:
-        InputError: neither a known name nor a folder; its TOML files or its table cannot be read, or nothing usable is left of it.
+        InputError: neither a known name nor a folder; its TOML files or its table cannot be read, or nothing usable is
+        left of it.
     """
     folder = Path(spec)
     if not (folder / "dataset.toml").is_file():
@@ -44,7 +46,10 @@ def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
     convert_table(table, description)
     notes = list(description.notes)
     inputs = complete_columns(table, notes)
-    frames = {str(name): rows.drop(columns="trajectory").reset_index(drop=True) for name, rows in table.groupby("trajectory", sort=False)}
+    frames = {
+        str(name): rows.drop(columns="trajectory").reset_index(drop=True)
+        for name, rows in table.groupby("trajectory", sort=False)
+    }
     ordered = {name: _ordered(name, rows, found) for name, rows in frames.items()}
     frames = {_part(name, number): part for name, parts in ordered.items() for number, part in enumerate(parts, 1)}
     owner = {_part(name, number): name for name, parts in ordered.items() for number in range(1, len(parts) + 1)}
@@ -59,15 +64,23 @@ def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
         without = f" Without a single number: {', '.join(empty)}." if empty else ""
         raise InputError(f"{where}: no run has two samples with all values; there is nothing to check.{without}")
     dataset = Dataset(
-        name=description.name, ship=ship, dt=dt, runs=tuple(runs), actuators=description.actuators, source=description.source,
-        licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)), derived=tuple(description.derived),
+        name=description.name, ship=ship, dt=dt, runs=tuple(runs), actuators=description.actuators,
+        source=description.source,
+        licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)),
+        derived=tuple(description.derived),
     )  # fmt: skip
     turned = description.velocities.startswith("earth") or bool(description.from_course)
     return Recording(dataset, read_toml(folder / "dataset.toml"), recorded, wrapped, parent, turned, turn), found
 
 
 def _error(
-    kind: str, text: str, line: str = "", todo: str = "", runs: tuple[str, ...] = (), channels: tuple[str, ...] = (), **figures: float
+    kind: str,
+    text: str,
+    line: str = "",
+    todo: str = "",
+    runs: tuple[str, ...] = (),
+    channels: tuple[str, ...] = (),
+    **figures: float,
 ) -> Finding:
     return Finding("reading", "error", kind, text, line, todo, channels, runs, dict(figures))
 
@@ -77,7 +90,13 @@ def _clean(table: pd.DataFrame, description: Description, found: list[Finding]) 
     nameless = (table["trajectory"].isna() | (table["trajectory"].astype(str).str.strip() == "")).to_numpy()
     if nameless.any():
         row = int(np.argmax(nameless)) + 2
-        found.append(_error("nameless rows", f"{nameless.sum()} rows have no run name, the first is row {row}.", todo="Name them or remove them."))
+        found.append(
+            _error(
+                "nameless rows",
+                f"{nameless.sum()} rows have no run name, the first is row {row}.",
+                todo="Name them or remove them.",
+            )
+        )
         table = table[~nameless]
     table = table.assign(trajectory=table["trajectory"].astype(str))
     for column in ("t", *(c for c in SIGNALS if c in table)):
@@ -86,19 +105,42 @@ def _clean(table: pd.DataFrame, description: Description, found: list[Finding]) 
             text = numbers.isna() & table[column].notna()
             if text.any():
                 where, value = int(np.argmax(text.to_numpy())), table[column][text].iloc[0]
-                message = f"{column} is text in {int(text.sum())} rows, the first is row {where + 2}: '{str(value)[:40]}'."
-                found.append(_error("text", message, todo="Write decimal numbers with a point.", channels=(column,), rows=int(text.sum())))
+                message = (
+                    f"{column} is text in {int(text.sum())} rows, the first is row {where + 2}: '{str(value)[:40]}'."
+                )
+                found.append(
+                    _error(
+                        "text",
+                        message,
+                        todo="Write decimal numbers with a point.",
+                        channels=(column,),
+                        rows=int(text.sum()),
+                    )
+                )
             table[column] = numbers
         table[column] = table[column].astype(float)
     unknown = sorted(set(description.runs) - set(table["trajectory"]))
     if unknown:
-        found.append(_error("unknown run", f"[runs] names {some(unknown)}, which the table does not hold.", todo="Remove it or correct the name."))
+        found.append(
+            _error(
+                "unknown run",
+                f"[runs] names {some(unknown)}, which the table does not hold.",
+                todo="Remove it or correct the name.",
+            )
+        )
     block = (table["trajectory"] != table["trajectory"].shift()).cumsum()
     starts = table["trajectory"].groupby(block).first()
     twice = tuple(dict.fromkeys(starts[starts.duplicated()]))
     if twice:
         message = f"rows of {len(twice)} runs stand in several places: {some(twice)}."
-        found.append(_error("scattered rows", message, todo="Sort the rows by trajectory and t, or give each run its own name.", runs=twice))
+        found.append(
+            _error(
+                "scattered rows",
+                message,
+                todo="Sort the rows by trajectory and t, or give each run its own name.",
+                runs=twice,
+            )
+        )
     return table
 
 
@@ -118,7 +160,8 @@ def _part(name: str, number: int) -> str:
 
 
 def _ordered(name: str, rows: pd.DataFrame, found: list[Finding]) -> list[pd.DataFrame]:
-    """Rows in order of time, one per time; in parts where sorting would mix two recordings, because the clock was set back between them."""
+    """Rows in order of time, one per time; in parts where sorting would mix two recordings, because the clock was set
+    back between them."""
     t = rows["t"].to_numpy()
     known = np.isfinite(t)
     steps = np.diff(t[known])
@@ -126,12 +169,22 @@ def _ordered(name: str, rows: pd.DataFrame, found: list[Finding]) -> list[pd.Dat
     if not len(back):
         return [rows.reset_index(drop=True)]
     k = int(back[0])
-    message = f"run '{name}': t does not grow in {len(back)} steps, the first from {t[known][k]:g} s to {t[known][k + 1]:g} s."
+    message = (
+        f"run '{name}': t does not grow in {len(back)} steps, the first from {t[known][k]:g} s to "
+        f"{t[known][k + 1]:g} s."
+    )
     todo = "Sort the rows, remove those that stand twice, or name two runs."
     parts = [rows.sort_values("t", kind="stable").drop_duplicates("t")]
-    if np.min(np.diff(rows[known].drop_duplicates()["t"].sort_values().to_numpy()), initial=np.inf) < 0.5 * float(np.median(steps)):
-        parts = [part.drop_duplicates("t") for _, part in rows[known].groupby(np.cumsum(np.concatenate([[0], steps < 0.0])))]
-        message += f" The clock was set back by {float(np.median(steps)) - steps[k]:.3g} s there: the same times stand with other values."
+    if np.min(np.diff(rows[known].drop_duplicates()["t"].sort_values().to_numpy()), initial=np.inf) < 0.5 * float(
+        np.median(steps)
+    ):
+        parts = [
+            part.drop_duplicates("t") for _, part in rows[known].groupby(np.cumsum(np.concatenate([[0], steps < 0.0])))
+        ]
+        message += (
+            f" The clock was set back by {float(np.median(steps)) - steps[k]:.3g} s there: the same times "
+            "stand with other values."
+        )
         todo = "Give the rows after it a run name of their own."
     found.append(_error("time runs back", message, todo=todo, runs=(name,), steps=len(back)))
     return [part.reset_index(drop=True) for part in parts]
@@ -150,7 +203,9 @@ def _sample_time(frames: dict[str, pd.DataFrame], description: Description, foun
     return float(f"{typical:.6g}")
 
 
-def _missing_values(frames: dict[str, pd.DataFrame], description: Description, recorded: frozenset[str], found: list[Finding]) -> None:
+def _missing_values(
+    frames: dict[str, pd.DataFrame], description: Description, recorded: frozenset[str], found: list[Finding]
+) -> None:
     """Rows without all values: at the end of a run (a tail), or elsewhere."""
     if description.gaps == "split":
         return
@@ -169,13 +224,20 @@ def _missing_values(frames: dict[str, pd.DataFrame], description: Description, r
             last = rows["t"].to_numpy()[: len(rows) - whole]
             end = f" after t = {last[np.isfinite(last)][-1]:g} s" if np.isfinite(last).any() else ": the whole run"
             message = f"run '{name}' ends in {whole} of {len(rows)} rows without values{every}{end}."
-            found.append(Finding("reading", "error", "NaN tail", message, _SPLIT, "", what, (name,), {"rows": whole}, picture))
+            found.append(
+                Finding("reading", "error", "NaN tail", message, _SPLIT, "", what, (name,), {"rows": whole}, picture)
+            )
         inside = int(bad.sum()) - whole
         if inside:
             message = (
-                f"run '{name}' lacks values in {inside} of {len(rows)} rows before its end{every}, the first is its row {int(np.argmax(bad)) + 1}."
+                f"run '{name}' lacks values in {inside} of {len(rows)} rows before its end{every}, the first "
+                f"is its row {int(np.argmax(bad)) + 1}."
             )
-            found.append(Finding("reading", "error", "missing values", message, _SPLIT, "", what, (name,), {"rows": inside}, picture))
+            found.append(
+                Finding(
+                    "reading", "error", "missing values", message, _SPLIT, "", what, (name,), {"rows": inside}, picture
+                )
+            )
 
 
 def _time_steps(frames: dict[str, pd.DataFrame], description: Description, dt: float, found: list[Finding]) -> None:
@@ -188,31 +250,70 @@ def _time_steps(frames: dict[str, pd.DataFrame], description: Description, dt: f
         gaps = np.flatnonzero(steps > 1.5 * dt)
         if len(gaps) and description.gaps == "refuse":
             k = int(gaps[np.argmax(steps[gaps])])
-            message = f"run '{name}' has {len(gaps)} gaps in time, the longest from {t[k] - steps[k]:g} s to {t[k]:g} s (dt = {dt:g} s)."
+            message = (
+                f"run '{name}' has {len(gaps)} gaps in time, the longest from {t[k] - steps[k]:g} s to "
+                f"{t[k]:g} s (dt = {dt:g} s)."
+            )
             picture = Picture(f"Steps of time, run {name}", "time [s]", "step [s]", (Curve("step", t, steps),))
             found.append(
-                Finding("reading", "error", "gap", message, _SPLIT, "", ("t",), (name,), {"gaps": len(gaps), "longest_s": steps[k]}, picture)
+                Finding(
+                    "reading",
+                    "error",
+                    "gap",
+                    message,
+                    _SPLIT,
+                    "",
+                    ("t",),
+                    (name,),
+                    {"gaps": len(gaps), "longest_s": steps[k]},
+                    picture,
+                )
             )
         uneven = np.abs(steps - dt) > 1e-3 * dt
         uneven[gaps] = False
         if uneven.any():
             most = float(np.max(np.abs(steps - dt)[uneven]))
-            message = f"run '{name}': {int(uneven.sum())} of {len(steps)} steps of t differ from {dt:g} s, by up to {most:.2g} s."
-            found.append(_error("uneven time", message, todo="Resample the run to a uniform t.", runs=(name,), steps=int(uneven.sum())))
+            message = (
+                f"run '{name}': {int(uneven.sum())} of {len(steps)} steps of t differ from {dt:g} s, by up to "
+                f"{most:.2g} s."
+            )
+            found.append(
+                _error(
+                    "uneven time",
+                    message,
+                    todo="Resample the run to a uniform t.",
+                    runs=(name,),
+                    steps=int(uneven.sum()),
+                )
+            )
             start = rows["t"].to_numpy()[0]
-            rows["t"] = start + np.round((rows["t"].to_numpy() - start) / dt) * dt  # near enough for the checks that follow
+            rows["t"] = (
+                start + np.round((rows["t"].to_numpy() - start) / dt) * dt
+            )  # near enough for the checks that follow
         first = rows["t"].to_numpy()[:1]
         if len(first) and abs(first[0]) > 0.5 * dt:
             late[name] = float(first[0])
     if late:
-        message = f"t does not begin at 0 in {len(late)} of {len(frames)} runs: {some([f'{k} at {v:g} s' for k, v in late.items()])}."
+        message = (
+            f"t does not begin at 0 in {len(late)} of {len(frames)} runs: "
+            f"{some([f'{k} at {v:g} s' for k, v in late.items()])}."
+        )
         found.append(
-            Finding("reading", "note", "late start", message, todo="Nothing: time is counted inside each run.", runs=tuple(late), channels=("t",))
+            Finding(
+                "reading",
+                "note",
+                "late start",
+                message,
+                todo="Nothing: time is counted inside each run.",
+                runs=tuple(late),
+                channels=("t",),
+            )
         )
 
 
 def _turn(frames: dict[str, pd.DataFrame]) -> float:
-    """A whole turn of the headings as they stand: 2 pi, or 360 where they jump by more than two turns (degrees that nobody declared)."""
+    """A whole turn of the headings as they stand: 2 pi, or 360 where they jump by more than two turns (degrees that
+    nobody declared)."""
     most = max((np.max(np.abs(_heading_steps(rows)), initial=0.0) for rows in frames.values()), default=0.0)
     return 360.0 if most > 4.0 * np.pi else 2.0 * np.pi
 
@@ -222,7 +323,8 @@ def _heading_steps(rows: pd.DataFrame) -> np.ndarray:
 
 
 def _runs(
-    frames: dict[str, pd.DataFrame], owner: dict[str, str], description: Description, inputs: tuple[str, ...], dt: float, turn: float, where: str,
+    frames: dict[str, pd.DataFrame], owner: dict[str, str], description: Description, inputs: tuple[str, ...],
+    dt: float, turn: float, where: str,
     found: list[Finding],
 ) -> tuple[list[Run], dict[str, str]]:  # fmt: skip
     """Whole pieces of every run, and which run each is a piece of; owner: name of a frame -> the run's."""
@@ -237,6 +339,15 @@ def _runs(
         for i, part in enumerate(pieces, 1):
             run = name if len(pieces) == 1 else f"{name}#{i}"
             meta = {"group": owner[name], **meta}
-            runs.append(Run(run, part["t"].to_numpy(), part[list(STATES)].to_numpy(), part[list(inputs)].to_numpy(), inputs, meta))
+            runs.append(
+                Run(
+                    run,
+                    part["t"].to_numpy(),
+                    part[list(STATES)].to_numpy(),
+                    part[list(inputs)].to_numpy(),
+                    inputs,
+                    meta,
+                )
+            )
             parent[run] = owner[name]
     return runs, parent

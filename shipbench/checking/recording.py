@@ -17,10 +17,14 @@ from .statistics import stretches
 class Recording:
     """A data set to check.
 
-    dataset: runs without missing values, uniform in time (pieces of one run share the group `parent`). given: dataset.toml as written, {} for a
-    registered set. recorded: columns that stand in the table (states that were filled in do not). wrapped: runs whose heading was wrapped.
-    parent: id of a piece -> id of the run that it is a piece of. turned: u, v were velocities over ground, turned into the ship's axes by psi: the
-    track says nothing of psi. turn: a whole turn in the unit of psi (degrees that nobody declared are read as they are).
+    dataset: runs without missing values, uniform in time (pieces of one run share the group `parent`). given:
+    dataset.toml as written, {} for a
+    registered set. recorded: columns that stand in the table (states that were filled in do not). wrapped: runs whose
+    heading was wrapped.
+    parent: id of a piece -> id of the run that it is a piece of. turned: u, v were velocities over ground, turned into
+    the ship's axes by psi: the
+    track says nothing of psi. turn: a whole turn in the unit of psi (degrees that nobody declared are read as they
+    are).
     """
 
     dataset: Dataset
@@ -57,13 +61,14 @@ class Recording:
 
     @cached_property
     def steps(self) -> np.ndarray:
-        """(10,) step in which each state is recorded, or less: of the changes between neighbours one in a hundred is smaller; 0: none."""
+        """(10,) step in which each state is recorded, or less: of the changes between neighbours one in a hundred is
+        smaller; 0: none."""
         changes = np.abs(np.concatenate([np.diff(run.states, axis=0) for run in self.runs]))
         return np.array([np.quantile(c[c > 0.0], 0.01) if np.any(c > 0.0) else 0.0 for c in changes.T])
 
     def rounded(self, channel: int) -> bool:
-        """Whether a state is recorded in steps of the size of its changes, so that it may well repeat itself (1 % of the changes in noise are smaller
-        than a fiftieth of the median)."""
+        """Whether a state is recorded in steps of the size of its changes, so that it may well repeat itself (1 % of
+        the changes in noise are smaller than a fiftieth of the median)."""
         changes = np.abs(np.concatenate([np.diff(run.states[:, channel]) for run in self.runs]))
         return bool(np.any(changes > 0.0) and self.steps[channel] > 0.1 * np.median(changes[changes > 0.0]))
 
@@ -84,7 +89,16 @@ class Recording:
                     runs.append(run)
                 elif b - a >= 2:
                     piece, name = f"{run.id}/{number}", self.name_of(run)
-                    runs.append(Run(piece, run.t[a:b], run.states[a:b], run.inputs[a:b], run.inputs_names, {"group": name, **run.meta}))
+                    runs.append(
+                        Run(
+                            piece,
+                            run.t[a:b],
+                            run.states[a:b],
+                            run.inputs[a:b],
+                            run.inputs_names,
+                            {"group": name, **run.meta},
+                        )
+                    )
                     parent[piece] = name
         return replace(self, dataset=self.dataset.with_runs(runs), parent=parent)
 

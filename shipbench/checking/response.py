@@ -1,7 +1,9 @@
-"""Actuators against what they do: a rudder or shaft whose record is late against the motion, a motion late against them, late orders.
+"""Actuators against what they do: a rudder or shaft whose record is late against the motion, a motion late against
+them, late orders.
 
-Changes of yaw rate, surge, rudder and shaft over some seconds are regressed on the integrals of what causes them, with the record of the cause
-moved in time. A cause acts at once, so the move that leaves the least squares is the lag of the record.
+Changes of yaw rate, surge, rudder and shaft over some seconds are regressed on the integrals of what causes them, with
+the record of the cause moved in time. A cause acts at once, so the move that leaves the least squares is the lag of the
+record.
 """
 
 from __future__ import annotations
@@ -26,13 +28,15 @@ _Columns = Callable[[np.ndarray, np.ndarray, _Shift], tuple[np.ndarray, list[np.
 
 @dataclass(frozen=True)
 class _Pair:
-    """A cause and its effect. columns: (states (T, 10), inputs, shift) -> effect (T,) and causes [(T,), ...], where shift moves a channel in time.
+    """A cause and its effect. columns: (states (T, 10), inputs, shift) -> effect (T,) and causes [(T,), ...], where
+    shift moves a channel in time.
 
-    late, early: smallest lag of the cause, or lead, that is reported [s at 130 m], and the log likelihood that it must gain. agreed: what a lag must
-    gain where the actuator waits for its order, too. Noise in the motion and forces that are not recorded make the rudder seem late, never early;
+    late, early: smallest lag of the cause, or lead, that is reported [s at 130 m], and the log likelihood that it must
+    gain. agreed: what a lag must gain where the actuator waits for its order, too. Noise in the motion and forces that
+    are not recorded make the rudder seem late, never early;
     early None: a lead is not told from the dead time of a gear.
-    of: the state of the effect. order: the cause is an order, which is held until the next sample, and windows that it does not explain count; else
-    these are left out.
+    of: the state of the effect. order: the cause is an order, which is held until the next sample, and windows that it
+    does not explain count; else these are left out.
     """
 
     cause: str
@@ -54,7 +58,16 @@ def _yaw(S: np.ndarray, orders: np.ndarray, shift: _Shift) -> tuple[np.ndarray, 
 
 def _surge(S: np.ndarray, orders: np.ndarray, shift: _Shift) -> tuple[np.ndarray, list[np.ndarray]]:
     u, v, r, delta, n = S[:, U], S[:, V], S[:, R], S[:, DELTA], shift(S[:, N])
-    return u, [n * np.abs(n), n * u, u * np.abs(u), v * r, r * r, delta**2 * u * np.abs(u), delta**2 * n * np.abs(n), np.ones(len(S))]
+    return u, [
+        n * np.abs(n),
+        n * u,
+        u * np.abs(u),
+        v * r,
+        r * r,
+        delta**2 * u * np.abs(u),
+        delta**2 * n * np.abs(n),
+        np.ones(len(S)),
+    ]
 
 
 def _gear(actuator: int) -> _Columns:
@@ -102,7 +115,9 @@ class _Search:
     @property
     def gain(self) -> float:
         """Log likelihood gained by the lag."""
-        return 0.5 * self.windows * float(np.log((self.squares[self.plain] + 1e-300) / (self.squares[self.best] + 1e-300)))
+        return (
+            0.5 * self.windows * float(np.log((self.squares[self.plain] + 1e-300) / (self.squares[self.best] + 1e-300)))
+        )
 
 
 def _search(recording: Recording, pair: _Pair) -> _Search | None:
@@ -114,10 +129,15 @@ def _search(recording: Recording, pair: _Pair) -> _Search | None:
     margin = int(np.ceil(lags[-1] / recording.dt))
     lengths = np.array([len(run) for run in recording.runs])
     ends = np.cumsum(lengths)
-    windows = np.concatenate([np.arange(b - n + margin, b - margin - ahead - edge + 1, ahead) for n, b in zip(lengths, ends, strict=True)])
+    windows = np.concatenate(
+        [np.arange(b - n + margin, b - margin - ahead - edge + 1, ahead) for n, b in zip(lengths, ends, strict=True)]
+    )
     if len(windows) < THRESHOLDS.count("lag_windows"):
         return None
-    S, orders = np.concatenate([run.states for run in recording.runs]), np.concatenate([run.inputs for run in recording.runs])
+    S, orders = (
+        np.concatenate([run.states for run in recording.runs]),
+        np.concatenate([run.inputs for run in recording.runs]),
+    )
     place, first, last = np.arange(len(S)), np.repeat(ends - lengths, lengths), np.repeat(ends - 1, lengths)
 
     def rows(lag: float) -> tuple[np.ndarray, np.ndarray]:
@@ -134,21 +154,26 @@ def _search(recording: Recording, pair: _Pair) -> _Search | None:
     keep = np.ones(len(y), dtype=bool)
     for _ in range(0 if pair.order else 2):
         keep = inliers(y - X @ np.linalg.lstsq(X[keep], y[keep], rcond=None)[0])
-    left = [float(np.mean((y[keep] - X[keep] @ np.linalg.lstsq(X[keep], y[keep], rcond=None)[0]) ** 2)) for y, X in map(rows, lags)]
+    left = [
+        float(np.mean((y[keep] - X[keep] @ np.linalg.lstsq(X[keep], y[keep], rcond=None)[0]) ** 2))
+        for y, X in map(rows, lags)
+    ]
     return _Search(lags, np.array(left), int(keep.sum()))
 
 
 def _changes(values: np.ndarray, windows: np.ndarray, ahead: int, edge: int) -> np.ndarray:
-    """(windows, P): mean of values (T, P) over an edge less the mean over the edge `ahead` samples before; windows: their first samples."""
+    """(windows, P): mean of values (T, P) over an edge less the mean over the edge `ahead` samples before; windows:
+    their first samples."""
     samples = windows[:, None] + np.arange(edge)
     return np.asarray((values[samples + ahead] - values[samples]).mean(axis=1))
 
 
 def check(recording: Recording) -> list[Finding]:
-    """At most one finding for each pair; none where actuators are commands: the lag is that of the gear then. A motion that import made of another
-    is not asked.
+    """At most one finding for each pair; none where actuators are commands: the lag is that of the gear then. A motion
+    that import made of another is not asked.
 
-    Where rudder or revolutions are missing from the record, what they do is laid on the other's lag: the motion is not asked.
+    Where rudder or revolutions are missing from the record, what they do is laid on the other's lag: the motion is not
+    asked.
     """
     if recording.dataset.actuators != "measured" or command_like(recording):
         return []
@@ -160,7 +185,8 @@ def check(recording: Recording) -> list[Finding]:
     waits = {cause: -float(s.lags[s.best]) for cause, s in searches.items() if s is not None and s.gain >= least}
     found = [
         f for pair in asked
-        if (s := searches[pair.cause]) is not None and (f := _judge(recording, pair, s, waits.get(f"{pair.cause}_c", 0.0))) is not None
+        if (s := searches[pair.cause]) is not None and (f := _judge(recording, pair, s,
+                waits.get(f"{pair.cause}_c", 0.0))) is not None
     ]  # fmt: skip
     motion = [f for f in found if f.channels == _MOTION]  # rudder and shaft may both say it
     return [f for f in found if f not in motion] + sorted(motion, key=lambda f: -f.evidence["gain"])[:1]
@@ -188,12 +214,18 @@ def _judge(recording: Recording, pair: _Pair, found: _Search, waits: float) -> F
     else:
         return None
     share = float(np.sqrt(found.squares[found.best] / found.squares[found.plain]))
-    text = f"{said}. Moved so, a regression of the {pair.effect} leaves {share:.0%} of what it leaves as recorded ({found.windows} windows)."
-    curve = Curve(f"{pair.effect} by {pair.cause}", found.lags, np.sqrt(found.squares / found.squares[found.plain]), ".-")
+    text = (
+        f"{said}. Moved so, a regression of the {pair.effect} leaves {share:.0%} of what it leaves as recorded "
+        f"({found.windows} windows)."
+    )
+    curve = Curve(
+        f"{pair.effect} by {pair.cause}", found.lags, np.sqrt(found.squares / found.squares[found.plain]), ".-"
+    )
     title = f"What the causes of the {pair.effect} leave, with {pair.cause} moved in time"
     picture = Picture(title, "lag of the record [s]", "left, as recorded = 1", (curve,))
     return Finding(
-        "response", "warning", "lag", text, toml_line({"delay": {k: round(v, 3) for k, v in line.items()}}), todo, tuple(line),
+        "response", "warning", "lag", text, toml_line({"delay": {k: round(v, 3) for k, v in line.items()}}), todo,
+        tuple(line),
         evidence={"lag_s": lag, "gain": found.gain, "windows": found.windows}, picture=picture,
     )  # fmt: skip
 

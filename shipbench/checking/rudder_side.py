@@ -1,4 +1,5 @@
-"""The side to which the recorded rudder turns the recorded yaw rate: a reversed rudder, and a mirrored heading, are told by it."""
+"""The side to which the recorded rudder turns the recorded yaw rate: a reversed rudder, and a mirrored heading, are
+told by it."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from .thresholds import THRESHOLDS
 
 @dataclass(frozen=True)
 class Side:
-    """sign: +1 where the recorded rudder turns the recorded yaw rate to its own side, -1 to the other, 0 where it is not clear."""
+    """sign: +1 where the recorded rudder turns the recorded yaw rate to its own side, -1 to the other, 0 where it is
+    not clear."""
 
     sign: float = 0.0
     evidence: str = ""
@@ -33,7 +35,9 @@ def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
     ahead, width, lag = (max(1, round(seconds * froude / dataset.dt)) for seconds in times)
     rows, turns = [], []
     for S in (run.states for run in runs):
-        idle = (S[:, F_B] == 0.0) & (S[:, F_S] == 0.0) & (S[:, U] * np.sign(np.median(S[:, U])) > 0.0) & (S[:, N] >= 0.0)
+        idle = (
+            (S[:, F_B] == 0.0) & (S[:, F_S] == 0.0) & (S[:, U] * np.sign(np.median(S[:, U])) > 0.0) & (S[:, N] >= 0.0)
+        )
         for a, b in stretches(idle):
             at = np.arange(a, b - ahead, max(1, ahead // 2))
             if len(at):
@@ -41,7 +45,12 @@ def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
                 rows.append(block - block.mean(axis=0))
             at = np.arange(a + lag, b - width, max(1, width // 2))
             turned, helm = (np.concatenate([[0.0], np.cumsum(S[:, channel])]) for channel in (R, DELTA))
-            turns.append(np.stack([(turned[at + width] - turned[at]) * dataset.dt, (helm[at + width - lag] - helm[at - lag]) / width], axis=-1))
+            turns.append(
+                np.stack(
+                    [(turned[at + width] - turned[at]) * dataset.dt, (helm[at + width - lag] - helm[at - lag]) / width],
+                    axis=-1,
+                )
+            )
     turn, helm = np.concatenate(turns).T if turns else np.zeros((2, 0))
     clear = np.abs(turn) > np.deg2rad(THRESHOLDS.value("side_turn")) * unit
     turn, helm = turn[clear], helm[clear]
@@ -54,7 +63,8 @@ def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
         return Side()
     against = int(np.sum(turn * helm < 0.0))
     text = (
-        f"In {against} of {len(turn)} turns the ship turns against the recorded rudder (correlation {likeness:.2f}). The rudder sign looks reversed."
+        f"In {against} of {len(turn)} turns the ship turns against the recorded rudder (correlation "
+        f"{likeness:.2f}). The rudder sign looks reversed."
     )
     return Side(sign, text)
 

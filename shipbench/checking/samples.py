@@ -22,9 +22,14 @@ def _equal(run: Run, channels: Sequence[int]) -> np.ndarray:
 
 
 def _moving(recording: Recording, run: Run, channels: Sequence[int]) -> np.ndarray:
-    """(samples - 1,): steps in which the channel ought to change: the ship makes way, and for psi, v and r turns (by r, or by psi)."""
+    """(samples - 1,): steps in which the channel ought to change: the ship makes way, and for psi, v and r turns (by r,
+    or by psi)."""
     S = run.states
-    way = np.hypot(np.diff(S[:, X]), np.diff(S[:, Y])) / recording.dt if X not in channels else np.hypot(S[1:, U], S[1:, V])
+    way = (
+        np.hypot(np.diff(S[:, X]), np.diff(S[:, Y])) / recording.dt
+        if X not in channels
+        else np.hypot(S[1:, U], S[1:, V])
+    )
     wide = max(3, round(2.0 * recording.froude / recording.dt)) | 1
     way = _averaged(way, wide)
     ahead = way > 0.2 * recording.speed
@@ -83,8 +88,11 @@ def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[F
             + f": the sensor is slower than the grid of {recording.dt:g} s or out of step with it."
         )
         findings.append(Finding(
-            "samples", "note", "repeated samples", text, todo="Nothing for fits over seconds; do not differentiate the position sample by sample.",
-            channels=tuple(STATES[c] for c in channels), evidence={"share": usual}, picture=_repeats_picture(recording, channels, repeats),
+            "samples", "note", "repeated samples", text,
+            todo="Nothing for fits over seconds; do not differentiate "
+                 "the position sample by sample.",
+            channels=tuple(STATES[c] for c in channels), evidence={"share": usual},
+            picture=_repeats_picture(recording, channels, repeats),
         ))  # fmt: skip
     return findings
 
@@ -121,7 +129,9 @@ def _visible(recording: Recording, run: Run, channels: Sequence[int], a: int, b:
     return abs(float(apart[b] - apart[a]) - (b - a) * usual) > hidden
 
 
-def _frozen(recording: Recording, name: str, channels: Sequence[int], stops: dict[str, list[tuple[int, int]]]) -> list[Finding]:
+def _frozen(
+    recording: Recording, name: str, channels: Sequence[int], stops: dict[str, list[tuple[int, int]]]
+) -> list[Finding]:
     """One finding on the standstills (run id -> first and last sample) of a channel in all runs."""
     runs = [run for run in recording.runs if stops.get(run.id)]
     if not runs:
@@ -135,12 +145,15 @@ def _frozen(recording: Recording, name: str, channels: Sequence[int], stops: dic
         intervals = cuts.setdefault(recording.name_of(run), {"cut": []})["cut"]
         intervals.extend([float(run.t[i]), float(run.t[j])] for i, j in stops[run.id])
     text = (
-        f"{name} stand{'s' * (len(keys) == 1)} still at one value while the ship moves on, {times(total, len(cuts))}; longest for "
+        f"{name} stand{'s' * (len(keys) == 1)} still at one value while the ship moves on, "
+        f"{times(total, len(cuts))}; longest for "
         f"{seconds:.3g} s, from {worst.t[a]:g} s to {worst.t[b]:g} s of '{recording.name_of(worst)}'."
     )
     part = slice(max(0, a - 3 * (b - a)), min(len(worst), b + 3 * (b - a)))
     curves = tuple(Curve(STATES[c], worst.t[part], worst.states[part, c] - worst.states[a, c], ".-") for c in channels)
-    picture = Picture(f"{name} in run {recording.name_of(worst)}, less the frozen value", "time [s]", labelled(*keys), curves)
+    picture = Picture(
+        f"{name} in run {recording.name_of(worst)}, less the frozen value", "time [s]", labelled(*keys), curves
+    )
     line, figures = toml_line({"runs": cuts}), {"times": total, "longest_s": seconds}
     return [Finding("samples", "warning", "frozen", text, line, "", keys, tuple(cuts), figures, picture)]
 
@@ -152,7 +165,12 @@ def _repeats_picture(recording: Recording, channels: Sequence[int], repeats: lis
     first = int(np.argmax(repeats[i]))
     part = slice(max(0, first - 30), first + 60)
     step = np.hypot(*np.diff(run.states[:, list(channels)], axis=0).T)
-    return Picture(f"Steps of x, y in run {recording.name_of(run)}", "time [s]", "step [m]", (Curve("step", run.t[1:][part], step[part], ".-"),))
+    return Picture(
+        f"Steps of x, y in run {recording.name_of(run)}",
+        "time [s]",
+        "step [m]",
+        (Curve("step", run.t[1:][part], step[part], ".-"),),
+    )
 
 
 def _stuck(recording: Recording, channel: int) -> list[Finding]:
@@ -192,9 +210,12 @@ def _quantised(recording: Recording) -> list[Finding]:
         return []
     text = f"delta is recorded in steps of {np.rad2deg(step):.2f} deg: {len(levels)} values in {len(values)} samples."
     counts = np.array([np.sum(np.abs(values - level) < 0.5 * step) for level in levels])
-    picture = Picture("Values of delta", "delta [deg]", "samples", (Curve("samples", np.rad2deg(levels), counts.astype(float), "."),))
+    picture = Picture(
+        "Values of delta", "delta [deg]", "samples", (Curve("samples", np.rad2deg(levels), counts.astype(float), "."),)
+    )
     return [Finding(
-        "samples", "note", "quantised", text, todo="Nothing; a rudder offset below half a step cannot be told.", channels=("delta",),
+        "samples", "note", "quantised", text, todo="Nothing; a rudder offset below half a step cannot be told.",
+        channels=("delta",),
         evidence={"step_rad": step, "levels": len(levels)}, picture=picture,
     )]  # fmt: skip
 

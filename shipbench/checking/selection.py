@@ -13,10 +13,13 @@ from .thresholds import THRESHOLDS
 
 @dataclass(frozen=True)
 class Chosen:
-    """Explanations in the order of choice, coefficients and standard errors of each, and the share of the plain squares that models leave.
+    """Explanations in the order of choice, coefficients and standard errors of each, and the share of the plain squares
+    that models leave.
 
-    left: "plain", every explanation alone, and "all chosen" -> root of squares left over root of the squares of `whole`. held: explanation -> squares
-    that all chosen ones leave in runs held out of the fit, over those that the others leave there without it. out: mean square that all leave there.
+    left: "plain", every explanation alone, and "all chosen" -> root of squares left over root of the squares of
+    `whole`. held: explanation -> squares
+    that all chosen ones leave in runs held out of the fit, over those that the others leave there without it. out: mean
+    square that all leave there.
     """
 
     names: tuple[str, ...]
@@ -54,7 +57,9 @@ def select(
         """Squares that a fit to every other cluster leaves in those between, and the other way round."""
         X = np.column_stack([nuisance, *(groups[n] for n in names)])
         odd = np.unique(cluster, return_inverse=True)[1] % 2 == 1
-        return sum(float(np.sum((y[~a] - X[~a] @ np.linalg.lstsq(X[a], y[a], rcond=None)[0]) ** 2)) for a in (odd, ~odd))
+        return sum(
+            float(np.sum((y[~a] - X[~a] @ np.linalg.lstsq(X[a], y[a], rcond=None)[0]) ** 2)) for a in (odd, ~odd)
+        )
 
     least = THRESHOLDS.value("explanation_gain")
 
@@ -84,17 +89,21 @@ def select(
     held = {out: held_out([n for n in names if n != out]) for out in names}
     every = held_out(names)
     return Chosen(
-        tuple(names), value, sd, left | {"all chosen": share(now.squares)}, len(y), {n: every / max(without, 1e-300) for n, without in held.items()},
+        tuple(names), value, sd, left | {"all chosen": share(now.squares)}, len(y),
+        {n: every / max(without, 1e-300) for n, without in held.items()},
         every / len(y),
     )  # fmt: skip
 
 
 def _gain(old: Fit, new: Fit, more: int) -> float:
-    return new.rows * float(np.log(max(old.squares, 1e-300) / max(new.squares, 1e-300))) - more * float(np.log(new.rows))
+    return new.rows * float(np.log(max(old.squares, 1e-300) / max(new.squares, 1e-300))) - more * float(
+        np.log(new.rows)
+    )
 
 
 def _trimmed(y: np.ndarray, X: np.ndarray, parts: int) -> np.ndarray:
-    """Rows that the richest model does not leave far out: jumps and spikes are found by other checks and must not decide here."""
+    """Rows that the richest model does not leave far out: jumps and spikes are found by other checks and must not
+    decide here."""
     keep = np.ones(len(y), dtype=bool)
     for _ in range(4):
         value, *_ = np.linalg.lstsq(X[keep], y[keep], rcond=None)

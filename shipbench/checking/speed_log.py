@@ -1,7 +1,8 @@
-"""A speed log that reads nothing where the ship makes way: below some speed (a Doppler log, a receiver that holds still), or now and then.
+"""A speed log that reads nothing where the ship makes way: below some speed (a Doppler log, a receiver that holds
+still), or now and then.
 
-What makes no way through the water drifts with it, steadily for a minute or two. Where a log reads nothing, and the track departs from the nearest
-steady drift by what the log explains nothing of, the log is wrong.
+What makes no way through the water drifts with it, steadily for a minute or two. Where a log reads nothing, and the
+track departs from the nearest steady drift by what the log explains nothing of, the log is wrong.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from .thresholds import THRESHOLDS
 
 @dataclass(frozen=True)
 class Silence:
-    """level: speed [m/s] up to which the log says nothing; pieces that show it, and their share of the samples; departure: the greatest of the track
-    from a steady drift [m], and its seconds; worst: the run with that."""
+    """level: speed [m/s] up to which the log says nothing; pieces that show it, and their share of the samples;
+    departure: the greatest of the track from a steady drift [m], and its seconds; worst: the run with that."""
 
     level: float
     pieces: int
@@ -56,19 +57,26 @@ def silence(dataset: Dataset) -> Silence | None:
                     samples += len(S)
     if len(found) < THRESHOLDS.count("silent_pieces"):
         return None
-    return Silence(float(np.hypot(u, v)), len(found), samples / sum(map(len, dataset.runs)), *max(found, key=lambda shown: shown[0]))
+    return Silence(
+        float(np.hypot(u, v)),
+        len(found),
+        samples / sum(map(len, dataset.runs)),
+        *max(found, key=lambda shown: shown[0]),
+    )
 
 
 def in_words(found: Silence) -> str:
     """Sentence on the dropout, with its figures."""
     return (
-        f"u and v read nothing (below {found.level:.2g} m/s) in {found.pieces} pieces, {found.share:.0%} of the samples, but the ship makes way "
+        f"u and v read nothing (below {found.level:.2g} m/s) in {found.pieces} pieces, {found.share:.0%} of the "
+        "samples, but the ship makes way "
         f"there: the track departs from a steady drift by up to {found.departure:.3g} m in {found.seconds:.3g} s."
     )
 
 
 def _departures(S: np.ndarray, dt: float) -> tuple[float, float]:
-    """Greatest distance [m] of the track from the steady drift that is nearest, as recorded and less the way by u and v."""
+    """Greatest distance [m] of the track from the steady drift that is nearest, as recorded and less the way by u and
+    v."""
     track = S[:, X] + 1j * S[:, Y]
     way = cumulative_trapezoid((S[:, U] + 1j * S[:, V]) * np.exp(1j * S[:, PSI]), dx=dt, initial=0.0)
     line = np.column_stack([np.ones(len(S)), np.arange(len(S))]).astype(complex)
@@ -84,10 +92,15 @@ def check(recording: Recording) -> list[Finding]:
         return []
     run = found.worst
     by_track = np.hypot(*np.gradient(run.states[:, [X, Y]], run.t, axis=0).T)
-    curves = (Curve("u", run.t, run.states[:, U]), Curve("v", run.t, run.states[:, V]), Curve("speed of the track", run.t, by_track))
+    curves = (
+        Curve("u", run.t, run.states[:, U]),
+        Curve("v", run.t, run.states[:, V]),
+        Curve("speed of the track", run.t, by_track),
+    )
     return [Finding(
         "speed_log", "error", "log reads nothing", in_words(found), channels=("u", "v"),
-        todo="Import it again without u and v: `shipbench data import` takes them from the track then, as `shipbench diagnose` does by itself.",
+        todo="Import it again without u and v: `shipbench data import` takes them from the track then, as "
+             "`shipbench diagnose` does by itself.",
         evidence={"level": found.level, "pieces": found.pieces, "share": found.share, "departure_m": found.departure},
         picture=Picture(f"Speed in run {recording.name_of(run)}", "time [s]", labelled("u", "v"), curves),
     )]  # fmt: skip

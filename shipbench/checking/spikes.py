@@ -1,8 +1,8 @@
 """Outliers (single samples away from their neighbours) and jumps (of position or heading, that stay).
 
-A spike stands far off the mean of its neighbours while these agree among themselves; far is eight robust deviations of all such differences of the
-channel. Positions and heading are looked at after their integrals (of the speeds, of the yaw rate) are taken off. A jump is a step of that
-difference that stays, when spikes are filled.
+A spike stands far off the mean of its neighbours while these agree among themselves; far is eight robust deviations of
+all such differences of the channel. Positions and heading are looked at after their integrals (of the speeds, of the
+yaw rate) are taken off. A jump is a step of that difference that stays, when spikes are filled.
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ def _off(values: np.ndarray) -> np.ndarray:
 
 def find_spikes(recording: Recording) -> dict[int, dict[str, np.ndarray]]:
     """channel -> run id -> indices of the samples."""
-    measured = recording.dataset.actuators == "measured" and not command_like(recording)  # commands may well come for one sample only
+    measured = recording.dataset.actuators == "measured" and not command_like(
+        recording
+    )  # commands may well come for one sample only
     levels = {run.id: _levels(recording, run, measured) for run in recording.runs if len(run) >= 7}
     states = {run.id: run.states for run in recording.runs}
     found: dict[int, dict[str, np.ndarray]] = {}
@@ -67,7 +69,9 @@ def find_spikes(recording: Recording) -> dict[int, dict[str, np.ndarray]]:
         limit = max(THRESHOLDS.value("outlier_size") * usual, _least(recording, channel, list(values.values())))
         for name, v in values.items():
             d = np.abs(np.diff(v))
-            near = np.maximum(np.maximum(d[:-3], d[3:]), np.abs(v[3:-1] - v[1:-3]))  # neighbours among themselves, without the sample
+            near = np.maximum(
+                np.maximum(d[:-3], d[3:]), np.abs(v[3:-1] - v[1:-3])
+            )  # neighbours among themselves, without the sample
             off = np.abs(_off(v))
             at = np.flatnonzero((off > limit) & (off > THRESHOLDS.value("outlier_ratio") * near)) + 2
             at = at[~_held(states[name], channel)[at]]
@@ -100,13 +104,17 @@ def _without(recording: Recording, found: dict[int, dict[str, np.ndarray]]) -> R
 def check(recording: Recording) -> list[Finding]:
     """Spikes of every channel, then jumps of position and heading."""
     spikes = find_spikes(recording)
-    return [_spikes(recording, channel, by_run) for channel, by_run in spikes.items()] + _jumps(_without(recording, spikes))
+    return [_spikes(recording, channel, by_run) for channel, by_run in spikes.items()] + _jumps(
+        _without(recording, spikes)
+    )
 
 
 def _spikes(recording: Recording, channel: int, by_run: dict[str, np.ndarray]) -> Finding:
     name = STATES[channel]
     runs = {run.id: run for run in recording.runs}
-    sizes = {k: float(np.max(np.abs(_off(_levels(recording, runs[k], True)[channel])[at - 2]))) for k, at in by_run.items()}
+    sizes = {
+        k: float(np.max(np.abs(_off(_levels(recording, runs[k], True)[channel])[at - 2]))) for k, at in by_run.items()
+    }
     worst = max(sizes, key=lambda k: sizes[k])
     run, at = runs[worst], by_run[worst]
     total, names = sum(len(v) for v in by_run.values()), recording.names(runs[k] for k in by_run)
@@ -121,7 +129,8 @@ def _spikes(recording: Recording, channel: int, by_run: dict[str, np.ndarray]) -
     part = slice(max(0, int(at[0]) - 20), int(at[0]) + 21)
     picture = Picture(
         f"{name} in run {recording.name_of(run)}", "time [s]", labelled(name),
-        (Curve(name, run.t[part], run.states[part, channel], ".-"), Curve("outlier", run.t[at[:1]], run.states[at[:1], channel], "o")),
+        (Curve(name, run.t[part], run.states[part, channel], ".-"),
+            Curve("outlier", run.t[at[:1]], run.states[at[:1], channel], "o")),
     )  # fmt: skip
     return Finding(
         "spikes",
@@ -138,7 +147,8 @@ def _spikes(recording: Recording, channel: int, by_run: dict[str, np.ndarray]) -
 
 
 def _jumps(recording: Recording) -> list[Finding]:
-    """Steps of position less integrated speeds, and of heading less integrated yaw rate, that stay; both at once along the motion: the clock's."""
+    """Steps of position less integrated speeds, and of heading less integrated yaw rate, that stay; both at once along
+    the motion: the clock's."""
     levels = {run.id: _levels(recording, run) for run in recording.runs if len(run) >= 9}
     combined = {channels: {k: _combined(each, channels) for k, each in levels.items()} for channels in _PLACES}
     at = {channels: _places(recording, channels, combined[channels]) for channels in _PLACES if levels}
@@ -170,7 +180,9 @@ def _places(recording: Recording, channels: tuple[int, ...], levels: dict[str, n
         if run.id not in levels:
             continue
         v, size = levels[run.id], _steps(levels[run.id], run.states, channels[0])
-        if made & set(recording.dataset.derived):  # rates smoothed of this very record lag behind a sharp turn: a jump stands out by itself
+        if made & set(
+            recording.dataset.derived
+        ):  # rates smoothed of this very record lag behind a sharp turn: a jump stands out by itself
             size = np.minimum(size, _beside(run.states, channels))
         places = [int(k) for k in np.flatnonzero(size > limit) if abs(_level_change(v, int(k))) > 0.6 * limit]
         if places:
@@ -179,7 +191,8 @@ def _places(recording: Recording, channels: tuple[int, ...], levels: dict[str, n
 
 
 def _beside(S: np.ndarray, channels: tuple[int, ...]) -> np.ndarray:
-    """(samples - 1,): by how much each step of the record differs from the nearer of the steps beside it; 0 at the ends."""
+    """(samples - 1,): by how much each step of the record differs from the nearer of the steps beside it; 0 at the
+    ends."""
     d = np.diff(S[:, list(channels)], axis=0)
     off = np.minimum(*(np.linalg.norm(d[1:-1] - other, axis=1) for other in (d[:-2], d[2:])))
     return np.concatenate([[0.0], off, [0.0]])
@@ -198,26 +211,41 @@ def _level_change(v: np.ndarray, k: int) -> complex:
     return change
 
 
-def _jump(recording: Recording, channels: tuple[int, ...], at: dict[str, list[int]], levels: dict[str, np.ndarray]) -> Finding:
+def _jump(
+    recording: Recording, channels: tuple[int, ...], at: dict[str, list[int]], levels: dict[str, np.ndarray]
+) -> Finding:
     """One finding on the jumps (run id -> last sample before each) of position or heading in all runs."""
     runs = {run.id: run for run in recording.runs}
-    sizes = {(name, k): float(abs(levels[name][k + 1] - levels[name][k])) for name, places in at.items() for k in places}
+    sizes = {
+        (name, k): float(abs(levels[name][k + 1] - levels[name][k])) for name, places in at.items() for k in places
+    }
     names = recording.names(runs[r] for r in at)
     name, k = max(sizes, key=lambda place: sizes[place])
     run, v, keys, unit = runs[name], levels[name], tuple(STATES[c] for c in channels), "m" if X in channels else "rad"
     text = (
         f"{', '.join(keys)} jump{'s' * (len(keys) == 1)} {times(len(sizes), len(names))} ({some(names)}); "
-        f"the greatest by {sizes[name, k]:.3g} {unit}, from {run.t[k]:g} s to {run.t[k + 1]:g} s of '{recording.name_of(run)}'."
+        f"the greatest by {sizes[name, k]:.3g} {unit}, from {run.t[k]:g} s to {run.t[k + 1]:g} s of "
+        f"'{recording.name_of(run)}'."
     )
     cuts: dict[str, dict[str, list[list[float]]]] = {}
     for other, i in sizes:
         t = float(runs[other].t[i + 1])
         cuts.setdefault(recording.name_of(runs[other]), {"cut": []})["cut"].append([t, t])
     part = slice(max(0, k - 20), k + 22)
-    curves = tuple(Curve(STATES[c], run.t[part], f(v)[part] - f(v)[part][0], ".-") for c, f in zip(channels, (np.real, np.imag), strict=False))
-    picture = Picture(f"{', '.join(keys)} less the integral of its rate, run {recording.name_of(run)}", "time [s]", f"[{unit}]", curves)
+    curves = tuple(
+        Curve(STATES[c], run.t[part], f(v)[part] - f(v)[part][0], ".-")
+        for c, f in zip(channels, (np.real, np.imag), strict=False)
+    )
+    picture = Picture(
+        f"{', '.join(keys)} less the integral of its rate, run {recording.name_of(run)}",
+        "time [s]",
+        f"[{unit}]",
+        curves,
+    )
     figures = {"greatest": sizes[name, k], "jumps": len(sizes)}
-    return Finding("spikes", "warning", "jump", text, toml_line({"runs": cuts}), "", keys, tuple(cuts), figures, picture)
+    return Finding(
+        "spikes", "warning", "jump", text, toml_line({"runs": cuts}), "", keys, tuple(cuts), figures, picture
+    )
 
 
 CHECK = check

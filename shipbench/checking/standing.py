@@ -1,6 +1,7 @@
 """A rudder or screw that never moves in the record, though the ship does what only they can do: turn, or keep her way.
 
-A column that is missing is taken as zero, and a sensor that died gives one value. No model can predict such turns or such a way.
+A column that is missing is taken as zero, and a sensor that died gives one value. No model can predict such turns or
+such a way.
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ def _driven(dataset: Dataset) -> _Shown | None:
         return None
     speed, loss, least = float(np.mean(ends[driven, 0])), float(np.mean(lost[driven])), float(np.mean(expected[driven]))
     text = (
-        f"The revolutions are zero throughout, and the ship keeps her way, {np.sum(driven)} times in {len(ends)}: of {speed:.3g} m/s "
+        f"The revolutions are zero throughout, and the ship keeps her way, {np.sum(driven)} times in {len(ends)}: "
+        f"of {speed:.3g} m/s "
         f"{loss:.2g} m/s are lost in {seconds:.3g} s; without thrust it would be {least:.2g} m/s or more."
     )
     return text, {"lost": loss, "without_thrust": least, "driven": int(np.sum(driven)), "windows": len(ends)}
@@ -85,7 +87,10 @@ def check(recording: Recording) -> list[Finding]:
     """One finding per actuator that never moves."""
     todo = {
         "delta": "Give the rudder, or its command as delta_c; without it these turns cannot be predicted.",
-        "n": "Give the revolutions, or their command as n_c; without them speed and the flow at the rudder cannot be predicted.",
+        "n": (
+            "Give the revolutions, or their command as n_c; without them speed and the flow at the rudder cannot "
+            "be predicted."
+        ),
     }
     return [
         Finding("standing", "warning", "actuator never moves", text, "", todo[name], (name,), evidence=figures)

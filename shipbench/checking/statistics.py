@@ -1,4 +1,5 @@
-"""Least squares whose errors hold when samples of one run go together, and scales of noise that outliers do not move."""
+"""Least squares whose errors hold when samples of one run go together, and scales of noise that outliers do not
+move."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Fit:
-    """value, sd (P,): coefficients and their standard errors; p (P,): two-sided probabilities; squares: what is left; rows: number of equations."""
+    """value, sd (P,): coefficients and their standard errors; p (P,): two-sided probabilities; squares: what is left;
+    rows: number of equations."""
 
     value: np.ndarray
     sd: np.ndarray
@@ -22,7 +24,8 @@ class Fit:
 def clustered_fit(y: np.ndarray, X: np.ndarray, cluster: np.ndarray) -> Fit:
     """Regress y (T,) on X (T, P); rows of one `cluster` (T,) may depend on one another.
 
-    Sandwich covariance (Liang and Zeger 1986) with the small-sample factor G/(G-1), t distribution with G-1 degrees of freedom.
+    Sandwich covariance (Liang and Zeger 1986) with the small-sample factor G/(G-1), t distribution with G-1 degrees of
+    freedom.
     """
     from scipy.stats import t as student
 
@@ -39,7 +42,8 @@ def clustered_fit(y: np.ndarray, X: np.ndarray, cluster: np.ndarray) -> Fit:
 
 
 def clusters(run: np.ndarray, fewest: int = 12) -> np.ndarray:
-    """Cluster of each row: its run, or a stretch of its run where there are fewer than `fewest` runs. run (T,): index of the run, ascending."""
+    """Cluster of each row: its run, or a stretch of its run where there are fewer than `fewest` runs. run (T,): index
+    of the run, ascending."""
     found = np.unique(run)
     if len(found) >= fewest:
         return run
@@ -63,7 +67,8 @@ def stretches(flags: np.ndarray) -> list[tuple[int, int]]:
 
 
 def inliers(residual: np.ndarray, groups: int = 1, limit: float = 6.0) -> np.ndarray:
-    """Rows (T,) whose residual lies within `limit` robust deviations; with `groups` of 2, equations (2 T/2) of one window go together."""
+    """Rows (T,) whose residual lies within `limit` robust deviations; with `groups` of 2, equations (2 T/2) of one
+    window go together."""
     size = np.sqrt(np.sum(residual.reshape(groups, -1) ** 2, axis=0))
     typical = float(np.median(size))
     return np.tile(size <= limit * max(typical, 1e-12), groups)

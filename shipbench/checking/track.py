@@ -26,7 +26,8 @@ _OVER_GROUND = ("scale of u and v", "lag of position", "off midship")
 
 @dataclass(frozen=True)
 class Windows:
-    """Complex earth-fixed quantities (W,), north + i east, of windows; run (W,): index of the run. span: their length [s]."""
+    """Complex earth-fixed quantities (W,), north + i east, of windows; run (W,): index of the run. span: their length
+    [s]."""
 
     run: np.ndarray
     span: float
@@ -39,7 +40,8 @@ class Windows:
 
 
 def shifted(recording: Recording, late: dict[int, float]) -> list[tuple[int, np.ndarray]]:
-    """(index, states) of every run with the channels in `late` put back by so many seconds; the ends that this leaves open are cut off.
+    """(index, states) of every run with the channels in `late` put back by so many seconds; the ends that this leaves
+    open are cut off.
 
     The pieces of one run share the index of the first.
     """
@@ -61,7 +63,9 @@ def shifted(recording: Recording, late: dict[int, float]) -> list[tuple[int, np.
 def windows(recording: Recording, late: dict[int, float]) -> Windows | None:
     """All windows of the data set, each half over the next, or None where there are fewer than 12."""
     width = max(3, round(THRESHOLDS.value("track_window") * recording.froude / recording.dt))
-    pieces = [(i, S[a : a + width + 1]) for i, S in shifted(recording, late) for a in range(0, len(S) - width, width // 2)]
+    pieces = [
+        (i, S[a : a + width + 1]) for i, S in shifted(recording, late) for a in range(0, len(S) - width, width // 2)
+    ]
     if len(pieces) < THRESHOLDS.count("windows"):
         return None
     S, dt = np.stack([p for _, p in pieces]), recording.dt
@@ -69,8 +73,10 @@ def windows(recording: Recording, late: dict[int, float]) -> Windows | None:
     own = S[..., U] + 1j * S[..., V]
     return Windows(
         run=np.array([i for i, _ in pieces]), span=width * dt, moved=z[:, -1] - z[:, 0],
-        surge=np.trapezoid(S[..., U] * e, dx=dt, axis=1), sway=1j * np.trapezoid(S[..., V] * e, dx=dt, axis=1), turned=e[:, -1] - e[:, 0],
-        velocity_change=np.sum(np.diff(own, axis=1) * 0.5 * (e[:, 1:] + e[:, :-1]), axis=1), way_change=(own * e)[:, -1] - (own * e)[:, 0],
+        surge=np.trapezoid(S[..., U] * e, dx=dt, axis=1), sway=1j * np.trapezoid(S[..., V] * e, dx=dt, axis=1),
+        turned=e[:, -1] - e[:, 0],
+        velocity_change=np.sum(np.diff(own, axis=1) * 0.5 * (e[:, 1:] + e[:, :-1]), axis=1),
+        way_change=(own * e)[:, -1] - (own * e)[:, 0],
     )  # fmt: skip
 
 
@@ -84,20 +90,26 @@ def explain_windows(w: Windows, turned: bool, only: Collection[str] | None = Non
     """only: names of the explanations that are tried (None: all)."""
     way, one = w.surge + w.sway, np.full(len(w.run), w.span, dtype=complex)
     groups = {
-        "scale of u and v": _real(way), "scale of u": _real(w.surge), "scale of v": _real(w.sway), "heading reference": _real(1j * way),
-        "through water": _real(one, 1j * one), "lag of u, v": _real(w.velocity_change), "lag of position": _real(-w.way_change),
+        "scale of u and v": _real(way), "scale of u": _real(w.surge), "scale of v": _real(w.sway),
+        "heading reference": _real(1j * way),
+        "through water": _real(one, 1j * one), "lag of u, v": _real(w.velocity_change),
+        "lag of position": _real(-w.way_change),
         "lag of heading": _real(w.way_change - w.velocity_change), "off midship": _real(w.turned, 1j * w.turned),
     }  # fmt: skip
-    groups = {name: g for name, g in groups.items() if (not turned or name in _OVER_GROUND) and (only is None or name in only)}
+    groups = {
+        name: g for name, g in groups.items() if (not turned or name in _OVER_GROUND) and (only is None or name in only)
+    }
     return select(
-        _real(w.moved - way)[:, 0], groups, np.zeros((2 * len(w.run), 0)), w.run, 2, float(np.sqrt(np.mean(np.abs(w.moved) ** 2) / 2.0)) + 1e-9,
+        _real(w.moved - way)[:, 0], groups, np.zeros((2 * len(w.run), 0)), w.run, 2,
+        float(np.sqrt(np.mean(np.abs(w.moved) ** 2) / 2.0)) + 1e-9,
         exclusive=(frozenset({"scale of u and v", "scale of u"}), _LATE),
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Explained:
-    """The windows as recorded (`plain`) and with the lags put back (`mended`), what was chosen on each, and seconds of lag by channel."""
+    """The windows as recorded (`plain`) and with the lags put back (`mended`), what was chosen on each, and seconds of
+    lag by channel."""
 
     plain: Windows
     mended: Windows
@@ -113,7 +125,11 @@ def explain(recording: Recording) -> Explained | None:
     if w is None or plain is None or np.sqrt(np.mean(np.abs(w.moved) ** 2)) < 0.02 * recording.dataset.ship.L:
         return None
     first = chosen = explain_windows(w, recording.turned)
-    for _ in range(8):  # a lag is linear for small ones only; one at a time, so that the error of a great one is not put down to another
+    for _ in range(
+        8
+        # a lag is linear for small ones only; one at a time, so that the error of a great one is not put down to
+        # another
+    ):
         moves = [name for name in chosen.names if name in LAGS and abs(chosen.value[name][0]) > 0.02 * recording.dt]
         if not moves:
             break
@@ -123,11 +139,14 @@ def explain(recording: Recording) -> Explained | None:
         if again is None:
             break
         w, chosen = again, explain_windows(again, recording.turned)
-    return Explained(plain, w, first, replace(chosen, left=first.left | {"all chosen": chosen.left["all chosen"]}), late)
+    return Explained(
+        plain, w, first, replace(chosen, left=first.left | {"all chosen": chosen.left["all chosen"]}), late
+    )
 
 
 def late_velocities(recording: Recording) -> tuple[float, float] | None:
-    """Seconds by which the velocities, as a vector in the earth's axes, are late against the position, with their standard error; None if not."""
+    """Seconds by which the velocities, as a vector in the earth's axes, are late against the position, with their
+    standard error; None if not."""
     found = explain(recording)
     if found is None or "lag of position" not in found.first.sd:
         return None
@@ -136,14 +155,17 @@ def late_velocities(recording: Recording) -> tuple[float, float] | None:
 
 
 def lags(recording: Recording) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """Seconds by which the velocities in the ship's axes, and the position, are late against the other, each with its standard error over the runs,
-    whatever the speed's scale, the heading's reference and the antenna's place; None where there are too few windows."""
+    """Seconds by which the velocities in the ship's axes, and the position, are late against the other, each with its
+    standard error over the runs, whatever the speed's scale, the heading's reference and the antenna's place; None
+    where there are too few windows."""
     w = windows(recording, {})
     if w is None:
         return None
     way, cluster = w.surge + w.sway, np.tile(clusters(w.run), 2)
     off, others = _real(w.moved - way)[:, 0], (way, 1j * way, w.turned, 1j * w.turned)
-    own, position = (clustered_fit(off, _real(column, *others), cluster) for column in (w.velocity_change, -w.way_change))
+    own, position = (
+        clustered_fit(off, _real(column, *others), cluster) for column in (w.velocity_change, -w.way_change)
+    )
     return (float(own.value[0]), float(own.sd[0])), (float(position.value[0]), float(position.sd[0]))
 
 
@@ -159,7 +181,8 @@ def may_be_none(lag: tuple[float, float]) -> bool:
 
 
 def through_water(recording: Recording) -> tuple[float, float] | None:
-    """Velocity [m/s] north and east of the water that the velocities are through, the same in all runs; None if they are over ground."""
+    """Velocity [m/s] north and east of the water that the velocities are through, the same in all runs; None if they
+    are over ground."""
     found = explain(recording)
     if found is None or "through water" not in found.chosen.names:
         return None

@@ -1,10 +1,12 @@
 """Gross errors of unit and sign, found before any model is fitted, by kinematics between the channels.
 
-Increments over windows of some seconds are compared with integrals, never with differences of neighbours. Track against heading and
-speeds, heading against yaw rate: every combination of units and signs is tried with the ordinary faults of sensors left free (a scale of 15 %, a
-compass error, an antenna away from midship, a delay, a drift), and one is believed if it leaves a quarter or less of the plain reading's
-squares; of the small sway alone, three quarters, if that is beyond chance and better than no sway at all. Of combinations that explain the
-same (a mirrored track with mirrored sway is a mirrored heading), that with the fewest errors is taken, the rudder's side included.
+Increments over windows of some seconds are compared with integrals, never with differences of neighbours. Track against
+heading and
+speeds, heading against yaw rate: every combination of units and signs is tried with the ordinary faults of sensors left
+free (a scale of 15 %, a compass error, an antenna away from midship, a delay, a drift), and one is believed if it
+leaves a quarter or less of the plain reading's squares; of the small sway alone, three quarters, if that is beyond
+chance and better than no sway at all. Of combinations that explain the same (a mirrored track with mirrored sway is a
+mirrored heading), that with the fewest errors is taken, the rudder's side included.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ _REVERSED = "x and y reversed"
 class UnitFinding:
     """A channel (state or command) that is not in our unit or sign.
 
-    kind: "degrees", "knots", "sign", "degrees, sign", or "exchanged with y" (of x). factor: recorded over true (1: exchanged). evidence: in words.
+    kind: "degrees", "knots", "sign", "degrees, sign", or "exchanged with y" (of x). factor: recorded over true (1:
+    exchanged). evidence: in words.
     """
 
     channel: str
@@ -41,8 +44,8 @@ class UnitFinding:
 def check_units(dataset: Dataset) -> list[UnitFinding]:
     """Gross unit and sign errors of a data set; empty when nothing is beyond doubt.
 
-    Seen are: units and sign of psi, r, u, v; x, y or both reversed, or exchanged; unit and side of delta; unit and sign of n; units of the thrusters;
-    commands beside their actuators. Not seen is a mirror image of everything.
+    Seen are: units and sign of psi, r, u, v; x, y or both reversed, or exchanged; unit and side of delta; unit and sign
+    of n; units of the thrusters; commands beside their actuators. Not seen is a mirror image of everything.
     """
     runs = [run for run in dataset.runs if len(run) >= 3]
     if not runs:
@@ -89,7 +92,11 @@ def merged(findings: Sequence[UnitFinding]) -> list[UnitFinding]:
     found: dict[str, UnitFinding] = {}
     for f in findings:
         old = found.get(f.channel)
-        found[f.channel] = f if old is None or f.kind == _SWAPPED else _finding(f.channel, f.factor * old.factor, f"{old.evidence} {f.evidence}")
+        found[f.channel] = (
+            f
+            if old is None or f.kind == _SWAPPED
+            else _finding(f.channel, f.factor * old.factor, f"{old.evidence} {f.evidence}")
+        )
     return [f for f in found.values() if f.factor != 1.0 or f.kind == _SWAPPED]
 
 
@@ -116,13 +123,15 @@ def _signed(channel: str) -> list[float]:
 
 
 _FRAMES = {
-    "plain": np.eye(2), "y reversed": np.diag([1.0, -1.0]), "x reversed": np.diag([-1.0, 1.0]), _SWAPPED: np.array([[0.0, 1.0], [1.0, 0.0]]),
+    "plain": np.eye(2), "y reversed": np.diag([1.0, -1.0]), "x reversed": np.diag([-1.0, 1.0]),
+    _SWAPPED: np.array([[0.0, 1.0], [1.0, 0.0]]),
 }  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _Motion:
-    """Squares that readings leave: track[reading] of (frame, psi, u, v) over that of no motion, yaw[(psi, r)] likewise; empty where there is none."""
+    """Squares that readings leave: track[reading] of (frame, psi, u, v) over that of no motion, yaw[(psi, r)] likewise;
+    empty where there is none."""
 
     track: dict[_Reading, float]
     yaw: dict[tuple[float, float], float]
@@ -130,12 +139,15 @@ class _Motion:
     windows: int
 
     def choose(self, side: Side, astern: Sequence[float]) -> _Reading:
-        """The reading with the fewest errors among those that explain the data as well as any; the plain one unless it fails by far.
+        """The reading with the fewest errors among those that explain the data as well as any; the plain one unless it
+        fails by far.
         astern: signs of u with which the shaft would turn the wrong way."""
         plain = _Reading()
         suits = self._tracks(plain) if self.track else [replace(plain, psi=psi) for psi in self._headings()]
         options = [(replace(k, r=r), self.track.get(k, 0.0)) for k in suits for r in self._rates(k.psi)]
-        return min(options, key=lambda o: (o[0].errors + (side.sign * np.sign(o[0].r) < 0) + (np.sign(o[0].u) in astern), o[1]))[0]
+        return min(
+            options, key=lambda o: (o[0].errors + (side.sign * np.sign(o[0].r) < 0) + (np.sign(o[0].u) in astern), o[1])
+        )[0]
 
     def _tracks(self, plain: _Reading) -> list[_Reading]:
         """Readings of the track that suit."""
@@ -172,18 +184,27 @@ class _Motion:
         text = "Yaw rate and heading agree only if it is read so."
         if self.track:
             plain, left = self.track[_Reading()] ** 0.5, self.track[replace(chosen, r=1.0)] ** 0.5
-            text = f"The track departs from heading and speeds by {plain:.1%} of its length as recorded, by {left:.1%} read so"
+            text = (
+                f"The track departs from heading and speeds by {plain:.1%} of its length as recorded, by "
+                f"{left:.1%} read so"
+            )
             text += f" ({self.windows} windows of {self.window:.3g} s)."
         if chosen.frame == _SWAPPED:
             found.append(UnitFinding("x", _SWAPPED, 1.0, text))
         elif chosen.frame != "plain":
-            found += [UnitFinding(channel, "sign", -1.0, text) for channel in ("xy" if chosen.frame == _REVERSED else chosen.frame[0])]
+            found += [
+                UnitFinding(channel, "sign", -1.0, text)
+                for channel in ("xy" if chosen.frame == _REVERSED else chosen.frame[0])
+            ]
         for channel, factor in (("psi", chosen.psi), ("u", chosen.u), ("v", chosen.v)):
             if factor != 1.0:
                 found.append(_finding(channel, factor, text))
         if chosen.r != 1.0:
             plain, left = self.yaw[chosen.psi, 1.0], self.yaw[chosen.psi, chosen.r]
-            text = f"The heading departs from the integrated yaw rate by {plain**0.5:.1%} of it as recorded, by {left**0.5:.1%} read so."
+            text = (
+                f"The heading departs from the integrated yaw rate by {plain**0.5:.1%} of it as recorded, by "
+                f"{left**0.5:.1%} read so."
+            )
             found.append(_finding("r", chosen.r, text))
         return found
 
@@ -201,7 +222,9 @@ def _motion(dataset: Dataset, runs: Sequence[Run]) -> _Motion:
     moved, turned = S[:, -1, [X, Y]] - S[:, 0, [X, Y]], S[:, -1, PSI] - S[:, 0, PSI]
     track: dict[_Reading, float] = {}
     whole = float(np.sum(moved**2))
-    headings = [f for f in _signed("psi") if abs(f) == 1.0 or np.ptp(S[..., PSI]) > 2.0 * np.pi]  # degrees: else all courses would be one
+    headings = [
+        f for f in _signed("psi") if abs(f) == 1.0 or np.ptp(S[..., PSI]) > 2.0 * np.pi
+    ]  # degrees: else all courses would be one
     if whole > len(S) * (0.02 * L) ** 2:
         floor = 2.0 * len(S) * (0.001 * L) ** 2
         for psi in headings:
@@ -246,7 +269,9 @@ def _track_parts(S: np.ndarray, psi: float, dt: float) -> dict[str, np.ndarray]:
     }  # fmt: skip
 
 
-def _track_squares(moved: np.ndarray, parts: dict[str, np.ndarray], span: float, limits: np.ndarray) -> dict[tuple[float, float], float]:
+def _track_squares(
+    moved: np.ndarray, parts: dict[str, np.ndarray], span: float, limits: np.ndarray
+) -> dict[tuple[float, float], float]:
     """Squares left of the ways `moved` (W, 2) for every reading of u and v."""
     pairs = list(itertools.product(_signed("u"), [*_signed("v"), np.inf]))
     u, v = (np.array(values)[:, None, None] for values in zip(*pairs, strict=True))
@@ -255,11 +280,14 @@ def _track_squares(moved: np.ndarray, parts: dict[str, np.ndarray], span: float,
     drift = span * np.eye(2)[:, None, :]
     shared = np.broadcast_arrays(way, across, parts["ahead"], parts["abeam"], change, own_change, drift[0], drift[1])
     columns = np.stack(shared, axis=-1).reshape(len(pairs), -1, len(limits))
-    return dict(zip(pairs, _bounded_squares((moved - way).reshape(len(pairs), -1), columns, limits).tolist(), strict=True))
+    return dict(
+        zip(pairs, _bounded_squares((moved - way).reshape(len(pairs), -1), columns, limits).tolist(), strict=True)
+    )
 
 
 def _bounded_squares(target: np.ndarray, columns: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """Least sums of squares (H,) of target (H, T) less columns (H, T, P) times coefficients within +-limits (P,): coordinate descent."""
+    """Least sums of squares (H,) of target (H, T) less columns (H, T, P) times coefficients within +-limits (P,):
+    coordinate descent."""
     scaled = columns * limits
     G, b = np.swapaxes(scaled, 1, 2) @ scaled, np.einsum("htp,ht->hp", scaled, target)
     x = np.zeros(b.shape)
@@ -276,7 +304,11 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
     found = []
     rudder = float(np.quantile(np.abs(S[:, DELTA]), 0.99))
     if THRESHOLDS.value("largest_rudder_angle") < rudder < 75.0:
-        found.append(_finding("delta", FACTORS["delta"]["degrees"], f"The rudder goes to {rudder:.3g}, which no rudder does in rad."))
+        found.append(
+            _finding(
+                "delta", FACTORS["delta"]["degrees"], f"The rudder goes to {rudder:.3g}, which no rudder does in rad."
+            )
+        )
     turning = S[np.abs(S[:, N]) > 0.7 * np.max(np.abs(S[:, N]))]
     diameter = ship.propeller.diameter if ship.propeller else 0.6 * ship.T
     noise = float(np.median(np.abs(np.concatenate([np.diff(run.states[:, N]) for run in runs]))))
@@ -285,7 +317,10 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
         if advance > 3.5:
             # a turning rate of rev/s x sqrt(D) is 1 to 7 on ships of any size (Froude), 2 pi times that in rad/s
             unit = "rev/s" if advance > 12.0 or np.median(np.abs(turning[:, N])) * diameter**0.5 < 7.0 else "rad/s"
-            text = f"At its highest revolutions the ship advances {advance:.3g} diameters per turn if n is in rpm; a screw gives way below 1.5."
+            text = (
+                f"At its highest revolutions the ship advances {advance:.3g} diameters per turn if n is in rpm; "
+                "a screw gives way below 1.5."
+            )
             found.append(_finding("n", FACTORS["n"][unit], text))
     greatest = ship.thrusters.max_force if ship.thrusters else 0.0
     for channel in (F_B, F_S):
@@ -307,7 +342,8 @@ def _lagged(runs: Sequence[Run], i: int, lag: int) -> tuple[float, np.ndarray, n
 
 
 def _shaft_sign(runs: Sequence[Run], dt: float, froude: float, ahead: float) -> list[UnitFinding]:
-    """Revolutions of the other sign: the ship keeps her speed against what is recorded, and hardly ever with it. ahead: sign of the recorded u."""
+    """Revolutions of the other sign: the ship keeps her speed against what is recorded, and hardly ever with it. ahead:
+    sign of the recorded u."""
     width = max(1, round(THRESHOLDS.value("keeping_time") * froude / dt))
     pieces = [run.states[a : a + width + 1] for run in runs for a in range(0, len(run) - width, width)]
     if not pieces:
@@ -319,7 +355,10 @@ def _shaft_sign(runs: Sequence[Run], dt: float, froude: float, ahead: float) -> 
     with_it, against = (int(np.sum(np.all(along == side, axis=1))) for side in (1.0, -1.0))
     if against < THRESHOLDS.count("occurrences") or against < THRESHOLDS.count("keeping_ratio") * with_it:
         return []
-    text = f"In {against} stretches of {width * dt:.3g} s the ship keeps her speed against her revolutions as recorded, in {with_it} with them."
+    text = (
+        f"In {against} stretches of {width * dt:.3g} s the ship keeps her speed against her revolutions as "
+        f"recorded, in {with_it} with them."
+    )
     return [_finding("n", -1.0, text)]
 
 
@@ -335,5 +374,7 @@ def check_commands(runs: Sequence[Run], dt: float, findings: Sequence[UnitFindin
         ratio = float(wanted @ is_) / float(is_ @ is_) * own.get(actuator, 1.0)
         near = min(_signed(actuator), key=lambda f: abs(np.log(abs(f / ratio))) + 10.0 * (f * ratio < 0.0))
         if near != 1.0 and abs(np.log(near / ratio)) < 0.25:
-            found.append(_finding(command, near, f"It is {ratio / own.get(actuator, 1.0):.3g} times its actuator's record."))
+            found.append(
+                _finding(command, near, f"It is {ratio / own.get(actuator, 1.0):.3g} times its actuator's record.")
+            )
     return found

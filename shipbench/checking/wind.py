@@ -1,7 +1,8 @@
 """Wind that is written as the direction it blows to: it would have to push the ship against the wind.
 
-Changes of surge and sway over 10 s (at 130 m, Froude-scaled) are regressed on state, actuators and the wind's force along and across the ship, once
-with the wind coming from the recorded direction and once going to it. The side whose force pushes to leeward is believed.
+Changes of surge and sway over 10 s (at 130 m, Froude-scaled) are regressed on state, actuators and the wind's force
+along and across the ship, once with the wind coming from the recorded direction and once going to it. The side whose
+force pushes to leeward is believed.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from .thresholds import THRESHOLDS
 
 
 def _rows(recording: Recording, turn: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """run (W,), change of (u, v) (W, 2), other columns of u's and of v's equation, wind's (along, across) (W, 2), with the direction turned."""
+    """run (W,), change of (u, v) (W, 2), other columns of u's and of v's equation, wind's (along, across) (W, 2), with
+    the direction turned."""
     ahead = max(1, round(THRESHOLDS.value("wind_push_time") * recording.froude / recording.dt))
     speed, direction = (recording.dataset.inputs.index(name) for name in ("wind_speed", "wind_from"))
     edge = max(1, round(THRESHOLDS.value("wind_push_mean") * recording.froude / recording.dt))
@@ -29,12 +31,21 @@ def _rows(recording: Recording, turn: float) -> tuple[np.ndarray, np.ndarray, np
         a, b = apparent_wind(S[:, PSI], S[:, U], S[:, V], W[:, speed], W[:, direction] + turn)
         force = -np.hypot(a, b)[:, None] * np.column_stack([a, b])
         for k in range(0, len(run) - ahead - edge + 1, ahead):
-            before, after, part = S[k : k + edge].mean(axis=0), S[k + ahead : k + ahead + edge].mean(axis=0), S[k : k + ahead + edge]
+            before, after, part = (
+                S[k : k + edge].mean(axis=0),
+                S[k + ahead : k + ahead + edge].mean(axis=0),
+                S[k : k + ahead + edge],
+            )
             u, v, r, n, delta, bow, stern = part.mean(axis=0)[[U, V, R, N, DELTA, F_B, F_S]]
-            race, flow = np.mean(part[:, DELTA] * part[:, N] * np.abs(part[:, N])), np.mean(part[:, DELTA] * part[:, U] * np.abs(part[:, U]))
+            race, flow = (
+                np.mean(part[:, DELTA] * part[:, N] * np.abs(part[:, N])),
+                np.mean(part[:, DELTA] * part[:, U] * np.abs(part[:, U])),
+            )
             owner.append(i)
             changes.append(after[[U, V]] - before[[U, V]])
-            surge.append([1.0, u, u * abs(u), n * abs(n), u * abs(n), np.mean(part[:, V] * part[:, R]), r**2, delta**2 * u**2])
+            surge.append(
+                [1.0, u, u * abs(u), n * abs(n), u * abs(n), np.mean(part[:, V] * part[:, R]), r**2, delta**2 * u**2]
+            )
             sway.append([1.0, v, v * abs(u), r * u, r, v * abs(v), flow, race, bow, stern])
             wind.append(force[k : k + ahead + edge].mean(axis=0))
     return np.array(owner), np.array(changes), np.array(surge), np.array(sway), np.array(wind)
@@ -63,7 +74,8 @@ class _Turned:
 
 
 def blows_to(recording: Recording) -> _Turned | None:
-    """Evidence that wind_from is where the wind blows to; None if it is not, without wind channels or where the wind does too little."""
+    """Evidence that wind_from is where the wind blows to; None if it is not, without wind channels or where the wind
+    does too little."""
     if not {"wind_speed", "wind_from"} <= set(recording.dataset.inputs):
         return None
     if len(_rows(recording, 0.0)[0]) < THRESHOLDS.count("wind_push_windows"):
@@ -86,16 +98,19 @@ def check(recording: Recording) -> list[Finding]:
     t_from, t_to = found.t_from, found.t_to
     sign = "clockwise" if recording.given.get("signs", {}).get("wind_from") == "to" else "to"
     text = (
-        f"wind_from is where the wind blows to: read as it stands it pushes the ship to windward (t = {t_from[0]:.1f} along, {t_from[1]:.1f} across);"
+        "wind_from is where the wind blows to: read as it stands it pushes the ship to windward (t = "
+        f"{t_from[0]:.1f} along, {t_from[1]:.1f} across);"
         f" turned by 180 deg it pushes to leeward (t = {t_to[0]:.1f}, {t_to[1]:.1f})."
     )
     picture = Picture(
-        "Change of sway against the wind's push as recorded", "push across the ship, speed squared [m^2/s^2]", "change of v [m/s]",
+        "Change of sway against the wind's push as recorded", "push across the ship, speed squared [m^2/s^2]",
+        "change of v [m/s]",
         (Curve("windows", found.push, found.change, "."),),
     )  # fmt: skip
     return [Finding(
         "wind", "error", "wind to", text, toml_line({"signs": {"wind_from": sign}}), channels=("wind_from",),
-        evidence={"t_from_along": t_from[0], "t_from_across": t_from[1], "t_to_along": t_to[0], "t_to_across": t_to[1]}, picture=picture,
+        evidence={"t_from_along": t_from[0], "t_from_across": t_from[1], "t_to_along": t_to[0], "t_to_across": t_to[1]},
+        picture=picture,
     )]  # fmt: skip
 
 

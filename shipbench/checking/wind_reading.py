@@ -1,4 +1,5 @@
-"""Wind as an instrument on board shows it, in place of the true wind: the true wind does not change because the ship turns or speeds up.
+"""Wind as an instrument on board shows it, in place of the true wind: the true wind does not change because the ship
+turns or speeds up.
 
 Every way to record a wind (off the bow or from north, with the ship's own motion in it or without, clockwise or not,
 where it comes from or blows to, m/s, knots, km/h) is turned back into a true wind. One is believed if it changes less
@@ -25,14 +26,16 @@ from .thresholds import THRESHOLDS
 
 CHANNELS = ("wind_speed", "wind_from")
 _WORDS = {
-    "true": "the true wind from north", "true-bow": "the true wind off the bow", "apparent": "the wind felt on board, off the bow",
+    "true": "the true wind from north", "true-bow": "the true wind off the bow",
+    "apparent": "the wind felt on board, off the bow",
     "apparent-north": "the wind felt on board, from north",
 }  # fmt: skip
 
 
 @dataclass(frozen=True)
 class WindReading:
-    """A way to read the wind channels: kind of `KINDS`; sign: of `[signs]`, "clockwise" for ours; angle, speed: units."""
+    """A way to read the wind channels: kind of `KINDS`; sign: of `[signs]`, "clockwise" for ours; angle, speed:
+    units."""
 
     kind: str = "true"
     sign: str = "clockwise"
@@ -43,9 +46,19 @@ class WindReading:
     def errors(self) -> int:
         """Number of separate departures from ours."""
         ours = WindReading()
-        return sum(a != b for a, b in ((self.kind, ours.kind), (self.sign, ours.sign), (self.angle, ours.angle), (self.speed, ours.speed)))
+        return sum(
+            a != b
+            for a, b in (
+                (self.kind, ours.kind),
+                (self.sign, ours.sign),
+                (self.angle, ours.angle),
+                (self.speed, ours.speed),
+            )
+        )
 
-    def wind(self, psi: np.ndarray, u: np.ndarray, v: np.ndarray, speed: np.ndarray, come_from: np.ndarray) -> np.ndarray:
+    def wind(
+        self, psi: np.ndarray, u: np.ndarray, v: np.ndarray, speed: np.ndarray, come_from: np.ndarray
+    ) -> np.ndarray:
         """True wind W exp(i wind_from) [m/s], east as imaginary part, (T,)."""
         angle = come_from * unit_factor("wind_from", self.angle) * (-1.0 if self.sign == "counterclockwise" else 1.0)
         if self.sign == "to":
@@ -65,7 +78,9 @@ class WindReading:
 
     def lines(self) -> dict[str, Any]:
         """For dataset.toml."""
-        units = {c: u for c, u, ours in (("wind_from", self.angle, "rad"), ("wind_speed", self.speed, "m/s")) if u != ours}
+        units = {
+            c: u for c, u, ours in (("wind_from", self.angle, "rad"), ("wind_speed", self.speed, "m/s")) if u != ours
+        }
         return {
             **({"wind": self.kind} if self.kind != "true" else {}), **({"units": units} if units else {}),
             **({"signs": {"wind_from": self.sign}} if self.sign != "clockwise" else {}),
@@ -78,10 +93,13 @@ def _recorded(run: Run) -> np.ndarray:
 
 
 def _readings(angle: str) -> list[WindReading]:
-    """All that changes of the wind can tell apart: sense and unit of speed show only where heading or motion of the ship are in it."""
+    """All that changes of the wind can tell apart: sense and unit of speed show only where heading or motion of the
+    ship are in it."""
     found = []
     for kind in KINDS:
-        signs = {"true": ("clockwise",), "true-bow": ("clockwise", "counterclockwise")}.get(kind, ("clockwise", "counterclockwise", "to"))
+        signs = {"true": ("clockwise",), "true-bow": ("clockwise", "counterclockwise")}.get(
+            kind, ("clockwise", "counterclockwise", "to")
+        )
         speeds = ("m/s", "kn", "km/h") if kind.startswith("apparent") else ("m/s",)
         found += [WindReading(kind, sign, angle, speed) for sign, speed in itertools.product(signs, speeds)]
     return found
@@ -120,17 +138,23 @@ def _ends(recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _evidence(plain: _Windows, reading: WindReading, read: _Windows) -> tuple[float, float]:
-    """Sum of the logs of the ratios of squares, and joint t, of changes and departures: by how much they are smaller `read` so than `plain`."""
+    """Sum of the logs of the ratios of squares, and joint t, of changes and departures: by how much they are smaller
+    `read` so than `plain`."""
     size = unit_factor("wind_speed", reading.speed)  # a smaller unit alone makes every change smaller
     before, bow = size * plain.changes, KINDS[reading.kind][0]
     seen = before if reading.sign == "clockwise" else -before if reading.sign == "to" else np.conj(before)
-    put_in = np.abs(seen * np.exp(1j * bow * plain.psi) - read.changes) + 1e-3  # had the ship kept the heading of the beginning
+    put_in = (
+        np.abs(seen * np.exp(1j * bow * plain.psi) - read.changes) + 1e-3
+    )  # had the ship kept the heading of the beginning
     gain, cluster = np.abs(before) ** 2 - np.abs(read.changes) ** 2, clusters(plain.owner)
     within = clustered_fit(gain / put_in, put_in[:, None], cluster)
     gain = np.abs(size * plain.departures) ** 2 - np.abs(read.departures) ** 2
     between = clustered_fit(gain, np.ones((len(gain), 1)), cluster)
     t = [float(f.value[0] / f.sd[0]) for f in (within, between)]
-    ratios = [_squares(size * a) / max(_squares(b), 1e-12) for a, b in ((plain.changes, read.changes), (plain.departures, read.departures))]
+    ratios = [
+        _squares(size * a) / max(_squares(b), 1e-12)
+        for a, b in ((plain.changes, read.changes), (plain.departures, read.departures))
+    ]
     joint = float(np.sum(t) / 2.0**0.5) if min(t) > THRESHOLDS.value("wind_t_each") else 0.0
     return float(np.sum(np.log(ratios))), joint
 
@@ -143,7 +167,9 @@ def wind_reading(recording: Recording) -> tuple[WindReading, _Windows, _Windows]
     """Reading of the wind channels, their windows as recorded and read so; None where they are true wind in SI."""
     if not set(CHANNELS) <= set(recording.dataset.inputs):
         return None
-    first = [run.inputs[0, run.inputs_names.index("wind_from")] for run in recording.runs]  # later it may be continuous beyond a turn
+    first = [
+        run.inputs[0, run.inputs_names.index("wind_from")] for run in recording.runs
+    ]  # later it may be continuous beyond a turn
     angle = "deg" if np.max(np.abs(first)) > 2.0 * np.pi + 0.01 else "rad"
     ours = WindReading(angle=angle)
     begin, end, owner = _ends(recording)
@@ -173,16 +199,27 @@ def mend_wind(recording: Recording) -> tuple[Recording, list[Finding]]:
     size, window = unit_factor("wind_speed", reading.speed), THRESHOLDS.value("wind_window") * recording.froude
     text = f"wind_speed and wind_from are {said(reading)}"
     if reading.kind != "true":
-        text += f": as the ship turns and speeds up, the wind as recorded changes by {size * _squares(plain.changes) ** 0.5:.3g} m/s over "
+        text += (
+            ": as the ship turns and speeds up, the wind as recorded changes by "
+            f"{size * _squares(plain.changes) ** 0.5:.3g} m/s over "
+        )
         text += f"{window:.3g} s, read so by {_squares(read.changes) ** 0.5:.3g} m/s, and departs from its mean over "
         text += f"all runs by {size * _squares(plain.departures) ** 0.5:.3g} m/s, "
         text += f"read so by {_squares(read.departures) ** 0.5:.3g} m/s"
     declared = _declared(recording, reading)
-    todo = f"dataset.toml says {' and '.join(declared)}, which the data contradict: try without that first." if declared else ""
-    curves = tuple(Curve(label, c.begin.imag, c.begin.real, ".") for label, c in (("as recorded", plain), ("as proposed", read)))
+    todo = (
+        f"dataset.toml says {' and '.join(declared)}, which the data contradict: try without that first."
+        if declared
+        else ""
+    )
+    curves = tuple(
+        Curve(label, c.begin.imag, c.begin.real, ".") for label, c in (("as recorded", plain), ("as proposed", read))
+    )
     finding = Finding(
-        "gross", "error", "wind not true" if reading.kind != "true" else "unit", f"{text}.", "" if declared else toml_line(reading.lines()), todo,
-        CHANNELS if reading.kind != "true" else ("wind_from",), picture=Picture("The wind", "from east [m/s]", "from north [m/s]", curves),
+        "gross", "error", "wind not true" if reading.kind != "true" else "unit", f"{text}.",
+        "" if declared else toml_line(reading.lines()), todo,
+        CHANNELS if reading.kind != "true" else ("wind_from",),
+        picture=Picture("The wind", "from east [m/s]", "from north [m/s]", curves),
     )  # fmt: skip
     return recording.with_dataset(reading.applied(recording.dataset)), [finding]
 

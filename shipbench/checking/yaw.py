@@ -19,10 +19,14 @@ from .track import least_lag, possible_scale, shifted
 
 
 def _windows(recording: Recording, lag: float) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """(run (W,), columns (W, 3): heading's change, integral of r, change of r; span [s]), r put back by `lag` s. Windows overlap by half: whatever is
-    chosen is judged by runs, which are independent."""
+    """(run (W,), columns (W, 3): heading's change, integral of r, change of r; span [s]), r put back by `lag` s.
+    Windows overlap by half: whatever is chosen is judged by runs, which are independent."""
     width = max(3, round(THRESHOLDS.value("track_window") * recording.froude / recording.dt))
-    pieces = [(i, S[a : a + width + 1]) for i, S in shifted(recording, {R: lag} if lag else {}) for a in range(0, len(S) - width, width // 2)]
+    pieces = [
+        (i, S[a : a + width + 1])
+        for i, S in shifted(recording, {R: lag} if lag else {})
+        for a in range(0, len(S) - width, width // 2)
+    ]
     if len(pieces) < THRESHOLDS.count("windows"):
         return None
     S = np.stack([p for _, p in pieces])
@@ -38,7 +42,8 @@ def _explain(run: np.ndarray, rows: np.ndarray, span: float, lag: bool = True) -
 
 
 class _Settled(NamedTuple):
-    """Windows as `_windows` makes them with the lag taken out, what was chosen in the record as it is and then, the lag and its standard error."""
+    """Windows as `_windows` makes them with the lag taken out, what was chosen in the record as it is and then, the lag
+    and its standard error."""
 
     made: tuple[np.ndarray, np.ndarray, float]
     first: Chosen
@@ -80,7 +85,11 @@ def check(recording: Recording) -> list[Finding]:
     if found.chosen.left["all chosen"] ** 2 > THRESHOLDS.value("unexplained"):
         return [_unrelated(found)]
     made, first, chosen, lag, lag_sd = found
-    return _lag(recording, made, first, chosen, lag, lag_sd) + _scale(made, first, chosen) + _biases(recording, made, first, chosen)
+    return (
+        _lag(recording, made, first, chosen, lag, lag_sd)
+        + _scale(made, first, chosen)
+        + _biases(recording, made, first, chosen)
+    )
 
 
 def _picture(made: tuple[np.ndarray, np.ndarray, float], what: str) -> Picture:
@@ -89,7 +98,9 @@ def _picture(made: tuple[np.ndarray, np.ndarray, float], what: str) -> Picture:
     deg = 180.0 / np.pi
     if what == "lag":
         curves = (Curve("windows", rows[:, 2] * deg, (rows[:, 0] - rows[:, 1]) * deg, "."),)
-        return Picture("Heading less integrated yaw rate", "change of r in the window [deg/s]", "difference [deg]", curves)
+        return Picture(
+            "Heading less integrated yaw rate", "change of r in the window [deg/s]", "difference [deg]", curves
+        )
     x, top = rows[:, 1] / span * deg, float(np.max(np.abs(rows[:, 1]))) / span * deg
     equal = Curve("equal", np.array([-top, top]), np.array([-top, top]))
     return Picture(
@@ -101,11 +112,25 @@ def _picture(made: tuple[np.ndarray, np.ndarray, float], what: str) -> Picture:
 def _unrelated(found: _Settled) -> Finding:
     left = found.chosen.left["all chosen"]
     text = (
-        f"r is not the rate of psi: the heading departs from the integral of r by {found.first.left['plain']:.0%} of its change. "
+        f"r is not the rate of psi: the heading departs from the integral of r by {found.first.left['plain']:.0%} "
+        "of its change. "
         f"With any bias, scale and lag it still does by {left:.0%}."
     )
-    todo = "Look for the yaw rate, or the heading, in another column. Without a yaw rate, import makes it from the heading."
-    return Finding("yaw", "error", "unrelated", text, "", todo, ("psi", "r"), evidence={"left": left}, picture=_picture(found.made, "scale"))
+    todo = (
+        "Look for the yaw rate, or the heading, in another column. Without a yaw rate, import makes it from the "
+        "heading."
+    )
+    return Finding(
+        "yaw",
+        "error",
+        "unrelated",
+        text,
+        "",
+        todo,
+        ("psi", "r"),
+        evidence={"left": left},
+        picture=_picture(found.made, "scale"),
+    )
 
 
 def _shares(first: Chosen, chosen: Chosen) -> str:
@@ -113,7 +138,14 @@ def _shares(first: Chosen, chosen: Chosen) -> str:
     return f"the heading departs from the integral of r by {plain:.1%} of its change as recorded, by {left:.1%} with it"
 
 
-def _lag(recording: Recording, made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Chosen, lag: float, sd: float) -> list[Finding]:
+def _lag(
+    recording: Recording,
+    made: tuple[np.ndarray, np.ndarray, float],
+    first: Chosen,
+    chosen: Chosen,
+    lag: float,
+    sd: float,
+) -> list[Finding]:
     plain = _windows(recording, 0.0) or made
     if not least_lag(recording) <= abs(lag) <= 0.5 * made[2]:
         return []
@@ -122,7 +154,8 @@ def _lag(recording: Recording, made: tuple[np.ndarray, np.ndarray, float], first
     late, other = ("r", "the heading") if lag > 0.0 else ("psi", "the yaw rate")  # sensors are late, not early
     text = f"{late} lags {other} by {abs(lag):.2g} s (standard error {sd:.1g} s): {_shares(first, chosen)}."
     return [Finding(
-        "yaw", "warning", "lag", text, toml_line({"delay": {late: round(abs(lag), 3)}}), channels=(late,), evidence={"lag_s": abs(lag), "sd_s": sd},
+        "yaw", "warning", "lag", text, toml_line({"delay": {late: round(abs(lag), 3)}}), channels=(late,),
+        evidence={"lag_s": abs(lag), "sd_s": sd},
         picture=_picture(plain, "lag"),
     )]  # fmt: skip
 
@@ -136,13 +169,29 @@ def _scale(made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Ch
     text = f"r reads {factor:.3f} of the heading's rate (standard error {sd:.3f}): {_shares(first, chosen)}."
     line = toml_line({"scale": {"r": round(factor, 4)}})
     severity: Severity = "error" if abs(factor - 1.0) > 0.1 else "warning"
-    return [Finding("yaw", severity, "scale", text, line, channels=("r",), evidence={"factor": factor, "sd": sd}, picture=_picture(made, "scale"))]
+    return [
+        Finding(
+            "yaw",
+            severity,
+            "scale",
+            text,
+            line,
+            channels=("r",),
+            evidence={"factor": factor, "sd": sd},
+            picture=_picture(made, "scale"),
+        )
+    ]
 
 
-def _biases(recording: Recording, made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Chosen) -> list[Finding]:
+def _biases(
+    recording: Recording, made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Chosen
+) -> list[Finding]:
     """One bias for all runs where they agree, else those of the runs that stand out."""
     run, rows, span = made[0][::2], made[1][::2], made[2]  # drifts add up over windows that do not overlap
-    known = sum((rows[:, 1 + i] * float(chosen.value[n][0]) for i, n in enumerate(("scale", "lag")) if n in chosen.names), np.zeros(len(run)))
+    known = sum(
+        (rows[:, 1 + i] * float(chosen.value[n][0]) for i, n in enumerate(("scale", "lag")) if n in chosen.names),
+        np.zeros(len(run)),
+    )
     left = rows[:, 0] - rows[:, 1] - known
     drifts = {int(i): -left[run == i] / span for i in np.unique(run) if np.sum(run == i) >= 3}
     shared = float(np.median([d.mean() for d in drifts.values()])) if drifts else np.inf
@@ -152,10 +201,22 @@ def _biases(recording: Recording, made: tuple[np.ndarray, np.ndarray, float], fi
         bias, sd = -float(chosen.value["bias"][0]), float(chosen.sd["bias"][0])
         if abs(bias) < least:
             return []
-        text = f"r reads {np.rad2deg(bias):+.4f} deg/s too much (standard error {np.rad2deg(sd):.4f}) in all runs: {_shares(first, chosen)}."
+        text = (
+            f"r reads {np.rad2deg(bias):+.4f} deg/s too much (standard error {np.rad2deg(sd):.4f}) in all runs: "
+            f"{_shares(first, chosen)}."
+        )
         line = toml_line({"bias": {"r": bias}})
         return [
-            Finding("yaw", "warning", "yaw rate bias", text, line, channels=("r",), evidence={"bias": bias, "sd": sd}, picture=_picture(made, "bias"))
+            Finding(
+                "yaw",
+                "warning",
+                "yaw rate bias",
+                text,
+                line,
+                channels=("r",),
+                evidence={"bias": bias, "sd": sd},
+                picture=_picture(made, "bias"),
+            )
         ]
     usual = spread(np.concatenate([d - d.mean() for d in drifts.values()])) if drifts else 0.0
     found: dict[str, float] = {}
@@ -170,14 +231,17 @@ def _biases(recording: Recording, made: tuple[np.ndarray, np.ndarray, float], fi
         return []
     worst = max(found, key=lambda k: abs(found[k]))
     text = (
-        f"r has a bias in {len(found)} of {len(np.unique(run))} runs ({some([f'{k} {np.rad2deg(v):+.3f}' for k, v in found.items()])} deg/s), "
-        f"greatest in {worst}: {np.rad2deg(found[worst]):+.3f} deg/s, {100 * abs(found[worst]) / recording.turning:.0f} % of the typical yaw rate."
+        f"r has a bias in {len(found)} of {len(np.unique(run))} runs "
+        f"({some([f'{k} {np.rad2deg(v):+.3f}' for k, v in found.items()])} deg/s), "
+        f"greatest in {worst}: {np.rad2deg(found[worst]):+.3f} deg/s, "
+        f"{100 * abs(found[worst]) / recording.turning:.0f} % of the typical yaw rate."
     )
     line = toml_line({"runs": {name: {"bias": {"r": bias}} for name, bias in found.items()}})
     mine = np.flatnonzero(run == next(i for i in np.unique(run) if recording.name_of(recording.runs[i]) == worst))
     drift = Curve("psi less integral of r", np.arange(1, len(mine) + 1) * span, np.rad2deg(np.cumsum(left[mine])))
     return [Finding(
-        "yaw", "warning", "yaw rate bias", text, line, channels=("r",), runs=tuple(found), evidence={f"bias_{k}": v for k, v in found.items()},
+        "yaw", "warning", "yaw rate bias", text, line, channels=("r",), runs=tuple(found),
+        evidence={f"bias_{k}": v for k, v in found.items()},
         picture=Picture(f"Heading less integrated yaw rate, run {worst}", "time [s]", "difference [deg]", (drift,)),
     )]  # fmt: skip
 

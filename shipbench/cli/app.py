@@ -1,4 +1,5 @@
-"""The command line. Only this module and the progress reporter print; everything heavy is imported inside the commands."""
+"""The command line. Only this module and the progress reporter print; everything heavy is imported inside the
+commands."""
 
 from __future__ import annotations
 
@@ -78,7 +79,10 @@ class _Group(TyperGroup):
         except ShipbenchError as error:
             code, text = 1, str(error)
         except OSError as error:
-            if error.errno in (None, errno.EPIPE):  # a reader that has read enough (| head) is no error; typer ends quietly
+            if error.errno in (
+                None,
+                errno.EPIPE,
+            ):  # a reader that has read enough (| head) is no error; typer ends quietly
                 raise
             code, text = 1, f"{error.filename or 'a file'}: {error.strerror}."
         say(f"error: {text}", err=True)
@@ -110,7 +114,9 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback()
 def _main(
-    version: Annotated[bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
 ) -> None:
     pass
 
@@ -119,25 +125,51 @@ def _main(
 def run(
     ctx: typer.Context,
     model: Annotated[list[str] | None, typer.Option("-m", "--model", help="Model spec; may be repeated.")] = None,
-    dataset: Annotated[list[str] | None, typer.Option("-d", "--dataset", help="Registered name or folder; may be repeated.")] = None,
-    config: Annotated[str | None, typer.Option("-c", "--config", help="Task file (TOML), or the name of a shipped one: paper, smoke.")] = None,
+    dataset: Annotated[
+        list[str] | None, typer.Option("-d", "--dataset", help="Registered name or folder; may be repeated.")
+    ] = None,
+    config: Annotated[
+        str | None, typer.Option("-c", "--config", help="Task file (TOML), or the name of a shipped one: paper, smoke.")
+    ] = None,
     folds: Annotated[int | None, typer.Option(help="Number of folds (default 5).")] = None,
-    split: Annotated[str | None, typer.Option(help="folds, published, kind (leave one kind of manoeuvre out) or speed (score the fastest).")] = None,
+    split: Annotated[
+        str | None,
+        typer.Option(help="folds, published, kind (leave one kind of manoeuvre out) or speed (score the fastest)."),
+    ] = None,
     seeds: Annotated[str | None, typer.Option(help="Seeds, such as 0,1,2 (default 0).")] = None,
     horizon: Annotated[float | None, typer.Option(help="Seconds to predict (default 120).")] = None,
-    history: Annotated[float | None, typer.Option(help="Seconds before the start that models may use (default 0).")] = None,
+    history: Annotated[
+        float | None, typer.Option(help="Seconds before the start that models may use (default 0).")
+    ] = None,
     stride: Annotated[float | None, typer.Option(help="Seconds between scored windows (default: the horizon).")] = None,
     max_runs: Annotated[int | None, typer.Option(help="Use only that many runs, evenly spread.")] = None,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder for the results (default runs/<name>; <name>-2 beside another study).")
+        Path | None,
+        typer.Option(
+            "-o", "--out", help="Folder for the results (default runs/<name>; <name>-2 beside another study)."
+        ),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Keep what the same code, data and task scored before.")] = False,
-    executor: Annotated[str, typer.Option(help="Where the cells run: local, processes or dask; the numbers are the same.")] = "local",
-    workers: Annotated[int | None, typer.Option(help="Number of processes at a time (default: one for each CPU).")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Address of the Dask scheduler, such as tcp://host:8786.")] = None,
-    time_limit: Annotated[float | None, typer.Option(help="Time limit per fit and prediction in seconds; one that exceeds it is stopped.")] = None,
-    memory_limit: Annotated[float | None, typer.Option(help="Memory limit per fit in GB; a fit that exceeds it is stopped.")] = None,
-    wait: Annotated[float | None, typer.Option(help="Seconds to wait for Dask workers before the study stops (default: no limit).")] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Keep what the same code, data and task scored before.")
+    ] = False,
+    executor: Annotated[
+        str, typer.Option(help="Where the cells run: local, processes or dask; the numbers are the same.")
+    ] = "local",
+    workers: Annotated[
+        int | None, typer.Option(help="Number of processes at a time (default: one for each CPU).")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of the Dask scheduler, such as tcp://host:8786.")
+    ] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(help="Time limit per fit and prediction in seconds; one that exceeds it is stopped.")
+    ] = None,
+    memory_limit: Annotated[
+        float | None, typer.Option(help="Memory limit per fit in GB; a fit that exceeds it is stopped.")
+    ] = None,
+    wait: Annotated[
+        float | None, typer.Option(help="Seconds to wait for Dask workers before the study stops (default: no limit).")
+    ] = None,
     device: Device = None,
     full: Full = False,
     quiet: Quiet = False,
@@ -154,14 +186,22 @@ def run(
     from ..leaderboard.pages import write_boards
 
     overrides = {
-        "models": model or None, "datasets": dataset or None, "folds": folds, "split": split, "seeds": parse_seeds(seeds),
+        "models": model or None, "datasets": dataset or None, "folds": folds, "split": split,
+        "seeds": parse_seeds(seeds),
         "horizon_s": horizon, "history_s": history, "stride_s": stride, "max_runs": max_runs,
     }  # fmt: skip
     execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit), device, wait)
     tasks = load_tasks(config, overrides)
     name = Path(config).stem if config else file_name(Path(tasks[0].dataset).name)
     folder = out or free_folder(Path("runs") / name, tasks, resume)
-    outcome = run_tasks(tasks, folder, resume=resume, execution=execution, progress=make_progress(quiet or as_json), command=str(ctx.obj))
+    outcome = run_tasks(
+        tasks,
+        folder,
+        resume=resume,
+        execution=execution,
+        progress=make_progress(quiet or as_json),
+        command=str(ctx.obj),
+    )
     tell = say if not quiet and not as_json else lambda line: None
     written = write_boards(outcome.results, folder, str(ctx.obj), tell=tell)
     if as_json:
@@ -192,20 +232,28 @@ def validate(as_json: Json = False) -> None:
     else:
         words = {True: "passed", False: "FAILED", None: "not judged"}
         columns = [
-            TableColumn("ship", "ship"), TableColumn("quantity", "quantity"), TableColumn("computed", "computed", significant(4)),
-            TableColumn("published", "published", significant(4)), TableColumn("unit", "unit"), TableColumn("tolerance", "tolerance"),
+            TableColumn("ship", "ship"), TableColumn("quantity", "quantity"),
+            TableColumn("computed", "computed", significant(4)),
+            TableColumn("published", "published", significant(4)), TableColumn("unit", "unit"),
+            TableColumn("tolerance", "tolerance"),
             TableColumn("result", "result"), TableColumn("source", "source"),
         ]  # fmt: skip
         within = f"{len(judged) - len(failed)} of {len(judged)} figures with a tolerance are within it."
         say_wrapped(f"{within} {len(rows) - len(judged)} figures are not judged.\n")
-        show_table(Table("Simulator against published figures", columns, [row | {"result": words[row["passed"]]} for row in rows]))
+        show_table(
+            Table(
+                "Simulator against published figures", columns, [row | {"result": words[row["passed"]]} for row in rows]
+            )
+        )
     if failed:
         raise typer.Exit(1)  # a figure is outside its tolerance
 
 
 @app.command()
 def predict(
-    model: Annotated[str, typer.Argument(metavar="MODEL", help="Folder of a saved model (cells/.../model of a result folder).")],
+    model: Annotated[
+        str, typer.Argument(metavar="MODEL", help="Folder of a saved model (cells/.../model of a result folder).")
+    ],
     dataset: DatasetArgument,
     out: Annotated[Path, typer.Option("-o", "--out", help="CSV file to write.")] = Path("predictions.csv"),
     horizon: Annotated[float | None, typer.Option(help="Seconds to predict (default: each run's length).")] = None,
@@ -222,6 +270,7 @@ def predict(
 
 
 def main() -> None:
-    """Entry point of the `shipbench` command. SIGTERM ends it as Ctrl-C does: what is finished is kept, nothing goes on behind it."""
+    """Entry point of the `shipbench` command. SIGTERM ends it as Ctrl-C does: what is finished is kept, nothing goes on
+    behind it."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     app()

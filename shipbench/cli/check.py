@@ -19,10 +19,18 @@ def data_check(
     ctx: typer.Context,
     dataset: DatasetArgument,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder for a page (check.html), findings.json and a picture of each finding.")
+        Path | None,
+        typer.Option(
+            "-o", "--out", help="Folder for a page (check.html), findings.json and a picture of each finding."
+        ),
     ] = None,
     apply: Annotated[
-        bool, typer.Option("--apply", help="Write the proposed lines into dataset.toml; the old file stays beside it as dataset.toml.before-check.")
+        bool,
+        typer.Option(
+            "--apply",
+            help="Write the proposed lines into dataset.toml; the old file stays beside it as "
+            "dataset.toml.before-check.",
+        ),
     ] = False,
     full: Full = False,
     quiet: Quiet = False,
@@ -30,7 +38,8 @@ def data_check(
 ) -> None:
     """Find faults of a data set from the data themselves: units, signs, frames, clocks, samples, copies.
 
-    Exit code 0: no error among the findings (warnings and notes may be there); 1: at least one error; 2: the input cannot be read.
+    Exit code 0: no error among the findings (warnings and notes may be there); 1: at least one error; 2: the input
+    cannot be read.
     """
     from ..bench.progress import steps_shown
     from ..checking.applying import laid, write_lines
@@ -40,7 +49,8 @@ def data_check(
 
     if apply and not Path(dataset, "dataset.toml").is_file():
         raise InputError(
-            f"'{dataset}' has no dataset.toml to apply lines to; accepted: a folder with one. Make it: shipbench data export {dataset} --out FOLDER"
+            f"'{dataset}' has no dataset.toml to apply lines to; accepted: a folder with one. Make it: shipbench "
+            f"data export {dataset} --out FOLDER"
         )
     with steps_shown(quiet or as_json):
         recording, findings = check_path(dataset)
@@ -54,7 +64,10 @@ def data_check(
         _show(facts, findings, full)
         _show_lines(lines, apply)
         if before is not None:
-            say(f"Written: {Path(dataset, 'dataset.toml')} (the old file: {before.name}). Next: shipbench data check {dataset}")
+            say(
+                f"Written: {Path(dataset, 'dataset.toml')} (the old file: {before.name}). Next: shipbench data "
+                f"check {dataset}"
+            )
         if written:
             say(f"Written: {written[0]} and {len(written) - 1} files beside it")
     if any(f.severity == "error" for f in findings):
@@ -66,7 +79,8 @@ _BRIEF = ("name", "ship", "runs")
 
 
 def _show(facts: dict[str, Any], findings: list[Finding], full: bool) -> None:
-    """The number of findings in a sentence, facts of the data set, then each finding with what to do; notes with --full only."""
+    """The number of findings in a sentence, facts of the data set, then each finding with what to do; notes with --full
+    only."""
     counts = {severity: sum(f.severity == severity for f in findings) for severity in ("error", "warning", "note")}
     numbers = [f"{number} {severity}{'s' * (number != 1)}" for severity, number in counts.items()]
     say(f"Findings: {', '.join(numbers)}.\n")
@@ -125,7 +139,9 @@ def suite_check(
     ctx: typer.Context,
     seeds: Annotated[int, typer.Option(help="Sets per source and fault.")] = 1,
     seed: Annotated[int, typer.Option(help="First seed.")] = 580,
-    development: Annotated[bool, typer.Option("--development", help="Other seeds, on which thresholds are set; nothing is published.")] = False,
+    development: Annotated[
+        bool, typer.Option("--development", help="Other seeds, on which thresholds are set; nothing is published.")
+    ] = False,
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the page.")] = Path("leaderboards"),
     quiet: Quiet = False,
 ) -> None:
@@ -133,7 +149,9 @@ def suite_check(
     from ..bench.progress import make_progress
     from ..suites.checks.suite import suite_command
 
-    page, tables = suite_command(seeds=seeds, first=seed, development=development, out=out, progress=make_progress(quiet), command=str(ctx.obj))
+    page, tables = suite_command(
+        seeds=seeds, first=seed, development=development, out=out, progress=make_progress(quiet), command=str(ctx.obj)
+    )
     for table in tables:
         show_table(table)
     say(f"Written: {page}")

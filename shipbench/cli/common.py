@@ -25,9 +25,15 @@ if TYPE_CHECKING:
 SETTINGS: dict[str, Any] = {"context_settings": {"help_option_names": ["-h", "--help"]}, "no_args_is_help": True}
 """Of every group of commands."""
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document to stdout and nothing else.")]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no notes; the result and what was written are still printed.")]
+Quiet = Annotated[
+    bool,
+    typer.Option("-q", "--quiet", help="No progress and no notes; the result and what was written are still printed."),
+]
 Full = Annotated[bool, typer.Option("--full", help="Print all tables, as on the written page.")]
-Device = Annotated[str | None, typer.Option(help="Where networks compute: cpu, cuda or cuda:1 (default cpu); physics stays on the CPU.")]
+Device = Annotated[
+    str | None,
+    typer.Option(help="Where networks compute: cpu, cuda or cuda:1 (default cpu); physics stays on the CPU."),
+]
 DatasetArgument = Annotated[str, typer.Argument(metavar="DATASET", help="Registered name or folder.")]
 
 
@@ -41,7 +47,9 @@ class Commands(TyperGroup):
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """The commands in their order."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, self.commands[name].get_short_help_str(HELP)) for name in self.list_commands(ctx)])
+            formatter.write_dl(
+                [(name, self.commands[name].get_short_help_str(HELP)) for name in self.list_commands(ctx)]
+            )
 
 
 def say(text: str, err: bool = False) -> None:

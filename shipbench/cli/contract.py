@@ -11,19 +11,26 @@ from .common import Device, Json, print_json, say_wrapped, show_table
 
 def check(
     model: Annotated[
-        str, typer.Argument(metavar="MODEL", help="Model spec: name, name[key=value], path/to/model.py:ClassName, or a saved model's folder.")
+        str,
+        typer.Argument(
+            metavar="MODEL",
+            help="Model spec: name, name[key=value], path/to/model.py:ClassName, or a saved model's folder.",
+        ),
     ],
     dataset: Annotated[
-        str | None, typer.Option("-d", "--dataset", help="Check on a few windows of these data (default: small simulated runs).")
+        str | None,
+        typer.Option("-d", "--dataset", help="Check on a few windows of these data (default: small simulated runs)."),
     ] = None,
     device: Device = None,
     as_json: Json = False,
 ) -> None:
     """Check whether a model keeps the contract, rule by rule, in seconds.
 
-    The model is fitted three times on a few short runs; give one that trains for long few epochs: 'neural_ode[epochs=2]'.
+    The model is fitted three times on a few short runs; give one that trains for long few epochs:
+    'neural_ode[epochs=2]'.
 
-    Exit code 0: every rule that applies is kept; 1: at least one is broken; 2: the model cannot be made or the data cannot be read.
+    Exit code 0: every rule that applies is kept; 1: at least one is broken; 2: the model cannot be made or the data
+    cannot be read.
     """
     from ..contract.base import BROKEN, NOT_APPLICABLE, PASSED
     from ..contract.check import check_model
@@ -41,10 +48,15 @@ def check(
             TableColumn("what it says", "says"),
             TableColumn("evidence", "evidence"),
         ]
-        rows = [vars(v) | {"status": shown[v.status], "says": "" if v.status == PASSED else v.says} for v in report.verdicts]
+        rows = [
+            vars(v) | {"status": shown[v.status], "says": "" if v.status == PASSED else v.says} for v in report.verdicts
+        ]
         counts = [len(report.of(status)) for status in (PASSED, BROKEN, NOT_APPLICABLE)]
         verdict = "breaks the contract" if counts[1] else "keeps the contract"
-        say_wrapped(f"'{report.model}' {verdict}: {{}} rules passed, {{}} broken, {{}} not applicable; {report.seconds:.1f} s.\n".format(*counts))
+        say_wrapped(
+            f"'{report.model}' {verdict}: {{}} rules passed, {{}} broken, {{}} not applicable; {report.seconds:.1f} "
+            "s.\n".format(*counts)
+        )
         show_table(Table(f"{report.model} on {report.data}", columns, rows))
     if report.of(BROKEN):
         raise typer.Exit(1)

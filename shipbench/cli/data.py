@@ -30,8 +30,12 @@ def data_list(as_json: Json = False) -> None:
 @data_app.command("get")
 def data_get(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Registered name of a public data set.")],
-    source: Annotated[str | None, typer.Option("--from", help="Folder with a copy, or another address of the same files.")] = None,
-    accept: Annotated[bool, typer.Option("--accept-licence", help="Accept the licence that is shown, without being asked.")] = False,
+    source: Annotated[
+        str | None, typer.Option("--from", help="Folder with a copy, or another address of the same files.")
+    ] = None,
+    accept: Annotated[
+        bool, typer.Option("--accept-licence", help="Accept the licence that is shown, without being asked.")
+    ] = False,
     quiet: Quiet = False,
 ) -> None:
     """Download a public data set (or take a copy) after its licence is accepted; every file is checked."""
@@ -47,17 +51,25 @@ def data_get(
     say(public.notice(), err=True)
     if not accept:
         if not sys.stdin.isatty():
-            raise InputError("the licence above is not accepted, and there is no terminal to ask on; nothing was fetched. Add --accept-licence.")
+            raise InputError(
+                "the licence above is not accepted, and there is no terminal to ask on; nothing was fetched. Add "
+                "--accept-licence."
+            )
         if not typer.confirm("Do you accept the licence?", err=True):
             raise InputError("the licence is not accepted; nothing was fetched.")
     fetched = public.fetch(folder, source, (lambda text: None) if quiet else lambda text: say(text, err=True))
-    say(f"{name}: {len(fetched)} files fetched into {folder}, every checksum is right. Use it: shipbench data describe {name}")
+    say(
+        f"{name}: {len(fetched)} files fetched into {folder}, every checksum is right. Use it: shipbench data "
+        f"describe {name}"
+    )
 
 
 @data_app.command("make")
 def data_make(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Registered name, with parameters in brackets.")],
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Also write it as a folder of the common format.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Also write it as a folder of the common format.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Make it anew even if it is in the cache.")] = False,
     quiet: Quiet = False,
 ) -> None:
@@ -75,7 +87,9 @@ def data_make(
 def data_describe(
     ctx: typer.Context,
     dataset: DatasetArgument,
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Write a data card there: card.md and card.html, with plots.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Write a data card there: card.md and card.html, with plots.")
+    ] = None,
     full: Full = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -104,9 +118,16 @@ def data_describe(
 
 @data_app.command("export")
 def data_export(
-    what: Annotated[str, typer.Argument(metavar="DATASET", help="Registered name or folder; or a result folder of `run`: its predictions.")],
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="DATASET", help="Registered name or folder; or a result folder of `run`: its predictions."
+        ),
+    ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write, or a file that ends in .mat.")],
-    format: Annotated[str | None, typer.Option("--format", help="csv, parquet or mat (MATLAB; the default for a file .mat).")] = None,
+    format: Annotated[
+        str | None, typer.Option("--format", help="csv, parquet or mat (MATLAB; the default for a file .mat).")
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Write a data set, or the predictions of a study, as CSV, Parquet or MATLAB file."""

@@ -32,7 +32,10 @@ def demo(
 
     trial = load_dataset("demo")
     note = (lambda text: None) if quiet else (lambda text: typer.echo(text, err=True))
-    note(f"1/3 diagnose: a trial of {len(trial.runs)} runs with a current of {SPEED} m/s towards {_degrees(TOWARDS)} that no model knows")
+    note(
+        f"1/3 diagnose: a trial of {len(trial.runs)} runs with a current of {SPEED} m/s towards {_degrees(TOWARDS)} "
+        "that no model knows"
+    )
     found = replace(diagnose(trial, gain=False), spec="demo")
     note("2/3 score: no model, the physics, and the physics with what was found; 3 folds by run")
     models = list(dict.fromkeys(["hold", "physics", found.extended_model]))
@@ -44,7 +47,10 @@ def demo(
     page = write_report(results, out / "report.html", str(ctx.obj), given=[out / "diagnosis"])
     error = results.rows.groupby("model").ed.mean()
     typer.echo(f"Hidden in the trial: a current of {SPEED} m/s towards {_degrees(TOWARDS)}. Found: {_found(found)}.")
-    typer.echo(f"Position error after a 60 s prediction, mean over held-out runs: {', '.join(f'{m} {error[m]:.1f} m' for m in models)}.")
+    typer.echo(
+        "Position error after a 60 s prediction, mean over held-out runs: "
+        f"{', '.join(f'{m} {error[m]:.1f} m' for m in models)}."
+    )
     typer.echo(f"Page: {page.path}. Open it in a browser.")
     typer.echo("Your trial: shipbench data import LOG.csv --propose mapping.toml")
     typer.echo("Your model: shipbench run --model path/to/model.py:Class --model physics --dataset demo --horizon 60")
@@ -65,7 +71,10 @@ def _found(found: Any) -> str:
         size = cause.parameters
         if {"speed", "to"} <= size.keys():
             low, high = size["speed"].ci95
-            words.append(f"{cause.effect} of {size['speed'].value:.2f} m/s (95 %: {low:.2f} to {high:.2f}) towards {_degrees(size['to'].value)}")
+            words.append(
+                f"{cause.effect} of {size['speed'].value:.2f} m/s (95 %: {low:.2f} to {high:.2f}) towards "
+                f"{_degrees(size['to'].value)}"
+            )
         else:
             words.append(cause.effect)
     return " and ".join(words)

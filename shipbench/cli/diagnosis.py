@@ -16,13 +16,20 @@ from .common import Commands, DatasetArgument, Full, Json, Quiet, print_json, sa
 def diagnose(
     dataset: DatasetArgument,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder for diagnosis.json, report.html, summary.txt (default diagnoses/NAME).")
+        Path | None,
+        typer.Option(
+            "-o", "--out", help="Folder for diagnosis.json, report.html, summary.txt (default diagnoses/NAME)."
+        ),
     ] = None,
     gain: Annotated[bool, typer.Option(help="Measure the gain on held-out runs (most of the time).")] = True,
     seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
     workers: Annotated[int, typer.Option(help="Processes for the folds.")] = 2,
-    thorough: Annotated[bool, typer.Option("--thorough", help="Use up to twice as much of a long record (twice the time or more).")] = False,
-    cpu_limit: Annotated[float, typer.Option(min=1.0, max=86_400.0, help="CPU seconds after which it ends with what stands; it is said.")] = 900.0,
+    thorough: Annotated[
+        bool, typer.Option("--thorough", help="Use up to twice as much of a long record (twice the time or more).")
+    ] = False,
+    cpu_limit: Annotated[
+        float, typer.Option(min=1.0, max=86_400.0, help="CPU seconds after which it ends with what stands; it is said.")
+    ] = 900.0,
     full: Full = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -59,11 +66,16 @@ def suite_diagnosis(
     seed: Annotated[int, typer.Option(help="Everything is drawn from it.")] = 0,
     per_effect: Annotated[int, typer.Option(help="Sets per effect and size.")] = 3,
     kinds: Annotated[
-        str | None, typer.Option(help="single,pair,none-same,none-other,outside,change,unit,published,none-published (default all).")
+        str | None,
+        typer.Option(
+            help="single,pair,none-same,none-other,outside,change,unit,published,none-published (default all)."
+        ),
     ] = None,
     development: Annotated[bool, typer.Option("--development", help="The ships on which thresholds are set.")] = False,
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the rows.")] = Path("runs/suite-diagnosis"),
-    gain: Annotated[bool, typer.Option(help="Also the held-out gain of every diagnosis and of the oracle (four times the time).")] = True,
+    gain: Annotated[
+        bool, typer.Option(help="Also the held-out gain of every diagnosis and of the oracle (four times the time).")
+    ] = True,
     resume: Annotated[bool, typer.Option(help="Keep what the same code has finished before.")] = True,
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
 ) -> None:
@@ -72,7 +84,8 @@ def suite_diagnosis(
     from ..suites.diagnosis.suite import suite_command
 
     page, rows = suite_command(
-        diagnose=run, seed=seed, per_effect=per_effect, kinds=kinds, development=development, out=out, resume=resume, workers=workers,
+        diagnose=run, seed=seed, per_effect=per_effect, kinds=kinds, development=development, out=out, resume=resume,
+        workers=workers,
         gain=gain, command=str(ctx.obj),
     )  # fmt: skip
     say(f"Written: {page} ({len(rows)} sets)")

@@ -14,7 +14,9 @@ from .common import Device, Full, Json, Quiet, exit_if_failed, parse_numbers, pa
 if TYPE_CHECKING:
     from ..bench.submissions import Results
 
-_Results = Annotated[list[Path] | None, typer.Argument(metavar="[RESULTS]...", help="Result folders (default: the newest below runs/).")]
+_Results = Annotated[
+    list[Path] | None, typer.Argument(metavar="[RESULTS]...", help="Result folders (default: the newest below runs/).")
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -29,8 +31,12 @@ def leaderboard(
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the pages.")] = Path("leaderboards"),
     formats: Annotated[str, typer.Option("--format", help="md, latex, csv, html; several with commas between.")] = "md",
     baseline: Annotated[str | None, typer.Option(help="Model that the skill is counted from (default: hold).")] = None,
-    verify: Annotated[bool, typer.Option("--verify", help="First compute everything shown again from the saved predictions.")] = False,
-    submission: Annotated[Path | None, typer.Option(help="Also write rows, summary and windows there: the one folder to hand in.")] = None,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="First compute everything shown again from the saved predictions.")
+    ] = False,
+    submission: Annotated[
+        Path | None, typer.Option(help="Also write rows, summary and windows there: the one folder to hand in.")
+    ] = None,
     plots: Annotated[bool, typer.Option(help="Draw the plots.")] = True,
     full: Full = False,
     quiet: Quiet = False,
@@ -75,7 +81,10 @@ def _verify(results: Results, silent: bool) -> None:
     if differences:
         raise typer.Exit(1)
     if not silent:
-        say(f"Verified: {len(results.rows)} rows are what the saved predictions give. Times of fits and rollouts are as reported.")
+        say(
+            f"Verified: {len(results.rows)} rows are what the saved predictions give. Times of fits and rollouts "
+            "are as reported."
+        )
 
 
 def _newest_results() -> Path:
@@ -89,13 +98,20 @@ def learning_curve(
     ctx: typer.Context,
     model: Annotated[list[str] | None, typer.Option("-m", "--model", help="Model spec; may be repeated.")] = None,
     dataset: Annotated[str | None, typer.Option("-d", "--dataset", help="Registered name or folder.")] = None,
-    config: Annotated[str | None, typer.Option("-c", "--config", help="Task file (TOML), or the name of a shipped one; its first data set.")] = None,
+    config: Annotated[
+        str | None,
+        typer.Option("-c", "--config", help="Task file (TOML), or the name of a shipped one; its first data set."),
+    ] = None,
     sizes: Annotated[str, typer.Option(help="Numbers of training runs, early stopping included.")] = "4,8,16,32,64,72",
     folds: Annotated[int | None, typer.Option(help="Number of folds (default 5).")] = None,
     seeds: Annotated[str | None, typer.Option(help="Seeds, such as 0,1,2 (default 0).")] = None,
     horizon: Annotated[float | None, typer.Option(help="Seconds to predict (default 120).")] = None,
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for the results (default runs/curve-<data set>).")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Keep what the same code, data and task finished before.")] = False,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for the results (default runs/curve-<data set>).")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Keep what the same code, data and task finished before.")
+    ] = False,
     device: Device = None,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -107,16 +123,25 @@ def learning_curve(
     from ..leaderboard.learning_curve import run_curve
 
     overrides = {
-        "models": model or None, "datasets": [dataset] if dataset else None, "folds": folds, "seeds": parse_seeds(seeds), "horizon_s": horizon,
+        "models": model or None, "datasets": [dataset] if dataset else None, "folds": folds,
+        "seeds": parse_seeds(seeds), "horizon_s": horizon,
     }  # fmt: skip
     task = load_tasks(config, overrides)[0]
     folder = out or Path("runs") / f"curve-{file_name(Path(task.dataset).name)}"
     numbers = parse_numbers("--sizes", sizes)
     curve = run_curve(
-        task, numbers, folder, resume=resume, execution=Execution(device=device), progress=make_progress(quiet or as_json), command=str(ctx.obj)
+        task,
+        numbers,
+        folder,
+        resume=resume,
+        execution=Execution(device=device),
+        progress=make_progress(quiet or as_json),
+        command=str(ctx.obj),
     )
     if as_json:
-        print_json({"out": str(folder), "page": str(curve.page), "curve": curve.board.as_json(), "failed": curve.failed})
+        print_json(
+            {"out": str(folder), "page": str(curve.page), "curve": curve.board.as_json(), "failed": curve.failed}
+        )
     else:
         show_boards([(curve.board, curve.page)], full=True)
         say(f"Results: {folder}\nPage: {curve.page}")

@@ -34,7 +34,10 @@ def models(name: _Name = None, as_json: Json = False) -> None:
         if part["unusable"]:
             say_wrapped(f"NOT USABLE HERE: {part['unusable']}", " " * _COLUMN)
     say("")
-    say_wrapped("A spec sets parameters in brackets, such as 'mlp[hidden=64,seed=3]'. Your own class: path/to/model.py:ClassName.")
+    say_wrapped(
+        "A spec sets parameters in brackets, such as 'mlp[hidden=64,seed=3]'. Your own class: "
+        "path/to/model.py:ClassName."
+    )
     say_wrapped("To explain one: shipbench models NAME")
 
 
@@ -116,8 +119,10 @@ def _effect(part: dict[str, Any], as_json: bool) -> None:
     for p in part["parameters"]:
         unit, factor = display_unit(p["unit"])
         rows.append({"name": p["name"], "unit": unit, **{key: factor * p[key] for key in ("typical", "low", "high")}})
-    columns = [TableColumn("size", "name"), TableColumn("unit", "unit"), TableColumn("typical", "typical", significant(3)),
-               TableColumn("least", "low", significant(3)), TableColumn("greatest", "high", significant(3))]  # fmt: skip
+    columns = [TableColumn("size", "name"), TableColumn("unit", "unit"),
+        TableColumn("typical", "typical", significant(3)),
+               TableColumn("least", "low", significant(3)),
+               TableColumn("greatest", "high", significant(3))]  # fmt: skip
     if rows:
         show_table(Table("Sizes for a ship of 130 m", columns, rows, ["They scale with the length by Froude's law."]))
         say("")

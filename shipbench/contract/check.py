@@ -41,8 +41,10 @@ class Report:
         """The report as one JSON document."""
         return {
             "model": self.model, "data": self.data, "seconds": round(self.seconds, 2),
-            "passed": len(self.of(PASSED)), "broken": len(self.of(BROKEN)), "not_applicable": len(self.of(NOT_APPLICABLE)),
-            "rules": [{"rule": v.rule, "says": v.says, "status": v.status, "evidence": v.evidence} for v in self.verdicts],
+            "passed": len(self.of(PASSED)), "broken": len(self.of(BROKEN)),
+            "not_applicable": len(self.of(NOT_APPLICABLE)),
+            "rules": [{"rule": v.rule, "says": v.says, "status": v.status,
+                    "evidence": v.evidence} for v in self.verdicts],
         }  # fmt: skip
 
 
@@ -55,7 +57,8 @@ def check_model(model: Any, data: Dataset | None = None, device: str | None = No
         device: where the model computes, if it has a device and the spec names none (see `check_device`).
 
     Raises:
-        InputError: the spec cannot be made into a model, the model refuses the data (`skip`), its inputs are not those of the data, or no such
+        InputError: the spec cannot be made into a model, the model refuses the data (`skip`), its inputs are not those
+        of the data, or no such
             device is here.
     """
     began = time.perf_counter()
@@ -70,13 +73,17 @@ def check_model(model: Any, data: Dataset | None = None, device: str | None = No
     for method in ("fit", "predict"):
         if not callable(getattr(model, method, None)):
             raise InputError(
-                f"model '{text}' has no method {method}; a predictor has fit(train, valid=None, *, seed) and predict(s0, U, history=None)."
+                f"model '{text}' has no method {method}; a predictor has fit(train, valid=None, *, seed) and "
+                "predict(s0, U, history=None)."
             )
-    inputs = tuple(getattr(model, "inputs", COMMANDS)) if spec.path is not None and spec.class_name is None else COMMANDS
+    inputs = (
+        tuple(getattr(model, "inputs", COMMANDS)) if spec.path is not None and spec.class_name is None else COMMANDS
+    )
     used = small_harbour(inputs=inputs) if data is None else few_windows(data)
     if inputs != used.inputs and spec.class_name is None and spec.path is not None:
         raise InputError(
-            f"the saved model uses the inputs {', '.join(inputs)}; data set '{used.name}' has {', '.join(used.inputs)}. Give its own data."
+            f"the saved model uses the inputs {', '.join(inputs)}; data set '{used.name}' has "
+            f"{', '.join(used.inputs)}. Give its own data."
         )
     refusal = getattr(model, "skip", None)
     if callable(refusal) and (why := refusal(used)):

@@ -1,5 +1,5 @@
-"""The contract of a predictor, rule by rule (contract, section 2). Every rule stands here once: `shipbench check` and the tests of the
-built-in models both go through `RULES`."""
+"""The contract of a predictor, rule by rule (contract, section 2). Every rule stands here once: `shipbench check` and
+the tests of the built-in models both go through `RULES`."""
 
 from __future__ import annotations
 
@@ -52,12 +52,19 @@ def parameters(c: Subject) -> str:
         make_predictor(replace(c.spec, params={**c.spec.params, "no_such_parameter": 1}))
     except InputError:
         return "; ".join([*said, "an unknown parameter is refused"])
-    raise Broken("[no_such_parameter=1] is accepted: a misspelled parameter would be ignored in silence. Refuse unknown ones (no **kwargs)")
+    raise Broken(
+        "[no_such_parameter=1] is accepted: a misspelled parameter would be ignored in silence. Refuse unknown ones "
+        "(no **kwargs)"
+    )
 
 
 def _flat(model: Any) -> dict[str, Any]:
     """Public attributes, those of dataclass fields that are dicts spread out."""
-    found = asdict(model) if is_dataclass(model) and not isinstance(model, type) else {k: v for k, v in vars(model).items() if not k.startswith("_")}
+    found = (
+        asdict(model)
+        if is_dataclass(model) and not isinstance(model, type)
+        else {k: v for k, v in vars(model).items() if not k.startswith("_")}
+    )
     inner = [value for value in found.values() if isinstance(value, dict)]
     return {**found, **{k: v for d in inner for k, v in d.items()}}
 
@@ -95,14 +102,18 @@ def history(c: Subject) -> str:
             raise NotApplicable("predict fails with and without a history: see the rule 'shape'")
         raise Broken(f"without a history it {raised(plain)}; accept history=None")
     if isinstance(told, Exception):
-        raise Broken(f"with a history of {HISTORY} samples it {raised(told)}; predict(s0, U, history=None) must take the third argument")
+        raise Broken(
+            f"with a history of {HISTORY} samples it {raised(told)}; predict(s0, U, history=None) must take the "
+            "third argument"
+        )
     if told.shape != plain.shape:
         raise Broken(f"shape {told.shape} with a history of {HISTORY} samples, {plain.shape} without")
     return f"shape {plain.shape} with {HISTORY} samples and without"
 
 
 def shape(c: Subject) -> str:
-    """`predict` gives states (batch, K, 10) for any batch and any K, finite one step ahead and, in some run at least, to the end."""
+    """`predict` gives states (batch, K, 10) for any batch and any K, finite one step ahead and, in some run at least,
+    to the end."""
     batch, K = c.batch, c.batch.U.shape[1]
     shapes = []
     for runs, steps in ((len(batch.s0), K), (1, K), (len(batch.s0), K // 3), (len(batch.s0), 1)):
@@ -110,7 +121,10 @@ def shape(c: Subject) -> str:
         if isinstance(S, Exception):
             raise Broken(f"for {runs} runs and {steps} steps it {raised(S)}")
         if S.shape != (runs, steps, len(STATES)):
-            raise Broken(f"shape {S.shape} for {runs} runs and {steps} steps; accepted: {(runs, steps, len(STATES))}, s0 not among them")
+            raise Broken(
+                f"shape {S.shape} for {runs} runs and {steps} steps; accepted: {(runs, steps, len(STATES))}, s0 not "
+                "among them"
+            )
         shapes.append(str(S.shape))
     finite = np.isfinite(c.S).all(axis=2)
     if not finite[:, 0].all() or not finite.all(axis=1).any():
@@ -119,7 +133,9 @@ def shape(c: Subject) -> str:
         hint = "; a saved model may need data of its own ship: --dataset" if c.saved else ""
         raise Broken(f"{STATES[j]} is {c.S[i, k, j]} at step {k + 1} of run {i}, on ordinary data{hint}")
     gone = int((~finite.all(axis=1)).sum())
-    return ", ".join(shapes) + (f"; {gone} of {len(finite)} runs diverge, which is a result and breaks no rule" if gone else "")
+    return ", ".join(shapes) + (
+        f"; {gone} of {len(finite)} runs diverge, which is a result and breaks no rule" if gone else ""
+    )
 
 
 def dtype(c: Subject) -> str:
@@ -147,7 +163,8 @@ def start(c: Subject) -> str:
 
 
 def repeatable(c: Subject) -> str:
-    """`predict` changes nothing in the model and draws nothing: asked again, after another question, it says the same."""
+    """`predict` changes nothing in the model and draws nothing: asked again, after another question, it says the
+    same."""
     batch = c.batch
     first = c.S
     c.ask(batch.s0[::-1] * 1.1, batch.U[::-1])
@@ -158,7 +175,12 @@ def predict_inputs(c: Subject) -> str:
     """`predict` leaves s0, U and the history as they are."""
     batch = c.parts[2].batch(history=HISTORY)
     past = batch.history[0].copy(), batch.history[1].copy()  # type: ignore[index]
-    given = {"s0": batch.s0.copy(), "U": batch.U.copy(), "the history's states": past[0], "the history's inputs": past[1]}
+    given = {
+        "s0": batch.s0.copy(),
+        "U": batch.U.copy(),
+        "the history's states": past[0],
+        "the history's inputs": past[1],
+    }
     before = {name: array.copy() for name, array in given.items()}
     c.model.predict(given["s0"], given["U"], past)
     for name, array in given.items():
@@ -172,7 +194,9 @@ def single_run(c: Subject) -> str:
     alone = attempt(lambda: c.ask(c.batch.s0[0], c.batch.U[0]))
     if isinstance(alone, Exception):
         raise Broken(f"for s0 (10,) and U {c.batch.U[0].shape} it {raised(alone)}")
-    return c.same(alone, c.ask(c.batch.s0[:1], c.batch.U[:1])[0], ROUNDING, "difference to the same run as a batch of one")
+    return c.same(
+        alone, c.ask(c.batch.s0[:1], c.batch.U[:1])[0], ROUNDING, "difference to the same run as a batch of one"
+    )
 
 
 def batch_independence(c: Subject) -> str:
@@ -189,13 +213,16 @@ def causality(c: Subject) -> str:
     spread = np.ptp(batch.U, axis=(0, 1))
     other = batch.U.copy()
     other[:, k:] = other[::-1, k:] + np.where(spread > 0.0, spread, 1.0)
-    said = c.same(c.ask(batch.s0, other)[:, :k], c.S[:, :k], _LEAK, f"other inputs from step {k + 1} on, states up to step {k}")
+    said = c.same(
+        c.ask(batch.s0, other)[:, :k], c.S[:, :k], _LEAK, f"other inputs from step {k + 1} on, states up to step {k}"
+    )
     shorter = c.same(c.ask(batch.s0, batch.U[:, :k]), c.S[:, :k], ROUNDING, f"K = {k} in place of {batch.U.shape[1]}")
     return f"{said}; {shorter}"
 
 
 def heading(c: Subject) -> str:
-    """The heading is not wrapped: started one turn further (psi + 2 pi), it stays one turn further and nothing else changes."""
+    """The heading is not wrapped: started one turn further (psi + 2 pi), it stays one turn further and nothing else
+    changes."""
     turn = np.eye(len(STATES))[PSI] * 2.0 * np.pi
     return c.same(c.ask(c.batch.s0 + turn, c.batch.U), c.S + turn, ROUNDING, "psi + 2 pi")
 
@@ -217,9 +244,13 @@ def rotation(c: Subject) -> str:
         raise NotApplicable(c.earth_fixed)
     turn, s0 = 1.2, c.batch.s0
     place = s0[:, :2].T
-    back = place - move_frame(s0, np.zeros(2), turn)[:, :2].T  # turned about each run's own start: its place is the rule 'translation'
+    back = (
+        place - move_frame(s0, np.zeros(2), turn)[:, :2].T
+    )  # turned about each run's own start: its place is the rule 'translation'
     moved, expected = c.ask(move_frame(s0, back, turn), c.batch.U), move_frame(c.S, back[..., None], turn)
-    moved[..., PSI] = expected[..., PSI] + wrap_angle(moved[..., PSI] - expected[..., PSI])  # whole turns are the rule 'heading'
+    moved[..., PSI] = expected[..., PSI] + wrap_angle(
+        moved[..., PSI] - expected[..., PSI]
+    )  # whole turns are the rule 'heading'
     return c.same(moved, expected, ROUNDING, f"turned by {turn} rad")
 
 
@@ -242,14 +273,17 @@ def diverging(c: Subject) -> str:
         if isinstance(S, Exception):
             raise Broken(f"started with {factor:g} times the speeds, it {raised(S)}; return inf or NaN instead")
         if S.shape != c.S.shape:
-            raise Broken(f"started with {factor:g} times the speeds, it returned the shape {S.shape}; accepted: {c.S.shape}")
+            raise Broken(
+                f"started with {factor:g} times the speeds, it returned the shape {S.shape}; accepted: {c.S.shape}"
+            )
         c.same(S[1:], c.S[1:], ROUNDING, f"the other runs beside one with {factor:g} times the speeds")
         said.append(f"{factor:g} times the speeds: {'finite' if np.isfinite(S[0]).all() else 'inf or NaN'}")
     return "; ".join(said)
 
 
 def not_finite(c: Subject) -> str:
-    """NaN or inf in the arguments is refused with a ValueError or InputError, or stays in its own run and shows there."""
+    """NaN or inf in the arguments is refused with a ValueError or InputError, or stays in its own run and shows
+    there."""
     batch, k = c.batch, c.batch.U.shape[1] // 2
     said = []
     for what, value in (("s0 NaN", np.nan), ("s0 inf", np.inf), (f"U NaN at step {k + 1}", np.nan)):
@@ -274,12 +308,19 @@ def not_finite(c: Subject) -> str:
 _ASKED = ("fit", "history", "shape")
 _COMPARED = (*_ASKED, "repeatable")
 _FUNCTIONS = (
-    ("fit", fit, ()), ("parameters", parameters, ("fit",)), ("fit_returns", fit_returns, ("fit",)), ("valid_optional", valid_optional, ("fit",)),
+    ("fit", fit, ()), ("parameters", parameters, ("fit",)), ("fit_returns", fit_returns, ("fit",)),
+    ("valid_optional", valid_optional, ("fit",)),
     ("fit_inputs", fit_inputs, ("fit",)), ("history", history, ("fit",)),
-    ("shape", shape, ("fit", "history")), ("dtype", dtype, _ASKED), ("start", start, _ASKED), ("repeatable", repeatable, _ASKED),
-    ("predict_inputs", predict_inputs, _ASKED), ("single_run", single_run, _COMPARED), ("batch", batch_independence, _COMPARED),
-    ("causality", causality, _COMPARED), ("heading", heading, _COMPARED), ("translation", translation, _COMPARED), ("rotation", rotation, _COMPARED),
-    ("seed", seed, _COMPARED), ("diverging", diverging, (*_COMPARED, "batch")), ("not_finite", not_finite, (*_COMPARED, "batch", "diverging")),
+    ("shape", shape, ("fit", "history")), ("dtype", dtype, _ASKED), ("start", start, _ASKED),
+    ("repeatable", repeatable, _ASKED),
+    ("predict_inputs", predict_inputs, _ASKED), ("single_run", single_run, _COMPARED),
+    ("batch", batch_independence, _COMPARED),
+    ("causality", causality, _COMPARED), ("heading", heading, _COMPARED), ("translation", translation, _COMPARED),
+    ("rotation", rotation, _COMPARED),
+    ("seed", seed, _COMPARED), ("diverging", diverging, (*_COMPARED, "batch")),
+    ("not_finite", not_finite, (*_COMPARED, "batch", "diverging")),
     ("saved", same_after_loading, _COMPARED),
 )  # fmt: skip
-RULES = tuple(Rule(name, " ".join((function.__doc__ or "").split()), function, after) for name, function, after in _FUNCTIONS)
+RULES = tuple(
+    Rule(name, " ".join((function.__doc__ or "").split()), function, after) for name, function, after in _FUNCTIONS
+)

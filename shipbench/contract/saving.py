@@ -44,7 +44,9 @@ def same_after_loading(c: Subject) -> str:
 
 def _load(c: Subject, folder: Path) -> tuple[Any, str]:
     """As a study would: by its folder where the class is registered under a name, else by the class's own `load`."""
-    if c.saved or (c.spec.path is None and c.spec.given is None and PREDICTORS.get(c.spec.name.partition(":")[0]) is type(c.model)):
+    if c.saved or (
+        c.spec.path is None and c.spec.given is None and PREDICTORS.get(c.spec.name.partition(":")[0]) is type(c.model)
+    ):
         return make_predictor(parse_spec(str(folder)), c.device), "its folder's name"
     return type(c.model).load(folder), "the class's load(path)"
 
@@ -53,7 +55,14 @@ def pickle_in(name: str, data: bytes) -> str:
     """Which file of the saved model is, or holds, a pickle; "" if none does. Nothing is unpickled to find out."""
     if zipfile.is_zipfile(io.BytesIO(data)):
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            return next((f"{name}: {found}" for member in archive.namelist() if (found := pickle_in(member, archive.read(member)))), "")
+            return next(
+                (
+                    f"{name}: {found}"
+                    for member in archive.namelist()
+                    if (found := pickle_in(member, archive.read(member)))
+                ),
+                "",
+            )
     if data[:6] == b"\x93NUMPY":
         major = data[6]
         reader = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0

@@ -17,7 +17,9 @@ _ENVIRONMENT = {"wind_speed": (2.0, 8.0), "wind_from": (-3.0, 3.0), "depth": (12
 """Range from which the constant value of each run is drawn, in the units of `signals.UNITS`."""
 
 
-def small_harbour(num: int = NUM_RUNS, horizon: int = STEPS, seed: int = 4, inputs: tuple[str, ...] = COMMANDS) -> Dataset:
+def small_harbour(
+    num: int = NUM_RUNS, horizon: int = STEPS, seed: int = 4, inputs: tuple[str, ...] = COMMANDS
+) -> Dataset:
     """`num` simulated port manoeuvres of a 130 m container ship, `horizon` seconds at 1 s.
 
     `inputs` may add environment channels; they are constant in a run and do not act on the ship.
@@ -29,7 +31,9 @@ def small_harbour(num: int = NUM_RUNS, horizon: int = STEPS, seed: int = 4, inpu
     extras = [np.repeat(rng.uniform(*_ENVIRONMENT[name], (num, 1)), len(t), axis=1) for name in inputs[len(COMMANDS) :]]
     held = np.concatenate([C, *[e[..., None] for e in extras]], axis=2)
     runs = tuple(Run(f"run{i}", t, S[i], held[i], inputs) for i in range(num))
-    return Dataset("small_harbour", ship.particulars, 1.0, runs, simulation="container130" if inputs == COMMANDS else None)
+    return Dataset(
+        "small_harbour", ship.particulars, 1.0, runs, simulation="container130" if inputs == COMMANDS else None
+    )
 
 
 def few_windows(data: Dataset) -> Dataset:
@@ -48,7 +52,9 @@ def few_windows(data: Dataset) -> Dataset:
 
 def copied(data: Dataset) -> Dataset:
     """The same data in arrays of their own, so that nobody can write into the originals."""
-    return data.with_runs(replace(r, t=r.t.copy(), states=r.states.copy(), inputs=r.inputs.copy(), meta=dict(r.meta)) for r in data.runs)
+    return data.with_runs(
+        replace(r, t=r.t.copy(), states=r.states.copy(), inputs=r.inputs.copy(), meta=dict(r.meta)) for r in data.runs
+    )
 
 
 def what_changed(before: Dataset, after: Dataset) -> str:

@@ -35,7 +35,8 @@ class NotApplicable(Exception):  # noqa: N818
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A model after `fit`, with what it was given (copies that it may have written into), what `fit` returned and how long it took."""
+    """A model after `fit`, with what it was given (copies that it may have written into), what `fit` returned and how
+    long it took."""
 
     model: Any
     train: Dataset
@@ -61,7 +62,11 @@ class Subject:
         """Runs to fit on, to stop by, and to predict."""
         n = len(self.data)
         test = 3 if n >= 12 else 2
-        return self.data.subset(range(n - test - 2)), self.data.subset(range(n - test - 2, n - test)), self.data.subset(range(n - test, n))
+        return (
+            self.data.subset(range(n - test - 2)),
+            self.data.subset(range(n - test - 2, n - test)),
+            self.data.subset(range(n - test, n)),
+        )
 
     @cached_property
     def batch(self) -> Batch:
@@ -74,7 +79,8 @@ class Subject:
         return self.parts[0].subset(range(min(4, len(self.parts[0]))))
 
     def fit(self, state: int, *, train: Dataset | None = None) -> Fitted:
-        """A fresh model fitted with the seed `SEED`, on `train` alone if it is given; `state` is what the global generators are set to meanwhile."""
+        """A fresh model fitted with the seed `SEED`, on `train` alone if it is given; `state` is what the global
+        generators are set to meanwhile."""
         model = make_predictor(self.spec, self.device)
         if self.saved:
             return Fitted(model, self.parts[0], None, model)
@@ -105,7 +111,8 @@ class Subject:
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """Size (10,) by which differences are judged: how far each state moves within the runs (1 for one that never moves)."""
+        """Size (10,) by which differences are judged: how far each state moves within the runs (1 for one that never
+        moves)."""
         states = np.stack([r.states for r in self.data.runs])
         moved = np.concatenate([states[..., : PSI + 1] - states[:, :1, : PSI + 1], states[..., PSI + 1 :]], axis=-1)
         size = np.sqrt(np.mean(moved**2, axis=(0, 1)))
@@ -128,7 +135,9 @@ class Subject:
             where = np.unravel_index(int(np.argmax(apart)), apart.shape)
             size = f"{STATES[where[-1]]} is {a[where]:.6g} against {b[where]:.6g}"
             raise Broken(f"{what}: {size} (limit {limit:g} of its size {self.scale[where[-1]]:.3g})")
-        return f"{what}: " + ("equal bit for bit" if not limit else f"{worst:.1e} (limit {limit:g})" if worst else "no difference")
+        return f"{what}: " + (
+            "equal bit for bit" if not limit else f"{worst:.1e} (limit {limit:g})" if worst else "no difference"
+        )
 
     @property
     def earth_fixed(self) -> str:
@@ -136,7 +145,11 @@ class Subject:
         effects = [e.name for e in self.spec.effects if EFFECTS.get(e.name).family in ("environment", "time")]
         if effects:
             return f"the model has earth-fixed effects ({', '.join(effects)})"
-        return "the model says that it knows a place on earth (earth_fixed)" if getattr(self.model, "earth_fixed", False) else ""
+        return (
+            "the model says that it knows a place on earth (earth_fixed)"
+            if getattr(self.model, "earth_fixed", False)
+            else ""
+        )
 
 
 def attempt(action: Callable[[], np.ndarray]) -> np.ndarray | Exception:
@@ -155,9 +168,11 @@ def raised(error: Exception) -> str:
 
 @contextmanager
 def global_generators(state: int) -> Iterator[None]:
-    """Set the global generators of random, numpy and torch; put them back afterwards. A model that draws from them does not follow its seed."""
+    """Set the global generators of random, numpy and torch; put them back afterwards. A model that draws from them does
+    not follow its seed."""
     torch = sys.modules.get("torch")
-    kept = random.getstate(), np.random.get_state(), torch.get_rng_state() if torch else None  # noqa: NPY002 - it is the global one that is meant
+    # The global state is the one that is meant.
+    kept = random.getstate(), np.random.get_state(), torch.get_rng_state() if torch else None  # noqa: NPY002
     random.seed(state)
     np.random.seed(state)  # noqa: NPY002
     if torch:

@@ -27,7 +27,8 @@ from ..storage import put
 from .public import PublicData
 
 _HELPERS = frozenset({
-    "base", "corrections", "coverage", "describe", "export", "files", "mat", "noise", "public", "reread", "sensitivity", "trajectories", "units",
+    "base", "corrections", "coverage", "describe", "export", "files", "mat", "noise", "public", "reread", "sensitivity",
+    "trajectories", "units",
 })  # fmt: skip
 DATASETS = Registry("data set", "data", "DATASET", helpers=_HELPERS, group="datasets")
 
@@ -40,7 +41,8 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class DatasetPart:
-    """A named data set: how to make it, under which licence, whether to keep it in the cache, and where it is downloaded from if it is.
+    """A named data set: how to make it, under which licence, whether to keep it in the cache, and where it is
+    downloaded from if it is.
 
     A change that alters the samples of a cached set gets a new `version` (and, once published, a new name).
     """
@@ -60,7 +62,8 @@ def public_folder(name: str) -> Path:
 
 
 def load_dataset(spec: str | os.PathLike[str], *, remake: bool = False, **options: Any) -> Dataset:
-    """A data set by registered name, `name[key=value]`, or the path of a folder in the contract's format (or of a .mat file that was exported).
+    """A data set by registered name, `name[key=value]`, or the path of a folder in the contract's format (or of a .mat
+    file that was exported).
 
     Args:
         spec: name, folder or .mat file; a folder is recognised by its dataset.toml.
@@ -82,14 +85,18 @@ def load_dataset(spec: str | os.PathLike[str], *, remake: bool = False, **option
         if options:
             raise InputError(f"{folder} is read from files and takes no parameters; given: {', '.join(options)}.")
         return read_mat(folder) if exported else read_dataset(folder)
-    if os.path.isdir(folder) and spec not in DATASETS:  # `shipbench demo` makes a folder of results with the name of a data set
+    if (
+        os.path.isdir(folder) and spec not in DATASETS
+    ):  # `shipbench demo` makes a folder of results with the name of a data set
         files = "trajectories.csv (or .csv.gz, .parquet), dataset.toml and ship.toml"
         raise InputError(f"folder {folder} holds no dataset.toml; a data set has {files}.{_logs_within(folder)}")
     parsed = parse_spec(spec)
     if parsed.name not in DATASETS:
         raise unknown_name("folder or data set", parsed.name, DATASETS.names())
     if parsed.effects or parsed.path is not None:
-        raise InputError(f"data set '{spec}': accepted: name, name[key=value,...] or a folder; effects (+name) belong to models.")
+        raise InputError(
+            f"data set '{spec}': accepted: name, name[key=value,...] or a folder; effects (+name) belong to models."
+        )
     part: DatasetPart = DATASETS.get(parsed.name)
     params = parsed.params | options
     _check_params(part, params)
@@ -111,10 +118,14 @@ def import_command(*logs: Path) -> str:
 def _no_data_set(spec: str, file: Path) -> InputError:
     """What to give or to do instead of a file."""
     if os.path.lexists(file.parent / "dataset.toml"):
-        return InputError(f"'{spec}' is one file of a data set; accepted: its folder. Give {shlex.quote(str(file.parent))}.")
+        return InputError(
+            f"'{spec}' is one file of a data set; accepted: its folder. Give {shlex.quote(str(file.parent))}."
+        )
     if file.name.lower().endswith(LOG_SUFFIXES):
         return InputError(f"'{spec}' is a log, not a data set yet. Start with: {import_command(file)}")
-    return InputError(f"'{spec}' is a file; accepted: a registered name, or a folder with dataset.toml. A log: {import_command(file)}")
+    return InputError(
+        f"'{spec}' is a file; accepted: a registered name, or a folder with dataset.toml. A log: {import_command(file)}"
+    )
 
 
 def _logs_within(folder: Path) -> str:
@@ -137,11 +148,14 @@ def _make(part: DatasetPart, params: dict[str, Any]) -> Dataset:
         if not params:  # then it is no fault of the user's
             raise
         given = ", ".join(f"{k}={v}" for k, v in params.items())
-        raise InputError(f"data set '{part.name}' cannot be made with {given}: {error}. Parameters are written name[key=value].") from error
+        raise InputError(
+            f"data set '{part.name}' cannot be made with {given}: {error}. Parameters are written name[key=value]."
+        ) from error
 
 
 def _cache_key(part: DatasetPart, params: dict[str, Any]) -> str:
-    """Folder name; digests keep apart what any readable form of the parameters might confuse, and the versions of a plug-in."""
+    """Folder name; digests keep apart what any readable form of the parameters might confuse, and the versions of a
+    plug-in."""
     text = json.dumps(params, sort_keys=True, default=str)
     plugin = DATASETS.digest(part.name)
     digest = [hashlib.sha256(text.encode()).hexdigest()[:12]] if params else []
@@ -165,7 +179,12 @@ def _from_cache(folder: Path) -> Dataset | None:
         _log.warning("the cached data set %s cannot be read (%s); it is made anew", folder, error)
         return None
     if dataset.fingerprint != promised:
-        _log.warning("the cached data set %s is damaged (fingerprint %s, promised %s); it is made anew", folder, dataset.fingerprint, promised)
+        _log.warning(
+            "the cached data set %s is damaged (fingerprint %s, promised %s); it is made anew",
+            folder,
+            dataset.fingerprint,
+            promised,
+        )
         return None
     return dataset
 
@@ -179,7 +198,8 @@ def _clear(folder: Path) -> None:
 
 
 def _to_cache(dataset: Dataset, folder: Path) -> None:
-    """Write beside the cache, then move: a reader sees a whole data set or none. A cache that cannot be written costs time, not results."""
+    """Write beside the cache, then move: a reader sees a whole data set or none. A cache that cannot be written costs
+    time, not results."""
     from .files import write_dataset
 
     fresh: Path | None = None
@@ -194,6 +214,11 @@ def _to_cache(dataset: Dataset, folder: Path) -> None:
         _clear(folder)
         put(fresh, folder)
     except (ShipbenchError, OSError) as error:
-        _log.warning("the data set '%s' cannot be kept in %s (%s); it will be made again next time", dataset.name, folder.parent, error)
+        _log.warning(
+            "the data set '%s' cannot be kept in %s (%s); it will be made again next time",
+            dataset.name,
+            folder.parent,
+            error,
+        )
         if fresh is not None:
             shutil.rmtree(fresh, ignore_errors=True)

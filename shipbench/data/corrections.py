@@ -1,7 +1,9 @@
-"""What dataset.toml may say of how a record departs from ours, beyond units and signs: frames, clocks, biases, bad samples, gaps.
+"""What dataset.toml may say of how a record departs from ours, beyond units and signs: frames, clocks, biases, bad
+samples, gaps.
 
-`shipbench data check` finds these and prints the lines; the loader applies them in this order: frame, bad samples, biases and scales, kind of
-velocities, cuts and gaps, delays, kind of wind, antenna. Values are in our units and signs, after `[units]` and `[signs]`.
+`shipbench data check` finds these and prints the lines; the loader applies them in this order: frame, bad samples,
+biases and scales, kind of velocities, cuts and gaps, delays, kind of wind, antenna. Values are in our units and signs,
+after `[units]` and `[signs]`.
 """
 
 from __future__ import annotations
@@ -24,7 +26,10 @@ _SPLIT_FEWEST = 2
 
 def _in_order(interval: tuple[float, float]) -> tuple[float, float]:
     if interval[0] > interval[1]:
-        raise ValueError(f"the interval ends before it begins; accepted: [from, to] in s with from <= to, such as [{interval[1]:g}, {interval[0]:g}]")
+        raise ValueError(
+            "the interval ends before it begins; accepted: [from, to] in s with from <= to, such as "
+            f"[{interval[1]:g}, {interval[0]:g}]"
+        )
     return interval
 
 
@@ -38,7 +43,8 @@ _MOST = 1e9
 class RunCorrections(BaseModel):
     """Keys of `[runs.<id>]` that change the samples; all others are metadata.
 
-    cut: [from, to] in s, both included: these samples are left out and the run is split there. fill: signal -> such intervals, bridged by straight
+    cut: [from, to] in s, both included: these samples are left out and the run is split there. fill: signal -> such
+    intervals, bridged by straight
     lines. bias: signal -> recorded less true. current: [north, east] m/s for velocities through water.
     """
 
@@ -52,14 +58,16 @@ class RunCorrections(BaseModel):
 class Corrections(BaseModel):
     """Keys of dataset.toml that hold for all runs.
 
-    frame: "east-north" where x is east and y north; "ENU" where psi besides is counterclockwise from east. velocities: what stands in u and v: "body"
-    over ground (ours), "earth" (north and east), "earth-east-north" (east and north), or "water" (body, through water; `current` = [north, east] m/s
-    is added). wind: what stands in wind_speed and wind_from: "true" (ours), "apparent" (as felt on board, its direction from the bow),
-    "apparent-north" (as felt on board, from north), "true-bow" (the true wind, its direction from the bow). antenna: [forward, starboard] m from
-    midship of the point whose position is recorded. gaps: "refuse", or "split" runs at gaps in time and at rows that lack values. scale: recorded
-    over true. bias: recorded less true. delay: s by which the record of a signal is late; "velocity" is the vector of u and v in earth axes (late or
-    filtered there, then turned by the heading of the moment). held: x, y or psi whose values a faster record repeats until the next one; straight
-    lines from value to value take their place.
+    frame: "east-north" where x is east and y north; "ENU" where psi besides is counterclockwise from east. velocities:
+    what stands in u and v: "body" over ground (ours), "earth" (north and east), "earth-east-north" (east and north), or
+    "water" (body, through water; `current` = [north, east] m/s is added). wind: what stands in wind_speed and
+    wind_from: "true" (ours), "apparent" (as felt on board, its direction from the bow), "apparent-north" (as felt on
+    board, from north), "true-bow" (the true wind, its direction from the bow). antenna: [forward, starboard] m from
+    midship of the point whose position is recorded. gaps: "refuse", or "split" runs at gaps in time and at rows that
+    lack values. scale: recorded
+    over true. bias: recorded less true. delay: s by which the record of a signal is late; "velocity" is the vector of u
+    and v in earth axes (late or filtered there, then turned by the heading of the moment). held: x, y or psi whose
+    values a faster record repeats until the next one; straight lines from value to value take their place.
     """
 
     frame: Literal["NED", "ENU", "east-north"] = "NED"
@@ -76,7 +84,9 @@ class Corrections(BaseModel):
     @property
     def changes_samples(self) -> bool:
         """Whether `correct_run` changes more than jumps of the heading (`frame` is the table's, see `to_ned`)."""
-        return any(getattr(self, key) != field.default for key, field in Corrections.model_fields.items() if key != "frame")
+        return any(
+            getattr(self, key) != field.default for key, field in Corrections.model_fields.items() if key != "frame"
+        )
 
 
 def check_names(corrections: Corrections, runs: dict[str, dict[str, Any]], where: str) -> None:
@@ -97,14 +107,21 @@ def check_names(corrections: Corrections, runs: dict[str, dict[str, Any]], where
             if signal not in known:
                 raise unknown_name(f"signal in [{table}] of {where}", signal, known)
             if not abs(value) <= _MOST or (table == "scale" and abs(value) < 1.0 / _MOST):
-                accepted = f"a finite number{' other than 0' * (table == 'scale')}, its size within {1 / _MOST * (table == 'scale'):g} to {_MOST:g}"
+                accepted = (
+                    f"a finite number{' other than 0' * (table == 'scale')}, its size within "
+                    f"{1 / _MOST * (table == 'scale'):g} to {_MOST:g}"
+                )
                 raise InputError(f"{where}: [{table}] {signal} = {value}; accepted: {accepted}. Correct that line.")
     if corrections.velocities != "water" and any(c is not None for c in currents):
-        raise InputError(f'{where}: a current is given, but velocities = "{corrections.velocities}". It belongs to velocities = "water".')
+        raise InputError(
+            f'{where}: a current is given, but velocities = "{corrections.velocities}". It belongs to velocities = '
+            '"water".'
+        )
 
 
 def split_meta(name: str, meta: dict[str, Any], where: str) -> tuple[RunCorrections, dict[str, Any]]:
-    """The corrections of a run, and its metadata without them (so that a data set written again is not corrected twice).
+    """The corrections of a run, and its metadata without them (so that a data set written again is not corrected
+    twice).
 
     Raises:
         InputError: a correction has another form.
@@ -114,7 +131,9 @@ def split_meta(name: str, meta: dict[str, Any], where: str) -> tuple[RunCorrecti
         return RunCorrections.model_validate(own), {k: v for k, v in meta.items() if k not in own}
     except ValidationError as error:
         place, _, wrong = fault(error)
-        accepted = "cut = [[from, to], ...] s, fill = {r = [[from, to], ...]}, bias = {r = 0.001}, current = [north, east]"
+        accepted = (
+            "cut = [[from, to], ...] s, fill = {r = [[from, to], ...]}, bias = {r = 0.001}, current = [north, east]"
+        )
         raise InputError(f"{where}: [runs.{name}] {'.'.join(place)}: {wrong}. Accepted: {accepted}.") from None
 
 
@@ -129,12 +148,14 @@ def to_ned(table: pd.DataFrame, corrections: Corrections) -> None:
 def correct_run(
     frame: pd.DataFrame, corrections: Corrections, own: RunCorrections, dt: float, where: str, turn: float = 2.0 * np.pi
 ) -> list[pd.DataFrame]:
-    """One run's rows, corrected, in as many pieces as cuts and gaps make of it (samples may still be faulty: the caller refuses them).
+    """One run's rows, corrected, in as many pieces as cuts and gaps make of it (samples may still be faulty: the caller
+    refuses them).
 
     turn: a whole turn of the heading, which is made continuous: 360 where it may not be in rad yet.
 
     Raises:
-        InputError: a fill has no samples to stand on, velocities through water lack their current, or a kind of wind its columns.
+        InputError: a fill has no samples to stand on, velocities through water lack their current, or a kind of wind
+        its columns.
     """
     frame = frame.reset_index(drop=True).copy()
     t = frame["t"].to_numpy()
@@ -152,12 +173,19 @@ def correct_run(
         if signal in frame:
             frame[signal] /= scale
     _to_body_over_ground(frame, corrections, own, where)
-    parts = [undelayed(part, corrections.delay, dt) for part in _pieces(frame, corrections, own, dt)]  # nothing is interpolated over a gap or a cut
-    return [_at_midship(_with_true_wind(part, corrections.wind, where), corrections.antenna) for part in parts if len(part) >= _SPLIT_FEWEST]
+    parts = [
+        undelayed(part, corrections.delay, dt) for part in _pieces(frame, corrections, own, dt)
+    ]  # nothing is interpolated over a gap or a cut
+    return [
+        _at_midship(_with_true_wind(part, corrections.wind, where), corrections.antenna)
+        for part in parts
+        if len(part) >= _SPLIT_FEWEST
+    ]
 
 
 def continuous(psi: np.ndarray, good: np.ndarray | bool = True, turn: float = 2.0 * np.pi) -> np.ndarray:
-    """The heading (samples,) without jumps of a whole turn between its `good` finite samples; where it has none, it keeps its bits."""
+    """The heading (samples,) without jumps of a whole turn between its `good` finite samples; where it has none, it
+    keeps its bits."""
     known = np.isfinite(psi) & good
     if not (np.abs(np.diff(psi[known])) > 0.5 * turn).any():
         return psi
@@ -170,7 +198,10 @@ def _with_true_wind(frame: pd.DataFrame, kind: str, where: str) -> pd.DataFrame:
     if kind == "true":
         return frame
     if not {"wind_speed", "wind_from"} <= set(frame):
-        raise InputError(f'{where}: wind = "{kind}" needs the columns wind_speed and wind_from. Add them, or remove that line of dataset.toml.')
+        raise InputError(
+            f'{where}: wind = "{kind}" needs the columns wind_speed and wind_from. Add them, or remove that line of '
+            "dataset.toml."
+        )
     psi, u, v, speed, come_from = (frame[c].to_numpy() for c in ("psi", "u", "v", "wind_speed", "wind_from"))
     north, east = true_wind(psi, u, v, speed, come_from, kind)
     return frame.assign(wind_speed=np.hypot(north, east), wind_from=np.arctan2(east, north))
@@ -202,7 +233,8 @@ def _fill(frame: pd.DataFrame, signal: str, t: np.ndarray, intervals: list[tuple
 
 
 def between_fixes(values: np.ndarray) -> np.ndarray:
-    """Straight lines from fix to fix of a record (samples,) that holds each value until the next; one held for long did not change."""
+    """Straight lines from fix to fix of a record (samples,) that holds each value until the next; one held for long did
+    not change."""
     if len(values) < 2:
         return values
     new = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1])
@@ -225,7 +257,10 @@ def _to_body_over_ground(frame: pd.DataFrame, corrections: Corrections, own: Run
     if corrections.velocities == "water":
         current = own.current or corrections.current
         if current is None:
-            raise InputError(f'{where}: velocities = "water" needs current = [north, east] in m/s, for all runs or under [runs.<id>].')
+            raise InputError(
+                f'{where}: velocities = "water" needs current = [north, east] in m/s, for all runs or under '
+                "[runs.<id>]."
+            )
         north, east = current
     else:
         north, east = own_way if corrections.velocities == "earth" else own_way[::-1]
@@ -234,7 +269,8 @@ def _to_body_over_ground(frame: pd.DataFrame, corrections: Corrections, own: Run
 
 
 def undelayed(frame: pd.DataFrame, delay: dict[str, float], dt: float) -> pd.DataFrame:
-    """Signals that were late put back in time; samples whose values lie outside the record are dropped. Commands move by whole samples."""
+    """Signals that were late put back in time; samples whose values lie outside the record are dropped. Commands move
+    by whole samples."""
     late = {s: d for s, d in delay.items() if (s in frame or s == VECTOR) and d != 0.0}
     t = frame["t"].to_numpy()
     if not late or len(t) < 2 or not np.isfinite(t).all():

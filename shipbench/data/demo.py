@@ -17,10 +17,17 @@ SEED, RUNS, SAMPLES = 1, 12, 100
 
 
 def make(seed: int = SEED) -> Dataset:
-    """12 runs of 100 s at 1 s of the 130 m container ship: zig-zags, turns, rudder and engine orders, with sensor noise and gusts."""
+    """12 runs of 100 s at 1 s of the 130 m container ship: zig-zags, turns, rudder and engine orders, with sensor noise
+    and gusts."""
     current = EFFECTS.get("current")
     hidden = [Hidden(current, current.internal({"speed": SPEED, "to": TOWARDS}))]
     return sea_trials(load_mmg_ship("container130"), int(seed), hidden, Trials(runs=RUNS, samples=SAMPLES), name="demo")
 
 
-DATASET = DatasetPart("demo", "12 simulated runs of a 130 m container ship, 100 s at 1 s, with a hidden current", "MIT", make, cached=False)
+DATASET = DatasetPart(
+    "demo",
+    "12 simulated runs of a 130 m container ship, 100 s at 1 s, with a hidden current",
+    "MIT",
+    make,
+    cached=False,
+)

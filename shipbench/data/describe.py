@@ -27,14 +27,22 @@ COMPARED = ("u", "v", "r", "n", "delta")
 
 
 def statistics(dataset: Dataset) -> pd.DataFrame:
-    """Minimum, maximum, mean, standard deviation and deciles over all samples of all runs; index: signal, with a column `unit`."""
+    """Minimum, maximum, mean, standard deviation and deciles over all samples of all runs; index: signal, with a column
+    `unit`."""
     S = np.concatenate([r.states for r in dataset.runs])
     inputs = np.concatenate([r.inputs for r in dataset.runs])
     rows = {}
     for name, values in [*zip(STATES, S.T, strict=True), *zip(dataset.inputs, inputs.T, strict=True)]:
         degrees = name in _SHOWN_IN_DEGREES
         x = np.rad2deg(values) if degrees else values
-        rows[name] = [x.min(), x.max(), x.mean(), x.std(), *np.percentile(x, [10, 50, 90]), "deg" if degrees else UNITS[name]]
+        rows[name] = [
+            x.min(),
+            x.max(),
+            x.mean(),
+            x.std(),
+            *np.percentile(x, [10, 50, 90]),
+            "deg" if degrees else UNITS[name],
+        ]
     return pd.DataFrame.from_dict(rows, orient="index", columns=[*STATISTICS, "unit"])
 
 
@@ -47,9 +55,9 @@ def table_ii() -> pd.DataFrame:
 def compare_with_paper(dataset: Dataset) -> pd.DataFrame:
     """Mean, std, P10 and P90 of u, v, r, n, delta: ours, the paper's, and the difference as a share of the paper's std.
 
-    The paper prints r with two decimals: its 0.01 stands for anything from 0.005 to 0.015 rad/s. For r `difference / paper std` is taken to the
-    nearest figure that rounds to the printed one, so that 0 means "not told apart by the paper's digits", and the std is taken as 0.01.
-    `plain difference / paper std` makes no such allowance.
+    The paper prints r with two decimals: its 0.01 stands for anything from 0.005 to 0.015 rad/s. For r `difference /
+    paper std` is taken to the nearest figure that rounds to the printed one, so that 0 means "not told apart by the
+    paper's digits", and the std is taken as 0.01. `plain difference / paper std` makes no such allowance.
     """
     ours, paper, rows = statistics(dataset), table_ii(), []
     for signal in COMPARED:

@@ -18,18 +18,24 @@ def check_format(format: str | None, out: Path, source: str) -> Format:
     """The format that is meant; a file that ends in .mat needs no word.
 
     Raises:
-        InputError: no format or an unknown one, a file's name that contradicts it, or `out` is the folder that is to be exported (its table would be
+        InputError: no format or an unknown one, a file's name that contradicts it, or `out` is the folder that is to be
+        exported (its table would be
             replaced).
     """
     is_mat_file = out.suffix == ".mat"
     chosen = "mat" if format is None and is_mat_file else format
     accepted = ", ".join(get_args(Format))
     if chosen is None:
-        raise InputError(f"--out {out}: no format is given; accepted: --format {accepted}, or a file that ends in .mat.")
+        raise InputError(
+            f"--out {out}: no format is given; accepted: --format {accepted}, or a file that ends in .mat."
+        )
     for known in get_args(Format):
         if chosen == known:
             if is_mat_file and known != "mat":
-                raise InputError(f"--out {out} is a .mat file, --format is {known}; accepted: a folder for csv and parquet, or --format mat.")
+                raise InputError(
+                    f"--out {out} is a .mat file, --format is {known}; accepted: a folder for csv and parquet, or "
+                    "--format mat."
+                )
             if is_mat_file:
                 check_output(out, [source])
             elif out.resolve() == Path(source).resolve() and Path(source).exists():

@@ -14,7 +14,17 @@ import tomli_w
 from pydantic import ConfigDict, Field, ValidationError
 
 from ..errors import InputError, unknown_name
-from ..frames import KNOWN, MOTION_STATES, SIGNALS, Columns, blocks, check_columns, complete_columns, long_table, samples
+from ..frames import (
+    KNOWN,
+    MOTION_STATES,
+    SIGNALS,
+    Columns,
+    blocks,
+    check_columns,
+    complete_columns,
+    long_table,
+    samples,
+)
 from ..names import check_name
 from ..records import Dataset, Run
 from ..ship import Ship
@@ -55,10 +65,12 @@ class Description(Corrections):
 def read_dataset(folder: str | Path) -> Dataset:
     """Read a folder of the contract's format into SI and our signs.
 
-    A unit or sign given for an actuator also holds for its command, unless the command has its own entry. Columns that are not signals are ignored.
+    A unit or sign given for an actuator also holds for its command, unless the command has its own entry. Columns that
+    are not signals are ignored.
 
     Raises:
-        InputError: a file or column is missing, a value is not a finite number, time is not uniform, or a key, unit or sign is unknown.
+        InputError: a file or column is missing, a value is not a finite number, time is not uniform, or a key, unit or
+        sign is unknown.
     """
     folder = Path(folder)
     description = read_description(folder / "dataset.toml")
@@ -66,7 +78,9 @@ def read_dataset(folder: str | Path) -> Dataset:
     table, where = read_table(folder, description)
     notes = list(description.notes)
     check_columns(table, where)
-    convert_table(table, description)  # before columns are filled in: what is copied from another column is in our units already
+    convert_table(
+        table, description
+    )  # before columns are filled in: what is copied from another column is in our units already
     inputs = complete_columns(table, notes)
     names = table["trajectory"].unique()
     unknown = set(description.runs) - set(names)
@@ -74,8 +88,10 @@ def read_dataset(folder: str | Path) -> Dataset:
         raise unknown_name(f"run in [runs] of {folder / 'dataset.toml'}", sorted(unknown)[0], names)
     runs = tuple(run for name, rows in blocks(table) for run in _runs(name, rows, inputs, description, where))
     return Dataset(
-        name=description.name, ship=ship, dt=description.dt, runs=runs, actuators=description.actuators, source=description.source,
-        licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)), derived=tuple(description.derived),
+        name=description.name, ship=ship, dt=description.dt, runs=runs, actuators=description.actuators,
+        source=description.source,
+        licence=description.licence, simulation=description.simulation, notes=tuple(dict.fromkeys(notes)),
+        derived=tuple(description.derived),
     )  # fmt: skip
 
 
@@ -98,7 +114,9 @@ def parse_description(data: dict[str, Any], path: Path) -> Description:
         description = Description.model_validate(data)
     except ValidationError as error:
         place, _, wrong = fault(error)
-        raise InputError(f"{path}: {'.'.join(place)}: {wrong}. Accepted keys: {', '.join(Description.model_fields)}.") from None
+        raise InputError(
+            f"{path}: {'.'.join(place)}: {wrong}. Accepted keys: {', '.join(Description.model_fields)}."
+        ) from None
     check_name(description.name, f"{path}: name")
     check_names(description, description.runs, path.name)
     return description
@@ -111,9 +129,13 @@ def ship_file(folder: Path, description: Description) -> Path:
         InputError: the description names a file elsewhere.
     """
     given = description.ship
-    if any(pure(given).is_absolute() or pure(given).drive or ".." in pure(given).parts for pure in (PurePosixPath, PureWindowsPath)):
+    if any(
+        pure(given).is_absolute() or pure(given).drive or ".." in pure(given).parts
+        for pure in (PurePosixPath, PureWindowsPath)
+    ):
         raise InputError(
-            f'{folder / "dataset.toml"}: ship = {given!r} lies outside the folder of the data set; accepted: a file in it, such as "ship.toml". '
+            f"{folder / 'dataset.toml'}: ship = {given!r} lies outside the folder of the data set; accepted: a file "
+            'in it, such as "ship.toml". '
             "Copy the ship's file there."
         )
     return folder / given
@@ -123,13 +145,16 @@ def read_table(folder: Path, description: Description) -> tuple[pd.DataFrame, Pa
     """The columns of the table that are ours, under our names, and the table's path.
 
     Raises:
-        InputError: no table or several, a required column is missing, two columns are one signal, or as `read_trajectories`.
+        InputError: no table or several, a required column is missing, two columns are one signal, or as
+        `read_trajectories`.
     """
     found = [folder / name for name in TABLES if os.path.lexists(folder / name)]
     if not found:
         raise InputError(f"folder {folder} has no trajectories; accepted: {', '.join(TABLES)}.")
     if len(found) > 1:
-        raise InputError(f"folder {folder} has {' and '.join(p.name for p in found)}; accepted: one table. Remove the others.")
+        raise InputError(
+            f"folder {folder} has {' and '.join(p.name for p in found)}; accepted: one table. Remove the others."
+        )
     path, ours = found[0], description.columns
     ids = next((theirs for theirs, signal in ours.items() if signal == "trajectory"), "trajectory")
     table = read_trajectories(path, ids, lambda names: _needed(list(names), ours, path))
@@ -145,12 +170,20 @@ def _needed(names: list[str], columns: dict[str, str], where: Path) -> list[str]
             raise unknown_name(f"signal for '{theirs}' in [columns] of dataset.toml:", ours, KNOWN)
     renamed = [columns.get(name, name) for name in names]
     for name in KNOWN:
-        if renamed.count(name) > 1 or (name in renamed and f"{name}.1" in renamed):  # pandas calls a header's second "x" "x.1"
-            raise InputError(f"{where}: two columns are '{name}'; accepted: one. Remove one, or correct [columns] in dataset.toml.")
+        if renamed.count(name) > 1 or (
+            name in renamed and f"{name}.1" in renamed
+        ):  # pandas calls a header's second "x" "x.1"
+            raise InputError(
+                f"{where}: two columns are '{name}'; accepted: one. Remove one, or correct [columns] in dataset.toml."
+            )
     for column in ("trajectory", "t", *MOTION_STATES):
         if column not in renamed:
             near = difflib.get_close_matches(column.lower(), renamed, n=1, cutoff=0.5)
-            hint = f" Did you mean '{near[0]}'? Then write [columns] {near[0]} = \"{column}\" in dataset.toml." if near else ""
+            hint = (
+                f" Did you mean '{near[0]}'? Then write [columns] {near[0]} = \"{column}\" in dataset.toml."
+                if near
+                else ""
+            )
             shown = renamed if len(renamed) <= _SHOWN else [*renamed[:_SHOWN], f"and {len(renamed) - _SHOWN} more"]
             raise InputError(f"{where}: column '{column}' is missing.{hint} Found: {', '.join(shown)}.")
     return [name for name, signal in zip(names, renamed, strict=True) if signal in KNOWN]
@@ -197,15 +230,19 @@ def _runs(name: str, rows: Columns, inputs: tuple[str, ...], description: Descri
     return [_run(f"{name}#{i}", part, inputs, description, where, shared) for i, part in enumerate(parts, 1)]
 
 
-def _run(name: str, rows: Columns, inputs: tuple[str, ...], description: Description, where: Path, meta: dict[str, Any]) -> Run:
+def _run(
+    name: str, rows: Columns, inputs: tuple[str, ...], description: Description, where: Path, meta: dict[str, Any]
+) -> Run:
     t = rows["t"]
     steps = np.diff(t)
     wrong = np.flatnonzero(~(np.abs(steps - description.dt) <= 1e-3 * description.dt))
     if len(wrong):
         k = int(wrong[0])
         raise InputError(
-            f"{where}: run '{name}': t goes from {t[k]:g} s to {t[k + 1]:g} s, dt in dataset.toml is {description.dt:g} s ({len(wrong)} such steps). "
-            'Time must be uniform inside a run and its rows in order: resample, or write gaps = "split" into dataset.toml.'
+            f"{where}: run '{name}': t goes from {t[k]:g} s to {t[k + 1]:g} s, dt in dataset.toml is "
+            f"{description.dt:g} s ({len(wrong)} such steps). "
+            'Time must be uniform inside a run and its rows in order: resample, or write gaps = "split" into '
+            "dataset.toml."
         )
     return Run(name, t.copy(), samples(rows, STATES), samples(rows, inputs), inputs, dict(meta))
 
@@ -221,8 +258,10 @@ def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz"
     folder = Path(folder)
     table = long_table(dataset.runs)
     description = {
-        "name": dataset.name, "ship": "ship.toml", "dt": dataset.dt, "actuators": dataset.actuators, "source": dataset.source,
-        "licence": dataset.licence, **({"simulation": dataset.simulation} if dataset.simulation else {}), "notes": list(dataset.notes),
+        "name": dataset.name, "ship": "ship.toml", "dt": dataset.dt, "actuators": dataset.actuators,
+        "source": dataset.source,
+        "licence": dataset.licence, **({"simulation": dataset.simulation} if dataset.simulation else {}),
+        "notes": list(dataset.notes),
         **({"derived": list(dataset.derived)} if dataset.derived else {}),
         "runs": {run.id: run.meta for run in dataset.runs if run.meta},
     }  # fmt: skip
@@ -242,4 +281,6 @@ def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz"
         for other in set(TABLES) - {name}:  # an earlier table in another format would contradict this one
             (folder / other).unlink(missing_ok=True)
     except OSError as error:
-        raise InputError(f"cannot write the data set to {folder}: {error.strerror}. Give a folder that can be written.") from None
+        raise InputError(
+            f"cannot write the data set to {folder}: {error.strerror}. Give a folder that can be written."
+        ) from None

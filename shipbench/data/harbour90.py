@@ -11,12 +11,15 @@ from ..simulate.harbour import Gusts, draw_plan, fly
 from .base import DatasetPart
 
 SHIP = "container130"
-SEED = 19  # of the first 30 seeds, the one whose statistics are closest to the source paper's Table II (`shipbench data describe harbour90`)
+# of the first 30 seeds, the one whose statistics are closest to the source paper's Table II (`shipbench data describe
+# harbour90`)
+SEED = 19
 NUM_RUNS, HORIZON, WARM_UP = 90, 120, 60
 
 
 def simulate(name: str, seed: int, gusts: Gusts | None = None, noise: np.ndarray | None = None) -> Dataset:
-    """Sail the 90 runs of `seed`; `noise` (10,) are standard deviations of white sensor noise on the states (thruster forces: relative)."""
+    """Sail the 90 runs of `seed`; `noise` (10,) are standard deviations of white sensor noise on the states (thruster
+    forces: relative)."""
     ship = load_mmg_ship(SHIP)
     plan_rng, wind_rng, noise_rng = (np.random.default_rng(s) for s in (seed, [seed, 1], [seed, 2]))
     plan = draw_plan(plan_rng, NUM_RUNS, ship.L, HORIZON, WARM_UP)
@@ -39,4 +42,10 @@ def make(seed: int = SEED) -> Dataset:
     return simulate("harbour90", int(seed))
 
 
-DATASET = DatasetPart("harbour90", "90 simulated port manoeuvres of a 130 m container ship, 120 s at 1 s, no noise", "MIT", make, cached=True)
+DATASET = DatasetPart(
+    "harbour90",
+    "90 simulated port manoeuvres of a 130 m container ship, 120 s at 1 s, no noise",
+    "MIT",
+    make,
+    cached=True,
+)

@@ -1,4 +1,5 @@
-"""The 90 port manoeuvres of `harbour90`, sailed in light hidden gusts and recorded by noisy sensors: no model can be perfect."""
+"""The 90 port manoeuvres of `harbour90`, sailed in light hidden gusts and recorded by noisy sensors: no model can be
+perfect."""
 
 from __future__ import annotations
 
@@ -10,12 +11,14 @@ from .base import DatasetPart
 from .harbour90 import SEED, simulate
 
 GUSTS = Gusts(sigma=1.5, tau=20.0)
-# White noise per sample: x, y 0.5 m; psi 0.3 deg; u, v 0.05 m/s; r 0.05 deg/s; n 0.5 rpm; delta 0.2 deg; thruster forces 1 % of reading.
+# White noise per sample: x, y 0.5 m; psi 0.3 deg; u, v 0.05 m/s; r 0.05 deg/s; n 0.5 rpm; delta 0.2 deg; thruster
+# forces 1 % of reading.
 NOISE = np.array([0.5, 0.5, np.deg2rad(0.3), 0.05, 0.05, np.deg2rad(0.05), 0.5, np.deg2rad(0.2), 0.01, 0.01])
 
 
 def make(seed: int = SEED) -> Dataset:
-    """The noisy set; the same plans as `harbour90`, so the tracks differ by the gusts and the controllers' answer to them."""
+    """The noisy set; the same plans as `harbour90`, so the tracks differ by the gusts and the controllers' answer to
+    them."""
     return simulate("harbour90_noisy", int(seed), GUSTS, NOISE)
 
 

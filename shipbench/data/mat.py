@@ -2,9 +2,10 @@
 
 The file holds two variables:
 
-- `dataset`: struct with name, dt [s], actuators, source, licence, simulation, notes (cell), fingerprint and ship (struct, SI);
-- `runs`: struct array, one element per run, with id, t (samples x 1) [s], states (samples x 10), commands (samples x 4), environment
-  (samples x channels), names and units (structs with one cell of text per array) and meta (text, JSON).
+- `dataset`: struct with name, dt [s], actuators, source, licence, simulation, notes (cell), fingerprint and ship
+  (struct, SI);
+- `runs`: struct array, one element per run, with id, t (samples x 1) [s], states (samples x 10), commands (samples x
+  4), environment (samples x channels), names and units (structs with one cell of text per array) and meta (text, JSON).
 
 Row k of commands and environment is held on [t_k, t_k+1). Units and signs are those of `signals`; n is in rpm.
 """
@@ -58,7 +59,9 @@ def save_mat(path: Path, variables: dict[str, Any]) -> None:
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}. Give a file or folder that can be written.") from None
     except (MatWriteError, OverflowError) as error:
-        raise InputError(f"{path}: too large for a .mat file ({error}). Take --format parquet, or export fewer runs.") from None
+        raise InputError(
+            f"{path}: too large for a .mat file ({error}). Take --format parquet, or export fewer runs."
+        ) from None
 
 
 def write_mat(dataset: Dataset, path: str | Path) -> None:
@@ -73,20 +76,24 @@ def write_mat(dataset: Dataset, path: str | Path) -> None:
     runs = [
         {
             "id": run.id, "t": run.t, "states": run.states, "commands": run.inputs[:, : len(COMMANDS)],
-            "environment": run.inputs[:, len(COMMANDS) :], "names": names, "units": units, "meta": json.dumps(run.meta, default=str),
+            "environment": run.inputs[:, len(COMMANDS) :], "names": names, "units": units,
+            "meta": json.dumps(run.meta, default=str),
         }
         for run in dataset.runs
     ]  # fmt: skip
     about = {
-        "name": dataset.name, "dt": float(dataset.dt), "actuators": dataset.actuators, "source": dataset.source, "licence": dataset.licence,
-        "simulation": dataset.simulation or "", "notes": cells(dataset.notes), "derived": cells(dataset.derived), "fingerprint": dataset.fingerprint,
+        "name": dataset.name, "dt": float(dataset.dt), "actuators": dataset.actuators, "source": dataset.source,
+        "licence": dataset.licence,
+        "simulation": dataset.simulation or "", "notes": cells(dataset.notes), "derived": cells(dataset.derived),
+        "fingerprint": dataset.fingerprint,
         "ship": dataset.ship.model_dump(exclude_none=True),
     }  # fmt: skip
     save_mat(Path(path), {"dataset": about, "runs": struct_array(runs)})
 
 
 def is_export(path: str | Path) -> bool:
-    """Whether a .mat file holds the variables of `write_mat`; also where it cannot be read, which `read_mat` explains."""
+    """Whether a .mat file holds the variables of `write_mat`; also where it cannot be read, which `read_mat`
+    explains."""
     from scipy.io import whosmat
 
     try:
@@ -114,20 +121,32 @@ def read_mat(path: str | Path) -> Dataset:
     except InputError:
         raise
     except NotImplementedError:
-        raise InputError(f"{path} is a MATLAB file of version 7.3, which is not read; save it again with save(..., '-v7').") from None
+        raise InputError(
+            f"{path} is a MATLAB file of version 7.3, which is not read; save it again with save(..., '-v7')."
+        ) from None
     except Exception as error:  # the reader raises whatever a damaged file leads it to
-        raise InputError(f"{path} cannot be read: {' '.join(str(error).split())[:160]}. Give a .mat file that `data export` wrote.") from None
+        raise InputError(
+            f"{path} cannot be read: {' '.join(str(error).split())[:160]}. Give a .mat file that `data export` wrote."
+        ) from None
     try:
         about = _plain(found["dataset"])
         runs = tuple(_run(element, str(path)) for element in np.atleast_1d(found["runs"].squeeze()))
         given = {key: str(about[key]) for key in ("name", "actuators", "source", "licence")}
-        dt, notes, simulation, ship = float(about["dt"]), tuple(about["notes"]), about["simulation"] or None, about["ship"]
+        dt, notes, simulation, ship = (
+            float(about["dt"]),
+            tuple(about["notes"]),
+            about["simulation"] or None,
+            about["ship"],
+        )
         derived = tuple(str(name) for name in about.get("derived", ()))
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         fields = f"accepted: the variables dataset and runs, each run with {', '.join(_RUN_FIELDS)}"
-        raise InputError(f"{path} does not have the form that `data export` writes ({type(error).__name__}: {error}); {fields}.") from None
+        raise InputError(
+            f"{path} does not have the form that `data export` writes ({type(error).__name__}: {error}); {fields}."
+        ) from None
     return Dataset(
-        ship=Ship.from_dict(ship, f"{path}: dataset.ship"), dt=dt, runs=runs, notes=notes, simulation=simulation, derived=derived,
+        ship=Ship.from_dict(ship, f"{path}: dataset.ship"), dt=dt, runs=runs, notes=notes, simulation=simulation,
+        derived=derived,
         name=given["name"], actuators=given["actuators"], source=given["source"], licence=given["licence"],
     )  # fmt: skip
 
@@ -135,13 +154,18 @@ def read_mat(path: str | Path) -> Dataset:
 def _run(element: Any, where: str) -> Run:
     names = _plain(element["names"])
     environment = tuple(names["environment"])
-    if (tuple(names["states"]), tuple(names["commands"])) != (STATES, COMMANDS) or not set(environment) <= set(ENVIRONMENT):
+    if (tuple(names["states"]), tuple(names["commands"])) != (STATES, COMMANDS) or not set(environment) <= set(
+        ENVIRONMENT
+    ):
         raise InputError(
-            f"{where}: names are {names}; accepted: states {', '.join(STATES)}, commands {', '.join(COMMANDS)}, environment any of "
+            f"{where}: names are {names}; accepted: states {', '.join(STATES)}, commands {', '.join(COMMANDS)}, "
+            "environment any of "
             f"{', '.join(ENVIRONMENT)}, in this order."
         )
     t = np.asarray(element["t"], dtype=float).ravel()
-    arrays = [np.asarray(element[part], dtype=float).reshape(len(t), -1) for part in ("states", "commands", "environment")]
+    arrays = [
+        np.asarray(element[part], dtype=float).reshape(len(t), -1) for part in ("states", "commands", "environment")
+    ]
     meta = json.loads(_plain(element["meta"]) or "{}")
     return Run(_plain(element["id"]), t, arrays[0], np.hstack(arrays[1:]), (*COMMANDS, *environment), meta)
 

@@ -17,9 +17,9 @@ _MAD = 1.4826
 
 @dataclass(frozen=True)
 class ChannelNoise:
-    """One channel: noise is the standard deviation of the part that is new in every sample, in our units (median and greatest over the runs, the run
-    of the greatest); step is the resolution of the record, or not-a-number where the values lie on no grid; repeated is the share of samples that
-    repeat the one before."""
+    """One channel: noise is the standard deviation of the part that is new in every sample, in our units (median and
+    greatest over the runs, the run of the greatest); step is the resolution of the record, or not-a-number where the
+    values lie on no grid; repeated is the share of samples that repeat the one before."""
 
     channel: str
     noise: float
@@ -32,17 +32,18 @@ class ChannelNoise:
 def white_noise(x: np.ndarray) -> float:
     """Standard deviation of the white noise on a smooth signal `x` (samples,).
 
-    Differences of order m let a smooth signal vanish and leave the variance of white noise times binomial(2m, m) (Gasser, Sroka and Jennen-Steinmetz
-    1986; Hall, Kay and Titterington 1990). The least of the orders 2 to 6 is taken, each by its median absolute deviation, so that neither bends
-    nor single jumps count as noise. What changes slowly (drift, bias, filtered noise) is not seen; of a motion that is sampled coarsely some is taken
-    for noise.
+    Differences of order m let a smooth signal vanish and leave the variance of white noise times binomial(2m, m)
+    (Gasser, Sroka and Jennen-Steinmetz 1986; Hall, Kay and Titterington 1990). The least of the orders 2 to 6 is taken,
+    each by its median absolute deviation, so that neither bends nor single jumps count as noise. What changes slowly
+    (drift, bias, filtered noise) is not seen; of a motion that is sampled coarsely some is taken for noise.
     """
     found = [_MAD * np.median(np.abs(np.diff(x, m))) / np.sqrt(comb(2 * m, m)) for m in _ORDERS if len(x) > 2 * m]
     return float(min(found, default=np.nan))
 
 
 def resolution(runs: list[np.ndarray]) -> float:
-    """Step of the grid that the values of all runs lie on, or not-a-number: every value of a grid is taken again and again, five times on average."""
+    """Step of the grid that the values of all runs lie on, or not-a-number: every value of a grid is taken again and
+    again, five times on average."""
     values = np.concatenate(runs)
     spread = float(np.ptp(values))
     changes = sum(int(np.count_nonzero(np.diff(x))) for x in runs)
@@ -51,10 +52,13 @@ def resolution(runs: list[np.ndarray]) -> float:
 
 
 def channel_noise(dataset: Dataset) -> list[ChannelNoise]:
-    """Noise of every measured channel: the states, without actuators that only repeat their commands, then the environment."""
+    """Noise of every measured channel: the states, without actuators that only repeat their commands, then the
+    environment."""
     measured = STATES if dataset.actuators == "measured" else STATES[: ACTUATORS.start]
     columns = [(name, [r.states[:, i] for r in dataset.runs]) for i, name in enumerate(measured)]
-    columns += [(name, [r.inputs[:, i] for r in dataset.runs]) for i, name in enumerate(dataset.inputs) if name in ENVIRONMENT]
+    columns += [
+        (name, [r.inputs[:, i] for r in dataset.runs]) for i, name in enumerate(dataset.inputs) if name in ENVIRONMENT
+    ]
     found = []
     for name, runs in columns:
         noise = np.array([white_noise(x) for x in runs])
@@ -62,7 +66,8 @@ def channel_noise(dataset: Dataset) -> list[ChannelNoise]:
         worst = int(np.nanargmax(noise)) if known.any() else 0
         repeated = float(np.mean(np.concatenate([np.diff(x) == 0.0 for x in runs])))
         found.append(ChannelNoise(
-            name, float(np.median(noise[known])) if known.any() else float("nan"), float(noise[worst]), dataset.runs[worst].id,
+            name, float(np.median(noise[known])) if known.any() else float("nan"), float(noise[worst]),
+            dataset.runs[worst].id,
             resolution(runs), repeated,
         ))  # fmt: skip
     return found

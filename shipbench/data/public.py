@@ -1,4 +1,5 @@
-"""Public data sets that are downloaded, never shipped: the licence comes first, and every file must have the published checksum (pooch)."""
+"""Public data sets that are downloaded, never shipped: the licence comes first, and every file must have the published
+checksum (pooch)."""
 
 from __future__ import annotations
 
@@ -42,13 +43,18 @@ class PublicData:
     @cached_property
     def checksums(self) -> dict[str, str]:
         """File name -> SHA-256 of its content, uncompressed."""
-        lines = (line.split() for line in self.registry.read_text(encoding="utf-8").splitlines() if not line.startswith("#"))
+        lines = (
+            line.split() for line in self.registry.read_text(encoding="utf-8").splitlines() if not line.startswith("#")
+        )
         return {name: digest.removeprefix("sha256:") for name, digest in lines}
 
     def notice(self) -> str:
         """What a user reads before anything is downloaded."""
         cite = "\n".join(f"  - {paper}" for paper in self.citation)
-        return f"Data set: {self.name}, {len(self.checksums)} files\nSource: {self.url}\nLicence: {self.licence}\n{self.terms}\nPlease cite:\n{cite}"
+        return (
+            f"Data set: {self.name}, {len(self.checksums)} files\nSource: {self.url}\nLicence: {self.licence}\n"
+            f"{self.terms}\nPlease cite:\n{cite}"
+        )
 
     def missing(self, folder: Path) -> list[str]:
         """The files that `folder` lacks."""
@@ -59,8 +65,11 @@ class PublicData:
         found = ((name, find(folder, name)) for name in self.checksums)
         return [name for name, path in found if path is not None and _digest(path) != self.checksums[name]]
 
-    def fetch(self, folder: Path, source: str | None = None, told: Callable[[str], None] = lambda text: None) -> list[str]:
-        """Bring the files that `folder` lacks, or that are damaged there, and return their names; each is kept only if its checksum is right.
+    def fetch(
+        self, folder: Path, source: str | None = None, told: Callable[[str], None] = lambda text: None
+    ) -> list[str]:
+        """Bring the files that `folder` lacks, or that are damaged there, and return their names; each is kept only if
+        its checksum is right.
 
         Args:
             folder: where they go.
@@ -80,7 +89,9 @@ class PublicData:
         if not online:
             self._check_copy(Path(where))
         pooch.get_logger().setLevel("ERROR")  # it would speak of every file; errors come as exceptions
-        pup = pooch.create(path=folder, base_url=where if online else Path(where).absolute().as_uri(), registry=dict(self.checksums))
+        pup = pooch.create(
+            path=folder, base_url=where if online else Path(where).absolute().as_uri(), registry=dict(self.checksums)
+        )
         downloader = pooch.HTTPDownloader(timeout=_TIMEOUT_S) if online else _Copy(Path(where))
         todo = sorted({*self.missing(folder), *self.changed(folder)})
         for i, name in enumerate(todo):
@@ -90,24 +101,33 @@ class PublicData:
             except RequestException as error:
                 reason = "no connection" if isinstance(error, NoConnection) else _short(error)
                 raise WorkError(
-                    f"{name} could not be downloaded from {where}: {reason}. {i} of {len(todo)} files were fetched and are kept in {folder}. "
-                    f"Try again when the network is there, or take a copy that you have: shipbench data get {self.name} --from FOLDER."
+                    f"{name} could not be downloaded from {where}: {reason}. {i} of {len(todo)} files were fetched "
+                    f"and are kept in {folder}. "
+                    "Try again when the network is there, or take a copy that you have: shipbench data get "
+                    f"{self.name} --from FOLDER."
                 ) from None
             except ValueError as error:  # pooch's word for a wrong checksum
                 raise InputError(
-                    f"{name} from {where} is not the published file and was refused: {_short(error)}. Take a fresh copy of the public data."
+                    f"{name} from {where} is not the published file and was refused: {_short(error)}. Take a fresh "
+                    "copy of the public data."
                 ) from None
             except (OSError, EOFError, zlib.error) as error:
-                raise InputError(f"{name} cannot be copied from {where} to {folder}: {_short(error)}. Take another copy or folder.") from None
+                raise InputError(
+                    f"{name} cannot be copied from {where} to {folder}: {_short(error)}. Take another copy or folder."
+                ) from None
         return todo
 
     def _check_copy(self, folder: Path) -> None:
         if not folder.is_dir():
-            raise InputError(f"--from {folder}: no such folder. Give the folder of your copy, or an address that begins with https://.")
+            raise InputError(
+                f"--from {folder}: no such folder. Give the folder of your copy, or an address that begins with "
+                "https://."
+            )
         missing = self.missing(folder)
         if missing:
             raise InputError(
-                f"{folder} lacks {len(missing)} of the {len(self.checksums)} files of {self.name}, the first is {missing[0]}. "
+                f"{folder} lacks {len(missing)} of the {len(self.checksums)} files of {self.name}, the first is "
+                f"{missing[0]}. "
                 "Accepted: a copy of the source's folder (or the whole repository), files plain or .gz."
             )
 

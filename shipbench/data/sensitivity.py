@@ -1,6 +1,8 @@
-"""What the runs of a data set tell apart: sensitivities of the physics model's rollouts to causes, and how far the others can imitate each.
+"""What the runs of a data set tell apart: sensitivities of the physics model's rollouts to causes, and how far the
+others can imitate each.
 
-The model is the benchmark's own (`predictors/physics.py`), fitted roughly to windows of the data; the sensitivities are those of its fit.
+The model is the benchmark's own (`predictors/physics.py`), fitted roughly to windows of the data; the sensitivities are
+those of its fit.
 """
 
 from __future__ import annotations
@@ -17,23 +19,39 @@ from .coverage import unit_time
 
 _WINDOW, _MOST_WINDOWS, _FIT_STEPS = 6.0, 24, 3
 IMITATED = 0.9
-"""A share of 0.9 is a variance inflation factor of 10, the usual limit of collinearity (Marquardt 1970; Belsley, Kuh and Welsch 1980)."""
+"""A share of 0.9 is a variance inflation factor of 10, the usual limit of collinearity (Marquardt 1970; Belsley, Kuh
+and Welsch 1980)."""
 _LEAST = 1e-3
-"""Least size of what there is to predict of a channel, in ship lengths, radians and sqrt(gL): in a dead straight run yaw is not nothing."""
+"""Least size of what there is to predict of a channel, in ship lengths, radians and sqrt(gL): in a dead straight run
+yaw is not nothing."""
 UNFELT = 1e-3
-"""A typical size that changes the tracks by less than this share of what holding the speeds gets wrong is not felt at all."""
+"""A typical size that changes the tracks by less than this share of what holding the speeds gets wrong is not felt at
+all."""
 
 _PARAMETERS = {2: ("resistance", "coast down with the shaft stopped, and speed up from rest"),
                0: ("propeller walk", "straight runs with the revolutions up and down"),
-               4: ("rudder offset", "vary the revolutions at one speed: the offset acts with the race, propeller walk with the thrust"),
-               5: ("rudder lift", "zig-zags at two speeds"), 10: ("rudder drag", "turns at two rudder angles from one speed")}  # fmt: skip
-_EFFECTS = ("thrust_gain", "race_gain", "rudder_stall", "cross_flow_drag", "propeller_walk_astern", "thruster_gain", "current", "wind")
+               4: ("rudder offset",
+                   "vary the revolutions at one speed: the offset acts with the race, propeller "
+                   "walk with the thrust"),
+               5: ("rudder lift", "zig-zags at two speeds"),
+               10: ("rudder drag", "turns at two rudder angles from "
+                                   "one speed")}  # fmt: skip
+_EFFECTS = (
+    "thrust_gain",
+    "race_gain",
+    "rudder_stall",
+    "cross_flow_drag",
+    "propeller_walk_astern",
+    "thruster_gain",
+    "current",
+    "wind",
+)
 
 
 @dataclass(frozen=True)
 class Telling:
-    """One cause: felt is the change that a typical size makes (share of what holding the speeds gets wrong), imitated the share of it (squared) that
-    the others can make together, alike the one that does most and its cosine."""
+    """One cause: felt is the change that a typical size makes (share of what holding the speeds gets wrong), imitated
+    the share of it (squared) that the others can make together, alike the one that does most and its cosine."""
 
     subject: str
     felt: float
@@ -45,7 +63,9 @@ class Telling:
 
 def tellings(dataset: Dataset) -> tuple[list[Telling], str]:
     """Every cause, and a sentence on how it was found (or why not)."""
-    steps = min(round(_WINDOW * unit_time(dataset.ship.L) / dataset.dt), int(np.median([len(r) for r in dataset.runs])) - 1)
+    steps = min(
+        round(_WINDOW * unit_time(dataset.ship.L) / dataset.dt), int(np.median([len(r) for r in dataset.runs])) - 1
+    )
     if steps < 4:
         return [], f"the runs are too short for rollouts: {steps} steps of {dataset.dt:g} s in the median run."
     windows = dataset.windows(steps)
@@ -74,14 +94,20 @@ def _columns(windows: Dataset) -> tuple[np.ndarray, list[str], dict[str, str]]:
     with np.errstate(all="ignore"):  # where nothing moves, the fit's intervals are empty; they are not asked for
         model = Physics(iterations=_FIT_STEPS).fit(windows)
     batch = windows.batch()
-    data = Data(model.c, batch, model.actuator_path(batch.s0, batch.U), model._wind(batch.U), windows.dt, model.substeps)
+    data = Data(
+        model.c, batch, model.actuator_path(batch.s0, batch.U), model._wind(batch.U), windows.dt, model.substeps
+    )
     effects = [EFFECTS.get(name) for name in _EFFECTS]
     sized = [effect.sized(windows.ship.L) for effect in effects]
     held = [tuple(p.typical if p.shape else 0.0 if p.other else None for p in parameters) for parameters in sized]
     forces = tuple(zip(effects, held, strict=True))
     runs = len(data.path)
-    function = rollout_function(model.c, windows.dt / model.substeps, data.wind is not None, True, forces, model.particulars)
-    free = [(e, p) for e, parameters in zip(effects, sized, strict=True) for p in parameters if not (p.shape or p.other)]
+    function = rollout_function(
+        model.c, windows.dt / model.substeps, data.wind is not None, True, forces, model.particulars
+    )
+    free = [
+        (e, p) for e, parameters in zip(effects, sized, strict=True) for p in parameters if not (p.shape or p.other)
+    ]
     p = np.concatenate([model.p, np.zeros(len(free))])
     _, S = data.linearised(function, batch.s0, data.inputs(data.path, with_time=True), p)
     root = np.sqrt(runs * data.truth.shape[1] * 6.0)
@@ -91,7 +117,9 @@ def _columns(windows: Dataset) -> tuple[np.ndarray, list[str], dict[str, str]]:
     kept = [*_PARAMETERS, *range(len(model.p), len(p))]
     Z = (J * scale)[..., kept].reshape(-1, len(kept))
     names = [*(name for name, _ in _PARAMETERS.values()), *(e.name.replace("_", " ") for e, _ in free)]
-    manoeuvres = {name: text for name, text in _PARAMETERS.values()} | {e.name.replace("_", " "): e.separate for e in effects}
+    manoeuvres = {name: text for name, text in _PARAMETERS.values()} | {
+        e.name.replace("_", " "): e.separate for e in effects
+    }
     return Z[np.isfinite(Z).all(axis=1)], names, manoeuvres
 
 

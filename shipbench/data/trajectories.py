@@ -1,4 +1,5 @@
-"""The table of trajectories as it stands in a file (CSV, plain or gzip; Parquet): only the columns that are used, and no more than memory holds."""
+"""The table of trajectories as it stands in a file (CSV, plain or gzip; Parquet): only the columns that are used, and
+no more than memory holds."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ from ..errors import InputError
 from ..regular_files import open_regular
 
 MOST_CELLS = 40_000_000
-"""Rows times columns of a data set, which is held in memory: reading takes up to 35 bytes a cell (measured), so 1.4 GB in all."""
+"""Rows times columns of a data set, which is held in memory: reading takes up to 35 bytes a cell (measured), so 1.4 GB
+in all."""
 MOST_BYTES = 1_100_000_000
 """Bytes of a table unpacked, as of a .mat file."""
 MOST_COLUMNS = 10_000
@@ -37,7 +39,8 @@ _DAMAGED = (
 
 
 def read_trajectories(path: Path, ids: str, needed: Callable[[Sequence[str]], list[str]]) -> pd.DataFrame:
-    """The needed columns of a table under its own names: numbers, or text where a column holds other things than numbers.
+    """The needed columns of a table under its own names: numbers, or text where a column holds other things than
+    numbers.
 
     Args:
         path: the file; its suffix tells the format.
@@ -45,17 +48,22 @@ def read_trajectories(path: Path, ids: str, needed: Callable[[Sequence[str]], li
         needed: picks from the names of all columns those that are read, or raises an InputError.
 
     Raises:
-        InputError: no regular file, damaged, not UTF-8, a row with more fields than the header, or too large for memory.
+        InputError: no regular file, damaged, not UTF-8, a row with more fields than the header, or too large for
+        memory.
     """
     read = _read_parquet if path.suffix == ".parquet" else _read_csv
     try:
         with open_regular(path, "table of trajectories") as file:
             return read(file, path, ids, needed)
     except UnicodeDecodeError:
-        raise InputError(f"{path} is not UTF-8 text. Save it again as CSV in UTF-8, or bring it in with: shipbench data import.") from None
+        raise InputError(
+            f"{path} is not UTF-8 text. Save it again as CSV in UTF-8, or bring it in with: shipbench data import."
+        ) from None
     except _DAMAGED as error:
         reason = " ".join(str(error).split())[:160] or type(error).__name__
-        raise InputError(f"{path} cannot be read: {reason}. It must be a table with the columns trajectory, t and the states.") from None
+        raise InputError(
+            f"{path} cannot be read: {reason}. It must be a table with the columns trajectory, t and the states."
+        ) from None
 
 
 def _read_csv(file: IO[bytes], path: Path, ids: str, needed: Callable[[Sequence[str]], list[str]]) -> pd.DataFrame:
@@ -74,8 +82,15 @@ def _read_csv(file: IO[bytes], path: Path, ids: str, needed: Callable[[Sequence[
         columns = needed(names)
         _check_size(path, rows, len(columns), len(names))
         empty = {column: _EMPTY for column in columns if column != ids}
-        # All columns are parsed, in blocks, and ours kept: with `usecols`, pandas would shift rows that have more fields than the header.
-        options = {"keep_default_na": False, "na_values": empty, "index_col": False, "low_memory": False, "chunksize": max(1, _CELLS // len(names))}
+        # All columns are parsed, in blocks, and ours kept: with `usecols`, pandas would shift rows that have more
+        # fields than the header.
+        options = {
+            "keep_default_na": False,
+            "na_values": empty,
+            "index_col": False,
+            "low_memory": False,
+            "chunksize": max(1, _CELLS // len(names)),
+        }
         read = [_without_truth_values(block[columns]) for block in pd.read_csv(text(), dtype={ids: str}, **options)]
     _check_decimals(read[0].drop(columns=ids, errors="ignore"), path)
     return pd.concat(read)
@@ -86,7 +101,8 @@ def _check_marks(header: bytes, path: Path) -> None:
     for mark, name in ((b";", "semicolons"), (b"\t", "tabs")):
         if header.count(mark) > header.count(b","):
             raise InputError(
-                f"{path} has {name} between its columns, as with decimal commas; accepted: commas there, and points in its numbers. "
+                f"{path} has {name} between its columns, as with decimal commas; accepted: commas there, and points "
+                "in its numbers. "
                 f"Save it so, or import it: shipbench data import {path} --propose mapping.toml"
             )
 
@@ -98,7 +114,8 @@ def _check_decimals(block: pd.DataFrame, path: Path) -> None:
         if commas.any():
             row = int(np.argmax(commas.to_numpy()))
             raise InputError(
-                f"{path}, row {row + 2}: '{column}' is '{block[column].iloc[row]}', with a comma; accepted: decimal points, and no mark between "
+                f"{path}, row {row + 2}: '{column}' is '{block[column].iloc[row]}', with a comma; accepted: decimal "
+                "points, and no mark between "
                 f"thousands. Save it so, or import it: shipbench data import {path} --propose mapping.toml"
             )
 
@@ -113,9 +130,14 @@ def _count_lines(text: Any, path: Path) -> int:
         longest = unfinished + (piece.find(b"\n") if b"\n" in piece else len(piece))
         unfinished = len(piece) - 1 - piece.rfind(b"\n") + (0 if b"\n" in piece else unfinished)
         if size > MOST_BYTES:
-            raise InputError(f"{path} holds more than {MOST_BYTES / 1e6:.0f} MB of text; accepted: up to that. Make several data sets of it.")
+            raise InputError(
+                f"{path} holds more than {MOST_BYTES / 1e6:.0f} MB of text; accepted: up to that. Make several data "
+                "sets of it."
+            )
         if longest > _LONGEST_LINE:
-            raise InputError(f"{path} has a line of more than {_LONGEST_LINE / 1e6:g} MB; it is no table with a sample per row.")
+            raise InputError(
+                f"{path} has a line of more than {_LONGEST_LINE / 1e6:g} MB; it is no table with a sample per row."
+            )
     return lines
 
 
@@ -124,10 +146,13 @@ def _check_size(path: Path, rows: int, columns: int, all_columns: int) -> None:
     if rows == 0:
         raise InputError(f"{path} has no rows; it needs one row per sample.")
     if all_columns > MOST_COLUMNS:
-        raise InputError(f"{path} has {all_columns} columns; accepted: up to {MOST_COLUMNS}. Remove those that are no signals.")
+        raise InputError(
+            f"{path} has {all_columns} columns; accepted: up to {MOST_COLUMNS}. Remove those that are no signals."
+        )
     if rows * columns > MOST_CELLS:
         raise InputError(
-            f"{path} has {rows} rows of {columns} signals; accepted: up to {MOST_CELLS // columns} such rows in one data set. "
+            f"{path} has {rows} rows of {columns} signals; accepted: up to {MOST_CELLS // columns} such rows in one "
+            "data set. "
             "Make several data sets of it, or resample the runs to a longer dt."
         )
 
@@ -147,14 +172,22 @@ def _read_parquet(file: IO[bytes], path: Path, ids: str, needed: Callable[[Seque
         texts = [name for name in columns if _is_text(schema.field(name).type)]
         _check_size(path, about.num_rows, len(columns), about.num_columns)
         places = [i for i in range(about.num_columns) if about.schema.column(i).path in columns]
-        size = sum(about.row_group(k).column(i).total_uncompressed_size for k in range(about.num_row_groups) for i in places)
+        size = sum(
+            about.row_group(k).column(i).total_uncompressed_size for k in range(about.num_row_groups) for i in places
+        )
     if size > MOST_BYTES:
-        raise InputError(f"{path} holds {size / 1e6:.0f} MB unpacked; accepted: up to {MOST_BYTES / 1e6:.0f} MB. Make several data sets of it.")
+        raise InputError(
+            f"{path} holds {size / 1e6:.0f} MB unpacked; accepted: up to {MOST_BYTES / 1e6:.0f} MB. Make several "
+            "data sets of it."
+        )
     file.seek(0)
     # Texts stay dictionaries while they are read: a long one in many rows would be copied into each.
     with pa.parquet.ParquetFile(file, read_dictionary=texts) as opened:
         batches = opened.iter_batches(_ROWS, columns=columns, use_threads=False)
-        blocks = [pd.DataFrame({name: _values(batch.column(name), name, name == ids, path) for name in columns}) for batch in batches]
+        blocks = [
+            pd.DataFrame({name: _values(batch.column(name), name, name == ids, path) for name in columns})
+            for batch in batches
+        ]
     return pd.concat(blocks, ignore_index=True)
 
 
@@ -163,13 +196,19 @@ def _is_text(kind: pa.DataType) -> bool:
 
 
 def _values(column: pa.Array, name: str, is_name: bool, path: Path) -> np.ndarray:
-    """Numbers as float64 with NaN where there is none; names of runs and all else as text, for the message that names the row."""
+    """Numbers as float64 with NaN where there is none; names of runs and all else as text, for the message that names
+    the row."""
     kind = column.type
-    number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind)
+    number = (
+        pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind)
+    )
     if number and not is_name:
         return column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
     if pa.types.is_nested(kind) or pa.types.is_binary(kind):
-        raise InputError(f"{path}: column '{name}' holds {kind}; accepted: {'text' if is_name else 'numbers'}. Correct or remove the column.")
+        raise InputError(
+            f"{path}: column '{name}' holds {kind}; accepted: {'text' if is_name else 'numbers'}. Correct or remove "
+            "the column."
+        )
     coded = column if pa.types.is_dictionary(kind) else column.cast(pa.string()).dictionary_encode()
     texts = coded.dictionary.cast(pa.string()).to_pylist()
     if any(len(text) > _LONGEST_TEXT for text in texts if text is not None):

@@ -18,11 +18,13 @@ _PARTS = re.compile(r"(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?) (\S+)")
 _BY_OURS = {"m": LENGTHS, "rad": _ANGLE, "m/s": _SPEED, "rad/s": _RATE, "rpm": _SHAFT, "N": _FORCE}
 
 _FLIPS = {
-    "x": "south", "y": "west", "psi": "counterclockwise", "u": "astern", "v": "port", "r": "port", "n": "astern", "delta": "port",
+    "x": "south", "y": "west", "psi": "counterclockwise", "u": "astern", "v": "port", "r": "port", "n": "astern",
+    "delta": "port",
     "F_b": "port", "F_s": "port", "wind_from": "counterclockwise",
 }  # fmt: skip
 _KEEPS = {
-    "x": "north", "y": "east", "psi": "clockwise", "u": "ahead", "v": "starboard", "r": "starboard", "n": "ahead", "delta": "starboard",
+    "x": "north", "y": "east", "psi": "clockwise", "u": "ahead", "v": "starboard", "r": "starboard", "n": "ahead",
+    "delta": "starboard",
     "F_b": "starboard", "F_s": "starboard", "wind_from": "clockwise",
 }  # fmt: skip
 

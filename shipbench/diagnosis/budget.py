@@ -20,8 +20,9 @@ from ..steps import tick
 class Budget:
     """Limits of one diagnosis, or of one of its training parts, and what it has used.
 
-    iterations: linearisations of all fits together (24 runs of 120 s take 50 to 500); seconds: CPU time of this process, which other work beside it
-    does not change; gigabytes: of the arrays of one linearisation. stopped: iterations and seconds when the limit acted first.
+    iterations: linearisations of all fits together (24 runs of 120 s take 50 to 500); seconds: CPU time of this
+    process, which other work beside it does not change; gigabytes: of the arrays of one linearisation. stopped:
+    iterations and seconds when the limit acted first.
     """
 
     iterations: int = 2000
@@ -54,7 +55,8 @@ class Budget:
             else "What is named so far stands; what could have followed was not looked for."
         )  # fmt: skip
         return [
-            f"stopped after {iterations} iterations of fits in {seconds:.0f} s of CPU time; the limits are {self.iterations} iterations and "
+            f"stopped after {iterations} iterations of fits in {seconds:.0f} s of CPU time; the limits are "
+            f"{self.iterations} iterations and "
             f"{self.seconds:g} s. {stands} Diagnose fewer or shorter runs, or raise the limit with --cpu-limit SECONDS."
         ]
 
@@ -68,8 +70,10 @@ class Budget:
         needed = 8e-9 * pieces * (3 * 6 * (products + sensitivities))  # of six channels, three copies at once
         if needed > self.gigabytes:
             raise InputError(
-                f"the record: {pieces} pieces of {samples} samples with {columns} columns would take {needed:.3g} GB of memory. "
-                f"Accepted: up to {self.gigabytes:g} GB, here {int(pieces * self.gigabytes / needed)} pieces, one or more for each run. "
+                f"the record: {pieces} pieces of {samples} samples with {columns} columns would take {needed:.3g} "
+                "GB of memory. "
+                f"Accepted: up to {self.gigabytes:g} GB, here {int(pieces * self.gigabytes / needed)} pieces, one "
+                "or more for each run. "
                 "Diagnose fewer runs."
             )
 

@@ -23,8 +23,8 @@ _DOUBT = "in the model, but not named while the ship file is in doubt"
 
 
 def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -> list[Candidate]:
-    """Every effect of the library once, best first, with why it was not named and the smallest size that would have been; measured: whether held-out
-    gains were."""
+    """Every effect of the library once, best first, with why it was not named and the smallest size that would have
+    been; measured: whether held-out gains were."""
     lines: dict[str, Candidate] = {}
     last = {s.term.label: s for s in reversed(found.selection.last)}
     refits = {s.term.label: s.score for s in sorted(found.selection.steps, key=lambda s: s.score)}
@@ -34,7 +34,8 @@ def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -
             continue
         score = max(s.score, refits.get(label, -np.inf))
         lines[label] = Candidate(
-            label, float(score), p_of(found, score), _reason(found, s, last.get(label), named), _shown(s, found.selection.null),
+            label, float(score), p_of(found, score), _reason(found, s, last.get(label), named),
+            _shown(s, found.selection.null),
             _detectable(found, s),
             s.term.effect.units(), s.term.effect.family,
         )  # fmt: skip
@@ -56,7 +57,11 @@ def _gear_candidate(found: Analysis, g: GearFinding, named: Sequence[str], motio
     reason = "named" if g.effect in named else f"score {g.score:.0f} below the threshold {found.threshold:.0f}"
     if g.effect not in named and g.score > found.threshold:
         best = next(x for x in found.all_gears if x.actuator == g.actuator)
-        reason = f"{best.effect} explains the same actuator better ({best.score:.0f} against {g.score:.0f})" if best is not g else _DOUBT
+        reason = (
+            f"{best.effect} explains the same actuator better ({best.score:.0f} against {g.score:.0f})"
+            if best is not g
+            else _DOUBT
+        )
     family = EFFECTS.get(g.effect).family
     return Candidate(g.effect, g.score, p_of(found, g.score), reason, {name: g.value}, detectable, {name: unit}, family)
 
@@ -69,7 +74,9 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
     if label in named:
         return "named"
     if found.unknown is not None and score > found.threshold:
-        own = max((x.score for x in steps if x.term.label == label), default=score)  # once fitted: it may have promised more
+        own = max(
+            (x.score for x in steps if x.term.label == label), default=score
+        )  # once fitted: it may have promised more
         return f"a dependence on {found.unknown.variable} explains more ({found.unknown.score:.0f} against {own:.0f})"
     if label in inside:
         late = any(t.label == label and t.since is not None for t in found.final.model.terms)
@@ -82,7 +89,9 @@ def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str])
     if score <= found.threshold:
         return f"score {score:.1f} below the threshold {found.threshold:.0f}"
     if score <= asked:
-        return f"score {score:.1f} below {asked:.1f}: the threshold is {odd:.1f} higher for effects in which ships differ"
+        return (
+            f"score {score:.1f} below {asked:.1f}: the threshold is {odd:.1f} higher for effects in which ships differ"
+        )
     if inside and (last is None or last.score <= asked):
         left = f", {last.score:.0f} beside it" if last is not None else ""
         return f"explained by {next((n for n in named if n in inside), inside[0])} ({score:.0f} alone{left})"
@@ -99,13 +108,16 @@ def _shown(s: Score, fit: Fit) -> dict[str, float]:
 
 
 def _detectable(found: Analysis, s: Score) -> dict[str, float]:
-    """Size from which a cause is expected to be named, along each amplitude; of values of single runs the root mean square. NaN beyond the bounds."""
+    """Size from which a cause is expected to be named, along each amplitude; of values of single runs the root mean
+    square. NaN beyond the bounds."""
     null, effect = found.selection.null, s.term.effect
     term, unit, least = s.term, null.scales.amplitudes(s.term, null.plant.c.L), detection_limit(s, found.standard)
     values = {}
     for size, p in zip(unit * least, [p for p in effect.sized(null.plant.c.L) if not p.shape], strict=True):
         seen = effect.public((size, 0.0))[effect.vector[0]] if effect.vector else float(size)
-        values[f"{p.name}_rms" if term.per_run else p.name] = seen if size <= max(abs(p.low), abs(p.high)) else float("nan")
+        values[f"{p.name}_rms" if term.per_run else p.name] = (
+            seen if size <= max(abs(p.low), abs(p.high)) else float("nan")
+        )
     return values
 
 
@@ -114,11 +126,23 @@ def _not_screened(found: Analysis, name: str, named: Sequence[str], measured: bo
     if name in named:
         reason = "named"
     elif effect.traits.search == "hull":
-        unpaid = "not shown to pay on held-out runs" if measured else "named only where it pays on held-out runs, which was not measured"
-        reason = f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}" if found.hull <= HULL_THRESHOLD else unpaid
+        unpaid = (
+            "not shown to pay on held-out runs"
+            if measured
+            else "named only where it pays on held-out runs, which was not measured"
+        )
+        reason = (
+            f"evidence {found.hull:.0f} below the threshold {HULL_THRESHOLD:.0f}"
+            if found.hull <= HULL_THRESHOLD
+            else unpaid
+        )
     elif effect.late:
         put_right = "the clocks of position and velocities were corrected before the fit"
-        reason = put_right if late_velocities_effect().name in named else "by the track, position and velocities are recorded at the same time"
+        reason = (
+            put_right
+            if late_velocities_effect().name in named
+            else "by the track, position and velocities are recorded at the same time"
+        )
     elif why := why_not(effect, plant):
         reason = why
     elif effect.traits.search == "change" and (barred := other_kinds_from(plant.seg.kinds)):

@@ -48,22 +48,28 @@ _WHOLE = 0.2
 
 @threadpool_limits.wrap(limits=1)  # its matrices are small: threads of several processes would wait for each other
 def diagnose(
-    dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequence[str] | None = None, workers: int = 1, thorough: bool = False,
+    dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequence[str] | None = None, workers: int = 1,
+    thorough: bool = False,
     budget: Budget | None = None,
 ) -> Diagnosis:  # fmt: skip
-    """Show what the plain physics model gets wrong on measured runs, name the causes, and measure what naming them is worth.
+    """Show what the plain physics model gets wrong on measured runs, name the causes, and measure what naming them is
+    worth.
 
     Args:
-        gain: cross-validate (everything is repeated on every training part); without, gains are None, and the hull is not named: that it lies off
+        gain: cross-validate (everything is repeated on every training part); without, gains are None, and the hull is
+        not named: that it lies off
             the regressions is named only where fitting it pays on runs that were not fitted.
         seed: of the bootstrap and of the folds.
         only: effects to consider (an oracle that knows what is hidden); default all.
         workers: processes for the folds; 1: everything runs in this one.
-        thorough: use up to twice as much of a long record (the folds use a quarter); 90 runs of 120 s are used whole either way.
-        budget: how much work and memory the whole may take; default that of `Budget`. A warning says where it has acted.
+        thorough: use up to twice as much of a long record (the folds use a quarter); 90 runs of 120 s are used whole
+        either way.
+        budget: how much work and memory the whole may take; default that of `Budget`. A warning says where it has
+        acted.
 
     Raises:
-        InputError: the ship never moves, there are too few samples for any fit, the record contradicts itself, `workers` is less than one, or it
+        InputError: the ship never moves, there are too few samples for any fit, the record contradicts itself,
+        `workers` is less than one, or it
             would take too much memory.
     """
     if workers < 1:
@@ -72,7 +78,9 @@ def diagnose(
         return _diagnosed(dataset, gain, seed, only, workers, THOROUGH_STEPS if thorough else MOST_STEPS, used)
 
 
-def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | None, workers: int, steps: int, used: Budget) -> Diagnosis:
+def _diagnosed(
+    dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | None, workers: int, steps: int, used: Budget
+) -> Diagnosis:
     """Diagnosis within a budget that is counted, see `diagnose`."""
     step("read the record", 0.0, 0.02)
     began, fingerprint = time.perf_counter(), dataset.fingerprint
@@ -81,12 +89,15 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
     cautious = is_too_little(dataset)
     apart = len({run.group for run in dataset.runs}) > 1
     if not apart and len(dataset) > 1:
-        warnings.append("all runs are one group (pieces of one log, say): no gain can be measured on runs that are held out.")
+        warnings.append(
+            "all runs are one group (pieces of one log, say): no gain can be measured on runs that are held out."
+        )
     wanted = gain and apart and not cautious
     whole, folds = _WHOLE if wanted else 0.48, THRESHOLDS.count("folds")
     work = partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled, budget=used.part(folds))
     with process_pool(workers) if wanted and workers > 1 else nullcontext() as pool:
-        # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known whether anything is measured
+        # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known
+        # whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
         step("fit the plain model", 0.02, whole)
         null = plain_model(Plant.of(dataset, steps), only, settled)
@@ -105,15 +116,26 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
         if not wanted or is_spent():
             worth = Worth()
         elif doubts:
-            worth = Worth(told=("no gain is measured while the ship file is in doubt: correct it, or confirm it, and diagnose again.",))
+            worth = Worth(
+                told=(
+                    "no gain is measured while the ship file is in doubt: correct it, or confirm it, and diagnose "
+                    "again.",
+                )
+            )
         else:
             worth = _cross_validated(dataset, found, seed, partial(work, budget=share), pool, ahead)
     lines = warnings + used.said(nothing=not rests) + list(worth.told)
     lines += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + doubts
     lines += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
-    causes = describe_causes(found, units, ready.late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs])
+    causes = describe_causes(
+        found, units, ready.late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs]
+    )
     changes = {e.name for e in searched_by("change")}
-    lines += [f"{c.effect}: {c.evidence} Fit the runs before it and from it on separately." for c in causes if c.effect in changes]
+    lines += [
+        f"{c.effect}: {c.evidence} Fit the runs before it and from it on separately."
+        for c in causes
+        if c.effect in changes
+    ]
     behind = _behind_its_record(found, causes)
     lines += [f"{name}: {text}" for name, text in behind.items()]
     lines += what_is_left(found) if causes and not doubts else []
@@ -126,7 +148,8 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
     return Diagnosis(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes),
         candidates=tuple(describe_candidates(found, [c.effect for c in causes], worth.gain is not None)),
-        what_is_wrong=what_is_wrong(trace), unexplained_after=remaining(found) | {"taken_as_noise": noise_in_words(found.final)},
+        what_is_wrong=what_is_wrong(trace),
+        unexplained_after=remaining(found) | {"taken_as_noise": noise_in_words(found.final)},
         extended_model="+".join(["physics", *names]), fingerprint=fingerprint, seconds=time.perf_counter() - began,
         warnings=tuple(lines), gain=worth.gain if causes else None, unknown=unknown_part(found),
         gain_per_run=worth.per_run if causes else (), trace=trace,
@@ -135,7 +158,8 @@ def _diagnosed(dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | No
 
 @dataclass(frozen=True)
 class Worth:
-    """Held-out gain, ED of every run before and after [m], whether the hull's derivatives are worth naming, and lines for the reader."""
+    """Held-out gain, ED of every run before and after [m], whether the hull's derivatives are worth naming, and lines
+    for the reader."""
 
     gain: Gain | None = None
     per_run: tuple[tuple[str, float, float], ...] = ()
@@ -175,21 +199,31 @@ def _of_depth(dataset: Dataset, plant: Plant) -> list[str]:
     if plant.seg.depth is not None:
         draughts = plant.seg.depth / plant.ship.T
         return [
-            f"the depth is recorded ({np.min(draughts):.2g} to {np.max(draughts):.2g} draughts): what it does to hull and added masses is in the "
+            f"the depth is recorded ({np.min(draughts):.2g} to {np.max(draughts):.2g} draughts): what it does to "
+            "hull and added masses is in the "
             "fitted model, by the formulas of `shallow_water`. The models of `shipbench run` do not know it."
         ]
     least = least_depth(dataset)
     if least > plant.ship.T:
         return []
     return [
-        f"the recorded depth falls to {least:.3g} m, and the ship draws {plant.ship.T:.3g} m: it is not used. A depth counts from the surface; "
+        f"the recorded depth falls to {least:.3g} m, and the ship draws {plant.ship.T:.3g} m: it is not used. A "
+        "depth counts from the surface; "
         "to one below the keel add the draught."
     ]
 
 
 @threadpool_limits.wrap(limits=1)  # a process of its own
 def _one_fold(
-    fold: int, threshold: float, hull: bool, *, dataset: Dataset, seed: int, only: Sequence[str] | None, settled: Sequence[str], budget: Budget
+    fold: int,
+    threshold: float,
+    hull: bool,
+    *,
+    dataset: Dataset,
+    seed: int,
+    only: Sequence[str] | None,
+    settled: Sequence[str],
+    budget: Budget,
 ) -> FoldGain:
     """Selection and fits on the training part of one fold, within a part of the budget of the whole."""
     test = _folds(dataset, seed)[fold]
@@ -201,7 +235,8 @@ def _one_fold(
 
 
 def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
-    """Places of the runs of each fold: groups in random order, whole, each where its middle run falls among equal parts."""
+    """Places of the runs of each fold: groups in random order, whole, each where its middle run falls among equal
+    parts."""
     members: dict[str, list[int]] = {}
     for i, run in enumerate(dataset.runs):
         members.setdefault(run.group, []).append(i)
@@ -211,7 +246,9 @@ def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
     folds = THRESHOLDS.count("folds")
     parts = [len(p) for p in np.array_split(np.arange(len(dataset)), folds)]
     part = np.repeat(np.arange(folds), parts)[np.cumsum(size) - 1 - size // 2]
-    return [np.sort(np.concatenate([g for g, k in zip(groups, part, strict=True) if k == fold])) for fold in np.unique(part)]
+    return [
+        np.sort(np.concatenate([g for g, k in zip(groups, part, strict=True) if k == fold])) for fold in np.unique(part)
+    ]
 
 
 def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, str]:
@@ -238,9 +275,15 @@ def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, st
 
 
 def _cross_validated(
-    dataset: Dataset, found: Analysis, seed: int, work: Callable[..., FoldGain], pool: Executor | None, ahead: Future[FoldGain] | None
+    dataset: Dataset,
+    found: Analysis,
+    seed: int,
+    work: Callable[..., FoldGain],
+    pool: Executor | None,
+    ahead: Future[FoldGain] | None,
 ) -> Worth:
-    """Held-out gain of the causes, and of the hull's derivatives beside them; ahead: the first part, as it is with the usual threshold."""
+    """Held-out gain of the causes, and of the hull's derivatives beside them; ahead: the first part, as it is with the
+    usual threshold."""
     hull = found.hull > HULL_THRESHOLD
     if not (found.final.model.terms or found.gears or hull) or found.unknown is not None:
         return Worth()
@@ -253,7 +296,9 @@ def _cross_validated(
         within(len(parts) / (len(rest) + len(ready)))
     parts += [part.result() for part in ready]
     if stopped := sum(part.stopped for part in parts):
-        return Worth(told=(f"no gain is measured: {stopped} of {len(parts)} training parts were stopped by the limit on work.",))
+        return Worth(
+            told=(f"no gain is measured: {stopped} of {len(parts)} training parts were stopped by the limit on work.",)
+        )
     before, after, with_hull = (np.zeros(len(dataset)) for _ in range(3))
     for part in parts:
         before[part.test], after[part.test], with_hull[part.test] = part.before, part.after, part.with_hull

@@ -27,11 +27,18 @@ from .selection.unknown import Dependence
 
 
 def describe_causes(
-    found: Analysis, units: Sequence[UnitFinding], late: LateVelocities | None, gain: Gain | None, hull: bool, doubt: bool, runs: Sequence[str]
+    found: Analysis,
+    units: Sequence[UnitFinding],
+    late: LateVelocities | None,
+    gain: Gain | None,
+    hull: bool,
+    doubt: bool,
+    runs: Sequence[str],
 ) -> list[Cause]:
-    """Named causes: what was taken out before the fit first (units, late velocities), then by score; the hull last, because it is off the
-    regressions on most ships. None in whose place something unknown is told; but in doubt about the ship file a force may be unknown for that, and
-    those are named that show whatever the ship is. `runs` are their names."""
+    """Named causes: what was taken out before the fit first (units, late velocities), then by score; the hull last,
+    because it is off the regressions on most ships. None in whose place something unknown is told; but in doubt about
+    the ship file a force may be unknown for that, and those are named that show whatever the ship is. `runs` are their
+    names."""
     causes = [_unit_cause(i + 1, u) for i, u in enumerate(units)]
     if late is not None:
         causes.append(_late_cause(len(causes) + 1, found, late))
@@ -39,10 +46,15 @@ def describe_causes(
         return causes
     seen = [_gear_cause(found, g, gain) for g in found.gears]
     felt = [_term_cause(found, index, term, gain, runs) for index, term in enumerate(found.final.model.terms)]
-    named = [c for c in felt if c.effect not in {s.effect for s in seen}] + [_with_motion(s, [c for c in felt if c.effect == s.effect]) for s in seen]
+    named = [c for c in felt if c.effect not in {s.effect for s in seen}] + [
+        _with_motion(s, [c for c in felt if c.effect == s.effect]) for s in seen
+    ]
     named.sort(key=lambda c: -c.score)
     if named and found.rival is not None:
-        other = f"{what_it_is(_described(found.rival))} explains the runs about as well (log Bayes factor {0.5 * found.rival.score:.0f})"
+        other = (
+            f"{what_it_is(_described(found.rival))} explains the runs about as well (log Bayes factor "
+            f"{0.5 * found.rival.score:.0f})"
+        )
         named[0] = replace(named[0], evidence=_sentences([named[0].evidence, other]))
     if doubt:
         named = [c for c in named if whatever_the_ship(c.effect, found)]
@@ -62,21 +74,31 @@ def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs
     rivals = rivals_of(found, term)
     notes = [f"The log Bayes factor compares the models {compared}", effect.way]
     notes += [goes_with(fit, of_runs(fit, index))] if term.per_run else []
-    notes += [f"{effect.name} begins with run {runs[term.since]} (number {term.since}, the first is 0)"] if term.since is not None else []
+    notes += (
+        [f"{effect.name} begins with run {runs[term.since]} (number {term.since}, the first is 0)"]
+        if term.since is not None
+        else []
+    )
     name = effect.name if term.since is None else searched_by("change")[0].name
     parameters = _parameters(fit, index, term)
     if term.since is not None:
         parameters = {"from_run": Estimate(float(term.since), "1", (np.nan, np.nan))} | parameters
     return Cause(
-        name, 0, score, p_of(found, score), parameters, rivals, effect.separate if rivals else "", gain, _sentences(notes),
+        name, 0, score, p_of(found, score), parameters, rivals, effect.separate if rivals else "", gain,
+        _sentences(notes),
         f"{supporters} of {fit.plant.seg.runs} runs", force_of_term(fit, index),
-        "" if term.per_run or term.since is not None else effect.correction({k: e.value for k, e in parameters.items()}),
+        "" if term.per_run or term.since is not None else effect.correction({k: e.value for k,
+                e in parameters.items()}),
     )  # fmt: skip
 
 
 def _sentences(texts: Iterable[str]) -> str:
     """Texts as sentences, those that are empty left out."""
-    return " ".join(f"{t[0].upper()}{t[1:].rstrip('.')}." if t.split()[0] not in EFFECTS else f"{t.rstrip('.')}." for t in texts if t)
+    return " ".join(
+        f"{t[0].upper()}{t[1:].rstrip('.')}." if t.split()[0] not in EFFECTS else f"{t.rstrip('.')}."
+        for t in texts
+        if t
+    )
 
 
 def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
@@ -90,7 +112,8 @@ def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
 
 
 def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
-    """Sizes with 95 % intervals: the wider of the model's and of the sandwich clustered by run; none for shape parameters, the best of a few."""
+    """Sizes with 95 % intervals: the wider of the model's and of the sandwich clustered by run; none for shape
+    parameters, the best of a few."""
     from scipy.stats import chi2, t
 
     effect = term.effect
@@ -101,7 +124,10 @@ def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
         rms = np.sqrt(np.mean(of_runs(fit, index) ** 2, axis=0))
         low, high = np.sqrt(num / chi2.ppf(0.975, num)), np.sqrt(num / chi2.ppf(0.025, num))
         names = [p.name for p in effect.parameters if not p.shape]
-        return {f"{n}_rms": Estimate(float(r), effect.parameters[0].unit, (float(r * low), float(r * high))) for n, r in zip(names, rms, strict=True)}
+        return {
+            f"{n}_rms": Estimate(float(r), effect.parameters[0].unit, (float(r * low), float(r * high)))
+            for n, r in zip(names, rms, strict=True)
+        }
     cov = covariance(fit, index) * np.outer(unit, unit)
     half = float(t.ppf(0.975, max(num - 1, 1)))
     q = (*value, *term.setting)
@@ -131,20 +157,33 @@ def _spread(effect: Effect, q: Sequence[float], name: str, cov: np.ndarray, num:
 def _gear_cause(found: Analysis, g: GearFinding, gain: Gain | None) -> Cause:
     effect = EFFECTS.get(g.effect)
     parameter = effect.parameters[0]
-    near = tuple(x.effect for x in found.all_gears if x.actuator == g.actuator and x.effect != g.effect and x.score > g.score - CONFUSED)
+    near = tuple(
+        x.effect
+        for x in found.all_gears
+        if x.actuator == g.actuator and x.effect != g.effect and x.score > g.score - CONFUSED
+    )
     runs = int(np.sum(g.per_run > 0))
     return Cause(
-        g.effect, 0, g.score, p_of(found, g.score), {parameter.name: Estimate(g.value, parameter.unit, g.ci95)}, near, effect.separate if near else
+        g.effect, 0, g.score, p_of(found, g.score), {parameter.name: Estimate(g.value, parameter.unit, g.ci95)}, near,
+        effect.separate if near else
         "", gain,
-        "It is detected between command and record of the actuator. The ship's motion is not used.", f"{runs} of {len(g.per_run)} runs",
+        "It is detected between command and record of the actuator. The ship's motion is not used.",
+        f"{runs} of {len(g.per_run)} runs",
     )  # fmt: skip
 
 
 def _with_motion(gear: Cause, motion: Sequence[Cause]) -> Cause:
-    """A cause of a gear's record with what the motion says of the same: a record that is late by as much as the motion is early is late alone."""
+    """A cause of a gear's record with what the motion says of the same: a record that is late by as much as the motion
+    is early is late alone."""
     for c in motion:
-        sizes = ", ".join(f"{n} {e.value:.2g} {e.unit} (95 %: {e.ci95[0]:.2g} to {e.ci95[1]:.2g})" for n, e in c.parameters.items())
-        late = "A negative value means that the record is late" if any(e.value < 0.0 for e in c.parameters.values()) else ""
+        sizes = ", ".join(
+            f"{n} {e.value:.2g} {e.unit} (95 %: {e.ci95[0]:.2g} to {e.ci95[1]:.2g})" for n, e in c.parameters.items()
+        )
+        late = (
+            "A negative value means that the record is late"
+            if any(e.value < 0.0 for e in c.parameters.values())
+            else ""
+        )
         seen = f"Between record and motion it is {sizes}, supported by {c.support}"
         gear = replace(gear, evidence=_sentences([gear.evidence, seen, late, c.evidence]))
     return gear
@@ -167,13 +206,24 @@ def _hull_cause(found: Analysis, gain: Gain | None) -> Cause:
 
 def _unit_cause(rank: int, u: UnitFinding) -> Cause:
     parameters = {f"{u.channel}_factor": Estimate(float(u.factor), "1", (float(u.factor), float(u.factor)))}
-    return Cause(searched_by("units")[0].name, rank, np.inf, 0.0, parameters, (), "", None, f"{u.channel}: {u.kind}. {u.evidence}")
+    return Cause(
+        searched_by("units")[0].name,
+        rank,
+        np.inf,
+        0.0,
+        parameters,
+        (),
+        "",
+        None,
+        f"{u.channel}: {u.kind}. {u.evidence}",
+    )
 
 
 def _late_cause(rank: int, found: Analysis, late: LateVelocities) -> Cause:
     half = 1.96 * late.sd
     parameters = {
-        "delay": Estimate(late.delay, "s", (late.delay - half, late.delay + half)), "earth_axes": Estimate(1.0, "1", (np.nan, np.nan)),
+        "delay": Estimate(late.delay, "s", (late.delay - half, late.delay + half)),
+        "earth_axes": Estimate(1.0, "1", (np.nan, np.nan)),
     }  # fmt: skip
     how = " behind a first-order filter" if late.filtered else ""
     evidence = (
@@ -187,7 +237,18 @@ def _late_cause(rank: int, found: Analysis, late: LateVelocities) -> Cause:
     effect = late_velocities_effect()
     confused = tuple(name for name in late_effects() if name != effect.name) if late.over_position < 0.0 else ()
     line = effect.correction({k: e.value for k, e in parameters.items()})
-    return Cause(effect.name, rank, late.score, p_of(found, late.score), parameters, confused, "", None, evidence, correction=line)
+    return Cause(
+        effect.name,
+        rank,
+        late.score,
+        p_of(found, late.score),
+        parameters,
+        confused,
+        "",
+        None,
+        evidence,
+        correction=line,
+    )
 
 
 def remaining(found: Analysis) -> dict[str, Any]:
@@ -198,7 +259,9 @@ def remaining(found: Analysis) -> dict[str, Any]:
     best = found.generic[0] if found.generic else None
     return {
         "force_variance_explained": {a: float(v) for a, v in zip(("surge", "sway", "yaw"), share, strict=True)},
-        "force_sd": {a: float(v) for a, v in zip(("surge [m/s^2]", "sway [m/s^2]", "yaw [rad/s^2]"), force, strict=True)},
+        "force_sd": {
+            a: float(v) for a, v in zip(("surge [m/s^2]", "sway [m/s^2]", "yaw [rad/s^2]"), force, strict=True)
+        },
         "best_dependence": None if best is None else _described(best),
     }
 
@@ -208,7 +271,12 @@ def what_is_left(found: Analysis) -> list[str]:
     if found.left is None:
         return []
     detected = f"{what_it_is(_described(found.left))} (log Bayes factor {0.5 * found.left.score:.0f})"
-    return [f"besides the named causes the runs show {detected}. No effect of the library covers it. It may bias the sizes of the causes."]
+    return [
+        (
+            f"besides the named causes the runs show {detected}. No effect of the library covers it. It may bias the "
+            "sizes of the causes."
+        )
+    ]
 
 
 def unknown_part(found: Analysis) -> dict[str, Any] | None:

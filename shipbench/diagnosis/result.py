@@ -39,9 +39,11 @@ class Gain:
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause. score: twice the log Bayes factor; p_value: of the greatest score of all candidates under the null.
+    """A named cause. score: twice the log Bayes factor; p_value: of the greatest score of all candidates under the
+    null.
 
-    support: such as "12 of 12 runs". force: 99th percentile of its magnitude on the runs in "surge", "sway" [N] and "yaw" [N m], where noticeable.
+    support: such as "12 of 12 runs". force: 99th percentile of its magnitude on the runs in "surge", "sway" [N] and
+    "yaw" [N m], where noticeable.
     correction: the line of dataset.toml that corrects the record for it, where there is one.
     """
 
@@ -65,7 +67,8 @@ class Cause:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A candidate and why it was not named. detectable: smallest size that would have been seen, per parameter name; NaN where none would."""
+    """A candidate and why it was not named. detectable: smallest size that would have been seen, per parameter name;
+    NaN where none would."""
 
     effect: str
     score: float
@@ -82,7 +85,8 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Wrong:
-    """One line of "what is wrong". depends_on: variable that the unexplained force or error follows ("" when none); when: in words."""
+    """One line of "what is wrong". depends_on: variable that the unexplained force or error follows ("" when none);
+    when: in words."""
 
     channel: str
     share_of_error: float
@@ -94,11 +98,11 @@ class Wrong:
 class Trace:
     """Time series of the plots, per segment of a run (padded with NaN).
 
-    run (B,) index of the run, names: of the runs. start (B,) [s]. t (K + 1,) [s]. measured, before, after (B, K + 1, 6): x y psi u v r recorded,
-    rolled out open-loop by the plain model, and by the extended one (held out where `held_out`; equal to `before` when nothing was named).
-    inputs (B, K + 1, 4): n delta F_b F_s. knots (J,) [s]; force (B, J, 3), force_sd (B, J, 3): latent acceleration in surge, sway [m/s^2],
-    yaw [rad/s^2], that the plain model needs to follow the measurement; force_after: the same for the extended model. white (B, K + 1, 6):
-    residuals of
+    run (B,) index of the run, names: of the runs. start (B,) [s]. t (K + 1,) [s]. measured, before, after (B, K + 1,
+    6): x y psi u v r recorded, rolled out open-loop by the plain model, and by the extended one (held out where
+    `held_out`; equal to `before` when nothing was named). inputs (B, K + 1, 4): n delta F_b F_s. knots (J,) [s]; force
+    (B, J, 3), force_sd (B, J, 3): latent acceleration in surge, sway [m/s^2], yaw [rad/s^2], that the plain model needs
+    to follow the measurement; force_after: the same for the extended model. white (B, K + 1, 6): residuals of
     the smoothed plain model over the noise.
     """
 
@@ -123,7 +127,10 @@ def what_it_is(unknown: Mapping[str, Any]) -> str:
     kind = "error of the" if unknown["axis"].startswith(("recorded", "ordered")) else "force in"
     if unknown["variable"] == "nothing":
         return f"a constant {kind} {unknown['axis']}"
-    return f"{'an' if kind[0] == 'e' else 'a'} {kind} {unknown['axis']} that depends on {unknown['variable']}, best as {unknown['form']}"
+    return (
+        f"{'an' if kind[0] == 'e' else 'a'} {kind} {unknown['axis']} that depends on {unknown['variable']}, best "
+        f"as {unknown['form']}"
+    )
 
 
 @dataclass(frozen=True)
@@ -153,13 +160,17 @@ class Diagnosis:
         return brief(f"<Diagnosis of {self.dataset}: {self.verdict}, {self.extended_model}>")
 
     def document(self) -> dict[str, Any]:
-        """The contract's JSON, plus `warnings`, the gain of all causes together, and `unknown` (channel and variable) where that is the verdict."""
+        """The contract's JSON, plus `warnings`, the gain of all causes together, and `unknown` (channel and variable)
+        where that is the verdict."""
         return {
             "schema": SCHEMA, "dataset": self.dataset, "base_model": "physics", "verdict": self.verdict,
-            "causes": [_plain(asdict(c)) for c in self.causes], "candidates": [_plain(asdict(c)) for c in self.candidates],
-            "what_is_wrong": [_plain(asdict(w)) for w in self.what_is_wrong], "unexplained_after": _plain(self.unexplained_after),
+            "causes": [_plain(asdict(c)) for c in self.causes],
+            "candidates": [_plain(asdict(c)) for c in self.candidates],
+            "what_is_wrong": [_plain(asdict(w)) for w in self.what_is_wrong],
+            "unexplained_after": _plain(self.unexplained_after),
             "extended_model": self.extended_model, "fingerprint": self.fingerprint, "seconds": round(self.seconds, 2),
-            "gain": None if self.gain is None else _plain(asdict(self.gain)), "unknown": _plain(self.unknown), "warnings": list(self.warnings),
+            "gain": None if self.gain is None else _plain(asdict(self.gain)), "unknown": _plain(self.unknown),
+            "warnings": list(self.warnings),
         }  # fmt: skip
 
 

@@ -1,4 +1,5 @@
-"""Every number by which the diagnosis decides. Lengths, times and forces that go with the ship are for 130 m, scaled by Froude's law.
+"""Every number by which the diagnosis decides. Lengths, times and forces that go with the ship are for 130 m, scaled by
+Froude's law.
 
 Numbers of single effects are traits of these effects (`effects/traits.py`).
 """
@@ -181,7 +182,9 @@ THRESHOLDS = Thresholds(
     Threshold("longest_ship", 400.0, "m", "length of the longest ships", "chosen-by-judgement"),
     Threshold("longest_delay", 10.0, "s at 130 m", "greatest delay that is looked for", "chosen-by-judgement"),
     Threshold("actuator_evidence", 10.0, "2 log likelihood ratio", "least score of a finding", "chosen-by-judgement"),
-    Threshold("least_record_error", 0.03, "share", "least reported size of an error of a record", "chosen-by-judgement"),
+    Threshold(
+        "least_record_error", 0.03, "share", "least reported size of an error of a record", "chosen-by-judgement"
+    ),
     Threshold("record_error_promising", 0.1, "share", "of the best score: corrected repeatedly", "actuator-records"),
     Threshold("record_reading_evidence", 10.0, "log evidence", "least for record or order", "actuator-records"),
     Threshold("time_constant_spread", 0.25, "share", "spread of ordinary time constants", "chosen-by-judgement"),
@@ -194,16 +197,54 @@ THRESHOLDS = Thresholds(
     Threshold("off_form", 0.02, "share", "of that gain, asked besides where ships differ", "evidence-asked"),
     Threshold("evidence_of_misfit", 10.0, "2 log evidence", "asked besides where misfit is absorbed", "evidence-asked"),
     Threshold("evidence_of_run_values", 50.0, "2 log evidence", "asked besides of one value a run", "evidence-asked"),
-    Threshold("play_over_noise", 6.0, "standard deviations", "play behind a record of the rudder that is no noise of it", "sizes-that-matter"),
-    Threshold("delay_beside_delay", 0.6, "typical sizes", "least delay beside that of another sensor", "sizes-that-matter"),
-    Threshold("along_the_normal", 0.1, "rad", "angle to the normal of a bank within which a steady wind or current mends its law", "a-bank"),
-    Threshold("doubt", 0.05, "probability", "that the size of a cause is zero, from which on it is not sure", "agreement-of-runs"),
-    Threshold("doubt_of_a_change", 1e-5, "probability", "the same of a cause that begins with a run", "agreement-of-runs"),
-    Threshold("against", -2.0, "2 log evidence", "of a cause without any one run, below which the other runs speak against it", "agreement-of-runs"),
     Threshold(
-        "own_forces_left", 30.0, "2 log evidence", "of forces of single runs that may be left beside values of single runs", "values-of-single-runs"
+        "play_over_noise",
+        6.0,
+        "standard deviations",
+        "play behind a record of the rudder that is no noise of it",
+        "sizes-that-matter",
     ),
-    Threshold("own_forces_share", 0.1, "share", "of what values of single runs are worth that may be left besides", "values-of-single-runs"),
+    Threshold(
+        "delay_beside_delay", 0.6, "typical sizes", "least delay beside that of another sensor", "sizes-that-matter"
+    ),
+    Threshold(
+        "along_the_normal",
+        0.1,
+        "rad",
+        "angle to the normal of a bank within which a steady wind or current mends its law",
+        "a-bank",
+    ),
+    Threshold(
+        "doubt",
+        0.05,
+        "probability",
+        "that the size of a cause is zero, from which on it is not sure",
+        "agreement-of-runs",
+    ),
+    Threshold(
+        "doubt_of_a_change", 1e-5, "probability", "the same of a cause that begins with a run", "agreement-of-runs"
+    ),
+    Threshold(
+        "against",
+        -2.0,
+        "2 log evidence",
+        "of a cause without any one run, below which the other runs speak against it",
+        "agreement-of-runs",
+    ),
+    Threshold(
+        "own_forces_left",
+        30.0,
+        "2 log evidence",
+        "of forces of single runs that may be left beside values of single runs",
+        "values-of-single-runs",
+    ),
+    Threshold(
+        "own_forces_share",
+        0.1,
+        "share",
+        "of what values of single runs are worth that may be left besides",
+        "values-of-single-runs",
+    ),
     # selection: screening, steps, changes
     Threshold("hopeless_score", 14.0, "2 log evidence", "below zero: no second estimate for run values", "screening"),
     Threshold("causes", 6, "1", "greatest number of causes", "chosen-by-judgement"),
@@ -273,6 +314,8 @@ THRESHOLDS = Thresholds(
     Threshold("single_run_slices", 12, "runs", "greatest number with a slice for each run", "chosen-by-judgement"),
     Threshold("correlation_lags", 10, "samples", "greatest lag of correlations of residuals", "chosen-by-judgement"),
     Threshold("run_values_share", 0.7, "share", "of the variance that a line explains, least", "chosen-by-judgement"),
-    Threshold("run_values_by_chance", 1e-3, "probability", "greatest for so good a line by chance", "chosen-by-judgement"),
+    Threshold(
+        "run_values_by_chance", 1e-3, "probability", "greatest for so good a line by chance", "chosen-by-judgement"
+    ),
 )
 """All of them, in the order of the diagnosis."""

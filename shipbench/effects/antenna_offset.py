@@ -1,8 +1,10 @@
-"""The recorded position is that of an antenna, ahead and to starboard of midship: p + R(psi) (forward, starboard). Its velocity is midship's (a log,
-or an inertial unit that reckons with the lever), or the antenna's own, from the same receiver: u - r starboard, v + r forward. Its own agree with the
+"""The recorded position is that of an antenna, ahead and to starboard of midship: p + R(psi) (forward, starboard). Its
+velocity is midship's (a log, or an inertial unit that reckons with the lever), or the antenna's own, from the same
+receiver: u - r starboard, v + r forward. Its own agree with the
 track, so that only the forces tell where on the ship they belong: what is ahead or astern may pass for another hull.
 
-It stands on the ship or near her: within three quarters of the length from midship, and within a breadth of the centreline."""
+It stands on the ship or near her: within three quarters of the length from midship, and within a breadth of the
+centreline."""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ from ..signals import PSI, R, U, V, X, Y
 from .base import Effect, Parameter, per_run
 
 _FORM = 0.08
-"""Lengths by which the forces of a hull act elsewhere than those of a fitted one (docs/calibration.md#sizes-that-matter)."""
+"""Lengths by which the forces of a hull act elsewhere than those of a fitted one
+(docs/calibration.md#sizes-that-matter)."""
 
 
 class AntennaOffset(Effect):

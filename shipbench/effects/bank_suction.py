@@ -1,9 +1,10 @@
-"""A straight bank, or those of a channel: suction towards it, and a moment that turns the leading end away, falling with distance.
+"""A straight bank, or those of a channel: suction towards it, and a moment that turns the leading end away, falling
+with distance.
 
-The bank is the line x cos(bearing) + y sin(bearing) = line; d is the distance from it (at least B/2), phi = (B/2)/d, less (B/2)/d of the opposite
-bank where there is a `channel` of such a breadth (0: no other bank), s = sin(bearing - psi) its side (1: to starboard).
-Y = rho/2 L T u^2 c phi s, N = -L rho/2 L T u|u| (0.2 c + moment) phi s: the pressure falls with the square of the speed either way, the bow wave
-stands at the leading end."""
+The bank is the line x cos(bearing) + y sin(bearing) = line; d is the distance from it (at least B/2), phi = (B/2)/d,
+less (B/2)/d of the opposite bank where there is a `channel` of such a breadth (0: no other bank), s = sin(bearing -
+psi) its side (1: to starboard). Y = rho/2 L T u^2 c phi s, N = -L rho/2 L T u|u| (0.2 c + moment) phi s: the pressure
+falls with the square of the speed either way, the bow wave stands at the leading end."""
 
 from __future__ import annotations
 
@@ -38,7 +39,9 @@ class BankSuction(Effect):
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         c, moment, bearing, line, channel = q
         distance, least = line - s.x * cos(bearing) - s.y * sin(bearing), 0.5 * ship.B
-        phi = least / maximum(distance, least) - smoothstep(channel, 0.0, 1.0) * least / maximum(channel - distance, least)
+        phi = least / maximum(distance, least) - smoothstep(channel, 0.0, 1.0) * least / maximum(
+            channel - distance, least
+        )
         unit = 0.5 * ship.rho * ship.L * ship.T * phi * sin(bearing - s.psi)
         u = s.u - e.u_c
         e.push(0.0, unit * c * u * u, -(0.2 * c + moment) * ship.L * unit * u * absolute(u))
@@ -48,8 +51,8 @@ class BankSuction(Effect):
         return setting[0]
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:
-        """Banks on four sides, along and across the direction in which the places visited lie, each two breadths beyond the outermost of them, and
-        the two along it together, each one or two breadths away."""
+        """Banks on four sides, along and across the direction in which the places visited lie, each two breadths beyond
+        the outermost of them, and the two along it together, each one or two breadths away."""
         flat = positions.reshape(-1, 2)
         flat = flat[np.isfinite(flat).all(axis=1)]
         along = np.linalg.eigh(np.cov(flat, rowvar=False))[1][:, 1]

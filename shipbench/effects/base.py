@@ -1,8 +1,11 @@
-"""An effect: one formula, used to hide a cause in simulated data, to test for it in measured data, and to extend a model.
+"""An effect: one formula, used to hide a cause in simulated data, to test for it in measured data, and to extend a
+model.
 
-A part is one file of this folder whose instance is bound to `EFFECT`; the file's name is the effect's name. It overrides one of three methods,
-which say where the cause enters: `force` (anything that acts on the hull), `gear` (between command and actuator) or `measure` (the sensors).
-Its values `q` are zero when nothing is missing, and may be numbers, one per run, or symbols (force only).
+A part is one file of this folder whose instance is bound to `EFFECT`; the file's name is the effect's name. It
+overrides one of three methods,
+which say where the cause enters: `force` (anything that acts on the hull), `gear` (between command and actuator) or
+`measure` (the sensors). Its values `q` are zero when nothing is missing, and may be numbers, one per run, or symbols
+(force only).
 """
 
 from __future__ import annotations
@@ -33,12 +36,14 @@ _ACTS_THROUGH = {"rudder": ("delta",), "propulsion": ("n",), "thruster": ("F_b",
 class Parameter:
     """One value of an effect.
 
-    typical, low, high are for a ship of 130 m; `scaling` says how they go with the length (Froude's law): a key of `_FROUDE`. A fit is held between
-    low and high; a size beyond them is not named (`Effect.plausible`).
-    A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes are zero. An `other` one
-    is the amplitude, or chooses, another form of the same cause, which a ship may have in its place: fitted, but not drawn for the suite.
-    `title` is the name in words, such as "sway damping"; a `relative` one is a change of a coefficient as a share, reported in percent;
-    one with `share_of` is a share of that quantity, reported in percent too.
+    typical, low, high are for a ship of 130 m; `scaling` says how they go with the length (Froude's law): a key of
+    `_FROUDE`. A fit is held between low and high; a size beyond them is not named (`Effect.plausible`).
+    A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes
+    are zero. An `other` one
+    is the amplitude, or chooses, another form of the same cause, which a ship may have in its place: fitted, but not
+    drawn for the suite. `title` is the name in words, such as "sway damping"; a `relative` one is a change of a
+    coefficient as a share, reported in percent; one with `share_of` is a share of that quantity, reported in percent
+    too.
     """
 
     name: str
@@ -62,15 +67,18 @@ class Parameter:
 class Effect:
     """Base of all effects; see the module's docstring.
 
-    Class attributes: `family` (environment, rudder, propulsion, thruster, hull, sensor, time), `summary`, `phrase` (a noun phrase for the verdict
-    with the names of values in braces, such as "a current of {speed} towards {to}"), `source`, `parameters`, `per_run` (every
-    run has its own values), `vector` (names of size and direction that two earth-fixed components are reported as), `separate` (the manoeuvre that
-    tells it from its look-alikes), `channels` (measured inputs without which it means nothing), `known_with` (measured inputs with which the model
-    has it already), `scales` (channels that it records (1 + q) times too large), `breaks_symmetry` (a force that knows port from
-    starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that are wrong), `late` (tells of another
-    time, and as much of the motion as a sensor in time, but where a record begins or ends), `unrecorded` (of a gear's: it may also act behind the
-    record of the actuator, where the motion alone shows it), `traits` (facts about ships and about its look-alikes). `way`: how one of those that
-    `fitted` gives acts, where the user should be told.
+    Class attributes: `family` (environment, rudder, propulsion, thruster, hull, sensor, time), `summary`, `phrase` (a
+    noun phrase for the verdict with the names of values in braces, such as "a current of {speed} towards {to}"),
+    `source`, `parameters`, `per_run` (every run has its own values), `vector` (names of size and direction that two
+    earth-fixed components are reported as), `separate` (the manoeuvre that tells it from its look-alikes), `channels`
+    (measured inputs without which it means nothing), `known_with` (measured inputs with which the model has it
+    already), `scales` (channels that it records (1 + q) times too large), `breaks_symmetry` (a force that knows port
+    from
+    starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that are
+    wrong), `late` (tells of another time, and as much of the motion as a sensor in time, but where a record begins or
+    ends), `unrecorded` (of a gear's: it may also act behind the record of the actuator, where the motion alone shows
+    it), `traits` (facts about ships and about its look-alikes). `way`: how one of those that `fitted` gives acts, where
+    the user should be told.
     """
 
     name: str = ""
@@ -114,7 +122,8 @@ class Effect:
         return None
 
     def form_spread(self, setting: Sequence[float], L: float) -> tuple[float, ...]:
-        """Standard deviation of its amplitudes, in their units, that the form of a hull of length L [m] adds to any estimate."""
+        """Standard deviation of its amplitudes, in their units, that the form of a hull of length L [m] adds to any
+        estimate."""
         return tuple(0.0 for p in self.parameters if not p.shape)
 
     def known(self, inputs: Mapping[str, np.ndarray], ship: Particulars) -> tuple[np.ndarray, ...]:
@@ -144,8 +153,8 @@ class Effect:
         return [()]
 
     def fitted(self, L: float) -> tuple[Effect, ...]:
-        """Effect with values in which it acts about linearly on a ship of length L [m] (`public` gives what they mean), once for each way in
-        which it may act."""
+        """Effect with values in which it acts about linearly on a ship of length L [m] (`public` gives what they mean),
+        once for each way in which it may act."""
         return (self,)
 
     def sized(self, L: float) -> tuple[Parameter, ...]:
@@ -153,14 +162,16 @@ class Effect:
         return tuple(p.for_length(L) for p in self.parameters)
 
     def public(self, q: Sequence[float]) -> dict[str, float]:
-        """The values under the names that are reported; two earth-fixed components become a size and a direction [rad]."""
+        """The values under the names that are reported; two earth-fixed components become a size and a direction
+        [rad]."""
         if self.vector is None:
             return {p.name: float(v) for p, v in zip(self.parameters, q, strict=True)}
         north, east = (float(v) for v in q)
         return {self.vector[0]: math.hypot(north, east), self.vector[1]: math.atan2(east, north) % (2.0 * math.pi)}
 
     def correction(self, values: Mapping[str, float]) -> str:
-        """The line of dataset.toml that corrects the record for it, from values under the reported names; empty where there is none."""
+        """The line of dataset.toml that corrects the record for it, from values under the reported names; empty where
+        there is none."""
         return ""
 
     def units(self) -> dict[str, str]:
@@ -170,7 +181,8 @@ class Effect:
         return {self.vector[0]: self.parameters[0].unit, self.vector[1]: "rad"}
 
     def internal(self, values: Mapping[str, float]) -> tuple[float, ...]:
-        """`q` from values under the reported names; those not given are zero, shape parameters typical, a vector's direction north.
+        """`q` from values under the reported names; those not given are zero, shape parameters typical, a vector's
+        direction north.
 
         Raises:
             InputError: a name is unknown, or a vector's size is missing.
@@ -219,10 +231,11 @@ def per_run(value: Array) -> Array:
 
 
 def delayed(S: np.ndarray, channels: Sequence[int], delay: Array, dt: float) -> np.ndarray:
-    """States (runs, samples, 10) whose `channels` are read `delay` seconds late (a number or one per run); before the run they go on as they began.
+    """States (runs, samples, 10) whose `channels` are read `delay` seconds late (a number or one per run); before the
+    run they go on as they began.
 
-    Between samples a cubic with central slopes (Catmull & Rom): a fit would not settle where the slope against the delay jumps, as it does at whole
-    samples of straight lines.
+    Between samples a cubic with central slopes (Catmull & Rom): a fit would not settle where the slope against the
+    delay jumps, as it does at whole samples of straight lines.
     """
     runs, samples = S.shape[:2]
     shift = np.broadcast_to(np.asarray(delay, dtype=float) / dt, (runs,))
@@ -230,11 +243,18 @@ def delayed(S: np.ndarray, channels: Sequence[int], delay: Array, dt: float) -> 
     low = np.clip(np.floor(at).astype(int), 0, samples - 2)
     part = (at - low)[..., None]
     p = np.clip(part, 0.0, 1.0)
-    weights = (0.5 * p * (p * (2.0 - p) - 1.0), 0.5 * (p * p * (3.0 * p - 5.0) + 2.0), 0.5 * p * (p * (4.0 - 3.0 * p) + 1.0), 0.5 * p * p * (p - 1.0))
+    weights = (
+        0.5 * p * (p * (2.0 - p) - 1.0),
+        0.5 * (p * p * (3.0 * p - 5.0) + 2.0),
+        0.5 * p * (p * (4.0 - 3.0 * p) + 1.0),
+        0.5 * p * p * (p - 1.0),
+    )
     columns = S[:, :, list(channels)]
     first, last = columns[:, 1:2] - columns[:, :1], columns[:, -1:] - columns[:, -2:-1]
     padded = np.concatenate([columns[:, :1] - first, columns, columns[:, -1:] + last], axis=1)
     rows = np.arange(runs)[:, None]
     out = S.copy()
-    out[:, :, list(channels)] = sum(w * padded[rows, low + i] for i, w in enumerate(weights)) + np.where(part < 0.0, first, last) * (part - p)
+    out[:, :, list(channels)] = sum(w * padded[rows, low + i] for i, w in enumerate(weights)) + np.where(
+        part < 0.0, first, last
+    ) * (part - p)
     return out

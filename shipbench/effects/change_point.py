@@ -1,7 +1,9 @@
-"""Something changed: another effect that is absent at first and present from a run on, or from a time within every run on.
+"""Something changed: another effect that is absent at first and present from a run on, or from a time within every run
+on.
 
-`EFFECT.of(inner, from_run=12)` is the effect that a model or a simulation takes; its values are those of the inner effect. Before the change the
-amplitudes are zero (shape parameters are kept), so that what was there all along stays in the model as itself.
+`EFFECT.of(inner, from_run=12)` is the effect that a model or a simulation takes; its values are those of the inner
+effect. Before the change the amplitudes are zero (shape parameters are kept), so that what was there all along stays in
+the model as itself.
 """
 
 from __future__ import annotations
@@ -35,23 +37,36 @@ class ChangePoint(Effect):
         self.rows: np.ndarray | None = None
 
     def of(
-        self, effect: Effect, *, from_run: int | None = None, from_time: float | None = None, rows: Sequence[int] | np.ndarray | None = None
+        self,
+        effect: Effect,
+        *,
+        from_run: int | None = None,
+        from_time: float | None = None,
+        rows: Sequence[int] | np.ndarray | None = None,
     ) -> ChangePoint:
-        """`effect` from the run number `from_run` (0 is the first) or from `from_time` [s] after the beginning of every run.
+        """`effect` from the run number `from_run` (0 is the first) or from `from_time` [s] after the beginning of every
+        run.
 
         Args:
-            rows: number of the run of each row (simulated run, segment) where rows are not the runs in order; values and flow have rows last.
+            rows: number of the run of each row (simulated run, segment) where rows are not the runs in order; values
+            and flow have rows last.
 
         Raises:
-            InputError: not just one of `from_run`, `from_time` is given, a cause that is no force shall begin within runs, or `effect` is a change.
+            InputError: not just one of `from_run`, `from_time` is given, a cause that is no force shall begin within
+            runs, or `effect` is a change.
         """
         if (from_run is None) == (from_time is None):
-            raise InputError(f"effect '{self.name}': from_run = {from_run}, from_time = {from_time}; give one of the two.")
+            raise InputError(
+                f"effect '{self.name}': from_run = {from_run}, from_time = {from_time}; give one of the two."
+            )
         if isinstance(effect, ChangePoint):
-            raise InputError(f"effect '{self.name}': the effect that changes is '{effect.name}' itself; give one of the others.")
+            raise InputError(
+                f"effect '{self.name}': the effect that changes is '{effect.name}' itself; give one of the others."
+            )
         if from_time is not None and effect.enters != "force":
             raise InputError(
-                f"effect '{self.name}': '{effect.name}' enters as {effect.enters}, from_time = {from_time}; only forces can begin within a run. "
+                f"effect '{self.name}': '{effect.name}' enters as {effect.enters}, from_time = {from_time}; only "
+                "forces can begin within a run. "
                 "Use from_run."
             )
         changed = ChangePoint()
@@ -99,19 +114,30 @@ class ChangePoint(Effect):
         begins = self._begins()
         for key, value in begins.items():
             if values.get(key, value) != value:
-                raise InputError(f"effect '{self.name}': {key} = {values[key]:g}, this one begins at {value:g}; make another one with `of`.")
+                raise InputError(
+                    f"effect '{self.name}': {key} = {values[key]:g}, this one begins at {value:g}; make another one "
+                    "with `of`."
+                )
         return self._inner().internal({k: v for k, v in values.items() if k not in begins})
 
     def _inner(self) -> Effect:
         if self.inner is None:
-            raise InputError(f"effect '{self.name}' does not say what changes; use EFFECT.of(effect, from_run=...) or of(effect, from_time=...).")
+            raise InputError(
+                f"effect '{self.name}' does not say what changes; use EFFECT.of(effect, from_run=...) or of(effect, "
+                "from_time=...)."
+            )
         return self.inner
 
     def _begins(self) -> dict[str, float]:
-        return {"from_run": float(self.from_run)} if self.from_run is not None else {"from_time": float(self.from_time or 0.0)}
+        return (
+            {"from_run": float(self.from_run)}
+            if self.from_run is not None
+            else {"from_time": float(self.from_time or 0.0)}
+        )
 
     def _gated(self, q: Sequence[Array], t: Array, like: Array) -> tuple[Array, ...]:
-        """The values with the amplitudes zero before the change; the last axis of `like`, or of the values, is that of the rows."""
+        """The values with the amplitudes zero before the change; the last axis of `like`, or of the values, is that of
+        the rows."""
         gate = self._after_run(q, like) if self.from_time is None else self._after_time(t, self.from_time)
         return tuple(v if p.shape else v * gate for v, p in zip(q, self._inner().parameters, strict=True))
 
@@ -126,7 +152,10 @@ class ChangePoint(Effect):
             lengths = [v.shape[-1] for v in (like, *q) if isinstance(v, np.ndarray) and v.ndim]
             rows = np.arange(lengths[0]) if lengths else None
         if rows is None or self.from_run is None:
-            raise InputError(f"effect '{self.name}': one number, and no runs to tell apart; give one value per run, or `rows` to `of`.")
+            raise InputError(
+                f"effect '{self.name}': one number, and no runs to tell apart; give one value per run, or `rows` to "
+                "`of`."
+            )
         return (rows >= self.from_run).astype(float)
 
 

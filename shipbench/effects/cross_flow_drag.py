@@ -1,4 +1,5 @@
-"""Drag of the flow across the hull beyond the model's own: Y = -rho/2 T C int w|w| dx, N = -rho/2 T C int x w|w| dx, w = v + x r."""
+"""Drag of the flow across the hull beyond the model's own: Y = -rho/2 T C int w|w| dx, N = -rho/2 T C int x w|w| dx, w
+= v + x r."""
 
 from __future__ import annotations
 

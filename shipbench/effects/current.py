@@ -1,6 +1,8 @@
-"""A uniform, steady current: the water moves over the ground, and the hull, propeller and rudder see the velocity through it.
+"""A uniform, steady current: the water moves over the ground, and the hull, propeller and rudder see the velocity
+through it.
 
-The components, north and east, say where it flows to; u_c = north cos(psi) + east sin(psi), v_c = east cos(psi) - north sin(psi)."""
+The components, north and east, say where it flows to; u_c = north cos(psi) + east sin(psi), v_c = east cos(psi) - north
+sin(psi)."""
 
 from __future__ import annotations
 
@@ -19,7 +21,10 @@ class Current(Effect):
     phrase = "a current of {speed} towards {to}"
     source = "Fossen (2021), section 10.3; added masses act on the velocity through the water"
     traits = Traits(imitates=("bank_suction",))
-    parameters = (Parameter("north", "m/s", 0.3, -6.0, 6.0, scaling="speed"), Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"))
+    parameters = (
+        Parameter("north", "m/s", 0.3, -6.0, 6.0, scaling="speed"),
+        Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"),
+    )
     breaks_symmetry = True
     vector = ("speed", "to")
     separate = "straight runs on reciprocal courses at two speeds, or a full turn"

@@ -17,7 +17,10 @@ class CurrentPerRun(Effect):
     phrase = "a current that differs from run to run"
     source = "Fossen (2021), section 10.3"
     traits = Traits(least_size=0.15)
-    parameters = (Parameter("north", "m/s", 0.3, -6.0, 6.0, scaling="speed"), Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"))
+    parameters = (
+        Parameter("north", "m/s", 0.3, -6.0, 6.0, scaling="speed"),
+        Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"),
+    )
     breaks_symmetry = True
     per_run = True
     vector = ("speed", "to")

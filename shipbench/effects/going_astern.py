@@ -1,7 +1,7 @@
 """The hull going astern, and a reversed propeller's thrust and wake, which derivatives for motion ahead do not know.
 
-N_v and Y_r change sign when the ship goes astern (the moment that destabilises her then turns about the other end). They are taken times 1 - 2 q b,
-where b goes from 0 ahead over 1/2 across to 1 astern: q = 1 is theory.
+N_v and Y_r change sign when the ship goes astern (the moment that destabilises her then turns about the other end).
+They are taken times 1 - 2 q b, where b goes from 0 ahead over 1/2 across to 1 astern: q = 1 is theory.
 The thrust of a reversed propeller has `thrust` times the J-term that the plain formula drops, for J within 1/2 of rest.
 """
 
@@ -20,7 +20,10 @@ class GoingAstern(Effect):
     family = "hull"
     summary = "hull, thrust and rudder while going astern"
     phrase = "forces astern that differ from the model"
-    source = "Yoshimura, Nakao & Ishibashi (2009): v u and r u in place of v U and r U; Miyauchi et al. (2022): flow at the rudder"
+    source = (
+        "Yoshimura, Nakao & Ishibashi (2009): v u and r u in place of v U and r U; Miyauchi et al. (2022): "
+        "flow at the rudder"
+    )
     traits = Traits(search="never")
     parameters = (
         Parameter("N_v", "1", 0.5, -0.5, 2.0),

@@ -15,7 +15,10 @@ class HullDerivatives(Effect):
     family = "hull"
     summary = "hull derivatives that differ from the regressions"
     phrase = "hull coefficients that differ from the regressions"
-    source = "Clarke, Gedling & Hine (1983): scatter of measured derivatives about the regressions; docs/theory.md#coefficients-of-the-left-side"
+    source = (
+        "Clarke, Gedling & Hine (1983): scatter of measured derivatives about the regressions; "
+        "docs/theory.md#coefficients-of-the-left-side"
+    )
     traits = Traits(search="hull")
     parameters = (
         Parameter("Y_v", "1", 0.25, -0.9, 3.0, title="sway damping", relative=True),

@@ -1,4 +1,5 @@
-"""Another mass than the ship file says (loading): mass and moment of inertia times 1 + share, added masses as they were."""
+"""Another mass than the ship file says (loading): mass and moment of inertia times 1 + share, added masses as they
+were."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The recorded position is old: x and y at t - delay; a negative delay means that they run ahead of the other channels."""
+"""The recorded position is old: x and y at t - delay; a negative delay means that they run ahead of the other
+channels."""
 
 from __future__ import annotations
 

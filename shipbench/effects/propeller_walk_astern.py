@@ -1,7 +1,8 @@
-"""The side force of a screw turning astern: Y = c Y_P, N = c N_P of `physics.propeller.side_force_astern`, and a share of its thrust at rest that
-acts at the propeller, whatever the ship's speed; none ahead.
+"""The side force of a screw turning astern: Y = c Y_P, N = c N_P of `physics.propeller.side_force_astern`, and a share
+of its thrust at rest that acts at the propeller, whatever the ship's speed; none ahead.
 
-c = 1 is the right-handed screw of Esso Osaka, which throws the stern to port; a left-handed one has c < 0, and share < 0."""
+c = 1 is the right-handed screw of Esso Osaka, which throws the stern to port; a left-handed one has c < 0, and share <
+0."""
 
 from __future__ import annotations
 

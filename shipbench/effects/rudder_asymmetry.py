@@ -1,4 +1,5 @@
-"""The rudder gives more lift to one side: times 1 + a where it turns the ship to starboard, 1 - a where to port (smooth over 0.05 rad)."""
+"""The rudder gives more lift to one side: times 1 + a where it turns the ship to starboard, 1 - a where to port (smooth
+over 0.05 rad)."""
 
 from __future__ import annotations
 

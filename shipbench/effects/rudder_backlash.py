@@ -1,4 +1,5 @@
-"""Play between steering gear and rudder: after each reversal the rudder stays until the play is taken up; half of it on either side."""
+"""Play between steering gear and rudder: after each reversal the rudder stays until the play is taken up; half of it on
+either side."""
 
 from __future__ import annotations
 

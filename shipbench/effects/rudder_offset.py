@@ -1,4 +1,5 @@
-"""The rudder stands at another angle than recorded (zero error of the gear or its sensor): delta + offset, positive to starboard."""
+"""The rudder stands at another angle than recorded (zero error of the gear or its sensor): delta + offset, positive to
+starboard."""
 
 from __future__ import annotations
 
@@ -20,7 +21,10 @@ class RudderOffset(Effect):
     traits = Traits(in_place_of=(4,), in_place_beside_hull=(0,))
     parameters = (Parameter("offset", "rad", math.radians(2.0), -0.15, 0.15),)
     breaks_symmetry = True
-    separate = "vary the shaft speed at one speed: the offset acts with the race, propeller walk with the thrust, wind with neither"
+    separate = (
+        "vary the shaft speed at one speed: the offset acts with the race, propeller walk with the thrust, "
+        "wind with neither"
+    )
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.delta = e.delta + q[0]

@@ -1,4 +1,5 @@
-"""The rudder turns no faster than a limit below the 2.3 deg/s that SOLAS asks for: rate = min(rate of the gear, limit); zero means no limit."""
+"""The rudder turns no faster than a limit below the 2.3 deg/s that SOLAS asks for: rate = min(rate of the gear, limit);
+zero means no limit."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ class RudderRateLimit(Effect):
     separate = "small and large rudder steps: a rate limit takes longer for the large one"
 
     def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
-        gears["delta"] = replace(gears["delta"], rate=where(q[0] > 0.0, minimum(gears["delta"].rate, q[0]), gears["delta"].rate))
+        gears["delta"] = replace(
+            gears["delta"], rate=where(q[0] > 0.0, minimum(gears["delta"].rate, q[0]), gears["delta"].rate)
+        )
 
 
 EFFECT = RudderRateLimit()

@@ -1,4 +1,5 @@
-"""The rudder loses lift beyond an angle of attack: the lost share is reached 0.35 rad (20 deg) above `angle`, on a smooth step."""
+"""The rudder loses lift beyond an angle of attack: the lost share is reached 0.35 rad (20 deg) above `angle`, on a
+smooth step."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from .base import Effect, Parameter
 from .traits import Traits
 
 _ORDINARY_ANGLE, _LEAST_BEYOND = 0.3, 0.7
-"""Angle [rad] from which rudders ordinarily stall, and the least size of a stall that begins there (docs/calibration.md#sizes-that-matter)."""
+"""Angle [rad] from which rudders ordinarily stall, and the least size of a stall that begins there
+(docs/calibration.md#sizes-that-matter)."""
 
 
 class RudderStall(Effect):

@@ -1,4 +1,5 @@
-"""The shaft gains revolutions no faster than a limit (load-up programme): rate = min(rate of the shaft, limit); zero means no limit."""
+"""The shaft gains revolutions no faster than a limit (load-up programme): rate = min(rate of the shaft, limit); zero
+means no limit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Finite water depth: hull derivatives, added masses and resistance grow with T/h (`physics.shallow_water`); zero is deep water."""
+"""Finite water depth: hull derivatives, added masses and resistance grow with T/h (`physics.shallow_water`); zero is
+deep water."""
 
 from __future__ import annotations
 
@@ -18,7 +19,10 @@ class ShallowWater(Effect):
     family = "environment"
     summary = "finite water depth"
     phrase = "shallow water, where the draught is {draught_to_depth}"
-    source = "Taimuri et al. (2020), Ocean Eng. 218, 108103: formulas of Kijima, Ankudinov and others; docs/theory.md#environment"
+    source = (
+        "Taimuri et al. (2020), Ocean Eng. 218, 108103: formulas of Kijima, Ankudinov and others; "
+        "docs/theory.md#environment"
+    )
     traits = Traits(between_ships=True)
     parameters = (Parameter("draught_to_depth", "1", 0.6, 0.0, 0.85, title="draught", share_of="depth"),)
     known_with = ("depth",)

@@ -1,4 +1,5 @@
-"""The recorded speeds, surge and sway, are too large by a constant share: u and v times 1 + scale; or, of a log with one axis, u alone."""
+"""The recorded speeds, surge and sway, are too large by a constant share: u and v times 1 + scale; or, of a log with
+one axis, u alone."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The bow thruster stands elsewhere than the ship file says: its lever + shift, forward positive. It acts within three quarters of the
-length from midship, whatever the hull makes of its jet."""
+"""The bow thruster stands elsewhere than the ship file says: its lever + shift, forward positive. It acts within three
+quarters of the length from midship, whatever the hull makes of its jet."""
 
 from __future__ import annotations
 

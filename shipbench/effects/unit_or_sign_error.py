@@ -1,7 +1,8 @@
 """One recorded channel is in another unit or has the other sign: recorded = (1 + change) times true, for every sample.
 
-The amplitude is the factor less one, so that zero means nothing, as everywhere; it is reported as the factor. `channel` is an index of
-`signals.STATES`, or its name where values are given by name. Two channels in a wrong unit (u and v in knots) are two such effects.
+The amplitude is the factor less one, so that zero means nothing, as everywhere; it is reported as the factor. `channel`
+is an index of `signals.STATES`, or its name where values are given by name. Two channels in a wrong unit (u and v in
+knots) are two such effects.
 """
 
 from __future__ import annotations
@@ -38,8 +39,13 @@ class UnitOrSignError(Effect):
     phrase = "a channel with another unit or sign"
     source = "docs/theory.md#sensors"
     traits = Traits(search="units", describes_data=True)
-    parameters = (Parameter("factor", "1", -2.0, -4000.0, 4000.0), Parameter("channel", "1", float(STATES.index("r")), 0.0, 9.0, shape=True))
-    separate = "none needed: heading against yaw rate, track against speeds, rudder against turning show it in any record"
+    parameters = (
+        Parameter("factor", "1", -2.0, -4000.0, 4000.0),
+        Parameter("channel", "1", float(STATES.index("r")), 0.0, 9.0, shape=True),
+    )
+    separate = (
+        "none needed: heading against yaw rate, track against speeds, rudder against turning show it in any record"
+    )
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
         this = np.arange(len(STATES)) == np.asarray(q[1], dtype=float)[..., None]
@@ -62,12 +68,17 @@ class UnitOrSignError(Effect):
             if key not in ("factor", "channel"):
                 raise unknown_parameter(f"effect '{self.name}'", key, ("factor", "channel"))
         if "factor" not in values or "channel" not in values:
-            raise InputError(f"effect '{self.name}': got {', '.join(values) or 'nothing'}; both factor and channel are needed.")
+            raise InputError(
+                f"effect '{self.name}': got {', '.join(values) or 'nothing'}; both factor and channel are needed."
+            )
         channel = values["channel"]
         if channel in STATES:
             channel = STATES.index(str(channel))
         if channel not in range(len(STATES)):
-            raise InputError(f"effect '{self.name}': channel = {channel}; accepted: 0 to {len(STATES) - 1}, or one of {', '.join(STATES)}.")
+            raise InputError(
+                f"effect '{self.name}': channel = {channel}; accepted: 0 to {len(STATES) - 1}, or one of "
+                f"{', '.join(STATES)}."
+            )
         return float(values["factor"]) - 1.0, float(channel)
 
     def describe(self, q: Sequence[float]) -> str:

@@ -1,4 +1,5 @@
-"""The recorded surge and sway velocities are old (a slow filter acts alike): u and v at t - delay, in the ship's axes or in the earth's."""
+"""The recorded surge and sway velocities are old (a slow filter acts alike): u and v at t - delay, in the ship's axes
+or in the earth's."""
 
 from __future__ import annotations
 
@@ -20,11 +21,15 @@ class VelocityDelay(Effect):
     phrase = "velocities that are {delay} late"
     source = "docs/theory.md#sensors"
     traits = Traits(faults_of=frozenset({"u", "v"}))
-    parameters = (Parameter("delay", "s", 2.0, -10.0, 10.0, scaling="time"), Parameter("earth_axes", "1", 0.0, 0.0, 1.0, shape=True))
+    parameters = (
+        Parameter("delay", "s", 2.0, -10.0, 10.0, scaling="time"),
+        Parameter("earth_axes", "1", 0.0, 0.0, 1.0, shape=True),
+    )
     separate = "changes of speed and quick turns"
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
-        """Late as a vector in the ship's axes (a speed log), or in the earth's (from positions), then turned by the heading of the moment."""
+        """Late as a vector in the ship's axes (a speed log), or in the earth's (from positions), then turned by the
+        heading of the moment."""
         body = delayed(S, (U, V), q[0], dt)
         if not np.any(q[1]):
             return body

@@ -1,6 +1,7 @@
 """The wake at the propeller falls while the ship drifts and turns: w = w_P0 - c (1 - w_P0)(1 - exp(-2|beta_P|)).
 
-beta_P = atan2(-(v + x_P r), u); 0.1 m/s (at 130 m) is added to u, and u held at or above zero, so that it stays smooth at rest."""
+beta_P = atan2(-(v + x_P r), u); 0.1 m/s (at 130 m) is added to u, and u held at or above zero, so that it stays smooth
+at rest."""
 
 from __future__ import annotations
 

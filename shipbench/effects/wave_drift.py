@@ -1,7 +1,7 @@
 """Mean drift force of waves: along their direction, nearly independent of the ship's speed.
 
-The components, north and east, are the amplitude squared times the direction of travel; in body axes (a_u, a_v), of size a:
-X = 0.3 rho g/2 B a_u, Y = rho g/2 L a_v |a_v|/a, N = -0.1 L Y a_u/a, which turns the ship beam on."""
+The components, north and east, are the amplitude squared times the direction of travel; in body axes (a_u, a_v), of
+size a: X = 0.3 rho g/2 B a_u, Y = rho g/2 L a_v |a_v|/a, N = -0.1 L Y a_u/a, which turns the ship beam on."""
 
 from __future__ import annotations
 
@@ -20,17 +20,24 @@ class WaveDrift(Effect):
     family = "environment"
     summary = "mean drift force of waves"
     phrase = "a wave drift force towards {to}"
-    source = "Faltinsen et al. (1980), 13th Symp. Naval Hydrodynamics: limit of short waves, simplified as in docs/theory.md#environment"
+    source = (
+        "Faltinsen et al. (1980), 13th Symp. Naval Hydrodynamics: limit of short waves, simplified as in "
+        "docs/theory.md#environment"
+    )
     traits = Traits(group="wind and waves")
-    parameters = (Parameter("north", "m^2", 0.12, -8.0, 8.0, scaling="area"), Parameter("east", "m^2", 0.12, -8.0, 8.0, scaling="area"))
+    parameters = (
+        Parameter("north", "m^2", 0.12, -8.0, 8.0, scaling="area"),
+        Parameter("east", "m^2", 0.12, -8.0, 8.0, scaling="area"),
+    )
     breaks_symmetry = True
     vector = ("amplitude_squared", "to")
     separate = "an anemometer or a wave buoy: wind and waves from one side push alike"
     ahead, moment = 0.3, -0.1
 
     def fitted(self, L: float) -> tuple[Self, ...]:
-        """With the force ahead of short waves, and five times that, as waves of the ship's length push her (added resistance in head waves: 3 to 10
-        rho g B^2/L times the amplitude squared, Faltinsen et al. 1980); and with the moment either way, as bow or stern are the fuller."""
+        """With the force ahead of short waves, and five times that, as waves of the ship's length push her (added
+        resistance in head waves: 3 to 10 rho g B^2/L times the amplitude squared, Faltinsen et al. 1980); and with the
+        moment either way, as bow or stern are the fuller."""
         found = []
         for ahead in (self.ahead, 5.0 * self.ahead):
             for moment in (self.moment, -self.moment):

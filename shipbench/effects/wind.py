@@ -18,20 +18,32 @@ class Wind(Effect):
     family = "environment"
     summary = "mean wind, the same in all runs"
     phrase = "a wind of {speed} from {from}"
-    source = "Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51: lowest harmonics in the fitted model; docs/theory.md#environment"
-    traits = Traits(group="wind and waves", imitates=("bank_suction",), relies_on=("wind_X", "wind_Y", "wind_N", "wind_lever"))
-    parameters = (Parameter("north", "m/s", 7.0, -60.0, 60.0, scaling="speed"), Parameter("east", "m/s", 7.0, -60.0, 60.0, scaling="speed"))
+    source = (
+        "Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51: lowest harmonics in the fitted model; "
+        "docs/theory.md#environment"
+    )
+    traits = Traits(
+        group="wind and waves", imitates=("bank_suction",), relies_on=("wind_X", "wind_Y", "wind_N", "wind_lever")
+    )
+    parameters = (
+        Parameter("north", "m/s", 7.0, -60.0, 60.0, scaling="speed"),
+        Parameter("east", "m/s", 7.0, -60.0, 60.0, scaling="speed"),
+    )
     breaks_symmetry = True
     vector = ("speed", "from")
     known_with = ("wind_speed", "wind_from")
-    separate = "the same manoeuvre at two speeds and on reciprocal courses: wind forces do not grow with the ship's speed"
+    separate = (
+        "the same manoeuvre at two speeds and on reciprocal courses: wind forces do not grow with the ship's speed"
+    )
     stretch: tuple[float, float] | None = None
     moment: float = 1.0
 
     def fitted(self, L: float) -> tuple[Self, ...]:
-        """Components a = W (W + W_0)/(W_t + W_0) of a wind W, W_t the typical one, W_0 a ship's ordinary speed: its forces grow with them, while the
-        square of a weak wind has no slope that a fit could follow. Once for each of three moments: that of an unknown superstructure may be a
-        fraction of the formula's or twice as large (the spread between types of ship: Blendermann 1994)."""
+        """Components a = W (W + W_0)/(W_t + W_0) of a wind W, W_t the typical one, W_0 a ship's ordinary speed: its
+        forces grow with them, while the
+        square of a weak wind has no slope that a fit could follow. Once for each of three moments: that of an unknown
+        superstructure may be a fraction of the formula's or twice as large (the spread between types of ship:
+        Blendermann 1994)."""
         found = []
         for moment in (0.3, 1.0, 2.0):
             effect = copy(self)
@@ -46,7 +58,9 @@ class Wind(Effect):
             return plain
         typical, speed = self.stretch
         factors = [(p.high + speed) / (typical + speed) for p in plain]
-        return tuple(replace(p, low=factor * p.low, high=factor * p.high) for p, factor in zip(plain, factors, strict=True))
+        return tuple(
+            replace(p, low=factor * p.low, high=factor * p.high) for p, factor in zip(plain, factors, strict=True)
+        )
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         air_u, air_v = body_axes(*self._wind(q), s.psi)

@@ -1,4 +1,5 @@
-"""The measured wind does not push this ship as the formula says: forces times 1 + X, 1 + Y, moment times 1 + N, side force `lever` further ahead."""
+"""The measured wind does not push this ship as the formula says: forces times 1 + X, 1 + Y, moment times 1 + N, side
+force `lever` further ahead."""
 
 from __future__ import annotations
 
@@ -25,7 +26,12 @@ class WindCoefficients(Effect):
     channels = ("wind_speed", "wind_from")
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        e.wind_X, e.wind_Y, e.wind_N, e.wind_lever = e.wind_X + q[0], e.wind_Y + q[1], e.wind_N + q[2], e.wind_lever + q[3]
+        e.wind_X, e.wind_Y, e.wind_N, e.wind_lever = (
+            e.wind_X + q[0],
+            e.wind_Y + q[1],
+            e.wind_N + q[2],
+            e.wind_lever + q[3],
+        )
 
 
 EFFECT = WindCoefficients()

@@ -10,7 +10,12 @@ class WindPerRun(Wind):
     summary = "mean wind, another one in each run"
     phrase = "a wind that differs from run to run"
     source = "Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51: as wind, one for each run"
-    traits = Traits(least_size=0.15, group="wind and waves", by_coefficients=True, relies_on=("wind_X", "wind_Y", "wind_N", "wind_lever"))
+    traits = Traits(
+        least_size=0.15,
+        group="wind and waves",
+        by_coefficients=True,
+        relies_on=("wind_X", "wind_Y", "wind_N", "wind_lever"),
+    )
     per_run = True
     separate = "an anemometer, or reciprocal courses within one run"
 

@@ -35,7 +35,8 @@ def joined(blocks: list[Block]) -> Block:
 
 
 def with_context(blocks: Iterable[Block], rows: int) -> Iterator[tuple[Block, int, int]]:
-    """(block, begin, end): every row stands once in [begin, end), with up to `rows` rows before and after it in the block."""
+    """(block, begin, end): every row stands once in [begin, end), with up to `rows` rows before and after it in the
+    block."""
     held: Block | None = None
     begin = 0
     for block in blocks:

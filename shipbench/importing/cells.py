@@ -24,8 +24,8 @@ _NUMBERS = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.t
 
 @dataclass
 class Counts:
-    """What was met while reading, for the summary: `what` was left out, `doubtful` was kept, `notes` says how files were read, `clock` what was found
-    of their clocks."""
+    """What was met while reading, for the summary: `what` was left out, `doubtful` was kept, `notes` says how files
+    were read, `clock` what was found of their clocks."""
 
     rows: int = 0
     what: Counter[str] = field(default_factory=Counter)
@@ -37,10 +37,20 @@ class Counts:
 
 
 class Cells:
-    """The cells of one batch of a log; `first_row` is the number of its first row in the file, `top` that of the first data row."""
+    """The cells of one batch of a log; `first_row` is the number of its first row in the file, `top` that of the first
+    data row."""
 
-    def __init__(self, path: Path, batch: pa.RecordBatch, source: Source, first_row: int, top: int, met: Counts) -> None:
-        self.path, self.batch, self.source, self.first_row, self.top, self.met = path, batch, source, first_row, top, met
+    def __init__(
+        self, path: Path, batch: pa.RecordBatch, source: Source, first_row: int, top: int, met: Counts
+    ) -> None:
+        self.path, self.batch, self.source, self.first_row, self.top, self.met = (
+            path,
+            batch,
+            source,
+            first_row,
+            top,
+            met,
+        )
 
     def numbers(self, column: str, missing: Sequence[str | float] | None = None) -> np.ndarray:
         """(n,) floats; NaN where the cell is empty or one of `missing` (default: the source's).

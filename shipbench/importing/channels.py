@@ -37,7 +37,8 @@ def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str |
 
 
 def read_named(path: Path, source: Source, met: Counts) -> Iterator[tuple[np.ndarray, Block]]:
-    """(names (n,) in the run column, if any, and block) of a log, as the file has them; rows without a time or a name are left out.
+    """(names (n,) in the run column, if any, and block) of a log, as the file has them; rows without a time or a name
+    are left out.
 
     Raises:
         InputError: a column is missing, or a cell is not a number or not a time.
@@ -81,14 +82,17 @@ def _without_footer(table: Table, columns: Sequence[str], source: Source) -> Ite
         after = next(batches, None)
         if after is None and source.time.names and (end := _footer(batch, source)) < len(batch):
             word = batch.column(source.time.names[0])[end].as_py()
-            table.notes.append(f"{table.path.name}: {len(batch) - end} rows at the end, left out: '{word[:40]}' stands for their time")
+            table.notes.append(
+                f"{table.path.name}: {len(batch) - end} rows at the end, left out: '{word[:40]}' stands for their time"
+            )
             batch = batch.slice(0, end)
         yield batch
         batch = after
 
 
 def _footer(batch: pa.RecordBatch, source: Source) -> int:
-    """The row where a footer begins, such as "Total" or "End of log": a word for the time, empty cells beside it, and no time after it."""
+    """The row where a footer begins, such as "Total" or "End of log": a word for the time, empty cells beside it, and
+    no time after it."""
     clock = batch.column(source.time.names[0])
     if not is_text(clock):
         return len(batch)

@@ -19,7 +19,8 @@ _WORDS = {"NORTH": "N", "SOUTH": "S", "EAST": "E", "WEST": "W"}
 _LETTERED = r"^(?P<before>[NSEWnsew]?)\s*(?P<number>[^NSEWnsew]*?)\s*(?P<after>[NSEWnsew]?)$"
 _SEXAGESIMAL = (
     r"^(?P<minus>[-\x{2212}]?)(?P<d>\d{1,3})\s*[\x{00b0}\x{00ba}]\s*(?P<m>\d{1,2}(?:[.,]\d*)?)"
-    r"(?:\s*['\x{2032}\x{2019}]?|(?:\s*['\x{2032}\x{2019}]\s*|\s+)(?P<s>\d{1,2}(?:[.,]\d*)?)\s*(?:[\"\x{2033}\x{201d}]|'')?)$"
+    r"(?:\s*['\x{2032}\x{2019}]?|(?:\s*['\x{2032}\x{2019}]\s*|\s+)"
+    r"(?P<s>\d{1,2}(?:[.,]\d*)?)\s*(?:[\"\x{2033}\x{201d}]|'')?)$"
 )
 
 
@@ -27,12 +28,16 @@ def coordinates(cells: Cells, name: str, channel: Channel, missing: Sequence[str
     """(n,) readings of a lat or lon, north and east positive, in the channel's unit; of `ddmm.mmmm` in degrees.
 
     Raises:
-        InputError: a cell is no number, its letters belong to the other axis or contradict its sign, or its minutes are above 60.
+        InputError: a cell is no number, its letters belong to the other axis or contradict its sign, or its minutes are
+        above 60.
     """
     (column,) = channel.columns
     if not cells.is_text(column):
         if channel.part is not None:
-            raise InputError(f"{cells.path}: column '{column}' holds one number a cell; part = {channel.part} serves cells with two. Remove part.")
+            raise InputError(
+                f"{cells.path}: column '{column}' holds one number a cell; part = {channel.part} serves cells with "
+                "two. Remove part."
+            )
         values, sides = cells.numbers(column, missing), None
     else:
         text = cells.texts(column, missing)
@@ -47,10 +52,15 @@ def coordinates(cells: Cells, name: str, channel: Channel, missing: Sequence[str
         raise cells.unread(column, int(np.argmax(bare)), hint, "without a letter")
     if channel.hemisphere is not None:
         if lettered.any():
-            raise InputError(f"{cells.path}: '{column}' has letters of the hemisphere in its cells; accepted: one of them. Remove hemisphere.")
+            raise InputError(
+                f"{cells.path}: '{column}' has letters of the hemisphere in its cells; accepted: one of them. "
+                "Remove hemisphere."
+            )
         sides = _sides_of(cells, channel.hemisphere)
         nameless = np.isfinite(values) & np.array([s is None for s in sides])
-        cells.met.what[f"readings of {name} without a letter in '{channel.hemisphere}', left out"] += int(nameless.sum())
+        cells.met.what[f"readings of {name} without a letter in '{channel.hemisphere}', left out"] += int(
+            nameless.sum()
+        )
         values = np.where(nameless, np.nan, values)
     if channel.unit in MINUTES:
         values = _degrees(cells, column, channel, values)
@@ -63,7 +73,9 @@ def check_hemispheres(table: Table, source: Source) -> None:
     Raises:
         InputError: there is such a column, with the line that reads it.
     """
-    found = {n: c for n in SIDES if (c := source.channels.get(n)) and c.kinds == ("column",) and not (c.hemisphere or c.sign)}
+    found = {
+        n: c for n in SIDES if (c := source.channels.get(n)) and c.kinds == ("column",) and not (c.hemisphere or c.sign)
+    }
     used = {n for c in source.channels.values() for n in c.every_column} | {*source.time.names, source.run}
     free = [n for n in table.columns if n and n not in used and table.columns.count(n) == 1]
     if table.form == "MATLAB" or not free or not found:  # vectors of several lengths may stand in one MATLAB file
@@ -72,15 +84,27 @@ def check_hemispheres(table: Table, source: Source) -> None:
     if batch is None:
         return
     for column, array in zip(free, batch.columns, strict=False):
-        words = {str(v).strip().upper() for v in pc.unique(array).to_pylist() if v not in (None, "")} if is_text(array) else set()
+        words = (
+            {str(v).strip().upper() for v in pc.unique(array).to_pylist() if v not in (None, "")}
+            if is_text(array)
+            else set()
+        )
         letters = {_WORDS.get(word, word) for word in words}
         for name, channel in found.items():
-            if letters <= set(SIDES[name]) and letters & {"S", "W"} and (count := _without_sign(batch.column(channel.columns[0]))):
-                entry = f'{name} = {{ column = "{channel.columns[0]}", unit = "{channel.unit}", hemisphere = "{column}" }}'
+            if (
+                letters <= set(SIDES[name])
+                and letters & {"S", "W"}
+                and (count := _without_sign(batch.column(channel.columns[0])))
+            ):
+                entry = (
+                    f'{name} = {{ column = "{channel.columns[0]}", unit = "{channel.unit}", hemisphere = "{column}" }}'
+                )
                 side = {"lat": "north", "lon": "east"}[name]
                 raise InputError(
-                    f"{table.path}: column '{column}' says {' or '.join(sorted(letters & {'S', 'W'}))}, and the mapping of '{name}' does not read "
-                    f'it ({count} positive readings). Write {entry}. If the column means something else, write sign = "{side}" instead.'
+                    f"{table.path}: column '{column}' says {' or '.join(sorted(letters & {'S', 'W'}))}, and the "
+                    f"mapping of '{name}' does not read "
+                    f"it ({count} positive readings). Write {entry}. If the column means something else, write sign "
+                    f'= "{side}" instead.'
                 )
 
 
@@ -92,7 +116,9 @@ def _without_sign(array: pa.Array) -> int:
 
 def _part(cells: Cells, column: str, text: pa.Array, part: int) -> pa.Array:
     """The first or second of the two numbers in each cell."""
-    text = pc.utf8_trim(pc.replace_substring_regex(text, r"(?i)^\s*POINT\b", ""), "()[]{} ")  # as in WKT, where the longitude is first
+    text = pc.utf8_trim(
+        pc.replace_substring_regex(text, r"(?i)^\s*POINT\b", ""), "()[]{} "
+    )  # as in WKT, where the longitude is first
     gap = r"\s*[;/]\s*|\s+" if cells.source.file.decimal == "," else r"\s*[,;/]\s*|\s+"
     before = pc.replace_substring_regex(text, r"([NSEWnsew])\s+", r"\1")
     after = pc.replace_substring_regex(text, r"\s+([NSEWnsew])\b", r"\1")
@@ -100,7 +126,12 @@ def _part(cells: Cells, column: str, text: pa.Array, part: int) -> pa.Array:
     halves = pc.split_pattern_regex(text, gap)
     odd = pc.fill_null(pc.not_equal(pc.list_value_length(halves), 2), False).to_numpy(zero_copy_only=False)
     if odd.any():
-        raise cells.unread(column, int(np.argmax(odd)), f" With part = {part}, cells with two numbers are accepted, such as 52.0, 4.0.", "not a pair")
+        raise cells.unread(
+            column,
+            int(np.argmax(odd)),
+            f" With part = {part}, cells with two numbers are accepted, such as 52.0, 4.0.",
+            "not a pair",
+        )
     return pc.list_element(halves, part - 1)
 
 
@@ -113,7 +144,9 @@ def _letters(text: pa.Array) -> tuple[pa.Array, np.ndarray | None]:
     if not pc.any(there).as_py():
         return text, None
     number = pc.replace_substring_regex(number, r"^(\d{1,3})[\s-]+(\d)", "\\1\u00b0 \\2")  # 33 47.63 S
-    return pc.if_else(there, number, text), pc.if_else(there, pc.utf8_upper(letter), None).to_numpy(zero_copy_only=False)
+    return pc.if_else(there, number, text), pc.if_else(there, pc.utf8_upper(letter), None).to_numpy(
+        zero_copy_only=False
+    )
 
 
 def _numbers(cells: Cells, column: str, text: pa.Array, channel: Channel, missing: Sequence[str | float]) -> np.ndarray:
@@ -132,7 +165,9 @@ def _numbers(cells: Cells, column: str, text: pa.Array, channel: Channel, missin
     plain = cells.finite(cells.parsed(column, pc.if_else(marked, None, text)), missing)
     minus = pc.fill_null(pc.not_equal(pc.struct_field(found, 0), ""), False).to_numpy(zero_copy_only=False)
     degrees, minutes, seconds = (
-        pc.fill_null(pc.replace_substring(pc.if_else(pc.equal(part, ""), "0", part), ",", ".").cast(pa.float64()), 0.0).to_numpy()
+        pc.fill_null(
+            pc.replace_substring(pc.if_else(pc.equal(part, ""), "0", part), ",", ".").cast(pa.float64()), 0.0
+        ).to_numpy()
         for part in (pc.struct_field(found, k) for k in (1, 2, 3))
     )
     high = (minutes > 60.0) | (seconds > 60.0)  # 59.9999 is rounded to 60
@@ -174,7 +209,9 @@ def _signed(cells: Cells, name: str, channel: Channel, values: np.ndarray, sides
             f"accepted for {name}: {' and '.join(accepted)}. Correct the column, or name another."
         )
     if channel.sign is not None and there.any():
-        raise InputError(f"{cells.path}: '{column}' has letters of the hemisphere, and sign = '{channel.sign}' is set. Remove sign.")
+        raise InputError(
+            f"{cells.path}: '{column}' has letters of the hemisphere, and sign = '{channel.sign}' is set. Remove sign."
+        )
     signs = np.array([accepted.get(s, 1.0) for s in sides])
     against = there & (values < 0.0) & (signs > 0.0)
     if against.any():

@@ -1,4 +1,5 @@
-"""Logs as text: CSV and its kin, in any encoding, streamed; rows that do not fit the header are refused, but for a cut last line or a footer."""
+"""Logs as text: CSV and its kin, in any encoding, streamed; rows that do not fit the header are refused, but for a cut
+last line or a footer."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ _NO_TEXT = ("idna", "punycode", "undefined", "unicode_escape", "raw_unicode_esca
 """Codecs of Python that make text of text, not of a file's bytes."""
 _WIDE = ("utf-16", "utf-32")
 _MARKS = (
-    (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )  # fmt: skip
 _MOST_ODD = 1000
@@ -32,7 +34,8 @@ def open_text(path: Path, layout: Layout) -> Table:
     """The columns of the header, or their numbers where [file] header = 0.
 
     Raises:
-        InputError: no text, or no header where it should stand; while it is streamed: rows with more or fewer fields than the header.
+        InputError: no text, or no header where it should stand; while it is streamed: rows with more or fewer fields
+        than the header.
     """
     with uncompressed(path) as file:
         head = file.read(TEXT_BLOCK)
@@ -44,14 +47,19 @@ def open_text(path: Path, layout: Layout) -> Table:
     if delimiter == BLANKS:
         header = " ".join(header.split())
         if encoding not in ("utf-8", "utf-8-sig", "ascii") and codecs.lookup(encoding).name.startswith("utf-"):
-            raise InputError(f"{path} is {encoding} text with blanks between the columns; accepted with blanks: UTF-8 or Latin-1. Save it as UTF-8.")
+            raise InputError(
+                f"{path} is {encoding} text with blanks between the columns; accepted with blanks: UTF-8 or "
+                "Latin-1. Save it as UTF-8."
+            )
     columns = tuple(name.strip() for name in next(csv.reader([header], delimiter=delimiter)))
     if not layout.header:
         columns = tuple(str(k + 1) for k in range(len(columns)))
     elif first.rstrip().endswith(delimiter) and len(next(csv.reader([first], delimiter=delimiter))) == len(columns) + 1:
         columns += ("",)  # every row ends with a delimiter that the header lacks
     if any(ord(c) < 32 and c != "\t" for c in header):
-        raise InputError(f"{path}: its header (row {layout.header}) holds control characters: the file is binary. Accepted: {KINDS}.")
+        raise InputError(
+            f"{path}: its header (row {layout.header}) holds control characters: the file is binary. Accepted: {KINDS}."
+        )
     check_number(path, len(columns))
     first_row = layout.header + layout.skip + 1
     form = f"text, delimiter {delimiter!r}, {encoding}"
@@ -59,11 +67,14 @@ def open_text(path: Path, layout: Layout) -> Table:
     def stream(wanted: Sequence[str]) -> Iterator[pa.RecordBatch]:
         # All as text: numbers are read by cells.py, which can name the row and the cell that is none.
         read = pa.csv.ReadOptions(
-            use_threads=False, block_size=TEXT_BLOCK, skip_rows=first_row - 1, column_names=[str(i) for i in range(len(columns))],
+            use_threads=False, block_size=TEXT_BLOCK, skip_rows=first_row - 1,
+            column_names=[str(i) for i in range(len(columns))],
             encoding="utf-8" if encoding == "utf-8-sig" else encoding,
         )  # fmt: skip
         at = [str(columns.index(name)) for name in wanted]
-        convert = pa.csv.ConvertOptions(include_columns=at, column_types={i: pa.string() for i in at}, strings_can_be_null=False)
+        convert = pa.csv.ConvertOptions(
+            include_columns=at, column_types={i: pa.string() for i in at}, strings_can_be_null=False
+        )
         odd = _OddRows(path, first_row)
         parse = pa.csv.ParseOptions(delimiter=delimiter, invalid_row_handler=odd.met)
         with uncompressed(path) as raw:
@@ -83,7 +94,9 @@ def _explained(path: Path, error: pa.ArrowInvalid) -> Exception:
     if "Empty CSV" in str(error) or "Could not skip" in str(error):
         return InputError(f"{path} has a header and no rows. Give a log with one row per sample.")
     if "UTF8" in str(error):
-        return InputError(f'{path} is not UTF-8 after its beginning. Set [file] encoding in the mapping, such as encoding = "cp1252".')
+        return InputError(
+            f'{path} is not UTF-8 after its beginning. Set [file] encoding in the mapping, such as encoding = "cp1252".'
+        )
     return error
 
 
@@ -96,7 +109,8 @@ class _OddRows:
         self._blank_before: list[int] = []
 
     def met(self, row: pa.csv.InvalidRow) -> str:
-        """Take a row out, for now; one of delimiters alone is an empty line. Reading ends at too many: an exception would be lost in pyarrow."""
+        """Take a row out, for now; one of delimiters alone is an empty line. Reading ends at too many: an exception
+        would be lost in pyarrow."""
         if not row.text.strip(" \t,;|"):
             self.blank += 1
             return "skip"
@@ -132,17 +146,27 @@ class _OddRows:
         """
         for k, row in enumerate(self.rows):
             cut = k == len(self.rows) - 1
-            if row.actual_columns > row.expected_columns or not (cut or not _BEGINS_DATA.match(row.text)) or not self.good:
+            if (
+                row.actual_columns > row.expected_columns
+                or not (cut or not _BEGINS_DATA.match(row.text))
+                or not self.good
+            ):
                 raise self._refused(row)
         return [
-            f"{self.path.name}, row {row.number}, left out: {row.actual_columns} of {row.expected_columns} fields at the end of the file: "
+            f"{self.path.name}, row {row.number}, left out: {row.actual_columns} of {row.expected_columns} fields "
+            "at the end of the file: "
             f"'{row.text[:40]}'" for row in self.rows
         ]  # fmt: skip
 
     def _refused(self, row: pa.csv.InvalidRow) -> InputError:
-        grouped = ' A number with a thousands separator needs quotes: "1,090".' if row.actual_columns > row.expected_columns else ""
+        grouped = (
+            ' A number with a thousands separator needs quotes: "1,090".'
+            if row.actual_columns > row.expected_columns
+            else ""
+        )
         return InputError(
-            f"{self.path}, row {row.number} has {row.actual_columns} fields; accepted: {row.expected_columns}, as the header has columns. "
+            f"{self.path}, row {row.number} has {row.actual_columns} fields; accepted: {row.expected_columns}, as "
+            "the header has columns. "
             f"It reads '{row.text[:80]}'.{grouped} Correct or remove the row."
         )
 
@@ -166,7 +190,9 @@ def find_encoding(path: Path, head: bytes, layout: Layout) -> tuple[str, list[st
         return layout.encoding, []
     given_by = option("--encoding NAME with --propose", "propose_mapping(..., encoding=NAME)")
     name = "cp1252" if _decodes(head, "cp1252") else "latin-1"
-    return name, [f"{path.name} is not UTF-8; read as Latin-1 ({name}). To choose another: {given_by}, or [file] encoding"]
+    return name, [
+        f"{path.name} is not UTF-8; read as Latin-1 ({name}). To choose another: {given_by}, or [file] encoding"
+    ]
 
 
 def check_encoding(name: str) -> str:
@@ -181,7 +207,10 @@ def check_encoding(name: str) -> str:
     except (LookupError, ValueError):
         text = False
     if not text or found.name.replace("-", "_") in _NO_TEXT:
-        raise InputError(f"[file] encoding = '{name}' is no text encoding; accepted: Python's names of encodings, such as 'utf-8' or 'latin-1'.")
+        raise InputError(
+            f"[file] encoding = '{name}' is no text encoding; accepted: Python's names of encodings, such as "
+            "'utf-8' or 'latin-1'."
+        )
     return found.name
 
 
@@ -194,7 +223,8 @@ def _decodes(head: bytes, encoding: str) -> bool:
 
 
 def _first_lines(path: Path, head: bytes, encoding: str, layout: Layout) -> tuple[str, str]:
-    """The header and the first row of data (empty where there is none); of a table without a header, the first row twice."""
+    """The header and the first row of data (empty where there is none); of a table without a header, the first row
+    twice."""
     number = layout.header or layout.skip + 1
     text = codecs.getincrementaldecoder(encoding)
     try:
@@ -202,15 +232,22 @@ def _first_lines(path: Path, head: bytes, encoding: str, layout: Layout) -> tupl
     except UnicodeError as error:
         place = f" (byte {error.start})" if isinstance(error, UnicodeDecodeError) else ""
         raise InputError(
-            f"{path} is not {encoding} text{place}; if it is text, set [file] encoding = 'latin-1' (or what it is) in the mapping, "
+            f"{path} is not {encoding} text{place}; if it is text, set [file] encoding = 'latin-1' (or what it is) "
+            "in the mapping, "
             f"or {option('--encoding with --propose', 'propose_mapping(..., encoding=NAME)')}."
         ) from None
     lines = io.StringIO(decoded, newline=None)
     first = [line.rstrip("\n") for line, _ in zip(lines, range(layout.header + layout.skip + 1), strict=False)]
     if not layout.header and (len(first) < number or not first[number - 1].strip()):
-        raise InputError(f"{path}: row {number} is empty; accepted with [file] header = 0: the first row of data after `skip` rows. Correct `skip`.")
+        raise InputError(
+            f"{path}: row {number} is empty; accepted with [file] header = 0: the first row of data after `skip` "
+            "rows. Correct `skip`."
+        )
     if len(first) < number or not first[number - 1].strip():
-        raise InputError(f"{path}: row {number} holds no header ([file] header = {number}). Set the number of the row with the columns' names.")
+        raise InputError(
+            f"{path}: row {number} holds no header ([file] header = {number}). Set the number of the row with the "
+            "columns' names."
+        )
     if len(decoded) == len(first[0]) and len(head) >= TEXT_BLOCK:
         raise InputError(f"{path}: its first line is longer than {TEXT_BLOCK >> 20} MB. Accepted: {KINDS}.")
     return first[number - 1], first[layout.header + layout.skip] if len(first) > layout.header + layout.skip else ""

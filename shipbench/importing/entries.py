@@ -11,22 +11,37 @@ from ..data.units import sign_factor, unit_factor
 from ..errors import InputError, unknown_name
 from ..signals import COMMANDS, ENVIRONMENT, STATES, UNITS
 
-EXTRA_UNITS = {"lat": "rad", "lon": "rad", "sog": "m/s", "cog": "rad", "apparent_wind_speed": "m/s", "apparent_wind_from": "rad"}
-"""What a log may hold beside our signals: WGS84 position, speed and course over ground (course clockwise from north), and the wind felt on board,
-its direction where it comes from, clockwise from the bow."""
+EXTRA_UNITS = {
+    "lat": "rad",
+    "lon": "rad",
+    "sog": "m/s",
+    "cog": "rad",
+    "apparent_wind_speed": "m/s",
+    "apparent_wind_from": "rad",
+}
+"""What a log may hold beside our signals: WGS84 position, speed and course over ground (course clockwise from north),
+and the wind felt on board, its direction where it comes from, clockwise from the bow."""
 CHANNELS = (*STATES, *COMMANDS, *ENVIRONMENT, *EXTRA_UNITS)
 ANGLES = ("psi", "cog", "wind_from", "apparent_wind_from")
 """Angles that wrap around; lon is made a position before anything else."""
 EXPRESSIONS = ("column", "mean", "sum", "diff", "atan2", "quaternion")
-"""How a channel is made: from one column; as mean or sum of several; as the first less the second; as the angle of [y, x]; as the heading of the
-body-to-earth quaternion [x, y, z, w]."""
+"""How a channel is made: from one column; as mean or sum of several; as the first less the second; as the angle of [y,
+x]; as the heading of the body-to-earth quaternion [x, y, z, w]."""
 ARCS = ("atan2", "quaternion")
 MINUTES = ("ddmm.mmmm", "ddmm.mmmmN")
-"""Latitude and longitude as NMEA 0183 has them, degrees and minutes in one number; with the letter of the hemisphere in the cell."""
+"""Latitude and longitude as NMEA 0183 has them, degrees and minutes in one number; with the letter of the hemisphere in
+the cell."""
 _OF_FULL = {"%": 100.0, "pwm": 500.0}
 _SIGN_WORDS = {"lat": ("north", "south"), "lon": ("east", "west"), "cog": ("clockwise", "counterclockwise"),
                "apparent_wind_from": ("clockwise", "counterclockwise")}  # fmt: skip
-_UNITS_LIKE = {"lat": "psi", "lon": "psi", "sog": "u", "cog": "psi", "apparent_wind_speed": "u", "apparent_wind_from": "psi"}
+_UNITS_LIKE = {
+    "lat": "psi",
+    "lon": "psi",
+    "sog": "u",
+    "cog": "psi",
+    "apparent_wind_speed": "u",
+    "apparent_wind_from": "psi",
+}
 
 
 MOST = 1e12
@@ -42,10 +57,12 @@ class Part(BaseModel):
 class Channel(Part):
     """One column, or one expression of columns: ours = sign x unit x factor x (reading + offset).
 
-    `gap` [s] replaces the mapping's for this channel (inf: logged on change); `missing` lists readings that are none, beside the source's (an empty
+    `gap` [s] replaces the mapping's for this channel (inf: logged on change); `missing` lists readings that are none,
+    beside the source's (an empty
     list: every number is a reading, also those that stand for "not available" by convention).
     `unit = "%"` and `unit = "pwm"` need `full`, the value in `full_unit` at 100 % or at 2000 us.
-    `hemisphere` is the column with N or S, E or W; `part` is the place (1 or 2) in a cell that holds latitude and longitude.
+    `hemisphere` is the column with N or S, E or W; `part` is the place (1 or 2) in a cell that holds latitude and
+    longitude.
     """
 
     column: str | None = None
@@ -94,7 +111,8 @@ class Channel(Part):
 
     def __str__(self) -> str:
         names = ", ".join(f"'{name}'" for name in self.columns)
-        return f"{names if self.kinds == ('column',) else f'{self.kinds[0]}({names})'}{f', part {self.part}' if self.part else ''}"
+        read = names if self.kinds == ("column",) else f"{self.kinds[0]}({names})"
+        return f"{read}, part {self.part}" if self.part else read
 
 
 def unit_of(channel: str) -> str:
@@ -128,8 +146,13 @@ def channel_factor(name: str, channel: Channel) -> float:
 
 def _full_of(name: str) -> str:
     """An example of what 100 % means."""
-    value, unit = {"rad": (35.0, "deg"), "rpm": (120.0, "rpm"), "N": (100.0, "kN")}.get(unit_of(name), (1.0, unit_of(name)))
-    return f'the value at full deflection, such as full = {value}, full_unit = "{unit}" (of %, the same as factor = {value / 100:g}, unit = "{unit}")'
+    value, unit = {"rad": (35.0, "deg"), "rpm": (120.0, "rpm"), "N": (100.0, "kN")}.get(
+        unit_of(name), (1.0, unit_of(name))
+    )
+    return (
+        f'the value at full deflection, such as full = {value}, full_unit = "{unit}" (of %, the same as factor = '
+        f'{value / 100:g}, unit = "{unit}")'
+    )
 
 
 def check_channel(name: str, channel: Channel, path: str | Path) -> None:
@@ -141,7 +164,10 @@ def check_channel(name: str, channel: Channel, path: str | Path) -> None:
     if name not in CHANNELS:
         raise unknown_name(f"channel in [channels] of {path}:", name, CHANNELS)
     if len(channel.kinds) != 1:
-        raise InputError(f"{path}: channel '{name}' has {' and '.join(channel.kinds) or 'no column'}; accepted: one of {', '.join(EXPRESSIONS)}.")
+        raise InputError(
+            f"{path}: channel '{name}' has {' and '.join(channel.kinds) or 'no column'}; accepted: one of "
+            f"{', '.join(EXPRESSIONS)}."
+        )
     where = f"{path}: channel '{name}', column {channel}"
     if channel.kinds[0] in ARCS and channel.unit != "rad":
         raise InputError(f'{where}: unit = "{channel.unit}"; {channel.kinds[0]} makes radians. Remove unit.')
@@ -150,10 +176,16 @@ def check_channel(name: str, channel: Channel, path: str | Path) -> None:
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     if any(abs(size) < 1.0 / MOST for size in (channel.factor, channel.full) if size is not None):
-        raise InputError(f"{where}: factor or full is 0 or next to it; accepted: any other number (it multiplies the reading).")
+        raise InputError(
+            f"{where}: factor or full is 0 or next to it; accepted: any other number (it multiplies the reading)."
+        )
     if channel.unit not in _OF_FULL and (channel.full is not None or channel.full_unit is not None):
-        raise InputError(f'{where}: full belongs to unit = "%" or "pwm", not to "{channel.unit}". Remove full and full_unit.')
-    as_written = [k for k in ("hemisphere", "part") if getattr(channel, k) is not None] + [channel.unit] * (channel.unit in MINUTES)
+        raise InputError(
+            f'{where}: full belongs to unit = "%" or "pwm", not to "{channel.unit}". Remove full and full_unit.'
+        )
+    as_written = [k for k in ("hemisphere", "part") if getattr(channel, k) is not None] + [channel.unit] * (
+        channel.unit in MINUTES
+    )
     if as_written and (name not in ("lat", "lon") or channel.kinds != ("column",)):
         raise InputError(f"{where}: {as_written[0]} serves a lat or lon of one column. Remove it.")
     if as_written and channel.sign is not None and as_written[0] != "part":

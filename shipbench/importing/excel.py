@@ -26,13 +26,17 @@ def open_excel(path: Path, layout: Layout) -> Table:
     """The sheet named in the mapping, else the only one.
 
     Raises:
-        InputError: openpyxl is not installed, or the file is no workbook, holds more than 1 GB (100 MB of texts), or has several sheets and none
+        InputError: openpyxl is not installed, or the file is no workbook, holds more than 1 GB (100 MB of texts), or
+        has several sheets and none
             is named.
     """
     _check_book(path)
     header = next(itertools.islice(_rows(path, layout), (layout.header or layout.skip + 1) - 1, None), None)
     if header is None or all(cell is None for cell in header):
-        raise InputError(f"{path}: row {layout.header} holds no header ([file] header = {layout.header}). Set the number of the row with the names.")
+        raise InputError(
+            f"{path}: row {layout.header} holds no header ([file] header = {layout.header}). Set the number of the "
+            "row with the names."
+        )
     columns = tuple("" if cell is None else str(cell).strip() for cell in header)
     if not layout.header:
         columns = tuple(str(k + 1) for k in range(len(columns)))
@@ -45,7 +49,12 @@ def open_excel(path: Path, layout: Layout) -> Table:
         empty = True
         while block := list(itertools.islice(body, _ROWS)):
             empty = False
-            yield as_batch({name: [_cell(row[i]) if i < len(row) else None for row in block] for name, i in zip(wanted, places, strict=True)})
+            yield as_batch(
+                {
+                    name: [_cell(row[i]) if i < len(row) else None for row in block]
+                    for name, i in zip(wanted, places, strict=True)
+                }
+            )
         if empty:
             raise InputError(f"{path} has a header and no rows. Give a log with one row per sample.")
 
@@ -66,11 +75,16 @@ def _check_book(path: Path) -> None:
         raise InputError(f"{path} is no Excel workbook or is cut short. Save it anew as .xlsx, or as CSV.")
     with zipfile.ZipFile(path) as packed:
         parts = packed.infolist()
-    size, whole = sum(p.file_size for p in parts), sum(p.file_size for p in parts if not p.filename.startswith("xl/worksheets/"))
+    size, whole = (
+        sum(p.file_size for p in parts),
+        sum(p.file_size for p in parts if not p.filename.startswith("xl/worksheets/")),
+    )
     if size > _LARGEST or whole > _LARGEST_WHOLE or size > max(_DENSEST * path.stat().st_size, 10_000_000):
         raise InputError(
-            f"{path} has {path.stat().st_size / 1e6:.1f} MB and holds {size / 1e6:.0f} MB unpacked, {whole / 1e6:.0f} MB of them texts and styles; "
-            f"accepted: up to {_LARGEST / 1e6:.0f} MB, {_LARGEST_WHOLE / 1e6:.0f} MB of texts and styles, and {_DENSEST} times its size. "
+            f"{path} has {path.stat().st_size / 1e6:.1f} MB and holds {size / 1e6:.0f} MB unpacked, "
+            f"{whole / 1e6:.0f} MB of them texts and styles; "
+            f"accepted: up to {_LARGEST / 1e6:.0f} MB, {_LARGEST_WHOLE / 1e6:.0f} MB of texts and styles, and "
+            f"{_DENSEST} times its size. "
             "Save the sheet as CSV, which is streamed."
         )
 
@@ -83,13 +97,16 @@ def _rows(path: Path, layout: Layout) -> Iterator[tuple[Any, ...]]:
     try:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
     except (InvalidFileException, LookupError, SyntaxError, zipfile.BadZipFile, TypeError, AttributeError) as error:
-        raise ValueError(f"damaged workbook ({type(error).__name__}: {error})") from None  # tables.reading makes the message
+        raise ValueError(
+            f"damaged workbook ({type(error).__name__}: {error})"
+        ) from None  # tables.reading makes the message
     try:
         if not book.sheetnames:
             raise InputError(f"{path} has no sheet, or is damaged. Save it anew as .xlsx, or as CSV.")
         if layout.sheet is None and len(book.sheetnames) > 1:
             raise InputError(
-                f'{path} has the sheets {", ".join(book.sheetnames)}. Name one: [file] sheet = "..." in the mapping, or '
+                f'{path} has the sheets {", ".join(book.sheetnames)}. Name one: [file] sheet = "..." in the '
+                "mapping, or "
                 f"{option('--sheet with --propose', 'propose_mapping(..., sheet=NAME)')}."
             )
         if layout.sheet is not None and layout.sheet not in book.sheetnames:
@@ -102,7 +119,8 @@ def _rows(path: Path, layout: Layout) -> Iterator[tuple[Any, ...]]:
 
 
 def _cell(value: Any) -> Any:
-    """Dates and times as ISO text; a date without a time of day as a date alone, so that a time column can follow it."""
+    """Dates and times as ISO text; a date without a time of day as a date alone, so that a time column can follow
+    it."""
     if isinstance(value, datetime.datetime):
         whole_day = value.time() == datetime.time() and value.tzinfo is None
         return value.date().isoformat() if whole_day else value.isoformat(sep=" ")

@@ -1,4 +1,5 @@
-"""Positions that a faster log repeats between two fixes of the receiver: only the rows where the fix changes are taken."""
+"""Positions that a faster log repeats between two fixes of the receiver: only the rows where the fix changes are
+taken."""
 
 from __future__ import annotations
 
@@ -11,7 +12,8 @@ from .cells import Counts
 from .track import usual
 
 _LEAST = 8
-"""Changes of a position in a block that are needed to tell how long a fix is held; of fewer, the block before decides."""
+"""Changes of a position in a block that are needed to tell how long a fix is held; of fewer, the block before decides.
+"""
 _WITH_THE_FIX = ("psi", "u", "v", "r", "sog", "cog")
 """Channels that may come from the same receiver."""
 
@@ -29,10 +31,18 @@ class _Held:
 def fixes_only(blocks: Iterable[Block], channels: tuple[str, ...], met: Counts) -> Iterator[Block]:
     """The blocks with NaN in place of a position that was only repeated, and of what came with it from the receiver.
 
-    A position is repeated where it stands still for rows and then leaps by more than the resolution of its numbers; where it moves by single steps of
-    its resolution it is a slow or coarse one, which is left as it is. Positions that stand still for longer than twice the usual stay in the log.
+    A position is repeated where it stands still for rows and then leaps by more than the resolution of its numbers;
+    where it moves by single steps of its resolution it is a slow or coarse one, which is left as it is. Positions that
+    stand still for longer than twice the usual stay in the log.
     """
-    pair = next(([channels.index(a), channels.index(b)] for a, b in (("x", "y"), ("lat", "lon")) if a in channels and b in channels), None)
+    pair = next(
+        (
+            [channels.index(a), channels.index(b)]
+            for a, b in (("x", "y"), ("lat", "lon"))
+            if a in channels and b in channels
+        ),
+        None,
+    )
     if pair is None:
         yield from blocks
         return
@@ -56,7 +66,10 @@ def fixes_only(blocks: Iterable[Block], channels: tuple[str, ...], met: Counts) 
             told = True
             every = usual(np.diff(block.t[rows[changed[:, 0]]]))
             names = ", ".join(channels[c] for c in pair)
-            met.clock.append(f"{names} are held between fixes, which come every {every:.3g} s; only rows where the fix changes are taken")
+            met.clock.append(
+                f"{names} are held between fixes, which come every {every:.3g} s; only rows where the fix changes "
+                "are taken"
+            )
         if not state.apart:
             for column in _companions(block.values[rows], changed[:, 0], channels):
                 values[rows[stale[:, 0]], column] = np.nan
@@ -64,7 +77,8 @@ def fixes_only(blocks: Iterable[Block], channels: tuple[str, ...], met: Counts) 
 
 
 def _decide(p: np.ndarray, moved: np.ndarray, state: _Held) -> None:
-    """Set how many rows a fix is usually held at most, and whether the two coordinates are renewed in different rows."""
+    """Set how many rows a fix is usually held at most, and whether the two coordinates are renewed in different
+    rows."""
     starts = np.flatnonzero(moved.any(axis=1))
     if len(starts) < _LEAST:
         return
@@ -81,7 +95,8 @@ def _decide(p: np.ndarray, moved: np.ndarray, state: _Held) -> None:
 
 
 def _resolution(leaps: np.ndarray, p: np.ndarray) -> float:
-    """The step of the grid that the readings lie on, as far as their leaps show it; their rounding where they lie on none."""
+    """The step of the grid that the readings lie on, as far as their leaps show it; their rounding where they lie on
+    none."""
     rounding = 16.0 * np.finfo(float).eps * max(float(np.max(np.abs(p))), 1e-300)
     sizes = np.unique(np.r_[0.0, leaps])
     spaces = np.diff(sizes)
@@ -90,7 +105,8 @@ def _resolution(leaps: np.ndarray, p: np.ndarray) -> float:
 
 
 def _stale(changed: np.ndarray, state: _Held) -> np.ndarray:
-    """(n, 2) rows that repeat a fix: all since the last change, up to twice the usual time; then one in that time is kept."""
+    """(n, 2) rows that repeat a fix: all since the last change, up to twice the usual time; then one in that time is
+    kept."""
     ages = np.empty(changed.shape, int)
     for k in range(2):
         rows = np.arange(len(changed))

@@ -1,4 +1,5 @@
-"""`import_logs`: logs and a mapping in, a data set's folder and a summary out, with memory that does not grow with the logs."""
+"""`import_logs`: logs and a mapping in, a data set's folder and a summary out, with memory that does not grow with the
+logs."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ _FINEST = 100
 
 @dataclass
 class _Log:
-    """One recording: its name and a stream for each source; `goes_on` where it is the one before, after its clock was set back."""
+    """One recording: its name and a stream for each source; `goes_on` where it is the one before, after its clock was
+    set back."""
 
     name: str
     files: str
@@ -46,11 +48,13 @@ class _Log:
 
 
 def import_logs(
-    logs: Sequence[Path], mapping: Mapping, ship: Ship, out: Path, *, force: bool = False, tell: Callable[[str], None] = lambda line: None
+    logs: Sequence[Path], mapping: Mapping, ship: Ship, out: Path, *, force: bool = False,
+    tell: Callable[[str], None] = lambda line: None
 ) -> Summary:  # fmt: skip
     """Write `out/{trajectories.*, dataset.toml, ship.toml}` from logs.
 
-    With one source every file is a recording of its own. With several, the files of a source follow one another, and the sources are merged on time.
+    With one source every file is a recording of its own. With several, the files of a source follow one another, and
+    the sources are merged on time.
 
     Args:
         logs: files, in the order of time where a source has several.
@@ -69,9 +73,14 @@ def import_logs(
             raise InputError(f"cannot read {path}: no such file. Give the path of an existing log.")
     places = [path.resolve() for path in logs]
     if twice := [str(path) for k, path in enumerate(logs) if places[k] in places[:k]]:
-        raise InputError(f"{twice[0]} is given twice; a run that stands twice would be on both sides of a fold. Give each log once.")
+        raise InputError(
+            f"{twice[0]} is given twice; a run that stands twice would be on both sides of a fold. Give each log once."
+        )
     if inside := [str(p) for p in logs if out.resolve() in p.resolve().parents]:
-        raise InputError(f"{inside[0]} lies in the folder of the data set ({out}). Give another folder with {option('--out', 'out=FOLDER')}.")
+        raise InputError(
+            f"{inside[0]} lies in the folder of the data set ({out}). Give another folder with "
+            f"{option('--out', 'out=FOLDER')}."
+        )
     taken: Counter[str] = Counter()
     with FolderWriter(out, force) as writer:
         for log in _recordings(logs, mapping, met):
@@ -144,12 +153,17 @@ def _recordings(logs: Sequence[Path], mapping: Mapping, met: Counts) -> Iterator
             step(f"read {path.name}", number / len(logs), (number + 1) / len(logs))
             for name, blocks in read_recordings(path, source, met):
                 for place, part in enumerate(parts(_clean(blocks, source, mapping, str(path), met))):
-                    yield _Log(run_name(name if name is not None else _stem(path)), path.name, {source_name: part}, place > 0)
+                    yield _Log(
+                        run_name(name if name is not None else _stem(path)), path.name, {source_name: part}, place > 0
+                    )
         return
     kinds = {is_absolute(s.time) for s in mapping.sources.values()}
     if len(kinds) > 1:
         told = ", ".join(f"{n} '{s.time.format}'" for n, s in mapping.sources.items())
-        raise InputError(f"the sources' clocks cannot be merged: {told}. Accepted: time stamps in all of them, or counted seconds in all of them.")
+        raise InputError(
+            f"the sources' clocks cannot be merged: {told}. Accepted: time stamps in all of them, or counted "
+            "seconds in all of them."
+        )
     files = _share_out(logs, mapping.sources)
     feeds = {}
     for name, source in mapping.sources.items():
@@ -179,11 +193,16 @@ def _share_out(logs: Sequence[Path], sources: dict[str, Source]) -> dict[str, li
     for name, found in files.items():
         if not found:
             told = ", ".join(p.name for p in logs)
-            raise InputError(f"no log for the source '{name}' (files = \"{sources[name].files}\"). Given: {told}. Give it, or mend `files`.")
+            raise InputError(
+                f"no log for the source '{name}' (files = \"{sources[name].files}\"). Given: {told}. Give it, or "
+                "mend `files`."
+            )
     unused = [p for p in logs if not any(p in found for found in files.values())]
     if unused:
         told = ", ".join(f'{n} "{s.files}"' for n, s in sources.items())
-        raise InputError(f"{unused[0]} belongs to no source; their files: {told}. Leave it out, or mend `files` in the mapping.")
+        raise InputError(
+            f"{unused[0]} belongs to no source; their files: {told}. Leave it out, or mend `files` in the mapping."
+        )
     return files
 
 
@@ -249,7 +268,8 @@ def _check_step(mapping: Mapping, steps: dict[str, float]) -> None:
     finest = min(steps, key=lambda name: steps[name])
     if mapping.dt < steps[finest] / _FINEST:
         raise InputError(
-            f"dt = {mapping.dt:g} s is less than 1/{_FINEST} of the time between samples of '{finest}', the fastest channel ({steps[finest]:g} s). "
+            f"dt = {mapping.dt:g} s is less than 1/{_FINEST} of the time between samples of '{finest}', the fastest "
+            f"channel ({steps[finest]:g} s). "
             "Accepted: a dt that the log can show. Give a longer one."
         )
 

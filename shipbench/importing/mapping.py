@@ -1,4 +1,5 @@
-"""mapping.toml: which column of a log is which signal, in which unit, sign and clock; and how the log is cut into runs."""
+"""mapping.toml: which column of a log is which signal, in which unit, sign and clock; and how the log is cut into
+runs."""
 
 from __future__ import annotations
 
@@ -23,8 +24,9 @@ LATEST = 7.3e9
 class Clock(Part):
     """Where time stands. `rate` [Hz] alone serves a log without a time column; `shift` [s] is added to every time.
 
-    `repeated`: rows that share a stamp keep it ("first"), or are spread evenly until the next stamp. `backwards`: rows that go back in time are
-    refused, left out ("drop"), sorted, or begin a recording of their own ("split": the clock was set back).
+    `repeated`: rows that share a stamp keep it ("first"), or are spread evenly until the next stamp. `backwards`: rows
+    that go back in time are refused, left out ("drop"), sorted, or begin a recording of their own ("split": the clock
+    was set back).
     """
 
     column: str | None = None
@@ -43,9 +45,9 @@ class Clock(Part):
 
 
 class Layout(Part):
-    """How the file is written. `header` is the number of the header's row, 0 where there is none (columns are then called "1", "2", ...);
-    `skip` the rows between it and the data (such as a row of units); `delimiter = " "` stands for runs of blanks; `thousands` stands between groups
-    of three digits."""
+    """How the file is written. `header` is the number of the header's row, 0 where there is none (columns are then
+    called "1", "2", ...); `skip` the rows between it and the data (such as a row of units); `delimiter = " "` stands
+    for runs of blanks; `thousands` stands between groups of three digits."""
 
     delimiter: str | None = Field(None, min_length=1, max_length=1)
     decimal: Literal[".", ","] = "."
@@ -71,7 +73,8 @@ class Origin(Part):
 
 
 class Source(Part):
-    """One kind of file. `antenna` is the point that x, y, lat, lon, sog and cog belong to, `speed_sensor` the one of u and v (default: midship)."""
+    """One kind of file. `antenna` is the point that x, y, lat, lon, sog and cog belong to, `speed_sensor` the one of u
+    and v (default: midship)."""
 
     files: str = "*"
     time: Clock
@@ -84,8 +87,10 @@ class Source(Part):
 
 
 class Split(Part):
-    """How logs become runs; all in s and m/s. `gap`: longer pauses split; `window`: runs of that length; `shortest`: shorter ones are left out;
-    `longest`: longer ones are cut in parts of one group; `still_speed`: stretches slower than that for `still_time` are left out."""
+    """How logs become runs; all in s and m/s. `gap`: longer pauses split; `window`: runs of that length; `shortest`:
+    shorter ones are left out;
+    `longest`: longer ones are cut in parts of one group; `still_speed`: stretches slower than that for `still_time` are
+    left out."""
 
     gap: float = Field(3.0, gt=0)
     window: float | None = Field(None, gt=0, allow_inf_nan=False)
@@ -96,7 +101,8 @@ class Split(Part):
 
 
 class Mapping(Part):
-    """The whole of mapping.toml. A mapping of one kind of file has the keys of `Source` at the top; of several, tables [sources.NAME]."""
+    """The whole of mapping.toml. A mapping of one kind of file has the keys of `Source` at the top; of several, tables
+    [sources.NAME]."""
 
     name: str = Field(min_length=1)
     dt: float = Field(gt=0, allow_inf_nan=False)
@@ -126,7 +132,8 @@ def load_mapping(path: str | Path, **overrides: Any) -> Mapping:
         overrides: `name`, `dt`, and keys of [split], which replace those of the file where they are not None.
 
     Raises:
-        InputError: not TOML; a missing or unknown key (with the nearest accepted one), channel, unit or sign; channels that make no data set.
+        InputError: not TOML; a missing or unknown key (with the nearest accepted one), channel, unit or sign; channels
+        that make no data set.
     """
     data = read_toml(path)
     for key, value in overrides.items():
@@ -139,10 +146,14 @@ def load_mapping(path: str | Path, **overrides: Any) -> Mapping:
         mark = source.file.delimiter
         if mark is not None and (mark.isalnum() or not mark.isascii() or mark in '"\r\n\0.+-'):
             raise InputError(
-                f"{path}: [file] delimiter = {mark!r}; accepted: a mark between columns, such as ',', ';', '|', '\\t', or ' ' for blanks."
+                f"{path}: [file] delimiter = {mark!r}; accepted: a mark between columns, such as ',', ';', '|', "
+                "'\\t', or ' ' for blanks."
             )
         if source.file.thousands == source.file.decimal:
-            raise InputError(f"{path}: [file] decimal and thousands are both '{source.file.decimal}'; accepted: two marks. Correct one.")
+            raise InputError(
+                f"{path}: [file] decimal and thousands are both '{source.file.decimal}'; accepted: two marks. "
+                "Correct one."
+            )
         for name, channel in source.channels.items():
             check_channel(name, channel, path)
         _check_clock(source.time, path)
@@ -158,7 +169,9 @@ def validated(data: dict[str, Any], path: str | Path) -> Mapping:
     """
     single = "sources" not in data
     if single:
-        data = {k: v for k, v in data.items() if k not in SOURCE_KEYS} | {"sources": {"log": {k: data[k] for k in SOURCE_KEYS if k in data}}}
+        data = {k: v for k, v in data.items() if k not in SOURCE_KEYS} | {
+            "sources": {"log": {k: data[k] for k in SOURCE_KEYS if k in data}}
+        }
     try:
         return Mapping.model_validate(data)
     except ValidationError as error:
@@ -196,7 +209,8 @@ def _check_clock(clock: Clock, path: str | Path) -> None:
     given = [k for k in ("column", "columns", "rate") if getattr(clock, k) is not None]
     if len(given) != 1:
         raise InputError(
-            f'{path}: [time] has {" and ".join(given) or "no column"}; accepted: one of column = "...", columns = ["date", "time"], '
+            f'{path}: [time] has {" and ".join(given) or "no column"}; accepted: one of column = "...", columns = '
+            '["date", "time"], '
             "or rate = 10.0 [Hz] for a log without a time column."
         )
     if clock.zone is not None:
@@ -205,7 +219,9 @@ def _check_clock(clock: Clock, path: str | Path) -> None:
         try:
             ZoneInfo(clock.zone)
         except (KeyError, ValueError, OSError):
-            raise InputError(f"{path}: [time] zone = '{clock.zone}'; accepted: names such as 'UTC' or 'Europe/Amsterdam'.") from None
+            raise InputError(
+                f"{path}: [time] zone = '{clock.zone}'; accepted: names such as 'UTC' or 'Europe/Amsterdam'."
+            ) from None
 
 
 def _check_together(mapping: Mapping, path: str | Path) -> None:
@@ -214,21 +230,43 @@ def _check_together(mapping: Mapping, path: str | Path) -> None:
     if twice:
         raise InputError(f"{path}: channel '{twice[0]}' stands in more than one source; accepted: one.")
     if "psi" not in names:
-        raise InputError(f"{path}: no channel 'psi'; the heading is needed (a course over ground is no heading). Mapped: {', '.join(names)}.")
+        raise InputError(
+            f"{path}: no channel 'psi'; the heading is needed (a course over ground is no heading). Mapped: "
+            f"{', '.join(names)}."
+        )
     if not {"x", "y"} <= set(names) and not {"lat", "lon"} <= set(names):
         raise InputError(f"{path}: no position; map both x and y [m], or both lat and lon. Mapped: {', '.join(names)}.")
     if {"x", "y"} & set(names) and {"lat", "lon"} & set(names):
-        raise InputError(f"{path}: a position as x, y and as lat, lon; accepted: one of them. Mapped: {', '.join(names)}.")
-    for a, b in (("sog", "cog"), ("wind_speed", "wind_from"), ("apparent_wind_speed", "apparent_wind_from"), ("lat", "lon"), ("x", "y")):
+        raise InputError(
+            f"{path}: a position as x, y and as lat, lon; accepted: one of them. Mapped: {', '.join(names)}."
+        )
+    for a, b in (
+        ("sog", "cog"),
+        ("wind_speed", "wind_from"),
+        ("apparent_wind_speed", "apparent_wind_from"),
+        ("lat", "lon"),
+        ("x", "y"),
+    ):
         if (a in names) != (b in names):
             here, gone = (a, b) if a in names else (b, a)
             raise InputError(f"{path}: '{here}' is mapped without '{gone}'; accepted: both or neither.")
         at = [s for s, source in mapping.sources.items() if {a, b} & set(source.channels)]
         if len(at) > 1:
-            raise InputError(f"{path}: '{a}' and '{b}' stand in the sources {' and '.join(at)}; accepted: both in one, on one clock.")
+            raise InputError(
+                f"{path}: '{a}' and '{b}' stand in the sources {' and '.join(at)}; accepted: both in one, on one clock."
+            )
     if len(mapping.sources) > 1 and any(s.run for s in mapping.sources.values()):
-        raise InputError(f"{path}: `run` serves a mapping with one source. Split several merged sources by gaps, windows or standing still.")
+        raise InputError(
+            f"{path}: `run` serves a mapping with one source. Split several merged sources by gaps, windows or "
+            "standing still."
+        )
     if mapping.split.window is not None and mapping.split.window < mapping.dt:
-        raise InputError(f"{path}: split.window = {mapping.split.window:g} s is below dt = {mapping.dt:g} s; accepted: two samples or more.")
+        raise InputError(
+            f"{path}: split.window = {mapping.split.window:g} s is below dt = {mapping.dt:g} s; accepted: two "
+            "samples or more."
+        )
     if mapping.split.gap < mapping.dt * 0.5:
-        raise InputError(f"{path}: split.gap = {mapping.split.gap:g} s is below dt = {mapping.dt:g} s; give the longest pause to be bridged.")
+        raise InputError(
+            f"{path}: split.gap = {mapping.split.gap:g} s is below dt = {mapping.dt:g} s; give the longest pause to "
+            "be bridged."
+        )

@@ -1,4 +1,5 @@
-"""MATLAB files: up to version 7 through scipy: vectors, columns of matrices and fields of structs under names such as `log.gps.lat` or `data(3)`."""
+"""MATLAB files: up to version 7 through scipy: vectors, columns of matrices and fields of structs under names such as
+`log.gps.lat` or `data(3)`."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ _OBJECTS = "\0objects"
 
 
 def open_matlab(path: Path) -> Table:
-    """Read a .mat file whole (the format cannot be streamed), which is why its size is limited; version 7.3 is another format, which is streamed.
+    """Read a .mat file whole (the format cannot be streamed), which is why its size is limited; version 7.3 is another
+    format, which is streamed.
 
     Raises:
         InputError: too large, damaged, or without numeric vectors.
@@ -45,9 +47,13 @@ def open_matlab(path: Path) -> Table:
             warnings.simplefilter("ignore")  # two objects go by one name in scipy; mat-io reads them
             content = loadmat(path, squeeze_me=True, struct_as_record=False)
     except NotImplementedError:
-        raise InputError(f"{path} is of a MATLAB version that is not read. In MATLAB: save('log.mat', ..., '-v7').") from None
+        raise InputError(
+            f"{path} is of a MATLAB version that is not read. In MATLAB: save('log.mat', ..., '-v7')."
+        ) from None
     except Exception as error:  # scipy raises whatever a damaged file leads it to
-        raise ValueError(f"damaged MATLAB file ({type(error).__name__}: {error})") from None  # tables.reading makes the message
+        raise ValueError(
+            f"damaged MATLAB file ({type(error).__name__}: {error})"
+        ) from None  # tables.reading makes the message
     vectors: dict[str, Any] = {}
     for name, value in content.items():
         if not name.startswith("__"):
@@ -60,7 +66,10 @@ def open_matlab(path: Path) -> Table:
         notes += [] if found else [not_read(path, objects)]
         vectors |= {name: value for name, value in found.items() if name not in vectors}
     if not vectors:
-        raise InputError(f"{path} holds no vectors of two or more numbers. Accepted: vectors, matrices with a sample per row, and structs of them.")
+        raise InputError(
+            f"{path} holds no vectors of two or more numbers. Accepted: vectors, matrices with a sample per row, "
+            "and structs of them."
+        )
     if len(vectors) > MOST_COLUMNS:
         raise InputError(f"{path} holds {len(vectors)} vectors; accepted: up to {MOST_COLUMNS}.")
 
@@ -68,7 +77,10 @@ def open_matlab(path: Path) -> Table:
         lengths = {name: len(vectors[name]) for name in wanted}
         if len(set(lengths.values())) > 1:
             told = ", ".join(f"{name} {n}" for name, n in lengths.items())
-            raise InputError(f"{path}: vectors of one source differ in length: {told}. Give each rate a [sources.NAME] with its own time column.")
+            raise InputError(
+                f"{path}: vectors of one source differ in length: {told}. Give each rate a [sources.NAME] with its "
+                "own time column."
+            )
         for begin in range(0, max(lengths.values()), _ROWS):
             yield as_batch({name: _numbers(vectors[name][begin : begin + _ROWS]) for name in wanted})
 
@@ -96,6 +108,11 @@ def _collect(name: str, value: Any, vectors: dict[str, Any], depth: int) -> None
             vectors[name] = value
         elif value.dtype.kind in "US" or all(isinstance(v, str) for v in value):  # text, such as time stamps
             vectors[name] = [str(v) for v in value]
-    elif isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "fiub" and value.shape[1] <= MOST_COLUMNS:
+    elif (
+        isinstance(value, np.ndarray)
+        and value.ndim == 2
+        and value.dtype.kind in "fiub"
+        and value.shape[1] <= MOST_COLUMNS
+    ):
         for j in range(value.shape[1]):
             vectors[f"{name}({j + 1})"] = value[:, j]

@@ -1,4 +1,5 @@
-"""MATLAB 7.3 files, which are HDF5, through h5py: streamed, so that they may be larger than memory; needs the extra `shipbench[matlab]`."""
+"""MATLAB 7.3 files, which are HDF5, through h5py: streamed, so that they may be larger than memory; needs the extra
+`shipbench[matlab]`."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ _MOST_LETTERS = 100
 
 @dataclass(frozen=True)
 class _Vector:
-    """Where a column stands: the path of its data set, and the index of all axes but that of the samples (None where the samples are)."""
+    """Where a column stands: the path of its data set, and the index of all axes but that of the samples (None where
+    the samples are)."""
 
     path: str
     at: tuple[int | None, ...]
@@ -36,10 +38,12 @@ class _Vector:
 
 
 def open_matlab73(path: Path) -> Table:
-    """The vectors, columns of matrices, struct fields and tables of the file under their MATLAB names. Cells are passed over.
+    """The vectors, columns of matrices, struct fields and tables of the file under their MATLAB names. Cells are passed
+    over.
 
     Raises:
-        InputError: h5py is not installed, or the file is damaged, declares more than it holds, or has no numeric vectors.
+        InputError: h5py is not installed, or the file is damaged, declares more than it holds, or has no numeric
+        vectors.
     """
     vectors: dict[str, _Vector] = {}
     objects: list[str] = []
@@ -50,7 +54,8 @@ def open_matlab73(path: Path) -> Table:
     notes: list[str] = []
     if objects:
         if size > _LARGEST:
-            raise InputError(f"{path} holds objects such as a table, and {size / 1e6:.0f} MB; accepted with objects: {_LARGEST / 1e6:.0f} MB. "
+            raise InputError(f"{path} holds objects such as a table, and {size / 1e6:.0f} MB; accepted with "
+                             f"objects: {_LARGEST / 1e6:.0f} MB. "
                              f"{how_to_save(objects)}.")  # fmt: skip
         whole = object_vectors(path, sorted({name.split(".")[0] for name in objects}))
         if not whole and not vectors:
@@ -58,7 +63,8 @@ def open_matlab73(path: Path) -> Table:
         notes += [] if whole else [not_read(path, objects)]
     if not vectors and not whole:
         raise InputError(
-            f"{path} holds no vectors of two or more numbers. Accepted: vectors, matrices with a sample per row, and structs of them; "
+            f"{path} holds no vectors of two or more numbers. Accepted: vectors, matrices with a sample per row, "
+            "and structs of them; "
             "a table or timetable: save it with writetable, or its variables one by one."
         )
 
@@ -66,11 +72,16 @@ def open_matlab73(path: Path) -> Table:
         lengths = {name: vectors[name].length if name in vectors else len(whole[name]) for name in wanted}
         if len(set(lengths.values())) > 1:
             told = ", ".join(f"{name} {n}" for name, n in lengths.items())
-            raise InputError(f"{path}: vectors of one source differ in length: {told}. Give each rate a [sources.NAME] with its own time column.")
+            raise InputError(
+                f"{path}: vectors of one source differ in length: {told}. Give each rate a [sources.NAME] with its "
+                "own time column."
+            )
         for begin in range(0, max(lengths.values()), _ROWS):
             with _opened(path) as file:  # opened for each block: nothing stays open where the reader stops
                 block = {
-                    name: _read(file[vectors[name].path], vectors[name], begin) if name in vectors else whole[name][begin : begin + _ROWS]
+                    name: _read(file[vectors[name].path], vectors[name], begin)
+                    if name in vectors
+                    else whole[name][begin : begin + _ROWS]
                     for name in wanted
                 }
             yield as_batch(block)
@@ -98,24 +109,32 @@ def _check_stored(name: str, item: Any) -> None:
     if item.size is None or "MATLAB_empty" in item.attrs:
         return
     if item.chunks:
-        pieces, stored = math.prod(math.ceil(n / c) for n, c in zip(item.shape, item.chunks, strict=True)), item.id.get_num_chunks()
+        pieces, stored = (
+            math.prod(math.ceil(n / c) for n, c in zip(item.shape, item.chunks, strict=True)),
+            item.id.get_num_chunks(),
+        )
     else:
         pieces, stored = item.size * item.dtype.itemsize, item.id.get_storage_size()
     if stored < pieces:
         raise InputError(
-            f"{item.file.filename}: '{name}' declares {item.size} values and holds {stored / pieces:.0%} of them: the file is damaged. Save it anew."
+            f"{item.file.filename}: '{name}' declares {item.size} values and holds {stored / pieces:.0%} of them: "
+            "the file is damaged. Save it anew."
         )
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    with needed_by(f"{path} is a MATLAB 7.3 file (HDF5). Reading it", "In MATLAB use save('log.mat', ..., '-v7') or writetable"):
+    with needed_by(
+        f"{path} is a MATLAB 7.3 file (HDF5). Reading it", "In MATLAB use save('log.mat', ..., '-v7') or writetable"
+    ):
         import h5py
     try:
         with h5py.File(path, "r") as file:
             yield file
     except (OSError, RuntimeError, KeyError, TypeError, AttributeError) as error:
-        raise ValueError(f"damaged MATLAB 7.3 file ({type(error).__name__}: {error})") from None  # tables.reading makes the message
+        raise ValueError(
+            f"damaged MATLAB 7.3 file ({type(error).__name__}: {error})"
+        ) from None  # tables.reading makes the message
 
 
 def _collect(name: str, group: Any, vectors: dict[str, _Vector], objects: list[str], seen: set[int]) -> None:
@@ -133,13 +152,21 @@ def _collect(name: str, group: Any, vectors: dict[str, _Vector], objects: list[s
         if isinstance(item, h5py.Group):
             if h5py.h5o.get_info(item.id).addr not in seen and full.count(".") < _DEEPEST:
                 _collect(full, item, vectors, objects, seen)
-        elif isinstance(item, h5py.Dataset) and not item.is_virtual and item.external is None and "MATLAB_empty" not in item.attrs:
+        elif (
+            isinstance(item, h5py.Dataset)
+            and not item.is_virtual
+            and item.external is None
+            and "MATLAB_empty" not in item.attrs
+        ):
             if "MATLAB_object_decode" in item.attrs:
                 objects.append(full)
             else:
                 _add(full, item, vectors)
         if len(vectors) > MOST_COLUMNS:
-            raise InputError(f"{group.file.filename} holds more than {MOST_COLUMNS} vectors; accepted: up to that. Save those that you need.")
+            raise InputError(
+                f"{group.file.filename} holds more than {MOST_COLUMNS} vectors; accepted: up to that. Save those "
+                "that you need."
+            )
 
 
 def _add(name: str, item: Any, vectors: dict[str, _Vector]) -> None:
@@ -147,10 +174,15 @@ def _add(name: str, item: Any, vectors: dict[str, _Vector]) -> None:
     if item.dtype.kind not in "fiub" or item.ndim not in (1, 2) or item.size < 2:
         return
     if item.chunks and np.prod(item.chunks, dtype=float) * item.dtype.itemsize > _LARGEST_CHUNK:
-        raise InputError(f"{item.file.filename}: '{name}' is packed in pieces above {_LARGEST_CHUNK / 1e6:.0f} MB; accepted: smaller ones.")
+        raise InputError(
+            f"{item.file.filename}: '{name}' is packed in pieces above {_LARGEST_CHUNK / 1e6:.0f} MB; accepted: "
+            "smaller ones."
+        )
     _check_stored(name, item)
     if item.attrs.get("MATLAB_class", b"") == b"char":
-        if item.ndim == 2 and item.shape[0] <= _MOST_LETTERS and item.shape[1] > 1:  # a row of letters for each sample, such as time stamps
+        if (
+            item.ndim == 2 and item.shape[0] <= _MOST_LETTERS and item.shape[1] > 1
+        ):  # a row of letters for each sample, such as time stamps
             vectors[name] = _Vector(item.name, (None,), item.shape[1], text=True)
     elif item.ndim == 1:
         vectors[name] = _Vector(item.name, (None,), item.shape[0])

@@ -1,4 +1,5 @@
-"""Tables, timetables, datetimes and strings of MATLAB through mat-io, which reads its objects; needs the extra `shipbench[matlab]`."""
+"""Tables, timetables, datetimes and strings of MATLAB through mat-io, which reads its objects; needs the extra
+`shipbench[matlab]`."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ _DEEPEST = 8
 
 
 def object_vectors(path: Path, names: Sequence[str] | None = None) -> dict[str, Any]:
-    """Columns of the objects in a .mat file under names such as `T.heading`; of timetables the row times, too. They are read whole.
+    """Columns of the objects in a .mat file under names such as `T.heading`; of timetables the row times, too. They are
+    read whole.
 
     Args:
         path: a .mat file of any version, of a size that was checked.

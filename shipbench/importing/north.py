@@ -1,6 +1,8 @@
-"""Headings that somebody interpolated linearly across 360/0 (or 180/-180): between 359 and 1 stand numbers such as 240 and 120.
+"""Headings that somebody interpolated linearly across 360/0 (or 180/-180): between 359 and 1 stand numbers such as 240
+and 120.
 
-The numbers lie between those of two neighbours, but the heading between these goes the other way round, by a few degrees only.
+The numbers lie between those of two neighbours, but the heading between these goes the other way round, by a few
+degrees only.
 """
 
 from __future__ import annotations
@@ -8,17 +10,20 @@ from __future__ import annotations
 import numpy as np
 
 LEAP = 10.0
-"""Times the steps beside it, and the usual step, that a step of such a heading has at least: no ship turns so, then not, within a sample."""
+"""Times the steps beside it, and the usual step, that a step of such a heading has at least: no ship turns so, then
+not, within a sample."""
 _EQUAL = 0.1
 """Share by which steps of a straight line between two readings may differ: that of a rounded record."""
 _Series = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
 def interpolated(psi: np.ndarray, turn: float = 2.0 * np.pi) -> list[tuple[int, int]]:
-    """First and last samples of the stretches of psi (samples,) that were interpolated across the end of the scale; turn: a whole turn.
+    """First and last samples of the stretches of psi (samples,) that were interpolated across the end of the scale;
+    turn: a whole turn.
 
-    Such a stretch is a straight line: its steps are equal, but for the first and the last, where samples lie between the readings. It makes nearly a
-    whole turn and begins and ends at once. A ship that turns a circle goes on as she did, on either side of it.
+    Such a stretch is a straight line: its steps are equal, but for the first and the last, where samples lie between
+    the readings. It makes nearly a whole turn and begins and ends at once. A ship that turns a circle goes on as she
+    did, on either side of it.
     """
     if len(psi) < 4:
         return []
@@ -38,7 +43,11 @@ def interpolated(psi: np.ndarray, turn: float = 2.0 * np.pi) -> list[tuple[int, 
                 last = b + 1 if b < len(rises) and 0.0 < rises[b] < full else b
                 inner, whole = rises[first + 1 : last - 1], abs(float(number[last] - number[first]))
                 straight = last - first >= 2 and bool(np.all(np.abs(inner - full) < _EQUAL * full))
-                beside = [abs(s) for s in (*moved[max(first - 1, 0) : first], *moved[last : last + 1]) if way * s > 0.0 or abs(s) <= LEAP * usual]
+                beside = [
+                    abs(s)
+                    for s in (*moved[max(first - 1, 0) : first], *moved[last : last + 1])
+                    if way * s > 0.0 or abs(s) <= LEAP * usual
+                ]
                 if straight and abs(whole - turn) < whole / LEAP and full > LEAP * max([usual, *beside]):
                     found.add((int(first) + 1, int(last) - 1))
     return sorted(found)
@@ -53,7 +62,8 @@ def fill_angle(values: np.ndarray, bad: np.ndarray, turn: float = 2.0 * np.pi) -
 
 
 def without_interpolated(series: _Series) -> tuple[_Series, int]:
-    """The channels of a log (times and readings each) without headings that were interpolated so, and the number of these."""
+    """The channels of a log (times and readings each) without headings that were interpolated so, and the number of
+    these."""
     t, psi = series["psi"]
     keep = np.ones(len(psi), dtype=bool)
     for a, b in interpolated(psi):

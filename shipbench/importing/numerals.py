@@ -1,4 +1,5 @@
-"""Numbers as logs write them: decimal comma, thousands, minus signs of typesetters, Fortran's exponent. What can be read in two ways is refused."""
+"""Numbers as logs write them: decimal comma, thousands, minus signs of typesetters, Fortran's exponent. What can be
+read in two ways is refused."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ class UnreadError(Exception):
 
 @dataclass(frozen=True)
 class Survey:
-    """Which decimal marks a block of cells has beyond doubt: 4,13 is a decimal comma; 1,090 may be a thousand and ninety."""
+    """Which decimal marks a block of cells has beyond doubt: 4,13 is a decimal comma; 1,090 may be a thousand and
+    ninety."""
 
     points: bool
     commas: bool
@@ -103,7 +105,9 @@ def _check_whole(text: pa.Array, layout: Layout) -> None:
     whole, grouped = _has(text, r"^[-+]?[1-9]\d\d$"), _grouped(text, ".")
     if _any(whole) and pc.all(pc.or_(grouped, pc.invert(pointed))).as_py() and not _any(_has(text, r"\d{4}")):
         raise UnreadError(
-            _first(grouped), ' It may be a thousand or a fraction. Set [file] thousands = "." in the mapping, or decimal = "." if it is a fraction.'
+            _first(grouped),
+            ' It may be a thousand or a fraction. Set [file] thousands = "." in the mapping, or decimal = "." if it '
+            "is a fraction.",
         )
 
 
@@ -112,7 +116,9 @@ def _ungrouped(number: pa.Array, layout: Layout) -> pa.Array:
     grouped = rf"^[-+]?\d{{1,3}}({_MARKS[mark]}\d{{3}})+({_MARKS[layout.decimal]}\d*)?$"
     odd = pc.and_not(_has(number, _MARKS[mark]), _has(number, grouped))
     if _any(odd):
-        raise UnreadError(_first(odd), f' With [file] thousands = "{mark}", groups of three digits are accepted, such as 1{mark}090.')
+        raise UnreadError(
+            _first(odd), f' With [file] thousands = "{mark}", groups of three digits are accepted, such as 1{mark}090.'
+        )
     return pc.replace_substring_regex(number, _MARKS[mark], "")
 
 
@@ -120,9 +126,14 @@ def _check_points(number: pa.Array, around: Survey) -> None:
     """Points where the decimal mark is a comma, and commas where only points can be decimal."""
     pointed, commas = _has(number, r"\d\.\d|^[-+]?\.\d"), _has(number, ",")
     if _any(pointed) and not _any(_decimal(number, ".")):
-        raise UnreadError(_first(pointed), ' [file] decimal is ",", so its point may stand for thousands. Set thousands = "." in [file] if it does.')
+        raise UnreadError(
+            _first(pointed),
+            ' [file] decimal is ",", so its point may stand for thousands. Set thousands = "." in [file] if it does.',
+        )
     if _any(commas) and _any(_decimal(number, ".")):
-        raise UnreadError(_first(commas), " Other cells of the column have decimal points. Write the log with one decimal mark.")
+        raise UnreadError(
+            _first(commas), " Other cells of the column have decimal points. Write the log with one decimal mark."
+        )
     if _any(commas) and around.points and not _any(_decimal(number, ",")):
         raise UnreadError(
             _first(commas),
@@ -158,7 +169,8 @@ def _reads(text: str) -> bool:
 
 
 def no_number(where: str, column: str, cell: str, hint: str, what: str) -> InputError:
-    """The error for a cell that is no number. Only a text without digits is offered as one that stands for a missing value."""
+    """The error for a cell that is no number. Only a text without digits is offered as one that stands for a missing
+    value."""
     accepted = "decimal numbers and empty cells"
     if not any(c.isdigit() for c in cell):
         accepted += f', and what [missing] lists: missing = ["{cell[:20]}"] takes it as missing'

@@ -22,11 +22,12 @@ _ROWS = 50_000
 
 
 def in_order(blocks: Iterable[Block], source: Source, where: str, met: Counts) -> Iterator[Block]:
-    """The blocks with times that go back only where `new` says that the clock was set back; rows that repeat a time stay where each brings other
-    channels.
+    """The blocks with times that go back only where `new` says that the clock was set back; rows that repeat a time
+    stay where each brings other channels.
 
     Raises:
-        InputError: time goes back and [time] backwards does not say what to do; so many rows repeat a time that the stamps are coarser than the
+        InputError: time goes back and [time] backwards does not say what to do; so many rows repeat a time that the
+        stamps are coarser than the
             samples; or there are too many rows to sort.
     """
     if is_daily(source.time):
@@ -37,7 +38,9 @@ def in_order(blocks: Iterable[Block], source: Source, where: str, met: Counts) -
         blocks = _spread(blocks)
     last, last_row, rows, repeats = -np.inf, None, 0, 0
     for block in _forwards(blocks, source, where, met):
-        before = np.vstack([np.full_like(block.values[:1], np.nan) if last_row is None else last_row, block.values[:-1]])
+        before = np.vstack(
+            [np.full_like(block.values[:1], np.nan) if last_row is None else last_row, block.values[:-1]]
+        )
         same = (np.diff(block.t, prepend=last) == 0.0) & ~block.new
         repeats += int((same & (np.isfinite(before) & np.isfinite(block.values)).any(axis=1)).sum())
         rows += len(block.t)
@@ -46,7 +49,8 @@ def in_order(blocks: Iterable[Block], source: Source, where: str, met: Counts) -
     met.what["readings at a time that was there before, left out"] += repeats
     if repeats > 0.2 * rows:
         raise InputError(
-            f"{where}: {repeats} of {rows} rows repeat the time of the row before: the stamps are coarser than the samples. "
+            f"{where}: {repeats} of {rows} rows repeat the time of the row before: the stamps are coarser than the "
+            "samples. "
             'Set [time] repeated = "spread" '
             "to spread such rows evenly until the next stamp, or use a finer time column."
         )
@@ -88,7 +92,8 @@ def _forwards(blocks: Iterable[Block], source: Source, where: str, met: Counts) 
             if block.new[at] or repeated[at - begin] or _begins_anew(block, at, state, source, where):
                 new[at - begin] = True
                 met.clock.append(
-                    f"the clock was set back: after {shown(source.time, state.high)} comes {shown(source.time, block.t[at])}; nothing is joined there"
+                    f"the clock was set back: after {shown(source.time, state.high)} comes "
+                    f"{shown(source.time, block.t[at])}; nothing is joined there"
                 )
                 state.high, state.rows, at = block.t[at], 1, at + 1
             else:
@@ -110,12 +115,14 @@ def _begins_anew(block: Block, k: int, state: _State, source: Source, where: str
         raise InputError(
             f"{where}: time goes back from {shown(source.time, state.high)} to {shown(source.time, block.t[k])}. "
             "Sort the log; or, if it holds several runs, name their column (`run = ...`). "
-            'Or set [time] backwards: "sort" where rows are out of order, "drop" to leave such rows out, "split" where the clock was set back.'
+            'Or set [time] backwards: "sort" where rows are out of order, "drop" to leave such rows out, "split" '
+            "where the clock was set back."
         )
     seen = _seen(block, k, max(k - state.rows, 0), state.high, source)
     if seen is not None:
         return seen
-    # Without a track: late rows are followed by a leap ahead to the present; a clock that was set back goes on at its pace.
+    # Without a track: late rows are followed by a leap ahead to the present; a clock that was set back goes on at its
+    # pace.
     ahead = np.flatnonzero(block.t[k:] >= state.high)
     if not len(ahead):
         return len(block.t) - k > 3
@@ -124,13 +131,15 @@ def _begins_anew(block: Block, k: int, state: _State, source: Source, where: str
 
 
 def _pace(block: Block, k: int, low: int) -> float:
-    """Usual time between the rows before row k, from `low` on, in the order of time; of the rows after it where there are none."""
+    """Usual time between the rows before row k, from `low` on, in the order of time; of the rows after it where there
+    are none."""
     before = usual(np.diff(np.sort(block.t[max(k - 50, low) : k])))
     return before if before > 0.0 else usual(np.diff(block.t[k : k + 50]))
 
 
 def _seen(block: Block, k: int, low: int, high: float, source: Source) -> bool | None:
-    """Whether the track shows that the clock was set back at row k, the latest time before it being `high`; None where it cannot tell."""
+    """Whether the track shows that the clock was set back at row k, the latest time before it being `high`; None where
+    it cannot tell."""
     near = _pace(block, k, low)
     depth = high - float(block.t[k])
     reach = int(min(max(4.0 * depth / near, 50.0), CONTEXT)) if near > 0.0 else 50
@@ -151,7 +160,9 @@ def _set_back_by_a_step(block: Block, begin: int, end: int, source: Source) -> n
     if source.time.repeated == "spread":
         return found
     steps = np.diff(block.t)
-    alone = [int(k) + 1 for k in np.flatnonzero(steps == 0.0) if np.count_nonzero(steps[max(k - 3, 0) : k + 4] <= 0.0) == 1]
+    alone = [
+        int(k) + 1 for k in np.flatnonzero(steps == 0.0) if np.count_nonzero(steps[max(k - 3, 0) : k + 4] <= 0.0) == 1
+    ]
     seen = [k for k in alone if _seen(block, k, 0, float(block.t[k]), source)]
     if len(seen) == 1 and begin <= seen[0] < end:
         found[seen[0] - begin] = True
@@ -170,7 +181,8 @@ def _sorted(blocks: Iterable[Block], source: Source, where: str, met: Counts) ->
         size += block.values.size + block.t.size
         if size > _MOST_SORTED:
             raise InputError(
-                f'{where}: more than {_MOST_SORTED:.0g} readings with [time] backwards = "sort", which sorts in memory; accepted: fewer. '
+                f'{where}: more than {_MOST_SORTED:.0g} readings with [time] backwards = "sort", which sorts in '
+                "memory; accepted: fewer. "
                 "Sort the file itself by its time column, or split it."
             )
     if not everything:
@@ -205,7 +217,8 @@ def _over_midnight(blocks: Iterable[Block]) -> Iterator[Block]:
 
 
 def _spread(blocks: Iterable[Block]) -> Iterator[Block]:
-    """Rows with one stamp, spread evenly until the next stamp; the last group, or one before a step back, is spread like the one before it."""
+    """Rows with one stamp, spread evenly until the next stamp; the last group, or one before a step back, is spread
+    like the one before it."""
     rest: Block | None = None
     step = 0.0
     for block in blocks:

@@ -1,4 +1,5 @@
-"""From what instruments give to what the contract asks for: a local plane, midship instead of the antenna, velocity in body axes, true wind."""
+"""From what instruments give to what the contract asks for: a local plane, midship instead of the antenna, velocity in
+body axes, true wind."""
 
 from __future__ import annotations
 
@@ -12,12 +13,15 @@ Angle = np.ndarray | float
 
 
 def to_plane(
-    lat: np.ndarray, lon: np.ndarray, origin: tuple[float, float], height: np.ndarray | float = 0.0, origin_height: float = 0.0
+    lat: np.ndarray, lon: np.ndarray, origin: tuple[float, float], height: np.ndarray | float = 0.0,
+    origin_height: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """North and east [m] in the plane that touches the WGS84 ellipsoid at `origin`.
 
-    Exact geographic/topocentric conversion, IOGP Guidance Note 7-2, section 4.1.2 (EPSG method 9837). Its two formulas serve the few kilometres of a
-    run as well as a projection library would: distances are off by less than d^3 / (6 R^2), 4 mm at 10 km and 0.5 m at 50 km.
+    Exact geographic/topocentric conversion, IOGP Guidance Note 7-2, section 4.1.2 (EPSG method 9837). Its two formulas
+    serve the few kilometres of a
+    run as well as a projection library would: distances are off by less than d^3 / (6 R^2), 4 mm at 10 km and 0.5 m at
+    50 km.
 
     Args:
         lat, lon: geodetic [rad].
@@ -25,7 +29,12 @@ def to_plane(
         height, origin_height: above the ellipsoid [m].
     """
     x, y, z = (
-        a - b for a, b in zip(_geocentric(lat, lon, height), _geocentric(np.float64(origin[0]), np.float64(origin[1]), origin_height), strict=True)
+        a - b
+        for a, b in zip(
+            _geocentric(lat, lon, height),
+            _geocentric(np.float64(origin[0]), np.float64(origin[1]), origin_height),
+            strict=True,
+        )
     )
     sin_lat, cos_lat, sin_lon, cos_lon = np.sin(origin[0]), np.cos(origin[0]), np.sin(origin[1]), np.cos(origin[1])
     north = -sin_lat * cos_lon * x - sin_lat * sin_lon * y + cos_lat * z
@@ -39,14 +48,19 @@ def _geocentric(lat: Angle, lon: Angle, height: Angle) -> tuple[Angle, Angle, An
     return across * np.cos(lon), across * np.sin(lon), ((1.0 - _E2) * normal + height) * np.sin(lat)
 
 
-def to_midship(x: np.ndarray, y: np.ndarray, psi: np.ndarray, lever: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+def to_midship(
+    x: np.ndarray, y: np.ndarray, psi: np.ndarray, lever: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
     """Position of midship from the position of a point on board at `lever` (forward, starboard) [m]."""
     forward, starboard = lever
     return x - forward * np.cos(psi) + starboard * np.sin(psi), y - forward * np.sin(psi) - starboard * np.cos(psi)
 
 
-def velocity_at_midship(u: np.ndarray, v: np.ndarray, r: np.ndarray, lever: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Surge and sway of midship from those of a point on board at `lever` (forward, starboard) [m]: u_P = u - r y_P, v_P = v + r x_P."""
+def velocity_at_midship(
+    u: np.ndarray, v: np.ndarray, r: np.ndarray, lever: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Surge and sway of midship from those of a point on board at `lever` (forward, starboard) [m]: u_P = u - r y_P,
+    v_P = v + r x_P."""
     forward, starboard = lever
     return u + r * starboard, v - r * forward
 

@@ -1,4 +1,5 @@
-"""Recordings of a log: its runs by name, also where their rows are interleaved, and its parts where the clock was set back."""
+"""Recordings of a log: its runs by name, also where their rows are interleaved, and its parts where the clock was set
+back."""
 
 from __future__ import annotations
 
@@ -24,8 +25,9 @@ _ROWS = 50_000
 def read_recordings(path: Path, source: Source, met: Counts) -> Iterator[tuple[str | None, Iterator[Block]]]:
     """(name in the run column or None, its rows) of each recording; read each to its end before the next.
 
-    Where the rows of a run stand in several places, as those of ships in a log of AIS messages do, they are gathered on disk: memory does not grow. A
-    place whose time begins anew, at or before the first time of that run, is a recording of its own.
+    Where the rows of a run stand in several places, as those of ships in a log of AIS messages do, they are gathered on
+    disk: memory does not grow. A place whose time begins anew, at or before the first time of that run, is a recording
+    of its own.
 
     Raises:
         InputError: as `read_blocks`.
@@ -44,7 +46,9 @@ def read_recordings(path: Path, source: Source, met: Counts) -> Iterator[tuple[s
                     t = block.t[rows[part]]
                     pile = latest.get(name)
                     if pile is None or (t[0] < pile.last and t[0] <= pile.first and not is_daily(source.time)):
-                        pile = latest[name] = _Pile(name, Path(folder) / str(len(piles)), done + int(rows[part][0]), float(t[0]))
+                        pile = latest[name] = _Pile(
+                            name, Path(folder) / str(len(piles)), done + int(rows[part][0]), float(t[0])
+                        )
                         piles.append(pile)
                     pile.add(block.rows(rows[part]))
             done += len(names)
@@ -127,7 +131,8 @@ def parts(blocks: Iterator[Block]) -> Iterator[Iterator[Block]]:
 
 
 def onward(blocks: Iterator[Block], met: Counts) -> Iterator[Block]:
-    """The rows of a source that is merged with others: those that a clock that was set back counts again are left out."""
+    """The rows of a source that is merged with others: those that a clock that was set back counts again are left
+    out."""
     high, until = -np.inf, None
     for block in blocks:
         before = np.maximum.accumulate(np.r_[high, block.t])

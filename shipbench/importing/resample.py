@@ -1,4 +1,5 @@
-"""Irregular samples to a uniform grid: low-pass and decimate what is faster, interpolate what is slower, keep the mean of what is held."""
+"""Irregular samples to a uniform grid: low-pass and decimate what is faster, interpolate what is slower, keep the mean
+of what is held."""
 
 from __future__ import annotations
 
@@ -16,9 +17,10 @@ def usual_step(t: np.ndarray) -> float:
 def sample(t: np.ndarray, v: np.ndarray, start: float, dt: float, count: int, antialias: bool = True) -> np.ndarray:
     """Values (count,) at start + k dt of a continuous signal that was sampled at times t (m,).
 
-    Where the samples come faster than dt, a zero-phase Bessel low-pass (order 4, forward and backward, -3 dB each way at 0.8 of the new Nyquist
-    frequency; `scipy.signal.bessel`, `sosfiltfilt`) keeps what the grid cannot show from folding into it. Bessel, because it does not overshoot: a
-    step of the rudder stays one. Slower samples are interpolated linearly.
+    Where the samples come faster than dt, a zero-phase Bessel low-pass (order 4, forward and backward, -3 dB each way
+    at 0.8 of the new Nyquist frequency; `scipy.signal.bessel`, `sosfiltfilt`) keeps what the grid cannot show from
+    folding into it. Bessel, because it does not overshoot: a step of the rudder stays one. Slower samples are
+    interpolated linearly.
     """
     grid = start + dt * np.arange(count)
     fine = int(np.ceil(dt / usual_step(t) - 0.05)) if len(t) > 1 else 1
@@ -40,7 +42,8 @@ def sample(t: np.ndarray, v: np.ndarray, start: float, dt: float, count: int, an
 
 
 def interval_means(t: np.ndarray, v: np.ndarray, start: float, dt: float, count: int) -> np.ndarray:
-    """Mean (count,) over [t_k, t_k+1) of a signal that holds each value until the next one: a command keeps its impulse.
+    """Mean (count,) over [t_k, t_k+1) of a signal that holds each value until the next one: a command keeps its
+    impulse.
 
     Of the last interval it is the mean up to the last sample and its usual step, where there are samples in it.
     """
@@ -57,7 +60,8 @@ def interval_means(t: np.ndarray, v: np.ndarray, start: float, dt: float, count:
 
 
 def interval_values(t: np.ndarray, v: np.ndarray, start: float, dt: float, count: int) -> np.ndarray:
-    """Value (count,) of a continuous input for [t_k, t_k+1): the mean of its samples there, or where they are slower, interpolated at the middle."""
+    """Value (count,) of a continuous input for [t_k, t_k+1): the mean of its samples there, or where they are slower,
+    interpolated at the middle."""
     if usual_step(t) < 0.95 * dt:
         return interval_means(t, v, start, dt, count)
     return np.interp(start + dt * (np.arange(count) + 0.5), t, v)

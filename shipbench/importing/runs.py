@@ -23,7 +23,8 @@ Series = dict[str, tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class Piece:
-    """Uniform samples: t (n,) [s], and each column (n,) under our names; `origin` lat, lon [deg] of the local plane, if any."""
+    """Uniform samples: t (n,) [s], and each column (n,) under our names; `origin` lat, lon [deg] of the local plane, if
+    any."""
 
     t: np.ndarray
     columns: dict[str, np.ndarray]
@@ -35,7 +36,8 @@ class Piece:
 
 
 def shortest_run(mapping: Mapping) -> float:
-    """Length [s] below which a piece is left out: as the mapping says (two samples at least), else a whole window, else 20 samples."""
+    """Length [s] below which a piece is left out: as the mapping says (two samples at least), else a whole window, else
+    20 samples."""
     split = mapping.split
     if split.shortest is not None:
         return max(split.shortest, mapping.dt)
@@ -45,8 +47,9 @@ def shortest_run(mapping: Mapping) -> float:
 def on_grid(stretch: Stretch, mapping: Mapping, ship: Ship) -> Piece:
     """States and inputs at start + k dt.
 
-    States are low-pass filtered and sampled, or interpolated; commands, wind and depth are means over [t_k, t_k+1), as a rollout holds them there.
-    Speeds that the log lacks come from course and speed over ground, or from the smoothed track; actuators that it lacks are left to the loader.
+    States are low-pass filtered and sampled, or interpolated; commands, wind and depth are means over [t_k, t_k+1), as
+    a rollout holds them there. Speeds that the log lacks come from course and speed over ground, or from the smoothed
+    track; actuators that it lacks are left to the loader.
     """
     series = {name: (t, np.unwrap(v) if name in ANGLES else v) for name, (t, v) in stretch.series.items()}
     count = math.floor((stretch.end - stretch.start) / mapping.dt + 1e-6) + 1
@@ -92,7 +95,11 @@ def _positions_at_midship(series: Series, mapping: Mapping) -> tuple[float, floa
     origin = None
     if "lat" in series:
         t, lat, lon = _together(series.pop("lat"), series.pop("lon"))
-        zero = (lat[0], lon[0]) if mapping.origin is None else (math.radians(mapping.origin.lat), math.radians(mapping.origin.lon))
+        zero = (
+            (lat[0], lon[0])
+            if mapping.origin is None
+            else (math.radians(mapping.origin.lat), math.radians(mapping.origin.lon))
+        )
         origin = (round(math.degrees(zero[0]), 8), round(math.degrees(zero[1]), 8))
         x, y = to_plane(lat, lon, zero)
     else:
@@ -104,8 +111,11 @@ def _positions_at_midship(series: Series, mapping: Mapping) -> tuple[float, floa
     return origin
 
 
-def _together(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Samples of two channels of one source at their common times; where they are renewed in different rows, at the times of both."""
+def _together(
+    a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Samples of two channels of one source at their common times; where they are renewed in different rows, at the
+    times of both."""
     t, i, j = np.intersect1d(a[0], b[0], assume_unique=True, return_indices=True)
     if len(t) >= 0.5 * min(len(a[0]), len(b[0])):
         return t, a[1][i], b[1][j]
@@ -115,7 +125,8 @@ def _together(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]
 
 
 def _velocity_at_midship(
-    series: Series, columns: dict[str, np.ndarray], mapping: Mapping, states: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    series: Series, columns: dict[str, np.ndarray], mapping: Mapping,
+    states: Callable[[np.ndarray, np.ndarray], np.ndarray]
 ) -> None:  # fmt: skip
     """u and v that the log gives, at midship: from its own columns, else from speed and course over ground."""
     measured = [name for name in "uv" if name in columns]
@@ -131,7 +142,9 @@ def _velocity_at_midship(
             columns.setdefault(name, value)
 
 
-def _environment(series: Series, columns: dict[str, np.ndarray], mapping: Mapping, stretch: Stretch, count: int) -> None:
+def _environment(
+    series: Series, columns: dict[str, np.ndarray], mapping: Mapping, stretch: Stretch, count: int
+) -> None:
     def inputs(t: np.ndarray, v: np.ndarray) -> np.ndarray:
         return interval_values(t, v, stretch.start, mapping.dt, count)
 
@@ -142,7 +155,9 @@ def _environment(series: Series, columns: dict[str, np.ndarray], mapping: Mappin
     elif "apparent_wind_speed" in series:
         t, speed, come_from = _together(series["apparent_wind_speed"], series["apparent_wind_from"])
         u, v = (np.interp(t, stretch.start + mapping.dt * np.arange(count), columns[name]) for name in "uv")
-        wind = tuple(inputs(t, component) for component in true_wind(_heading_at(series, t), u, v, speed, come_from, "apparent"))  # type: ignore[assignment]
+        wind = tuple(
+            inputs(t, component) for component in true_wind(_heading_at(series, t), u, v, speed, come_from, "apparent")
+        )  # type: ignore[assignment]
     if wind is not None:
         columns["wind_speed"] = np.hypot(*wind)
         columns["wind_from"] = np.unwrap(np.arctan2(wind[1], wind[0]))
@@ -151,7 +166,8 @@ def _environment(series: Series, columns: dict[str, np.ndarray], mapping: Mappin
 
 
 def without_standing(piece: Piece, mapping: Mapping) -> Iterator[Piece]:
-    """Parts of a piece in which the ship moves: speed below `still_speed` for `still_time` or longer is cut out (mean over a quarter of it)."""
+    """Parts of a piece in which the ship moves: speed below `still_speed` for `still_time` or longer is cut out (mean
+    over a quarter of it)."""
     limit, dt = mapping.split.still_speed, mapping.dt
     if limit is None:
         yield piece
@@ -184,8 +200,12 @@ def windows(piece: Piece, mapping: Mapping) -> Iterator[Piece]:
 
 
 def outliers(piece: Piece, ship: Ship) -> dict[str, int]:
-    """Samples at which the ship would be faster than sqrt(g L), a Froude number of 1: by its track, and by its u and v."""
+    """Samples at which the ship would be faster than sqrt(g L), a Froude number of 1: by its track, and by its u and
+    v."""
     greatest = math.sqrt(9.81 * ship.L)
     step = np.hypot(np.diff(piece.columns["x"]), np.diff(piece.columns["y"])) / np.diff(piece.t)
     speed = np.hypot(piece.columns["u"], piece.columns["v"])
-    return {f"{name} (faster than sqrt(g L) = {greatest:.3g} m/s)": int((v > greatest).sum()) for name, v in (("x, y", step), ("u, v", speed))}
+    return {
+        f"{name} (faster than sqrt(g L) = {greatest:.3g} m/s)": int((v > greatest).sum())
+        for name, v in (("x, y", step), ("u, v", speed))
+    }

@@ -1,4 +1,5 @@
-"""Readings that stand for "not available": AIS codes, fill values of recorders, the largest integer of a field. Judged for each channel by itself."""
+"""Readings that stand for "not available": AIS codes, fill values of recorders, the largest integer of a field. Judged
+for each channel by itself."""
 
 from __future__ import annotations
 
@@ -17,13 +18,16 @@ CODES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "u": ((102.3, _KNOT, f"102.3 kn ({_AIS})"),),
     "r": ((-128.0, _DEG / 60.0, f"-128 deg/min ({_AIS})"), (-731.386, _DEG / 60.0, f"-731 deg/min ({_AIS})")),
 }
-"""Value, its unit in ours, in words: position reports of the AIS (ITU-R M.1371-5, table 48; -731 deg/min is the decoded -128), receivers without a
-fix."""
+"""Value, its unit in ours, in words: position reports of the AIS (ITU-R M.1371-5, table 48; -731 deg/min is the decoded
+-128), receivers without a fix."""
 _LARGEST = {
-    "lat": 90.0 * _DEG, "lon": _TURN, **dict.fromkeys(ANGLES, _TURN), "u": 50.0, "v": 50.0, "sog": 50.0, "r": _TURN, "delta": 0.5 * np.pi,
-    "delta_c": 0.5 * np.pi, "n": 9000.0, "n_c": 9000.0, "wind_speed": 120.0, "apparent_wind_speed": 120.0, "depth": 11_000.0,
+    "lat": 90.0 * _DEG, "lon": _TURN, **dict.fromkeys(ANGLES, _TURN), "u": 50.0, "v": 50.0, "sog": 50.0, "r": _TURN,
+    "delta": 0.5 * np.pi,
+    "delta_c": 0.5 * np.pi, "n": 9000.0, "n_c": 9000.0, "wind_speed": 120.0, "apparent_wind_speed": 120.0,
+    "depth": 11_000.0,
 }  # fmt: skip
-"""What no ship, shaft, sea or storm reaches, in our units; a fill value beyond it is no reading, whatever the others are."""
+"""What no ship, shaft, sea or storm reaches, in our units; a fill value beyond it is no reading, whatever the others
+are."""
 _ORDERED = ("n", "delta", "F_b", "F_s", "n_c", "delta_c", "F_b_c", "F_s_c")
 """Channels that may step to any value at once; the others are continuous."""
 _NINES = np.array([999.0, 9999.0, 99_999.0, 999_999.0])
@@ -32,12 +36,17 @@ _SMALLEST = 99.0
 """Fill values below are too near to readings to be told from them."""
 _SCALED = np.unique((np.r_[_NINES, _WHOLE][:, None] / 10.0 ** np.arange(8)).ravel())
 _FILLS = _SCALED[_SCALED > _SMALLEST]
-_CONVERTED = np.unique((np.r_[_NINES, 0.01 * _WHOLE[:3]][:, None] * np.array([_DEG, _DEG / 60.0, _KNOT, 1.0 / 3.6, 0.3048, 60.0])).ravel())
+_CONVERTED = np.unique(
+    (np.r_[_NINES, 0.01 * _WHOLE[:3]][:, None] * np.array([_DEG, _DEG / 60.0, _KNOT, 1.0 / 3.6, 0.3048, 60.0])).ravel()
+)
 """Fill values that somebody converted to our unit from degrees, knots, km/h, feet or rev/s."""
 
 
-def not_available(name: str, readings: np.ndarray, factor: float, neutral: float = 0.0) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """(masks (n,) of readings that are none, by what they are; mask of readings that look like fill values, but may be readings).
+def not_available(
+    name: str, readings: np.ndarray, factor: float, neutral: float = 0.0
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """(masks (n,) of readings that are none, by what they are; mask of readings that look like fill values, but may be
+    readings).
 
     Args:
         name: the channel.
@@ -57,7 +66,9 @@ def not_available(name: str, readings: np.ndarray, factor: float, neutral: float
     if not hits.any():
         return {}, hits
     others = np.isfinite(values) & ~hits
-    counted_on = name in ANGLES and bool((np.abs(values[others]) > _TURN + _DEG).any())  # over north: readings beyond a turn are readings
+    counted_on = name in ANGLES and bool(
+        (np.abs(values[others]) > _TURN + _DEG).any()
+    )  # over north: readings beyond a turn are readings
     sure = hits & beyond & (not counted_on)
     doubtful = np.zeros(len(values), bool)
     if name in _ORDERED:
@@ -79,7 +90,8 @@ def _is_one_of(table: np.ndarray, values: np.ndarray, tolerance: float) -> np.nd
 
 
 def _far(values: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, bool]:
-    """(values farther from the others than these are from each other, or from zero where all are alike; whether all others are zero)."""
+    """(values farther from the others than these are from each other, or from zero where all are alike; whether all
+    others are zero)."""
     if not others.any():
         return np.zeros(len(values), bool), True
     low, high = values[others].min(), values[others].max()
@@ -88,8 +100,8 @@ def _far(values: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, bool]:
 
 
 def _unled(values: np.ndarray, hit: np.ndarray, suspect: np.ndarray, wraps: bool) -> np.ndarray:
-    """Hits that a continuous channel cannot have come to: the steps to the readings beside that are not suspect exceed every step between such
-    readings in the block."""
+    """Hits that a continuous channel cannot have come to: the steps to the readings beside that are not suspect exceed
+    every step between such readings in the block."""
     others = np.flatnonzero(np.isfinite(values) & ~suspect)
     if len(others) < 2 or not hit.any():
         return np.zeros(len(values), bool)
@@ -104,15 +116,20 @@ def _unled(values: np.ndarray, hit: np.ndarray, suspect: np.ndarray, wraps: bool
     rows = np.flatnonzero(hit)
     place = np.searchsorted(others, rows)
     before = np.where(place > 0, distance(values[rows], values[others[np.maximum(place - 1, 0)]]), np.inf)
-    after = np.where(place < len(others), distance(values[rows], values[others[np.minimum(place, len(others) - 1)]]), np.inf)
-    limit = np.maximum(largest, _DEG if wraps else 0.01 * np.abs(values[rows]))  # a flicker of the last digit is no step
+    after = np.where(
+        place < len(others), distance(values[rows], values[others[np.minimum(place, len(others) - 1)]]), np.inf
+    )
+    limit = np.maximum(
+        largest, _DEG if wraps else 0.01 * np.abs(values[rows])
+    )  # a flicker of the last digit is no step
     unled = np.zeros(len(values), bool)
     unled[rows] = np.minimum(before, after) > limit
     return unled
 
 
 def beyond_a_turn(values: np.ndarray) -> np.ndarray:
-    """Angles (n,) [rad] outside of -180 to 360 degrees that the ship did not turn to: they begin and end with a step of half a turn or more."""
+    """Angles (n,) [rad] outside of -180 to 360 degrees that the ship did not turn to: they begin and end with a step of
+    half a turn or more."""
     rows = np.flatnonzero(np.isfinite(values))
     found = np.zeros(len(values), bool)
     out = (values[rows] > _TURN + _DEG) | (values[rows] < -0.5 * _TURN - _DEG)

@@ -1,4 +1,5 @@
-"""Speeds from positions: the derivative of a smoothing spline whose stiffness is estimated from the data; never differences of samples."""
+"""Speeds from positions: the derivative of a smoothing spline whose stiffness is estimated from the data; never
+differences of samples."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ _FACTOR, _CANDIDATES = 1.5, 10
 
 @dataclass(frozen=True)
 class Smoothed:
-    """Derivatives on the grid (count, signals), the spline's time constant [s] and the scatter that it took out (r.m.s., unit of the signals)."""
+    """Derivatives on the grid (count, signals), the spline's time constant [s] and the scatter that it took out
+    (r.m.s., unit of the signals)."""
 
     rate: np.ndarray
     time_constant: float
@@ -25,17 +27,20 @@ class Smoothed:
 def derivative(t: np.ndarray, values: np.ndarray, grid: np.ndarray, dt: float, scale: float) -> Smoothed:
     """Time derivatives of noisy signals of one sensor.
 
-    A cubic smoothing spline (`scipy.interpolate.make_smoothing_spline`; Woltring 1986): the curve f of least sum (v - f)^2 + lam * integral f''^2. It
-    is the Rauch-Tung-Striebel smoother of a body whose acceleration is white noise (Wahba 1978). Its time constant (lam * step)^(1/4) is the one that
-    best predicts held-out blocks of samples, each 5 `scale` long: blocks, because a receiver's errors last for seconds, and a cross-validation that
-    leaves out single samples takes them for motion (Chu & Marron 1991). It is not let below `scale`.
+    A cubic smoothing spline (`scipy.interpolate.make_smoothing_spline`; Woltring 1986): the curve f of least sum (v -
+    f)^2 + lam * integral f''^2. It is the Rauch-Tung-Striebel smoother of a body whose acceleration is white noise
+    (Wahba 1978). Its time constant (lam * step)^(1/4) is the one that best predicts held-out blocks of samples, each 5
+    `scale` long: blocks, because a receiver's errors last for seconds, and a cross-validation that leaves out single
+    samples takes them for motion (Chu & Marron 1991). It is not let below `scale`.
 
     Args:
         t, values: (m,), (m, signals) samples, t increasing [s].
         grid: (count,) times of the result [s].
         dt: step of the grid [s]; samples that are much faster are first averaged in bins of a quarter of it.
-        scale: shortest time constant [s]. Froude's time sqrt(L / g) serves: waves are faster, manoeuvres slower. On simulated manoeuvres of 130 m at
-            1 Hz the error is then 0.002 m/s without noise and 0.009 m/s with 0.2 m of it; in the first and last 5 s 0.012 and 0.027 m/s.
+        scale: shortest time constant [s]. Froude's time sqrt(L / g) serves: waves are faster, manoeuvres slower. On
+        simulated manoeuvres of 130 m at
+            1 Hz the error is then 0.002 m/s without noise and 0.009 m/s with 0.2 m of it; in the first and last 5 s
+            0.012 and 0.027 m/s.
     """
     from scipy.interpolate import make_smoothing_spline
 
@@ -56,14 +61,17 @@ def derivative(t: np.ndarray, values: np.ndarray, grid: np.ndarray, dt: float, s
 def _ends(s: np.ndarray, values: np.ndarray, reach: float) -> Any:
     """The cubic whose accelerations at both ends are those of parabolas through the samples up to `reach` from there.
 
-    Without it the spline, which has no acceleration at its ends, would be wrong there by acceleration times time constant.
+    Without it the spline, which has no acceleration at its ends, would be wrong there by acceleration times time
+    constant.
     """
     from scipy.interpolate import CubicSpline
 
     accelerations = []
     for near in (s <= s[0] + reach, s >= s[-1] - reach):
         enough = near.sum() >= 5
-        accelerations.append(2.0 * np.polyfit(s[near] - s[near].mean(), values[near], 2)[0] if enough else np.zeros(values.shape[1]))
+        accelerations.append(
+            2.0 * np.polyfit(s[near] - s[near].mean(), values[near], 2)[0] if enough else np.zeros(values.shape[1])
+        )
     first, last = accelerations
     length = s[-1] - s[0]
     # End values of the cubic with these accelerations and no value or slope at the beginning.

@@ -31,11 +31,13 @@ def text_durations(texts: pa.Array, where: str) -> np.ndarray:
     unread = values.notna() & parts["s"].isna() & (values != "NaT")
     if unread.any():
         raise InputError(
-            f"{where}: '{values[unread].iloc[0][:60]}' is no duration; accepted: hours:minutes:seconds, such as '0 days 00:00:01.5' or '1:00:01.5'. "
+            f"{where}: '{values[unread].iloc[0][:60]}' is no duration; accepted: hours:minutes:seconds, such as '0 "
+            "days 00:00:01.5' or '1:00:01.5'. "
             "Correct [time] format or the log."
         )
     days, hours, minutes, seconds = (
-        pd.to_numeric(parts[name].str.replace(",", "."), errors="coerce").to_numpy(dtype=float, na_value=np.nan) for name in ("days", "h", "m", "s")
+        pd.to_numeric(parts[name].str.replace(",", "."), errors="coerce").to_numpy(dtype=float, na_value=np.nan)
+        for name in ("days", "h", "m", "s")
     )
     sign = np.where(parts["sign"].eq("-").fillna(False), -1.0, 1.0)
     return np.nan_to_num(days) * 86_400.0 + sign * (3600.0 * hours + 60.0 * minutes + seconds)
@@ -44,8 +46,9 @@ def text_durations(texts: pa.Array, where: str) -> np.ndarray:
 def parsed(texts: pa.Array, clock: Clock, accepted: tuple[str, ...], where: str, told: list[str]) -> pd.Series:
     """Stamps (n,) as datetimes, with a zone where they carry one.
 
-    Only ISO stamps, and those of a pattern with %z or %Z, carry an offset: what ends like one elsewhere is a year. A stamp without the fraction that
-    the pattern has is a whole second. Digits without separators (%H%M%S) may lack leading zeros. 23:59:60, a leap second, is the next 00:00:00.
+    Only ISO stamps, and those of a pattern with %z or %Z, carry an offset: what ends like one elsewhere is a year. A
+    stamp without the fraction that the pattern has is a whole second. Digits without separators (%H%M%S) may lack
+    leading zeros. 23:59:60, a leap second, is the next 00:00:00.
 
     Raises:
         InputError: a stamp is not of the format, or only some have a zone.
@@ -57,10 +60,13 @@ def parsed(texts: pa.Array, clock: Clock, accepted: tuple[str, ...], where: str,
         share = pc.sum(ends).as_py() or 0
         zoned = share > 0
         if 0 < share < len(ends):
-            raise InputError(f"{where}: {share} of {len(ends)} time stamps have a zone; accepted: all or none. Correct the log.")
+            raise InputError(
+                f"{where}: {share} of {len(ends)} time stamps have a zone; accepted: all or none. Correct the log."
+            )
         if zoned and clock.zone is not None:
             raise InputError(
-                f"{where}: the time stamps have a zone of their own, and [time] zone = '{clock.zone}' is set; accepted: one. Remove `zone`."
+                f"{where}: the time stamps have a zone of their own, and [time] zone = '{clock.zone}' is set; "
+                "accepted: one. Remove `zone`."
             )
     values = pd.Series(texts.to_pandas()).astype("string")
     leap = pc.fill_null(pc.match_substring_regex(texts, _LEAP), False).to_numpy(zero_copy_only=False)
@@ -70,12 +76,17 @@ def parsed(texts: pa.Array, clock: Clock, accepted: tuple[str, ...], where: str,
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            stamps = pd.to_datetime(values, format="ISO8601", utc=zoned) if iso else _by_pattern(values, clock.format, zoned)
+            stamps = (
+                pd.to_datetime(values, format="ISO8601", utc=zoned) if iso else _by_pattern(values, clock.format, zoned)
+            )
     except (ValueError, OverflowError) as error:
         first = next((v for v in values if isinstance(v, str)), "")
-        reason = re.split(r"\. You might|, at position|\n", str(error))[0][:140]  # pandas goes on with advice on its own options
+        reason = re.split(r"\. You might|, at position|\n", str(error))[0][
+            :140
+        ]  # pandas goes on with advice on its own options
         raise InputError(
-            f"{where}: a time stamp is not of the format '{clock.format}' (the first is '{first[:60]}'): {reason}. Accepted: {', '.join(accepted)}."
+            f"{where}: a time stamp is not of the format '{clock.format}' (the first is '{first[:60]}'): {reason}. "
+            f"Accepted: {', '.join(accepted)}."
         ) from None
     return stamps + pd.to_timedelta(leap.astype(int), unit="s") if leap.any() else stamps
 
@@ -120,4 +131,7 @@ def _with_zeros(values: pd.Series, pattern: str) -> pd.Series:
 def _matcher(pattern: str) -> str:
     """A regular expression for the stamps of a part of a pattern; its fraction may be left out."""
     tokens = re.findall(r"[.,:]?%f|%.|[^%]", pattern)
-    return "".join(r"(?:[.,:]?\d+)?" if token.endswith("%f") else ".+?" if token.startswith("%") else re.escape(token) for token in tokens)
+    return "".join(
+        r"(?:[.,:]?\d+)?" if token.endswith("%f") else ".+?" if token.startswith("%") else re.escape(token)
+        for token in tokens
+    )

@@ -14,16 +14,19 @@ from .ordering import CONTEXT
 from .track import Jumps, jumps, positions, usual, velocities
 
 _LEAST = 0.5
-"""A pause is looked at where it is longer than the usual step by this or more, and a step of the clock is one of this or more [s]."""
+"""A pause is looked at where it is longer than the usual step by this or more, and a step of the clock is one of this
+or more [s]."""
 
 _PLAIN = 300
 """Joints without a pause that show how certain the track is."""
 
 
 def steps_marked(blocks: Iterable[Block], source: Source, gap: float, met: Counts) -> Iterator[Block]:
-    """The blocks, `new` where the clock stepped in a pause of up to `gap` [s] that would be bridged: a plain pause stays one.
+    """The blocks, `new` where the clock stepped in a pause of up to `gap` [s] that would be bridged: a plain pause
+    stays one.
 
-    In a plain pause the ship goes on by its speed times the pause; where the clock stepped, by less (set ahead) or more (set back).
+    In a plain pause the ship goes on by its speed times the pause; where the clock stepped, by less (set ahead) or more
+    (set back).
     """
     channels = list(source.channels)
     for block, begin, end in with_context(blocks, CONTEXT):
@@ -35,7 +38,8 @@ def steps_marked(blocks: Iterable[Block], source: Source, gap: float, met: Count
                     new[row] = True
                     way = "ahead" if seconds > 0 else "back"
                     met.clock.append(
-                        f"the clock stepped {way} by about {abs(seconds):.2g} s in the pause from {shown(source.time, block.t[row - 1])} "
+                        f"the clock stepped {way} by about {abs(seconds):.2g} s in the pause from "
+                        f"{shown(source.time, block.t[row - 1])} "
                         f"to {shown(source.time, block.t[row])}: the track shows less time than the stamps"
                     )
         yield Block(block.t, block.values, new).rows(slice(begin, end))

@@ -1,4 +1,5 @@
-"""From streams of several rates to stretches of time in which every channel has samples, with as little in memory as that takes."""
+"""From streams of several rates to stretches of time in which every channel has samples, with as little in memory as
+that takes."""
 
 from __future__ import annotations
 
@@ -20,9 +21,11 @@ _MOST_SAMPLES = 1_000_000
 
 @dataclass(frozen=True)
 class Stretch:
-    """A time span [start, end] [s] without gaps: `series` maps each channel to its times (m,) and values (m,), with some context before and after.
+    """A time span [start, end] [s] without gaps: `series` maps each channel to its times (m,) and values (m,), with
+    some context before and after.
 
-    `part` counts the parts of a span that is longer than the longest run, or in which a clock was set, from 0; `last` says that the span ends here.
+    `part` counts the parts of a span that is longer than the longest run, or in which a clock was set, from 0; `last`
+    says that the span ends here.
     """
 
     start: float
@@ -49,7 +52,9 @@ class Feed:
         self.t, self.values = np.empty(0), np.empty((0, len(channels)))
         self.first, self.last = np.nan, -np.inf
         self.breaks: list[tuple[float, float]] = []  # last time before, and first time after the clock was set
-        self._old: dict[str, tuple[float, float]] = {}  # last sample of each channel that was dropped: what is held from then on
+        self._old: dict[
+            str, tuple[float, float]
+        ] = {}  # last sample of each channel that was dropped: what is held from then on
 
     def fill(self, until: float) -> None:
         """Read until a sample at or after `until` is there, or the stream ends."""
@@ -61,7 +66,9 @@ class Feed:
             elif len(block.t):
                 self.first = block.t[0] if np.isnan(self.first) else self.first
                 before = np.r_[self.last, block.t[:-1]]
-                self.breaks += [(float(before[k]), float(block.t[k])) for k in np.flatnonzero(block.new) if np.isfinite(before[k])]
+                self.breaks += [
+                    (float(before[k]), float(block.t[k])) for k in np.flatnonzero(block.new) if np.isfinite(before[k])
+                ]
                 self.last = float(block.t[-1])
                 t.append(block.t)
                 values.append(block.values)
@@ -91,8 +98,8 @@ class Feed:
 
 
 class Stretches:
-    """Iterates over the stretches of one log; afterwards `cuts` tells what was left out, `start` and `end` what the log spans,
-    `steps` the usual time between the samples of each channel at the beginning.
+    """Iterates over the stretches of one log; afterwards `cuts` tells what was left out, `start` and `end` what the log
+    spans, `steps` the usual time between the samples of each channel at the beginning.
 
     Args:
         feeds: the sources, on one clock.
@@ -104,7 +111,8 @@ class Stretches:
     """
 
     def __init__(
-        self, feeds: list[Feed], gaps: Mapping[str, float], held: frozenset[str], longest: float, step: float, context: float
+        self, feeds: list[Feed], gaps: Mapping[str, float], held: frozenset[str], longest: float, step: float,
+        context: float
     ) -> None:  # fmt: skip
         self.feeds, self.gaps, self.held, self.longest, self.step = feeds, gaps, held, longest, step
         self.finite_gap = max((g for g in gaps.values() if np.isfinite(g)), default=0.0)
@@ -157,10 +165,14 @@ class Stretches:
         self._note(covered, self.end, pieces)
 
     def _clock_set(self, end: float, begin: float = np.inf) -> bool:
-        """Whether a clock was set just after `end` (and just before `begin`): no pause, but nothing may be joined there."""
+        """Whether a clock was set just after `end` (and just before `begin`): no pause, but nothing may be joined
+        there."""
         near = self.finite_gap * (1 + _SLACK)
         breaks = [b for feed in self.feeds for b in feed.breaks]
-        return any(end <= before <= end + near and (after <= begin <= after + near or begin == np.inf) for before, after in breaks)
+        return any(
+            end <= before <= end + near and (after <= begin <= after + near or begin == np.inf)
+            for before, after in breaks
+        )
 
     def _limit_memory(self) -> None:
         """Shorten the parts of a log that is sampled so densely that the longest part would not fit."""
@@ -186,7 +198,9 @@ class Stretches:
             ends[-1] = feed.last
         return np.column_stack([t[np.r_[0, breaks + 1]], ends])
 
-    def _context(self, start: float, end: float, pieces: dict[str, np.ndarray]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    def _context(
+        self, start: float, end: float, pieces: dict[str, np.ndarray]
+    ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Samples of the piece that each channel has around [start, end]."""
         found = {}
         for feed in self.feeds:
@@ -204,7 +218,9 @@ class Stretches:
         if end <= start:
             return
         middle = 0.5 * (start + end)
-        silent = tuple(n for n, spans in pieces.items() if not ((spans[:, 0] <= middle) & (spans[:, 1] >= middle)).any())
+        silent = tuple(
+            n for n, spans in pieces.items() if not ((spans[:, 0] <= middle) & (spans[:, 1] >= middle)).any()
+        )
         self.cuts.append(Cut(start, end, silent))
 
 

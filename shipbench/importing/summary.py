@@ -45,7 +45,8 @@ class Summary:
         self.absolute = is_absolute(next(iter(mapping.sources.values())).time)
 
     def add(self, run: str, file: str, piece: Piece, group: str | None, stretch: int) -> None:
-        """A run that was written, of the recording's stretch of that number; `group` names the pieces of one uninterrupted stretch."""
+        """A run that was written, of the recording's stretch of that number; `group` names the pieces of one
+        uninterrupted stretch."""
         begin, end = float(piece.t[0]), float(piece.t[-1])
         written: list[Any] = [moment(begin), moment(end)] if self.absolute else [round(begin, 6), round(end, 6)]
         self.meta[run] = {"file": file, "from": written[0], "to": written[1]}
@@ -87,7 +88,8 @@ class Summary:
         self.cut(f"no samples of {', '.join(told[:4])}{' and others' if len(told) > 4 else ''}", cut.end - cut.start)
 
     def span(self, seconds: float, shortened: float | None) -> None:
-        """The length of a recording; `shortened` where its parts had to be shorter than the mapping says, to keep memory small."""
+        """The length of a recording; `shortened` where its parts had to be shorter than the mapping says, to keep
+        memory small."""
         self.seconds += seconds
         self.part_length = shortened or self.part_length
 
@@ -113,22 +115,39 @@ class Summary:
         mapping, lines = self.mapping, []
         if mapping.has("lat"):
             fixed = mapping.origin
-            where = "the first position of each stretch (origin in [runs])" if fixed is None else f"{fixed.lat:g}, {fixed.lon:g} deg"
+            where = (
+                "the first position of each stretch (origin in [runs])"
+                if fixed is None
+                else f"{fixed.lat:g}, {fixed.lon:g} deg"
+            )
             lines.append(f"x, y from lat, lon: the plane that touches the WGS84 ellipsoid at {where}")
         for source in mapping.sources.values():
             if source.antenna:
-                lines.append(f"positions moved to midship from an antenna at x = {source.antenna.x:g} m, y = {source.antenna.y:g} m")
+                lines.append(
+                    f"positions moved to midship from an antenna at x = {source.antenna.x:g} m, y = "
+                    f"{source.antenna.y:g} m"
+                )
             if source.speed_sensor:
-                lines.append(f"u, v moved to midship from x = {source.speed_sensor.x:g} m, y = {source.speed_sensor.y:g} m")
+                lines.append(
+                    f"u, v moved to midship from x = {source.speed_sensor.x:g} m, y = {source.speed_sensor.y:g} m"
+                )
         if from_course := self.from_course():
             lines.append(f"{', '.join(from_course)} from sog, cog and psi (over ground)")
-        for names, base, unit, factor in ((("u", "v"), "x, y and psi", "m", 1.0), (("r",), "psi", "deg", 180.0 / math.pi)):
+        for names, base, unit, factor in (
+            (("u", "v"), "x, y and psi", "m", 1.0),
+            (("r",), "psi", "deg", 180.0 / math.pi),
+        ):
             found = [n for n in names if n in self.times]
             if found:
                 times, noise = self.times[found[0]], factor * float(np.median(self.scatter[found[0]]))
-                spread = f"{min(times):.3g} to {max(times):.3g} s" if max(times) > 1.005 * min(times) else f"{times[0]:.3g} s"
+                spread = (
+                    f"{min(times):.3g} to {max(times):.3g} s"
+                    if max(times) > 1.005 * min(times)
+                    else f"{times[0]:.3g} s"
+                )
                 lines.append(
-                    f"{', '.join(found)} from {base} by a cubic smoothing spline, time constant {spread}; scatter taken out {noise:.2g} {unit}"
+                    f"{', '.join(found)} from {base} by a cubic smoothing spline, time constant {spread}; scatter "
+                    f"taken out {noise:.2g} {unit}"
                 )
         if mapping.has("apparent_wind_speed") and not mapping.has("wind_speed"):
             lines.append("true wind from the apparent wind, psi, u and v")
@@ -148,16 +167,31 @@ class Summary:
         """For dataset.toml and the terminal."""
         lines = self.derived()
         if self.mapping.split.window:
-            lines.append(f"runs are windows of {self.mapping.split.window:g} s; those of one recording may follow each other without a pause")
-        lines += [f"DOUBTFUL: {count} samples of {what}: outliers, or a wrong unit" for what, count in self.doubtful.items() if count]
-        lines += [*self.met.clock[:_SHOWN], *([f"... and {len(self.met.clock) - _SHOWN} more of the clock"] if len(self.met.clock) > _SHOWN else [])]
+            lines.append(
+                f"runs are windows of {self.mapping.split.window:g} s; those of one recording may follow each other "
+                "without a pause"
+            )
+        lines += [
+            f"DOUBTFUL: {count} samples of {what}: outliers, or a wrong unit"
+            for what, count in self.doubtful.items()
+            if count
+        ]
+        lines += [
+            *self.met.clock[:_SHOWN],
+            *([f"... and {len(self.met.clock) - _SHOWN} more of the clock"] if len(self.met.clock) > _SHOWN else []),
+        ]
         lines += [f"DOUBTFUL: {count} {what}" for what, count in self.met.doubtful.items() if count]
         lines += [
-            f'{name} reaches {most:.4g} deg: taken as counted on over north. If it is in steps of 0.01 deg: unit = "cdeg"'
+            (
+                f"{name} reaches {most:.4g} deg: taken as counted on over north. If it is in steps of 0.01 deg: unit = "
+                '"cdeg"'
+            )
             for name, most in self.met.reach.items()
         ]
         if self.interpolated:
-            lines.append(f"{self.interpolated} headings were interpolated linearly across 360/0 (359, 240, 120, 1): left out")
+            lines.append(
+                f"{self.interpolated} headings were interpolated linearly across 360/0 (359, 240, 120, 1): left out"
+            )
         lines += self.met.notes
         if self.part_length is not None:
             lines.append(f"densely sampled: parts of at most {self.part_length:g} s, to keep memory small")
@@ -174,8 +208,10 @@ class Summary:
         own = {"derived": [name for name in "uvr" if name in self.times], "from_course": self.from_course()}
         source = self.mapping.source or f"imported from {files if len(files) < 200 else f'{len(self.met.forms)} logs'}"
         return {
-            "name": self.mapping.name, "ship": "ship.toml", "dt": self.mapping.dt, "actuators": self.actuators(), "source": source,
-            "licence": self.mapping.licence, "notes": self.notes(), **{key: names for key, names in own.items() if names}, "runs": self.meta,
+            "name": self.mapping.name, "ship": "ship.toml", "dt": self.mapping.dt, "actuators": self.actuators(),
+            "source": source,
+            "licence": self.mapping.licence, "notes": self.notes(),
+            **{key: names for key, names in own.items() if names}, "runs": self.meta,
         }  # fmt: skip
 
     def no_runs(self) -> str:
@@ -185,15 +221,19 @@ class Summary:
         return (
             f"no run is left of {self.seconds:g} s of log. Left out: {why}. Usual time between samples: {steps}. "
             f"Accepted: runs of at least {shortest_run(self.mapping):g} s in which every mapped channel has samples. "
-            "Set split.gap (or a channel's own gap; inf for a command that is logged only when it changes), split.shortest, or leave a channel out."
+            "Set split.gap (or a channel's own gap; inf for a command that is logged only when it changes), "
+            "split.shortest, or leave a channel out."
         )
 
     def document(self) -> dict[str, Any]:
         """For --json."""
         return {
-            "out": str(self.table.parent), "table": self.table.name, "name": self.mapping.name, "dt": self.mapping.dt, "actuators": self.actuators(),
-            "runs": self.runs, "seconds": sum(r["seconds"] for r in self.runs), "log_seconds": self.seconds, "log_rows": self.met.rows,
-            "forms": self.met.forms, "columns": list(self.columns), "channels": self.converted(), "derived": self.derived(),
+            "out": str(self.table.parent), "table": self.table.name, "name": self.mapping.name, "dt": self.mapping.dt,
+            "actuators": self.actuators(),
+            "runs": self.runs, "seconds": sum(r["seconds"] for r in self.runs), "log_seconds": self.seconds,
+            "log_rows": self.met.rows,
+            "forms": self.met.forms, "columns": list(self.columns), "channels": self.converted(),
+            "derived": self.derived(),
             "left_out": self.left_out(), "notes": self.notes(),
         }  # fmt: skip
 
@@ -209,9 +249,13 @@ class Summary:
         lines += [f"  {r['id']}: {r['seconds']:g} s, {r['from']} to {r['to']}" for r in self.runs[:_SHOWN]]
         if len(self.runs) > _SHOWN:
             lines.append(f"  ... and {len(self.runs) - _SHOWN} more")
-        missing = [n for n, c in zip(STATES[6:], COMMANDS, strict=True) if n not in self.columns and c not in self.columns]
+        missing = [
+            n for n, c in zip(STATES[6:], COMMANDS, strict=True) if n not in self.columns and c not in self.columns
+        ]
         blocks = {
-            "read": [f"{what}: {count} file{'s' * (count > 1)}" for what, count in Counter(self.met.forms.values()).items()],
+            "read": [
+                f"{what}: {count} file{'s' * (count > 1)}" for what, count in Counter(self.met.forms.values()).items()
+            ],
             "channels": self.converted(),
             "notes": self.notes(),
             "left out": self.left_out(),

@@ -27,17 +27,28 @@ MOST_COLUMNS = 10_000
 TEXT_BLOCK = 1 << 22
 """Bytes in which the header must stand, and the size of the blocks in which text is read."""
 DENSEST, ALWAYS = 200, 10_000_000
-"""Unpacked over packed size of a compressed log, and bytes that are unpacked whatever the packed size; those of logs are below 100."""
-_UNREADABLE = (zipfile.BadZipFile, ValueError, OSError, EOFError, zlib.error, lzma.LZMAError, pa.ArrowException, MemoryError)
+"""Unpacked over packed size of a compressed log, and bytes that are unpacked whatever the packed size; those of logs
+are below 100."""
+_UNREADABLE = (
+    zipfile.BadZipFile,
+    ValueError,
+    OSError,
+    EOFError,
+    zlib.error,
+    lzma.LZMAError,
+    pa.ArrowException,
+    MemoryError,
+)
 KINDS = "CSV or other delimited text (.csv, .txt, .dat, .tsv, also .gz, .bz2, .xz), Parquet, MATLAB .mat, Excel .xlsx"
 
 
 @dataclass(frozen=True)
 class Table:
-    """A log that was opened: its columns, what was found of its form, and a function that streams some columns as Arrow batches.
+    """A log that was opened: its columns, what was found of its form, and a function that streams some columns as Arrow
+    batches.
 
-    `first_row` is the number of the first data row in the file, for messages. `notes` says how the file was read; the stream adds to it. `blocks`:
-    about how many batches the stream gives, for the progress.
+    `first_row` is the number of the first data row in the file, for messages. `notes` says how the file was read; the
+    stream adds to it. `blocks`: about how many batches the stream gives, for the progress.
     """
 
     path: Path
@@ -68,7 +79,9 @@ def reading(path: Path) -> Iterator[None]:
         yield
     except _UNREADABLE as error:
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise InputError(f"{path} cannot be read: {reason}. It may be cut short or of another format; accepted: {KINDS}.") from None
+        raise InputError(
+            f"{path} cannot be read: {reason}. It may be cut short or of another format; accepted: {KINDS}."
+        ) from None
 
 
 def check_columns(table: Table, wanted: Sequence[str]) -> None:
@@ -80,11 +93,20 @@ def check_columns(table: Table, wanted: Sequence[str]) -> None:
     for name in wanted:
         count = table.columns.count(name)
         if count > 1:
-            raise InputError(f"{table.path}: {count} columns are named '{name}'; accepted: one. Rename all but one in the file.")
+            raise InputError(
+                f"{table.path}: {count} columns are named '{name}'; accepted: one. Rename all but one in the file."
+            )
         if count == 0:
-            found = table.columns if len(table.columns) <= 60 else (*table.columns[:60], f"and {len(table.columns) - 60} more")
+            found = (
+                table.columns
+                if len(table.columns) <= 60
+                else (*table.columns[:60], f"and {len(table.columns) - 60} more")
+            )
             if len(table.columns) == 1 and (other := [d for d in DELIMITERS if d in table.columns[0].strip()]):
-                hint = f" Its header reads as one column; is the delimiter {other[0]!r}? Set [file] delimiter in the mapping."
+                hint = (
+                    f" Its header reads as one column; is the delimiter {other[0]!r}? Set [file] delimiter in "
+                    "the mapping."
+                )
                 raise InputError(f"{table.path}: no column '{name}'.{hint} Header: {table.columns[0][:200]}")
             raise InputError(" ".join([str(unknown_name(f"column of {table.path}:", name, found)), *table.notes]))
 
@@ -92,7 +114,10 @@ def check_columns(table: Table, wanted: Sequence[str]) -> None:
 def check_number(path: Path, columns: int) -> None:
     """Not more columns than a log has."""
     if columns > MOST_COLUMNS:
-        raise InputError(f"{path} has {columns} columns; accepted: up to {MOST_COLUMNS}. Save the columns that you need as a file of their own.")
+        raise InputError(
+            f"{path} has {columns} columns; accepted: up to {MOST_COLUMNS}. Save the columns that you need as a "
+            "file of their own."
+        )
 
 
 def uncompressed(path: Path) -> Any:
@@ -121,7 +146,8 @@ class Bounded(io.RawIOBase):
         self._count += len(block)
         if self._count > self._most:
             raise InputError(
-                f"{self._path} unpacks to more than {DENSEST} times its size ({self._most / 1e6:.0f} MB); logs have up to 100 times. "
+                f"{self._path} unpacks to more than {DENSEST} times its size ({self._most / 1e6:.0f} MB); logs have "
+                "up to 100 times. "
                 "If it is a log, unpack it first and give that file."
             )
         buffer[: len(block)] = block

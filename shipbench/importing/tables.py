@@ -1,4 +1,5 @@
-"""Any log as a stream of record batches: CSV and its kin, Parquet; MATLAB and Excel in files of their own. Never the whole file in memory."""
+"""Any log as a stream of record batches: CSV and its kin, Parquet; MATLAB and Excel in files of their own. Never the
+whole file in memory."""
 
 from __future__ import annotations
 
@@ -76,7 +77,9 @@ def _check_packed(path: Path) -> None:
         raise InputError(f"{path} is an OpenDocument file. Save the sheet as .xlsx or .csv.")
     if "[Content_Types].xml" not in names:
         inside = f"{', '.join(names[:3])}{' and more' if len(names) > 3 else ''}"
-        raise InputError(f"{path} is a zip archive (it holds {inside}). Unpack it, and give the logs in it: unzip {path.name}")
+        raise InputError(
+            f"{path} is a zip archive (it holds {inside}). Unpack it, and give the logs in it: unzip {path.name}"
+        )
 
 
 def _open_parquet(path: Path) -> Table:

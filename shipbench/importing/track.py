@@ -1,4 +1,5 @@
-"""The track that a log holds, and what it says about the log's clock: the time that passed, by the distance made good."""
+"""The track that a log holds, and what it says about the log's clock: the time that passed, by the distance made
+good."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ _SIGMA = 1.4826
 
 
 def positions(t: np.ndarray, values: np.ndarray, channels: Sequence[str]) -> np.ndarray | None:
-    """(n, 2) north, east [m], NaN where the row has none; None where the source has no positions. The earth is a sphere here."""
+    """(n, 2) north, east [m], NaN where the row has none; None where the source has no positions. The earth is a sphere
+    here."""
     names = next((pair for pair in (("x", "y"), ("lat", "lon")) if set(pair) <= set(channels)), None)
     if names is None:
         return None
@@ -35,7 +37,8 @@ def positions(t: np.ndarray, values: np.ndarray, channels: Sequence[str]) -> np.
 
 
 def velocities(t: np.ndarray, values: np.ndarray, channels: Sequence[str]) -> np.ndarray | None:
-    """(n, 2) velocity over ground north, east [m/s] that the log states, between its samples by interpolation; None where it states none."""
+    """(n, 2) velocity over ground north, east [m/s] that the log states, between its samples by interpolation; None
+    where it states none."""
     given = {name: values[:, k] for k, name in enumerate(channels)}
     if {"sog", "cog"} <= set(given):
         stated = given["sog"][:, None] * np.column_stack([np.cos(given["cog"]), np.sin(given["cog"])])
@@ -58,8 +61,8 @@ def usual(steps: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class Jumps:
-    """Of joints (m,) between two fixes: by how much the clock went ahead of the track [s], the standard error of that, what a change of velocity
-    within the pause could explain, and the part of the leap across the course."""
+    """Of joints (m,) between two fixes: by how much the clock went ahead of the track [s], the standard error of that,
+    what a change of velocity within the pause could explain, and the part of the leap across the course."""
 
     seconds: np.ndarray
     error: np.ndarray
@@ -67,10 +70,11 @@ class Jumps:
     across: np.ndarray
 
     def certain(self, least: float, plain: Jumps) -> np.ndarray:
-        """Joints that only a clock explains: by `least` [s] or more, along the course, and far outside of what joints without a pause show.
+        """Joints that only a clock explains: by `least` [s] or more, along the course, and far outside of what joints
+        without a pause show.
 
-        Outside means five standard errors, more where `plain` joints scatter by more than theirs (errors that last for seconds), and twice the
-        95 % quantile of `plain`.
+        Outside means five standard errors, more where `plain` joints scatter by more than theirs (errors that last for
+        seconds), and twice the 95 % quantile of `plain`.
         """
         with np.errstate(invalid="ignore", divide="ignore"):
             spread = max(1.0, 0.5 * _quantile(np.abs(plain.seconds) / plain.error))
@@ -84,11 +88,14 @@ def _quantile(values: np.ndarray) -> float:
     return float(np.quantile(values, 0.95)) if len(values) else 0.0
 
 
-def jumps(t: np.ndarray, p: np.ndarray, v: np.ndarray | None, joints: np.ndarray, low: np.ndarray, high: np.ndarray) -> Jumps:
+def jumps(
+    t: np.ndarray, p: np.ndarray, v: np.ndarray | None, joints: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> Jumps:
     """What the track says about the time between the fixes before and at each of `joints`.
 
-    A straight line is fitted to the fixes on either side; where both meet in the middle of the pause, the track leaps by velocity times the seconds
-    that did not pass. Where the log states velocities, the fixes less the way that they explain are nearly constant, and more of them serve.
+    A straight line is fitted to the fixes on either side; where both meet in the middle of the pause, the track leaps
+    by velocity times the seconds that did not pass. Where the log states velocities, the fixes less the way that they
+    explain are nearly constant, and more of them serve.
 
     Args:
         t, p: (n,) [s], (n, 2) [m] fixes.
@@ -107,11 +114,14 @@ def jumps(t: np.ndarray, p: np.ndarray, v: np.ndarray | None, joints: np.ndarray
     stated = _jumps(t, p - way, v, joints, low, high, np.full_like(counts, _POINTS), strides)
     with np.errstate(invalid="ignore"):
         better = ~(5.0 * found.error + found.turning < 5.0 * stated.error + stated.turning)
-    return Jumps(*(np.where(better, getattr(stated, f), getattr(found, f)) for f in ("seconds", "error", "turning", "across")))
+    return Jumps(
+        *(np.where(better, getattr(stated, f), getattr(found, f)) for f in ("seconds", "error", "turning", "across"))
+    )
 
 
 def _jumps(
-    t: np.ndarray, q: np.ndarray, v: np.ndarray, joints: np.ndarray, low: np.ndarray, high: np.ndarray, counts: np.ndarray, strides: np.ndarray
+    t: np.ndarray, q: np.ndarray, v: np.ndarray, joints: np.ndarray, low: np.ndarray, high: np.ndarray,
+    counts: np.ndarray, strides: np.ndarray
 ) -> Jumps:  # fmt: skip
     middle = 0.5 * (t[joints] + t[joints - 1])
     number = np.arange(_POINTS)
@@ -134,7 +144,8 @@ def _jumps(
 
 
 def _line(s: np.ndarray, q: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Value (m, 2) at s = 0, slope (m, 2) and variance (m,) of the value of a weighted straight line; NaN for fewer than four points."""
+    """Value (m, 2) at s = 0, slope (m, 2) and variance (m,) of the value of a weighted straight line; NaN for fewer
+    than four points."""
     n, s1, s2 = w.sum(axis=1), (w * s).sum(axis=1), (w * s**2).sum(axis=1)
     q0, q1 = np.einsum("mk,mkc->mc", w, q), np.einsum("mk,mkc->mc", w * s, q)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -148,7 +159,8 @@ def _line(s: np.ndarray, q: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.n
 def was_set_back(t: np.ndarray, p: np.ndarray, joint: int, seconds: float) -> bool | None:
     """Whether the rows from `joint` on are later than their stamps say, by `seconds`; None where the track cannot tell.
 
-    Rows that are merely late lie on the track of the rows before; behind a clock that was set back, the ship was further on at the same stamps.
+    Rows that are merely late lie on the track of the rows before; behind a clock that was set back, the ship was
+    further on at the same stamps.
 
     Args:
         t, p: (n,) [s], (n, 2) [m] fixes in the order of the log, some of them before `joint`.

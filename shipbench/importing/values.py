@@ -1,4 +1,5 @@
-"""Values of a channel, in our unit and sign, from the cells of a block: columns, expressions of columns, positions as written."""
+"""Values of a channel, in our unit and sign, from the cells of a block: columns, expressions of columns, positions as
+written."""
 
 from __future__ import annotations
 
@@ -39,8 +40,8 @@ def channel_values(cells: Cells, name: str, channel: Channel) -> np.ndarray:
 
 
 def _missing(cells: Cells, name: str, channel: Channel) -> list[str | float]:
-    """What stands for a missing value in a channel: its own list, and the source's without codes of other channels: 511 is no heading, but may be
-    a shaft speed."""
+    """What stands for a missing value in a channel: its own list, and the source's without codes of other channels: 511
+    is no heading, but may be a shaft speed."""
     kept = []
     for mark in cells.source.missing:
         of = [other for other, codes in CODES.items() if any(mark == code for code, _, _ in codes)]
@@ -49,14 +50,16 @@ def _missing(cells: Cells, name: str, channel: Channel) -> list[str | float]:
         else:
             count = int(sum((cells.numbers(column, ()) == mark).sum() for column in channel.columns))
             cells.met.doubtful[
-                f"readings of {name} that are {mark:g}, kept: `missing` of the source is taken for the code of {of[0]}. "
+                f"readings of {name} that are {mark:g}, kept: `missing` of the source is taken for the code of "
+                f"{of[0]}. "
                 f"If they are none: missing = [{mark:g}] in channels.{name}"
             ] += count
     return [*kept, *(channel.missing or [])]
 
 
 def _available(cells: Cells, name: str, channel: Channel, readings: np.ndarray) -> np.ndarray:
-    """Readings without those that stand for "not available"; what is taken out or looks like it is counted for the summary."""
+    """Readings without those that stand for "not available"; what is taken out or looks like it is counted for the
+    summary."""
     if channel.unit == "pwm":
         none = (readings <= 0.0) | (readings == 65_535.0)
         cells.met.what[f"readings of {name} that are 0 or 65535 us (no pulse), taken as missing"] += int(none.sum())
@@ -66,7 +69,10 @@ def _available(cells: Cells, name: str, channel: Channel, readings: np.ndarray) 
         cells.met.what[f"readings of {name} that are {words}, taken as missing"] += int(mask.sum())
     for value in np.unique(readings[doubtful]):
         cells.met.doubtful[
-            f"readings of {name} are {value:.10g}, far from all others. If it stands for no reading: missing = [{value:.10g}] in channels.{name}"
+            (
+                f"readings of {name} are {value:.10g}, far from all others. If it stands for no reading: missing = "
+                f"[{value:.10g}] in channels.{name}"
+            )
         ] += int((readings == value).sum())
     return np.where(np.logical_or.reduce([np.zeros(len(readings), bool), *masks.values()]), np.nan, readings)
 
@@ -74,7 +80,9 @@ def _available(cells: Cells, name: str, channel: Channel, readings: np.ndarray) 
 def _tell_turns(cells: Cells, name: str, angles: np.ndarray) -> None:
     """Angles [rad] beyond 360 degrees by more than a turn, for the summary: those that jump, and how far they go."""
     odd = beyond_a_turn(angles)
-    cells.met.doubtful[f"readings of {name} jump beyond -180 to 360 deg: outliers, or a code to list in `missing`"] += int(odd.sum())
+    cells.met.doubtful[f"readings of {name} jump beyond -180 to 360 deg: outliers, or a code to list in `missing`"] += (
+        int(odd.sum())
+    )
     there = np.rad2deg(angles[np.isfinite(angles) & ~odd])
     if len(there) and (there.max() > 720.0 or there.min() < -360.0):
         cells.met.reach[name] = max(cells.met.reach.get(name, 0.0), float(np.abs(there).max()))
@@ -120,7 +128,10 @@ def _check_range(cells: Cells, name: str, channel: Channel, values: np.ndarray) 
         if 1e5 <= worst <= np.rad2deg(limit) * 1e7:
             hint = f'Is it counted in 1e-7 deg? Then write unit = "1e-7 deg" (or factor = 1e-7) in {name}.'
         elif worst <= np.rad2deg(limit) * 100.0 and (degrees % 100.0 <= 60.0).all() and _lat_in_minutes(cells):
-            hint = f'Are the last two whole digits minutes? Then write unit = "ddmm.mmmm" in {name}, and hemisphere = "COLUMN" for N/S or E/W.'
+            hint = (
+                f'Are the last two whole digits minutes? Then write unit = "ddmm.mmmm" in {name}, and hemisphere '
+                '= "COLUMN" for N/S or E/W.'
+            )
     raise InputError(f"{where}; accepted: up to {np.rad2deg(limit):g}. {hint}")
 
 

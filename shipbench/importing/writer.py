@@ -1,4 +1,5 @@
-"""The three files of the contract, run by run, in a folder beside the wanted one that takes its name when all is there."""
+"""The three files of the contract, run by run, in a folder beside the wanted one that takes its name when all is
+there."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ class FolderWriter:
     """A context: `add` runs, then `finish`. Leaving it without `finish` (an error, Ctrl-C) leaves nothing behind.
 
     Raises:
-        InputError: the folder is there already and `force` is not set, or holds other files than a data set's, or cannot be written.
+        InputError: the folder is there already and `force` is not set, or holds other files than a data set's, or
+        cannot be written.
     """
 
     def __init__(self, out: Path, force: bool = False) -> None:
@@ -45,7 +47,10 @@ class FolderWriter:
             raise self._unwritable(error) from None
 
     def _unwritable(self, error: OSError) -> InputError:
-        return InputError(f"cannot write the data set to {self.out}: {error.strerror}. Give another folder with {option('--out', 'out=FOLDER')}.")
+        return InputError(
+            f"cannot write the data set to {self.out}: {error.strerror}. Give another folder with "
+            f"{option('--out', 'out=FOLDER')}."
+        )
 
     def add(self, run: str, t: np.ndarray, columns: dict[str, np.ndarray]) -> None:
         """Write one run."""
@@ -66,7 +71,11 @@ class FolderWriter:
                 self._table.close()
             table = self.fresh / "trajectories.parquet"
             if self.rows <= CSV_ROWS:  # small enough to be opened by people
-                pa.csv.write_csv(pa.parquet.read_table(table), self.fresh / "trajectories.csv", pa.csv.WriteOptions(quoting_style="needed"))
+                pa.csv.write_csv(
+                    pa.parquet.read_table(table),
+                    self.fresh / "trajectories.csv",
+                    pa.csv.WriteOptions(quoting_style="needed"),
+                )
                 table.unlink()
                 table = self.fresh / "trajectories.csv"
             (self.fresh / "dataset.toml").write_text(tomli_w.dumps(description), encoding="utf-8")
@@ -80,7 +89,9 @@ class FolderWriter:
     def __enter__(self) -> FolderWriter:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if self._table is not None:
             with suppress(OSError):  # a full disk was told already
                 self._table.close()
@@ -98,11 +109,18 @@ def _check_target(out: Path, force: bool) -> None:
         return
     held = sorted(p.name for p in out.iterdir())
     if held and not force:
-        raise InputError(f"folder {out} is there already ({', '.join(held[:4])}). Give {place}, or {replacing} to replace that data set.")
+        raise InputError(
+            f"folder {out} is there already ({', '.join(held[:4])}). Give {place}, or {replacing} to replace that "
+            "data set."
+        )
     if others := [name for name in held if name not in _OURS and not name.startswith(BEFORE_CHECK)]:
-        raise InputError(f"folder {out} holds more than a data set ({', '.join(others[:4])}); {replacing} replaces only a data set. Give {place}.")
+        raise InputError(
+            f"folder {out} holds more than a data set ({', '.join(others[:4])}); {replacing} replaces only a data "
+            f"set. Give {place}."
+        )
 
 
 def run_name(text: str) -> str:
-    """Letters, digits, '_', '-', '.' and '@' of a text: safe in paths, TOML and spreadsheets (no name begins like a formula)."""
+    """Letters, digits, '_', '-', '.' and '@' of a text: safe in paths, TOML and spreadsheets (no name begins like a
+    formula)."""
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", text).strip("_.-")[:80] or "run"

@@ -40,11 +40,21 @@ class Board:
 
     def markdown(self, command: str, plots: Sequence[str] = ()) -> str:
         """The whole page; `command` is what rendered it, `plots` are image paths relative to it."""
-        lines = [f"# {markdown_text(self.title)}", "", *[f"- {markdown_text(line)}" for line in [*self.head, f"Rendered by `{command}`."]], ""]
+        lines = [
+            f"# {markdown_text(self.title)}",
+            "",
+            *[f"- {markdown_text(line)}" for line in [*self.head, f"Rendered by `{command}`."]],
+            "",
+        ]
         tables = [table.markdown() for table in self.tables]
         images = [f"![{Path(p).stem.replace('-', ' ')}]({p})\n" for p in plots]
         return "\n".join(["\n".join(lines), *tables[:1], *images, *tables[1:]])
 
     def as_json(self) -> dict[str, Any]:
         """Everything as plain data."""
-        return {"dataset": self.dataset, "ranking": self.ranking, "about": self.head, "tables": [t.as_json() for t in self.tables]}
+        return {
+            "dataset": self.dataset,
+            "ranking": self.ranking,
+            "about": self.head,
+            "tables": [t.as_json() for t in self.tables],
+        }

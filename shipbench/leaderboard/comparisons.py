@@ -1,4 +1,5 @@
-"""The tables of a leaderboard that say how certain it is: skill, win rate, paired tests, seeds; slices by regime; indices of standard manoeuvres."""
+"""The tables of a leaderboard that say how certain it is: skill, win rate, paired tests, seeds; slices by regime;
+indices of standard manoeuvres."""
 
 from __future__ import annotations
 
@@ -35,11 +36,23 @@ def comparison_table(scores: Scores) -> Table:
     for model in scores.models:
         line: dict[str, Any] = {"model": model, **errors[model]}
         if baseline:
-            line |= dict(zip(("skill", "skill_low", "skill_high"), (100.0 * x for x in matched.skill(model, baseline)), strict=True))
+            line |= dict(
+                zip(
+                    ("skill", "skill_low", "skill_high"),
+                    (100.0 * x for x in matched.skill(model, baseline)),
+                    strict=True,
+                )
+            )
         if model != CEILING:
             others = [m for m in ranked if m != model]
             if others:
-                line |= dict(zip(("wins", "wins_low", "wins_high"), (100.0 * x for x in matched.win_rate(model, others)), strict=True))
+                line |= dict(
+                    zip(
+                        ("wins", "wins_low", "wins_high"),
+                        (100.0 * x for x in matched.win_rate(model, others)),
+                        strict=True,
+                    )
+                )
             place = ranked.index(model)
             if place:
                 line["p_above"] = holm.get(frozenset((model, ranked[place - 1])), float("nan"))
@@ -55,13 +68,23 @@ def comparison_table(scores: Scores) -> Table:
     else:
         notes.append("No skill: no rows of the baseline `hold`; name another with --baseline.")
     if len(ranked) > 1:
-        columns += [TableColumn("win rate [%]", "wins", number(1), interval=True), TableColumn("p, next better", "p_above", p_text)]
-        notes.append("Win rate: how often the model has the lower ED of a run, over runs and other ranked models; a run without a score is lost.")
+        columns += [
+            TableColumn("win rate [%]", "wins", number(1), interval=True),
+            TableColumn("p, next better", "p_above", p_text),
+        ]
+        notes.append(
+            "Win rate: how often the model has the lower ED of a run, over runs and other ranked models; a run "
+            "without a score is lost."
+        )
         notes.append("p, next better: of the paired test against the model one rank above, as in the table of pairs.")
     if several_seeds:
-        columns += [TableColumn("seeds", "seeds", str), TableColumn(f"ED {SIGMA} over seeds [m]", "seed_spread", number(2))]
+        columns += [
+            TableColumn("seeds", "seeds", str),
+            TableColumn(f"ED {SIGMA} over seeds [m]", "seed_spread", number(2)),
+        ]
         notes.append(
-            f"{SIGMA} over seeds: standard deviation (n - 1) of the model's ED from seed to seed; intervals are over runs, seeds averaged in a run."
+            f"{SIGMA} over seeds: standard deviation (n - 1) of the model's ED from seed to seed; intervals are "
+            "over runs, seeds averaged in a run."
         )
     return Table("Ranking, skill and win rate", columns, lines, notes)
 
@@ -72,15 +95,24 @@ def pair_table(scores: Scores) -> Table:
     lines: list[dict[str, Any]] = []
     for pair in scores.pairs:
         share = f"{pair.better}/{pair.windows}"
-        line = {"first": pair.first, "second": pair.second, "difference": pair.difference, "better": share, "p": pair.p, "p_holm": pair.p_holm}
+        line = {
+            "first": pair.first,
+            "second": pair.second,
+            "difference": pair.difference,
+            "better": share,
+            "p": pair.p,
+            "p_holm": pair.p_holm,
+        }
         lines.append(line | {"difference_low": pair.low, "difference_high": pair.high})
     columns = [
-        TableColumn("model", "first"), TableColumn("against", "second"), TableColumn("ED difference [m]", "difference", number(2), interval=True),
+        TableColumn("model", "first"), TableColumn("against", "second"),
+        TableColumn("ED difference [m]", "difference", number(2), interval=True),
         TableColumn("better in", "better"), TableColumn("p", "p", p_text), TableColumn("p, Holm", "p_holm", p_text),
     ]  # fmt: skip
     runs = scores.matched.clusters
     notes = [
-        f"Mean ED of the first less that of the second on the same windows, seeds averaged; bootstrap-t over {runs} runs ({RESAMPLES} resamples, "
+        f"Mean ED of the first less that of the second on the same windows, seeds averaged; bootstrap-t over {runs} "
+        f"runs ({RESAMPLES} resamples, "
         "windows of one run drawn together), p after Holm over all pairs.",
     ]
     if runs < FEW_RUNS:
@@ -110,15 +142,22 @@ def slice_table(scores: Scores) -> Table | None:
     by_slice: list[dict[str, Any]] = []
     for name, s in names.items():
         runs = scores.rows["cluster"][s.members[place]].nunique()
-        line: dict[str, Any] = {"slice": s.label, "windows": f"{s.members.sum()}" if runs == s.members.sum() else f"{s.members.sum()} ({runs})"}
+        line: dict[str, Any] = {
+            "slice": s.label,
+            "windows": f"{s.members.sum()}" if runs == s.members.sum() else f"{s.members.sum()} ({runs})",
+        }
         for i, model in enumerate(lines):
             line |= {f"m{i}{end}": model.get(f"{name}{end}", float("nan")) for end in ("", "_low", "_high")}
         by_slice.append(line)
     few = any("(" in line["windows"] for line in by_slice)
-    columns = [TableColumn("windows in which the true ship", "slice"), TableColumn("number (runs)" if few else "number", "windows")]
+    columns = [
+        TableColumn("windows in which the true ship", "slice"),
+        TableColumn("number (runs)" if few else "number", "windows"),
+    ]
     columns += [TableColumn(model, f"m{i}", significant(3), interval=True) for i, model in enumerate(scores.models)]
     notes = [
-        "ED [m], mean over the windows. Speed, drift angle (weighted with speed) and |rudder| are means over the window, cut into thirds of them; "
+        "ED [m], mean over the windows. Speed, drift angle (weighted with speed) and |rudder| are means over the "
+        "window, cut into thirds of them; "
         "astern: astern revolutions are ordered; thrusters: one has an order."
     ]
     return Table("Regime slices", columns, by_slice, notes)
@@ -127,7 +166,9 @@ def slice_table(scores: Scores) -> Table | None:
 def trial_table(scores: Scores) -> Table | None:
     """Errors of the IMO/ITTC indices where windows are standard manoeuvres, or None."""
     windows = scores.windows
-    columns = {name: column for name, column in zip(TRIAL_NAMES, TRIAL_COLUMNS, strict=True) if column.name in scores.rows}
+    columns = {
+        name: column for name, column in zip(TRIAL_NAMES, TRIAL_COLUMNS, strict=True) if column.name in scores.rows
+    }
     if windows is None or not columns:
         return None
     lines = [line for name, column in columns.items() for line in _trial_lines(scores, windows, name, column)]
@@ -135,11 +176,19 @@ def trial_table(scores: Scores) -> Table | None:
         return None
     shown = [TableColumn("index", "index"), TableColumn("model", "model"), TableColumn("windows", "windows", str)]
     shown += [TableColumn("reached", "reached", str), TableColumn("true mean", "true", significant(3))]
-    shown += [TableColumn("mean absolute error", "error", significant(3)), TableColumn("mean error", "bias", significant(3))]
+    shown += [
+        TableColumn("mean absolute error", "error", significant(3)),
+        TableColumn("mean error", "bias", significant(3)),
+    ]
     notes = [
-        "Predicted less true, over windows that are a turn or a zig-zag (the rudder leaves a straight course for one angle and stays, or goes to "
-        "and fro), under the recorded orders: a model's overshoot is counted from its own heading when the true rudder was reversed.",
-        "Reached: windows in which the model gets there too (turns 90 or 180 degrees, comes back from the overshoot); the errors are of those.",
+        "Predicted less true, over windows that are a turn or a zig-zag (the rudder leaves a straight course for "
+        "one angle and stays, or goes to "
+        "and fro), under the recorded orders: a model's overshoot is counted from its own heading when the true "
+        "rudder was reversed.",
+        (
+            "Reached: windows in which the model gets there too (turns 90 or 180 degrees, comes back from the "
+            "overshoot); the errors are of those."
+        ),
     ]
     return Table("Indices of standard manoeuvres (IMO, ITTC)", shown, lines, notes)
 
@@ -154,6 +203,18 @@ def _trial_lines(scores: Scores, windows: Frame, name: str, column: Column) -> l
         part = scores.rows[scores.rows["model"] == model]
         mine = part[[key in keys for key in zip(part["fold"], part["run"], strict=True)]]
         errors = factor * mine[column.name].dropna()
-        line: dict[str, Any] = {"index": f"{column.label} [{shown}]", "model": model, "windows": len(mine), "reached": len(errors)}
-        lines.append(line | {"true": factor * float(there[name].mean()), "error": float(errors.abs().mean()), "bias": float(errors.mean())})
+        line: dict[str, Any] = {
+            "index": f"{column.label} [{shown}]",
+            "model": model,
+            "windows": len(mine),
+            "reached": len(errors),
+        }
+        lines.append(
+            line
+            | {
+                "true": factor * float(there[name].mean()),
+                "error": float(errors.abs().mean()),
+                "bias": float(errors.mean()),
+            }
+        )
     return lines

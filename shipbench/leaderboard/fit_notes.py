@@ -21,7 +21,9 @@ def fit_notes(summaries: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], s
         bad = [(report, fold) for report, fold in found if not report.fits]
         if bad:
             report, fold = max(bad, key=lambda pair: pair[0].error / max(pair[0].hold, 1e-9))
-            where = f" In {len(bad)} of {len(found)} fits; the figures are those of fold {fold}." if len(found) > 1 else ""
+            where = (
+                f" In {len(bad)} of {len(found)} fits; the figures are those of fold {fold}." if len(found) > 1 else ""
+            )
             notes[key] = report.note + where
     return notes
 

@@ -29,7 +29,9 @@ def check_formats(formats: Sequence[str]) -> None:
             raise unknown_name("format", name, list(FORMATS))
 
 
-def render(board: Board, name: str, command: str, images: Sequence[Path], folder: Path, curves: dict[str, Any] | None = None) -> tuple[str, str]:
+def render(
+    board: Board, name: str, command: str, images: Sequence[Path], folder: Path, curves: dict[str, Any] | None = None
+) -> tuple[str, str]:
     """Suffix and text of `board` in the format `name`.
 
     Args:
@@ -54,8 +56,10 @@ def latex(board: Board, command: str) -> str:
     parts = [*[f"% {one_line(line)}" for line in about], r"% \usepackage{booktabs,graphicx}", ""]
     for table in board.tables:
         parts += [
-            r"\begin{table}[tbp]", r"\centering", rf"\caption{{{latex_text(f'{board.dataset}: {table.title}')}}}", r"\resizebox{\textwidth}{!}{%",
-            _latex_tabular(table) + "}", *[rf"\par\footnotesize {latex_text(note)}" for note in table.notes], r"\end{table}", "",
+            r"\begin{table}[tbp]", r"\centering", rf"\caption{{{latex_text(f'{board.dataset}: {table.title}')}}}",
+            r"\resizebox{\textwidth}{!}{%",
+            _latex_tabular(table) + "}", *[rf"\par\footnotesize {latex_text(note)}" for note in table.notes],
+            r"\end{table}", "",
         ]  # fmt: skip
     return "\n".join(parts)
 
@@ -68,13 +72,17 @@ def _latex_tabular(table: Table) -> str:
         text = rf"\textit{{{text}}}" if row.get("_reference") and text else text
         return rf"\shortstack[r]{{{text}\\{{\scriptsize {between}}}}}" if between else text
 
-    frame = pd.DataFrame([[cell(c, row) for c in table.columns] for row in table.rows], columns=[latex_text(c.header) for c in table.columns])
+    frame = pd.DataFrame(
+        [[cell(c, row) for c in table.columns] for row in table.rows],
+        columns=[latex_text(c.header) for c in table.columns],
+    )
     layout = "".join("r" if c.format else "l" for c in table.columns)
     return frame.to_latex(index=False, escape=False, column_format=layout).rstrip()
 
 
 def csv(board: Board) -> str:
-    """One line per figure: data set, table, row (its text cells), figure, value (not rounded), ends of the 95 % interval."""
+    """One line per figure: data set, table, row (its text cells), figure, value (not rounded), ends of the 95 %
+    interval."""
     import pandas as pd
 
     lines = []
@@ -82,8 +90,14 @@ def csv(board: Board) -> str:
         names = [c for c in table.columns if c.format is None]
         for row in table.as_json()["rows"]:
             words = [str(row[c.key]) for c in names if row[c.key] not in (None, "")]
-            label = {"dataset": csv_text(board.dataset), "table": csv_text(table.title), "row": csv_text(" | ".join(words))}
+            label = {
+                "dataset": csv_text(board.dataset),
+                "table": csv_text(table.title),
+                "row": csv_text(" | ".join(words)),
+            }
             for column in (c for c in table.columns if c.format is not None):
                 ends = {end: row.get(f"{column.key}_{end}") for end in ("low", "high")}
                 lines.append(label | {"figure": csv_text(column.header), "value": row[column.key], **ends})
-    return pd.DataFrame(lines, columns=["dataset", "table", "row", "figure", "value", "low", "high"]).to_csv(index=False, lineterminator="\n")
+    return pd.DataFrame(lines, columns=["dataset", "table", "row", "figure", "value", "low", "high"]).to_csv(
+        index=False, lineterminator="\n"
+    )

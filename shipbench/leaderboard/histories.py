@@ -43,9 +43,13 @@ def study_plots(series: Series, rows: Frame, models: Sequence[str], L: float, B:
     """
     if not series.tracks:
         return {"runs": [], "fits": []}
-    first = rows.sort_values(["seed", "fold"], kind="stable").drop_duplicates(["model", "run"])  # as the tracks: of several seeds the first
+    first = rows.sort_values(["seed", "fold"], kind="stable").drop_duplicates(
+        ["model", "run"]
+    )  # as the tracks: of several seeds the first
     by_run = {run: part.set_index("model") for run, part in first.groupby("run")}
-    signals = [s for s in SIGNALS if s[0] not in (F_B, F_S) or any(np.any(t.truth[:, s[0]] != 0.0) for t in series.tracks)]
+    signals = [
+        s for s in SIGNALS if s[0] not in (F_B, F_S) or any(np.any(t.truth[:, s[0]] != 0.0) for t in series.tracks)
+    ]
     columns = [EAST, NORTH, *(q for _, _, q in signals), ERROR]
     runs = []
     for track in series.tracks:
@@ -65,7 +69,9 @@ def study_plots(series: Series, rows: Frame, models: Sequence[str], L: float, B:
     names = [Line("measured", "measured"), *(Line(m, i) for i, m in enumerate(models))]
     histories = ["error", *(q.name for _, _, q in signals)]
     start = _median_run([by_run[track.run] for track in series.tracks])
-    return linked_plots(columns, names, histories, runs, ("east", "north"), start) | {"fits": [STATES[i] for i in FITTED]}
+    return linked_plots(columns, names, histories, runs, ("east", "north"), start) | {
+        "fits": [STATES[i] for i in FITTED]
+    }
 
 
 def shown(S: np.ndarray, truth: np.ndarray, signals: Sequence[tuple[int, float, Quantity]]) -> dict[str, np.ndarray]:
@@ -94,8 +100,8 @@ def _median_run(found: Sequence[Frame]) -> int:
 
 
 def near(predicted: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """States (steps, 6 or 10) without what follows the first position that lies farther off than twice the true track's extent: a model that
-    diverges must not hide the others. The truth may have gaps."""
+    """States (steps, 6 or 10) without what follows the first position that lies farther off than twice the true track's
+    extent: a model that diverges must not hide the others. The truth may have gaps."""
     known = truth[np.isfinite(truth[:, :2]).all(axis=1), :2]
     reach = 2.0 * float(np.max(np.ptp(known, axis=0), initial=1e-3)) if len(known) else np.inf
     with np.errstate(all="ignore"):

@@ -1,4 +1,5 @@
-"""The result of a leaderboard in one or two sentences, in tiles, and in the short table of a terminal: who is first, by how much, how sure."""
+"""The result of a leaderboard in one or two sentences, in tiles, and in the short table of a terminal: who is first, by
+how much, how sure."""
 
 from __future__ import annotations
 
@@ -25,7 +26,10 @@ def lead(scores: Scores) -> str:
     if len(ranked) == 1:
         return f"{mean}{_between(errors[first]['ed_mean_low'], errors[first]['ed_mean_high'])}, over {_runs(scores)}."
     second = ranked[1]
-    behind = f"'{first}' is first: mean position error (ED) {_metres(errors[first]['ed_mean'])}, '{second}' {_metres(errors[second]['ed_mean'])}."
+    behind = (
+        f"'{first}' is first: mean position error (ED) {_metres(errors[first]['ed_mean'])}, '{second}' "
+        f"{_metres(errors[second]['ed_mean'])}."
+    )
     return f"{behind} {_certainty(scores, first, second)}"
 
 
@@ -40,14 +44,19 @@ def lead_tiles(scores: Scores, horizon: float) -> list[Tile]:
     if pair is not None and np.isfinite(pair.p_holm) and pair.difference != 0.0:
         sure = "significant" if pair.p_holm < _CERTAIN else "not significant"
         found.append(
-            Tile("Difference in ED", sure, f"{_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, {_p(scores, pair)}")
+            Tile(
+                "Difference in ED",
+                sure,
+                f"{_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, {_p(scores, pair)}",
+            )
         )
     windows = len(scores.rows[["fold", "run"]].drop_duplicates())
     missing = sum(expected - scored for scored, expected in scores.shares.values())
     return [
         *found, Tile("Windows", str(windows), f"of {horizon:g} s, from {_runs(scores)}"),
         Tile("Models", str(len(scores.models)), "on the same windows"),
-        Tile("Not scored", str(missing), "predictions; the reasons stand under Status and cost" if missing else "every prediction was scored"),
+        Tile("Not scored", str(missing),
+            "predictions; the reasons stand under Status and cost" if missing else "every prediction was scored"),
     ]  # fmt: skip
 
 
@@ -60,7 +69,10 @@ def _certainty(scores: Scores, first: str, second: str) -> str:
     if pair.difference == 0.0:
         return f"They do not differ on {_runs(scores)}."
     sure = "The difference is significant" if pair.p_holm < _CERTAIN else "The difference is not significant"
-    return f"{sure}: {_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, {_p(scores, pair)}, {_runs(scores)}."
+    return (
+        f"{sure}: {_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, "
+        f"{_p(scores, pair)}, {_runs(scores)}."
+    )
 
 
 def _p(scores: Scores, pair: Pair) -> str:
@@ -86,7 +98,12 @@ def _runs(scores: Scores) -> str:
 def short_table(full: Table) -> Table:
     """The means of the table of errors alone, without the notes on how the other figures are made."""
     columns = [c for c in full.columns if c.format is None or c.key.endswith("_mean")]
-    return replace(full, title="Errors over the horizon", columns=columns, notes=[_SHORT, *(n for n in full.notes if not n.startswith(_LONG))])
+    return replace(
+        full,
+        title="Errors over the horizon",
+        columns=columns,
+        notes=[_SHORT, *(n for n in full.notes if not n.startswith(_LONG))],
+    )
 
 
 _LONG = ("ED in", "In italics")

@@ -41,7 +41,8 @@ def run_curve(
     progress: Progress | None = None,
     command: str = "",
 ) -> Curve:
-    """Run `task` with each number of training runs into `out/train<number>`, and write `out/learning-curve.md` with its plot.
+    """Run `task` with each number of training runs into `out/train<number>`, and write `out/learning-curve.md` with its
+    plot.
 
     The training runs of a smaller number are among those of a larger one; the scored runs are the same.
 
@@ -50,7 +51,10 @@ def run_curve(
     """
     numbers = sorted(set(sizes))
     if not numbers or numbers[0] < 2:
-        raise InputError(f"--sizes {', '.join(map(str, sizes)) or '(none)'}; accepted: numbers of training runs of 2 and more, such as 4,8,16,32,72.")
+        raise InputError(
+            f"--sizes {', '.join(map(str, sizes)) or '(none)'}; accepted: numbers of training runs of 2 and more, "
+            "such as 4,8,16,32,72."
+        )
     tasks = {n: task.model_copy(update={"train_runs": n}) for n in numbers}
     for one in tasks.values():
         check_task(one)
@@ -58,7 +62,9 @@ def run_curve(
     failed: list[str] = []
     boards: dict[int, Board] = {}
     for n, one in tasks.items():
-        outcome = run_tasks([one], out / f"train{n:03d}", resume=resume, execution=execution, progress=progress, command=command)
+        outcome = run_tasks(
+            [one], out / f"train{n:03d}", resume=resume, execution=execution, progress=progress, command=command
+        )
         failed += [f"{n} training runs: {line}" for line in outcome.failed]
         dataset = outcome.summaries[0]["dataset"]
         found[n], boards[n] = scores_of(outcome.results, dataset), build_board(outcome.results, dataset)
@@ -76,12 +82,33 @@ def _board(found: dict[int, Scores], last: Board) -> Board:
             figures = _figures(scores, model)
             line |= {f"n{n}{end}": figures[end] for end in figures}
         lines.append(line)
-    columns = [TableColumn("model", "model"), *[TableColumn(f"{n} runs", f"n{n}", number(2), interval=True) for n in found]]
+    columns = [
+        TableColumn("model", "model"),
+        *[TableColumn(f"{n} runs", f"n{n}", number(2), interval=True) for n in found],
+    ]
     incomplete = {m: [n for n, s in found.items() if s.shares[m][0] < s.shares[m][1]] for m in last.ranking}
-    notes = ["ED [m], mean over runs and folds; intervals: 95 %, bootstrap over the scored runs, which are the same in every column."]
-    notes.append("Training runs include those set aside for early stopping; the runs of a smaller number are among those of a larger one.")
-    notes += [f"`{m}` has runs without a score with {', '.join(map(str, n))} training runs: no figure there." for m, n in incomplete.items() if n]
-    return Board(last.dataset, last.ranking, [Table("Error against number of training runs", columns, lines, notes)], last.head, "Learning curve")
+    notes = [
+        (
+            "ED [m], mean over runs and folds; intervals: 95 %, bootstrap over the scored runs, which are the same in "
+            "every column."
+        )
+    ]
+    notes.append(
+        "Training runs include those set aside for early stopping; the runs of a smaller number are among those of "
+        "a larger one."
+    )
+    notes += [
+        f"`{m}` has runs without a score with {', '.join(map(str, n))} training runs: no figure there."
+        for m, n in incomplete.items()
+        if n
+    ]
+    return Board(
+        last.dataset,
+        last.ranking,
+        [Table("Error against number of training runs", columns, lines, notes)],
+        last.head,
+        "Learning curve",
+    )
 
 
 def _figures(scores: Scores, model: str) -> dict[str, float]:

@@ -1,4 +1,5 @@
-"""All data sets of a study beside one another: mean rank, win rate, skill, and a critical-difference diagram where there are enough data sets."""
+"""All data sets of a study beside one another: mean rank, win rate, skill, and a critical-difference diagram where
+there are enough data sets."""
 
 from __future__ import annotations
 
@@ -22,9 +23,11 @@ ALPHA = 0.05
 
 
 def data_sets_needed(models: int) -> int:
-    """Fewest data sets with which a paired rank test can tell any two of `models` apart at 5 % after Bonferroni or Holm.
+    """Fewest data sets with which a paired rank test can tell any two of `models` apart at 5 % after Bonferroni or
+    Holm.
 
-    Wilcoxon's signed-rank test on n data sets has no two-sided p below 2 / 2^n; of k (k - 1) / 2 pairs the first must stay below 0.05 / pairs.
+    Wilcoxon's signed-rank test on n data sets has no two-sided p below 2 / 2^n; of k (k - 1) / 2 pairs the first must
+    stay below 0.05 / pairs.
     """
     pairs = models * (models - 1) // 2
     return math.ceil(math.log2(2 * pairs / ALPHA))
@@ -44,9 +47,11 @@ class Overall:
         return len(self.errors) >= data_sets_needed(len(self.models)) and not not_installed(["scikit_posthocs"])
 
     def draw(self, folder: Path) -> Path:
-        """The critical-difference diagram: mean ranks; a bar joins models that Wilcoxon's test does not tell apart (p after Holm).
+        """The critical-difference diagram: mean ranks; a bar joins models that Wilcoxon's test does not tell apart (p
+        after Holm).
 
-        Source: Demsar (2006), J. Mach. Learn. Res. 7; pairwise tests instead of Nemenyi's: Benavoli et al. (2016), J. Mach. Learn. Res. 17.
+        Source: Demsar (2006), J. Mach. Learn. Res. 7; pairwise tests instead of Nemenyi's: Benavoli et al. (2016), J.
+        Mach. Learn. Res. 17.
         """
         from .plots import new_figure, save
         from .plots import short_name as in_legend
@@ -71,7 +76,12 @@ def _diagram(ranks: dict[str, float], p_values: Any, axis: Any) -> None:
     import scikit_posthocs as posthocs
 
     posthocs.critical_difference_diagram(
-        ranks, p_values, ax=axis, alpha=ALPHA, label_fmt_left="{label} ({rank:.2f})  ", label_fmt_right="  {label} ({rank:.2f})"
+        ranks,
+        p_values,
+        ax=axis,
+        alpha=ALPHA,
+        label_fmt_left="{label} ({rank:.2f})  ",
+        label_fmt_right="  {label} ({rank:.2f})",
     )
     axis.set_title("Mean rank over data sets (1 is best); joined: not told apart at 5 %", fontsize=11)
 
@@ -83,7 +93,8 @@ def _ranks(errors: np.ndarray) -> np.ndarray:
 
 
 def over_data_sets(sets: Sequence[Scores]) -> Overall | None:
-    """The page over several data sets, for the ranked models that have every score on all of them; None for one data set or one such model."""
+    """The page over several data sets, for the ranked models that have every score on all of them; None for one data
+    set or one such model."""
     if len(sets) < 2:
         return None
     models = [m for m in sets[0].ranked if all(m in s.matched.complete for s in sets)]
@@ -95,21 +106,33 @@ def over_data_sets(sets: Sequence[Scores]) -> Overall | None:
     asked = sets[0].asked_baseline or FLOOR
     baseline = asked if asked in models and (errors[:, models.index(asked)] > 0).all() else None
     table = _table(sets, models, errors, baseline)
-    board = Board(NAME, models, [table], _head(sets, models), lead=_lead(table, len(sets)), tiles=_tiles(table, len(sets)))
+    board = Board(
+        NAME, models, [table], _head(sets, models), lead=_lead(table, len(sets)), tiles=_tiles(table, len(sets))
+    )
     return Overall(replace(board, tables=[_with_diagram(table, Overall(board, models, errors))]), models, errors)
 
 
 def _table(sets: Sequence[Scores], models: list[str], errors: np.ndarray, baseline: str | None) -> Table:
-    drawn = np.stack([s.matched.means(models) for s in sets])  # (data sets, resamples, models); runs are drawn in each data set apart
+    drawn = np.stack(
+        [s.matched.means(models) for s in sets]
+    )  # (data sets, resamples, models); runs are drawn in each data set apart
     runs = min(s.matched.clusters for s in sets)
     ranks = _ranks(drawn).mean(axis=0)
     lines: list[dict[str, Any]] = []
     for j, model in enumerate(models):
         others = [m for m in models if m != model]
         wins = [s.matched.wins(model, others) for s in sets]
-        won = np.mean([s.boot.means(s.matched.codes, w[:, None], s.matched.weights[:, None])[:, 0] for s, w in zip(sets, wins, strict=True)], axis=0)
+        won = np.mean(
+            [
+                s.boot.means(s.matched.codes, w[:, None], s.matched.weights[:, None])[:, 0]
+                for s, w in zip(sets, wins, strict=True)
+            ],
+            axis=0,
+        )
         line: dict[str, Any] = {"model": model, "rank": float(_ranks(errors).mean(axis=0)[j])}
-        line["wins"] = 100.0 * float(np.mean([np.average(w, weights=s.matched.weights) for s, w in zip(sets, wins, strict=True)]))
+        line["wins"] = 100.0 * float(
+            np.mean([np.average(w, weights=s.matched.weights) for s, w in zip(sets, wins, strict=True)])
+        )
         figures = {"rank": ranks[:, j], "wins": 100.0 * won}
         if baseline:
             b = models.index(baseline)
@@ -121,7 +144,12 @@ def _table(sets: Sequence[Scores], models: list[str], errors: np.ndarray, baseli
         lines.append(line)
     columns = [TableColumn("model", "model"), TableColumn("mean rank", "rank", number(2), interval=True)]
     columns.append(TableColumn("win rate [%]", "wins", number(1), interval=True))
-    notes = ["Every data set counts the same. Intervals: 95 %, bootstrap over the runs of each data set; for these data sets, not for others."]
+    notes = [
+        (
+            "Every data set counts the same. Intervals: 95 %, bootstrap over the runs of each data set; for these data "
+            "sets, not for others."
+        )
+    ]
     if baseline:
         columns.append(TableColumn(f"skill against `{baseline}` [%]", "skill", number(1), interval=True))
         notes.append(f"Skill: 100 (1 - geometric mean of ED / ED of `{baseline}`).")
@@ -132,7 +160,8 @@ def _lead(table: Table, count: int) -> str:
     """Who has the best mean rank, and who follows."""
     first, second = table.rows[:2]
     return (
-        f"'{first['model']}' has the best mean rank over {count} data sets: {_rank(first)}. '{second['model']}' is second: {_rank(second)}. "
+        f"'{first['model']}' has the best mean rank over {count} data sets: {_rank(first)}. '{second['model']}' is "
+        f"second: {_rank(second)}. "
         "Rank 1 is the least position error."
     )
 
@@ -140,7 +169,11 @@ def _lead(table: Table, count: int) -> str:
 def _tiles(table: Table, count: int) -> list[Tile]:
     places = zip(("First", "Second"), table.rows, strict=False)
     found = [Tile(label, short_name(row["model"]), f"mean rank {_rank(row)}") for label, row in places]
-    return [*found, Tile("Data sets", str(count), "each counts the same"), Tile("Models", str(len(table.rows)), "scored on all of them")]
+    return [
+        *found,
+        Tile("Data sets", str(count), "each counts the same"),
+        Tile("Models", str(len(table.rows)), "scored on all of them"),
+    ]
 
 
 def _rank(row: dict[str, Any]) -> str:
@@ -153,8 +186,10 @@ def _with_diagram(table: Table, overall: Overall) -> Table:
     count, needed = len(overall.errors), data_sets_needed(len(overall.models))
     if count < needed:
         note = (
-            f"No critical-difference diagram: {len(overall.models)} models need at least {needed} data sets before a paired rank test can tell any "
-            f"two apart at 5 % (Wilcoxon, Holm); there are {count}. Within a data set the paired comparison over runs answers."
+            f"No critical-difference diagram: {len(overall.models)} models need at least {needed} data sets before "
+            "a paired rank test can tell any "
+            f"two apart at 5 % (Wilcoxon, Holm); there are {count}. Within a data set the paired comparison over "
+            "runs answers."
         )
     elif not overall.can_draw:
         note = f"The critical-difference diagram {not_installed(['scikit_posthocs'])}."
@@ -167,5 +202,7 @@ def _head(sets: Sequence[Scores], models: list[str]) -> list[str]:
     left_out = sorted({m for s in sets for m in s.ranked} - set(models))
     lines = [f"{len(sets)} data sets: {', '.join(s.dataset for s in sets)}."]
     if left_out:
-        lines.append(f"Left out, since they lack a score on one of the data sets: {', '.join(f'`{m}`' for m in left_out)}.")
+        lines.append(
+            f"Left out, since they lack a score on one of the data sets: {', '.join(f'`{m}`' for m in left_out)}."
+        )
     return lines

@@ -24,7 +24,9 @@ from .lead import lead, lead_tiles, short_table
 from .scores import Scores, cluster_of
 
 SPLITS = {
-    "folds": "{folds} folds by run", "published": "published split", "kind": "{folds} folds, each scored on a kind of manoeuvre left out of training",
+    "folds": "{folds} folds by run", "published": "published split",
+    "kind": ("{folds} folds, each scored on a kind "
+             "of manoeuvre left out of training"),
     "speed": "trained on the slower runs, scored on the fastest",
 }  # fmt: skip
 """How a page names the split of a task."""
@@ -34,7 +36,8 @@ def build_board(results: Results, dataset: str, baseline: str | None = None) -> 
     """The leaderboard of `dataset`; skill is counted from the model `baseline` (default: `hold`, where it is there).
 
     Raises:
-        InputError: the rows are of different protocols, data (fingerprints) or tasks, which are never ranked together; or there is no such baseline.
+        InputError: the rows are of different protocols, data (fingerprints) or tasks, which are never ranked together;
+        or there is no such baseline.
     """
     return _board(scores_of(results, dataset, baseline), [s for s in results.summaries if s["dataset"] == dataset])
 
@@ -51,9 +54,15 @@ def scores_of(results: Results, dataset: str, baseline: str | None = None) -> Sc
     columns = {c["name"]: c for s in summaries for c in s["columns"]}
     windows = results.windows
     if windows is not None:
-        windows = windows[(windows["dataset"] == dataset) & windows["fingerprint"].isin(rows["fingerprint"]) & windows["task"].isin(rows["task"])]
+        windows = windows[
+            (windows["dataset"] == dataset)
+            & windows["fingerprint"].isin(rows["fingerprint"])
+            & windows["task"].isin(rows["task"])
+        ]
     tasks = [s["task"] for s in summaries]
-    beside_paper = dataset == board_tables.PAPER_DATASET and all(t["split"] == "folds" and not t.get("train_runs") for t in tasks)
+    beside_paper = dataset == board_tables.PAPER_DATASET and all(
+        t["split"] == "folds" and not t.get("train_runs") for t in tasks
+    )
     return Scores(dataset, rows.assign(cluster=cluster_of(rows)), columns, windows, baseline, beside_paper)
 
 
@@ -71,7 +80,15 @@ def _board(scores: Scores, summaries: list[dict[str, Any]]) -> Board:
     tables.append(board_tables.status_table(scores, parameters_by_model(summaries)))
     known = [t for t in tables if t is not None]
     tiles = lead_tiles(scores, summaries[0]["task"]["horizon_s"])
-    return Board(scores.dataset, scores.models, known, _head(scores.rows, summaries), lead=lead(scores), tiles=tiles, short=short_table(known[0]))
+    return Board(
+        scores.dataset,
+        scores.models,
+        known,
+        _head(scores.rows, summaries),
+        lead=lead(scores),
+        tiles=tiles,
+        short=short_table(known[0]),
+    )
 
 
 def _marked(table: Table, dataset: str, summaries: list[dict[str, Any]]) -> Table:
@@ -81,7 +98,12 @@ def _marked(table: Table, dataset: str, summaries: list[dict[str, Any]]) -> Tabl
         return table
     rows = [row | {"fit": MARK} if row.get("model") in notes else row for row in table.rows]
     columns = [*table.columns[:3], TableColumn("fit", "fit"), *table.columns[3:]]
-    return replace(table, columns=columns, rows=rows, notes=[*table.notes, *(f"{MARK} `{model}`: {note}" for model, note in notes.items())])
+    return replace(
+        table,
+        columns=columns,
+        rows=rows,
+        notes=[*table.notes, *(f"{MARK} `{model}`: {note}" for model, note in notes.items())],
+    )
 
 
 def _refuse_mixtures(rows: Frame, summaries: list[dict[str, Any]], dataset: str) -> None:
@@ -96,7 +118,8 @@ def _refuse_mixtures(rows: Frame, summaries: list[dict[str, Any]], dataset: str)
             )
     if summaries and summaries[0]["protocol"] != PROTOCOL:
         raise InputError(
-            f"data set '{dataset}': the rows are of protocol {summaries[0]['protocol']}, this version ranks protocol {PROTOCOL}; "
+            f"data set '{dataset}': the rows are of protocol {summaries[0]['protocol']}, this version ranks "
+            f"protocol {PROTOCOL}; "
             "run the models again."
         )
 
@@ -140,9 +163,11 @@ def write_boards(
     baseline: str | None = None,
     tell: Callable[[str], None] = lambda line: None,
 ) -> list[tuple[Board, Path]]:
-    """Render every data set of `results` into `out/<dataset>.md` (and the other `formats`), with its plots beside it in `out/<dataset>/`.
+    """Render every data set of `results` into `out/<dataset>.md` (and the other `formats`), with its plots beside it in
+    `out/<dataset>/`.
 
-    Several data sets with several models in common also get a page over all of them. `tell` gets a line on each plot that cannot be drawn.
+    Several data sets with several models in common also get a page over all of them. `tell` gets a line on each plot
+    that cannot be drawn.
 
     Returns:
         Each board with the path of its page in the first format.
@@ -162,7 +187,10 @@ def write_boards(
     if overall is not None:
         page = overall.board.dataset
         if page in names:
-            raise InputError(f"a data set is named '{page}', as the page over all data sets is. Rename the data set, or give it alone.")
+            raise InputError(
+                f"a data set is named '{page}', as the page over all data sets is. Rename the data set, or give it "
+                "alone."
+            )
         boards.append(overall.board)
         images[page] = [overall.draw(out / page)] if plots and overall.can_draw else []
     written = []
@@ -180,7 +208,10 @@ def _draw(results: Results, board: Board, out: Path, tell: Callable[[str], None]
 
     folder = out / file_name(board.dataset)
     if folder.is_symlink():
-        raise InputError(f"{folder} is a link; accepted: a folder, so that pictures land below {out}. Remove the link, or give another --out.")
+        raise InputError(
+            f"{folder} is a link; accepted: a folder, so that pictures land below {out}. Remove the link, or give "
+            "another --out."
+        )
     return draw_all(results, board.dataset, board.ranking, folder, lambda line: tell(f"{board.dataset}: {line}"))
 
 
@@ -192,7 +223,9 @@ def _curves(results: Results, board: Board) -> dict[str, Any]:
     return study_curves(results, board.dataset, [m for m in board.ranking if m in scored])
 
 
-def _write(board: Board, form: str, command: str, images: Sequence[Path], out: Path, curves: dict[str, Any] | None) -> Path:
+def _write(
+    board: Board, form: str, command: str, images: Sequence[Path], out: Path, curves: dict[str, Any] | None
+) -> Path:
     """The page in one format, in one step."""
     suffix, text = render(board, form, command, images, out, curves)
     return write_text(out / f"{file_name(board.dataset)}{suffix}", text)

@@ -1,4 +1,5 @@
-"""Plots of a leaderboard: tracks, box plots and error against horizon, from saved predictions. PNG, drawn without a display."""
+"""Plots of a leaderboard: tracks, box plots and error against horizon, from saved predictions. PNG, drawn without a
+display."""
 
 from __future__ import annotations
 
@@ -25,15 +26,24 @@ if TYPE_CHECKING:
 
 # Okabe and Ito's palette, told apart with every common colour blindness; line styles differ too.
 _PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-_KNOWN = {"physics": "#0072B2", "mlp": "#D55E00", "neural_ode": "#009E73", "lstm": "#CC79A7", "hold": "#8C8C8C", "oracle": "#E69F00"}
+_KNOWN = {
+    "physics": "#0072B2",
+    "mlp": "#D55E00",
+    "neural_ode": "#009E73",
+    "lstm": "#CC79A7",
+    "hold": "#8C8C8C",
+    "oracle": "#E69F00",
+}
 _DASHES: dict[str, Any] = {
-    "physics": "-", "neural_ode": (0, (5, 1.5)), "mlp": (0, (3, 1, 1, 1)), "lstm": (0, (1, 1)), "hold": (0, (7, 3)), "oracle": (0, (1, 2)),
+    "physics": "-", "neural_ode": (0, (5, 1.5)), "mlp": (0, (3, 1, 1, 1)), "lstm": (0, (1, 1)), "hold": (0, (7, 3)),
+    "oracle": (0, (1, 2)),
 }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class _Prediction:
-    """One model's scored windows of one cell: ids, s0 (batch, 10), truth and S (batch, K, 10), which of them are scored."""
+    """One model's scored windows of one cell: ids, s0 (batch, 10), truth and S (batch, K, 10), which of them are
+    scored."""
 
     ids: tuple[str, ...]
     s0: np.ndarray
@@ -44,7 +54,11 @@ class _Prediction:
 
 def _predictions(results: Results, dataset: str, model: str) -> Iterator[_Prediction]:
     """The cells of a model that hold predictions; of several seeds the first."""
-    found = [(s, p) for s, p in zip(results.summaries, results.sources, strict=True) if s["dataset"] == dataset and s["model"] == model]
+    found = [
+        (s, p)
+        for s, p in zip(results.summaries, results.sources, strict=True)
+        if s["dataset"] == dataset and s["model"] == model
+    ]
     first = min((s["seed"] for s, _ in found), default=0)
     for summary, source in found:
         if summary["seed"] != first:
@@ -85,7 +99,10 @@ def style(models: Sequence[str]) -> dict[str, dict[str, Any]]:
     free = [c for c in _PALETTE if c not in {_KNOWN[base] for base in known.values()}] or list(_PALETTE)
     others = itertools.cycle(free)
     return {
-        m: {"color": _KNOWN[known[m]], "linestyle": _DASHES[known[m]]} if m in known else {"color": next(others), "linestyle": "-"} for m in models
+        m: {"color": _KNOWN[known[m]], "linestyle": _DASHES[known[m]]}
+        if m in known
+        else {"color": next(others), "linestyle": "-"}
+        for m in models
     }
 
 
@@ -117,13 +134,23 @@ def drawable(results: Results, dataset: str, ranking: Sequence[str]) -> tuple[li
     return models, without
 
 
-def draw_all(results: Results, dataset: str, ranking: Sequence[str], folder: Path, tell: Callable[[str], None] = lambda line: None) -> list[Path]:
-    """Draw every plot of a data set into `folder`. Models without a single scored run are left out, and those without saved predictions, of which
-    `tell` gets one line."""
+def draw_all(
+    results: Results,
+    dataset: str,
+    ranking: Sequence[str],
+    folder: Path,
+    tell: Callable[[str], None] = lambda line: None,
+) -> list[Path]:
+    """Draw every plot of a data set into `folder`. Models without a single scored run are left out, and those without
+    saved predictions, of which `tell` gets one line."""
     rows = results.rows[results.rows["dataset"] == dataset]
     models, without = drawable(results, dataset, ranking)
     if without:
-        what = f"plots without {', '.join(without[:5])}{' and others' if len(without) > 5 else ''}" if models else "no plots"
+        what = (
+            f"plots without {', '.join(without[:5])}{' and others' if len(without) > 5 else ''}"
+            if models
+            else "no plots"
+        )
         tell(f"{what}: no saved predictions. Give the folder that `shipbench run` wrote, whole, or --no-plots.")
     if not models:
         return []
@@ -136,7 +163,8 @@ def draw_all(results: Results, dataset: str, ranking: Sequence[str], folder: Pat
 
 
 def choose_runs(rows: Frame, models: Sequence[str]) -> dict[str, str]:
-    """A good, a median and a bad run: the 10, 50 and 90 % points of the models' median ED (floor and ceiling left out)."""
+    """A good, a median and a bad run: the 10, 50 and 90 % points of the models' median ED (floor and ceiling left
+    out)."""
     compared = [m for m in models if m not in ("hold", "oracle")] or list(models)
     scored = rows[(rows["status"] == "ok") & rows["model"].isin(compared)]
     order = scored.groupby("run")["ed"].median().sort_values().index
@@ -148,13 +176,20 @@ def outline(x: float, y: float, psi: float, L: float, B: float) -> np.ndarray:
     """Corners (east, north) [m] of a ship's deck with its bow at heading `psi` [rad]."""
     ahead = L * np.array([0.5, 0.3, -0.44, -0.5, -0.5, -0.44, 0.3])
     starboard = B * np.array([0.0, 0.5, 0.5, 0.3, -0.3, -0.5, -0.5])
-    return np.stack([y + ahead * np.sin(psi) + starboard * np.cos(psi), x + ahead * np.cos(psi) - starboard * np.sin(psi)], axis=1)
+    return np.stack(
+        [y + ahead * np.sin(psi) + starboard * np.cos(psi), x + ahead * np.cos(psi) - starboard * np.sin(psi)], axis=1
+    )
 
 
-def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[str, Any], runs: Sequence[str] = ()) -> Figure:
-    """Tracks of `runs`, or of a good, a median and a bad one; the true ship every quarter of the horizon, the predicted ones at its end."""
+def tracks(
+    results: Results, dataset: str, models: Sequence[str], summary: dict[str, Any], runs: Sequence[str] = ()
+) -> Figure:
+    """Tracks of `runs`, or of a good, a median and a bad one; the true ship every quarter of the horizon, the predicted
+    ones at its end."""
     rows = results.rows[results.rows["dataset"] == dataset]
-    chosen = {plain(run): run for run in runs} or {f"{name} run: {plain(run)}": run for name, run in choose_runs(rows, models).items()}
+    chosen = {plain(run): run for run in runs} or {
+        f"{name} run: {plain(run)}": run for name, run in choose_runs(rows, models).items()
+    }
     figure = new_figure(5.0 * len(chosen), 6.2)
     axes = np.atleast_1d(figure.subplots(1, len(chosen)))
     styles = style(models)
@@ -163,7 +198,9 @@ def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[
             for axis, run in zip(axes, chosen.values(), strict=True):
                 if run in cell.ids and cell.ok[cell.ids.index(run)]:
                     i = cell.ids.index(run)
-                    _track(axis, cell.s0[i], cell.truth[i], summary, label="true", color="black", linestyle="-", fill=True)
+                    _track(
+                        axis, cell.s0[i], cell.truth[i], summary, label="true", color="black", linestyle="-", fill=True
+                    )
                     _track(axis, cell.s0[i], cell.S[i], summary, label=model, **styles[model])
     for axis, (title, run) in zip(axes, chosen.items(), strict=True):
         error = rows[(rows["run"] == run) & (rows["status"] == "ok")].groupby("model")["ed"].mean()
@@ -177,24 +214,52 @@ def tracks(results: Results, dataset: str, models: Sequence[str], summary: dict[
             continue
         order = ["true", *[m for m in models if m in handles]]
         texts = ["true", *[f"{short_name(m)} (ED {error[m]:.3g} m)" for m in order[1:]]]
-        axis.legend([handles[m] for m in order], texts, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
+        axis.legend(
+            [handles[m] for m in order], texts, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2
+        )
     about = f"{plain(dataset)}: tracks over {summary['task']['horizon_s']:g} s"
-    figure.suptitle(f"{about}; the true ship every quarter, the predicted ones at the end" if len(chosen) > 1 else about, fontsize=12)
+    figure.suptitle(
+        f"{about}; the true ship every quarter, the predicted ones at the end" if len(chosen) > 1 else about,
+        fontsize=12,
+    )
     return figure
 
 
 def _track(
-    axis: Axes, s0: np.ndarray, states: np.ndarray, summary: dict[str, Any], *, label: str, color: str, linestyle: Any, fill: bool = False
+    axis: Axes,
+    s0: np.ndarray,
+    states: np.ndarray,
+    summary: dict[str, Any],
+    *,
+    label: str,
+    color: str,
+    linestyle: Any,
+    fill: bool = False,
 ) -> None:
     """One line from s0 through the states, with ships; the true track (`fill`) is drawn once per axis."""
     if label == "true" and label in axis.get_legend_handles_labels()[1]:
         return
     path = np.concatenate([s0[None], states])
-    axis.plot(path[:, Y], path[:, X], color=color, linestyle=linestyle, lw=2.6 if fill else 1.8, label=label, zorder=2 if fill else 3)
+    axis.plot(
+        path[:, Y],
+        path[:, X],
+        color=color,
+        linestyle=linestyle,
+        lw=2.6 if fill else 1.8,
+        label=label,
+        zorder=2 if fill else 3,
+    )
     quarters = np.linspace(0, len(path) - 1, 5).round().astype(int)
     for k in quarters if fill else quarters[-1:] if label != "oracle" else []:
         corners = outline(path[k, X], path[k, Y], path[k, PSI], summary["ship_L"], summary["ship_B"])
-        axis.fill(*corners.T, facecolor="0.85" if fill else "none", edgecolor=color, lw=0.9, alpha=0.9, zorder=1 if fill else 3)
+        axis.fill(
+            *corners.T,
+            facecolor="0.85" if fill else "none",
+            edgecolor=color,
+            lw=0.9,
+            alpha=0.9,
+            zorder=1 if fill else 3,
+        )
 
 
 def _readable_limits(axis: Axes, groups: Sequence[np.ndarray]) -> None:
@@ -210,18 +275,23 @@ def _readable_limits(axis: Axes, groups: Sequence[np.ndarray]) -> None:
 
 
 def boxes(rows: Frame, models: Sequence[str], summary: dict[str, Any]) -> Figure:
-    """Box plots of the per-run ED, EDH and cVDM (the paper's fig. 2): quartiles, whiskers at 5 and 95 %, mean as a diamond."""
+    """Box plots of the per-run ED, EDH and cVDM (the paper's fig. 2): quartiles, whiskers at 5 and 95 %, mean as a
+    diamond."""
     columns = [c for c in summary["columns"] if c["name"] in ("ed", "edh", "cvdm")]
     figure = new_figure(4.6 * len(columns), 4.6)
     styles = style(models)
     for axis, column in zip(np.atleast_1d(figure.subplots(1, len(columns))), columns, strict=True):
-        groups = [rows.loc[(rows["model"] == m) & (rows["status"] == "ok"), column["name"]].dropna().to_numpy() for m in models]
+        groups = [
+            rows.loc[(rows["model"] == m) & (rows["status"] == "ok"), column["name"]].dropna().to_numpy()
+            for m in models
+        ]
         shown = [(m, g) for m, g in zip(models, groups, strict=True) if len(g)]
         if not shown:
             continue
         drawn = axis.boxplot(
             [g for _, g in shown], whis=(5, 95), showmeans=True, widths=0.62, patch_artist=True,
-            medianprops={"color": "black", "lw": 1.6}, flierprops={"marker": ".", "ms": 4, "mec": "0.45", "mfc": "0.45"},
+            medianprops={"color": "black", "lw": 1.6},
+            flierprops={"marker": ".", "ms": 4, "mec": "0.45", "mfc": "0.45"},
             meanprops={"marker": "D", "mfc": "white", "mec": "black", "ms": 5},
         )  # fmt: skip
         for patch, (model, _) in zip(drawn["boxes"], shown, strict=True):
@@ -230,7 +300,10 @@ def boxes(rows: Frame, models: Sequence[str], summary: dict[str, Any]) -> Figure
         axis.set_ylabel(f"{column['label']} [{column['unit']}]")
         axis.grid(axis="y", alpha=0.25)
         _readable_limits(axis, [g for _, g in shown])
-    what = f"error of each run (mean over {summary['task']['horizon_s']:g} s); box quartiles, whiskers 5 to 95 %, diamond mean"
+    what = (
+        f"error of each run (mean over {summary['task']['horizon_s']:g} s); box quartiles, whiskers 5 to 95 %, "
+        "diamond mean"
+    )
     figure.suptitle(f"{plain(summary['dataset'])}: {what}", fontsize=11)
     return figure
 

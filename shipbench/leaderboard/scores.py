@@ -1,4 +1,5 @@
-"""The scores of one data set as all tables of its leaderboard use them: statistics with intervals, ranking, matched errors."""
+"""The scores of one data set as all tables of its leaderboard use them: statistics with intervals, ranking, matched
+errors."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ FLOOR = "hold"
 
 
 def cluster_of(rows: Frame) -> Frame:
-    """The unit of resampling of each row: the group of runs where rows tell it, else the run that the window was cut from."""
+    """The unit of resampling of each row: the group of runs where rows tell it, else the run that the window was cut
+    from."""
     if "group" not in rows:
         return rows["parent"]
     known = rows.groupby(["fold", "run"])["group"].transform("first")  # of the same window in rows that tell it
@@ -28,8 +30,9 @@ def cluster_of(rows: Frame) -> Frame:
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Rows of one data set; `columns` are the numeric columns by name; `windows` tells what the true ship does (or None); `asked_baseline`:
-    the model that skill is counted from, where one was named; `beside_paper`: the source paper's figures are of such a task."""
+    """Rows of one data set; `columns` are the numeric columns by name; `windows` tells what the true ship does (or
+    None); `asked_baseline`: the model that skill is counted from, where one was named; `beside_paper`: the source
+    paper's figures are of such a task."""
 
     dataset: str
     rows: Frame
@@ -89,7 +92,8 @@ class Scores:
 
     @cached_property
     def _cells(self) -> dict[str, tuple[Frame, np.ndarray, np.ndarray]]:
-        """Of each model its scored rows, their runs as places in `boot`, and the number of their cell (fold and seed)."""
+        """Of each model its scored rows, their runs as places in `boot`, and the number of their cell (fold and
+        seed)."""
         found = {}
         for model in self.shares:
             part = self.scored[self.scored["model"] == model]
@@ -106,7 +110,8 @@ class Scores:
         return values, codes, [np.flatnonzero(cells == cell) for cell in np.unique(cells)]
 
     def means(self, column: str) -> dict[str, dict[str, float]]:
-        """By model the statistics over the runs of a fold, then their mean over folds and seeds (sigma: n - 1; IQR: linear quantiles)."""
+        """By model the statistics over the runs of a fold, then their mean over folds and seeds (sigma: n - 1; IQR:
+        linear quantiles)."""
         return {model: self._means(*self._values(column, model)) for model in self.shares}
 
     @staticmethod
@@ -118,26 +123,37 @@ class Scores:
         spreads = [np.std(g, ddof=1) for g in groups if len(g) > 1]  # one run alone has none
         return {
             "mean": float(np.mean([g.mean() for g in groups])), "median": float(np.mean(quartiles[:, 1])),
-            "std": float(np.mean(spreads)) if spreads else float("nan"), "iqr": float(np.mean(quartiles[:, 2] - quartiles[:, 0])),
+            "std": float(np.mean(spreads)) if spreads else float("nan"),
+            "iqr": float(np.mean(quartiles[:, 2] - quartiles[:, 0])),
         }  # fmt: skip
 
-    def figures(self, column: str, statistics: tuple[str, ...] = ("mean",), factor: float = 1.0) -> dict[str, dict[str, float]]:
+    def figures(
+        self, column: str, statistics: tuple[str, ...] = ("mean",), factor: float = 1.0
+    ) -> dict[str, dict[str, float]]:
         """By model `column_statistic`, `.._low` and `.._high` with the 95 % interval over runs, for tables."""
         found: dict[str, dict[str, float]] = {}
         for model in self.shares:
             values, codes, places = self._values(column, model)
             means = self._means(values, codes, places)
-            drawn = self._replicates(values, codes, places, statistics) if places else np.full((1, len(statistics)), np.nan)
+            drawn = (
+                self._replicates(values, codes, places, statistics) if places else np.full((1, len(statistics)), np.nan)
+            )
             runs = len(np.unique(codes))
             line: dict[str, float] = {}
             for i, name in enumerate(statistics):
                 low, high = interval(drawn[:, i], runs)
                 key = f"{column}_{name}"
-                line |= {key: factor * means.get(name, float("nan")), f"{key}_low": factor * low, f"{key}_high": factor * high}
+                line |= {
+                    key: factor * means.get(name, float("nan")),
+                    f"{key}_low": factor * low,
+                    f"{key}_high": factor * high,
+                }
             found[model] = line
         return found
 
-    def _replicates(self, values: np.ndarray, codes: np.ndarray, places: list[np.ndarray], statistics: tuple[str, ...]) -> np.ndarray:
+    def _replicates(
+        self, values: np.ndarray, codes: np.ndarray, places: list[np.ndarray], statistics: tuple[str, ...]
+    ) -> np.ndarray:
         """(resamples, statistics) of one model's values, with the weights of the means over folds and seeds."""
         weights = np.empty(len(values))
         for at in places:
@@ -147,7 +163,9 @@ class Scores:
             spreads = np.stack([self.boot.spread(codes[at], values[at]) for at in places])
             known = np.isfinite(spreads)
             with np.errstate(invalid="ignore"):
-                drawn += list((np.where(known, spreads, 0.0).sum(axis=0) / known.sum(axis=0)).T)  # folds without a drawn run are left out
+                drawn += list(
+                    (np.where(known, spreads, 0.0).sum(axis=0) / known.sum(axis=0)).T
+                )  # folds without a drawn run are left out
         return np.stack(drawn, axis=1)
 
     @cached_property
@@ -158,7 +176,9 @@ class Scores:
         for j, model in enumerate(self.models):
             part = self.rows[self.rows["model"] == model]
             by_window = part.assign(ed=part["ed"].where(part["status"] == "ok")).groupby(["fold", "run"])["ed"]
-            mean = by_window.mean().where(by_window.count() == part["seed"].nunique())  # a window that one seed lost is lost
+            mean = by_window.mean().where(
+                by_window.count() == part["seed"].nunique()
+            )  # a window that one seed lost is lost
             errors[:, j] = mean.reindex(list(zip(keys["fold"], keys["run"], strict=True))).to_numpy(float)
         weights = 1.0 / keys.groupby("fold")["run"].transform("size").to_numpy(float)
         return Matched(self.models, errors, weights, self.boot.codes(keys["cluster"].tolist()), self.boot)

@@ -28,7 +28,8 @@ _WINDOW = 50
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One window: `t` (steps,) [s], `truth` and each model's prediction (steps, 10), order and units of `signals.STATES`, the first row at s0.
+    """One window: `t` (steps,) [s], `truth` and each model's prediction (steps, 10), order and units of
+    `signals.STATES`, the first row at s0.
 
     `fits`: of each model the fit of every signal (10,) [%], over all time steps of the window.
     """
@@ -42,7 +43,8 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Of one data set: `t` (knots,) [s]; tracks by window; errors of each model by window, position [m] and heading [deg], (windows, knots);
+    """Of one data set: `t` (knots,) [s]; tracks by window; errors of each model by window, position [m] and heading
+    [deg], (windows, knots);
     `left_out`: lines on what is not drawn."""
 
     t: np.ndarray
@@ -52,25 +54,38 @@ class Series:
 
 
 def gather(results: Results, dataset: str, models: Sequence[str], points: int = POINTS) -> Series:
-    """Read the saved predictions of `models` on `dataset`, of several seeds the first; at most `points` points of tracks are kept."""
+    """Read the saved predictions of `models` on `dataset`, of several seeds the first; at most `points` points of
+    tracks are kept."""
     rows = results.rows[(results.rows["dataset"] == dataset) & results.rows["model"].isin(list(models))]
     seeds = rows.groupby("model")["seed"].min().to_dict()
-    left_out = [f"Of several seeds of {_listed(m for m in models if rows.loc[rows['model'] == m, 'seed'].nunique() > 1)} only the first is drawn."]
+    left_out = [
+        (
+            f"Of several seeds of {_listed(m for m in models if rows.loc[rows['model'] == m, 'seed'].nunique() > 1)} "
+            "only the first is drawn."
+        )
+    ]
     left_out = left_out if rows["seed"].nunique() > 1 else []
     order = rows[rows["status"] == "ok"].groupby("run")["ed"].median().sort_values().index.tolist()
     order += [run for run in dict.fromkeys(rows["run"]) if run not in set(order)]
     tracks = len(models) + 1  # and the true one
     kept = max(1, points // (_LEAST * tracks + _WINDOW))
-    chosen = set(order if len(order) <= kept else [order[i] for i in np.linspace(0, len(order) - 1, kept).round().astype(int)])
+    chosen = set(
+        order if len(order) <= kept else [order[i] for i in np.linspace(0, len(order) - 1, kept).round().astype(int)]
+    )
     if len(chosen) < len(order):
-        left_out.append(f"Tracks and time histories: {len(chosen)} of {len(order)} windows, evenly spread from the least error to the greatest.")
+        left_out.append(
+            f"Tracks and time histories: {len(chosen)} of {len(order)} windows, evenly spread from the least error "
+            "to the greatest."
+        )
     reading = _Reading(chosen, int(np.clip((points // max(1, len(chosen)) - _WINDOW) // tracks, _LEAST, _MOST)))
     pairs = list(zip(results.summaries, results.sources, strict=True))
     for summary, source in pairs:
         if summary["dataset"] == dataset and summary["model"] in seeds and summary["seed"] == seeds[summary["model"]]:
             reading.take(summary, source)
     if reading.thinned:
-        left_out.append(f"Every track and time history is drawn through {reading.thinned} of its points, evenly spread in time.")
+        left_out.append(
+            f"Every track and time history is drawn through {reading.thinned} of its points, evenly spread in time."
+        )
     return reading.series(order, [*left_out, *reading.missing])
 
 
@@ -96,15 +111,21 @@ class _Reading:
             S = read_predictions(source, cell)
         except InputError as error:
             reason = " ".join(str(error).split())
-            self.missing.append(f"The predictions of `{cell.model}`, fold {cell.fold}, are not drawn; they cannot be read: {reason}.")
+            self.missing.append(
+                f"The predictions of `{cell.model}`, fold {cell.fold}, are not drawn; they cannot be read: {reason}."
+            )
             return
         if S is None:
             if summary["status"] in ("ok", "diverged"):
-                self.missing.append(f"The predictions of `{cell.model}`, fold {cell.fold}, are not drawn; they are not in the result folder.")
+                self.missing.append(
+                    f"The predictions of `{cell.model}`, fold {cell.fold}, are not drawn; they are not in the "
+                    "result folder."
+                )
             return
         if S.shape != batch.truth.shape:
             self.missing.append(
-                f"The predictions of `{cell.model}`, fold {cell.fold}, are not drawn: shape {S.shape}, that of the truth {batch.truth.shape}."
+                f"The predictions of `{cell.model}`, fold {cell.fold}, are not drawn: shape {S.shape}, that of the "
+                f"truth {batch.truth.shape}."
             )
             return
         ok = np.array([status == "ok" for status in summary["run_status"]])
@@ -129,12 +150,17 @@ class _Reading:
         for i, run in enumerate(batch.ids):
             if run in self.chosen:
                 if run not in self.tracks:
-                    self.tracks[run] = Track(run, dt * knots, np.concatenate([batch.s0[i : i + 1], batch.truth[i]])[knots])
+                    self.tracks[run] = Track(
+                        run, dt * knots, np.concatenate([batch.s0[i : i + 1], batch.truth[i]])[knots]
+                    )
                 self.tracks[run].predicted[model] = np.concatenate([batch.s0[i : i + 1], S[i]])[knots]
                 self.tracks[run].fits[model] = fit_percent(true=batch.truth[i], pred=S[i])
 
     def series(self, order: Sequence[str], left_out: list[str]) -> Series:
-        errors = {m: (np.concatenate([e for e, _ in parts]), np.concatenate([h for _, h in parts])) for m, parts in self.errors.items()}
+        errors = {
+            m: (np.concatenate([e for e, _ in parts]), np.concatenate([h for _, h in parts]))
+            for m, parts in self.errors.items()
+        }
         tracks = [self.tracks[run] for run in sorted(order) if run in self.tracks]
         return Series(self.t, tracks, {m: e for m, e in errors.items() if len(e[0])}, left_out)
 

@@ -14,7 +14,8 @@ from ..storage import Frame
 
 @dataclass(frozen=True)
 class Regime:
-    """Mean ED [m] of every model in the slices of one regime; `counts` are windows, a value is NaN where a model has no score."""
+    """Mean ED [m] of every model in the slices of one regime; `counts` are windows, a value is NaN where a model has no
+    score."""
 
     name: str
     labels: tuple[str, ...]
@@ -23,7 +24,8 @@ class Regime:
 
 
 def regime_errors(rows: Frame, windows: Frame | None, models: Sequence[str]) -> list[Regime]:
-    """Of every regime in which the windows differ. rows: of one data set; windows: what `Results.windows` tells of it."""
+    """Of every regime in which the windows differ. rows: of one data set; windows: what `Results.windows` tells of
+    it."""
     if windows is None:
         return []
     scored = rows[rows["status"] == "ok"]

@@ -1,9 +1,11 @@
 """Honest uncertainty: intervals, paired tests and win rates by a bootstrap over runs.
 
-The unit that is drawn is the run (the cluster): windows of one run are drawn together, since they share a ship, a day and a manoeuvre.
-Folds are no unit: five of them can never reach p < 0.0625. The same draws serve every model and every table, so that differences are paired.
-Several seeds of a model stand inside the run and are averaged there: intervals are over runs, for the seeds that were run; the spread over
-seeds has its own column.
+The unit that is drawn is the run (the cluster): windows of one run are drawn together, since they share a ship, a day
+and a manoeuvre.
+Folds are no unit: five of them can never reach p < 0.0625. The same draws serve every model and every table, so that
+differences are paired.
+Several seeds of a model stand inside the run and are averaged there: intervals are over runs, for the seeds that were
+run; the spread over seeds has its own column.
 """
 
 from __future__ import annotations
@@ -45,17 +47,23 @@ class Bootstrap:
         return summed
 
     def means(self, codes: np.ndarray, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Weighted mean of each column in each resample, (resamples, columns); values (n, columns), those not finite are left out."""
+        """Weighted mean of each column in each resample, (resamples, columns); values (n, columns), those not finite
+        are left out."""
         known = np.isfinite(values)
         weighted = np.where(known, weights, 0.0)
         with np.errstate(invalid="ignore", divide="ignore"):
-            return (self.counts @ self.totals(codes, np.where(known, weighted * values, 0.0))) / (self.counts @ self.totals(codes, weighted))
+            return (self.counts @ self.totals(codes, np.where(known, weighted * values, 0.0))) / (
+                self.counts @ self.totals(codes, weighted)
+            )
 
     def spread(self, codes: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Median, standard deviation (n - 1) and interquartile range of `values` (n,) in each resample, (resamples, 3)."""
+        """Median, standard deviation (n - 1) and interquartile range of `values` (n,) in each resample, (resamples,
+        3)."""
         order = np.argsort(values)
         values, codes = values[order], codes[order]
-        return np.concatenate([_spread(self.counts[rows, codes], values) for rows in _blocks(len(self.counts), len(values))])
+        return np.concatenate(
+            [_spread(self.counts[rows, codes], values) for rows in _blocks(len(self.counts), len(values))]
+        )
 
     def p_value(self, differences: np.ndarray, weights: np.ndarray) -> float:
         """Two-sided p of no mean difference, by the symmetric bootstrap-t over runs; never below 1 / (resamples + 1).
@@ -64,7 +72,8 @@ class Bootstrap:
             differences: (runs,) weighted sums of the differences in each run.
             weights: (runs,) sums of the weights.
 
-        Source: Hall (1992), The Bootstrap and Edgeworth Expansion, section 3.6; the error of the ratio is the linearised one.
+        Source: Hall (1992), The Bootstrap and Edgeworth Expansion, section 3.6; the error of the ratio is the
+        linearised one.
         """
         num = len(differences)
         if num < 2:
@@ -77,7 +86,10 @@ class Bootstrap:
         sums = self.counts @ np.stack([rest, weights, rest**2, rest * weights, weights**2], axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             moved = sums[:, 0] / sums[:, 1]  # the resample's mean less the mean
-            errors = np.sqrt(scale * np.maximum(sums[:, 2] - 2 * moved * sums[:, 3] + moved**2 * sums[:, 4], 0.0)) / sums[:, 1]
+            errors = (
+                np.sqrt(scale * np.maximum(sums[:, 2] - 2 * moved * sums[:, 3] + moved**2 * sums[:, 4], 0.0))
+                / sums[:, 1]
+            )
             drawn = np.abs(moved) / errors
             seen = abs(mean) / error
         return float((1 + np.sum(drawn >= seen)) / (len(self.counts) + 1))
@@ -123,10 +135,12 @@ def _tail(clusters: int) -> float:
 
 
 def interval(replicates: np.ndarray, clusters: int) -> tuple[float, float]:
-    """The 95 % interval of `replicates` (resamples,) that were drawn from `clusters` runs; not-a-number for fewer than two runs.
+    """The 95 % interval of `replicates` (resamples,) that were drawn from `clusters` runs; not-a-number for fewer than
+    two runs.
 
     Percentiles, widened for few runs: the level is that of sqrt(n / (n - 1)) t(n - 1) instead of the normal quantile.
-    Source: Hesterberg (2015), What teachers should know about the bootstrap, section 5.2 (expanded percentile interval).
+    Source: Hesterberg (2015), What teachers should know about the bootstrap, section 5.2 (expanded percentile
+    interval).
     """
     known = replicates[np.isfinite(replicates)]
     if clusters < 2 or not len(known):
@@ -138,7 +152,8 @@ def interval(replicates: np.ndarray, clusters: int) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two models on the same windows: mean error of `first` less that of `second`, its interval, in how many windows `first` is better, and p."""
+    """Two models on the same windows: mean error of `first` less that of `second`, its interval, in how many windows
+    `first` is better, and p."""
 
     first: str
     second: str
@@ -153,9 +168,11 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """Errors of every model on the same windows, (windows, models), seeds averaged; not-a-number where a model has no score.
+    """Errors of every model on the same windows, (windows, models), seeds averaged; not-a-number where a model has no
+    score.
 
-    `weights` (windows,) make the weighted mean the mean over folds of the fold means. `codes` (windows,) tell which run each window is of.
+    `weights` (windows,) make the weighted mean the mean over folds of the fold means. `codes` (windows,) tell which run
+    each window is of.
     """
 
     models: list[str]
@@ -191,7 +208,8 @@ class Matched:
         return len(np.unique(self.codes))
 
     def skill(self, model: str, baseline: str) -> tuple[float, float, float]:
-        """1 - error / error of `baseline` with its interval; not-a-number unless both are complete and the baseline errs."""
+        """1 - error / error of `baseline` with its interval; not-a-number unless both are complete and the baseline
+        errs."""
         if not {model, baseline} <= set(self.complete) or not self.mean(baseline) > 0:
             return (float("nan"),) * 3
         drawn = self.means([model, baseline])
@@ -200,7 +218,8 @@ class Matched:
         return (1.0 - self.mean(model) / self.mean(baseline), *interval(1.0 - ratio, self.clusters))
 
     def wins(self, model: str, others: Sequence[str]) -> np.ndarray:
-        """Share of `others` that `model` beats in each window (windows,); a tie counts half, a window without a score is lost."""
+        """Share of `others` that `model` beats in each window (windows,); a tie counts half, a window without a score
+        is lost."""
         own = np.nan_to_num(self.of(model), nan=np.inf)
         theirs = np.nan_to_num(np.stack([self.of(other) for other in others]), nan=np.inf)
         return np.mean(np.where(own < theirs, 1.0, np.where(own == theirs, 0.5, 0.0)), axis=0)
@@ -212,7 +231,8 @@ class Matched:
         return (float(np.average(won, weights=self.weights)), *interval(drawn, self.clusters))
 
     def pairs(self, models: Sequence[str]) -> list[Pair]:
-        """Every two of `models` that are complete, in the order given; p adjusted over all of them after Holm (1979)."""
+        """Every two of `models` that are complete, in the order given; p adjusted over all of them after Holm
+        (1979)."""
         from statsmodels.stats.multitest import multipletests
 
         names = [m for m in models if m in self.complete]

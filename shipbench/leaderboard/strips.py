@@ -1,4 +1,5 @@
-"""Intervals of every model on one axis: a strip beside each name, in percent of its width, so that names and numbers keep their size on a phone."""
+"""Intervals of every model on one axis: a strip beside each name, in percent of its width, so that names and numbers
+keep their size on a phone."""
 
 from __future__ import annotations
 
@@ -11,12 +12,19 @@ from ..render.linked import COLOURS
 from ..render.svg import label, limits, ticks
 from ..render.table import Table, TableColumn
 
-TITLES = {"ed_mean": "Position error ED [m]", "edh_mean": "EDH [m]", "cvdm_mean": "cVDM [%]", "rank": "Mean rank, 1 is best"}
+TITLES = {
+    "ed_mean": "Position error ED [m]",
+    "edh_mean": "EDH [m]",
+    "cvdm_mean": "cVDM [%]",
+    "rank": "Mean rank, 1 is best",
+}
 """Columns with an interval that are drawn, and the title of their axis."""
 STYLE = """
-.strips { display: grid; grid-template-columns: minmax(8rem, 17rem) minmax(0, 1fr); column-gap: .8rem; align-items: center; max-width: 62rem; }
+.strips { display: grid; grid-template-columns: minmax(8rem, 17rem) minmax(0, 1fr);
+  column-gap: .8rem; align-items: center; max-width: 62rem; }
 .strips > span { overflow-wrap: anywhere; font-size: .88rem; } .strips small { color: var(--dim); white-space: nowrap; }
-.strip { width: 100%; height: 1.6rem; display: block; overflow: visible; } .interval { stroke-width: 5; } .strip .band { opacity: .3; }
+.strip { width: 100%; height: 1.6rem; display: block; overflow: visible; } .interval { stroke-width: 5; }
+.strip .band { opacity: .3; }
 .strip .dot { stroke: var(--paper); stroke-width: 1.5; }
 @media (max-width: 40rem) { .strips { grid-template-columns: minmax(0, 1fr); }
   .strips > span:not(:empty) { margin-top: .4rem; } .strips > span:empty { display: none; } }
@@ -41,7 +49,8 @@ class _Scale:
 
 
 def strips(table: Table) -> list[dict[str, Any]]:
-    """One drawing for each column of `TITLES` that the table has: `title`, `rows` (model, text, svg) and the svg of the `axis`.
+    """One drawing for each column of `TITLES` that the table has: `title`, `rows` (model, text, svg) and the svg of the
+    `axis`.
 
     A row's mean is a dot, its 95 % interval a bar; a pale band is the middle half of the runs, where the row holds it.
     """
@@ -51,18 +60,33 @@ def strips(table: Table) -> list[dict[str, Any]]:
 def _strips(table: Table, column: TableColumn) -> dict[str, Any]:
     key = column.key
     middle = f"_{key.removesuffix('_mean')}_middle"
-    rows = [(i, row) for i, row in enumerate(table.rows) if not row.get("_reference") and np.isfinite(row.get(key, np.nan))]
+    rows = [
+        (i, row) for i, row in enumerate(table.rows) if not row.get("_reference") and np.isfinite(row.get(key, np.nan))
+    ]
     known = {
-        i: [x for x in (row[key], row.get(f"{key}_low"), row.get(f"{key}_high"), *row.get(middle, ())) if x is not None and np.isfinite(x)]
+        i: [
+            x
+            for x in (row[key], row.get(f"{key}_low"), row.get(f"{key}_high"), *row.get(middle, ()))
+            if x is not None and np.isfinite(x)
+        ]
         for i, row in rows
     }
-    (low, high), log = limits([min(v) for v in known.values()], [max(v) for v in known.values()], [row[key] for _, row in rows])
+    (low, high), log = limits(
+        [min(v) for v in known.values()], [max(v) for v in known.values()], [row[key] for _, row in rows]
+    )
     scale = _Scale(low, high, log)
     marks = [(scale(value), label(value)) for value in ticks(low, high, log)]
     grid = "".join(f'<line class="grid" x1="{at:.2f}%" x2="{at:.2f}%" y1="0" y2="100%"/>' for at, _ in marks)
     axis = "".join(f'<text class="x" x="{at:.2f}%" y="14">{text}</text>' for at, text in marks)
-    drawn = [(row["model"], _text(column, row), grid + _row(scale, row, key, middle, f"c{i % COLOURS}")) for i, row in rows]
-    return {"title": TITLES[key] + (", logarithmic" if log else ""), "rows": drawn, "axis": axis, "middle": any(middle in row for _, row in rows)}
+    drawn = [
+        (row["model"], _text(column, row), grid + _row(scale, row, key, middle, f"c{i % COLOURS}")) for i, row in rows
+    ]
+    return {
+        "title": TITLES[key] + (", logarithmic" if log else ""),
+        "rows": drawn,
+        "axis": axis,
+        "middle": any(middle in row for _, row in rows),
+    }
 
 
 def _row(scale: _Scale, row: dict[str, Any], key: str, middle: str, colour: str) -> str:
@@ -72,7 +96,9 @@ def _row(scale: _Scale, row: dict[str, Any], key: str, middle: str, colour: str)
         parts.append(f'<rect class="band {colour}" x="{a:.2f}%" width="{max(b - a, 0.0):.2f}%" y="15%" height="70%"/>')
     low, high = row.get(f"{key}_low"), row.get(f"{key}_high")
     if low is not None and high is not None and np.isfinite([low, high]).all():
-        parts.append(f'<line class="interval {colour}" x1="{scale(low):.2f}%" x2="{scale(high):.2f}%" y1="50%" y2="50%"/>')
+        parts.append(
+            f'<line class="interval {colour}" x1="{scale(low):.2f}%" x2="{scale(high):.2f}%" y1="50%" y2="50%"/>'
+        )
     return "".join(parts) + f'<circle class="dot {colour}" cx="{scale(row[key]):.2f}%" cy="50%" r="5"/>'
 
 

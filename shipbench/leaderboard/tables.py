@@ -1,4 +1,5 @@
-"""The tables of scores of a leaderboard: the paper's Table III, errors against horizon, of signals and kinds of manoeuvre, status and cost."""
+"""The tables of scores of a leaderboard: the paper's Table III, errors against horizon, of signals and kinds of
+manoeuvre, status and cost."""
 
 from __future__ import annotations
 
@@ -21,8 +22,16 @@ _NO_SIGNAL = {*TABLE_III, *_WHOLE_RUN, *(c.name for c in TRIAL_COLUMNS)}
 
 # Seed paper, Table III: mu, m, sigma, IQR on the paper's own 90 trajectories, which are not public.
 PAPER = {
-    "paper: physics": {"ed": (13.52, 10.82, 10.31, 13.10), "edh": (18.79, 15.59, 14.52, 17.87), "cvdm": (14.23, 13.27, 8.24, 8.83)},
-    "paper: MLP": {"ed": (20.84, 17.10, 12.94, 17.87), "edh": (28.49, 22.62, 18.37, 22.86), "cvdm": (28.95, 22.99, 20.45, 20.10)},
+    "paper: physics": {
+        "ed": (13.52, 10.82, 10.31, 13.10),
+        "edh": (18.79, 15.59, 14.52, 17.87),
+        "cvdm": (14.23, 13.27, 8.24, 8.83),
+    },
+    "paper: MLP": {
+        "ed": (20.84, 17.10, 12.94, 17.87),
+        "edh": (28.49, 22.62, 18.37, 22.86),
+        "cvdm": (28.95, 22.99, 20.45, 20.10),
+    },
 }
 PAPER_DATASET = "harbour90"
 FEW_RUNS = 10
@@ -38,12 +47,19 @@ def table_iii(scores: Scores) -> Table:
     for model in scores.models:
         place += model != CEILING
         scored, expected = shares[model]
-        line: dict[str, Any] = {"rank": "" if model == CEILING else str(place), "model": model, "runs": f"{scored}/{expected}"}
+        line: dict[str, Any] = {
+            "rank": "" if model == CEILING else str(place),
+            "model": model,
+            "runs": f"{scored}/{expected}",
+        }
         own = scores.scored[scores.scored["model"] == model]
-        line |= {f"_{m}_middle": tuple(own[m].quantile([0.25, 0.75])) for m in metrics}  # drawn on the page, in no table
+        line |= {
+            f"_{m}_middle": tuple(own[m].quantile([0.25, 0.75])) for m in metrics
+        }  # drawn on the page, in no table
         lines.append(line | {key: value for m in metrics for key, value in figures[m][model].items()})
     notes = [
-        f"{', '.join(columns[m]['label'] + ' in ' + columns[m]['unit'] for m in metrics)}: averaged over the predicted time steps of each run; "
+        f"{', '.join(columns[m]['label'] + ' in ' + columns[m]['unit'] for m in metrics)}: averaged over the "
+        "predicted time steps of each run; "
         f"{MU} mean, m median, {SIGMA} standard deviation (n - 1), IQR interquartile range over the runs of a fold; "
         "then the mean over folds (and seeds). Intervals: 95 %, bootstrap over runs."
     ]
@@ -51,7 +67,10 @@ def table_iii(scores: Scores) -> Table:
     if runs < FEW_RUNS:
         notes.append(f"Only {runs} runs: with so few, intervals are rough.")
     if any(scored < expected for scored, expected in shares.values()):
-        notes.append("Runs: scored of expected. A model with unscored runs ranks below all complete ones; the reasons stand below.")
+        notes.append(
+            "Runs: scored of expected. A model with unscored runs ranks below all complete ones; the reasons stand "
+            "below."
+        )
     undefined = int(scores.scored[metrics].isna().any(axis=1).sum())
     if undefined:
         notes.append(f"In {undefined} rows the true ship does not move: cVDM has no scale there and leaves them out.")
@@ -59,12 +78,17 @@ def table_iii(scores: Scores) -> Table:
         notes.append("`oracle` is the simulator itself: the ceiling, not ranked.")
     if scores.beside_paper:
         lines += [
-            {"model": name, "_reference": True} | {f"{m}_{s}": v for m in metrics for s, v in zip(STATISTICS, values[m], strict=True)}
+            {"model": name, "_reference": True}
+            | {f"{m}_{s}": v for m in metrics for s, v in zip(STATISTICS, values[m], strict=True)}
             for name, values in PAPER.items()
         ]
-        notes.append("In italics: Table III of the source paper, on its own 90 runs (not public); same metrics, other data.")
+        notes.append(
+            "In italics: Table III of the source paper, on its own 90 runs (not public); same metrics, other data."
+        )
     head = [TableColumn("#", "rank"), TableColumn("model", "model"), TableColumn("runs", "runs")]
-    heads = {f"{m}_{s}": f"{columns[m]['label']} {SYMBOLS[s]} [{columns[m]['unit']}]" for m in metrics for s in STATISTICS}
+    heads = {
+        f"{m}_{s}": f"{columns[m]['label']} {SYMBOLS[s]} [{columns[m]['unit']}]" for m in metrics for s in STATISTICS
+    }
     shown = [TableColumn(text, key, number(2), interval=True) for key, text in heads.items()]
     return Table("Errors over the horizon (layout of the paper's Table III)", head + shown, lines, notes)
 
@@ -80,7 +104,9 @@ def claim(scores: Scores) -> Table:
             here[f"{metric}_{s}"] = 100.0 * (1.0 - means["physics"].get(s, nan) / means["mlp"].get(s, nan))
             there[f"{metric}_{s}"] = 100.0 * (1.0 - PAPER["paper: physics"][metric][i] / PAPER["paper: MLP"][metric][i])
     keys = [k for k in here if k != "where"]
-    header = {k: f"{'cVDM' if k.startswith('cvdm') else k.split('_')[0].upper()} {SYMBOLS[k.split('_')[1]]}" for k in keys}
+    header = {
+        k: f"{'cVDM' if k.startswith('cvdm') else k.split('_')[0].upper()} {SYMBOLS[k.split('_')[1]]}" for k in keys
+    }
     columns = [TableColumn("", "where"), *[TableColumn(header[k], k, number(1)) for k in keys]]
     return Table("`physics` below `mlp`, in percent", columns, [here, there])
 
@@ -91,9 +117,15 @@ def _mean_table(title: str, scores: Scores, chosen: list[dict[str, str]], notes:
     figures = {c["name"]: scores.figures(c["name"], factor=units[c["name"]][1]) for c in chosen}
     lines: list[dict[str, Any]] = []
     for model in scores.models:
-        renamed = {key.replace(f"{name}_mean", name, 1): value for name in figures for key, value in figures[name][model].items()}
+        renamed = {
+            key.replace(f"{name}_mean", name, 1): value
+            for name in figures
+            for key, value in figures[name][model].items()
+        }
         lines.append({"model": model} | renamed)
-    shown = [TableColumn(f"{c['label']} [{units[c['name']][0]}]", c["name"], significant(3), interval=True) for c in chosen]
+    shown = [
+        TableColumn(f"{c['label']} [{units[c['name']][0]}]", c["name"], significant(3), interval=True) for c in chosen
+    ]
     return Table(title, [TableColumn("model", "model"), *shown], lines, notes)
 
 
@@ -101,7 +133,10 @@ def horizon_table(scores: Scores) -> Table:
     """Position error at fixed times, at the end, over the run; heading error."""
     at_times = [c for n, c in scores.columns.items() if n.startswith("ed_at_")]
     chosen = at_times + [scores.columns[n] for n in _WHOLE_RUN if n in scores.columns]
-    note = "Mean over runs and folds. `ED at t` is the position error at that time; heading error is the mean of |dpsi| over the run."
+    note = (
+        "Mean over runs and folds. `ED at t` is the position error at that time; heading error is the mean of "
+        "|dpsi| over the run."
+    )
     return _mean_table("Error against horizon", scores, chosen, [note])
 
 
@@ -130,7 +165,8 @@ def kind_table(scores: Scores) -> Table:
 
 
 def group_lines(scores: Scores, column: str, members: dict[str, Any]) -> list[dict[str, Any]]:
-    """By model the mean of `column` over the rows of each group (name -> mask of the rows), with intervals over runs."""
+    """By model the mean of `column` over the rows of each group (name -> mask of the rows), with intervals over
+    runs."""
     lines = []
     models, scored = scores.rows["model"].to_numpy(), (scores.rows["status"] == "ok").to_numpy()
     values, codes = scores.rows[column].to_numpy(float), scores.boot.codes(scores.rows["cluster"].tolist())
@@ -149,7 +185,8 @@ def group_lines(scores: Scores, column: str, members: dict[str, Any]) -> list[di
 
 
 def status_table(scores: Scores, parameters: dict[str, float]) -> Table:
-    """Statuses with their reasons, and what a model costs: seconds of a fit, of a rollout, numbers that the fit found (`parameters`)."""
+    """Statuses with their reasons, and what a model costs: seconds of a fit, of a rollout, numbers that the fit found
+    (`parameters`)."""
     lines, notes = [], []
     for model in scores.models:
         part = scores.rows[scores.rows["model"] == model]
@@ -157,18 +194,34 @@ def status_table(scores: Scores, parameters: dict[str, float]) -> Table:
         cells = part.drop_duplicates(["fold", "seed"])
         done = cells[cells["status"].isin(["ok", "diverged"])]
         shared = int(cells["fit_shared_by"].max())
-        cost = {"fit_s": float(done["fit_s"].mean()), "predict_ms": 1e3 * float(done["predict_s"].mean()), "parameters": parameters.get(model)}
-        lines.append({"model": model, "shared": str(shared) if shared > 1 else "", **cost, **{s: int(counts.get(s, 0)) for s in STATUSES}})
+        cost = {
+            "fit_s": float(done["fit_s"].mean()),
+            "predict_ms": 1e3 * float(done["predict_s"].mean()),
+            "parameters": parameters.get(model),
+        }
+        lines.append(
+            {
+                "model": model,
+                "shared": str(shared) if shared > 1 else "",
+                **cost,
+                **{s: int(counts.get(s, 0)) for s in STATUSES},
+            }
+        )
         for (status, reason), same in part[part["status"] != "ok"].groupby(["status", "reason"], sort=False):
             first = same.iloc[0]
-            notes.append(f"`{model}` {status} in {len(same)} rows (fold {first['fold']}, run {first['run']}): {reason}.")
+            notes.append(
+                f"`{model}` {status} in {len(same)} rows (fold {first['fold']}, run {first['run']}): {reason}."
+            )
     folded = [*notes[:20], f"... and {len(notes) - 20} more reasons (in the rows)."] if len(notes) > 20 else notes
     columns = [TableColumn("model", "model"), *[TableColumn(s, s, str) for s in STATUSES]]
     columns += [
         TableColumn("fit [s]", "fit_s", significant(3)), TableColumn("fitted together", "shared"),
         TableColumn("predict [ms]", "predict_ms", significant(3)),
     ]  # fmt: skip
-    about = "Fit: seconds per fold and seed; fits that ran together share their time equally. Predict: per rollout, in one batch."
+    about = (
+        "Fit: seconds per fold and seed; fits that ran together share their time equally. Predict: per rollout, "
+        "in one batch."
+    )
     if parameters:
         columns.append(TableColumn("parameters", "parameters", number(0)))
         about += " Parameters: numbers that a fit sets, scales of inputs and outputs not counted."

@@ -1,4 +1,5 @@
-"""What a page shows, computed again: scores and windows from the saved predictions and truth, the rest from the data set where it is at hand."""
+"""What a page shows, computed again: scores and windows from the saved predictions and truth, the rest from the data
+set where it is at hand."""
 
 from __future__ import annotations
 
@@ -33,8 +34,9 @@ TOLERANCE = 1e-9
 def verify(results: Results) -> tuple[list[str], list[str]]:
     """Compute again all that a page shows.
 
-    Scores, statuses with their reasons and the windows come from the saved predictions and truth; the numbers of parameters from the saved models of
-    shipbench's own kinds; truth, ship, runs and what they are called from the data set, where it is at hand.
+    Scores, statuses with their reasons and the windows come from the saved predictions and truth; the numbers of
+    parameters from the saved models of shipbench's own kinds; truth, ship, runs and what they are called from the data
+    set, where it is at hand.
 
     Returns:
         One line on each figure that differs, and notes on what could not be computed again.
@@ -52,12 +54,20 @@ def verify(results: Results) -> tuple[list[str], list[str]]:
         S, batch = _saved(source, cell)
         if summary["status"] in ("failed", "skipped"):
             if S is not None:
-                found.differences.append(f"{cell.label}: status is '{summary['status']}' in the rows, and there are predictions.")
+                found.differences.append(
+                    f"{cell.label}: status is '{summary['status']}' in the rows, and there are predictions."
+                )
             continue
         if S is None or batch is None:
-            raise InputError(f"{source}: no saved predictions of {cell.label}; --verify needs the whole folder that `shipbench run` wrote.")
+            raise InputError(
+                f"{source}: no saved predictions of {cell.label}; --verify needs the whole folder that `shipbench "
+                "run` wrote."
+            )
         if S.shape != batch.truth.shape or list(batch.ids) != summary["runs"]["test"]:
-            found.differences.append(f"{cell.label}: predictions of shape {S.shape} for a truth of shape {batch.truth.shape}, or of other runs.")
+            found.differences.append(
+                f"{cell.label}: predictions of shape {S.shape} for a truth of shape {batch.truth.shape}, or of "
+                "other runs."
+            )
             continue
         if found.truth(summary, cell, source, batch, results.windows):  # scores against another truth say nothing
             found.differences += _compare_scores(summary, cell, own, batch, S)
@@ -71,7 +81,9 @@ def _saved(source: Path, cell: Cell) -> tuple[np.ndarray | None, Batch | None]:
         S = read_predictions(source, cell)
         return S, None if S is None else read_truth(source, cell.dataset, cell.fold)
     except InputError as error:
-        raise InputError(f"{source}: the saved truth or predictions of {cell.label} cannot be read: {error} --verify needs them.") from None
+        raise InputError(
+            f"{source}: the saved truth or predictions of {cell.label} cannot be read: {error} --verify needs them."
+        ) from None
 
 
 def _compare_scores(summary: dict[str, Any], cell: Cell, own: Frame, batch: Batch, S: np.ndarray) -> list[str]:
@@ -85,12 +97,18 @@ def _compare_scores(summary: dict[str, Any], cell: Cell, own: Frame, batch: Batc
             found.append(f"{cell.label}, run {run}: status is '{said}' in the rows, '{status}' from the predictions.")
             continue
         if own["reason"].iloc[i] != reasons[i]:
-            found.append(f"{cell.label}, run {run}: the reason is '{shown(own['reason'].iloc[i])}' in the rows, '{reasons[i]}' from the predictions.")
+            found.append(
+                f"{cell.label}, run {run}: the reason is '{shown(own['reason'].iloc[i])}' in the rows, "
+                f"'{reasons[i]}' from the predictions."
+            )
     for name, values in again.items():
         said = own[name].to_numpy(float)
         for i in np.flatnonzero(~np.isclose(said, values, rtol=TOLERANCE, atol=1e-12, equal_nan=True)).tolist():
             if own["status"].iloc[i] == ("ok" if ok[i] else "diverged"):
-                found.append(f"{cell.label}, run {batch.ids[i]}: {name} is {said[i]:.10g} in the rows, {values[i]:.10g} from the predictions.")
+                found.append(
+                    f"{cell.label}, run {batch.ids[i]}: {name} is {said[i]:.10g} in the rows, {values[i]:.10g} from "
+                    "the predictions."
+                )
     return found
 
 
@@ -125,7 +143,9 @@ class _Found:
                 why = f"which is not at hand ({shown(error).splitlines()[0][:120]})"
             if self._sets[key] is None:
                 link = " " if why.startswith("which") else ": "
-                self.notes[f"the truth of '{name}' was not compared with the data set{',' if link == ' ' else ''}{link}{why}"] = None
+                self.notes[
+                    f"the truth of '{name}' was not compared with the data set{',' if link == ' ' else ''}{link}{why}"
+                ] = None
         return self._sets[key]
 
     def data_set(self, summary: dict[str, Any], cell: Cell, source: Path, own: Frame) -> None:
@@ -134,7 +154,14 @@ class _Found:
         if found is None:
             return
         data, folds = found
-        ship = {"dataset": data.name, "ship": data.ship.name, "ship_L": data.ship.L, "ship_B": data.ship.B, "dt": data.dt, "inputs": [*data.inputs]}
+        ship = {
+            "dataset": data.name,
+            "ship": data.ship.name,
+            "ship_L": data.ship.L,
+            "ship_B": data.ship.B,
+            "dt": data.dt,
+            "inputs": [*data.inputs],
+        }
         for key, value in ship.items():
             self._differs(f"{source}: {key} of '{cell.dataset}'", summary[key], value)
         for key, value in (("source", data.source), ("licence", data.licence)):
@@ -150,15 +177,22 @@ class _Found:
         for run in fold.test.runs:
             if run.id not in own.index:
                 continue  # said above
-            for name, value in (("parent", str(run.meta.get("parent", run.id))), ("kind", run.kind), ("group", run.group)):
+            for name, value in (
+                ("parent", str(run.meta.get("parent", run.id))),
+                ("kind", run.kind),
+                ("group", run.group),
+            ):
                 said = own[name].get(run.id) if name in own else None
                 if not isinstance(said, str):  # rows without a group are counted by their parent
                     said = own["parent"].get(run.id)
                 if said != value:
-                    self.differences.append(f"{cell.label}, run {run.id}: {name} is '{said}' in the rows, '{value}' in the data set.")
+                    self.differences.append(
+                        f"{cell.label}, run {run.id}: {name} is '{said}' in the rows, '{value}' in the data set."
+                    )
 
     def truth(self, summary: dict[str, Any], cell: Cell, source: Path, batch: Batch, windows: Frame | None) -> bool:
-        """Whether the saved truth is that of the data set, and windows.parquet what it gives; once for each fold of a folder."""
+        """Whether the saved truth is that of the data set, and windows.parquet what it gives; once for each fold of a
+        folder."""
         key = (source, cell.dataset, cell.fold)
         if key not in self._truths:
             known = self._set(summary)
@@ -168,24 +202,33 @@ class _Found:
                 or _same_truth(known[1][cell.fold], make_task(summary["task"]).history(summary["dt"]), batch)
             )
             if not same:
-                self.differences.append(f"{cell.dataset} fold {cell.fold}: the saved truth is not that of the data set.")
+                self.differences.append(
+                    f"{cell.dataset} fold {cell.fold}: the saved truth is not that of the data set."
+                )
             elif windows is not None:
                 self._windows(summary, cell, batch, windows)
             self._truths[key] = same
         return self._truths[key]
 
     def _windows(self, summary: dict[str, Any], cell: Cell, batch: Batch, windows: Frame) -> None:
-        mine = windows["dataset"].eq(cell.dataset) & windows["fingerprint"].eq(summary["fingerprint"]) & windows["task"].eq(summary["task_key"])
+        mine = (
+            windows["dataset"].eq(cell.dataset)
+            & windows["fingerprint"].eq(summary["fingerprint"])
+            & windows["task"].eq(summary["task_key"])
+        )
         there = windows[mine & windows["fold"].eq(cell.fold)].set_index("run").reindex(list(batch.ids))
         again = window_features(batch, summary["ship_L"])
         for name in FEATURES:
             said = there[name].to_numpy(float)
             for i in np.flatnonzero(~np.isclose(said, again[name], rtol=TOLERANCE, atol=1e-12, equal_nan=True)):
                 where = f"{cell.dataset} fold {cell.fold}, run {batch.ids[i]}"
-                self.differences.append(f"{where}: {name} is {said[i]:.10g} in windows.parquet, {again[name][i]:.10g} from the truth.")
+                self.differences.append(
+                    f"{where}: {name} is {said[i]:.10g} in windows.parquet, {again[name][i]:.10g} from the truth."
+                )
 
     def parameters(self, summary: dict[str, Any], cell: Cell, source: Path) -> None:
-        """The number of parameters against the saved model, of shipbench's own kinds: nothing of a stranger's is imported."""
+        """The number of parameters against the saved model, of shipbench's own kinds: nothing of a stranger's is
+        imported."""
         if summary.get("parameters") is None:
             return
         folder = source / cell.folder / "model"
@@ -197,9 +240,13 @@ class _Found:
             self.notes[f"the number of parameters of '{cell.model}' cannot be computed again: {error}"] = None
             return
         if number != summary["parameters"]:
-            self.differences.append(f"{cell.label}: parameters is {summary['parameters']} in summary.json, {number} in the saved model.")
+            self.differences.append(
+                f"{cell.label}: parameters is {summary['parameters']} in summary.json, {number} in the saved model."
+            )
 
 
 def _same_truth(fold: Fold, history: int, batch: Batch) -> bool:
     theirs = fold.test.batch(history)
-    return theirs.ids == batch.ids and all(np.array_equal(getattr(theirs, n), getattr(batch, n)) for n in ("s0", "U", "truth"))
+    return theirs.ids == batch.ids and all(
+        np.array_equal(getattr(theirs, n), getattr(batch, n)) for n in ("s0", "U", "truth")
+    )

@@ -1,11 +1,12 @@
 """A metric: a function of the true and the predicted states, with its label and unit.
 
-One file per metric; the file's name is the metric's name and the file binds a `Metric` to `METRIC`. The function takes keyword-only
-arguments, and only those of these that it needs:
+One file per metric; the file's name is the metric's name and the file binds a `Metric` to `METRIC`. The function takes
+keyword-only arguments, and only those of these that it needs:
 
 - `true`, `pred`: (batch, K, 10), states at the K predicted knots, order and units of `signals.STATES`;
 - `s0`: (batch, 10), the state that the predictor was given. It is known, so it is never scored;
-- `U`: (batch, K, inputs), the recorded orders and what else was measured, `U[:, k]` held on the step that ends at knot k;
+- `U`: (batch, K, inputs), the recorded orders and what else was measured, `U[:, k]` held on the step that ends at knot
+  k;
 - `L`: the ship's length [m]; `dt`: sample time [s].
 """
 
@@ -38,7 +39,8 @@ class Metric:
     """A function with what is needed to print its values.
 
     Args:
-        function: keyword-only; returns (batch, K) if `per_knot`, else (batch,); with several columns they are a further, last axis.
+        function: keyword-only; returns (batch, K) if `per_knot`, else (batch,); with several columns they are a
+        further, last axis.
         columns: what the function returns, in that order.
         per_knot: the per-run value is the mean over the K knots.
         smaller_is_better: direction of ranking.
@@ -49,15 +51,23 @@ class Metric:
     per_knot: bool = True
     smaller_is_better: bool = True
 
-    def values(self, *, true: np.ndarray, pred: np.ndarray, s0: np.ndarray, L: float, dt: float, U: np.ndarray | None = None) -> np.ndarray:
+    def values(
+        self, *, true: np.ndarray, pred: np.ndarray, s0: np.ndarray, L: float, dt: float, U: np.ndarray | None = None
+    ) -> np.ndarray:
         """Values of the metric, (batch, K[, columns]) or (batch[, columns]).
 
         Raises:
             InputError: the shapes of truth and prediction differ, or the metric needs `U` and none is given.
         """
-        if true.shape != pred.shape or true.ndim != 3 or true.shape[2] != len(STATES) or s0.shape != (len(true), len(STATES)):
+        if (
+            true.shape != pred.shape
+            or true.ndim != 3
+            or true.shape[2] != len(STATES)
+            or s0.shape != (len(true), len(STATES))
+        ):
             raise InputError(
-                f"{self.columns[0].label}: true {true.shape}, pred {pred.shape}, s0 {s0.shape}; accepted: true and pred "
+                f"{self.columns[0].label}: true {true.shape}, pred {pred.shape}, s0 {s0.shape}; accepted: true and "
+                "pred "
                 f"(batch, K, {len(STATES)}), s0 (batch, {len(STATES)})."
             )
         known = {"true": true, "pred": pred, "s0": s0, "L": L, "dt": dt, "U": U}
@@ -86,9 +96,11 @@ def state_error(true: np.ndarray, pred: np.ndarray) -> np.ndarray:
 
 
 def fit_percent(*, true: np.ndarray, pred: np.ndarray) -> np.ndarray:
-    """100 (1 - |pred - true| / |true - mean(true)|) of each signal [%], (K, 10) to (10,): the NRMSE fit of MATLAB's `compare`.
+    """100 (1 - |pred - true| / |true - mean(true)|) of each signal [%], (K, 10) to (10,): the NRMSE fit of MATLAB's
+    `compare`.
 
-    100 is exact, 0 no better than the mean; NaN where the true signal is constant. Source: MATLAB documentation of `compare`.
+    100 is exact, 0 no better than the mean; NaN where the true signal is constant. Source: MATLAB documentation of
+    `compare`.
     """
     with np.errstate(all="ignore"):
         error = np.linalg.norm(state_error(true, pred), axis=0)

@@ -1,7 +1,9 @@
-"""Indices of standard manoeuvres (IMO MSC.137(76), ITTC): advance, transfer, tactical diameter of turns, overshoot angles of zig-zags.
+"""Indices of standard manoeuvres (IMO MSC.137(76), ITTC): advance, transfer, tactical diameter of turns, overshoot
+angles of zig-zags.
 
-They are read off any track that begins on a straight course under recorded orders. In a rollout the orders are the true ship's, also for the model:
-its rudder is reversed when the true one was, so its overshoot is counted from its own heading at that moment.
+They are read off any track that begins on a straight course under recorded orders. In a rollout the orders are the true
+ship's, also for the model: its rudder is reversed when the true one was, so its overshoot is counted from its own
+heading at that moment.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ SMALLEST = np.deg2rad(5.0)
 STEADY = 0.1
 """|r| L / speed below which a course is straight; hard turns have 0.5 to 1."""
 NEAR, SHARE = 0.1, 0.9
-"""The order stands at the manoeuvre's angle, within 10 %, in 90 % of the samples; in the rest the rudder is on its way to the other side."""
+"""The order stands at the manoeuvre's angle, within 10 %, in 90 % of the samples; in the rest the rudder is on its way
+to the other side."""
 
 NAMES = ("advance", "transfer", "tactical_diameter", "overshoot_1", "overshoot_2")
 _LABELS = ("advance", "transfer", "tactical diameter", "first overshoot", "second overshoot")
@@ -26,9 +29,11 @@ _UNITS = ("L", "L", "L", "rad", "rad")
 
 
 def turning_indices(path: np.ndarray, L: float) -> tuple[float, float, float]:
-    """Advance and transfer (at 90 degrees of heading change) and tactical diameter (at 180) in ship lengths; not-a-number where not reached.
+    """Advance and transfer (at 90 degrees of heading change) and tactical diameter (at 180) in ship lengths;
+    not-a-number where not reached.
 
-    path: (samples, 10) states from the moment the rudder is put over; advance is along the course there, transfer square to it.
+    path: (samples, 10) states from the moment the rudder is put over; advance is along the course there, transfer
+    square to it.
     """
     course = path[0, PSI]
     east, north = path[:, Y] - path[0, Y], path[:, X] - path[0, X]
@@ -42,10 +47,11 @@ def turning_indices(path: np.ndarray, L: float) -> tuple[float, float, float]:
 
 
 def overshoots(psi: np.ndarray, reversals: np.ndarray, side: float) -> tuple[float, float]:
-    """First and second overshoot angle [rad]: how far the heading goes on after the first and the second reversal of the rudder.
+    """First and second overshoot angle [rad]: how far the heading goes on after the first and the second reversal of
+    the rudder.
 
-    psi: (samples,) heading [rad]. reversals: samples at which the rudder order changes side. side: +1 if the first order was to starboard.
-    Not-a-number where the heading does not come back before the next reversal or the end.
+    psi: (samples,) heading [rad]. reversals: samples at which the rudder order changes side. side: +1 if the first
+    order was to starboard. Not-a-number where the heading does not come back before the next reversal or the end.
     """
     found = [float("nan")] * 2
     for i, start in enumerate(reversals[:2]):
@@ -58,12 +64,15 @@ def overshoots(psi: np.ndarray, reversals: np.ndarray, side: float) -> tuple[flo
 
 
 def _orders(start: np.ndarray, path: np.ndarray, orders: np.ndarray, L: float) -> tuple[int, np.ndarray] | None:
-    """The sample at which the rudder is put over from a straight course, and those at which it is reversed; None for any other orders."""
+    """The sample at which the rudder is put over from a straight course, and those at which it is reversed; None for
+    any other orders."""
     angle = float(np.max(np.abs(orders)))
     if angle < SMALLEST:
         return None
     reached = int(np.argmax(np.abs(orders) >= (1.0 - NEAR) * angle))
-    small = np.flatnonzero(np.abs(orders[:reached]) <= 0.5 * angle)  # course keeping, until the rudder leaves for its angle
+    small = np.flatnonzero(
+        np.abs(orders[:reached]) <= 0.5 * angle
+    )  # course keeping, until the rudder leaves for its angle
     begin = int(small[-1]) + 1 if len(small) else 0
     before = start if begin == 0 else path[begin - 1]
     speed = float(np.hypot(before[U], before[V]))
@@ -73,11 +82,13 @@ def _orders(start: np.ndarray, path: np.ndarray, orders: np.ndarray, L: float) -
 
 
 def trial_indices(*, s0: np.ndarray, states: np.ndarray, true: np.ndarray, U: np.ndarray, L: float) -> np.ndarray:
-    """`NAMES` of each run, (batch, 5) in ship lengths and rad; not-a-number where the orders are no such manoeuvre or the track does not get there.
+    """`NAMES` of each run, (batch, 5) in ship lengths and rad; not-a-number where the orders are no such manoeuvre or
+    the track does not get there.
 
-    A turn: from a straight course the rudder goes to one angle and stays. A zig-zag: it goes to one angle, then to and fro between that angle
-    on both sides. s0 (batch, 10), states and true (batch, K, 10), U (batch, K, inputs); which runs are manoeuvres, and from when, is told by the
-    orders and by the true track, so that it is the same for every model.
+    A turn: from a straight course the rudder goes to one angle and stays. A zig-zag: it goes to one angle, then to and
+    fro between that angle on both sides. s0 (batch, 10), states and true (batch, K, 10), U (batch, K, inputs); which
+    runs are manoeuvres, and from when, is told by the orders and by the true track, so that it is the same for every
+    model.
     """
     found = np.full((len(states), len(NAMES)), np.nan)
     for i, (start, path, truth, orders) in enumerate(zip(s0, states, true, U[..., DELTA_C], strict=True)):
@@ -95,7 +106,9 @@ def trial_indices(*, s0: np.ndarray, states: np.ndarray, true: np.ndarray, U: np
 
 def trial_index_errors(*, true: np.ndarray, pred: np.ndarray, s0: np.ndarray, U: np.ndarray, L: float) -> np.ndarray:
     """Predicted less true indices, (batch, 5)."""
-    return trial_indices(s0=s0, states=pred, true=true, U=U, L=L) - trial_indices(s0=s0, states=true, true=true, U=U, L=L)
+    return trial_indices(s0=s0, states=pred, true=true, U=U, L=L) - trial_indices(
+        s0=s0, states=true, true=true, U=U, L=L
+    )
 
 
 COLUMNS = tuple(Column(f"{n}_error", label, unit) for n, label, unit in zip(NAMES, _LABELS, _UNITS, strict=True))

@@ -14,8 +14,8 @@ from .modifiers import is_neutral
 def lag_with_rate_limit(value: Array, command: Array, dt: Array, T: Array, rate: Array) -> Array:
     """The actuator after `dt` seconds of a held command.
 
-    d(value)/dt = clip((command - value)/T, -rate, rate): it moves at `rate` while the error exceeds rate T, then decays with time constant T [s].
-    `rate` is in units of `value` per second; T must be positive.
+    d(value)/dt = clip((command - value)/T, -rate, rate): it moves at `rate` while the error exceeds rate T, then decays
+    with time constant T [s]. `rate` is in units of `value` per second; T must be positive.
     """
     error = command - value
     size = absolute(error)
@@ -28,9 +28,9 @@ def lag_with_rate_limit(value: Array, command: Array, dt: Array, T: Array, rate:
 
 @dataclass(frozen=True)
 class Gear:
-    """What lies between a command and its actuator: transport delay [s], time constant T [s], rate limit, deadband of the controller and play
-    (backlash) of the transmission, these three in the actuator's units (and per second); T2: time constant [s] of what follows the motor, such as
-    the filter of a sensor, in place of play."""
+    """What lies between a command and its actuator: transport delay [s], time constant T [s], rate limit, deadband of
+    the controller and play (backlash) of the transmission, these three in the actuator's units (and per second); T2:
+    time constant [s] of what follows the motor, such as the filter of a sensor, in place of play."""
 
     T: Array
     rate: Array
@@ -43,9 +43,9 @@ class Gear:
 def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, substeps: int = 1) -> np.ndarray:
     """The actuator (runs, samples * substeps + 1) that follows held commands (runs, samples) from `start` (runs,).
 
-    The controller sees the command `delay` seconds late (the first command held before) and rests while |command - position| < deadband; the motor
-    moves with lag and rate limit; the actuator follows the motor once the play is taken up (it starts in the middle of it). Each value of the gear
-    may be one per run.
+    The controller sees the command `delay` seconds late (the first command held before) and rests while |command -
+    position| < deadband; the motor moves with lag and rate limit; the actuator follows the motor once the play is taken
+    up (it starts in the middle of it). Each value of the gear may be one per run.
     """
     runs, samples = command.shape
     h = dt / substeps
@@ -55,8 +55,15 @@ def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, sub
     shift = gear.delay / h
     whole = np.floor(shift).astype(int)
     part = shift - whole
-    held, steps, last = np.repeat(command, substeps, axis=1), np.arange(samples * substeps)[:, None], samples * substeps - 1
-    seen = [(held[np.arange(runs), np.clip(steps - whole - late, 0, last)], time) for late, time in ((1, part * h), (0, (1.0 - part) * h))]
+    held, steps, last = (
+        np.repeat(command, substeps, axis=1),
+        np.arange(samples * substeps)[:, None],
+        samples * substeps - 1,
+    )
+    seen = [
+        (held[np.arange(runs), np.clip(steps - whole - late, 0, last)], time)
+        for late, time in ((1, part * h), (0, (1.0 - part) * h))
+    ]
     seen = [(values, time) for values, time in seen if not np.all(time <= 0.0)]
     follows = replace(gear, **{name: 0.0 for name in ("deadband", "backlash", "T2") if not np.any(getattr(gear, name))})
     for j in range(last + 1):
@@ -66,7 +73,8 @@ def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, sub
 
 
 def gear_step(motor: Array, position: Array, wanted: Sequence[tuple[Array, Array]], gear: Gear) -> tuple[Array, Array]:
-    """Motor and actuator after commands that reach the controller one after the other, each with the seconds that it stands there."""
+    """Motor and actuator after commands that reach the controller one after the other, each with the seconds that it
+    stands there."""
     for command, time in wanted:
         before = motor
         moved = lag_with_rate_limit(motor, command, time, gear.T, gear.rate)
@@ -75,7 +83,9 @@ def gear_step(motor: Array, position: Array, wanted: Sequence[tuple[Array, Array
             position = _second_lag(position, before, motor, time, gear.T2)
     if not is_neutral(gear.T2, 0.0):
         return motor, position
-    return motor, motor if is_neutral(gear.backlash, 0.0) else clip(position, motor - 0.5 * gear.backlash, motor + 0.5 * gear.backlash)
+    return motor, motor if is_neutral(gear.backlash, 0.0) else clip(
+        position, motor - 0.5 * gear.backlash, motor + 0.5 * gear.backlash
+    )
 
 
 def _second_lag(value: Array, before: Array, after: Array, dt: Array, T: Array) -> Array:
@@ -85,7 +95,8 @@ def _second_lag(value: Array, before: Array, after: Array, dt: Array, T: Array) 
 
 
 def _stopped_short(before: Array, after: Array, wanted: Array, deadband: Array) -> Array:
-    """Where a controller with a deadband leaves the motor that would have moved from `before` to `after`: it stops the moment it is near enough."""
+    """Where a controller with a deadband leaves the motor that would have moved from `before` to `after`: it stops the
+    moment it is near enough."""
     side = sign(wanted - before)
     near = absolute(wanted - before) <= deadband
     return where(near, before, side * minimum(side * after, side * wanted - deadband))

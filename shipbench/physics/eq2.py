@@ -1,7 +1,8 @@
-"""The model that is fitted to data: equations (2) to (8) of the source paper, in the reading of docs/theory.md#equations-of-motion.
+"""The model that is fitted to data: equations (2) to (8) of the source paper, in the reading of
+docs/theory.md#equations-of-motion.
 
-The left side (masses, hull derivatives) comes from published regressions on the main dimensions; the right side holds p0..p10. Its
-structure (quadratic
+The left side (masses, hull derivatives) comes from published regressions on the main dimensions; the right side holds
+p0..p10. Its structure (quadratic
 hull, lift and drag polynomials of the rudder) differs from the MMG simulator's on purpose.
 """
 
@@ -73,9 +74,10 @@ class Coefficients:
 def coefficients(ship: Particulars) -> Coefficients:
     """Left side of eq. (2) for a ship.
 
-    Source: Inoue et al. (1981) for the derivatives, whose structure eq. (2) is; Clarke et al. (1983) for the added masses in sway and yaw,
-    Soeding (1982) for
-    surge, X_vr = -0.28 m_y as KCS has it (docs/theory.md#equations-of-motion), a_H and x_H of Yoshimura & Masumoto (2012).
+    Source: Inoue et al. (1981) for the derivatives, whose structure eq. (2) is; Clarke et al. (1983) for the added
+    masses in sway and yaw, Soeding (1982) for
+    surge, X_vr = -0.28 m_y as KCS has it (docs/theory.md#equations-of-motion), a_H and x_H of Yoshimura & Masumoto
+    (2012).
     """
     L, B, T, rho = ship.L, ship.B, ship.T, ship.rho
     form = (L, B, T, ship.Cb)
@@ -93,15 +95,18 @@ def coefficients(ship: Particulars) -> Coefficients:
         Y_v=lin.Y_v * qd, Y_r=lin.Y_r * qd * L, N_v=lin.N_v * qd * L, N_r=lin.N_r * qd * L**2,
         X_vr=m_y + X_vr + ship.mass, X_rr=ship.mass * ship.xG - Y_rd,
         Y_vv=non.Y_vv * qd, Y_vr=non.Y_vr * qd * L, Y_rr=non.Y_rr * qd * L**2,
-        N_rr=non.N_rr * qd * L**3, N_vvr=non.N_vvr * qd * L**2, N_vrr=non.N_vrr * qd * L**3, max_drift=min(0.5, 0.8 * abs(non.N_rr / non.N_vrr)),
-        eps=0.05 * (L / 100.0) ** 0.5, rho=rho, L=L, T=T, D_P=ship.D_P, x_P=ship.x_P, w_P0=ship.w_P0, t_P=ship.t_P, kt=ship.kt,
+        N_rr=non.N_rr * qd * L**3, N_vvr=non.N_vvr * qd * L**2, N_vrr=non.N_vrr * qd * L**3,
+        max_drift=min(0.5, 0.8 * abs(non.N_rr / non.N_vrr)),
+        eps=0.05 * (L / 100.0) ** 0.5, rho=rho, L=L, T=T, D_P=ship.D_P, x_P=ship.x_P, w_P0=ship.w_P0, t_P=ship.t_P,
+        kt=ship.kt,
         A_R=ship.A_R, eta=min(ship.D_P / ship.H_R, 1.0), x_R=ship.x_R, a_H=a_H, x_H=x_H * L,
         tunnels=thruster.Tunnels(ship.x_bow, ship.x_stern), A_F=ship.A_F, A_L=ship.A_L,
     )  # fmt: skip
 
 
 def propulsion(u: Array, n: Array, c: Coefficients, e: Modifiers | None = None) -> tuple[Array, Array, Array]:
-    """(X_n, V_A, race): thrust on the ship (1 - t) T [N], axial speed at the propeller and of its race [m/s]; n in rpm."""
+    """(X_n, V_A, race): thrust on the ship (1 - t) T [N], axial speed at the propeller and of its race [m/s]; n in
+    rpm."""
     e = e or Modifiers()
     V_A = u - (c.w_P0 + e.wake) * maximum(u, 0.0)  # no wake going astern: the propeller then leads
     thrust = propeller.thrust_quadratic(n / 60.0, V_A, c.D_P, c.kt, c.rho) * e.thrust
@@ -114,12 +119,21 @@ def propulsion(u: Array, n: Array, c: Coefficients, e: Modifiers | None = None) 
 
 
 def rudder(
-    v: Array, r: Array, delta: Array, V_A: Array, race: Array, c: Coefficients, p: Sequence[Array], e: Modifiers | None = None
+    v: Array,
+    r: Array,
+    delta: Array,
+    V_A: Array,
+    race: Array,
+    c: Coefficients,
+    p: Sequence[Array],
+    e: Modifiers | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Rudder force (X, Y, N) from lift and drag, c_L = p4 + p5 a + p6 a^2 + p7 a^3, c_D = p8 + p9 a + p10 a^2 (eq. 7, 8).
+    """Rudder force (X, Y, N) from lift and drag, c_L = p4 + p5 a + p6 a^2 + p7 a^3, c_D = p8 + p9 a + p10 a^2 (eq. 7,
+    8).
 
-    Inflow: the share eta = D_P/H_R of the blade stands in the race, the rest in the wake; sideways 0.364 v + 0.66 x_R r (Kose/Brix flow
-    straightening). Angle of attack a = delta + atan2(w_R, u_R). Lift acts across the inflow, to port for a > 0; drag along it.
+    Inflow: the share eta = D_P/H_R of the blade stands in the race, the rest in the wake; sideways 0.364 v + 0.66 x_R r
+    (Kose/Brix flow straightening). Angle of attack a = delta + atan2(w_R, u_R). Lift acts across the inflow, to port
+    for a > 0; drag along it.
     """
     e = e or Modifiers()
     u2, angle = c.eta * race * race + (1.0 - c.eta) * V_A * V_A, delta + e.delta
@@ -153,14 +167,20 @@ class _Inertia(NamedTuple):
 
 def _inertia(c: Coefficients, e: Modifiers) -> _Inertia:
     """Masses of the left side, with what effects make of them."""
-    if all(is_neutral(field, 1.0) for field in (e.mass, e.m_x, e.m_y, e.J_z)) and is_neutral(e.x_G, 0.0) and is_neutral(e.coupling, 0.0):
+    if (
+        all(is_neutral(field, 1.0) for field in (e.mass, e.m_x, e.m_y, e.J_z))
+        and is_neutral(e.x_G, 0.0)
+        and is_neutral(e.coupling, 0.0)
+    ):
         return _Inertia(c.m, c.x_G, c.m + c.m_x, c.m11, c.m12_Y, c.m12_N, c.m22, c.X_vr, c.X_rr)
     m, x_G = c.m * e.mass, c.x_G + e.x_G
     moved = m * x_G - c.m * c.x_G + e.coupling
     added = c.m_y * (e.m_y - 1.0)
     m22 = c.I_zz * e.mass + m * x_G * x_G + c.J_z * e.J_z
     X_vr = c.X_vr + 0.72 * added + (m - c.m)
-    return _Inertia(m, x_G, m + c.m_x * e.m_x, m + c.m_y * e.m_y, c.m12_Y + moved, c.m12_N + moved, m22, X_vr, c.X_rr + moved)
+    return _Inertia(
+        m, x_G, m + c.m_x * e.m_x, m + c.m_y * e.m_y, c.m12_Y + moved, c.m12_N + moved, m22, X_vr, c.X_rr + moved
+    )
 
 
 def accelerations(
@@ -178,14 +198,17 @@ def accelerations(
 ) -> tuple[Array, Array, Array]:
     """(du, dv, dr) of eq. (2) [m/s^2, m/s^2, rad/s^2].
 
-    n in rpm, delta in rad, F_b and F_s in N; `air` is the ship's velocity relative to the air in body axes (`wind.apparent_wind`) or None
-    without wind; p holds p0..p10: p0 lateral over axial propeller force [1], p1..p3 resistance [N s/m, N s^2/m^2, N s^3/m^3], p4..p10
-    rudder [1]; `mods` carries effects that the plain model leaves out.
+    n in rpm, delta in rad, F_b and F_s in N; `air` is the ship's velocity relative to the air in body axes
+    (`wind.apparent_wind`) or None without wind; p holds p0..p10: p0 lateral over axial propeller force [1], p1..p3
+    resistance [N s/m, N s^2/m^2, N s^3/m^3], p4..p10 rudder [1]; `mods` carries effects that the plain model leaves
+    out.
 
-    The two cubic yaw terms are divided by U; their v/U is held at 0.5 (30 deg of drift, the end of the charts) or where N_vrr v r^2/U
-    would exceed the yaw damping N_rr r|r|: beyond, a ship set sideways by wind at low speed would spin up without limit.
+    The two cubic yaw terms are divided by U; their v/U is held at 0.5 (30 deg of drift, the end of the charts) or where
+    N_vrr v r^2/U would exceed the yaw damping N_rr r|r|: beyond, a ship set sideways by wind at low speed would spin up
+    without limit.
 
-    X_e, Y_e, N_e are thrusters and measured wind. R(u) = -(p1 u + p2 u|u| + p3 u^3): it opposes the motion on both tacks of u.
+    X_e, Y_e, N_e are thrusters and measured wind. R(u) = -(p1 u + p2 u|u| + p3 u^3): it opposes the motion on both
+    tacks of u.
     """
     e = mods or Modifiers()
     f = e.hull
@@ -204,7 +227,14 @@ def accelerations(
     X_d, Y_d, N_d = rudder(v, r, delta, V_A, race, c, p, e)
     Y_T, N_T = thruster.tunnel_thrusters(u, F_b * e.bow, F_s * e.stern, c.tunnels, e.loss, e.lever)
     abs_r = absolute(r)
-    X = X_n + X_d - f.resistance * (u * (p[1] + p[2] * absolute(u) + p[3] * u * u)) + f.X_nonlinear * i.X_vr * v * r + i.X_rr * r * r + e.X
+    X = (
+        X_n
+        + X_d
+        - f.resistance * (u * (p[1] + p[2] * absolute(u) + p[3] * u * u))
+        + f.X_nonlinear * i.X_vr * v * r
+        + i.X_rr * r * r
+        + e.X
+    )
     Y_n = p[0] * X_n
     Y = Y_n + Y_d + Y_T + f.Y_v * c.Y_v * speed * v + (f.Y_r * c.Y_r * speed - i.m * u) * r + e.Y
     Y = Y + f.Y_nonlinear * (c.Y_vv * v * absolute(v) + c.Y_vr * v * abs_r + c.Y_rr * r * abs_r)

@@ -44,7 +44,8 @@ class PolynomialHull:
 
 @dataclass(frozen=True)
 class UnifiedHull:
-    """Low-speed coefficients (Yoshimura, Nakao & Ishibashi 2009); X0_F, X0_A < 0 are the resistance ahead and astern."""
+    """Low-speed coefficients (Yoshimura, Nakao & Ishibashi 2009); X0_F, X0_A < 0 are the resistance ahead and
+    astern."""
 
     X0_F: float
     X0_A: float
@@ -62,7 +63,8 @@ class UnifiedHull:
 
 @dataclass(frozen=True)
 class HullFactors:
-    """Multipliers of the linear derivatives, of the nonlinear terms of each axis and of the resistance; arrays per run or floats."""
+    """Multipliers of the linear derivatives, of the nonlinear terms of each axis and of the resistance; arrays per run
+    or floats."""
 
     Y_v: Array = 1.0
     Y_r: Array = 1.0
@@ -80,10 +82,13 @@ class HullFactors:
 DEEP = HullFactors()
 
 
-def polynomial(u: Array, v: Array, r: Array, c: PolynomialHull, L: float, T: float, rho: float, f: HullFactors = DEEP) -> tuple[Array, Array, Array]:
+def polynomial(
+    u: Array, v: Array, r: Array, c: PolynomialHull, L: float, T: float, rho: float, f: HullFactors = DEEP
+) -> tuple[Array, Array, Array]:
     """Hull force from the cubic MMG polynomial.
 
-    v' = v/U, r' = rL/U with U = sqrt(u^2 + v^2 + eps^2) and |r'| <= 1.5, so that it stays finite at rest; the resistance is R0 u|u|.
+    v' = v/U, r' = rL/U with U = sqrt(u^2 + v^2 + eps^2) and |r'| <= 1.5, so that it stays finite at rest; the
+    resistance is R0 u|u|.
 
     Source: Yasukawa & Yoshimura (2015), eq. 8-10. Limits: zero at rest; good for |beta| < 25 deg, |r'| < 1, u > 0.
     """
@@ -101,7 +106,8 @@ def polynomial(u: Array, v: Array, r: Array, c: PolynomialHull, L: float, T: flo
 
 
 def cross_flow(v: Array, r: Array, L: float, C_rY: float, C_rN: float) -> tuple[Array, Array]:
-    """Integrals over the length, xi = x/L in [-1/2, 1/2], of w|w| and w|w| xi with w = v + C_r r L xi (per unit C_D; m^2/s^2)."""
+    """Integrals over the length, xi = x/L in [-1/2, 1/2], of w|w| and w|w| xi with w = v + C_r r L xi (per unit C_D;
+    m^2/s^2)."""
     Y, N = 0.0, 0.0
     for xi, weight in zip(_NODES.tolist(), _WEIGHTS.tolist(), strict=True):
         wY, wN = v + C_rY * L * xi * r, v + C_rN * L * xi * r
@@ -111,8 +117,8 @@ def cross_flow(v: Array, r: Array, L: float, C_rY: float, C_rN: float) -> tuple[
 
 
 def tilted_cross_flow(v: Array, r: Array, L: float) -> tuple[Array, Array]:
-    """The same of a drag that grows along the length: integrals of 2 xi w|w| and 2 xi^2 w|w|, w = v + r L xi (distributions along the hull: J. P.
-    Hooft, Ocean Eng. 21 (1994) 329)."""
+    """The same of a drag that grows along the length: integrals of 2 xi w|w| and 2 xi^2 w|w|, w = v + r L xi
+    (distributions along the hull: J. P. Hooft, Ocean Eng. 21 (1994) 329)."""
     Y, N = 0.0, 0.0
     for xi, weight in zip(_NODES.tolist(), _WEIGHTS.tolist(), strict=True):
         w = v + L * xi * r
@@ -121,13 +127,18 @@ def tilted_cross_flow(v: Array, r: Array, L: float) -> tuple[Array, Array]:
     return Y, N
 
 
-def unified(u: Array, v: Array, r: Array, c: UnifiedHull, L: float, T: float, rho: float, f: HullFactors = DEEP) -> tuple[Array, Array, Array]:
-    """Hull force of the unified model for ocean and harbour: linear lift terms plus cross-flow drag; nothing is divided by the speed.
+def unified(
+    u: Array, v: Array, r: Array, c: UnifiedHull, L: float, T: float, rho: float, f: HullFactors = DEEP
+) -> tuple[Array, Array, Array]:
+    """Hull force of the unified model for ocean and harbour: linear lift terms plus cross-flow drag; nothing is divided
+    by the speed.
 
     X = rho/2 L T {[X0_F + (X0_A - X0_F)|beta|/pi] u U + (X_vv v^2 + X_rr L^2 r^2) u/U + X_vr L v r}
-    Y = rho/2 L T {Y_v v|u| + Y_r L r u - C_D int |w|w dxi},  N = rho/2 L^2 T {N_v v u + N_r L r|u| - C_D int |w|w xi dxi}
+    Y = rho/2 L T {Y_v v|u| + Y_r L r u - C_D int |w|w dxi},  N = rho/2 L^2 T {N_v v u + N_r L r|u| - C_D int |w|w xi
+    dxi}
 
-    Source: Yoshimura, Nakao & Ishibashi (2009), with the quadratic drag terms X_vv, X_rr of the ship's polynomial, which oppose u.
+    Source: Yoshimura, Nakao & Ishibashi (2009), with the quadratic drag terms X_vv, X_rr of the ship's polynomial,
+    which oppose u.
     Limits: zero at rest; pure sway gives Y = -rho/2 L T C_D v|v|.
     """
     speed = sqrt(u * u + v * v + 1e-12)
@@ -135,7 +146,10 @@ def unified(u: Array, v: Array, r: Array, c: UnifiedHull, L: float, T: float, rh
     drag = c.X0_F + (c.X0_A - c.X0_F) * angle
     IY, IN = cross_flow(v, r, L, c.C_rY, c.C_rN)
     q = 0.5 * rho * L * T
-    X = q * (f.resistance * drag * u * speed + f.X_nonlinear * ((c.X_vv * v * v + c.X_rr * L**2 * r * r) * u / speed + c.X_vr * L * v * r))
+    X = q * (
+        f.resistance * drag * u * speed
+        + f.X_nonlinear * ((c.X_vv * v * v + c.X_rr * L**2 * r * r) * u / speed + c.X_vr * L * v * r)
+    )
     Y = q * (f.Y_v * c.Y_v * v * absolute(u) + f.Y_r * c.Y_r * L * r * u - f.Y_nonlinear * c.C_D * IY)
     N = q * L * (f.N_v * c.N_v * v * u + f.N_r * c.N_r * L * r * absolute(u) - f.N_nonlinear * c.C_D * IN)
     return X, Y, N

@@ -1,4 +1,5 @@
-"""The MMG ship: hull, propeller, rudder, thrusters, wind, current and depth summed into accelerations. This is the simulator's truth.
+"""The MMG ship: hull, propeller, rudder, thrusters, wind, current and depth summed into accelerations. This is the
+simulator's truth.
 
 The fitted model (`eq2`) is a different structure on purpose: data made and fitted with the same equations prove little.
 """
@@ -35,7 +36,8 @@ class MMGPropeller:
 
 @dataclass(frozen=True)
 class MMGActuators:
-    """Time constants [s] and rate limits of shaft [rev/s^2], rudder [rad/s] and thrusters [N/s]; greatest rudder angle [rad]."""
+    """Time constants [s] and rate limits of shaft [rev/s^2], rudder [rad/s] and thrusters [N/s]; greatest rudder angle
+    [rad]."""
 
     T_n: float
     rate_n: float
@@ -76,7 +78,8 @@ class MMGShip:
 class Environment:
     """What surrounds the ship, uniform over the field; each value a float or one per run.
 
-    current_speed [m/s] and current_to [rad, direction it flows towards]; wind_speed [m/s] and wind_from [rad]; depth [m].
+    current_speed [m/s] and current_to [rad, direction it flows towards]; wind_speed [m/s] and wind_from [rad]; depth
+    [m].
     """
 
     current_speed: Array = 0.0
@@ -146,7 +149,8 @@ def water_forces(
     factors: hull.HullFactors,
     e: Modifiers | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Sum of hull, propeller, rudder and thruster forces (X, Y, N) about midship; velocities through the water, n in rev/s."""
+    """Sum of hull, propeller, rudder and thruster forces (X, Y, N) about midship; velocities through the water, n in
+    rev/s."""
     p, e = ship.propeller, e or Modifiers()
     if isinstance(ship.hull, hull.PolynomialHull):
         X_H, Y_H, N_H = hull.polynomial(u, v, r, ship.hull, ship.L, ship.T, ship.rho, factors)
@@ -193,7 +197,9 @@ def load_mmg_ship(name: str) -> MMGShip:
         mmg = data["mmg"]
         return _assemble(ship, mmg)
     except (KeyError, TypeError) as error:
-        raise InputError(f"{path}: [mmg] is incomplete: {error}. See configs/ships/container130.toml for a full set.") from None
+        raise InputError(
+            f"{path}: [mmg] is incomplete: {error}. See configs/ships/container130.toml for a full set."
+        ) from None
 
 
 def _assemble(ship: Ship, mmg: dict[str, Any]) -> MMGShip:
@@ -211,16 +217,19 @@ def _assemble(ship: Ship, mmg: dict[str, Any]) -> MMGShip:
     tunnels = mmg.get("thrusters", {})
     kinds = {"polynomial": hull.PolynomialHull, "unified": hull.UnifiedHull}
     return MMGShip(
-        name=ship.name, L=L, B=ship.B, T=T, Cb=float(ship.Cb or m / (rho * L * ship.B * T)), rho=rho, m=m, x_G=float(ship.xG or 0.0),
+        name=ship.name, L=L, B=ship.B, T=T, Cb=float(ship.Cb or m / (rho * L * ship.B * T)), rho=rho, m=m,
+        x_G=float(ship.xG or 0.0),
         I_zG=ship.Izz if ship.Izz is not None else m * (0.25 * L) ** 2,
         m_x=mmg["m_x_dash"] * unit_mass, m_y=mmg["m_y_dash"] * unit_mass, J_z=mmg["J_z_dash"] * unit_inertia,
         hull=kinds[form](**hull_data),
         propeller=MMGPropeller(
-            D=prop.diameter, w_P0=float(prop.wake or 0.0), t_P=float(prop.thrust_deduction or 0.0), x_P=float(prop.x or -0.48 * L),
+            D=prop.diameter, w_P0=float(prop.wake or 0.0), t_P=float(prop.thrust_deduction or 0.0),
+            x_P=float(prop.x or -0.48 * L),
             kt=prop.kt or (0.0, 0.0, 0.0), **mmg["propeller"],
         ),
         rudder=rudder.MMGRudder(A_R=blade.area, H_R=float(ship.rudder.height), **rudder_data),
-        thrusters=thruster.Tunnels(thrusters.x_bow if thrusters else 0.0, thrusters.x_stern if thrusters else 0.0, **tunnels),
+        thrusters=thruster.Tunnels(thrusters.x_bow if thrusters else 0.0, thrusters.x_stern if thrusters else 0.0,
+            **tunnels),
         actuators=MMGActuators(**{f.name: mmg["actuators"][f.name] for f in fields(MMGActuators)}),
         A_F=ship.wind.frontal_area if ship.wind else 0.0, A_L=ship.wind.lateral_area if ship.wind else 1.0,
         particulars=ship,

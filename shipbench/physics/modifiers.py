@@ -1,7 +1,9 @@
-"""Where a cause that the plain model leaves out enters it: one list of places, read by the simulated ship and by the fitted one alike.
+"""Where a cause that the plain model leaves out enters it: one list of places, read by the simulated ship and by the
+fitted one alike.
 
-An effect (`shipbench.effects`) writes its formula once, as changes of these fields; what each ship makes of a field (its own rudder, hull and
-propeller) stays its own. That keeps hidden cause and named cause the same physics in two different structures.
+An effect (`shipbench.effects`) writes its formula once, as changes of these fields; what each ship makes of a field
+(its own rudder, hull and propeller) stays its own. That keeps hidden cause and named cause the same physics in two
+different structures.
 """
 
 from __future__ import annotations
@@ -14,7 +16,8 @@ from .hull import DEEP, HullFactors
 
 
 class Flow(NamedTuple):
-    """What an effect may look at, at one instant: place [m], time since the run began [s], motion over ground, actuators [rpm, rad, N, N]."""
+    """What an effect may look at, at one instant: place [m], time since the run began [s], motion over ground,
+    actuators [rpm, rad, N, N]."""
 
     x: Array
     y: Array
@@ -33,16 +36,20 @@ class Flow(NamedTuple):
 class Modifiers:
     """Neutral as constructed: nothing is missing.
 
-    u_c, v_c: velocity of the water in body axes [m/s]; drift: share of the wind's velocity that the water has besides. air_u, air_v: velocity of the
-    air beyond the measured wind, body axes [m/s]; wind_X, wind_Y, wind_N: factors of the wind's forces and moment; wind_lever: of its side force, to
-    add [m]. delta: rudder angle to add [rad]; rudder: factor of the rudder's lift; rudder_asymmetry a: factor 1 + a to starboard and 1 - a to port;
-    stall: share of the lift lost beyond `stall_angle` [rad]; late_stall: the same from 26 to 37 deg, as any rudder may. race, thrust: factors of the
-    race's excess speed and of the thrust; off_design: thrust [N] beside that of K_T, to add before the factor; straightening: factor of the sideways
-    flow at the rudder, 1 + its asymmetry where it comes from port (positive) and 1 - where from starboard; straightening_r: factor of its part by yaw
-    alone; backing: share of the flow at the rudder that a reversed propeller stops; reversal: a rudder angle counts 1 - 2 reversal where the flow
-    comes from astern (1/2: nothing, 1: the other way); wake: added to the wake fraction. bow, stern: factors of the thrusters; lever: shift of the
-    bow thruster [m]; loss: share of side force and moment lost at speed. mass, m_x, m_y, J_z: factors of the ship's mass (with its inertia), of added
-    mass in surge and sway and of added inertia in yaw; coupling: added mass between sway and yaw, to add [kg m]; x_G: shift of the centre of gravity
+    u_c, v_c: velocity of the water in body axes [m/s]; drift: share of the wind's velocity that the water has besides.
+    air_u, air_v: velocity of the air beyond the measured wind, body axes [m/s]; wind_X, wind_Y, wind_N: factors of the
+    wind's forces and moment; wind_lever: of its side force, to
+    add [m]. delta: rudder angle to add [rad]; rudder: factor of the rudder's lift; rudder_asymmetry a: factor 1 + a to
+    starboard and 1 - a to port;
+    stall: share of the lift lost beyond `stall_angle` [rad]; late_stall: the same from 26 to 37 deg, as any rudder may.
+    race, thrust: factors of the race's excess speed and of the thrust; off_design: thrust [N] beside that of K_T, to
+    add before the factor; straightening: factor of the sideways flow at the rudder, 1 + its asymmetry where it comes
+    from port (positive) and 1 - where from starboard; straightening_r: factor of its part by yaw alone; backing: share
+    of the flow at the rudder that a reversed propeller stops; reversal: a rudder angle counts 1 - 2 reversal where the
+    flow comes from astern (1/2: nothing, 1: the other way); wake: added to the wake fraction. bow, stern: factors of
+    the thrusters; lever: shift of the bow thruster [m]; loss: share of side force and moment lost at speed. mass, m_x,
+    m_y, J_z: factors of the ship's mass (with its inertia), of added mass in surge and sway and of added inertia in
+    yaw; coupling: added mass between sway and yaw, to add [kg m]; x_G: shift of the centre of gravity
     [m]. hull: factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship [N m] to add.
     """
 
@@ -94,7 +101,8 @@ class Modifiers:
         self.X, self.Y, self.N = self.X + X, self.Y + Y, self.N + N
 
     def water(self, air: tuple[Array, Array] | None, u: Array, v: Array) -> tuple[Array, Array]:
-        """Velocity of the water in body axes [m/s]; u, v over ground, `air` the same relative to the air, or None where nothing is known of it."""
+        """Velocity of the water in body axes [m/s]; u, v over ground, `air` the same relative to the air, or None where
+        nothing is known of it."""
         if air is None or is_neutral(self.drift, 0.0):
             return self.u_c, self.v_c
         return self.u_c + self.drift * (u - air[0]), self.v_c + self.drift * (v - air[1])
@@ -104,7 +112,8 @@ class Modifiers:
         return self.wind_X * X, self.wind_Y * Y, self.wind_N * N + self.wind_lever * Y
 
     def sideways(self, w_R: Array) -> Array:
-        """Sideways flow at the rudder [m/s] after straightening by hull and propeller; a single screw straightens the two sides unequally."""
+        """Sideways flow at the rudder [m/s] after straightening by hull and propeller; a single screw straightens the
+        two sides unequally."""
         if is_neutral(self.straightening, 1.0) and is_neutral(self.straightening_asymmetry, 0.0):
             return w_R
         return self.straightening * (w_R + self.straightening_asymmetry * absolute(w_R))

@@ -26,24 +26,35 @@ _SIDE_A = (-7.9e-5, 7.99e-3, -4.93e-3, -5.87e-3, -5.58e-4)
 _SIDE_B = (3.5e-5, -3.17e-3, 1.96e-3, 2.33e-3, 2.25e-4)
 
 
-def thrust_quadratic(n: Array, V_A: Array, D: float, kt: tuple[float, float, float], rho: float, astern: float = 0.65) -> Array:
+def thrust_quadratic(
+    n: Array, V_A: Array, D: float, kt: tuple[float, float, float], rho: float, astern: float = 0.65
+) -> Array:
     """Thrust from K_T = k0 + k1 J + k2 J^2, multiplied out so that nothing is divided by n.
 
-    T = rho D^2 (k0 D^2 n|n| + k1 D n V_A + k2 V_A|V_A|) for n >= 0; turning astern the J-term is dropped and k0 is scaled by `astern`.
+    T = rho D^2 (k0 D^2 n|n| + k1 D n V_A + k2 V_A|V_A|) for n >= 0; turning astern the J-term is dropped and k0 is
+    scaled by `astern`.
 
-    Limits: first quadrant as published (Yasukawa & Yoshimura 2015, eq. 22-23). For n < 0 only the size is right: 0.65 k0 is the level of the
-    B4-70 four-quadrant curve at J = -0.2 to -0.5. At rest with n = 0 the thrust is 0.
+    Limits: first quadrant as published (Yasukawa & Yoshimura 2015, eq. 22-23). For n < 0 only the size is right: 0.65
+    k0 is the level of the B4-70 four-quadrant curve at J = -0.2 to -0.5. At rest with n = 0 the thrust is 0.
     """
     ahead = maximum(n, 0.0)
     back = n - ahead
-    return rho * D**2 * (kt[0] * D**2 * (ahead * ahead - astern * back * back) + kt[1] * D * ahead * V_A + kt[2] * V_A * absolute(V_A))
+    return (
+        rho
+        * D**2
+        * (
+            kt[0] * D**2 * (ahead * ahead - astern * back * back)
+            + kt[1] * D * ahead * V_A
+            + kt[2] * V_A * absolute(V_A)
+        )
+    )
 
 
 def thrust_four_quadrant(n: Array, V_A: Array, D: float, rho: float) -> Array:
     """Thrust of a B4-70 screw, P/D = 0.8, in all four quadrants.
 
-    beta = atan2(V_A, 0.7 pi n D); T = rho/2 (V_A^2 + (0.7 pi n D)^2) pi/4 D^2 C_T(beta), 100 C_T = sum_k A_k cos(k beta) + B_k sin(k
-    beta), k = 0..20.
+    beta = atan2(V_A, 0.7 pi n D); T = rho/2 (V_A^2 + (0.7 pi n D)^2) pi/4 D^2 C_T(beta), 100 C_T = sum_k A_k cos(k
+    beta) + B_k sin(k beta), k = 0..20.
 
     Source: Roddy, Hess & Faller (2006). Limit: 0 at rest with n = 0.
     """
@@ -63,13 +74,16 @@ def thrust_coefficient_four_quadrant(J: Array) -> Array:
     return thrust_four_quadrant(1.0, J, 1.0, 1.0)
 
 
-def wake_fraction(u: Array, v: Array, r: Array, w_P0: float, x_P: float, C1: float, C2_plus: float, C2_minus: float) -> Array:
+def wake_fraction(
+    u: Array, v: Array, r: Array, w_P0: float, x_P: float, C1: float, C2_plus: float, C2_minus: float
+) -> Array:
     """Wake fraction while manoeuvring.
 
-    (1 - w_P) = (1 - w_P0) {1 + (1 - exp(-C1 |beta_P|)) (C2 - 1)}, beta_P = beta - x'_P r' taken geometrically as atan2(-(v + x_P r), u).
+    (1 - w_P) = (1 - w_P0) {1 + (1 - exp(-C1 |beta_P|)) (C2 - 1)}, beta_P = beta - x'_P r' taken geometrically as
+    atan2(-(v + x_P r), u).
 
-    Source: Yasukawa & Yoshimura (2015), eq. 24. Limits: w_P0 straight ahead; 0 going astern (the hull is then downstream); with C1 = 0
-    the wake stays w_P0.
+    Source: Yasukawa & Yoshimura (2015), eq. 24. Limits: w_P0 straight ahead; 0 going astern (the hull is then
+    downstream); with C1 = 0 the wake stays w_P0.
     """
     beta_P = arctan2(-(v + x_P * r), maximum(u, 0.0) + 1e-3)
     C2 = where(beta_P > 0, C2_plus + 0.0 * beta_P, C2_minus)
@@ -80,10 +94,12 @@ def wake_fraction(u: Array, v: Array, r: Array, w_P0: float, x_P: float, C1: flo
 def side_force_astern(n: Array, u: Array, D: float, L: float, T: float, rho: float) -> tuple[Array, Array]:
     """Side force Y_P [N] and moment N_P [N m] about midship of a right-handed screw turning astern.
 
-    Y_P = rho/2 L T (nD)^2 {A1 + A2 J, J in [-0.35, -0.06]; A3 + A4 J below; A5 above}, J = u / (nD); N_P likewise with L^2 and B. The stern goes to
+    Y_P = rho/2 L T (nD)^2 {A1 + A2 J, J in [-0.35, -0.06]; A3 + A4 J below; A5 above}, J = u / (nD); N_P likewise with
+    L^2 and B. The stern goes to
     port: Y_P < 0, N_P > 0. Zero for n >= 0.
 
-    Source: form of Hachii with the values of the Esso Osaka, as in Miyauchi et al. (2022), doi 10.1007/s00773-022-00889-3.
+    Source: form of Hachii with the values of the Esso Osaka, as in Miyauchi et al. (2022), doi
+    10.1007/s00773-022-00889-3.
     """
     tip = where(n < 0, n, -1.0 + 0.0 * n) * D
     J = u / where(tip < -1e-6, tip, -1e-6 + 0.0 * tip)
@@ -96,11 +112,13 @@ def side_force_astern(n: Array, u: Array, D: float, L: float, T: float, rho: flo
 
 
 def race_speed(V_A: Array, thrust: Array, D: float, rho: float) -> Array:
-    """Axial speed far behind the propeller, sqrt(V_A^2 + 8 T / (rho pi D^2)) (momentum theory); 0 where the thrust would stop the flow."""
+    """Axial speed far behind the propeller, sqrt(V_A^2 + 8 T / (rho pi D^2)) (momentum theory); 0 where the thrust
+    would stop the flow."""
     return sqrt(maximum(V_A * V_A + 8.0 * thrust / (rho * math.pi * D**2), 1e-8))
 
 
 def race_through(V_A: Array, thrust: Array, D: float, rho: float) -> Array:
-    """The same of a propeller that drives ahead in a flow which may come from astern: negative where that is the stronger of the two."""
+    """The same of a propeller that drives ahead in a flow which may come from astern: negative where that is the
+    stronger of the two."""
     s = V_A * absolute(V_A) + 8.0 * thrust / (rho * math.pi * D**2)
     return s / sqrt(sqrt(s * s + 1e-8))

@@ -1,6 +1,8 @@
-"""Manoeuvring coefficients from the main dimensions (level trim). Prime-I: force on rho/2 L^2 U^2; MMG: force on rho/2 L T U^2.
+"""Manoeuvring coefficients from the main dimensions (level trim). Prime-I: force on rho/2 L^2 U^2; MMG: force on rho/2
+L T U^2.
 
-Validity: merchant ships. Against measured KCS and KVLCC2 values the linear derivatives are off by 10 to 25 %, the cubic ones by 50 % and
+Validity: merchant ships. Against measured KCS and KVLCC2 values the linear derivatives are off by 10 to 25 %, the cubic
+ones by 50 % and
 more: a fit that calls them exact inherits that.
 """
 
@@ -22,9 +24,11 @@ class Clarke(NamedTuple):
 def clarke_1983(L: float, B: float, T: float, Cb: float) -> Clarke:
     """Added masses in sway and yaw (prime-I).
 
-    Source: Clarke, Gedling & Hine (1983), regression equations; N'_rd with 0.33 B/L as in the original. B/L is held at 0.2, that of the beamiest
-    merchant ships: up to there N'_rd/Y'_vd is that of an integral over sections (1/12 of a prism; KCS and KVLCC2, measured: 0.05), beyond it falls
-    to nothing at 0.3, and a tug would turn without added inertia, about an added mass 0.4 L before midship.
+    Source: Clarke, Gedling & Hine (1983), regression equations; N'_rd with 0.33 B/L as in the original. B/L is held at
+    0.2, that of the beamiest
+    merchant ships: up to there N'_rd/Y'_vd is that of an integral over sections (1/12 of a prism; KCS and KVLCC2,
+    measured: 0.05), beyond it falls to nothing at 0.3, and a tug would turn without added inertia, about an added mass
+    0.4 L before midship.
     """
     k, b = -math.pi * (T / L) ** 2, min(B / L, 0.2)
     return Clarke(
@@ -45,7 +49,8 @@ class InoueLinear(NamedTuple):
 
 
 def inoue_linear(L: float, B: float, T: float, Cb: float) -> InoueLinear:
-    """Linear derivatives (MMG normalisation), level trim: -(pi k/2 + 1.4 a), pi k/4, -k, -(0.54 k - k^2) with k = 2T/L, a = Cb B/L.
+    """Linear derivatives (MMG normalisation), level trim: -(pi k/2 + 1.4 a), pi k/4, -k, -(0.54 k - k^2) with k = 2T/L,
+    a = Cb B/L.
 
     Source: Inoue, Hirano & Kijima (1981). Y_r and N_v are totals: they hold the added-mass Coriolis part.
     """
@@ -67,8 +72,8 @@ class InoueNonlinear(NamedTuple):
 def inoue_nonlinear(L: float, B: float, T: float, Cb: float) -> InoueNonlinear:
     """Nonlinear derivatives (MMG normalisation) read off Inoue's charts.
 
-    Source: Inoue, Hirano & Kijima (1981), chart fits of Zhou, Sheng & Feng (1983). The argument Cb B/L is held inside the charts' range
-    [0.08, 0.16], outside of which the cubic fits run away.
+    Source: Inoue, Hirano & Kijima (1981), chart fits of Zhou, Sheng & Feng (1983). The argument Cb B/L is held inside
+    the charts' range [0.08, 0.16], outside of which the cubic fits run away.
     """
     a = min(max(Cb * B / L, 0.08), 0.16)
     fine = (1.0 - Cb) * T / B
@@ -88,5 +93,6 @@ def surge_added_mass(displacement: float, L: float, rho: float) -> float:
 
 
 def hull_rudder_interaction(L: float, B: float, Cb: float) -> tuple[float, float]:
-    """(a_H, x'_H): force increase factor 3.6 Cb B/L and its point of application, -0.4 L (Yoshimura & Masumoto 2012)."""
+    """(a_H, x'_H): force increase factor 3.6 Cb B/L and its point of application, -0.4 L (Yoshimura & Masumoto
+    2012)."""
     return 3.6 * Cb * B / L, -0.4

@@ -1,4 +1,5 @@
-"""Rudder forces: the MMG form in the propeller race (also reversing) and the lift and drag form of the source paper's fit.
+"""Rudder forces: the MMG form in the propeller race (also reversing) and the lift and drag form of the source paper's
+fit.
 
 A positive rudder angle turns the ship to starboard: Y_R < 0 and N_R > 0 ahead.
 """
@@ -32,15 +33,17 @@ class MMGRudder:
     c_pr: float = -0.176
 
 
-def inflow_speed(u: Array, n: Array, thrust: Array, w_P: Array, c: MMGRudder, D: float, rho: float, race_factor: Array = 1.0) -> Array:
+def inflow_speed(
+    u: Array, n: Array, thrust: Array, w_P: Array, c: MMGRudder, D: float, rho: float, race_factor: Array = 1.0
+) -> Array:
     """Longitudinal inflow at the rudder [m/s] in the propeller race, without division by the advance ratio.
 
-    n >= 0: u_R = eps sqrt(eta [u_P + kappa (sqrt(u_P^2 + 8 T/(rho pi D^2)) - u_P)]^2 + (1 - eta) u_P^2), u_P = (1 - w_P) u, eta = D/H_R.
-    n < 0:  Kitagawa's form u_R = sign(s) sqrt|s|, s = eta sign(a) a^2 + (1 - eta) b^2 + c_pr u^2, a = b - k_xr sqrt(8|T|/(rho pi D^2)), b
-    = eps (1 - w_P) u.
+    n >= 0: u_R = eps sqrt(eta [u_P + kappa (sqrt(u_P^2 + 8 T/(rho pi D^2)) - u_P)]^2 + (1 - eta) u_P^2), u_P = (1 -
+    w_P) u, eta = D/H_R. n < 0:  Kitagawa's form u_R = sign(s) sqrt|s|, s = eta sign(a) a^2 + (1 - eta) b^2 + c_pr u^2,
+    a = b - k_xr sqrt(8|T|/(rho pi D^2)), b = eps (1 - w_P) u.
 
-    Source: Yasukawa & Yoshimura (2015), eq. 38, written for low speed, and Kitagawa's form for n < 0, both as in Miyauchi et al. (2022). Limits:
-    eps kappa sqrt(eta)
+    Source: Yasukawa & Yoshimura (2015), eq. 38, written for low speed, and Kitagawa's form for n < 0, both as in
+    Miyauchi et al. (2022). Limits: eps kappa sqrt(eta)
     times the race speed at u = 0; close to zero when backing with headway. Going astern with n < 0 it is u.
     """
     eta = min(D / c.H_R, 1.0)
@@ -48,17 +51,31 @@ def inflow_speed(u: Array, n: Array, thrust: Array, w_P: Array, c: MMGRudder, D:
     jet2 = 8.0 * absolute(thrust) / (rho * math.pi * D**2)
     race = sqrt(maximum(u_P * u_P + where(thrust > 0, jet2, -jet2), 1e-8))
     inner = u_P + c.kappa * race_factor * (race - u_P)
-    ahead = c.epsilon * sqrt(eta * inner * inner + (1.0 - eta) * u_P * u_P + 1e-10) * where(inner >= 0, 1.0 + 0.0 * inner, -1.0)
+    ahead = (
+        c.epsilon
+        * sqrt(eta * inner * inner + (1.0 - eta) * u_P * u_P + 1e-10)
+        * where(inner >= 0, 1.0 + 0.0 * inner, -1.0)
+    )
     b = c.epsilon * u_P
     a = b - c.k_xr * sqrt(jet2 + 1e-10)
-    loss = c.c_pr * smoothstep(-n, 0.0, 0.5)  # the loss grows with reversed revolutions, so that u_R is continuous at n = 0
+    loss = c.c_pr * smoothstep(
+        -n, 0.0, 0.5
+    )  # the loss grows with reversed revolutions, so that u_R is continuous at n = 0
     s = eta * sign(a) * a * a + (1.0 - eta) * b * b + loss * u * u
     backing = where(u >= 0, sign(s) * sqrt(absolute(s) + 1e-10), u)
     return where(n >= 0, ahead, backing)
 
 
 def mmg_rudder(
-    u: Array, v: Array, r: Array, delta: Array, u_R: Array, c: MMGRudder, L: float, rho: float, lift: Callable[[Array], Array] | None = None
+    u: Array,
+    v: Array,
+    r: Array,
+    delta: Array,
+    u_R: Array,
+    c: MMGRudder,
+    L: float,
+    rho: float,
+    lift: Callable[[Array], Array] | None = None,
 ) -> tuple[Array, Array, Array]:
     """Rudder force (X_R, Y_R, N_R) about midship; `lift(alpha_R)` multiplies F_N where the blade is not as built.
 
@@ -82,5 +99,6 @@ def mmg_rudder(
 
 
 def lift_slope(aspect_ratio: float) -> float:
-    """Slope of the normal-force coefficient, f_alpha = 6.13 A / (A + 2.25) per rad (Fujii; Yasukawa & Yoshimura 2015, eq. 31)."""
+    """Slope of the normal-force coefficient, f_alpha = 6.13 A / (A + 2.25) per rad (Fujii; Yasukawa & Yoshimura 2015,
+    eq. 31)."""
     return 6.13 * aspect_ratio / (aspect_ratio + 2.25)

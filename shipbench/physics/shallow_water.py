@@ -20,14 +20,14 @@ class DepthFactors(NamedTuple):
 def depth_factors(depth: Array, L: float, B: float, T: float, Cb: float) -> DepthFactors:
     """Multipliers at water depth `depth` [m] (held at or above 1.15 T).
 
-    Y_v: -F + (1 - F)^(-0.4 Cb B/T), N_r: -F + (1 - F)^(14.28 T/L - 1.5), F = T/h (Kijima). Y_r and N_v: ratio of the regressions with
-    k_e = k / [T/2h + ((pi T/2h) cot(pi T/2h))^q] to those with k = 2T/L, q = 0.7 and 1.7 (Tang). Resistance 1 + 0.388 F^2 (Furukawa).
-    Nonlinear derivatives
-    K0 + K1 b + K2 b^2; added masses K0 + a K1 b + c K2 b^2 with b = Cb B (1 + B/L)^2 / T, (a, c) = (2/3, 8/15) for m_y and (2/5, 24/105)
-    for J_z (Ankudinov).
+    Y_v: -F + (1 - F)^(-0.4 Cb B/T), N_r: -F + (1 - F)^(14.28 T/L - 1.5), F = T/h (Kijima). Y_r and N_v: ratio of the
+    regressions with k_e = k / [T/2h + ((pi T/2h) cot(pi T/2h))^q] to those with k = 2T/L, q = 0.7 and 1.7 (Tang).
+    Resistance 1 + 0.388 F^2 (Furukawa). Nonlinear derivatives
+    K0 + K1 b + K2 b^2; added masses K0 + a K1 b + c K2 b^2 with b = Cb B (1 + B/L)^2 / T, (a, c) = (2/3, 8/15) for m_y
+    and (2/5, 24/105) for J_z (Ankudinov).
 
-    Source: Taimuri et al. (2020), Ocean Eng. 218; Tang et al. (2020) and Furukawa et al. (2016) as in github.com/nikpau/mmgdynamics. Limit: 1
-    in deep water.
+    Source: Taimuri et al. (2020), Ocean Eng. 218; Tang et al. (2020) and Furukawa et al. (2016) as in
+    github.com/nikpau/mmgdynamics. Limit: 1 in deep water.
     """
     h = maximum(depth, 1.15 * T)
     ratio = T / h

@@ -16,11 +16,16 @@ CHANNELS = slice(U, None)
 
 def joined(parts: Sequence[Array], axis: int = -1) -> Array:
     """Arrays, or tensors, one after another along `axis`."""
-    return np.concatenate(parts, axis) if isinstance(parts[0], np.ndarray) else sys.modules["torch"].cat(tuple(parts), axis)
+    return (
+        np.concatenate(parts, axis)
+        if isinstance(parts[0], np.ndarray)
+        else sys.modules["torch"].cat(tuple(parts), axis)
+    )
 
 
 class InputFeatures:
-    """Inputs as a network sees them: wind as its components from ahead and from starboard, so that a turned frame changes nothing.
+    """Inputs as a network sees them: wind as its components from ahead and from starboard, so that a turned frame
+    changes nothing.
 
     Args:
         names: columns of U.
@@ -48,7 +53,8 @@ def dead_reckoning(s0: Array, y: Array, dt: float) -> Array:
     Args:
         s0: (..., 10) initial states; y: (..., K, 7) channels at t_1 .. t_K.
 
-    Source: paper, eq. (10) to (14): p_k+1 = p_k + dt [u' cos psi - v' sin psi, u' sin psi + v' cos psi, r'], u', v', r' at k + 1, psi at k.
+    Source: paper, eq. (10) to (14): p_k+1 = p_k + dt [u' cos psi - v' sin psi, u' sin psi + v' cos psi, r'], u', v', r'
+    at k + 1, psi at k.
     """
     u, v, r = y[..., 0], y[..., 1], y[..., 2]
     psi = s0[..., None, PSI] + dt * r.cumsum(-1)

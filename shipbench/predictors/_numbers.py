@@ -11,8 +11,11 @@ RATE, WEIGHT = (0.0, 100.0), (0.0, 1e6)
 
 
 def check_numbers(model: Any, bounds: dict[str, tuple[float, float]]) -> None:
-    """Raises ValueError where a field of `model` is no number within its bounds; whole numbers where both bounds are whole."""
+    """Raises ValueError where a field of `model` is no number within its bounds; whole numbers where both bounds are
+    whole."""
     for key, (low, high) in bounds.items():
         value, whole = getattr(model, key), isinstance(low, int)
         if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)) or not low <= value <= high:
-            raise ValueError(f"{key} = {value!r}; accepted: {low:g} or more, at most {high:g}{', a whole number' if whole else ''}")
+            raise ValueError(
+                f"{key} = {value!r}; accepted: {low:g} or more, at most {high:g}{', a whole number' if whole else ''}"
+            )

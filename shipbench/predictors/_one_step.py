@@ -1,7 +1,8 @@
-"""What one-step models share, whatever learns the step: samples to learn from, and the rollout that feeds predictions back.
+"""What one-step models share, whatever learns the step: samples to learn from, and the rollout that feeds predictions
+back.
 
-y = [u, v, r, n, delta, F_b, F_s]; a step maps (y_k, input features at k) to y_k+1 or to y_k+1 - y_k; the pose follows by eq. (10) to (14).
-Arrays are of numpy or of torch, as the model's step takes them.
+y = [u, v, r, n, delta, F_b, F_s]; a step maps (y_k, input features at k) to y_k+1 or to y_k+1 - y_k; the pose follows
+by eq. (10) to (14). Arrays are of numpy or of torch, as the model's step takes them.
 """
 
 from __future__ import annotations
@@ -33,8 +34,11 @@ def transitions(S: Array, U: Array, features: InputFeatures) -> tuple[Array, Arr
     return before, inputs, after
 
 
-def one_step_rollout(step: Callable[[Array], Array], s0: Array, U: Array, features: InputFeatures, dt: float, *, increment: bool) -> Array:
-    """Roll a one-step model out in float64, so that what is predicted for a run does not depend, to far below 1 mm, on the runs beside it.
+def one_step_rollout(
+    step: Callable[[Array], Array], s0: Array, U: Array, features: InputFeatures, dt: float, *, increment: bool
+) -> Array:
+    """Roll a one-step model out in float64, so that what is predicted for a run does not depend, to far below 1 mm, on
+    the runs beside it.
 
     Args:
         step: (batch, 7 + features) to the next y (batch, 7), or to its change if `increment`; both in physical units.

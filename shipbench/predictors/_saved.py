@@ -28,8 +28,8 @@ _SHIP_DIFFERS = 0.01
 
 @dataclass(frozen=True)
 class Origin:
-    """What a model was fitted on: sample time [s], inputs, actuators ("measured" or "commanded"), the ship's name, L, B, T [m] and displacement [m^3]
-    (empty where an older saved model does not tell)."""
+    """What a model was fitted on: sample time [s], inputs, actuators ("measured" or "commanded"), the ship's name, L,
+    B, T [m] and displacement [m^3] (empty where an older saved model does not tell)."""
 
     dt: float
     inputs: tuple[str, ...]
@@ -70,7 +70,8 @@ def remembers_origins(fit_group: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def check_origin(name: str, origin: Origin | None, data: Dataset) -> list[str]:
-    """What a reader must know where the saved model `name` is used on `data`: another ship, or other actuators. Each is told in one line of the log.
+    """What a reader must know where the saved model `name` is used on `data`: another ship, or other actuators. Each is
+    told in one line of the log.
 
     Raises:
         InputError: the data have another sample time or other channels than the model was made for.
@@ -79,21 +80,32 @@ def check_origin(name: str, origin: Origin | None, data: Dataset) -> list[str]:
         return []
     if abs(origin.dt - data.dt) > 1e-3 * origin.dt:
         raise InputError(
-            f"the saved model {name} steps {origin.dt:g} s; data set '{data.name}' is sampled at {data.dt:g} s. Accepted: data at {origin.dt:g} s. "
+            f"the saved model {name} steps {origin.dt:g} s; data set '{data.name}' is sampled at {data.dt:g} s. "
+            f"Accepted: data at {origin.dt:g} s. "
             f"Import the log again with dt = {origin.dt:g} in its mapping, or fit the model on these data."
         )
     if origin.inputs != data.inputs:
         raise InputError(
-            f"the model uses the inputs {', '.join(origin.inputs)}; data set '{data.name}' has {', '.join(data.inputs)}. "
+            f"the model uses the inputs {', '.join(origin.inputs)}; data set '{data.name}' has "
+            f"{', '.join(data.inputs)}. "
             "Give data with the same channels."
         )
     notes, here = [], Origin.of(data)
     words = zip(("L", "B", "T", "displacement"), origin.size, here.size, ("m", "m", "m", "m^3"), strict=False)
-    differs = [f"{key} = {now:.4g} {unit} (model: {then:.4g})" for key, then, now, unit in words if abs(now - then) > _SHIP_DIFFERS * then]
+    differs = [
+        f"{key} = {now:.4g} {unit} (model: {then:.4g})"
+        for key, then, now, unit in words
+        if abs(now - then) > _SHIP_DIFFERS * then
+    ]
     if differs:
-        notes.append(f"the saved model {name} was fitted on ship '{origin.ship}'; these data are of another: {', '.join(differs)}")
+        notes.append(
+            f"the saved model {name} was fitted on ship '{origin.ship}'; these data are of another: "
+            f"{', '.join(differs)}"
+        )
     if origin.actuators and origin.actuators != data.actuators:
-        notes.append(f"the saved model {name} was fitted on {origin.actuators} actuators; these data have {data.actuators} ones")
+        notes.append(
+            f"the saved model {name} was fitted on {origin.actuators} actuators; these data have {data.actuators} ones"
+        )
     for note in notes:
         _log.warning("warning: %s", note)
     return notes
@@ -137,7 +149,9 @@ def read_arrays(folder: Path, meta: dict[str, Any]) -> dict[str, np.ndarray]:
         with zipfile.ZipFile(path) as archive:
             if (broken := archive.testzip()) is not None:
                 raise ValueError(f"arrays.npz is damaged at {broken}")
-        if "digest" in meta and meta["digest"] != _digest({k: v for k, v in meta.items() if k != "digest"}, read_bytes(path, most=MOST_ARRAYS)):
+        if "digest" in meta and meta["digest"] != _digest(
+            {k: v for k, v in meta.items() if k != "digest"}, read_bytes(path, most=MOST_ARRAYS)
+        ):
             raise ValueError("its files were changed after it was saved, or are damaged")
         for name, array in arrays.items():
             if array.dtype.kind not in "fiub":
@@ -150,7 +164,10 @@ def read_arrays(folder: Path, meta: dict[str, Any]) -> dict[str, np.ndarray]:
 def damaged(folder: Path, error: Exception) -> InputError:
     """The message on a folder that holds no saved model, or a damaged one."""
     why = (str(error) or type(error).__name__).rstrip(".")
-    return InputError(f"{folder} is not a saved model, or it is damaged: {why}. Give a folder that save() wrote, whole, or fit the model again.")
+    return InputError(
+        f"{folder} is not a saved model, or it is damaged: {why}. Give a folder that save() wrote, whole, or fit "
+        "the model again."
+    )
 
 
 def check_shapes(arrays: Mapping[str, np.ndarray], shapes: Mapping[str, tuple[int, ...]]) -> None:
@@ -170,9 +187,16 @@ def sample_time(meta: Mapping[str, Any]) -> float:
 
 
 def origin_of(meta: dict[str, Any]) -> Origin | None:
-    """What a saved model was made for; of one from before this was kept, its dt and inputs. None where it does not tell."""
+    """What a saved model was made for; of one from before this was kept, its dt and inputs. None where it does not
+    tell."""
     if isinstance(made := meta.get("made_for"), dict):
-        return Origin(sample_time(made), tuple(made["inputs"]), str(made["actuators"]), str(made["ship"]), tuple(map(float, made["size"])))
+        return Origin(
+            sample_time(made),
+            tuple(made["inputs"]),
+            str(made["actuators"]),
+            str(made["ship"]),
+            tuple(map(float, made["size"])),
+        )
     inner = meta["meta"].get("physics", meta["meta"])
     return Origin(sample_time(inner), tuple(meta["inputs"])) if "dt" in inner else None
 

@@ -52,22 +52,30 @@ def class_from_file(path: Path, class_name: str) -> Any:
         finally:
             _brought.update(n for n in set(sys.modules) - before - {name} if _own_file(sys.modules[n]))
     if not hasattr(module, class_name):
-        raise unknown_name(f"class in {path}", class_name, [k for k, v in vars(module).items() if isinstance(v, type) and v.__module__ == name])
+        raise unknown_name(
+            f"class in {path}",
+            class_name,
+            [k for k, v in vars(module).items() if isinstance(v, type) and v.__module__ == name],
+        )
     return getattr(module, class_name)
 
 
 def models_in(path: Path) -> list[str]:
-    """Classes of a Python file that have `fit` and `predict`, or else all its classes; read, not imported. None where it is not Python."""
+    """Classes of a Python file that have `fit` and `predict`, or else all its classes; read, not imported. None where
+    it is not Python."""
     try:
         found = [node for node in ast.parse(read_text(path, "Python file")).body if isinstance(node, ast.ClassDef)]
     except (InputError, SyntaxError, ValueError):
         return []
     methods = [{part.name for part in node.body if isinstance(part, ast.FunctionDef)} for node in found]
-    return [node.name for node, own in zip(found, methods, strict=True) if {"fit", "predict"} <= own] or [node.name for node in found]
+    return [node.name for node, own in zip(found, methods, strict=True) if {"fit", "predict"} <= own] or [
+        node.name for node in found
+    ]
 
 
 def spec_in_file(name: str) -> str:
-    """The spec that was meant by the name of a file without its class, or of a class without its file; "" where there is no such file here."""
+    """The spec that was meant by the name of a file without its class, or of a class without its file; "" where there
+    is no such file here."""
     if name.endswith(".py"):
         return " or ".join(f"{name}:{model}" for model in models_in(Path(name)))
     files = islice(Path().glob("*.py"), _MOST_FILES) if name.isidentifier() else ()
@@ -92,16 +100,23 @@ _watched: list[set[str]] = []
 
 
 def _watch(event: str, args: tuple[Any, ...]) -> None:
-    if event == "open" and _watched and isinstance(args[0], str | bytes | os.PathLike) and not set(str(args[1] or "r")) & set("wax+"):
+    if (
+        event == "open"
+        and _watched
+        and isinstance(args[0], str | bytes | os.PathLike)
+        and not set(str(args[1] or "r")) & set("wax+")
+    ):
         for paths in list(_watched):
             paths.add(os.path.abspath(os.fsdecode(args[0])))
 
 
 @contextmanager
 def files_read(*below: Path) -> Iterator[dict[str, Path]]:
-    """Files that are opened in Python while the context lasts, by name relative to the first folder of `below` that holds them, filled at its end.
+    """Files that are opened in Python while the context lasts, by name relative to the first folder of `below` that
+    holds them, filled at its end.
 
-    Code is left out (`code_of`), and so is what was written meanwhile. A library that opens files in machine code of its own is not seen.
+    Code is left out (`code_of`), and so is what was written meanwhile. A library that opens files in machine code of
+    its own is not seen.
     """
     if not _listens:
         sys.addaudithook(_watch)  # there is no way to take it away again
@@ -114,15 +129,22 @@ def files_read(*below: Path) -> Iterator[dict[str, Path]]:
         _watched.remove(paths)
         for file in map(Path, sorted(paths)):
             root = next((root for root in below if file.is_relative_to(root)), None)
-            if root is not None and file.suffix not in (".py", ".pyc") and file.is_file() and file.stat().st_mtime_ns < began and _outside(file):
+            if (
+                root is not None
+                and file.suffix not in (".py", ".pyc")
+                and file.is_file()
+                and file.stat().st_mtime_ns < began
+                and _outside(file)
+            ):
                 found[file.relative_to(root).as_posix()] = file
 
 
 def code_of(path: Path) -> dict[str, bytes]:
-    """Content of the model file and of all code of the user's that it imports, by name relative to where it is imported from.
+    """Content of the model file and of all code of the user's that it imports, by name relative to where it is imported
+    from.
 
-    To be asked after `class_from_file`, in a process that imported no other user's code. Of a package all its Python files belong to it. Modules
-    that functions import by name later are found in the source.
+    To be asked after `class_from_file`, in a process that imported no other user's code. Of a package all its Python
+    files belong to it. Modules that functions import by name later are found in the source.
     """
     files = {path.name: path}
     for name, module in list(sys.modules.items()):
@@ -142,7 +164,9 @@ def code_of(path: Path) -> dict[str, bytes]:
 def _whole(file: Path, name: list[str]) -> dict[str, Path]:
     """The files of the top-level module or package behind the module `name` at `file`, by name relative to its root."""
     depth = len(name) - (file.stem != "__init__")
-    if depth == 0 or file.parts[-depth - 1 : -1] != tuple(name[:depth]):  # a module of one file, or one that is not where its name says
+    if depth == 0 or file.parts[-depth - 1 : -1] != tuple(
+        name[:depth]
+    ):  # a module of one file, or one that is not where its name says
         return {file.name: file}
     top = file.parents[depth - 1]
     return {p.relative_to(top.parent).as_posix(): p for p in [*top.rglob("*.py"), file]}
@@ -176,7 +200,9 @@ def _own_file(module: ModuleType) -> Path | None:
 
 def _outside(path: Path) -> bool:
     """Whether a path lies outside the environment: Python's library, installed packages, shipbench."""
-    return not any(path.absolute().is_relative_to(root) or path.resolve().is_relative_to(root) for root in _environment())
+    return not any(
+        path.absolute().is_relative_to(root) or path.resolve().is_relative_to(root) for root in _environment()
+    )
 
 
 @cache

@@ -1,7 +1,7 @@
 """Base of all predictors: fit, predict, save, load; and the way from a model spec to a predictor.
 
-A part is one file of this folder whose class is bound to `PREDICTOR`. Its dataclass fields are the parameters that a spec sets
-(`mlp[hidden=64,seed=3]`); arrays that `fit` finds are returned by `_arrays` and taken back by `_restore`.
+A part is one file of this folder whose class is bound to `PREDICTOR`. Its dataclass fields are the parameters that a
+spec sets (`mlp[hidden=64,seed=3]`); arrays that `fit` finds are returned by `_arrays` and taken back by `_restore`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,17 @@ from ..names import brief
 from ..records import Dataset
 from ..signals import COMMANDS, STATES
 from ..specs import Spec, parse_spec, spec_of
-from ._saved import Origin, damaged, described, origin_of, read_arrays, read_meta, remembers_origin, remembers_origins, write_saved
+from ._saved import (
+    Origin,
+    damaged,
+    described,
+    origin_of,
+    read_arrays,
+    read_meta,
+    remembers_origin,
+    remembers_origins,
+    write_saved,
+)
 from ._user_file import class_from_file, spec_in_file
 from .device import check_device
 from .registered import PREDICTORS
@@ -32,10 +42,11 @@ __all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "make_
 class Predictor(Protocol):
     """The seam of the benchmark; foreign classes conform without inheriting.
 
-    `predict(s0, U, history)`: s0 (batch, 10), U (batch, K, inputs) -> S (batch, K, 10), S[:, k] at t_k+1. A class may also offer the
-    class method `fit_group(models, trains, valids, seeds)`, which fits many at once (folds and seeds) in place; `skip(dataset)`, which says why it
-    cannot take a data set, or None; `num_parameters`, how many numbers a fit sets; `seeded = False` where nothing is drawn;
-    `earth_fixed = True` where it knows a place on earth; `device`, which `--device` sets ("cpu", "cuda", "cuda:1") before it fits or predicts.
+    `predict(s0, U, history)`: s0 (batch, 10), U (batch, K, inputs) -> S (batch, K, 10), S[:, k] at t_k+1. A class may
+    also offer the class method `fit_group(models, trains, valids, seeds)`, which fits many at once (folds and seeds) in
+    place; `skip(dataset)`, which says why it cannot take a data set, or None; `num_parameters`, how many numbers a fit
+    sets; `seeded = False` where nothing is drawn; `earth_fixed = True` where it knows a place on earth; `device`, which
+    `--device` sets ("cpu", "cuda", "cuda:1") before it fits or predicts.
     """
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Any: ...
@@ -48,7 +59,8 @@ class PredictorBase(ABC):
 
     name: ClassVar[str]
     needs: ClassVar[tuple[str, ...]] = ()
-    """Optional packages that its module imports, by their names in `extras.EXTRAS`; `shipbench models` reads them without importing the module."""
+    """Optional packages that its module imports, by their names in `extras.EXTRAS`; `shipbench models` reads them
+    without importing the module."""
     inputs: tuple[str, ...] = COMMANDS
     """Names of the columns of U, known after `fit`."""
     origin: Origin | None = None
@@ -58,15 +70,21 @@ class PredictorBase(ABC):
         """Every `fit` and `fit_group` remembers what it was given: a saved model can then refuse other data."""
         super().__init_subclass__(**options)
         if "__repr__" not in cls.__dict__:
-            cls.__repr__ = PredictorBase.__repr__  # type: ignore[method-assign]  # a dataclass would write one that does not say whether it is fitted
+            # A dataclass would write one that does not say whether it is fitted.
+            cls.__repr__ = PredictorBase.__repr__  # type: ignore[method-assign]
         if "fit" in cls.__dict__:
             cls.fit = remembers_origin(cls.__dict__["fit"])  # type: ignore[method-assign]
         if "fit_group" in cls.__dict__:
-            cls.fit_group = classmethod(remembers_origins(cls.__dict__["fit_group"].__func__))  # type: ignore[attr-defined]
+            own = cls.__dict__["fit_group"].__func__
+            cls.fit_group = classmethod(remembers_origins(own))  # type: ignore[attr-defined]
 
     def __repr__(self) -> str:
         """The class with its parameters, and whether it is fitted."""
-        given = ", ".join(f"{f.name}={getattr(self, f.name)!r}" for f in fields(self) if f.repr) if is_dataclass(self) else ""
+        given = (
+            ", ".join(f"{f.name}={getattr(self, f.name)!r}" for f in fields(self) if f.repr)
+            if is_dataclass(self)
+            else ""
+        )
         return brief(f"<{type(self).__name__}({given}), {'fitted' if self.fitted else 'not fitted'}>")
 
     @property
@@ -79,7 +97,8 @@ class PredictorBase(ABC):
             raise InputError(f"{self.name}: {what} was called before fit; fit or load the model first.")
 
     def skip(self, dataset: Dataset) -> str | None:
-        """Why this model cannot take `dataset`, or None; a study then has rows with the status `skipped` and this reason."""
+        """Why this model cannot take `dataset`, or None; a study then has rows with the status `skipped` and this
+        reason."""
         return None
 
     @abstractmethod
@@ -94,8 +113,8 @@ class PredictorBase(ABC):
         """What `fit` found."""
         return {}
 
-    def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:  # noqa: B027 - a model without memory has nothing to take back
-        """Take back what `_arrays` and `_meta` returned."""
+    def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:  # noqa: B027
+        """Take back what `_arrays` and `_meta` returned; a model without memory has nothing to take."""
 
     def _meta(self) -> dict[str, Any]:
         """Anything else to save, as JSON."""
@@ -128,17 +147,23 @@ class PredictorBase(ABC):
         if history is not None:
             history = np.ascontiguousarray(history[0], dtype=float), np.ascontiguousarray(history[1], dtype=float)
         if s0.ndim != 2 or s0.shape[1] != len(STATES):
-            raise InputError(f"s0 has shape {s0.shape}; accepted: (batch, {len(STATES)}) or ({len(STATES)},): {', '.join(STATES)}.")
+            raise InputError(
+                f"s0 has shape {s0.shape}; accepted: (batch, {len(STATES)}) or ({len(STATES)},): {', '.join(STATES)}."
+            )
         if U.ndim != 3 or U.shape[0] != s0.shape[0] or U.shape[2] != len(self.inputs) or U.shape[1] == 0:
             raise InputError(
-                f"U has shape {U.shape}; accepted: ({s0.shape[0]}, K, {len(self.inputs)}) with K >= 1 and the inputs {', '.join(self.inputs)}."
+                f"U has shape {U.shape}; accepted: ({s0.shape[0]}, K, {len(self.inputs)}) with K >= 1 and the "
+                f"inputs {', '.join(self.inputs)}."
             )
         for label, array in (("s0", s0), ("U", U)):
             if not np.isfinite(array).all():
                 where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
                 raise InputError(f"{label}{list(where)} is {array[where]}; every value must be finite.")
         if history is not None and (history[0].shape[2] != len(STATES) or history[1].shape[:2] != history[0].shape[:2]):
-            raise InputError(f"history has shapes {history[0].shape} and {history[1].shape}; accepted: (batch, H, 10) and (batch, H, inputs).")
+            raise InputError(
+                f"history has shapes {history[0].shape} and {history[1].shape}; accepted: (batch, H, 10) and "
+                "(batch, H, inputs)."
+            )
         S = self._rollout(s0, U, history)
         return S[0] if single else S
 
@@ -150,7 +175,13 @@ class PredictorBase(ABC):
         """
         self._refuse_unfitted("save")
         params: dict[str, Any] = asdict(self) if is_dataclass(self) else {}
-        meta = {"predictor": self.name, "params": params, "inputs": list(self.inputs), "meta": self._meta(), **described(self.origin)}
+        meta = {
+            "predictor": self.name,
+            "params": params,
+            "inputs": list(self.inputs),
+            "meta": self._meta(),
+            **described(self.origin),
+        }
         write_saved(Path(path), meta, self._arrays())
 
     @classmethod
@@ -164,7 +195,8 @@ class PredictorBase(ABC):
         meta = read_meta(folder)
         arrays = read_arrays(folder, meta)
         try:
-            # Where it was trained says nothing of where it is read: a model from a machine with a GPU predicts on one without.
+            # Where it was trained says nothing of where it is read: a model from a machine with a GPU predicts on one
+            # without.
             model = cls(**{key: value for key, value in meta["params"].items() if key != "device"})
             model.inputs = tuple(meta["inputs"])
             model._restore(arrays, meta["meta"])
@@ -182,7 +214,8 @@ class PredictorFamily(PredictorBase):
     @classmethod
     @abstractmethod
     def member(cls, member: str, params: dict[str, Any]) -> Self:
-        """The unfitted model of a spec; `member` is what stands behind the colon ("" where there is none), `params` are unchecked.
+        """The unfitted model of a spec; `member` is what stands behind the colon ("" where there is none), `params` are
+        unchecked.
 
         Raises:
             InputError: an unknown member or parameter, or a value that is not accepted.
@@ -191,14 +224,19 @@ class PredictorFamily(PredictorBase):
 
 def _no_effects(spec: Spec) -> InputError:
     added = "+".join(e.name for e in spec.effects)
-    return InputError(f"model spec '{spec.text}': effects extend 'physics' and 'neural_ode', '{spec.name}' takes none. Write physics+{added}.")
+    return InputError(
+        f"model spec '{spec.text}': effects extend 'physics' and 'neural_ode', '{spec.name}' takes none. Write "
+        f"physics+{added}."
+    )
 
 
 def make_predictor(model: Any, device: str | None = None) -> Any:
-    """The unfitted predictor of a spec (or the fitted one, for a saved folder), to compute on `device` if it has one and the spec names none.
+    """The unfitted predictor of a spec (or the fitted one, for a saved folder), to compute on `device` if it has one
+    and the spec names none.
 
     Args:
-        model: "physics+current", "mlp[hidden=64]", "my_model.py:MyNet", the folder of a saved model, a `Spec`, a class, or an object (then a copy).
+        model: "physics+current", "mlp[hidden=64]", "my_model.py:MyNet", the folder of a saved model, a `Spec`, a class,
+        or an object (then a copy).
         device: "cpu", "cuda" or "cuda:1".
 
     Raises:
@@ -216,7 +254,9 @@ def _given(spec: Spec) -> Any:
     try:
         return spec.given() if isinstance(spec.given, type) else copy.deepcopy(spec.given)
     except (TypeError, ValueError) as error:
-        made, instead = ("made", "an object, such as MyNet(hidden=64)") if isinstance(spec.given, type) else ("copied", "its class")
+        made, instead = (
+            ("made", "an object, such as MyNet(hidden=64)") if isinstance(spec.given, type) else ("copied", "its class")
+        )
         raise InputError(f"model '{spec.text}' cannot be {made}: {error}. Give {instead}.") from error
 
 
@@ -238,7 +278,9 @@ def _made(spec: Spec) -> Any:
     if isinstance(cls, type) and issubclass(cls, PredictorFamily):
         return cls.member(member, params)
     if member:
-        raise InputError(f"model spec '{spec.text}': '{family}' takes no ':{member}'. Write {family}, or {family}[parameter=value].")
+        raise InputError(
+            f"model spec '{spec.text}': '{family}' takes no ':{member}'. Write {family}, or {family}[parameter=value]."
+        )
     if is_dataclass(cls):
         for key in params:
             if key not in {f.name for f in fields(cls)}:

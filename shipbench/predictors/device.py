@@ -30,7 +30,8 @@ def check_device(name: str, *, here: bool = True) -> str:
         if int(name.partition(":")[2] or 0) >= count:
             found = ", ".join(["cpu", *(f"cuda:{i}" for i in range(count))])
             raise InputError(
-                f"device '{name}' is not here: PyTorch {torch.__version__} finds {count or 'no'} GPU{'s' if count > 1 else ''}. "
+                f"device '{name}' is not here: PyTorch {torch.__version__} finds {count or 'no'} "
+                f"GPU{'s' if count > 1 else ''}. "
                 f"Accepted here: {found}. A GPU needs its driver and PyTorch's CUDA build."
             )
     return name

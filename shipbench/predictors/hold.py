@@ -48,7 +48,8 @@ class Hold(PredictorBase):
         S = np.repeat(s0[:, None, :], len(t), axis=1)
         _, _, psi, u, v, r = np.moveaxis(s0[:, MOTION, None], 1, 0)
         turned = r * t
-        # Integral of the turned body velocity, from s0's axes: (sin a / a, (1 - cos a) / a) t without the division at a = 0.
+        # Integral of the turned body velocity, from s0's axes: (sin a / a, (1 - cos a) / a) t without the division at a
+        # = 0.
         along, across = t * np.sinc(turned / np.pi), t * np.sin(turned / 2) * np.sinc(turned / (2 * np.pi))
         ahead, starboard = u * along - v * across, u * across + v * along
         S[..., X] += ahead * np.cos(psi) - starboard * np.sin(psi)

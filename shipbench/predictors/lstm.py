@@ -1,7 +1,8 @@
-"""A recurrent network that rolls itself out: increments of y from a long short-term memory fed with its own predictions.
+"""A recurrent network that rolls itself out: increments of y from a long short-term memory fed with its own
+predictions.
 
-Trained free-running on windows that grow in length, on y and on the pose that follows from it. Without history the memory starts
-from a network of y at s0; with history the cell first runs over the measured y.
+Trained free-running on windows that grow in length, on y and on the pose that follows from it. Without history the
+memory starts from a network of y at s0; with history the cell first runs over the measured y.
 
 Source: Hochreiter and Schmidhuber (1997), Long short-term memory, Neural Computation 9.
 """
@@ -47,7 +48,12 @@ class _Network(nn.Module):
     """Cell, head and initial memory of all members, with their scalers."""
 
     def __init__(
-        self, features: InputFeatures, hidden: int, scalers: tuple[Scaler, Scaler, Scaler], draw: Sequence[torch.Generator], commanded: bool
+        self,
+        features: InputFeatures,
+        hidden: int,
+        scalers: tuple[Scaler, Scaler, Scaler],
+        draw: Sequence[torch.Generator],
+        commanded: bool,
     ) -> None:
         super().__init__()
         self.features, self.commanded = features, commanded
@@ -62,7 +68,9 @@ class _Network(nn.Module):
         h, c = self.initial(self.scale_y(y)).chunk(2, dim=-1)
         return torch.tanh(h), c
 
-    def step(self, y: Tensor, held: Tensor, psi: Tensor, memory: tuple[Tensor, Tensor]) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+    def step(
+        self, y: Tensor, held: Tensor, psi: Tensor, memory: tuple[Tensor, Tensor]
+    ) -> tuple[Tensor, tuple[Tensor, Tensor]]:
         """y at the end of the step and the memory; held (members, batch, inputs), psi (members, batch) [rad]."""
         h, c = memory
         x = torch.cat([self.scale_y(y), self.scale_u(self.features(held, psi))], dim=-1)
@@ -98,7 +106,8 @@ class _Network(nn.Module):
 
 
 class Stage(NamedTuple):
-    """Part of the training: rollout length [model steps], windows per minibatch, number of epochs, longest history [steps]."""
+    """Part of the training: rollout length [model steps], windows per minibatch, number of epochs, longest history
+    [steps]."""
 
     steps: int
     batch: int
@@ -107,12 +116,14 @@ class Stage(NamedTuple):
 
 
 class _Rollouts(StackedTask):
-    """Free-running rollouts from random starts of random runs; the score is the mean position error of whole validation windows [m]."""
+    """Free-running rollouts from random starts of random runs; the score is the mean position error of whole validation
+    windows [m]."""
 
     MINIBATCHES = 10
     """Per epoch."""
 
-    def __init__(self, net: _Network, training: StackedRuns, validation: StackedRuns, stages: Sequence[Stage], draw: Sequence[torch.Generator],
+    def __init__(self, net: _Network, training: StackedRuns, validation: StackedRuns, stages: Sequence[Stage],
+        draw: Sequence[torch.Generator],
                  dt: float, pose_weight: float) -> None:  # fmt: skip
         super().__init__()
         self.net, self.training_runs, self.validation, self.stages, self.draw = net, training, validation, stages, draw
@@ -126,9 +137,12 @@ class _Rollouts(StackedTask):
         return sum(s.epochs for s in self.stages)
 
     def _windows(self, stage: Stage, history: int) -> tuple[Tensor, Tensor]:
-        """Runs (members, batch) and their samples (members, batch, history + steps + 1): one random window per random run."""
+        """Runs (members, batch) and their samples (members, batch, history + steps + 1): one random window per random
+        run."""
         length = history + stage.steps
-        runs, starts = random_windows(self.training_runs.counts, self.training_runs.steps + 1 - length, stage.batch, self.draw)
+        runs, starts = random_windows(
+            self.training_runs.counts, self.training_runs.steps + 1 - length, stage.batch, self.draw
+        )
         return runs, starts[..., None] + torch.arange(length + 1)
 
     def chunks(self) -> Iterator[Chunk]:
@@ -136,7 +150,8 @@ class _Rollouts(StackedTask):
         for stage in self.stages:
             for epoch in range(stage.epochs):
                 numbers = range(epoch * self.MINIBATCHES, (epoch + 1) * self.MINIBATCHES)
-                # Every other minibatch has a history, of a length that goes through its range: the same for all members.
+                # Every other minibatch has a history, of a length that goes through its range: the same for all
+                # members.
                 lengths = [0 if i % 2 == 0 or not stage.history else 1 + (i * 7) % stage.history for i in numbers]
                 yield Chunk([(self._windows(stage, length), length, stage.steps) for length in lengths], everyone)
 
@@ -177,7 +192,8 @@ class LSTM(PredictorBase):
         hidden: width of the memory and of the head.
         lr: Adam's first step size; a cosine takes it down to a hundredth.
         epochs: number of validations, each after 10 minibatches.
-        pose_weight: weight of the pose error (in units of the error of kept velocities) against the error of standardised y.
+        pose_weight: weight of the pose error (in units of the error of kept velocities) against the error of
+        standardised y.
         device: where to train and to predict: "cpu", "cuda" or "cuda:1".
     """
 
@@ -216,8 +232,11 @@ class LSTM(PredictorBase):
         return [s for s in stages if s.epochs]
 
     @classmethod
-    def fit_group(cls, models: Sequence[LSTM], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]) -> None:
-        """Train several (folds, seeds) of the same parameters as one stacked batch; each comes out as it would alone."""
+    def fit_group(
+        cls, models: Sequence[LSTM], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]
+    ) -> None:
+        """Train several (folds, seeds) of the same parameters as one stacked batch; each comes out as it would
+        alone."""
         lead, dt, names = models[0], trains[0].dt, trains[0].inputs
         pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
         training, validation = StackedRuns.of([t for t, _ in pairs]), StackedRuns.of([v for _, v in pairs])
@@ -233,7 +252,8 @@ class LSTM(PredictorBase):
         commanded = trains[0].actuators == "commanded"
         net = _Network(features, lead.hidden, scalers, draw, commanded)
         task = _Rollouts(net, training, validation, lead._stages(training.steps), draw, dt * stride, lead.pose_weight)
-        # Hundreds of small dependent steps: threads that wait for one another gain a third at best, and on a busy machine cost tenfold.
+        # Hundreds of small dependent steps: threads that wait for one another gain a third at best, and on a busy
+        # machine cost tenfold.
         train(task, Recipe(lr=lead.lr, lr_end=0.01, chunks=task.num_chunks, clip=1.0, device=lead.device, threads=1))
         state = {k: v.detach().cpu().numpy() for k, v in net.state_dict().items()}
         for m, model in enumerate(models):
@@ -255,7 +275,9 @@ class LSTM(PredictorBase):
         past = (start[:, :, None][:, :, :0], held[:, :, :0])
         if history is not None and len(history[0][0]) >= d:
             first = len(history[0][0]) % d  # the samples d, 2 d, .. steps before s0
-            states, inputs = (torch.as_tensor(known[:, first::d], dtype=torch.float64, device=self.device)[None] for known in history)
+            states, inputs = (
+                torch.as_tensor(known[:, first::d], dtype=torch.float64, device=self.device)[None] for known in history
+            )
             past = (states, inputs)
         y = net.rollout(past, start, held, d * self._dt)[0]
         if d > 1:
@@ -271,7 +293,9 @@ class LSTM(PredictorBase):
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
         sizes = (("y", _Y), ("u", InputFeatures(self.inputs).count), ("dy", _Y))
         check_shapes(arrays, {f"scale_{k}.{what}": (1, 1, size) for k, size in sizes for what in ("mean", "std")})
-        check_shapes(arrays, {"initial.layers.0.weight": (1, _Y, self.hidden)})  # before a network of that width is made
+        check_shapes(
+            arrays, {"initial.layers.0.weight": (1, _Y, self.hidden)}
+        )  # before a network of that width is made
         self._weights, self._dt = arrays, sample_time(meta)
         self._stride, self._commanded = int(meta["stride"]), bool(meta["commanded"])
         if self._stride < 1:
@@ -280,7 +304,8 @@ class LSTM(PredictorBase):
 
 
 def _between(y0: Tensor, y: Tensor, stride: int) -> Tensor:
-    """Linear interpolation to `stride` samples per model step: y (batch, steps, 7) at the ends of steps -> (batch, steps * stride, 7)."""
+    """Linear interpolation to `stride` samples per model step: y (batch, steps, 7) at the ends of steps -> (batch,
+    steps * stride, 7)."""
     before = torch.cat([y0[:, None], y[:, :-1]], dim=1)
     share = torch.arange(1, stride + 1, dtype=y.dtype, device=y.device)[:, None] / stride
     return (before[:, :, None] + share * (y - before)[:, :, None]).flatten(1, 2)

@@ -1,7 +1,7 @@
 """The paper's multilayer perceptron: y and the commands at k -> y at k + 1, pose by eq. (10) to (14).
 
-y = [u, v, r, n, delta, F_b, F_s]; three hidden layers of 100, ReLU, mean squared error on standardised data, Adam 1e-3, batch 32, at most
-200 epochs, stop when validation does not improve by 1e-4 for 10 epochs.
+y = [u, v, r, n, delta, F_b, F_s]; three hidden layers of 100, ReLU, mean squared error on standardised data, Adam 1e-3,
+batch 32, at most 200 epochs, stop when validation does not improve by 1e-4 for 10 epochs.
 
 Source: the source paper, eq. (10) to (14).
 """
@@ -69,7 +69,8 @@ class _OneStep(StackedTask):
 
     @staticmethod
     def _gathered(x: Tensor, z: Tensor, rows: Tensor) -> Iterator[tuple[Tensor, Tensor]]:
-        """The minibatches of `rows` (steps, members, batch), gathered many at a time: a step then costs no indexing, an epoch no second copy."""
+        """The minibatches of `rows` (steps, members, batch), gathered many at a time: a step then costs no indexing, an
+        epoch no second copy."""
         for some in rows.split(_GATHERED):
             flat, shape = some.flatten(), (*some.shape, -1)
             yield from zip(x[flat].view(shape).unbind(0), z[flat].view(shape).unbind(0), strict=True)
@@ -93,7 +94,8 @@ class MLP(PredictorBase):
     Args:
         hidden, layers: width and number of the hidden layers.
         epochs, batch, lr, patience, min_delta: training, as in the paper.
-        target: "state" predicts y at k + 1 as the paper does; "increment" predicts y_k+1 - y_k, an honest stronger variant.
+        target: "state" predicts y at k + 1 as the paper does; "increment" predicts y_k+1 - y_k, an honest stronger
+        variant.
         device: where to train and to predict: "cpu", "cuda" or "cuda:1".
     """
 
@@ -113,7 +115,16 @@ class MLP(PredictorBase):
         check_device(self.device)
         check_target(self.target)
         check_numbers(
-            self, {"hidden": WIDTH, "layers": LAYERS, "epochs": ROUNDS, "batch": ROUNDS, "patience": ROUNDS, "lr": RATE, "min_delta": WEIGHT}
+            self,
+            {
+                "hidden": WIDTH,
+                "layers": LAYERS,
+                "epochs": ROUNDS,
+                "batch": ROUNDS,
+                "patience": ROUNDS,
+                "lr": RATE,
+                "min_delta": WEIGHT,
+            },
         )
         self._weights: dict[str, np.ndarray] = {}
         self._dt = 0.0
@@ -130,8 +141,11 @@ class MLP(PredictorBase):
         return self
 
     @classmethod
-    def fit_group(cls, models: Sequence[MLP], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]) -> None:
-        """Train several (folds, seeds) of the same parameters as one stacked batch; each comes out as it would alone."""
+    def fit_group(
+        cls, models: Sequence[MLP], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]
+    ) -> None:
+        """Train several (folds, seeds) of the same parameters as one stacked batch; each comes out as it would
+        alone."""
         lead = models[0]
         pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
         names = trains[0].inputs
@@ -139,8 +153,19 @@ class MLP(PredictorBase):
         # Not bound to names: the samples as they are would otherwise be kept beside the standardised ones.
         trained, stopped = zip(*pairs, strict=True)
         task = _OneStep(lead, _samples(trained, features), _samples(stopped, features), seeds)
-        # Matrices this small gain nothing from a second thread, and on a busy machine two that wait for one another cost tenfold.
-        watch = train(task, Recipe(lr=lead.lr, patience=lead.patience, min_delta=lead.min_delta, device=lead.device, threads=1, epochs=lead.epochs))
+        # Matrices this small gain nothing from a second thread, and on a busy machine two that wait for one another
+        # cost tenfold.
+        watch = train(
+            task,
+            Recipe(
+                lr=lead.lr,
+                patience=lead.patience,
+                min_delta=lead.min_delta,
+                device=lead.device,
+                threads=1,
+                epochs=lead.epochs,
+            ),
+        )
         state = {k: v.detach().cpu().numpy() for k, v in task.state_dict().items()}
         for m, model in enumerate(models):
             model.inputs, model._dt = names, trains[m].dt
@@ -159,7 +184,9 @@ class MLP(PredictorBase):
             return torch.addmm(layers[-1][1], h, layers[-1][0]) * w["scale_z.std"][0] + w["scale_z.mean"][0]
 
         start, held = (torch.as_tensor(known, device=self.device) for known in (s0, U))
-        S = one_step_rollout(step, start, held, InputFeatures(self.inputs), self._dt, increment=self.target == "increment")
+        S = one_step_rollout(
+            step, start, held, InputFeatures(self.inputs), self._dt, increment=self.target == "increment"
+        )
         return S.cpu().numpy()
 
     def _arrays(self) -> dict[str, np.ndarray]:
@@ -172,7 +199,11 @@ class MLP(PredictorBase):
         sizes = [NUM_CHANNELS + InputFeatures(self.inputs).count, *[self.hidden] * self.layers, NUM_CHANNELS]
         shapes = {f"net.layers.{i}.weight": (1, *pair) for i, pair in enumerate(pairwise(sizes))}
         shapes |= {f"net.layers.{i}.bias": (1, 1, size) for i, size in enumerate(sizes[1:])}
-        shapes |= {f"scale_{k}.{what}": (1, 1, size) for k, size in (("x", sizes[0]), ("z", sizes[-1])) for what in ("mean", "std")}
+        shapes |= {
+            f"scale_{k}.{what}": (1, 1, size)
+            for k, size in (("x", sizes[0]), ("z", sizes[-1]))
+            for what in ("mean", "std")
+        }
         check_shapes(arrays, shapes)
         self._weights, self._dt, self._epochs_run = arrays, sample_time(meta), int(meta["epochs_run"])
 

@@ -1,7 +1,10 @@
-"""The fitted physics plus a learned residual acceleration, trained through the solver of torchdiffeq on windows that grow in length.
+"""The fitted physics plus a learned residual acceleration, trained through the solver of torchdiffeq on windows that
+grow in length.
 
-The residual is a small network of (u, v, r, n, delta, F_b, F_s), and of the velocity through the air where wind is measured, whose output starts
-at exactly zero: training starts at the fitted physics and the weights of the best validation rollout are kept, the untouched physics among them.
+The residual is a small network of (u, v, r, n, delta, F_b, F_s), and of the velocity through the air where wind is
+measured, whose output starts
+at exactly zero: training starts at the fitted physics and the weights of the best validation rollout are kept, the
+untouched physics among them.
 
 Source: Chen et al. (2018), Neural ordinary differential equations, NeurIPS 31.
 """
@@ -27,7 +30,17 @@ from ._saved import check_shapes
 from .base import History, PredictorBase
 from .device import check_device
 from .networks.residual import Drive, Grid, Residual, features, solve, typical_accelerations
-from .networks.stacked import Scaler, generators, hold_error, padded, position_score, random_windows, shares_of, trapezoid_pose, with_valid
+from .networks.stacked import (
+    Scaler,
+    generators,
+    hold_error,
+    padded,
+    position_score,
+    random_windows,
+    shares_of,
+    trapezoid_pose,
+    with_valid,
+)
 from .networks.training import Chunk, Recipe, StackedTask, train
 from .physics import Physics
 from .physics_model.fit_report import FitReport
@@ -42,15 +55,23 @@ class Stage(NamedTuple):
 
 
 class _Windows(StackedTask):
-    """Windows from random starts; the score is the mean position error of the validation rollouts over their full length [m]."""
+    """Windows from random starts; the score is the mean position error of the validation rollouts over their full
+    length [m]."""
 
     MINIBATCHES = 20
     """Per epoch."""
 
-    def __init__(self, model: Residual, training: Drive, validation: Drive, grid: Grid, stages: Sequence[Stage], draw: Sequence[torch.Generator],
+    def __init__(self, model: Residual, training: Drive, validation: Drive, grid: Grid, stages: Sequence[Stage],
+        draw: Sequence[torch.Generator],
                  penalty: float) -> None:  # fmt: skip
         super().__init__()
-        self.model, self.training_runs, self.validation, self.grid, self.stages = model, training, validation, grid, stages
+        self.model, self.training_runs, self.validation, self.grid, self.stages = (
+            model,
+            training,
+            validation,
+            grid,
+            stages,
+        )
         self.draw, self.penalty, self.members = draw, penalty, len(training.counts)
         self.dt = grid.step * grid.per_knot
         self.scale = {s.steps: hold_error(training.S, training.counts, self.dt, s.steps) for s in stages}
@@ -67,11 +88,17 @@ class _Windows(StackedTask):
         for stage in self.stages:
             room = knots - stage.steps + 1
             for _ in range(stage.epochs):
-                picks = (random_windows(self.training_runs.counts, room, stage.batch, self.draw) for _ in range(self.MINIBATCHES))
+                picks = (
+                    random_windows(self.training_runs.counts, room, stage.batch, self.draw)
+                    for _ in range(self.MINIBATCHES)
+                )
                 yield Chunk([(runs, starts, stage.steps) for runs, starts in picks], everyone)
 
-    def _roll(self, drive: Drive, runs: Tensor, starts: Tensor, steps: int) -> tuple[Tensor, Tensor, Tensor, Tensor | None]:
-        """Predicted u, v, r (members, batch, steps, 3) and pose, measured states and wind at the end, of windows at `starts` [knots]."""
+    def _roll(
+        self, drive: Drive, runs: Tensor, starts: Tensor, steps: int
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor | None]:
+        """Predicted u, v, r (members, batch, steps, 3) and pose, measured states and wind at the end, of windows at
+        `starts` [knots]."""
         device, fine = self.model.p.device, self.grid.per_knot
         S = drive.S[runs[..., None], starts[..., None] + torch.arange(steps + 1)].to(device)
         at = (runs[..., None], starts[..., None] * fine + torch.arange(steps * fine))
@@ -129,7 +156,8 @@ class NeuralODE(PredictorBase):
         """Add effects to the physics beneath (`neural_ode+race_gain`), as in `Physics.extend`.
 
         Raises:
-            InputError: an effect is unknown, acts on the sensors, or depends on place or time, which the training windows do not know.
+            InputError: an effect is unknown, acts on the sensors, or depends on place or time, which the training
+            windows do not know.
         """
         self.physics = Physics().extend(effects)
         for effect in effects:
@@ -137,7 +165,8 @@ class NeuralODE(PredictorBase):
             if part.traits.local or part.enters == "sensor":
                 raise InputError(
                     f"effect '{effect.name}' cannot extend neural_ode: it acts on the sensors, or at a place or time. "
-                    f"Accepted: effects that act as forces or in the gears. Write physics+{effect.name}, or mend the data."
+                    f"Accepted: effects that act as forces or in the gears. Write physics+{effect.name}, or mend "
+                    "the data."
                 )
         self.effects = tuple(effects)
         return self
@@ -168,7 +197,13 @@ class NeuralODE(PredictorBase):
         return [Stage(min(steps, knots), batch, n) for (steps, batch, _), n in zip(plan, epochs, strict=True) if n]
 
     @classmethod
-    def fit_group(cls, models: Sequence[NeuralODE], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]) -> None:
+    def fit_group(
+        cls,
+        models: Sequence[NeuralODE],
+        trains: Sequence[Dataset],
+        valids: Sequence[Dataset | None],
+        seeds: Sequence[int],
+    ) -> None:
         """Fit the physics of each, then train all residuals as one stacked batch; each comes out as it would alone."""
         lead = models[0]
         pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
@@ -180,16 +215,28 @@ class NeuralODE(PredictorBase):
         grid = Grid.of(physics[0])
         learn, check = (Drive.of(physics, part, grid) for part in zip(*pairs, strict=True))
         draw = generators(seeds)
-        seen = features(learn.S, None) if learn.air is None else features(learn.S[:, :-1], learn.air[:, :: grid.per_knot])
+        seen = (
+            features(learn.S, None) if learn.air is None else features(learn.S[:, :-1], learn.air[:, :: grid.per_knot])
+        )
         scale_in = Scaler.fit(seen.split(learn.counts))
         residual = Residual(physics, lead.hidden, scale_in, typical_accelerations(physics, learn), draw)
         task = _Windows(residual, learn, check, grid, lead._stages(learn.S.shape[1] - 1), draw, lead.penalty)
         # Many small elementwise operations: a second thread only costs.
-        recipe = Recipe(lead.lr, clip=1.0, weight_decay=lead.weight_decay, chunks=task.num_chunks, lr_end=0.02, device=lead.device, threads=1)
+        recipe = Recipe(
+            lead.lr,
+            clip=1.0,
+            weight_decay=lead.weight_decay,
+            chunks=task.num_chunks,
+            lr_end=0.02,
+            device=lead.device,
+            threads=1,
+        )
         train(task, recipe)
         state = {k: v.detach().cpu().numpy() for k, v in residual.state_dict().items()}
         for m, model in enumerate(models):
-            model._weights = {k: v[:, m : m + 1].copy() if k in ("p", "q") else v[m : m + 1].copy() for k, v in state.items()}
+            model._weights = {
+                k: v[:, m : m + 1].copy() if k in ("p", "q") else v[m : m + 1].copy() for k, v in state.items()
+            }
             model.improved = bool(np.any(model._weights["net.layers.2.weight"]))
 
     def _residual(self) -> Residual:

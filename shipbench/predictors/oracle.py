@@ -1,6 +1,8 @@
-"""Ceiling for simulated data: the simulator itself, started from the recorded s0 (it does not know hidden gusts or the noise in s0).
+"""Ceiling for simulated data: the simulator itself, started from the recorded s0 (it does not know hidden gusts or the
+noise in s0).
 
-Source: Yasukawa and Yoshimura (2015), Introduction of MMG standard method for ship maneuvering predictions, J. Mar. Sci. Technol. 20.
+Source: Yasukawa and Yoshimura (2015), Introduction of MMG standard method for ship maneuvering predictions, J. Mar.
+Sci. Technol. 20.
 """
 
 from __future__ import annotations
@@ -42,7 +44,10 @@ class Oracle(PredictorBase):
             InputError: the data were not simulated.
         """
         if train.simulation is None:
-            raise InputError(f"oracle: data set '{train.name}' has no 'simulation' entry; the oracle needs data of shipbench's own simulator.")
+            raise InputError(
+                f"oracle: data set '{train.name}' has no 'simulation' entry; the oracle needs data of shipbench's "
+                "own simulator."
+            )
         self._set(train.simulation, train.dt, train.inputs)
         return self
 

@@ -1,4 +1,5 @@
-"""The source paper's physics: eq. (2) to (8) with 11 parameters fitted by constrained nonlinear least squares over whole rollouts (eq. 9).
+"""The source paper's physics: eq. (2) to (8) with 11 parameters fitted by constrained nonlinear least squares over
+whole rollouts (eq. 9).
 
 Source: the source paper, eq. (2) to (9).
 """
@@ -58,7 +59,8 @@ class Physics(PredictorBase):
     Args:
         iterations: most Gauss-Newton steps of the fit.
         tolerance: relative decrease of the cost below which the fit stops.
-        piece: longest rollout in the fit [s], 0 for whole runs: runs are cut into pieces that each start from the measured state. Where gusts push
+        piece: longest rollout in the fit [s], 0 for whole runs: runs are cut into pieces that each start from the
+        measured state. Where gusts push
             a ship, the end of a long rollout is their work and says little of the parameters.
     """
 
@@ -78,9 +80,9 @@ class Physics(PredictorBase):
     def extend(self, effects: Sequence[EffectSpec]) -> Self:
         """Add effects to what is fitted (`physics+current`): their formulas are those of `shipbench.effects`.
 
-        Values that the spec sets are held; the others are fitted with p0..p10, or from command and actuator for effects of a gear where both
-        are recorded. p4 stays zero beside a fitted rudder offset or asymmetry, p0 beside a fitted propeller walk (and beside a rudder offset where
-        hull derivatives are fitted too): data cannot tell them apart.
+        Values that the spec sets are held; the others are fitted with p0..p10, or from command and actuator for effects
+        of a gear where both are recorded. p4 stays zero beside a fitted rudder offset or asymmetry, p0 beside a fitted
+        propeller walk (and beside a rudder offset where hull derivatives are fitted too): data cannot tell them apart.
         Runs begin at t = 0 s, the time of s0.
 
         Raises:
@@ -102,7 +104,8 @@ class Physics(PredictorBase):
         return hasattr(self, "p")
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
-        """Fit actuator dynamics, then p0..p10, over full rollouts of all runs of `train` and `valid` (nothing is tuned on `valid`).
+        """Fit actuator dynamics, then p0..p10, over full rollouts of all runs of `train` and `valid` (nothing is tuned
+        on `valid`).
 
         Raises:
             InputError: the spec gives an effect a value that no such ship has.
@@ -123,7 +126,10 @@ class Physics(PredictorBase):
         if asked is not None and np.isfinite(result.cost):
             result = self._fit_effects(batch, result, asked)
         if not np.isfinite(result.cost):
-            raise WorkError(f"the physics fit of '{data.name}' found no finite rollouts; check units and signs with `shipbench data check`.")
+            raise WorkError(
+                f"the physics fit of '{data.name}' found no finite rollouts; check units and signs with `shipbench "
+                "data check`."
+            )
         self.p, self.ci95, self.cost = result.p, result.ci95, result.cost
         self.report = self._report(batch)
         return self
@@ -134,7 +140,11 @@ class Physics(PredictorBase):
 
         low, high = bounds(parameter_scale(self.c))
         edge = 1e-4 * (high - low)
-        at = [s for i, (s, _, _) in enumerate(PARAMETERS) if i not in self.held and not low[i] + edge[i] < self.p[i] < high[i] - edge[i]]
+        at = [
+            s
+            for i, (s, _, _) in enumerate(PARAMETERS)
+            if i not in self.held and not low[i] + edge[i] < self.p[i] < high[i] - edge[i]
+        ]
         kept = Hold.at(self.dt)._rollout(batch.s0, batch.U, None)
         error = position_error(self._rollout(batch.s0, batch.U, None), batch)
 
@@ -142,7 +152,9 @@ class Physics(PredictorBase):
             p = fit_parameters(self._rolling(), other, self.iterations, self.tolerance).p
             return position_error(self._rolling().states(other.s0, other.U, p), other)
 
-        return with_reversed_shaft(FitReport(tuple(at), len(PARAMETERS) - len(self.held), error, position_error(kept, batch)), batch, error_on)
+        return with_reversed_shaft(
+            FitReport(tuple(at), len(PARAMETERS) - len(self.held), error, position_error(kept, batch)), batch, error_on
+        )
 
     def _pieces(self, data: Dataset) -> Dataset:
         """The runs, cut into pieces of `piece` seconds, or of the shortest run where that is shorter."""
@@ -150,13 +162,16 @@ class Physics(PredictorBase):
         return data.windows(steps) if self.piece else data
 
     def _fit_effects(self, batch: Batch, base: Fit, asked: Extension) -> Fit:
-        """Gears first where they are recorded, then everything else together, once for every setting of open shape parameters; the best is kept."""
+        """Gears first where they are recorded, then everything else together, once for every setting of open shape
+        parameters; the best is kept."""
         from .physics_model.effects_fit import fit_extension
         from .physics_model.fit import Data
 
         asked = Extension(asked.terms)  # a second fit starts afresh
         if not self.commanded:
-            self.actuator_params, asked = fit_gears(batch, self.dt, self.substeps, asked, self.actuator_params, self.particulars)
+            self.actuator_params, asked = fit_gears(
+                batch, self.dt, self.substeps, asked, self.actuator_params, self.particulars
+            )
         self.held = asked.held()
         best: tuple[Fit, Extension] | None = None
         for choice in asked.settings(batch.truth[:, :, :2], self.particulars):
@@ -165,7 +180,9 @@ class Physics(PredictorBase):
             def repath(extension: Extension) -> np.ndarray:
                 return self._path_under(extension, batch)
 
-            found = fit_extension(data, base, choice, self.particulars, repath, self.commanded, self.iterations, self.tolerance)
+            found = fit_extension(
+                data, base, choice, self.particulars, repath, self.commanded, self.iterations, self.tolerance
+            )
             if best is None or not best[0].cost <= found[0].cost:  # also where the best so far diverged
                 best = found
         if best is None:
@@ -186,7 +203,8 @@ class Physics(PredictorBase):
         self.substeps = max(1, int(np.ceil(dt / (0.15 * np.sqrt(self.c.L)) - 1e-9)))
 
     def actuators_after(self, actuators: np.ndarray, commands: np.ndarray, dt: float) -> np.ndarray:
-        """Actuator states (..., 4) after `dt` seconds of held commands (..., 4); they are the commands themselves where none were measured."""
+        """Actuator states (..., 4) after `dt` seconds of held commands (..., 4); they are the commands themselves where
+        none were measured."""
         if self.commanded:
             return commands.copy()
         now, wanted = (list(np.moveaxis(a, -1, 0)) for a in (actuators, commands))
@@ -229,23 +247,56 @@ class Physics(PredictorBase):
         start, path = true_start(s0, sensors, self.dt), self.actuator_path(s0, U)
         S = np.empty((len(s0), U.shape[1] + 1, s0.shape[1]))
         S[:, 0] = start
-        S[:, 1:, MOTION] = roll(forces, start, path, self._wind(U), self.dt / self.substeps, self.substeps, self.c, list(self.p), self.particulars)
-        S[:, 1:, ACTUATORS] = U[..., : len(COMMANDS)] if self.commanded else path[:, self.substeps - 1 :: self.substeps, 2]
+        S[:, 1:, MOTION] = roll(
+            forces,
+            start,
+            path,
+            self._wind(U),
+            self.dt / self.substeps,
+            self.substeps,
+            self.c,
+            list(self.p),
+            self.particulars,
+        )
+        S[:, 1:, ACTUATORS] = (
+            U[..., : len(COMMANDS)] if self.commanded else path[:, self.substeps - 1 :: self.substeps, 2]
+        )
         return measured(S, sensors, self.dt)[:, 1:]
 
     def describe(self) -> str:
-        """The fitted equations with units and 95 % confidence intervals (clustered over runs), and what was estimated of the ship."""
+        """The fitted equations with units and 95 % confidence intervals (clustered over runs), and what was estimated
+        of the ship."""
         lines = [
-            f"physics of {self.ship.name}: eq. (2) to (8), left side from Inoue (1981), Clarke (1983) and Soeding (1982)",
-            f"  surge  {self.c.m + self.c.m_x:.4g} du = {self.c.X_vr:.4g} v r + {self.c.X_rr:.4g} r^2 + X_n + X_delta + X_e - R",
-            f"  sway   {self.c.m11:.4g} dv + {self.c.m12_Y:.4g} dr = {self.c.Y_v:.4g} U v + ({self.c.Y_r:.4g} U - {self.c.m:.4g} u) r "
+            (
+                f"physics of {self.ship.name}: eq. (2) to (8), left side from Inoue (1981), Clarke (1983) and Soeding "
+                "(1982)"
+            ),
+            (
+                f"  surge  {self.c.m + self.c.m_x:.4g} du = {self.c.X_vr:.4g} v r + {self.c.X_rr:.4g} r^2 + X_n + "
+                "X_delta + X_e - R"
+            ),
+            f"  sway   {self.c.m11:.4g} dv + {self.c.m12_Y:.4g} dr = {self.c.Y_v:.4g} U v + ({self.c.Y_r:.4g} U - "
+            f"{self.c.m:.4g} u) r "
             f"+ {self.c.Y_vv:.4g} v|v| + {self.c.Y_vr:.4g} v|r| + {self.c.Y_rr:.4g} r|r| + Y_n + Y_delta + Y_e",
-            f"  yaw    {self.c.m12_N:.4g} dv + {self.c.m22:.4g} dr = {self.c.N_v:.4g} U v + ({self.c.N_r:.4g} U - {self.c.m * self.c.x_G:.4g} u) r "
-            f"+ {self.c.N_rr:.4g} r|r| + {self.c.N_vvr:.4g} v^2 r/U + {self.c.N_vrr:.4g} v r^2/U + N_n + N_delta + N_e   [SI]",
-            "  Y_n = p0 X_n; R = p1 u + p2 u|u| + p3 u^3; c_L = p4 + p5 a + p6 a^2 + p7 a^3; c_D = p8 + p9 a + p10 a^2 [a in rad]",
+            f"  yaw    {self.c.m12_N:.4g} dv + {self.c.m22:.4g} dr = {self.c.N_v:.4g} U v + ({self.c.N_r:.4g} U - "
+            f"{self.c.m * self.c.x_G:.4g} u) r "
+            f"+ {self.c.N_rr:.4g} r|r| + {self.c.N_vvr:.4g} v^2 r/U + {self.c.N_vrr:.4g} v r^2/U + N_n + N_delta + "
+            "N_e   [SI]",
+            (
+                "  Y_n = p0 X_n; R = p1 u + p2 u|u| + p3 u^3; c_L = p4 + p5 a + p6 a^2 + p7 a^3; c_D = p8 + p9 a + p10 "
+                "a^2 [a in rad]"
+            ),
         ]
-        for i, ((symbol, meaning, unit), value, (low, high)) in enumerate(zip(PARAMETERS, self.p, self.ci95, strict=True)):
-            interval = f"zero: {self.held[i]}" if i in self.held else "at its bound" if np.isnan(low) else f"[{low:.4g}, {high:.4g}]"
+        for i, ((symbol, meaning, unit), value, (low, high)) in enumerate(
+            zip(PARAMETERS, self.p, self.ci95, strict=True)
+        ):
+            interval = (
+                f"zero: {self.held[i]}"
+                if i in self.held
+                else "at its bound"
+                if np.isnan(low)
+                else f"[{low:.4g}, {high:.4g}]"
+            )
             lines.append(f"  {symbol:4s} = {value:11.4g} {unit:12s} {interval:28s} {meaning}")
         if self.commanded:
             lines.append("  actuators: the data record commands only; no dynamics between command and actuator")
@@ -255,17 +306,29 @@ class Physics(PredictorBase):
                 for (symbol, meaning, unit), value in zip(ACTUATOR_PARAMETERS, self.actuator_params, strict=True)
             ]
         lines += self.extension.describe() if self.extension is not None else []
-        lines += [f"  fit: {self.report.summary}", *([f"  {self.report.note}"] if self.report.note else [])] if self.report is not None else []
+        lines += (
+            [f"  fit: {self.report.summary}", *([f"  {self.report.note}"] if self.report.note else [])]
+            if self.report is not None
+            else []
+        )
         return "\n".join(lines + [f"  note: {n}" for n in self.particulars.notes])
 
     def _arrays(self) -> dict[str, np.ndarray]:
         arrays = {"p": self.p, "ci95": self.ci95, "actuators": self.actuator_params}
         if self.extension is not None:
-            arrays |= {"effect_values": np.concatenate([*map(np.array, self.extension.values)]), "effect_ci95": self.extension.ci95}
+            arrays |= {
+                "effect_values": np.concatenate([*map(np.array, self.extension.values)]),
+                "effect_ci95": self.extension.ci95,
+            }
         return arrays
 
     def _meta(self) -> dict[str, Any]:
-        meta = {"ship": self.ship.model_dump(exclude_none=True), "dt": self.dt, "commanded": self.commanded, "cost": float(self.cost)}
+        meta = {
+            "ship": self.ship.model_dump(exclude_none=True),
+            "dt": self.dt,
+            "commanded": self.commanded,
+            "cost": float(self.cost),
+        }
         if self.report is not None:
             meta["report"] = self.report.as_dict()
         if self.extension is not None:
@@ -275,8 +338,15 @@ class Physics(PredictorBase):
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
         num = len(PARAMETERS)
         check_shapes(arrays, {"p": (num,), "ci95": (num, 2), "actuators": (len(ACTUATOR_PARAMETERS),)})
-        self._set_ship(Ship.from_dict(meta["ship"], "saved model"), self.inputs, sample_time(meta), bool(meta["commanded"]))
-        self.p, self.ci95, self.actuator_params, self.cost = arrays["p"], arrays["ci95"], arrays["actuators"], float(meta["cost"])
+        self._set_ship(
+            Ship.from_dict(meta["ship"], "saved model"), self.inputs, sample_time(meta), bool(meta["commanded"])
+        )
+        self.p, self.ci95, self.actuator_params, self.cost = (
+            arrays["p"],
+            arrays["ci95"],
+            arrays["actuators"],
+            float(meta["cost"]),
+        )
         self.report = FitReport.from_dict(meta["report"]) if "report" in meta else None
         if "effects" in meta:
             asked = extension_of([EffectSpec(e["name"], e["params"]) for e in meta["effects"]])

@@ -1,8 +1,10 @@
-"""Sparse equations of motion found by PySINDy: accelerations of u, v, r as polynomials of velocities and actuators (needs the extra `pysindy`).
+"""Sparse equations of motion found by PySINDy: accelerations of u, v, r as polynomials of velocities and actuators
+(needs the extra `pysindy`).
 
-d(nu)/dt = Xi Theta(u, v, r, n, delta, F_b, F_s, measured wind ahead and abeam, depth), Xi sparse by sequentially thresholded least squares
-(Brunton, Proctor and Kutz 2016, PNAS 113, eq. 2 to 7). All variables and accelerations are divided by their root mean square first, so that one
-threshold suits them all. The actuators follow their commands by a lag with a rate limit fitted to the data, as in `physics`.
+d(nu)/dt = Xi Theta(u, v, r, n, delta, F_b, F_s, measured wind ahead and abeam, depth), Xi sparse by sequentially
+thresholded least squares (Brunton, Proctor and Kutz 2016, PNAS 113, eq. 2 to 7). All variables and accelerations are
+divided by their root mean square first, so that one threshold suits them all. The actuators follow their commands by a
+lag with a rate limit fitted to the data, as in `physics`.
 
 Source: Brunton, Proctor and Kutz (2016), Discovering governing equations from data by sparse identification, PNAS 113.
 """
@@ -26,7 +28,8 @@ from .base import History, PredictorBase
 from .physics_model.actuator_fit import fit_actuators
 
 _BEYOND = 10.0
-"""A run whose velocity exceeds this many times the largest of the training data has diverged: polynomials leave the data fast."""
+"""A run whose velocity exceeds this many times the largest of the training data has diverged: polynomials leave the
+data fast."""
 
 
 @dataclass
@@ -37,7 +40,8 @@ class PySINDy(PredictorBase):
         degree: of the polynomials.
         threshold: terms whose coefficient (of scaled variables) stays below it are dropped.
         alpha: ridge penalty of the least squares.
-        derivative: "finite_difference" (second order) or "smoothed" (of velocities smoothed by a Savitzky-Golay filter, for noisy data).
+        derivative: "finite_difference" (second order) or "smoothed" (of velocities smoothed by a Savitzky-Golay filter,
+        for noisy data).
     """
 
     name: ClassVar[str] = "pysindy"
@@ -61,7 +65,8 @@ class PySINDy(PredictorBase):
         return bool(self._found)
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
-        """Find the equations from all runs of `train` and `valid` (nothing here stops early); the seed has no part in it."""
+        """Find the equations from all runs of `train` and `valid` (nothing here stops early); the seed has no part in
+        it."""
         data = train.merged(valid)
         self.inputs, self._dt = data.inputs, data.dt
         methods = {"finite_difference": pysindy.FiniteDifference, "smoothed": pysindy.SmoothedFiniteDifference}
@@ -70,20 +75,25 @@ class PySINDy(PredictorBase):
             method = methods[self.derivative]()
             rates.append(np.asarray(method(run.states[:, VELOCITY], self._dt)))
             nu.append(np.asarray(method.smoothed_x_))
-            others.append(np.concatenate([run.states[:, ACTUATORS], self._environment(run.inputs, run.states[:, PSI])], axis=1))
+            others.append(
+                np.concatenate([run.states[:, ACTUATORS], self._environment(run.inputs, run.states[:, PSI])], axis=1)
+            )
         scale_x, scale_rate, scale_w = (_root_mean_square(np.concatenate(a)) for a in (nu, rates, others))
         # A channel that never moves is no regressor: beside the constant term it would make the problem singular.
         moving = np.concatenate(others).std(axis=0) > 1e-9 * scale_w
         found = pysindy.SINDy(
-            optimizer=pysindy.STLSQ(threshold=self.threshold, alpha=self.alpha), feature_library=pysindy.PolynomialLibrary(degree=self.degree)
+            optimizer=pysindy.STLSQ(threshold=self.threshold, alpha=self.alpha),
+            feature_library=pysindy.PolynomialLibrary(degree=self.degree),
         )
         found.fit(
             [x / scale_x for x in nu], t=self._dt, x_dot=[rate / scale_rate for rate in rates],
             u=[w[:, moving] / scale_w[moving] for w in others] if moving.any() else None,
         )  # fmt: skip
         self._found = {
-            "powers": np.asarray(found.feature_library.powers_), "coefficients": np.asarray(found.coefficients()), "moving": moving,
-            "scale_x": scale_x, "scale_rate": scale_rate, "scale_w": scale_w, "actuators": fit_actuators(data.batch(), self._dt),
+            "powers": np.asarray(found.feature_library.powers_), "coefficients": np.asarray(found.coefficients()),
+            "moving": moving,
+            "scale_x": scale_x, "scale_rate": scale_rate, "scale_w": scale_w,
+            "actuators": fit_actuators(data.batch(), self._dt),
             "largest": np.abs(np.concatenate(nu)).max(axis=0),
         }  # fmt: skip
         return self
@@ -133,12 +143,18 @@ class PySINDy(PredictorBase):
         names = [*STATES[VELOCITY], *controls]
         lines = []
         for name, row in zip(STATES[VELOCITY], f["coefficients"], strict=True):
-            terms = [f"{c:+.4g}" + "".join(f" {v}" + (f"^{p}" if p > 1 else "") for v, p in zip(names, powers, strict=True) if p)
+            terms = [f"{c:+.4g}" + "".join(f" {v}" + (f"^{p}" if p > 1 else "") for v,
+                    p in zip(names, powers, strict=True) if p)
                      for c, powers in zip(row, f["powers"], strict=True) if c]  # fmt: skip
             lines.append(f"d{name}/dt = {' '.join(terms) or '0'}")
         sizes = [*f["scale_x"], *f["scale_w"][f["moving"]]]
         rates = ", ".join(f"d{n}/dt {s:.4g}" for n, s in zip(STATES[VELOCITY], f["scale_rate"], strict=True))
-        return "\n".join([*lines, "divided by: " + ", ".join(f"{n} {s:.4g}" for n, s in zip(names, sizes, strict=True)) + "; " + rates])
+        return "\n".join(
+            [
+                *lines,
+                "divided by: " + ", ".join(f"{n} {s:.4g}" for n, s in zip(names, sizes, strict=True)) + "; " + rates,
+            ]
+        )
 
     def num_parameters(self) -> int:
         """Coefficients that are not zero, and the lags and rates of the actuators."""
@@ -153,7 +169,16 @@ class PySINDy(PredictorBase):
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
         others = InputFeatures(self.inputs).count
         terms, used = arrays["powers"].shape[0], 3 + int(np.count_nonzero(arrays["moving"]))
-        check_shapes(arrays, {"powers": (terms, used), "coefficients": (3, terms), "moving": (others,), "scale_w": (others,), "actuators": (6,)})
+        check_shapes(
+            arrays,
+            {
+                "powers": (terms, used),
+                "coefficients": (3, terms),
+                "moving": (others,),
+                "scale_w": (others,),
+                "actuators": (6,),
+            },
+        )
         check_shapes(arrays, {"scale_x": (3,), "scale_rate": (3,), "largest": (3,)})
         self._found, self._dt = arrays, sample_time(meta)
 

@@ -4,4 +4,6 @@ from __future__ import annotations
 
 from ..registry import Registry
 
-PREDICTORS = Registry("predictor", "predictors", "PREDICTOR", helpers=frozenset({"base", "device", "registered", "training"}), lazy=True)
+PREDICTORS = Registry(
+    "predictor", "predictors", "PREDICTOR", helpers=frozenset({"base", "device", "registered", "training"}), lazy=True
+)

@@ -1,7 +1,8 @@
-"""Any scikit-learn regressor as a one-step model, `sklearn:HistGradientBoostingRegressor[max_iter=50]` (needs the extra `sklearn`).
+"""Any scikit-learn regressor as a one-step model, `sklearn:HistGradientBoostingRegressor[max_iter=50]` (needs the extra
+`sklearn`).
 
-It learns y_k+1 - y_k from y_k and the inputs at k, both standardised, and is rolled out like the paper's network. A regressor with one output is
-fitted once per channel. Where it has a `random_state`, that is the seed.
+It learns y_k+1 - y_k from y_k and the inputs at k, both standardised, and is rolled out like the paper's network. A
+regressor with one output is fitted once per channel. Where it has a `random_state`, that is the seed.
 
 Source: Pedregosa et al. (2011), Scikit-learn: machine learning in Python, JMLR 12.
 """
@@ -26,7 +27,8 @@ from .base import History, PredictorFamily
 
 _OWN = ("target",)
 _TOO_LARGE = 1e30
-"""A standardised value beyond this is a rollout that has diverged; regressors refuse what float32 cannot hold (3.4e38)."""
+"""A standardised value beyond this is a rollout that has diverged; regressors refuse what float32 cannot hold (3.4e38).
+"""
 
 
 def _regressors() -> dict[str, Any]:
@@ -38,9 +40,9 @@ def _regressors() -> dict[str, Any]:
 class SklearnOneStep(PredictorFamily):
     """One-step model around a scikit-learn regressor.
 
-    `save` keeps the training samples and fits again on `load`, since a fitted regressor can otherwise only be pickled, and a pickle runs code
-    when it is read. The saved folder therefore contains the training data; where the refitted model does not predict what the saved
-    one did (another version of scikit-learn), `load` refuses.
+    `save` keeps the training samples and fits again on `load`, since a fitted regressor can otherwise only be pickled,
+    and a pickle runs code when it is read. The saved folder therefore contains the training data; where the refitted
+    model does not predict what the saved one did (another version of scikit-learn), `load` refuses.
 
     Args:
         regressor: class name of the regressor, such as "Ridge".
@@ -66,7 +68,10 @@ class SklearnOneStep(PredictorFamily):
     def member(cls, member: str, params: dict[str, Any]) -> Self:
         """`sklearn:Ridge[alpha=0.1,target=state]`: `target` is ours, all other parameters are the regressor's."""
         if not member:
-            raise InputError("model spec 'sklearn' names no regressor; write sklearn:HistGradientBoostingRegressor, or another of scikit-learn's.")
+            raise InputError(
+                "model spec 'sklearn' names no regressor; write sklearn:HistGradientBoostingRegressor, or another "
+                "of scikit-learn's."
+            )
         own = {k: v for k, v in params.items() if k in _OWN}
         try:
             return cls(member, {k: v for k, v in params.items() if k not in _OWN}, **own)
@@ -77,7 +82,8 @@ class SklearnOneStep(PredictorFamily):
         """The unfitted regressor.
 
         Raises:
-            InputError: scikit-learn has no regressor of that name, or it has no such parameter, or cannot be made without a further one.
+            InputError: scikit-learn has no regressor of that name, or it has no such parameter, or cannot be made
+            without a further one.
         """
         known = _regressors()
         if self.regressor not in known:
@@ -90,7 +96,10 @@ class SklearnOneStep(PredictorFamily):
         try:
             made = cls(**self.params)
         except TypeError as error:
-            raise InputError(f"'sklearn:{self.regressor}' cannot be made from a spec: {error}. Use one that needs no other estimator.") from None
+            raise InputError(
+                f"'sklearn:{self.regressor}' cannot be made from a spec: {error}. Use one that needs no other "
+                "estimator."
+            ) from None
         if "random_state" in accepted and "random_state" not in self.params:
             made.set_params(random_state=seed)
         return made if made.__sklearn_tags__().target_tags.multi_output else MultiOutputRegressor(made)
@@ -109,7 +118,9 @@ class SklearnOneStep(PredictorFamily):
         data = train.merged(valid)
         self.inputs, self._dt, self._seed = data.inputs, data.dt, seed
         batch = data.batch()
-        y, inputs, after = transitions(np.concatenate([batch.s0[:, None], batch.truth], axis=1), batch.U, InputFeatures(self.inputs))
+        y, inputs, after = transitions(
+            np.concatenate([batch.s0[:, None], batch.truth], axis=1), batch.U, InputFeatures(self.inputs)
+        )
         self._x = np.concatenate([y, inputs], axis=-1)
         self._z = after - y if self.target == "increment" else after
         try:
@@ -129,14 +140,20 @@ class SklearnOneStep(PredictorFamily):
         good = (np.abs(scaled) < _TOO_LARGE).all(axis=1)  # False for NaN
         z = np.full((len(scaled), NUM_CHANNELS), np.nan)
         if good.any():
-            z[good] = np.asarray(self._fitted.predict(scaled[good])).reshape(-1, NUM_CHANNELS) * self._scale_z[1] + self._scale_z[0]
+            z[good] = (
+                np.asarray(self._fitted.predict(scaled[good])).reshape(-1, NUM_CHANNELS) * self._scale_z[1]
+                + self._scale_z[0]
+            )
         return z
 
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
-        return one_step_rollout(self._step, s0, U, InputFeatures(self.inputs), self._dt, increment=self.target == "increment")
+        return one_step_rollout(
+            self._step, s0, U, InputFeatures(self.inputs), self._dt, increment=self.target == "increment"
+        )
 
     def num_parameters(self) -> int | None:
-        """Coefficients and intercepts of a linear regressor; None for any other, which keeps its numbers in ways of its own."""
+        """Coefficients and intercepts of a linear regressor; None for any other, which keeps its numbers in ways of its
+        own."""
         found = getattr(self._fitted, "estimators_", [self._fitted])  # one for each channel, or one for all
         if not all(hasattr(linear, "coef_") for linear in found):
             return None
@@ -154,13 +171,18 @@ class SklearnOneStep(PredictorFamily):
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
         self._x, self._z = arrays["x"], arrays["z"]
-        check_shapes(arrays, {"x": (len(self._x), NUM_CHANNELS + InputFeatures(self.inputs).count), "z": (len(self._x), NUM_CHANNELS)})
+        check_shapes(
+            arrays,
+            {"x": (len(self._x), NUM_CHANNELS + InputFeatures(self.inputs).count), "z": (len(self._x), NUM_CHANNELS)},
+        )
         self._dt, self._seed = sample_time(meta), int(meta["seed"])
         self._fit_regressor()
         if not np.allclose(self._probe(), arrays["probe"], rtol=1e-9, atol=1e-12):
             raise InputError(
-                f"the saved model 'sklearn:{self.regressor}' was fitted with scikit-learn {meta['scikit-learn']}; fitted again with "
-                f"{sklearn.__version__} it predicts something else. Install scikit-learn {meta['scikit-learn']}, or fit it anew."
+                f"the saved model 'sklearn:{self.regressor}' was fitted with scikit-learn {meta['scikit-learn']}; "
+                "fitted again with "
+                f"{sklearn.__version__} it predicts something else. Install scikit-learn {meta['scikit-learn']}, or "
+                "fit it anew."
             )
 
 

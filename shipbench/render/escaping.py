@@ -1,4 +1,5 @@
-"""Names and words of others as text of a page, one function for each format. HTML: `html.escape`; terminals: `names.shown`."""
+"""Names and words of others as text of a page, one function for each format. HTML: `html.escape`; terminals:
+`names.shown`."""
 
 from __future__ import annotations
 
@@ -7,7 +8,8 @@ import re
 from ..names import shown
 
 _LATEX = {
-    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "%": r"\%", "_": r"\_", "~": r"\textasciitilde{}",
+    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "%": r"\%", "_": r"\_",
+    "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}", "<": "$<$", ">": "$>$", "|": "$|$", "\u03bc": r"$\mu$", "\u03c3": r"$\sigma$",
 }  # fmt: skip
 _HTML_IN_MARKDOWN = re.compile(r"<(?=[A-Za-z/!?])|&(?=#|[A-Za-z][A-Za-z0-9]*;)")
@@ -33,11 +35,14 @@ def latex_text(text: str) -> str:
     parts = re.split(r"`([^`]*)`", one_line(text))
     escaped = ["".join(_LATEX.get(c, c) for c in part) for part in parts]
     line = "".join(rf"\texttt{{{part}}}" if i % 2 else part for i, part in enumerate(escaped))
-    return f"{{}}{line}" if line.startswith(("[", "*")) else line  # at the beginning of a row they would belong to the \\ before
+    return (
+        f"{{}}{line}" if line.startswith(("[", "*")) else line
+    )  # at the beginning of a row they would belong to the \\ before
 
 
 def csv_text(text: str) -> str:
-    """Any text as a cell of CSV that no spreadsheet computes: an apostrophe before what begins like a formula and is no number."""
+    """Any text as a cell of CSV that no spreadsheet computes: an apostrophe before what begins like a formula and is no
+    number."""
     if not text.lstrip().startswith(_FORMULA) or len(text.strip()) == 1:
         return text
     try:

@@ -1,7 +1,9 @@
-"""The common base of all HTML pages: one style, one header, one way of escaping, one content security policy, plots without a network.
+"""The common base of all HTML pages: one style, one header, one way of escaping, one content security policy, plots
+without a network.
 
-A page is a jinja2 template of its own that begins with `{% extends "base.html.j2" %}` and fills the blocks `nav` and `content`;
-`render_page` renders it. `macros.html.j2` holds the tables that are sorted with a click. `render/linked.py` describes the plots.
+A page is a jinja2 template of its own that begins with `{% extends "base.html.j2" %}` and fills the blocks `nav` and
+`content`; `render_page` renders it. `macros.html.j2` holds the tables that are sorted with a click. `render/linked.py`
+describes the plots.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ from typing import Any
 _HERE = Path(__file__).resolve().parent
 _TEMPLATES = _HERE / "templates"
 _PLOTLY = "vendor/plotly-basic.min.js"
-"""Plotly's basic bundle as published on npm (`plotly.js-basic-dist-min`); its first lines hold the version, its licence lies beside it."""
+"""Plotly's basic bundle as published on npm (`plotly.js-basic-dist-min`); its first lines hold the version, its licence
+lies beside it."""
 
 
 @dataclass(frozen=True)
@@ -65,14 +68,25 @@ def render_page(
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
-        loader=FileSystemLoader([folder, _TEMPLATES]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader([folder, _TEMPLATES]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.filters.update(ticks=_ticks, short=short_name, embedded=embedded, parts=_parts)
     styles = _read("page.css") + style
-    scripts = [*([_read(_PLOTLY)] if plots else []), _read("tables.js"), _read("copy.js"), *([_read("linked.js")] if plots else [])]
+    scripts = [
+        *([_read(_PLOTLY)] if plots else []),
+        _read("tables.js"),
+        _read("copy.js"),
+        *([_read("linked.js")] if plots else []),
+    ]
     return environment.get_template(template).render(
-        title=title, dataset=dataset, command=command, lead=lead, tiles=tiles, style=styles, scripts=scripts, plots=plots,
-        policy=content_policy(styles, scripts, images=images, plots=plots), made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        title=title, dataset=dataset, command=command, lead=lead, tiles=tiles, style=styles, scripts=scripts,
+        plots=plots,
+        policy=content_policy(styles, scripts, images=images, plots=plots),
+        made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         shipbench=version("shipbench"), plotly=plotly_version() if plots else "", **context,
     )  # fmt: skip
 
@@ -85,7 +99,8 @@ def plotly_version() -> str:
 
 
 def embedded(data: Any) -> Any:
-    """JSON for a `<script type="application/json">`: no `</script>` and no `<!--` can stand in it, and no number that JSON does not have."""
+    """JSON for a `<script type="application/json">`: no `</script>` and no `<!--` can stand in it, and no number that
+    JSON does not have."""
     from markupsafe import Markup
 
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
@@ -115,7 +130,14 @@ def _read(name: str) -> str:
     return (_HERE / name).read_text(encoding="utf-8")
 
 
-def content_policy(style: str, script: str | Sequence[str] = "", *, images: bool = False, style_attributes: bool = False, plots: bool = False) -> str:
+def content_policy(
+    style: str,
+    script: str | Sequence[str] = "",
+    *,
+    images: bool = False,
+    style_attributes: bool = False,
+    plots: bool = False,
+) -> str:
     """The content security policy of a page: it fetches nothing and runs nothing but this style and script.
 
     Args:
@@ -123,7 +145,8 @@ def content_policy(style: str, script: str | Sequence[str] = "", *, images: bool
         script: the contents of its script elements, likewise; "" for a page without.
         images: whether it holds pictures (`data:`).
         style_attributes: whether its drawings have attributes `style`, which cannot fetch anything.
-        plots: whether it draws with Plotly, which adds an empty style element, fills it by script and sets attributes `style`.
+        plots: whether it draws with Plotly, which adds an empty style element, fills it by script and sets attributes
+        `style`.
     """
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'"]
     if style_attributes or plots:
@@ -138,4 +161,6 @@ def content_policy(style: str, script: str | Sequence[str] = "", *, images: bool
 
 def _digests(contents: Sequence[str]) -> str:
     """Digests by which a browser knows what it may use, whatever a name in the page may hold."""
-    return " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()}'" for content in contents)
+    return " ".join(
+        f"'sha256-{base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()}'" for content in contents
+    )

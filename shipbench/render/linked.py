@@ -3,15 +3,16 @@
 The contract, as JSON in the page (macro `linked` of `macros.html.j2`):
 
     columns   one entry for each quantity: `name`, `label`, `unit`, `decimals`
-    series    one entry for each line: `name`, `role` ("measured", or the number of a model: its colour and its switch `data-toggle`)
-    track     names of the columns east and north [m], or null for a page without tracks
+    series    one entry for each line: `name`, `role` ("measured", or the number of a model: its colour and its switch
+    `data-toggle`) track     names of the columns east and north [m], or null for a page without tracks
     histories names of the columns that are drawn against time, from the top
     runs      one entry for each run: `name`, `note`, `t`, `values[series][column]`, `outlines`, `cells[model]`
     start     the number of the run shown first
 
-`t` [s, two decimals] and each `values[series][column]` are whole numbers in the last decimal: the first one, then the steps from the last finite
-value; null where nothing is drawn; a whole column that a series does not have is null. `outlines` are closed polygons [[east...], [north...]] [m].
-`cells` are texts for elements with `data-cell="model-number"`.
+`t` [s, two decimals] and each `values[series][column]` are whole numbers in the last decimal: the first one, then the
+steps from the last finite value; null where nothing is drawn; a whole column that a series does not have is null.
+`outlines` are closed polygons [[east...], [north...]] [m]. `cells` are texts for elements with
+`data-cell="model-number"`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from typing import Any
 import numpy as np
 
 COLOURS = 8
-"""Colours of the style sheet (`--c0` to `--c7`); model i has colour i modulo this, and from there on other dashes. `linked.js` does the same."""
+"""Colours of the style sheet (`--c0` to `--c7`); model i has colour i modulo this, and from there on other dashes.
+`linked.js` does the same."""
 _DASHES = ("", "7 3", "2 2", "8 2 2 2")
 _LARGEST = 1e9
 """Values beyond it are not drawn: a prediction that diverged."""
@@ -59,7 +61,8 @@ class Line:
 
 
 def packed(values: np.ndarray, decimals: int) -> list[int | None]:
-    """Values (n,) as whole numbers of the last decimal, each as the step from the finite one before it; None where not finite."""
+    """Values (n,) as whole numbers of the last decimal, each as the step from the finite one before it; None where not
+    finite."""
     found: list[int | None] = []
     last = 0
     for value in np.asarray(values, float).tolist():
@@ -93,7 +96,14 @@ def linked_run(
     """
     values = [[packed(line[c.name], c.decimals) if c.name in line else None for c in columns] for line in lines]
     rings = [np.round(ring.T, 1).tolist() for ring in outlines]
-    return {"name": name, "note": note, "t": packed(t, 2), "values": values, "outlines": rings, "cells": [list(row) for row in cells]}
+    return {
+        "name": name,
+        "note": note,
+        "t": packed(t, 2),
+        "values": values,
+        "outlines": rings,
+        "cells": [list(row) for row in cells],
+    }
 
 
 def linked_plots(
@@ -106,6 +116,7 @@ def linked_plots(
 ) -> dict[str, Any]:
     """The whole of the contract; `runs` come from `linked_run`."""
     return {
-        "columns": [asdict(c) for c in columns], "series": [asdict(s) for s in lines], "track": list(track) if track else None,
+        "columns": [asdict(c) for c in columns], "series": [asdict(s) for s in lines],
+        "track": list(track) if track else None,
         "histories": list(histories), "runs": list(runs), "start": start,
     }  # fmt: skip

@@ -39,20 +39,30 @@ class Axes:
 
     def band(self, x: np.ndarray, low: np.ndarray, high: np.ndarray) -> str:
         """The `d` of the area between two lines."""
-        return path(np.column_stack([self.px(np.concatenate([x, x[::-1]])), self.py(np.concatenate([low, high[::-1]]))])) + "z"
+        return (
+            path(np.column_stack([self.px(np.concatenate([x, x[::-1]])), self.py(np.concatenate([low, high[::-1]]))]))
+            + "z"
+        )
 
     def grid(self, xlabel: str, ylabel: str, names: Sequence[str] = (), xticks: Sequence[float] = ()) -> str:
-        """Grid lines, ticks and labels; `names` replace the numbers of a horizontal axis of categories 0, 1, ..., `xticks` its round numbers."""
+        """Grid lines, ticks and labels; `names` replace the numbers of a horizontal axis of categories 0, 1, ...,
+        `xticks` its round numbers."""
         bottom, right = self.height - _BOTTOM, self.width - _RIGHT
         parts = []
         for value in ticks(*self.y, self.log):
             at = f"{float(self.py(value)):.1f}"
-            parts.append(f'<path class="grid" d="M{_LEFT:g} {at}H{right:g}"/><text class="y" x="{_LEFT - 5:g}" y="{at}">{label(value)}</text>')
+            parts.append(
+                f'<path class="grid" d="M{_LEFT:g} {at}H{right:g}"/><text class="y" x="{_LEFT - 5:g}" '
+                f'y="{at}">{label(value)}</text>'
+            )
         round_numbers = [v for v in xticks if self.x[0] <= v <= self.x[1]] or ticks(*self.x)
         places = [(float(i), text) for i, text in enumerate(names)] if names else [(v, label(v)) for v in round_numbers]
         for value, text in places:
             at = f"{float(self.px(value)):.1f}"
-            parts.append(f'<path class="grid" d="M{at} {_TOP:g}V{bottom:g}"/><text class="x" x="{at}" y="{bottom + 14:g}">{text}</text>')
+            parts.append(
+                f'<path class="grid" d="M{at} {_TOP:g}V{bottom:g}"/><text class="x" x="{at}" '
+                f'y="{bottom + 14:g}">{text}</text>'
+            )
         parts.append(f'<text class="x" x="{(_LEFT + right) / 2:g}" y="{self.height - 5:g}">{xlabel}</text>')
         parts.append(f'<text class="x" transform="translate(11 {(_TOP + bottom) / 2:g}) rotate(-90)">{ylabel}</text>')
         return "".join(parts)
@@ -95,7 +105,8 @@ def label(value: float) -> str:
 
 
 def limits(lows: Sequence[float], highs: Sequence[float], typical: Sequence[float]) -> tuple[tuple[float, float], bool]:
-    """Limits of a vertical axis of errors, and whether it is logarithmic: where the `typical` errors lie more than a factor of 12 apart."""
+    """Limits of a vertical axis of errors, and whether it is logarithmic: where the `typical` errors lie more than a
+    factor of 12 apart."""
     positive = [v for v in typical if np.isfinite(v) and v > 0]
     top = max([v for v in highs if np.isfinite(v)], default=1.0)
     if positive and max(positive) > 12.0 * min(positive) and top > 0:

@@ -95,7 +95,10 @@ class Table:
         for row in self.rows:
             cells = [cell_text(c.text(row)) for c in self.columns]
             intervals = [c.interval_text(row).replace(" to ", " to\u00a0") for c in self.columns]  # wraps once at most
-            cells = [f"{cell}<br><sub>{between}</sub>" if between else cell for cell, between in zip(cells, intervals, strict=True)]
+            cells = [
+                f"{cell}<br><sub>{between}</sub>" if between else cell
+                for cell, between in zip(cells, intervals, strict=True)
+            ]
             if row.get("_reference"):
                 cells = [f"*{cell}*" if cell else "" for cell in cells]
             lines.append("| " + " | ".join(cells) + " |")
@@ -109,22 +112,39 @@ class Table:
             value = value.item() if hasattr(value, "item") else value
             return None if isinstance(value, float) and not math.isfinite(value) else value
 
-        keys = [key for c in self.columns for key in (c.key, *((f"{c.key}_low", f"{c.key}_high") if c.interval else ()))]
+        keys = [
+            key for c in self.columns for key in (c.key, *((f"{c.key}_low", f"{c.key}_high") if c.interval else ()))
+        ]
         rows = [{key: plain(row.get(key)) for key in keys} for row in self.rows]
-        return {"title": self.title, "columns": {c.key: c.header for c in self.columns}, "rows": rows, "notes": list(self.notes)}
+        return {
+            "title": self.title,
+            "columns": {c.key: c.header for c in self.columns},
+            "rows": rows,
+            "notes": list(self.notes),
+        }
 
 
 def table_cells(table: Table) -> dict[str, Any]:
-    """A table for the macro `table` of `render/templates/macros.html.j2`: cells as text, beside the value that they are sorted by.
+    """A table for the macro `table` of `render/templates/macros.html.j2`: cells as text, beside the value that they are
+    sorted by.
 
-    The head of a row is its model; in a table without models its first text. It stays in sight when the table is scrolled sideways.
+    The head of a row is its model; in a table without models its first text. It stays in sight when the table is
+    scrolled sideways.
     """
     models = any(c.key == "model" for c in table.columns)
-    heads = {c.key for i, c in enumerate(table.columns) if c.key == "model" or (not models and i == 0 and c.format is None)}
+    heads = {
+        c.key for i, c in enumerate(table.columns) if c.key == "model" or (not models and i == 0 and c.format is None)
+    }
     lines = []
     for row in table.rows:
         cells = [
-            {"text": c.text(row), "between": _between(c, row), "by": _sort_key(row.get(c.key)), "number": c.format is not None} for c in table.columns
+            {
+                "text": c.text(row),
+                "between": _between(c, row),
+                "by": _sort_key(row.get(c.key)),
+                "number": c.format is not None,
+            }
+            for c in table.columns
         ]
         lines.append({"cells": cells, "reference": bool(row.get("_reference"))})
     head = [{"text": c.header, "number": c.format is not None, "model": c.key in heads} for c in table.columns]

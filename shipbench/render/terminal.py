@@ -28,12 +28,16 @@ MOST_INTERVALS = 8
 
 
 def paragraph(text: str, width: int, indent: str = "", hanging: str = "") -> list[str]:
-    """Lines of at most `width`; `hanging` begins every line but the first. A word that is longer than a line is broken."""
-    return textwrap.wrap(text, max(width, 20), initial_indent=indent, subsequent_indent=hanging or indent, break_on_hyphens=False)
+    """Lines of at most `width`; `hanging` begins every line but the first. A word that is longer than a line is
+    broken."""
+    return textwrap.wrap(
+        text, max(width, 20), initial_indent=indent, subsequent_indent=hanging or indent, break_on_hyphens=False
+    )
 
 
 def command_lines(command: str, width: int, indent: str = "  ") -> list[str]:
-    """A command in lines of at most `width` that a shell takes as one: broken before an option, with a backslash at the end."""
+    """A command in lines of at most `width` that a shell takes as one: broken before an option, with a backslash at the
+    end."""
     words = shlex.split(command)
     parts = [shlex.quote(words[0])] if words else []
     for word in words[1:]:
@@ -54,8 +58,8 @@ def command_lines(command: str, width: int, indent: str = "  ") -> list[str]:
 def show_table(table: Table, console: Console) -> None:
     """Print a table.
 
-    Columns that do not fit stand in a further part, beside the names of the rows again. Names that take half of the screen stand on a line of their
-    own above their figures. A table of words alone that does not fit becomes a list.
+    Columns that do not fit stand in a further part, beside the names of the rows again. Names that take half of the
+    screen stand on a line of their own above their figures. A table of words alone that does not fit becomes a list.
     """
     screen = _Screen(table, console.width)
     lines = [Text(shown(line), style="bold") for line in paragraph(table.title, console.width)]
@@ -74,12 +78,17 @@ class _Screen:
         self.table, self.width = table, width
         self.between = sum(c.interval for c in table.columns) <= MOST_INTERVALS
         self.needed = [self._needed(column) for column in table.columns]
-        self.least = [w if c.format or w <= _PROSE else _NARROW for w, c in zip(self.needed, table.columns, strict=True)]
+        self.least = [
+            w if c.format or w <= _PROSE else _NARROW for w, c in zip(self.needed, table.columns, strict=True)
+        ]
 
     @property
     def is_prose(self) -> bool:
         """Whether there are words alone, too many for columns side by side."""
-        return not any(c.format for c in self.table.columns) and sum(self.needed) + _GAP * (len(self.needed) - 1) > self.width
+        return (
+            not any(c.format for c in self.table.columns)
+            and sum(self.needed) + _GAP * (len(self.needed) - 1) > self.width
+        )
 
     def _cell(self, column: TableColumn, row: dict[str, Any]) -> list[tuple[str, str]]:
         """Lines of a cell, each with its style."""
@@ -94,7 +103,8 @@ class _Screen:
         return max([1, *cells, *map(len, shown(column.header).split())])
 
     def _names(self) -> list[int]:
-        """Places of the columns that name a row, which every part repeats: one before the first figure whose cells differ, else all of these."""
+        """Places of the columns that name a row, which every part repeats: one before the first figure whose cells
+        differ, else all of these."""
         columns = self.table.columns
         leading = range(max(next((i for i, c in enumerate(columns) if c.format is not None), 1), 1))
         for i in leading:
@@ -133,7 +143,9 @@ class _Screen:
     def _part(self, part: Sequence[int], apart: Sequence[int]) -> list[Text]:
         """Header, rule and rows of the columns `part`; `apart`: columns whose cells stand on a line above."""
         widths = self._widths(part)
-        heads = {i: [(line, "bold") for line in textwrap.wrap(shown(self.table.columns[i].header), widths[i])] for i in part}
+        heads = {
+            i: [(line, "bold") for line in textwrap.wrap(shown(self.table.columns[i].header), widths[i])] for i in part
+        }
         deepest = max(map(len, heads.values()), default=0)
         heads = {i: [("", "")] * (deepest - len(lines)) + lines for i, lines in heads.items()}
         above = "  ".join(shown(self.table.columns[i].header) for i in apart)
@@ -146,13 +158,18 @@ class _Screen:
         return [*lines, Text("")]
 
     def _side_by_side(self, cells: dict[int, list[tuple[str, str]]], widths: dict[int, int]) -> list[Text]:
-        wrapped = {i: [(part, style) for line, style in lines for part in _broken(line, widths[i])] for i, lines in cells.items()}
+        wrapped = {
+            i: [(part, style) for line, style in lines for part in _broken(line, widths[i])]
+            for i, lines in cells.items()
+        }
         found = []
         for k in range(max(map(len, wrapped.values()), default=0)):
             line = Text()
             for i, lines in wrapped.items():
                 text, style = lines[k] if k < len(lines) else ("", "")
-                line.append(text.rjust(widths[i]) if self.table.columns[i].format else text.ljust(widths[i]), style=style).append(" " * _GAP)
+                line.append(
+                    text.rjust(widths[i]) if self.table.columns[i].format else text.ljust(widths[i]), style=style
+                ).append(" " * _GAP)
             line.rstrip()
             found.append(line)
         return found
@@ -166,7 +183,11 @@ class _Screen:
             lines += [Text(line, style="bold") for line in paragraph(head, self.width)]
             for column in (c for c in self.table.columns if c not in heads):
                 text = " ".join(shown(column.text(row), keep="\n").split())
-                lines += [Text(line) for line in paragraph(f"{shown(column.header)}: {text}", self.width, "  ", "    ")] if text else []
+                lines += (
+                    [Text(line) for line in paragraph(f"{shown(column.header)}: {text}", self.width, "  ", "    ")]
+                    if text
+                    else []
+                )
         return [*lines, Text("")]
 
 

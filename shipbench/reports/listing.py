@@ -1,4 +1,5 @@
-"""What a part says of itself, read from its source without importing it (so that a list never loads torch or casadi)."""
+"""What a part says of itself, read from its source without importing it (so that a list never loads torch or
+casadi)."""
 
 from __future__ import annotations
 
@@ -14,14 +15,23 @@ from ..registry import Registry
 
 
 def describe_parts(registry: Registry) -> list[dict[str, Any]]:
-    """For each registered part its name, one line on it, its parameters with their defaults as written, where it comes from, and why it
-    cannot be used here ("" where it can): an optional package is missing, or a plug-in (only these are imported) fails to import."""
+    """For each registered part its name, one line on it, its parameters with their defaults as written, where it comes
+    from, and why it cannot be used here ("" where it can): an optional package is missing, or a plug-in (only these are
+    imported) fails to import."""
     parts = []
     for name in registry.names():
         path, entry = _place(registry, name)
         summary, parameters, needs = read_part(path, registry.attribute, entry) if path else ("", {}, ())
         unusable = not_installed(needs) if entry is None else _problem(registry, name)
-        parts.append({"name": name, "summary": summary, "parameters": parameters, "from": entry or "shipbench", "unusable": unusable})
+        parts.append(
+            {
+                "name": name,
+                "summary": summary,
+                "parameters": parameters,
+                "from": entry or "shipbench",
+                "unusable": unusable,
+            }
+        )
     return parts
 
 
@@ -34,13 +44,18 @@ def _place(registry: Registry, name: str) -> tuple[Path | None, str | None]:
 
 
 def explain_part(registry: Registry, name: str) -> tuple[list[str], dict[str, str]]:
-    """Paragraphs of the docstrings of a part's module and class, without the first line; what is said of each parameter."""
+    """Paragraphs of the docstrings of a part's module and class, without the first line; what is said of each
+    parameter."""
     path, entry = _place(registry, name)
     try:
         tree = ast.parse(path.read_text(encoding="utf-8")) if path else ast.parse("")
     except (OSError, SyntaxError, UnicodeDecodeError):
         return [], {}
-    bound = entry.partition(":")[2] if entry else next((_bound_name(n) for n in tree.body if _binds(n, registry.attribute)), "")
+    bound = (
+        entry.partition(":")[2]
+        if entry
+        else next((_bound_name(n) for n in tree.body if _binds(n, registry.attribute)), "")
+    )
     own = next((ast.get_docstring(n) or "" for n in tree.body if isinstance(n, ast.ClassDef) and n.name == bound), "")
     words, _, arguments = own.partition("Args:\n")
     meanings: dict[str, str] = {}
@@ -65,9 +80,13 @@ def describe_effects() -> list[dict[str, Any]]:
     parts = []
     for name in EFFECTS.names():
         effect = EFFECTS.get(name)
-        parameters = [{"name": p.name, "unit": p.unit, "typical": p.typical, "low": p.low, "high": p.high} for p in effect.parameters]
+        parameters = [
+            {"name": p.name, "unit": p.unit, "typical": p.typical, "low": p.low, "high": p.high}
+            for p in effect.parameters
+        ]
         parts.append({
-            "name": name, "family": effect.family, "summary": effect.summary, "source": effect.source, "per_run": effect.per_run,
+            "name": name, "family": effect.family, "summary": effect.summary, "source": effect.source,
+            "per_run": effect.per_run,
             "parameters": parameters,
         })  # fmt: skip
     return parts
@@ -83,7 +102,8 @@ def _source(entry: str) -> Path | None:
 
 
 def read_part(path: Path, attribute: str, entry: str | None = None) -> tuple[str, dict[str, str], tuple[str, ...]]:
-    """First line of the module's docstring; the fields (name -> default as written) of the class bound to `attribute`; the packages it needs.
+    """First line of the module's docstring; the fields (name -> default as written) of the class bound to `attribute`;
+    the packages it needs.
 
     `entry` ("module:Class") names the class of a plug-in instead.
     """
@@ -94,12 +114,16 @@ def read_part(path: Path, attribute: str, entry: str | None = None) -> tuple[str
     classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
     summary = (ast.get_docstring(tree) or "").strip().split("\n")[0]
     bound = entry.partition(":")[2] if entry else next((_bound_name(n) for n in tree.body if _binds(n, attribute)), "")
-    return (summary, _fields(classes[bound], classes), _needs(classes[bound])) if bound in classes else (summary, {}, ())
+    return (
+        (summary, _fields(classes[bound], classes), _needs(classes[bound])) if bound in classes else (summary, {}, ())
+    )
 
 
 def _needs(node: ast.ClassDef) -> tuple[str, ...]:
     """The literal value of the class variable `needs` of a predictor."""
-    values = [n.value for n in node.body if isinstance(n, ast.AnnAssign) and n.value and ast.unparse(n.target) == "needs"]
+    values = [
+        n.value for n in node.body if isinstance(n, ast.AnnAssign) and n.value and ast.unparse(n.target) == "needs"
+    ]
     return ast.literal_eval(values[0]) if values else ()
 
 
@@ -112,7 +136,8 @@ def _bound_name(node: ast.stmt) -> str:
 
 
 def _fields(node: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> dict[str, str]:
-    """Annotated fields of a dataclass and of its bases in the same file; class variables and private names are no parameters."""
+    """Annotated fields of a dataclass and of its bases in the same file; class variables and private names are no
+    parameters."""
     found: dict[str, str] = {}
     for base in node.bases:
         if isinstance(base, ast.Name) and base.id in classes:

@@ -1,4 +1,5 @@
-"""Recorded runs as linked plots: tracks and time histories of a data set, for pages that show data and no prediction."""
+"""Recorded runs as linked plots: tracks and time histories of a data set, for pages that show data and no
+prediction."""
 
 from __future__ import annotations
 
@@ -21,7 +22,9 @@ _SAMPLES = 60_000
 _COMMANDS = (DELTA, N, F_B, F_S)
 
 
-def recorded_plots(dataset: Dataset, runs: Mapping[str, Sequence[Run]], notes: Mapping[str, str], start: str = "") -> dict[str, Any]:
+def recorded_plots(
+    dataset: Dataset, runs: Mapping[str, Sequence[Run]], notes: Mapping[str, str], start: str = ""
+) -> dict[str, Any]:
     """Tracks, states and commands as linked plots.
 
     Args:
@@ -32,7 +35,11 @@ def recorded_plots(dataset: Dataset, runs: Mapping[str, Sequence[Run]], notes: M
     """
     everything = np.concatenate([piece.states for pieces in runs.values() for piece in pieces])
     signals = [s for s in SIGNALS if s[0] not in (F_B, F_S) or np.any(everything[:, s[0]] != 0.0)]
-    commands = {f"{STATES[i]}_c": (factor, q) for i, factor, q in signals if i in _COMMANDS and f"{STATES[i]}_c" in dataset.inputs}
+    commands = {
+        f"{STATES[i]}_c": (factor, q)
+        for i, factor, q in signals
+        if i in _COMMANDS and f"{STATES[i]}_c" in dataset.inputs
+    }
     columns = [EAST, NORTH, *(q for _, _, q in signals)]
     most = _SAMPLES // len(runs)
     drawn = []
@@ -41,7 +48,9 @@ def recorded_plots(dataset: Dataset, runs: Mapping[str, Sequence[Run]], notes: M
         states = {"east": S[:, Y], "north": S[:, X]} | {q.name: factor * S[:, i] for i, factor, q in signals}
         ordered = {q.name: factor * U[:, dataset.inputs.index(key)] for key, (factor, q) in commands.items()}
         kept = thinned(np.stack([*states.values(), *ordered.values()], axis=1), most)
-        lines = [{key: column[kept] for key, column in line.items()} for line in (states, ordered)[: 2 if commands else 1]]
+        lines = [
+            {key: column[kept] for key, column in line.items()} for line in (states, ordered)[: 2 if commands else 1]
+        ]
         whole = S[np.isfinite(S).all(axis=1)]
         hulls = [
             outline(float(s[X]), float(s[Y]), float(s[PSI]), dataset.ship.L, dataset.ship.B)
@@ -64,8 +73,8 @@ def _joined(pieces: Sequence[Run]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def thinned(columns: np.ndarray, most: int) -> np.ndarray:
-    """Indices of about `most` of the rows of `columns` (n, k), in order: evenly spread, and of each stretch between them where a column is
-    least and greatest, so that a single wrong sample stays visible."""
+    """Indices of about `most` of the rows of `columns` (n, k), in order: evenly spread, and of each stretch between
+    them where a column is least and greatest, so that a single wrong sample stays visible."""
     n, k = columns.shape
     if n <= most:
         return np.arange(n)
@@ -75,6 +84,8 @@ def thinned(columns: np.ndarray, most: int) -> np.ndarray:
     for a, b in pairwise(edges):
         part = columns[a:b]
         gaps = ~np.isfinite(part)
-        kept.update((a, *(a + np.where(gaps, np.inf, part).argmin(axis=0)), *(a + np.where(gaps, -np.inf, part).argmax(axis=0))))
+        kept.update(
+            (a, *(a + np.where(gaps, np.inf, part).argmin(axis=0)), *(a + np.where(gaps, -np.inf, part).argmax(axis=0)))
+        )
         kept.update((a + np.flatnonzero(gaps.all(axis=1))).tolist())  # breaks of the lines
     return np.array(sorted(int(i) for i in kept))

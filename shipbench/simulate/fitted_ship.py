@@ -1,4 +1,5 @@
-"""Sea trials of a ship that *is* the fitted model: eq. (2) with drawn parameters. Nothing is hidden and nothing differs in structure.
+"""Sea trials of a ship that *is* the fitted model: eq. (2) with drawn parameters. Nothing is hidden and nothing differs
+in structure.
 
 For counting false alarms only; causes to be found are always hidden in the MMG ship.
 """
@@ -25,7 +26,8 @@ _MAX_TURN = 1.5
 
 
 def draw_parameters(rng: np.random.Generator, c: eq2.Coefficients) -> list[float]:
-    """p0..p10 of a symmetric ship: resistance, lift and drag of the rudder near what the source paper and rudder theory give."""
+    """p0..p10 of a symmetric ship: resistance, lift and drag of the rudder near what the source paper and rudder theory
+    give."""
     area, speed = 0.5 * c.rho * c.L * c.T, 0.1 * np.sqrt(9.81 * c.L)
     p = [0.0] * eq2.NUM_PARAMETERS
     p[1] = 0.002 * area * speed * rng.uniform(0.0, 2.0)
@@ -36,13 +38,20 @@ def draw_parameters(rng: np.random.Generator, c: eq2.Coefficients) -> list[float
 
 
 def draw_hull(rng: np.random.Generator) -> list[Hidden]:
-    """Differences of an ordinary ship from the regressions: hull derivatives, race at the rudder, wake in turns, thrusters at speed."""
+    """Differences of an ordinary ship from the regressions: hull derivatives, race at the rudder, wake in turns,
+    thrusters at speed."""
     hull = EFFECTS.get("hull_derivatives")
     factors = np.clip(HULL_SPREAD * rng.standard_normal(len(hull.parameters)), -0.5, 0.5)
     own = []
-    for name, centre, spread in (("race_gain", -0.45, 0.1), ("wake_variation", 0.35, 0.12), ("thruster_speed_loss", 0.25, 0.12)):
+    for name, centre, spread in (
+        ("race_gain", -0.45, 0.1),
+        ("wake_variation", 0.35, 0.12),
+        ("thruster_speed_loss", 0.25, 0.12),
+    ):
         effect = EFFECTS.get(name)
-        own.append(Hidden(effect, effect.internal({effect.parameters[0].name: centre + spread * rng.standard_normal()})))
+        own.append(
+            Hidden(effect, effect.internal({effect.parameters[0].name: centre + spread * rng.standard_normal()}))
+        )
     return [Hidden(hull, tuple(float(f) for f in factors)), *own]
 
 
@@ -64,9 +73,11 @@ def _self_propulsion(c: eq2.Coefficients, p: list[float], speed: float) -> float
 
 
 def gust_size(c: eq2.Coefficients, speed: float, gust: float) -> np.ndarray:
-    """Accelerations (3,) [m/s^2, m/s^2, rad/s^2] of a gust [m/s] from ahead (surge) and abeam (sway, yaw) at `speed` [m/s] in calm air,
-    with the wind forces of the MMG ship, so that both simulators are shaken alike."""
-    calm, ahead, abeam = (wind.blendermann(speed + a, b, c.A_F, c.A_L, c.L) for a, b in ((0.0, 0.0), (gust, 0.0), (0.0, gust)))
+    """Accelerations (3,) [m/s^2, m/s^2, rad/s^2] of a gust [m/s] from ahead (surge) and abeam (sway, yaw) at `speed`
+    [m/s] in calm air, with the wind forces of the MMG ship, so that both simulators are shaken alike."""
+    calm, ahead, abeam = (
+        wind.blendermann(speed + a, b, c.A_F, c.A_L, c.L) for a, b in ((0.0, 0.0), (gust, 0.0), (0.0, gust))
+    )
     return np.abs(np.array([(ahead[0] - calm[0]) / (c.m + c.m_x), abeam[1] / c.m11, abeam[2] / c.m22]))
 
 
@@ -81,7 +92,8 @@ def _gusts(rng: np.random.Generator, runs: int, steps: int, dt: float, size: np.
 
 
 def fitted_trials(ship: Vessel, seed: int, plan: Trials | None = None, name: str = "trials") -> Dataset:
-    """Trials of eq. (2) on the particulars and actuators of `ship`: same orders, sensors and size of gusts as `sea_trials`.
+    """Trials of eq. (2) on the particulars and actuators of `ship`: same orders, sensors and size of gusts as
+    `sea_trials`.
 
     A drawn hull that spins (|r| L over the speed beyond 1.5) is drawn again.
 
@@ -91,7 +103,10 @@ def fitted_trials(ship: Vessel, seed: int, plan: Trials | None = None, name: str
     """
     plan = plan or Trials()
     if any(plan.wind):
-        raise InputError(f"trials of eq. (2) have no mean wind (value: {plan.wind}); accepted: gusts alone, or `sea_trials` of an MMG ship.")
+        raise InputError(
+            f"trials of eq. (2) have no mean wind (value: {plan.wind}); accepted: gusts alone, or `sea_trials` of "
+            "an MMG ship."
+        )
     rng = np.random.default_rng(seed)
     particulars = complete(ship.particulars)
     c = eq2.coefficients(particulars)
@@ -103,19 +118,29 @@ def fitted_trials(ship: Vessel, seed: int, plan: Trials | None = None, name: str
         gusts = _gusts(rng, plan.runs, sailing.U.shape[1], sailing.dt, size, 20.0 * sailing.scale)
         num = max(1, int(np.ceil(sailing.dt / sailing.max_step - 1e-9)))
 
-        def acceleration(s: Flow, k: int, p: list[float] = p, hull: list[Hidden] = hull, gusts: np.ndarray = gusts) -> tuple[Array, ...]:
+        def acceleration(
+            s: Flow, k: int, p: list[float] = p, hull: list[Hidden] = hull, gusts: np.ndarray = gusts
+        ) -> tuple[Array, ...]:
             e = _modifiers(hull, s, particulars)
             found = eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, (s.u, s.v), c, p, e)
             return tuple(a + gusts[:, k, i] for i, a in enumerate(found))
 
-        S = integrate(acceleration, sailing.s0, actuator_paths(ship, sailing.s0, sailing.U, sailing.dt, num), sailing.dt, num)
+        S = integrate(
+            acceleration, sailing.s0, actuator_paths(ship, sailing.s0, sailing.U, sailing.dt, num), sailing.dt, num
+        )
         if is_sane(S, ship.L):
-            return write_down(ship, sailing, S, (), plan, rng, name, f"shipbench trials of eq. (2) on {ship.name}, seed {seed}")
-    raise WorkError(f"trials of eq. (2) on ship '{ship.name}': none of {_TRIES} drawn hulls can be sailed; choose another ship or seed.")
+            return write_down(
+                ship, sailing, S, (), plan, rng, name, f"shipbench trials of eq. (2) on {ship.name}, seed {seed}"
+            )
+    raise WorkError(
+        f"trials of eq. (2) on ship '{ship.name}': none of {_TRIES} drawn hulls can be sailed; choose another ship "
+        "or seed."
+    )
 
 
 def is_sane(S: np.ndarray, L: float) -> bool:
-    """Whether all runs S (runs, samples, 10) stay finite and none spins: |r| L is below 1.5 times the speed (0.8 m/s at least, at 130 m)."""
+    """Whether all runs S (runs, samples, 10) stay finite and none spins: |r| L is below 1.5 times the speed (0.8 m/s at
+    least, at 130 m)."""
     if not np.all(np.isfinite(S)):
         return False
     floor = 0.8 * (L / 130.0) ** 0.5

@@ -1,4 +1,5 @@
-"""Closed-loop port approaches and departures: waypoints, line-of-sight steering, speed orders, stops and thrusters, for many runs at once."""
+"""Closed-loop port approaches and departures: waypoints, line-of-sight steering, speed orders, stops and thrusters, for
+many runs at once."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ _LEGS = 24
 
 @dataclass(frozen=True)
 class Gusts:
-    """Hidden wind: an Ornstein-Uhlenbeck vector with standard deviation `sigma` per axis [m/s] and time constant `tau` [s]."""
+    """Hidden wind: an Ornstein-Uhlenbeck vector with standard deviation `sigma` per axis [m/s] and time constant `tau`
+    [s]."""
 
     sigma: float
     tau: float
@@ -26,8 +28,9 @@ class Gusts:
 class Plan:
     """What the pilots of all runs intend; arrays have the run as first axis.
 
-    waypoints (runs, legs, 2) [m]; target_speed (runs, orders) [m/s] in force from order_time (runs, orders) [s]; engine_gain (runs,) [rpm per m/s];
-    stopping (runs,): the ship is brought to a stop with astern revolutions; thrusters (runs,): tunnel thrusters help to steer.
+    waypoints (runs, legs, 2) [m]; target_speed (runs, orders) [m/s] in force from order_time (runs, orders) [s];
+    engine_gain (runs,) [rpm per m/s]; stopping (runs,): the ship is brought to a stop with astern revolutions;
+    thrusters (runs,): tunnel thrusters help to steer.
     """
 
     waypoints: np.ndarray
@@ -41,12 +44,13 @@ class Plan:
 
 
 def draw_plan(rng: np.random.Generator, num: int, L: float, horizon: float, warm_up: float) -> Plan:
-    """Draw the intentions of `num` runs: winding channels, speed orders every 20 to 60 s, a few stops, a few thruster assists."""
+    """Draw the intentions of `num` runs: winding channels, speed orders every 20 to 60 s, a few stops, a few thruster
+    assists."""
     speed = np.clip(np.where(rng.random(num) < 0.66, rng.normal(4.02, 0.18, num), rng.normal(5.3, 0.32, num)), 2.4, 6.3)
     course = rng.uniform(-np.pi, np.pi, num)
-    turns = np.deg2rad(-4.0) + np.deg2rad(np.where(rng.random(num) < 0.08, 85.0, rng.uniform(0.0, 34.0, num)))[:, None] * rng.standard_normal(
-        (num, _LEGS)
-    )
+    turns = np.deg2rad(-4.0) + np.deg2rad(np.where(rng.random(num) < 0.08, 85.0, rng.uniform(0.0, 34.0, num)))[
+        :, None
+    ] * rng.standard_normal((num, _LEGS))
     turns[:, 0] = 0.0
     courses = course[:, None] + np.cumsum(np.clip(turns, -1.6, 1.6), axis=1)
     legs = rng.uniform(1.5, 3.0, (num, _LEGS)) * L
@@ -59,15 +63,26 @@ def draw_plan(rng: np.random.Generator, num: int, L: float, horizon: float, warm
     target = np.clip(speed[:, None] - 0.43 + rng.normal(0.0, 0.6, (num, 30)), 1.8, 6.6)
     target[stopping] = np.where(orders[stopping] > warm_up - 60.0, -0.6, target[stopping])
     assist = stopping | (rng.random(num) < 0.05)
-    return Plan(start[:, None] + np.cumsum(steps, axis=1), target, orders, rng.uniform(32.0, 80.0, num), stopping, assist, speed, course)
+    return Plan(
+        start[:, None] + np.cumsum(steps, axis=1),
+        target,
+        orders,
+        rng.uniform(32.0, 80.0, num),
+        stopping,
+        assist,
+        speed,
+        course,
+    )
 
 
-def fly(ship: MMGShip, plan: Plan, rng: np.random.Generator, horizon: int, warm_up: int, gusts: Gusts | None = None) -> tuple[np.ndarray, np.ndarray]:
+def fly(
+    ship: MMGShip, plan: Plan, rng: np.random.Generator, horizon: int, warm_up: int, gusts: Gusts | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Sail the plan with the pilots' controllers at 1 s.
 
     Returns:
-        States (runs, horizon + 1, 10) and commands (runs, horizon + 1, 4) of the recorded part, after `warm_up` seconds that give every run a natural
-        initial state.
+        States (runs, horizon + 1, 10) and commands (runs, horizon + 1, 4) of the recorded part, after `warm_up` seconds
+        that give every run a natural initial state.
     """
     from ..physics.mmg import Environment
 
@@ -104,7 +119,8 @@ def _pilot(ship: MMGShip, plan: Plan, state: np.ndarray, leg: np.ndarray, t: flo
     error = wrap_angle(wanted - drift - state[:, PSI])
     order = np.maximum((plan.order_time <= t).sum(axis=1) - 1, 0)
     target = plan.target_speed[rows, order]
-    # The engine order is given once per speed order from the speed then sailed: pilots do not trim the shaft every second.
+    # The engine order is given once per speed order from the speed then sailed: pilots do not trim the shaft every
+    # second.
     rpm = np.clip(25.0 * target + plan.engine_gain * (target - state[:, U]), -180.0, 180.0)
     rpm = np.where(plan.stopping, rpm, np.maximum(rpm, 20.0))  # dead slow ahead is the least order under way
     rpm = np.where(plan.stopping & (target < 0), np.where(state[:, U] > target, np.minimum(rpm, -100.0), 0.0), rpm)

@@ -1,4 +1,5 @@
-"""Sailing the MMG ship with causes hidden in it: effects on the hull, in the gears and in the sensors, under gusts that nobody records."""
+"""Sailing the MMG ship with causes hidden in it: effects on the hull, in the gears and in the sensors, under gusts that
+nobody records."""
 
 from __future__ import annotations
 
@@ -47,8 +48,11 @@ def gears_of(ship: Vessel, hidden: Sequence[Hidden]) -> dict[str, Gear]:
     return gears
 
 
-def actuator_paths(ship: Vessel, s0: np.ndarray, U: np.ndarray, dt: float, num: int, hidden: Sequence[Hidden] = ()) -> np.ndarray:
-    """Actuators (runs, 2 K num + 1, 4) under commands U (runs, K, 4), at the ends and the middle of `num` integration steps per sample."""
+def actuator_paths(
+    ship: Vessel, s0: np.ndarray, U: np.ndarray, dt: float, num: int, hidden: Sequence[Hidden] = ()
+) -> np.ndarray:
+    """Actuators (runs, 2 K num + 1, 4) under commands U (runs, K, 4), at the ends and the middle of `num` integration
+    steps per sample."""
     gears, limit = gears_of(ship, hidden), ship.particulars.thrusters.max_force if ship.particulars.thrusters else 0.0
     command = [U[..., 0], np.clip(U[..., 1], -ship.actuators.delta_max, ship.actuators.delta_max)]
     command += [np.clip(U[..., i], -limit, limit) for i in (2, 3)]
@@ -56,8 +60,11 @@ def actuator_paths(ship: Vessel, s0: np.ndarray, U: np.ndarray, dt: float, num: 
     return np.stack([gear_path(s0[:, 6 + i], command[i], dt, gears[k], 2 * num) for i, k in enumerate(kinds)], axis=-1)
 
 
-def integrate(acceleration: Callable[[Flow, int], tuple[Array, ...]], s0: np.ndarray, actuators: np.ndarray, dt: float, num: int) -> np.ndarray:
-    """States (runs, K + 1, 10) from `s0` (runs, 10) along `actuators` (of `actuator_paths`); `acceleration(flow, k)` gives (du, dv, dr) in step k."""
+def integrate(
+    acceleration: Callable[[Flow, int], tuple[Array, ...]], s0: np.ndarray, actuators: np.ndarray, dt: float, num: int
+) -> np.ndarray:
+    """States (runs, K + 1, 10) from `s0` (runs, 10) along `actuators` (of `actuator_paths`); `acceleration(flow, k)`
+    gives (du, dv, dr) in step k."""
     h, K = dt / num, (actuators.shape[1] - 1) // (2 * num)
     motion = tuple(s0[:, :6].T)
     S = np.empty((len(s0), K + 1, 10))
@@ -77,7 +84,13 @@ def integrate(acceleration: Callable[[Flow, int], tuple[Array, ...]], s0: np.nda
 
 
 def sail(
-    ship: MMGShip, s0: np.ndarray, U: np.ndarray, dt: float, hidden: Sequence[Hidden] = (), wind: np.ndarray | None = None, max_step: float = 0.25
+    ship: MMGShip,
+    s0: np.ndarray,
+    U: np.ndarray,
+    dt: float,
+    hidden: Sequence[Hidden] = (),
+    wind: np.ndarray | None = None,
+    max_step: float = 0.25,
 ) -> np.ndarray:
     """True states (runs, K + 1, 10) from `s0` (runs, 10) under commands U (runs, K, 4), `s0` included.
 
@@ -98,7 +111,9 @@ def sail(
     return integrate(acceleration, s0, actuator_paths(ship, s0, U, dt, num, hidden), dt, num)
 
 
-def record(S: np.ndarray, dt: float, hidden: Sequence[Hidden], noise: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def record(
+    S: np.ndarray, dt: float, hidden: Sequence[Hidden], noise: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
     """What the sensors write down of the true states S (runs, samples, 10): faults of the sensors, then white noise.
 
     `noise` (10,) are standard deviations; those of the thruster forces are relative to the reading.

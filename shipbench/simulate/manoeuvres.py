@@ -15,7 +15,8 @@ from .simulator import Simulator
 
 @dataclass(frozen=True)
 class Turning:
-    """Indices of a turning circle in ship lengths, steady values at its end, time of 90 degrees of heading change [s]."""
+    """Indices of a turning circle in ship lengths, steady values at its end, time of 90 degrees of heading change
+    [s]."""
 
     advance: float
     transfer: float
@@ -46,7 +47,10 @@ def turning_circle(sim: Simulator, speed: float, rpm: float, delta_deg: float, d
     S = np.concatenate([s0[:, None], sim.rollout(s0, command, dt)], axis=1)[0]
     turned = np.abs(S[:, PSI])
     if not turned[-1] > np.pi:
-        raise WorkError(f"turning circle: {np.rad2deg(turned[-1]):.0f} deg of heading change after {duration:g} s; 180 are needed: sail longer.")
+        raise WorkError(
+            f"turning circle: {np.rad2deg(turned[-1]):.0f} deg of heading change after {duration:g} s; 180 are "
+            "needed: sail longer."
+        )
     L, t, end = sim.ship.L, np.arange(steps + 1) * dt, S[-1]
     advance, transfer, tactical_diameter = turning_indices(S, L)
     speed_end = float(np.hypot(end[U], end[V]))
@@ -61,8 +65,11 @@ def turning_circle(sim: Simulator, speed: float, rpm: float, delta_deg: float, d
     )
 
 
-def zigzag_overshoots(sim: Simulator, speed: float, rpm: float, amplitudes_deg: Sequence[float], dt: float, duration: float) -> np.ndarray:
-    """First and second overshoot angles [deg], (Z, 2), of zig-zags that start with the rudder at each of `amplitudes_deg` (negative: to port first).
+def zigzag_overshoots(
+    sim: Simulator, speed: float, rpm: float, amplitudes_deg: Sequence[float], dt: float, duration: float
+) -> np.ndarray:
+    """First and second overshoot angles [deg], (Z, 2), of zig-zags that start with the rudder at each of
+    `amplitudes_deg` (negative: to port first).
 
     Raises:
         WorkError: one of them has not reversed its rudder three times within `duration` [s].
@@ -88,7 +95,10 @@ def zigzag_overshoots(sim: Simulator, speed: float, rpm: float, amplitudes_deg: 
     if least < 3:
         raise WorkError(f"zig-zag: only {least} rudder reversals within {duration:g} s; 3 are needed: sail longer.")
     over = [
-        [np.max(side * psi[first : last + 1, i]) for side, first, last in zip((sign[i], -sign[i]), s, s[1:], strict=False)]
+        [
+            np.max(side * psi[first : last + 1, i])
+            for side, first, last in zip((sign[i], -sign[i]), s, s[1:], strict=False)
+        ]
         for i, s in enumerate(switches)
     ]
     return np.asarray(over) - amplitude[:, None]

@@ -1,8 +1,10 @@
-"""Four ships of the literature in their authors' own equations, which neither the MMG simulator nor the fitted model shares with them.
+"""Four ships of the literature in their authors' own equations, which neither the MMG simulator nor the fitted model
+shares with them.
 
-What is told from trials of these ships is told of hulls, propellers and rudders that the fit does not know: cubic hull forces with products of rudder
-and drift (Mariner), thrust and rudder flow as quadratics of speed and revolutions (tanker), a hull that heels in turns (S175), a small fast one that
-heels, with absolute values in its hull forces and rudders beside the races (navy). Side forces of the propeller and of zero helm and a rudder's stall
+What is told from trials of these ships is told of hulls, propellers and rudders that the fit does not know: cubic hull
+forces with products of rudder and drift (Mariner), thrust and rudder flow as quadratics of speed and revolutions
+(tanker), a hull that heels in turns (S175), a small fast one that heels, with absolute values in its hull forces and
+rudders beside the races (navy). Side forces of the propeller and of zero helm and a rudder's stall
 are left out: they are causes with names.
 """
 
@@ -40,7 +42,8 @@ class Published:
         particulars: what a user of the diagnosis is told.
         actuators: of an ordinary ship of this size; the sources leave them open or limit angles to what autopilots use.
         cruise: speed [m/s] about which the equations hold; trials begin at `ratios` of it.
-        rates: (motion, n [rpm], delta [rad], factor of the thrust, (X, Y, N) [N, N, N m] to add) -> accelerations; motion is u, v, r through the
+        rates: (motion, n [rpm], delta [rad], factor of the thrust, (X, Y, N) [N, N, N m] to add) -> accelerations;
+        motion is u, v, r through the
             water and, beyond the plane, further states, whose rates follow.
         more: number of those: roll rate [rad/s] and heel [rad], or none.
         rpm: of the shaft where the equations have none.
@@ -66,18 +69,22 @@ def _sum(terms: Mapping[str, float], **values: np.ndarray) -> np.ndarray:
 
 
 _MARINER = {
-    "X": {"u": -184, "uu": -110, "uuu": -215, "vv": -899, "rr": 18, "rv": 798, "dd": -95, "udd": -190, "vd": 93, "uvd": 93},
-    "Y": {"v": -1160, "r": -499, "vvv": -8078, "vvr": 15356, "vu": -1160, "ru": -499, "d": 278, "ddd": -90, "ud": 556, "uud": 278, "vdd": -4,
+    "X": {"u": -184, "uu": -110, "uuu": -215, "vv": -899, "rr": 18, "rv": 798, "dd": -95, "udd": -190, "vd": 93,
+        "uvd": 93},
+    "Y": {"v": -1160, "r": -499, "vvv": -8078, "vvr": 15356, "vu": -1160, "ru": -499, "d": 278, "ddd": -90, "ud": 556,
+        "uud": 278, "vdd": -4,
           "vvd": 1190},
-    "N": {"v": -264, "r": -166, "vvv": 1636, "vvr": -5483, "vu": -264, "ru": -166, "d": -139, "ddd": 45, "ud": -278, "uud": -139, "vdd": 13,
+    "N": {"v": -264, "r": -166, "vvv": 1636, "vvr": -5483, "vu": -264, "ru": -166, "d": -139, "ddd": 45, "ud": -278,
+        "uud": -139, "vdd": 13,
           "vvd": -489},
 }  # fmt: skip
 _SERVICE = 7.7175
 
 
 def _mariner(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, push: Push) -> Motion:
-    """Chislett & Strom-Tejsen (1965), HyA report Hy-5, about 15 kn; coefficients 1e-5, on rho/2 L^2 U^2. The shaft is not in the
-    equations; more thrust is more of the force that holds the service speed, half of -X_u as for a resistance that grows with the square."""
+    """Chislett & Strom-Tejsen (1965), HyA report Hy-5, about 15 kn; coefficients 1e-5, on rho/2 L^2 U^2. The shaft is
+    not in the equations; more thrust is more of the force that holds the service speed, half of -X_u as for a
+    resistance that grows with the square."""
     L, m, I_z, x_G = 160.93, 798e-5, 39.2e-5, -0.023
     U = np.hypot(motion[0], motion[1]) + 1e-9
     u, v, r, d = (motion[0] - _SERVICE) / U, motion[1] / U, motion[2] * L / U, -delta
@@ -108,11 +115,14 @@ def _tanker(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, pus
 
 _S175 = {
     "X": {"uu": -0.0004226, "vr": -0.00311, "vv": -0.00386, "rr": 0.0002, "ff": -0.0002},
-    "Y": {"v": -0.0116, "r": 0.00242, "f": -0.000063, "vvv": -0.109, "rrr": 0.00177, "vvr": 0.0214, "vrr": -0.0405, "vvf": 0.04605, "vff": 0.00304,
+    "Y": {"v": -0.0116, "r": 0.00242, "f": -0.000063, "vvv": -0.109, "rrr": 0.00177, "vvr": 0.0214, "vrr": -0.0405,
+        "vvf": 0.04605, "vff": 0.00304,
           "rrf": 0.009325, "rff": -0.001368},
-    "K": {"v": 0.0003026, "r": -0.000063, "p": -0.0000075, "f": -0.000021, "vvv": 0.002843, "rrr": -0.0000462, "vvr": -0.000588, "vrr": 0.0010565,
+    "K": {"v": 0.0003026, "r": -0.000063, "p": -0.0000075, "f": -0.000021, "vvv": 0.002843, "rrr": -0.0000462,
+        "vvr": -0.000588, "vrr": 0.0010565,
           "vvf": -0.0012012, "vff": -0.0000793, "rrf": -0.000243, "rff": 0.00003569},
-    "N": {"v": -0.0038545, "r": -0.00222, "p": 0.000213, "f": -0.0001424, "vvv": 0.001492, "rrr": -0.00229, "vvr": -0.0424, "vrr": 0.00156,
+    "N": {"v": -0.0038545, "r": -0.00222, "p": 0.000213, "f": -0.0001424, "vvv": 0.001492, "rrr": -0.00229,
+        "vvr": -0.0424, "vrr": 0.00156,
           "vvf": -0.019058, "vff": -0.0053766, "rrf": -0.0038592, "rff": 0.0024195},
 }  # fmt: skip
 
@@ -143,16 +153,19 @@ def _s175(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, push:
 
 
 _NAVY: dict[str, dict[str, float]] = {
-    "Y": {"Uv": -11800, "ur": 131000, "Vv": -3700, "vR": -794000, "rV": -182000, "fUV": 10800, "fUR": 251000, "fuu": -74},
-    "K": {"Uv": 9260, "ur": -102000, "Vv": 29300, "vR": 621000, "rV": 142000, "fUV": -8400, "fUR": -196000, "fuu": -1180, "Up": -15500,
+    "Y": {"Uv": -11800, "ur": 131000, "Vv": -3700, "vR": -794000, "rV": -182000, "fUV": 10800, "fUR": 251000,
+        "fuu": -74},
+    "K": {"Uv": 9260, "ur": -102000, "Vv": 29300, "vR": 621000, "rV": 142000, "fUV": -8400, "fUR": -196000,
+        "fuu": -1180, "Up": -15500,
           "Pp": -416000, "p": -500000},
     "N": {"Uv": -92000, "Ur": -4710000, "Rr": -202e6, "rV": -15.6e6, "fUV": -214000, "fuR": -4980000, "fuU": -8000},
 }  # fmt: skip
 
 
 def _navy(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, push: Push) -> Motion:
-    """Blanke & Christensen (1993), 10th Ship Control Systems Symposium, Ottawa: a multipurpose navy ship at 8 m/s, SI, about midship; in capitals the
-    absolute values. Two rudders of 1.5 m^2 whose lift grows by 0.054 a degree; stall at 23 degrees is left out. The propellers are not in the
+    """Blanke & Christensen (1993), 10th Ship Control Systems Symposium, Ottawa: a multipurpose navy ship at 8 m/s, SI,
+    about midship; in capitals the absolute values. Two rudders of 1.5 m^2 whose lift grows by 0.054 a degree; stall at
+    23 degrees is left out. The propellers are not in the
     source: two of 1.6 m with K_T = 0.45 - 0.40 J, bilinear in revolutions and speed, as are linear propeller models."""
     rho, volume, x_G, z_G, x_R, z_R, D = 1014.0, 357.0, -3.38, -1.06, -23.79, 1.5, 1.6
     m, (u, v, r, p, f), rps = rho * volume, motion, np.maximum(n, 0.0) / 60.0
@@ -161,11 +174,24 @@ def _navy(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, push:
     angle = delta + np.arctan2(v + x_R * r, np.maximum(u, 0.1))
     lift = 0.5 * rho * 3.0 * (u * u + v * v) * 0.054 * np.rad2deg(angle)
     T = thrust * 2.0 * rho * D**4 * (0.45 * rps * rps - 0.40 * rps * 0.95 * u / D)
-    X = 0.95 * T - 1960.0 * u * np.abs(u) + 1.33 * m * v * r + m * (x_G * r * r - z_G * p * r) - np.abs(lift * np.sin(delta)) + push[0]
+    X = (
+        0.95 * T
+        - 1960.0 * u * np.abs(u)
+        + 1.33 * m * v * r
+        + m * (x_G * r * r - z_G * p * r)
+        - np.abs(lift * np.sin(delta))
+        + push[0]
+    )
     Y = Y - m * u * r - lift * np.cos(delta) + push[1]
     K = K + m * z_G * u * r + z_R * lift * np.cos(delta) - m * 9.81 * (1.1 * f + 0.325 * f**3)
     N = N - m * x_G * u * r - x_R * lift * np.cos(delta) + push[2]
-    inertia = np.array([[m + 393e3, 296e3 - m * z_G, m * x_G + 1.4e6], [-296e3 - m * z_G, 3.1503e6, 0.0], [m * x_G - 538e3, 0.0, 86.634e6]])
+    inertia = np.array(
+        [
+            [m + 393e3, 296e3 - m * z_G, m * x_G + 1.4e6],
+            [-296e3 - m * z_G, 3.1503e6, 0.0],
+            [m * x_G - 538e3, 0.0, 86.634e6],
+        ]
+    )
     dv, dp, dr = np.linalg.solve(inertia, np.array([Y, K, N]))
     return X / (m + 17.4e3), dv, dr, dp, p
 
@@ -173,20 +199,28 @@ def _navy(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, push:
 def _ordinary(L: float) -> MMGActuators:
     k = (L / 130.0) ** 0.5
     return MMGActuators(
-        T_n=6.0 * k, rate_n=0.05, T_delta=1.5 * k, rate_delta=np.deg2rad(3.0) / k, T_F=3.0 * k, rate_F=1.0, delta_max=np.deg2rad(35.0)
+        T_n=6.0 * k,
+        rate_n=0.05,
+        T_delta=1.5 * k,
+        rate_delta=np.deg2rad(3.0) / k,
+        T_F=3.0 * k,
+        rate_F=1.0,
+        delta_max=np.deg2rad(35.0),
     )
 
 
 PUBLISHED = {
     "mariner": Published(
         "mariner",
-        Ship(name="Mariner", L=160.93, B=23.17, T=8.23, displacement=16_630.0, propeller=Propeller(diameter=6.7), rudder=Rudder(area=30.0),
+        Ship(name="Mariner", L=160.93, B=23.17, T=8.23, displacement=16_630.0, propeller=Propeller(diameter=6.7),
+            rudder=Rudder(area=30.0),
              wind=Wind(frontal_area=450.0, lateral_area=1800.0)),
         _ordinary(160.93), _SERVICE, (0.8, 1.1), _mariner, rpm=73.0,
     ),
     "tanker": Published(
         "tanker",
-        Ship(name="Tanker", L=304.8, B=47.17, T=18.46, displacement=220_000.0, propeller=Propeller(diameter=9.1), rudder=Rudder(area=117.0),
+        Ship(name="Tanker", L=304.8, B=47.17, T=18.46, displacement=220_000.0, propeller=Propeller(diameter=9.1),
+            rudder=Rudder(area=117.0),
              wind=Wind(frontal_area=1100.0, lateral_area=3200.0)),
         _ordinary(304.8), 5.5, (0.45, 1.25), _tanker,
     ),
@@ -199,13 +233,15 @@ PUBLISHED = {
     ),
     "navy": Published(
         "navy",
-        Ship(name="Navy ship", L=51.5, B=8.6, T=2.3, displacement=357.0, rho=1014.0, xG=-3.38, propeller=Propeller(diameter=1.9),
+        Ship(name="Navy ship", L=51.5, B=8.6, T=2.3, displacement=357.0, rho=1014.0, xG=-3.38,
+            propeller=Propeller(diameter=1.9),
              rudder=Rudder(area=3.0, height=1.5, x=-23.79), wind=Wind(frontal_area=50.0, lateral_area=220.0)),
         replace(_ordinary(51.5), rate_n=0.5), 8.0, (0.6, 1.1), _navy, more=2,
     ),
 }  # fmt: skip
-"""By name; displacement as in the equations. Diameter and rudder area of mariner and tanker, and areas above water, are round figures for ships of
-their kind; the diameter of the navy ship is that of one propeller with the thrust of both."""
+"""By name; displacement as in the equations. Diameter and rudder area of mariner and tanker, and areas above water, are
+round figures for ships of their kind; the diameter of the navy ship is that of one propeller with the thrust of
+both."""
 
 
 def rpm_at(ship: Published, speed: float) -> float:
@@ -215,18 +251,31 @@ def rpm_at(ship: Published, speed: float) -> float:
     none = np.zeros(1)
 
     def surge(rpm: float) -> float:
-        return float(ship.rates((np.array([speed]), *(none for _ in range(2 + ship.more))), np.array([rpm]), none, 1.0, (none, none, none))[0][0])
+        return float(
+            ship.rates(
+                (np.array([speed]), *(none for _ in range(2 + ship.more))),
+                np.array([rpm]),
+                none,
+                1.0,
+                (none, none, none),
+            )[0][0]
+        )
 
     return float(brentq(surge, 1.0, 1000.0))
 
 
 def wind_force(ship: Published, u_rw: np.ndarray, v_rw: np.ndarray) -> Push:
-    """Wind force and moment [N, N, N m] from the velocity through the air [m/s]: C_X = -0.6 cos, C_Y = 0.85 sin, C_N = 0.07 sin 2 gamma, within what
-    Blendermann (1994) measured on ships of many kinds, and neither simulator's nor fit's."""
+    """Wind force and moment [N, N, N m] from the velocity through the air [m/s]: C_X = -0.6 cos, C_Y = 0.85 sin, C_N =
+    0.07 sin 2 gamma, within what Blendermann (1994) measured on ships of many kinds, and neither simulator's nor
+    fit's."""
     areas, q = ship.particulars.wind, 0.5 * RHO_AIR * np.hypot(u_rw, v_rw)
     assert areas is not None
     side = q * areas.lateral_area
-    return -0.6 * q * areas.frontal_area * u_rw, -0.85 * side * v_rw, -0.14 * side * ship.L * u_rw * v_rw / (np.hypot(u_rw, v_rw) + 1e-9)
+    return (
+        -0.6 * q * areas.frontal_area * u_rw,
+        -0.85 * side * v_rw,
+        -0.14 * side * ship.L * u_rw * v_rw / (np.hypot(u_rw, v_rw) + 1e-9),
+    )
 
 
 def _modified(hidden: Sequence[Hidden], flow: Flow, ship: Published) -> Modifiers:
@@ -240,16 +289,24 @@ def _modified(hidden: Sequence[Hidden], flow: Flow, ship: Published) -> Modifier
         item.effect.force(e, flow, item.q, particulars)
         for f in fields(e):
             value, before = getattr(e, f.name), getattr(neutral, f.name)
-            if f.name not in _UNDERSTOOD and value is not before and not (isinstance(before, float) and is_neutral(value, before)):
+            if (
+                f.name not in _UNDERSTOOD
+                and value is not before
+                and not (isinstance(before, float) and is_neutral(value, before))
+            ):
                 raise InputError(
-                    f"effect '{item.effect.name}' changes '{f.name}', which published ships do not have; accepted: effects that act through "
+                    f"effect '{item.effect.name}' changes '{f.name}', which published ships do not have; accepted: "
+                    "effects that act through "
                     f"{', '.join(_UNDERSTOOD)}, gears or sensors."
                 )
     return e
 
 
-def published_trials(ship: Published, seed: int, hidden: Sequence[Hidden] = (), plan: Trials | None = None, name: str = "trials") -> Dataset:
-    """Trials of a published ship with `hidden` causes: orders, sensors and gusts as in `sea_trials`, ahead and without thrusters.
+def published_trials(
+    ship: Published, seed: int, hidden: Sequence[Hidden] = (), plan: Trials | None = None, name: str = "trials"
+) -> Dataset:
+    """Trials of a published ship with `hidden` causes: orders, sensors and gusts as in `sea_trials`, ahead and without
+    thrusters.
 
     Raises:
         InputError: see `_modified`.
@@ -270,17 +327,29 @@ def published_trials(ship: Published, seed: int, hidden: Sequence[Hidden] = (), 
     for j in range(steps * _SUBSTEPS):
 
         def rhs(x: Motion, stage: int, j: int = j) -> Motion:
-            return _rates(ship, forces, x, path[:, 2 * j + stage], wind[:, j // _SUBSTEPS], (j + 0.5 * stage) * sailing.dt / _SUBSTEPS)
+            return _rates(
+                ship,
+                forces,
+                x,
+                path[:, 2 * j + stage],
+                wind[:, j // _SUBSTEPS],
+                (j + 0.5 * stage) * sailing.dt / _SUBSTEPS,
+            )
 
         x = rk4_step(rhs, x, sailing.dt / _SUBSTEPS)
         if (j + 1) % _SUBSTEPS == 0:
             level = np.cos(x[7]) if ship.more else 1.0
             S[:, (j + 1) // _SUBSTEPS, :6] = np.stack([*x[:4], x[4] * level, x[5] * level], axis=-1)
-    return write_down(ship, sailing, S, hidden, plan, rng, name, f"shipbench trials of the published ship {ship.name}, seed {seed}")
+    return write_down(
+        ship, sailing, S, hidden, plan, rng, name, f"shipbench trials of the published ship {ship.name}, seed {seed}"
+    )
 
 
-def _rates(ship: Published, hidden: Sequence[Hidden], x: Motion, actuators: np.ndarray, wind: np.ndarray, t: float) -> Motion:
-    """Rates of x, y, psi, u, v, r over ground and of the further states. u, v, r are those of the ship's own plane, which heels."""
+def _rates(
+    ship: Published, hidden: Sequence[Hidden], x: Motion, actuators: np.ndarray, wind: np.ndarray, t: float
+) -> Motion:
+    """Rates of x, y, psi, u, v, r over ground and of the further states. u, v, r are those of the ship's own plane,
+    which heels."""
     px, py, psi, u, v, r, *more = x
     flow = Flow(px, py, t, psi, u, v, r, *actuators.T)
     e = _modified(hidden, flow, ship)

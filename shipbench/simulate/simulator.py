@@ -25,7 +25,8 @@ _COMMANDS = len(COMMANDS)
 class Simulator:
     """The ship and the greatest internal step [s].
 
-    The default, 0.25 s, keeps the RK4 error of the 130 m ship's 120 s rollouts below 1 mm; shorter ships need steps shorter by sqrt(L).
+    The default, 0.25 s, keeps the RK4 error of the 130 m ship's 120 s rollouts below 1 mm; shorter ships need steps
+    shorter by sqrt(L).
     """
 
     ship: MMGShip
@@ -66,9 +67,11 @@ class Simulator:
         return S
 
     def fast_rollout(self, s0: np.ndarray, U: np.ndarray, dt: float, env: Environment = CALM) -> np.ndarray:
-        """`rollout` for planning and Monte Carlo: the same formula as machine code (`shipbench.compiled`), the same numbers to rounding.
+        """`rollout` for planning and Monte Carlo: the same formula as machine code (`shipbench.compiled`), the same
+        numbers to rounding.
 
-        Data sets are made with `rollout`, whose bits do not depend on a compiler. The first call for a ship compiles, about 1 s, and keeps the code.
+        Data sets are made with `rollout`, whose bits do not depend on a compiler. The first call for a ship compiles,
+        about 1 s, and keeps the code.
 
         Raises:
             InputError: the water is shallow, which this path does not know.
@@ -105,7 +108,8 @@ _made: dict[str, Rollout] = {}
 
 
 def _machine_code(ship: MMGShip) -> Rollout:
-    """One integration step: x the ten states; w commands, current speed and direction, wind speed and direction; p the step [s]."""
+    """One integration step: x the ten states; w commands, current speed and direction, wind speed and direction; p the
+    step [s]."""
     import casadi as ca
 
     from ..compiled import Rollout

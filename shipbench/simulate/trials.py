@@ -1,4 +1,5 @@
-"""Sea trials to diagnose: runs of mixed manoeuvres (steps, zig-zags, turns, engine orders, thruster pushes), on any MMG ship."""
+"""Sea trials to diagnose: runs of mixed manoeuvres (steps, zig-zags, turns, engine orders, thruster pushes), on any MMG
+ship."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from .manoeuvres import self_propulsion_rpm
 from .simulator import Simulator
 
 NOISE = np.array([0.5, 0.5, np.deg2rad(0.3), 0.05, 0.05, np.deg2rad(0.05), 0.5, np.deg2rad(0.2), 0.01, 0.01])
-"""Standard deviations on a 130 m ship: 0.5 m, 0.3 deg, 0.05 m/s, 0.05 deg/s, 0.5 rpm, 0.2 deg, 1 % of the thruster force."""
+"""Standard deviations on a 130 m ship: 0.5 m, 0.3 deg, 0.05 m/s, 0.05 deg/s, 0.5 rpm, 0.2 deg, 1 % of the thruster
+force."""
 
 WAVES, WAVE_PERIOD = (0.15, 0.2, np.deg2rad(0.35)), 8.0
 """Motion in waves of a 130 m ship: standard deviations in surge and sway [m] and yaw [rad], peak period [s]."""
@@ -27,7 +29,8 @@ CRUISE = 4.5
 
 
 STANDARD = (
-    ("turn", 35.0), ("turn", -35.0), ("zig-zag", 10.0), ("zig-zag", -10.0), ("zig-zag", 20.0), ("zig-zag", -20.0), ("stop", 0.0), ("pull-out", 25.0),
+    ("turn", 35.0), ("turn", -35.0), ("zig-zag", 10.0), ("zig-zag", -10.0), ("zig-zag", 20.0), ("zig-zag", -20.0),
+    ("stop", 0.0), ("pull-out", 25.0),
     ("turn", 15.0), ("turn", -15.0),
 )  # fmt: skip
 """What a yard's trials consist of (IMO MSC.137(76)), with the rudder in degrees."""
@@ -36,9 +39,10 @@ _QUICK_LEG, _SLOW_LEG = 45.0, 65.0
 
 @dataclass(frozen=True)
 class Trials:
-    """What is sailed: number of runs, samples after the first, gusts (standard deviation per axis [m/s] on a 130 m ship; 0: calm), noise factor,
-    whether runs go astern and use thrusters, motion in waves, as a factor of `WAVES`, the mean wind under the gusts (from north and from east
-    [m/s] on a 130 m ship), and whether the runs are `STANDARD` manoeuvres from cruising speed on opposite courses."""
+    """What is sailed: number of runs, samples after the first, gusts (standard deviation per axis [m/s] on a 130 m
+    ship; 0: calm), noise factor, whether runs go astern and use thrusters, motion in waves, as a factor of `WAVES`, the
+    mean wind under the gusts (from north and from east [m/s] on a 130 m ship), and whether the runs are `STANDARD`
+    manoeuvres from cruising speed on opposite courses."""
 
     runs: int = 24
     samples: int = 120
@@ -52,19 +56,24 @@ class Trials:
 
 
 def standard_commands(rpm: np.ndarray, steps: int, dt: float, scale: float) -> np.ndarray:
-    """Commands (runs, steps, 4) of `STANDARD` in turn, from 20 s on: a turn lasts, a zig-zag reverses six times by the clock, a pull-out ends after
-    200 s, a stop is ordered with 0.6 of the revolutions astern. Times at 130 m."""
+    """Commands (runs, steps, 4) of `STANDARD` in turn, from 20 s on: a turn lasts, a zig-zag reverses six times by the
+    clock, a pull-out ends after 200 s, a stop is ordered with 0.6 of the revolutions astern. Times at 130 m."""
     U, t = np.zeros((len(rpm), steps, 4)), np.arange(steps) * dt / scale - 20.0
     for i, (kind, degrees) in enumerate(STANDARD[k % len(STANDARD)] for k in range(len(rpm))):
         leg = np.floor(t / (_SLOW_LEG if abs(degrees) > 15.0 else _QUICK_LEG) + 0.5)  # the first one half as long
-        side = {"zig-zag": np.where(leg < 7, (-1.0) ** leg, 0.0), "pull-out": np.where(t < 200.0, 1.0, 0.0)}.get(kind, 1.0)
+        side = {"zig-zag": np.where(leg < 7, (-1.0) ** leg, 0.0), "pull-out": np.where(t < 200.0, 1.0, 0.0)}.get(
+            kind, 1.0
+        )
         U[i, :, 0] = np.where((t >= 0.0) & (kind == "stop"), -0.6, 1.0) * rpm[i]
         U[i, :, 1] = np.where(t >= 0.0, np.deg2rad(degrees) * side, 0.0)
     return U
 
 
-def draw_commands(rng: np.random.Generator, ship: Vessel, speed: np.ndarray, rpm: np.ndarray, steps: int, dt: float, plan: Trials) -> np.ndarray:
-    """Commands (runs, steps, 4): a third of the runs zig-zags by the clock, a third turns, a third random steps; engine orders in half of them."""
+def draw_commands(
+    rng: np.random.Generator, ship: Vessel, speed: np.ndarray, rpm: np.ndarray, steps: int, dt: float, plan: Trials
+) -> np.ndarray:
+    """Commands (runs, steps, 4): a third of the runs zig-zags by the clock, a third turns, a third random steps; engine
+    orders in half of them."""
     num, scale = len(speed), (ship.L / 130.0) ** 0.5
     U, t = np.zeros((num, steps, 4)), np.arange(steps) * dt / scale
     force = ship.particulars.thrusters.max_force if ship.particulars.thrusters else 0.0
@@ -93,7 +102,15 @@ def draw_commands(rng: np.random.Generator, ship: Vessel, speed: np.ndarray, rpm
     return U
 
 
-def gusts(rng: np.random.Generator, num: int, steps: int, dt: float, sigma: float, tau: float, mean: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+def gusts(
+    rng: np.random.Generator,
+    num: int,
+    steps: int,
+    dt: float,
+    sigma: float,
+    tau: float,
+    mean: tuple[float, float] = (0.0, 0.0),
+) -> np.ndarray:
     """Ornstein-Uhlenbeck wind vectors about a mean (from north, from east) as (speed, from), (num, steps, 2)."""
     keep = np.exp(-dt / tau)
     wind = np.empty((num, steps, 2))
@@ -105,14 +122,19 @@ def gusts(rng: np.random.Generator, num: int, steps: int, dt: float, sigma: floa
 
 
 def in_waves(rng: np.random.Generator, states: np.ndarray, dt: float, scale: float, size: float) -> np.ndarray:
-    """States (runs, samples, 10) with first-order motion in waves on top: surge, sway and yaw by themselves, each a sum of 25 sines with random
-    phases and the spectrum of Pierson & Moskowitz (J. Geophys. Res. 69 (1964) 5181); velocities are their rates."""
+    """States (runs, samples, 10) with first-order motion in waves on top: surge, sway and yaw by themselves, each a sum
+    of 25 sines with random phases and the spectrum of Pierson & Moskowitz (J. Geophys. Res. 69 (1964) 5181); velocities
+    are their rates."""
     ratio = np.linspace(0.75, 1.5, 25)
     omega, share = 2.0 * np.pi / (WAVE_PERIOD * scale) * ratio, ratio**-5 * np.exp(-1.25 * ratio**-4)
-    phase = dt * np.arange(states.shape[1])[:, None] * omega + rng.uniform(0.0, 2.0 * np.pi, (3, len(states), 1, len(omega)))
+    phase = dt * np.arange(states.shape[1])[:, None] * omega + rng.uniform(
+        0.0, 2.0 * np.pi, (3, len(states), 1, len(omega))
+    )
     amplitude = size * np.array(WAVES) * [scale**2, scale**2, 1.0]
     waves = np.sqrt(2.0 * share / share.sum())
-    (surge, sway, yaw), rates = (amplitude[:, None, None] * v for v in (np.sin(phase) @ waves, np.cos(phase) @ (omega * waves)))
+    (surge, sway, yaw), rates = (
+        amplitude[:, None, None] * v for v in (np.sin(phase) @ waves, np.cos(phase) @ (omega * waves))
+    )
     c, s = np.cos(states[..., 2]), np.sin(states[..., 2])
     moved = states.copy()
     moved[..., :6] += np.stack([c * surge - s * sway, s * surge + c * sway, yaw, *rates], axis=-1)
@@ -121,7 +143,8 @@ def in_waves(rng: np.random.Generator, states: np.ndarray, dt: float, scale: flo
 
 @dataclass(frozen=True)
 class Sailing:
-    """One set of trials as ordered, warm-up included: scale is sqrt(L/130), s0 (runs, 10), U (runs, steps, 4), max_step [s]."""
+    """One set of trials as ordered, warm-up included: scale is sqrt(L/130), s0 (runs, 10), U (runs, steps, 4), max_step
+    [s]."""
 
     scale: float
     dt: float
@@ -134,9 +157,15 @@ class Sailing:
 
 
 def draw_sailing(
-    rng: np.random.Generator, ship: Vessel, plan: Trials, rpm: float, cruise: float | None = None, ratios: tuple[float, float] = (0.45, 1.25)
+    rng: np.random.Generator,
+    ship: Vessel,
+    plan: Trials,
+    rpm: float,
+    cruise: float | None = None,
+    ratios: tuple[float, float] = (0.45, 1.25),
 ) -> Sailing:
-    """Places, speeds and commands of `plan`; `rpm` holds the cruising speed (default 4.5 m/s at 130 m), runs begin at `ratios` of it.
+    """Places, speeds and commands of `plan`; `rpm` holds the cruising speed (default 4.5 m/s at 130 m), runs begin at
+    `ratios` of it.
 
     One sample per second at 130 m, less for much smaller ships.
     """
@@ -150,7 +179,9 @@ def draw_sailing(
     U = np.zeros((plan.runs, plan.samples + _WARM_UP, 4))
     U[..., 0] = (rpm * ratio)[:, None]
     if plan.standard:
-        s0[:, 2] = rng.uniform(-np.pi, np.pi) + np.pi * (np.arange(plan.runs) // 2 % 2)  # to port and to starboard on the same course
+        s0[:, 2] = rng.uniform(-np.pi, np.pi) + np.pi * (
+            np.arange(plan.runs) // 2 % 2
+        )  # to port and to starboard on the same course
         U[:, _WARM_UP:] = standard_commands(rpm * ratio, plan.samples, dt, scale)
     else:
         U[:, _WARM_UP:] = draw_commands(rng, ship, s0[:, 3], rpm * ratio, plan.samples, dt, plan)
@@ -160,9 +191,17 @@ def draw_sailing(
 
 
 def write_down(
-    ship: Vessel, sailing: Sailing, S: np.ndarray, hidden: Sequence[Hidden], plan: Trials, rng: np.random.Generator, name: str, source: str
+    ship: Vessel,
+    sailing: Sailing,
+    S: np.ndarray,
+    hidden: Sequence[Hidden],
+    plan: Trials,
+    rng: np.random.Generator,
+    name: str,
+    source: str,
 ) -> Dataset:
-    """The data set of the true states S (runs, steps + 1, 10): the warm-up cut off, motion in waves, the sensors' faults and noise added."""
+    """The data set of the true states S (runs, steps + 1, 10): the warm-up cut off, motion in waves, the sensors'
+    faults and noise added."""
     noise = plan.noise * NOISE * (ship.L / 130.0) ** _FROUDE
     S = S[:, _WARM_UP:]
     if plan.waves:
@@ -175,23 +214,36 @@ def write_down(
 
 
 def sea_trials(
-    ship: MMGShip, seed: int, hidden: Sequence[Hidden] = (), plan: Trials | None = None, name: str = "trials", wind_recorded: bool = False
+    ship: MMGShip,
+    seed: int,
+    hidden: Sequence[Hidden] = (),
+    plan: Trials | None = None,
+    name: str = "trials",
+    wind_recorded: bool = False,
 ) -> Dataset:
-    """Sail and record a set of runs with `hidden` causes; one sample per second at 130 m, scaled with sqrt(L) for much smaller ships.
+    """Sail and record a set of runs with `hidden` causes; one sample per second at 130 m, scaled with sqrt(L) for much
+    smaller ships.
 
-    The runs begin after a warm-up under the same causes, so that currents and winds have had their time. wind_recorded: the gusts become the input
-    channels wind_speed and wind_from.
+    The runs begin after a warm-up under the same causes, so that currents and winds have had their time. wind_recorded:
+    the gusts become the input channels wind_speed and wind_from.
     """
     plan = plan or Trials()
     rng = np.random.default_rng(seed)
     sailing = draw_sailing(rng, ship, plan, self_propulsion_rpm(Simulator(ship), CRUISE * (ship.L / 130.0) ** 0.5))
     scale, dt = sailing.scale, sailing.dt
     mean = (plan.wind[0] * scale, plan.wind[1] * scale)
-    wind = gusts(rng, plan.runs, sailing.U.shape[1], dt, plan.gusts * scale, 20.0 * scale, mean) if plan.gusts or any(mean) else None
+    wind = (
+        gusts(rng, plan.runs, sailing.U.shape[1], dt, plan.gusts * scale, 20.0 * scale, mean)
+        if plan.gusts or any(mean)
+        else None
+    )
     S = sail(ship, sailing.s0, sailing.U, dt, hidden, wind, max_step=sailing.max_step)
     data = write_down(ship, sailing, S, hidden, plan, rng, name, f"shipbench sea trials of {ship.name}, seed {seed}")
     if not wind_recorded or wind is None:
         return data
     felt = np.concatenate([wind[:, _WARM_UP:], wind[:, -1:]], axis=1)
     names = (*COMMANDS, "wind_speed", "wind_from")
-    return data.with_runs(replace(run, inputs=np.column_stack([run.inputs, w]), inputs_names=names) for run, w in zip(data.runs, felt, strict=True))
+    return data.with_runs(
+        replace(run, inputs=np.column_stack([run.inputs, w]), inputs_names=names)
+        for run, w in zip(data.runs, felt, strict=True)
+    )

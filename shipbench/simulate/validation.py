@@ -1,4 +1,5 @@
-"""The simulator beside published figures, one row a figure. Tolerances are those of the project; rows without one are printed for comparison."""
+"""The simulator beside published figures, one row a figure. Tolerances are those of the project; rows without one are
+printed for comparison."""
 
 from __future__ import annotations
 
@@ -25,7 +26,14 @@ _KT_POLYNOMIAL = {0.0: 0.354, 0.2: 0.291, 0.4: 0.212, 0.6: 0.123, 0.8: 0.028}
 
 
 def _row(
-    ship: str, quantity: str, computed: float, published: float, unit: str, tolerance: float | None, relative: bool, source: str
+    ship: str,
+    quantity: str,
+    computed: float,
+    published: float,
+    unit: str,
+    tolerance: float | None,
+    relative: bool,
+    source: str,
 ) -> dict[str, Any]:
     error = abs(computed - published) / (abs(published) if relative else 1.0)
     return {
@@ -36,7 +44,8 @@ def _row(
 
 
 def integrator_order(ship: str = "container130") -> float:
-    """Measured order of the simulator's integration: slope of log error on log step in a turn with the actuators at rest.
+    """Measured order of the simulator's integration: slope of log error on log step in a turn with the actuators at
+    rest.
 
     Steps 4, 2 and 1 s against 0.0625 s over 64 s; the ship is already turning, so no limit is met inside a step.
     """
@@ -57,7 +66,8 @@ def integrator_order(ship: str = "container130") -> float:
 
 
 def table() -> list[dict[str, Any]]:
-    """Rows with ship, quantity, computed, published, unit, tolerance, passed (None where only printed beside), source."""
+    """Rows with ship, quantity, computed, published, unit, tolerance, passed (None where only printed beside),
+    source."""
     rows = []
     model, kcs = Simulator(load_mmg_ship("kvlcc2_l7"), 0.1), Simulator(load_mmg_ship("kcs"), 0.5)
     paper = "Yasukawa & Yoshimura (2015), Table 4"
@@ -69,26 +79,81 @@ def table() -> list[dict[str, Any]]:
     turn = turning_circle(model, KVLCC2_SPEED, KVLCC2_RPM, -35.0, 0.1, 120.0)
     rows += [
         _row("kvlcc2_l7", "advance, -35 deg", turn.advance, 3.36, "L", None, True, "reference's own run"),
-        _row("kvlcc2_l7", "tactical diameter, -35 deg", turn.tactical_diameter, 3.34, "L", None, True, "reference's own run"),
+        _row(
+            "kvlcc2_l7",
+            "tactical diameter, -35 deg",
+            turn.tactical_diameter,
+            3.34,
+            "L",
+            None,
+            True,
+            "reference's own run",
+        ),
     ]
     rows.append(
-        _row("kcs", "self-propulsion at 24 kn", self_propulsion_rpm(kcs, KCS_SPEED), KCS_RPM, "rpm", 0.005, True, "SIMMAN study of KVLCC and KCS")
+        _row(
+            "kcs",
+            "self-propulsion at 24 kn",
+            self_propulsion_rpm(kcs, KCS_SPEED),
+            KCS_RPM,
+            "rpm",
+            0.005,
+            True,
+            "SIMMAN study of KVLCC and KCS",
+        )
     )
     for sign, advance, diameter in ((1, 3.36, 3.59), (-1, 3.24, 3.36)):
         turn = turning_circle(kcs, KCS_SPEED, KCS_RPM, 35.0 * sign, 0.5, 600.0)
         rows += [
             _row("kcs", f"advance, {35 * sign:+d} deg", turn.advance, advance, "L", None, True, "reference's own run"),
-            _row("kcs", f"tactical diameter, {35 * sign:+d} deg", turn.tactical_diameter, diameter, "L", None, True, "reference's own run"),
+            _row(
+                "kcs",
+                f"tactical diameter, {35 * sign:+d} deg",
+                turn.tactical_diameter,
+                diameter,
+                "L",
+                None,
+                True,
+                "reference's own run",
+            ),
         ]
     for name, sim, speed, rpm, dt, duration in (
         ("kvlcc2_l7", model, KVLCC2_SPEED, KVLCC2_RPM, 0.1, 200.0), ("kcs", kcs, KCS_SPEED, KCS_RPM, 0.5, 900.0)
     ):  # fmt: skip
         angles = _ZIGZAG[name]
-        for (angle, published), computed in zip(angles.items(), zigzag_overshoots(sim, speed, rpm, [*angles], dt, duration), strict=True):
+        for (angle, published), computed in zip(
+            angles.items(), zigzag_overshoots(sim, speed, rpm, [*angles], dt, duration), strict=True
+        ):
             for label, ours, theirs in zip(("1st", "2nd"), computed.tolist(), published, strict=True):
-                rows.append(_row(name, f"zig-zag {angle:+d}/{angle:+d}, {label} overshoot", ours, theirs, "deg", None, True, "reference's own run"))
+                rows.append(
+                    _row(
+                        name,
+                        f"zig-zag {angle:+d}/{angle:+d}, {label} overshoot",
+                        ours,
+                        theirs,
+                        "deg",
+                        None,
+                        True,
+                        "reference's own run",
+                    )
+                )
     for J, value in _KT_POLYNOMIAL.items():
         computed = float(thrust_coefficient_four_quadrant(np.float64(J)))
-        rows.append(_row("B4-70, P/D 0.8", f"K_T at J = {J:g}, 4 quadrants", computed, value, "1", 0.01, False, "Wageningen polynomial"))
-    rows.append(_row("container130", "order of the integrator", integrator_order(), 4.0, "1", 0.2, False, "classical Runge-Kutta"))
+        rows.append(
+            _row(
+                "B4-70, P/D 0.8",
+                f"K_T at J = {J:g}, 4 quadrants",
+                computed,
+                value,
+                "1",
+                0.01,
+                False,
+                "Wageningen polynomial",
+            )
+        )
+    rows.append(
+        _row(
+            "container130", "order of the integrator", integrator_order(), 4.0, "1", 0.2, False, "classical Runge-Kutta"
+        )
+    )
     return rows

@@ -31,7 +31,9 @@ class Broken:
         raise RuntimeError("no")
 
 
-@pytest.mark.parametrize(("model", "count"), [(Said(), 12), (Method(), 13), (Torch(), 8), (Broken(), None), (object(), None)])
+@pytest.mark.parametrize(
+    ("model", "count"), [(Said(), 12), (Method(), 13), (Torch(), 8), (Broken(), None), (object(), None)]
+)
 def test_foreign_models(model, count):
     assert count_parameters(model) == count
 
@@ -62,8 +64,12 @@ def test_adapters_count_coefficients_and_not_what_they_keep_for_loading(harbour)
     pytest.importorskip("pysindy")
     sparse = make_predictor(parse_spec("pysindy")).fit(train, seed=0)
     equations = sparse.describe().split("divided by")[0]
-    assert count_parameters(sparse) == 6 + len(re.findall(r" [+-][\d.]+", equations))  # the actuators, and what the equations show
+    assert count_parameters(sparse) == 6 + len(
+        re.findall(r" [+-][\d.]+", equations)
+    )  # the actuators, and what the equations show
 
 
 def test_the_table_has_the_mean_over_cells_of_those_that_tell():
-    assert parameters_by_model([{"model": "a", "parameters": 4}, {"model": "a", "parameters": 6}, {"model": "b"}]) == {"a": 5.0}
+    assert parameters_by_model([{"model": "a", "parameters": 4}, {"model": "a", "parameters": 6}, {"model": "b"}]) == {
+        "a": 5.0
+    }

@@ -1,4 +1,5 @@
-"""A real Dask cluster on loopback: the same table as the local one, also where a worker is killed; clear messages where it is not there."""
+"""A real Dask cluster on loopback: the same table as the local one, also where a worker is killed; clear messages where
+it is not there."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ import numpy as np
 class Drawn:
     def fit(self, train, valid=None, *, seed=0):
         time.sleep(0.3)
-        self.bias = np.random.default_rng(seed).normal() + np.random.normal() + sum(r.states.sum() for r in train.runs) * 1e-9
+        drawn = np.random.default_rng(seed).normal() + np.random.normal()
+        self.bias = drawn + sum(r.states.sum() for r in train.runs) * 1e-9
         return self
     def predict(self, s0, U, history=None):
         return np.repeat(s0[:, None], U.shape[1], axis=1) + self.bias
@@ -63,14 +65,19 @@ def environment(**more: str) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory):
-    """A scheduler and two workers of one thread; the workers stand in another folder, with another number of threads and no data."""
+    """A scheduler and two workers of one thread; the workers stand in another folder, with another number of threads
+    and no data."""
     address, elsewhere, processes = f"tcp://127.0.0.1:{free_port()}", tmp_path_factory.mktemp("elsewhere"), []
 
     def start(*arguments: str) -> None:
         command = [sys.executable, "-m", f"distributed.cli.{arguments[0]}", *arguments[1:], "--no-dashboard"]
         env = environment(OMP_NUM_THREADS="2", SHIPBENCH_CACHE=str(elsewhere / "no cache"))
         log = (elsewhere / f"{len(processes)}.log").open("w")
-        processes.append(subprocess.Popen(command, cwd=elsewhere, env=env, stdout=log, stderr=subprocess.STDOUT, start_new_session=True))
+        processes.append(
+            subprocess.Popen(
+                command, cwd=elsewhere, env=env, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
+            )
+        )
         log.close()
 
     start("dask_scheduler", "--host", "127.0.0.1", "--port", address.rpartition(":")[2])
@@ -106,7 +113,18 @@ def command(tmp_path, toy_folder):
 @pytest.mark.long
 def test_a_worker_killed_mid_run_changes_nothing_in_the_table(cluster, command, tmp_path):
     address, processes = cluster
-    models = ["-m", "models.py:Drawn", "-m", "models.py:Together", "-m", "hold", "-m", "models.py:Raises", "--seeds", "0,1,2"]
+    models = [
+        "-m",
+        "models.py:Drawn",
+        "-m",
+        "models.py:Together",
+        "-m",
+        "hold",
+        "-m",
+        "models.py:Raises",
+        "--seeds",
+        "0,1,2",
+    ]
     dask = ["--executor", "dask", "--scheduler", address]
     study, end = command(*models, *dask, "-o", "there"), time.monotonic() + 60
     while len(list(tmp_path.glob("there/cells/toyset/models*/fold*"))) < 3:
@@ -123,12 +141,18 @@ def test_a_worker_killed_mid_run_changes_nothing_in_the_table(cluster, command, 
         cwd=tmp_path, env=environment(OMP_NUM_THREADS="1"), capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert local.returncode == 0, local.stderr
-    tables = [pd.read_parquet(tmp_path / out / "rows.parquet").drop(columns=["fit_s", "predict_s"]) for out in ("there", "here")]
+    tables = [
+        pd.read_parquet(tmp_path / out / "rows.parquet").drop(columns=["fit_s", "predict_s"])
+        for out in ("there", "here")
+    ]
     pd.testing.assert_frame_equal(*tables, check_exact=True)
     statuses = tables[0].groupby("model")["status"].first()
     assert statuses["models.py:Raises"] == "failed"
     assert statuses["models.py:Drawn"] == "ok"
-    saved = [sorted(p.relative_to(tmp_path / out) for p in (tmp_path / out / "cells").rglob("*")) for out in ("there", "here")]
+    saved = [
+        sorted(p.relative_to(tmp_path / out) for p in (tmp_path / out / "cells").rglob("*"))
+        for out in ("there", "here")
+    ]
     assert saved[0] == saved[1]
 
 
@@ -137,9 +161,11 @@ def test_workers_with_other_code_are_refused(cluster, command, tmp_path):
     shutil.copytree(package, tmp_path / "other" / "shipbench", ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "other" / "shipbench" / "edited.py").write_text("")
     study = subprocess.run(
-        [sys.executable, "-P", "-m", "shipbench", "run", "-m", "hold", "-d", "toyset", "--horizon", "20", "--folds", "2", "--executor", "dask",
+        [sys.executable, "-P", "-m", "shipbench", "run", "-m", "hold", "-d", "toyset", "--horizon", "20", "--folds",
+            "2", "--executor", "dask",
          "--scheduler", cluster[0], "-q"],
-        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path / "other")}, capture_output=True, text=True, check=False,
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path / "other")}, capture_output=True, text=True,
+        check=False,
     )  # fmt: skip
     assert study.returncode == 2, study.stderr
     assert study.stderr.startswith("error: the Dask worker on ")
@@ -147,13 +173,17 @@ def test_workers_with_other_code_are_refused(cluster, command, tmp_path):
     assert study.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize("address", [f"tcp://127.0.0.1:{free_port()}", "nonsense", "foo://host:1"], ids=["nobody", "nonsense", "foo"])
+@pytest.mark.parametrize(
+    "address", [f"tcp://127.0.0.1:{free_port()}", "nonsense", "foo://host:1"], ids=["nobody", "nonsense", "foo"]
+)
 def test_a_scheduler_that_is_not_there_is_told_within_seconds(toy_folder, tmp_path, monkeypatch, address):
     toy_folder(runs=6)
     monkeypatch.chdir(tmp_path)
     assert executors.CONNECT_S < 10
     monkeypatch.setattr(executors, "CONNECT_S", 1.0)
-    done = CliRunner().invoke(app, ["run", "-m", "hold", "-d", "toyset", "--horizon", "20", "--executor", "dask", "--scheduler", address])
+    done = CliRunner().invoke(
+        app, ["run", "-m", "hold", "-d", "toyset", "--horizon", "20", "--executor", "dask", "--scheduler", address]
+    )
     assert done.exit_code == 2
     assert done.output.startswith(f"error: no Dask scheduler answers at {address} (")
     assert done.output.count("\n") == 1
@@ -164,7 +194,9 @@ def test_a_missing_package_is_told_with_what_to_install(monkeypatch):
     from shipbench.errors import InputError
 
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"needs distributed, which is not installed\. Install it: pip install 'shipbench\[dask\]'"):
+    with pytest.raises(
+        InputError, match=r"needs distributed, which is not installed\. Install it: pip install 'shipbench\[dask\]'"
+    ):
         open_workers(Execution("dask", scheduler="tcp://127.0.0.1:1")).__enter__()
 
 

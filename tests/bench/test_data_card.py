@@ -43,7 +43,13 @@ def test_a_card_is_written_printed_and_given_as_json(cli, toy_folder, tmp_path):
     assert {p.name for p in (tmp_path / "card").iterdir()} == {"card.md", "card.html"} | pictures
     text = (tmp_path / "card/card.md").read_text()
     assert set(re.findall(r"\]\((\S+?)\)", text)) == pictures
-    for word in ("- licence: MIT", "- source: formula", "One sample every 1 s", "Noise of the channels", "| shallow water | depth is not recorded |"):
+    for word in (
+        "- licence: MIT",
+        "- source: formula",
+        "One sample every 1 s",
+        "Noise of the channels",
+        "| shallow water | depth is not recorded |",
+    ):
         assert word in text
     again = cli("data", "describe", "toyset", "--out", "card", "--json")
     document = json.loads(again.stdout)
@@ -106,7 +112,9 @@ def test_a_drawing_holds_the_time_of_every_cell(harbour):
 
 def test_thrusters_and_wind_are_drawn_where_there_are_any(harbour):
     names = (*harbour.inputs, "wind_speed", "wind_from")
-    windy = harbour.with_runs(Run(r.id, r.t, r.states, np.hstack([r.inputs, np.full((len(r), 2), 1.0)]), names) for r in harbour.runs)
+    windy = harbour.with_runs(
+        Run(r.id, r.t, r.states, np.hstack([r.inputs, np.full((len(r), 2), 1.0)]), names) for r in harbour.runs
+    )
     assert [c.name for c in coverage(windy)][4:] == ["thrusters", "wind"]
 
 

@@ -23,23 +23,49 @@ from tests.diagnosis.test_wrong import make_trace
 
 GAIN = Gain("ED", 21.3, 9.8, 0.54, (0.4, 0.66), "24/24")
 CAUSE = Cause(
-    "current", 1, 120.0, 0.001, {"speed": Estimate(0.31, "m/s", (0.28, 0.34)), "to": Estimate(2.5, "rad", (2.4, 2.6))}, ("wind",),
+    "current", 1, 120.0, 0.001, {"speed": Estimate(0.31, "m/s", (0.28, 0.34)), "to": Estimate(2.5, "rad", (2.4, 2.6))},
+    ("wind",),
     "reciprocal courses", GAIN, "", "24 of 24 runs", {"sway": 38123.0, "yaw": 1.2e6},
 )  # fmt: skip
 CANDIDATES = (
-    Candidate("current", 120.0, 0.001, "named", {"north": 0.2}, {"north": 0.05, "east": float("nan")}, {"speed": "m/s", "to": "rad"}, "environment"),
-    Candidate("heading_bias", float("nan"), float("nan"), "score below the threshold", {}, {"bias": 0.002}, {"bias": "rad"}, "sensor"),
+    Candidate(
+        "current",
+        120.0,
+        0.001,
+        "named",
+        {"north": 0.2},
+        {"north": 0.05, "east": float("nan")},
+        {"speed": "m/s", "to": "rad"},
+        "environment",
+    ),
+    Candidate(
+        "heading_bias",
+        float("nan"),
+        float("nan"),
+        "score below the threshold",
+        {},
+        {"bias": 0.002},
+        {"bias": "rad"},
+        "sensor",
+    ),
 )
 
 
 def make_diagnosis(verdict: str = "found", name: str = "trial") -> Diagnosis:
     found = verdict == "found"
-    unknown = {"axis": "yaw", "variable": "heading", "form": "cos(3 psi + phase)", "score": 44.0, "share": 0.5} if verdict == "unknown" else None
+    unknown = (
+        {"axis": "yaw", "variable": "heading", "form": "cos(3 psi + phase)", "score": 44.0, "share": 0.5}
+        if verdict == "unknown"
+        else None
+    )
     return Diagnosis(
         dataset=name, verdict=verdict, causes=(CAUSE,) if found else (), candidates=CANDIDATES,
-        what_is_wrong=(Wrong("sway", 0.6, "heading", "worst at 90 to 135 deg"),), unexplained_after={"force_sd": {"surge": 0.001}},
-        extended_model="physics+current" if found else "physics", fingerprint="abc", seconds=12.0, warnings=("few runs",),
-        gain=GAIN if found else None, unknown=unknown, gain_per_run=(("a", 20.0, 9.0), ("b", 22.0, 10.6)) if found else (), trace=make_trace(4),
+        what_is_wrong=(Wrong("sway", 0.6, "heading", "worst at 90 to 135 deg"),),
+        unexplained_after={"force_sd": {"surge": 0.001}},
+        extended_model="physics+current" if found else "physics", fingerprint="abc", seconds=12.0,
+        warnings=("few runs",),
+        gain=GAIN if found else None, unknown=unknown,
+        gain_per_run=(("a", 20.0, 9.0), ("b", 22.0, 10.6)) if found else (), trace=make_trace(4),
     )  # fmt: skip
 
 
@@ -59,7 +85,9 @@ def written(request, tmp_path_factory):
 def test_the_page_stands_alone_and_names_every_candidate(written):
     verdict, folder = written
     text = (folder / "report.html").read_text()
-    assert not re.search(r"(src|href)=.https?:|@import|url\(http", re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL))
+    assert not re.search(
+        r"(src|href)=.https?:|@import|url\(http", re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+    )
     assert all(c.effect in text for c in CANDIDATES)
     assert "prefers-color-scheme" in text
     assert len(text) < 5e6
@@ -77,7 +105,8 @@ def test_names_from_the_data_are_escaped(tmp_path):
 def test_the_document_has_the_contracts_keys_and_no_nan(tmp_path):
     write_diagnosis(in_words(make_diagnosis()), tmp_path)
     document = json.loads((tmp_path / "diagnosis.json").read_text())
-    keys = {"schema", "dataset", "base_model", "verdict", "causes", "candidates", "what_is_wrong", "unexplained_after", "extended_model",
+    keys = {"schema", "dataset", "base_model", "verdict", "causes", "candidates", "what_is_wrong", "unexplained_after",
+        "extended_model",
             "fingerprint", "seconds"}  # fmt: skip
     assert keys <= set(document)
     assert document["schema"] == 1
@@ -111,11 +140,17 @@ def test_the_commands_name_the_data_as_the_user_did(spec, tmp_path, monkeypatch)
     """A folder's data set has a name of its own, and one with parameters is not found without them."""
     spec = spec.format(folder=tmp_path / "my trial")
     loaded = []
-    monkeypatch.setattr("shipbench.data.base.load_dataset", lambda given: loaded.append(given) or SimpleNamespace(name="bridge"))
-    monkeypatch.setattr("shipbench.diagnosis.diagnose.diagnose", lambda data, **options: in_words(make_diagnosis(name=data.name)))
+    monkeypatch.setattr(
+        "shipbench.data.base.load_dataset", lambda given: loaded.append(given) or SimpleNamespace(name="bridge")
+    )
+    monkeypatch.setattr(
+        "shipbench.diagnosis.diagnose.diagnose", lambda data, **options: in_words(make_diagnosis(name=data.name))
+    )
     result = CliRunner().invoke(app, ["diagnose", spec, "--out", str(tmp_path / "out")])
     assert loaded == [spec]
-    assert f"--model physics+current --dataset {shlex.quote(spec)}" in " ".join(result.stdout.replace("\\\n", "").split())  # broken for a shell
+    assert f"--model physics+current --dataset {shlex.quote(spec)}" in " ".join(
+        result.stdout.replace("\\\n", "").split()
+    )  # broken for a shell
     page = html.unescape((tmp_path / "out/report.html").read_text())
     assert f"--model physics+current --dataset {shlex.quote(spec)}<" in page
     assert f"shipbench diagnose {shlex.quote(spec)}<" in page
@@ -144,7 +179,10 @@ def test_none_comes_with_the_sizes_that_would_have_been_seen():
     ],
 )
 def test_unknown_tells_a_force_from_an_error_of_a_sensor(axis, variable, form, told):
-    d = replace(in_words(make_diagnosis("unknown")), unknown={"axis": axis, "variable": variable, "form": form, "score": 44.0, "share": None})
+    d = replace(
+        in_words(make_diagnosis("unknown")),
+        unknown={"axis": axis, "variable": variable, "form": form, "score": 44.0, "share": None},
+    )
     assert told in headline(d)
     assert told in page(d)
 
@@ -152,14 +190,25 @@ def test_unknown_tells_a_force_from_an_error_of_a_sensor(axis, variable, form, t
 def test_what_follows_the_place_is_drawn_over_the_places():
     """Its axes alone: what else is missing follows something else."""
     unknown = {"axis": "yaw and sway", "variable": "position", "form": "a x + b y", "score": 44.0, "share": None}
-    drawn, other = (page(replace(make_diagnosis("unknown"), unknown=u)) for u in (unknown, unknown | {"variable": "heading"}))
-    assert [f"Missing {axis} force over the places" in drawn for axis in ("surge", "sway", "yaw")] == [False, True, True]
+    drawn, other = (
+        page(replace(make_diagnosis("unknown"), unknown=u)) for u in (unknown, unknown | {"variable": "heading"})
+    )
+    assert [f"Missing {axis} force over the places" in drawn for axis in ("surge", "sway", "yaw")] == [
+        False,
+        True,
+        True,
+    ]
     assert "over the places" not in other
 
 
 def test_an_effect_that_no_possible_size_shows_has_a_line_without_one():
-    seen, never = (Candidate(e, 1.0, 0.9, "below", {}, {"gain": v}, {"gain": "1"}, "rudder") for e, v in (("one", 0.3), ("other", np.nan)))
-    lines = summary_lines(replace(make_diagnosis("none"), candidates=(seen, never, Candidate("third", 1.0, 0.9, "below"))))
+    seen, never = (
+        Candidate(e, 1.0, 0.9, "below", {}, {"gain": v}, {"gain": "1"}, "rudder")
+        for e, v in (("one", 0.3), ("other", np.nan))
+    )
+    lines = summary_lines(
+        replace(make_diagnosis("none"), candidates=(seen, never, Candidate("third", 1.0, 0.9, "below")))
+    )
     at = next(i for i, line in enumerate(lines) if line.startswith("Detection limit"))
     assert [line.split() for line in lines[at + 2 : at + 5]] == [["one", "gain", "0.300"], ["other", "-"], []]
 
@@ -223,7 +272,8 @@ def test_names_of_runs_and_warnings_are_escaped_in_whatever_alphabet():
     d = make_diagnosis()
     names = ("<img src=x onerror=alert(1)>", "$\\frac{1}{$", "\u8d8a\u91ce", "\udcff")
     hostile = "<b>&"
-    text = page(replace(extended(d), trace=replace(d.trace, names=names, after=d.trace.measured + 0.01), warnings=(hostile,), gain_per_run=(
+    text = page(replace(extended(d), trace=replace(d.trace, names=names, after=d.trace.measured + 0.01),
+            warnings=(hostile,), gain_per_run=(
         (names[0], 20.0, 9.0), (names[1], 0.0, 1.0))))  # fmt: skip
     assert "<img" not in re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
     assert "&lt;img src=x" in text
@@ -232,7 +282,9 @@ def test_names_of_runs_and_warnings_are_escaped_in_whatever_alphabet():
 
 
 def test_a_name_that_is_not_text_can_be_written(tmp_path):
-    text = write_report(in_words(make_diagnosis(name="bad \udcff name")), tmp_path / "deep" / "r.html").read_text(encoding="utf-8")
+    text = write_report(in_words(make_diagnosis(name="bad \udcff name")), tmp_path / "deep" / "r.html").read_text(
+        encoding="utf-8"
+    )
     assert "bad ? name" in text
 
 

@@ -1,4 +1,5 @@
-"""The suite with stubs in place of the diagnosis: one that is told the answer, one that is always wrong, one that fails."""
+"""The suite with stubs in place of the diagnosis: one that is told the answer, one that is always wrong, one that
+fails."""
 
 from __future__ import annotations
 
@@ -26,9 +27,23 @@ CALLS: list[str] = []
 
 
 def diagnosis(named=(), verdict=None, unknown=None, gain=0.5, confused=(), parameters=None) -> Diagnosis:
-    causes = tuple(Cause(n, i + 1, 30.0, 0.001, parameters or {}, confused_with=tuple(confused)) for i, n in enumerate(named))
+    causes = tuple(
+        Cause(n, i + 1, 30.0, 0.001, parameters or {}, confused_with=tuple(confused)) for i, n in enumerate(named)
+    )
     improved = Gain("ED", 10.0, 10.0 * (1 - gain), gain, (gain, gain), "4/4")
-    return Diagnosis("trials", verdict or ("found" if named else "none"), causes, (), (), {}, "physics", "0", 1.5, gain=improved, unknown=unknown)
+    return Diagnosis(
+        "trials",
+        verdict or ("found" if named else "none"),
+        causes,
+        (),
+        (),
+        {},
+        "physics",
+        "0",
+        1.5,
+        gain=improved,
+        unknown=unknown,
+    )
 
 
 def always_current(dataset, *, gain=True, seed=0, only=()):
@@ -50,7 +65,8 @@ def failing(dataset, *, gain=True, seed=0):
 
 def row(kind="single", truth=("current",), named=("current",), size=(1.0,), **more):
     base = {
-        "key": "k", "kind": kind, "truth": list(truth), "named": list(named), "size": list(size), "values": [{"speed": 0.3, "to": 1.0}],
+        "key": "k", "kind": kind, "truth": list(truth), "named": list(named), "size": list(size),
+        "values": [{"speed": 0.3, "to": 1.0}],
         "status": "ok", "reason": "", "verdict": "found" if named else "none", "confused": {}, "estimates": {},
         "evidence": {}, "unknown": None, "variables": [],
         "detail": {}, "seconds": 20.0, "gain": 0.4, "ship": "kcs-80m",
@@ -109,9 +125,22 @@ def test_resuming_keeps_finished_rows_and_repeats_failed_and_changed_ones(tmp_pa
     again = run_suite(tmp_path, diagnose=always_current, seeds_per_effect=1, kinds=("unit",), **QUICK)
     assert len(CALLS) == len(first) + 2
     assert again == first
-    run_suite(tmp_path, diagnose=always_current, seeds_per_effect=1, kinds=("unit",), **(QUICK | {"plan": Trials(runs=3, samples=40)}))
+    run_suite(
+        tmp_path,
+        diagnose=always_current,
+        seeds_per_effect=1,
+        kinds=("unit",),
+        **(QUICK | {"plan": Trials(runs=3, samples=40)}),
+    )
     assert len(CALLS) == 2 * len(first) + 2, "another plan: nothing may be kept"
-    run_suite(tmp_path, diagnose=always_current, seeds_per_effect=1, kinds=("unit",), resume=False, **(QUICK | {"plan": Trials(runs=3, samples=40)}))
+    run_suite(
+        tmp_path,
+        diagnose=always_current,
+        seeds_per_effect=1,
+        kinds=("unit",),
+        resume=False,
+        **(QUICK | {"plan": Trials(runs=3, samples=40)}),
+    )
     assert len(CALLS) == 3 * len(first) + 2
 
 
@@ -180,19 +209,30 @@ def test_a_pair_is_exact_without_a_third_cause():
 
 
 def test_sizes_are_compared_without_directions_and_intervals_are_counted():
-    errors, covered = scores.size_errors([row(estimates={"current": {"speed": [0.33, 0.31, 0.35], "to": [3.0, 2.9, 3.1]}})])
+    errors, covered = scores.size_errors(
+        [row(estimates={"current": {"speed": [0.33, 0.31, 0.35], "to": [3.0, 2.9, 3.1]}})]
+    )
     assert errors == pytest.approx([0.1])
     assert covered == [False]
     assert scores.size_errors([row(estimates={"wind": {"speed": [0.3, 0.2, 0.4]}})]) == ([], [])
 
 
 def test_a_change_needs_its_effect_and_its_run():
-    change = {"kind": "change", "truth": ("change_point",), "named": ("change_point",), "detail": {"changed": "thrust_gain", "from_run": 9}}
+    change = {
+        "kind": "change",
+        "truth": ("change_point",),
+        "named": ("change_point",),
+        "detail": {"changed": "thrust_gain", "from_run": 9},
+    }
     there = {"change_point": {"from_run": [9.0, 8.0, 10.0]}}
     assert scores.right_change(row(**change, estimates=there, evidence={"change_point": "thrust_gain from run 9"}))
     assert not scores.right_change(row(**change, estimates=there, evidence={"change_point": "current from run 9"}))
     assert not scores.right_change(
-        row(**change, estimates={"change_point": {"from_run": [12.0, 11.0, 13.0]}}, evidence={"change_point": "thrust_gain"})
+        row(
+            **change,
+            estimates={"change_point": {"from_run": [12.0, 11.0, 13.0]}},
+            evidence={"change_point": "thrust_gain"},
+        )
     )
 
 
@@ -211,7 +251,14 @@ def test_estimates_travel_from_the_diagnosis_to_the_row():
 
 def test_the_page_is_rendered_from_the_rows_beside_it(tmp_path):
     page, rows = suite_command(
-        diagnose=nothing, per_effect=1, kinds="unit", out=tmp_path / "run", page=tmp_path / "page", workers=1, plan=TINY, baselines=False
+        diagnose=nothing,
+        per_effect=1,
+        kinds="unit",
+        out=tmp_path / "run",
+        page=tmp_path / "page",
+        workers=1,
+        plan=TINY,
+        baselines=False,
     )
     kept, about = read_rows(tmp_path / "page" / "diagnosis.json")
     assert page.read_text() == render(kept, about)
@@ -225,8 +272,16 @@ def test_a_page_of_all_kinds_says_what_falls_short(tmp_path):
         "runs": 24, "samples": 120, "command": "c", "seed": 0, "per_effect": 1, "which": "test", "workers": 2,
         "code": {"shipbench": "0", "source": "s", "git": ""}, "machine": {"cpus": 2, "platform": "p", "python": "3"},
     }  # fmt: skip
-    baselines = {"white residuals": {"named": ["wind"], "best": []}, "derivative regression": {"named": ["current"], "best": []}}
-    rows = [row(baselines=baselines), row(named=("wind",), baselines=baselines), row(size=(0.3,)), row(kind="none-same", truth=(), named=())]
+    baselines = {
+        "white residuals": {"named": ["wind"], "best": []},
+        "derivative regression": {"named": ["current"], "best": []},
+    }
+    rows = [
+        row(baselines=baselines),
+        row(named=("wind",), baselines=baselines),
+        row(size=(0.3,)),
+        row(kind="none-same", truth=(), named=()),
+    ]
     text = write_page(tmp_path, rows, about).read_text()
     assert "| first-named cause right, 1x | 0.50 |" in text
     assert "- first-named cause right, 1x: 0.50, must reach >= 0.9 (n = 2)." in text

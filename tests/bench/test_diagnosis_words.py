@@ -8,7 +8,10 @@ from shipbench.diagnosis.result import Cause, Estimate
 from shipbench.effects.base import EFFECTS
 from shipbench.reports.diagnosis.text import cause_lines, estimate, force_words, in_words
 
-BANNED = re.compile(r"\b(told|said|felt|knots?|heals?|mends?|misread|plant|revolutions|off the regressions|off the formula)\b", re.IGNORECASE)
+BANNED = re.compile(
+    r"\b(told|said|felt|knots?|heals?|mends?|misread|plant|revolutions|off the regressions|off the formula)\b",
+    re.IGNORECASE,
+)
 LONGEST = 30
 
 
@@ -17,11 +20,16 @@ def make_cause(name: str) -> Cause:
     effect = EFFECTS.get(name)
     sizes = {p.name: Estimate(p.typical, p.unit, (0.8 * p.typical, 1.2 * p.typical)) for p in effect.parameters}
     if effect.vector:
-        sizes = {effect.vector[0]: Estimate(0.36, "m/s", (0.34, 0.37)), effect.vector[1]: Estimate(1.03, "rad", (1.0, 1.05))}
+        sizes = {
+            effect.vector[0]: Estimate(0.36, "m/s", (0.34, 0.37)),
+            effect.vector[1]: Estimate(1.03, "rad", (1.0, 1.05)),
+        }
     if name == "change_point":
         sizes = {"from_run": Estimate(6.0, "1", (float("nan"), float("nan")))}
     line = effect.correction({k: e.value for k, e in sizes.items()})
-    return Cause(name, 1, 400.0, 0.001, sizes, ("wind",), effect.separate, None, "", "12 of 12 runs", {"sway": 38e3}, line)
+    return Cause(
+        name, 1, 400.0, 0.001, sizes, ("wind",), effect.separate, None, "", "12 of 12 runs", {"sway": 38e3}, line
+    )
 
 
 @pytest.mark.parametrize("name", EFFECTS.built_in())
@@ -68,14 +76,17 @@ def test_a_relative_change_is_reported_in_percent_with_its_direction(value, ci95
 
 def test_forces_have_the_unit_that_suits_their_size():
     assert (
-        force_words({"surge": 940.0, "sway": 38_100.0, "yaw": 1.21e6}) == "up to 940 N lengthwise, 38 kN sideways and 1.2 MN m in yaw on these runs"
+        force_words({"surge": 940.0, "sway": 38_100.0, "yaw": 1.21e6})
+        == "up to 940 N lengthwise, 38 kN sideways and 1.2 MN m in yaw on these runs"
     )
     assert force_words({"yaw": 999_999.0}) == "up to 1.0 MN m in yaw on these runs"
     assert force_words({}) == ""
 
 
 def test_a_sensor_error_comes_with_the_line_that_corrects_it():
-    assert "To correct the record, write in dataset.toml: [bias] psi = 0.0349" in " ".join(cause_lines(make_cause("heading_bias"), 200))
+    assert "To correct the record, write in dataset.toml: [bias] psi = 0.0349" in " ".join(
+        cause_lines(make_cause("heading_bias"), 200)
+    )
     assert EFFECTS.get("heading_bias").correction({"bias": 0.1, "turned_velocities": 1.0}) == ""
     alone = EFFECTS.get("speed_scale").fitted(130.0)[1]
     assert alone.correction({"scale": 0.05}) == "[scale] u = 1.05"

@@ -26,8 +26,10 @@ SCRIPT = "<script>alert(1)</script>"
 @pytest.mark.parametrize(
     ("text", "escaped"),
     [
-        (SCRIPT, "&lt;script>alert(1)&lt;/script>"), ("<!-- x", "&lt;!-- x"), ("p <0.001 & more", "p <0.001 & more"), ("&lt;b>", "&amp;lt;b>"),
-        ("[a](javascript:b)", "[a]\\(javascript:b)"), ("![a][b]", "![a]\\[b]"), ("mlp[epochs=3]", "mlp[epochs=3]"), ("a\n# b", "a # b"),
+        (SCRIPT, "&lt;script>alert(1)&lt;/script>"), ("<!-- x", "&lt;!-- x"), ("p <0.001 & more", "p <0.001 & more"),
+        ("&lt;b>", "&amp;lt;b>"),
+        ("[a](javascript:b)", "[a]\\(javascript:b)"), ("![a][b]", "![a]\\[b]"), ("mlp[epochs=3]", "mlp[epochs=3]"),
+        ("a\n# b", "a # b"),
         ("x\x1b[2J", "x\\x1b[2J"),
     ],
 )  # fmt: skip
@@ -38,7 +40,8 @@ def test_markdown_holds_no_html_and_no_links_of_others(text, escaped):
 @pytest.mark.parametrize(
     ("text", "escaped"),
     [
-        ("x\n\\immediate\\write18{id}", r"x \textbackslash{}immediate\textbackslash{}write18\{id\}"), ("`a_b` c", r"\texttt{a\_b} c"), ("[x", "{}[x"),
+        ("x\n\\immediate\\write18{id}", r"x \textbackslash{}immediate\textbackslash{}write18\{id\}"),
+        ("`a_b` c", r"\texttt{a\_b} c"), ("[x", "{}[x"),
         ("*", "{}*"),
     ],
 )  # fmt: skip
@@ -79,7 +82,9 @@ def test_no_text_of_a_summary_becomes_html_in_markdown(tmp_path):
 
 
 def test_names_in_csv_are_text(tmp_path):
-    lines = render(build_board(results({"=cmd": [[1, 2]]}, "=data"), "=data"), "csv", "", [], tmp_path)[1].splitlines()[1:]
+    lines = render(build_board(results({"=cmd": [[1, 2]]}, "=data"), "=data"), "csv", "", [], tmp_path)[1].splitlines()[
+        1:
+    ]
     assert lines
     assert all(line.startswith("'=data,") for line in lines)
     assert any(",'=cmd," in line for line in lines)
@@ -88,7 +93,10 @@ def test_names_in_csv_are_text(tmp_path):
 def test_names_of_runs_in_predictions_are_text(tmp_path):
     import numpy as np
 
-    write_csv([("=cmd|'/c calc'!A0", np.arange(2.0), np.zeros((2, 10))), ("-5", np.arange(2.0), np.zeros((2, 10)))], tmp_path / "p.csv")
+    write_csv(
+        [("=cmd|'/c calc'!A0", np.arange(2.0), np.zeros((2, 10))), ("-5", np.arange(2.0), np.zeros((2, 10)))],
+        tmp_path / "p.csv",
+    )
     first = [line.split(",")[0] for line in (tmp_path / "p.csv").read_text().splitlines()[1:]]
     assert first == ["'=cmd|'/c calc'!A0"] * 2 + ["-5"] * 2
 
@@ -114,11 +122,18 @@ def digest_of(content):
 
 
 def test_pages_allow_their_own_style_and_nothing_else(tmp_path):
-    for text in (hostile("html", tmp_path, source="<style>*{display:none}</style>"), page(make_diagnosis(name="<style>*{display:none}</style>"))):
+    for text in (
+        hostile("html", tmp_path, source="<style>*{display:none}</style>"),
+        page(make_diagnosis(name="<style>*{display:none}</style>")),
+    ):
         policy = re.search(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', text)[1]
         assert policy.startswith("default-src 'none'; base-uri 'none'; form-action 'none'; ")
         scripts = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
         assert "unsafe-eval" not in policy
-        assert re.findall(r"script-src ([^;]*)", policy) == ([" ".join(f"'sha256-{digest_of(s)}'" for s in scripts)] if scripts else [])
-        [style] = re.findall(r"<style[^>]*>(.*?)</style>", re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL), re.DOTALL)
+        assert re.findall(r"script-src ([^;]*)", policy) == (
+            [" ".join(f"'sha256-{digest_of(s)}'" for s in scripts)] if scripts else []
+        )
+        [style] = re.findall(
+            r"<style[^>]*>(.*?)</style>", re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL), re.DOTALL
+        )
         assert f"'sha256-{digest_of(style)}'" in policy

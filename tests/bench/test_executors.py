@@ -121,7 +121,9 @@ def test_processes_give_the_numbers_of_this_process_bit_for_bit(study, capfd):
 def test_what_a_model_does_to_its_data_and_to_global_generators_stays_its_own(study):
     alone = scores(study("Together"))
     after = scores(study("Good", "Together", out="after"))
-    pd.testing.assert_frame_equal(alone, after[after["model"].isin(alone["model"])].reset_index(drop=True), check_exact=True)
+    pd.testing.assert_frame_equal(
+        alone, after[after["model"].isin(alone["model"])].reset_index(drop=True), check_exact=True
+    )
 
 
 @pytest.mark.parametrize("executor", ["local", "processes"])
@@ -136,7 +138,9 @@ def test_models_get_one_memory_layout_wherever_the_data_come_from(toy, tmp_path,
         data = toy(runs=6, steps=20)
         data = data.with_runs(dataclasses.replace(r, states=order(r.states), inputs=order(r.inputs)) for r in data.runs)
         monkeypatch.setattr("shipbench.bench.runner.load_dataset", lambda _, data=data: data)
-        task = make_task({"dataset": "toy", "models": [f"{tmp_path}/layout.py:Tells"], "horizon_s": 20, "folds": 2, "max_runs": 4})
+        task = make_task(
+            {"dataset": "toy", "models": [f"{tmp_path}/layout.py:Tells"], "horizon_s": 20, "folds": 2, "max_runs": 4}
+        )
         told |= set(run_tasks([task], tmp_path / "out", execution=Execution(executor)).rows["reason"])
     assert len(told) == 1
 
@@ -190,7 +194,8 @@ def test_a_model_file_that_changes_under_the_study_stops_it(study):
 
 def test_children_get_the_thread_settings_of_the_study(study, tmp_path, monkeypatch):
     (tmp_path / "threads.py").write_text(
-        "import os, numpy as np\nclass Tells:\n    def fit(self, train, valid=None, *, seed=0): raise ValueError(os.environ.get('OMP_NUM_THREADS'))\n"
+        "import os, numpy as np\nclass Tells:\n    def fit(self, train, valid=None, *, seed=0): raise "
+        "ValueError(os.environ.get('OMP_NUM_THREADS'))\n"
     )
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     rows = study(f"{tmp_path}/threads.py:Tells", execution=Execution("processes", workers=2)).rows
@@ -204,7 +209,9 @@ def test_no_process_and_no_temporary_folder_is_left(study, tmp_path, monkeypatch
     before = set(psutil.Process().children(recursive=True))  # of other tests
     study("Hangs", "Good", execution=Execution("processes", workers=2, limits=Limits(seconds=2.5)))
     assert list(scratch.iterdir()) == []
-    assert set(psutil.Process().children(recursive=True)) <= before  # neither running nor ended without being waited for
+    assert (
+        set(psutil.Process().children(recursive=True)) <= before
+    )  # neither running nor ended without being waited for
 
 
 @pytest.mark.parametrize(

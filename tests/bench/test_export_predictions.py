@@ -55,11 +55,17 @@ def test_tables_hold_every_prediction_and_give_ed_again(cli, study, format):
     assert len(table) == len(rows) * 20, "no window is left out, whatever became of it"
     assert sorted(table.model.unique()) == ["hold", "mine.py:Broken", "mine.py:Wild"]
     scored = table[table.status == "ok"]
-    ed = np.hypot(scored.x - scored.true_x, scored.y - scored.true_y).groupby([scored.model, scored.fold, scored.run]).mean()
+    ed = (
+        np.hypot(scored.x - scored.true_x, scored.y - scored.true_y)
+        .groupby([scored.model, scored.fold, scored.run])
+        .mean()
+    )
     published = rows[rows.status == "ok"].set_index(["model", "fold", "run"])["ed"]
     pd.testing.assert_series_equal(ed.sort_index(), published.sort_index(), check_names=False, rtol=1e-12)
     one = table[(table.model == "hold") & (table.fold == 1)]
-    np.testing.assert_array_equal(one[list(STATES)].to_numpy(), read_predictions(study, Cell("toyset", "hold", 1, 0)).reshape(-1, 10))
+    np.testing.assert_array_equal(
+        one[list(STATES)].to_numpy(), read_predictions(study, Cell("toyset", "hold", 1, 0)).reshape(-1, 10)
+    )
     starts = pd.read_csv("o/starts.csv") if format == "csv" else pd.read_parquet("o/starts.parquet")
     np.testing.assert_array_equal(starts[starts.fold == 1][list(STATES)], read_truth(study, "toyset", 1).s0)
     assert json.loads(Path("o/summary.json").read_text()) == json.loads((study / "summary.json").read_text())
@@ -70,9 +76,13 @@ def test_the_mat_file_gives_ed_again_in_the_way_of_the_docs(cli, study):
     assert result.exit_code == 0, result.output
     cells = loadmat("p.mat")["predictions"][0]
     rows = pd.read_parquet(study / "rows.parquet")
-    assert [(str(c["model"][0]), int(c["fold"][0, 0])) for c in cells] == [(m, f) for m in ("hold", "mine.py:Wild", "mine.py:Broken") for f in (0, 1)]
+    assert [(str(c["model"][0]), int(c["fold"][0, 0])) for c in cells] == [
+        (m, f) for m in ("hold", "mine.py:Wild", "mine.py:Broken") for f in (0, 1)
+    ]
     for c in cells:
-        ed = np.mean(np.hypot(c["S"][:, :, 0] - c["truth"][:, :, 0], c["S"][:, :, 1] - c["truth"][:, :, 1]), axis=1)  # as in docs/matlab.md
+        ed = np.mean(
+            np.hypot(c["S"][:, :, 0] - c["truth"][:, :, 0], c["S"][:, :, 1] - c["truth"][:, :, 1]), axis=1
+        )  # as in docs/matlab.md
         ok = np.array([str(s[0][0]) == "ok" for s in c["run_status"]])
         np.testing.assert_allclose(ed[ok], c["ED"][ok, 0], rtol=1e-12)
         own = rows[(rows.model == str(c["model"][0])) & (rows.fold == int(c["fold"][0, 0]))]

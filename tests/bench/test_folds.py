@@ -116,7 +116,9 @@ def test_the_published_split_is_one_fold_and_its_validation_runs_come_from_train
 
 def test_a_group_on_both_sides_of_the_published_split_is_told(toy):
     data = toy(4, meta=lambda i: {"split": "test" if i == 3 else "train", "group": f"log{i // 2}"})
-    assert select_runs(data, task(split="published"))[1] == ("the published split has pieces of 'log1' both in training and in test",)
+    assert select_runs(data, task(split="published"))[1] == (
+        "the published split has pieces of 'log1' both in training and in test",
+    )
 
 
 @pytest.mark.parametrize(
@@ -192,10 +194,18 @@ def test_fewer_training_runs_are_among_the_more_and_are_scored_on_the_same(toy):
     [
         ({"split": "kind"}, lambda i: {"manoeuvre": "turn"}, r"every run has manoeuvre = 'turn'; name the kinds"),
         ({"split": "kind"}, lambda i: {}, r"every run has manoeuvre = ''"),
-        ({"split": "kind"}, lambda i: {"manoeuvre": "ab"[i % 2], "group": 1}, r"without 'a' no run is left to train on"),
+        (
+            {"split": "kind"},
+            lambda i: {"manoeuvre": "ab"[i % 2], "group": 1},
+            r"without 'a' no run is left to train on",
+        ),
         ({"split": "speed"}, lambda i: {"group": 1}, r"has one group of runs only"),
         ({"train_runs": 9}, lambda i: {}, r"train_runs = 9, but fold 0 has 8 training runs; give at most 8"),
-        ({"train_runs": 3, "folds": 2}, lambda i: {"group": i // 2}, r"in fold 0 that is fewer than two groups of runs"),
+        (
+            {"train_runs": 3, "folds": 2},
+            lambda i: {"group": i // 2},
+            r"in fold 0 that is fewer than two groups of runs",
+        ),
     ],
 )
 def test_a_split_that_cannot_be_made_says_why(toy, changes, meta, message):

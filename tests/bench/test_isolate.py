@@ -1,4 +1,5 @@
-"""A stranger's model under the local executor: what it does to its process, to others and to the truth harms its own rows only."""
+"""A stranger's model under the local executor: what it does to its process, to others and to the truth harms its own
+rows only."""
 
 from __future__ import annotations
 
@@ -49,7 +50,8 @@ class Interrupts(Plain):
 
 class Peeks(Plain):
     def predict(self, s0, U, history=None):
-        found = [o for o in gc.get_objects() if type(o).__name__ == "Batch" or (isinstance(o, np.ndarray) and o.shape[-1:] == (10,) and o.ndim == 3)]
+        states = lambda o: isinstance(o, np.ndarray) and o.shape[-1:] == (10,) and o.ndim == 3
+        found = [o for o in gc.get_objects() if type(o).__name__ == "Batch" or states(o)]
         assert not found, found
         return super().predict(s0, U)
 
@@ -141,14 +143,22 @@ def helped(study, tmp_path):
     """The study with a model of several files, in a folder of its own."""
     folder = tmp_path / "mine"
     (folder / "parts").mkdir(parents=True)
-    files = {"model.py": HELPED, "helpers.py": "GAIN = 1.0", "parts/__init__.py": "", "parts/sizes.py": "SIZE = 0.0", "late.py": "SHIFT = 0.0"}
+    files = {
+        "model.py": HELPED,
+        "helpers.py": "GAIN = 1.0",
+        "parts/__init__.py": "",
+        "parts/sizes.py": "SIZE = 0.0",
+        "late.py": "SHIFT = 0.0",
+    }
     for name, text in files.items():
         (folder / name).write_text(text)
 
     def run(**options):
         (tmp_path / "models.py").write_text(MODELS)
         data = next(p.parent.name for p in tmp_path.glob("*/dataset.toml"))
-        task = make_task({"dataset": data, "models": ["mine/model.py:Scaled"], "horizon_s": 20, "folds": 2, "valid_runs": 1})
+        task = make_task(
+            {"dataset": data, "models": ["mine/model.py:Scaled"], "horizon_s": 20, "folds": 2, "valid_runs": 1}
+        )
         return run_tasks([task], "out", **options)
 
     return run, folder
@@ -171,7 +181,9 @@ def test_resume_runs_again_where_a_module_of_the_model_changed(helped, change):
 
 def test_code_that_the_key_does_not_cover_is_told_and_run_again(helped):
     run, folder = helped
-    (folder / "model.py").write_text(HELPED.replace("from late import SHIFT", "import importlib; SHIFT = importlib.import_module('late').SHIFT"))
+    (folder / "model.py").write_text(
+        HELPED.replace("from late import SHIFT", "import importlib; SHIFT = importlib.import_module('late').SHIFT")
+    )
     outcome = run()
     summary = read_summary(outcome.out, Cell(*(outcome.summaries[0][k] for k in ("dataset", "model", "fold", "seed"))))
     assert summary["key"] == ""
@@ -200,7 +212,9 @@ def test_a_data_file_that_a_model_reads_is_told_and_its_change_is_seen(helped, w
 @pytest.mark.parametrize("raised", ["KeyboardInterrupt", "GeneratorExit", "SystemExit(0)"])
 def test_a_model_that_cannot_be_made_is_one_message_whatever_it_raises(study, raised, capfd):
     Path("models.py").write_text(f"class Plain:\n    def __init__(self):\n        raise {raised}\n")
-    with pytest.raises(InputError, match=rf"models.py:Plain' cannot be made: {raised.partition('(')[0]}: ?\d?\. Correct its file"):
+    with pytest.raises(
+        InputError, match=rf"models.py:Plain' cannot be made: {raised.partition('(')[0]}: ?\d?\. Correct its file"
+    ):
         study("Plain")
     assert "Traceback" not in capfd.readouterr().err
 

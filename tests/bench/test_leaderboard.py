@@ -32,7 +32,8 @@ COLUMNS = [
 
 
 def results(models, dataset="toy", *, fingerprint="f1", protocol=PROTOCOL, task="t1", kinds=("",)):
-    """Rows from `models`: name -> list over folds of the runs' ED; None is a diverged run. The other columns are multiples of ED."""
+    """Rows from `models`: name -> list over folds of the runs' ED; None is a diverged run. The other columns are
+    multiples of ED."""
     rows, summaries = [], []
     for model, folds in models.items():
         for fold, errors in enumerate(folds):
@@ -40,17 +41,22 @@ def results(models, dataset="toy", *, fingerprint="f1", protocol=PROTOCOL, task=
                 value = np.nan if error is None else float(error)
                 rows.append(
                     {
-                        "protocol": protocol, "dataset": dataset, "fingerprint": fingerprint, "task": task, "model": model, "fold": fold,
+                        "protocol": protocol, "dataset": dataset, "fingerprint": fingerprint, "task": task,
+                        "model": model, "fold": fold,
                         "seed": 0, "run": f"r{fold}{i}", "parent": f"r{fold}{i}", "kind": kinds[i % len(kinds)],
-                        "status": "diverged" if error is None else "ok", "reason": "u is nan at t = 3 s" if error is None else "",
-                        "ed": value, "edh": 2 * value, "cvdm": 3 * value, "heading_error": value / 100, "rmse_F_b": 1000 * value,
+                        "status": "diverged" if error is None else "ok",
+                        "reason": "u is nan at t = 3 s" if error is None else "",
+                        "ed": value, "edh": 2 * value, "cvdm": 3 * value, "heading_error": value / 100,
+                        "rmse_F_b": 1000 * value,
                         "ed_at_10s": value / 2, "fit_s": 1.5, "fit_shared_by": 1, "predict_s": 0.002,
                     }
                 )  # fmt: skip
             summaries.append(
                 {
-                    "dataset": dataset, "fingerprint": fingerprint, "protocol": protocol, "task_key": task, "model": model, "fold": fold,
-                    "seed": 0, "columns": COLUMNS, "task": {"split": "folds", "horizon_s": 20, "history_s": 0}, "ship": "toy", "ship_L": 50.0,
+                    "dataset": dataset, "fingerprint": fingerprint, "protocol": protocol, "task_key": task,
+                    "model": model, "fold": fold,
+                    "seed": 0, "columns": COLUMNS, "task": {"split": "folds", "horizon_s": 20, "history_s": 0},
+                    "ship": "toy", "ship_L": 50.0,
                     "dt": 1.0, "source": "", "licence": "", "notes": ["depth unknown"], "command": "shipbench run -m x",
                     "finished": "2026-01-02T03:04:05", "code": {"shipbench": "0", "source": "abc", "git": ""},
                     "machine": {"cpus": 2, "python": "3", "torch": "2"},
@@ -73,7 +79,9 @@ def test_statistics_are_taken_per_fold_and_then_averaged():
 
 
 def test_models_are_sorted_by_mean_ed_and_incomplete_ones_come_after_all_complete_ones():
-    board = build_board(results({"bad": [[9, 9]], "good": [[1, 3]], "dead": [[None, None]], "lucky": [[0.1, None]]}), "toy")
+    board = build_board(
+        results({"bad": [[9, 9]], "good": [[1, 3]], "dead": [[None, None]], "lucky": [[0.1, None]]}), "toy"
+    )
     assert board.ranking == ["good", "bad", "lucky", "dead"]
     rows = first_table(board)
     assert (rows["lucky"]["runs"], rows["dead"]["runs"]) == ("1/2", "0/2")
@@ -106,7 +114,9 @@ def test_a_table_without_any_scored_run_keeps_its_rows():
 def test_undefined_scores_are_counted():
     found = results({"m": [[1, 2]]})
     found.rows.loc[0, "cvdm"] = np.nan
-    assert any(note.startswith("In 1 rows the true ship does not move") for note in build_board(found, "toy").tables[0].notes)
+    assert any(
+        note.startswith("In 1 rows the true ship does not move") for note in build_board(found, "toy").tables[0].notes
+    )
 
 
 def test_angles_and_forces_are_shown_in_the_units_that_people_read():
@@ -119,7 +129,9 @@ def test_angles_and_forces_are_shown_in_the_units_that_people_read():
 def test_harbour90_stands_beside_the_papers_table():
     board = build_board(results({"physics": [[6, 12]], "mlp": [[20, 30]]}, "harbour90"), "harbour90")
     rows = first_table(board)
-    assert [rows["paper: physics"][f"ed_{s}"] for s in ("mean", "median", "std", "iqr")] == list(PAPER["paper: physics"]["ed"])
+    assert [rows["paper: physics"][f"ed_{s}"] for s in ("mean", "median", "std", "iqr")] == list(
+        PAPER["paper: physics"]["ed"]
+    )
     claim = {row["where"]: row for row in board.tables[1].rows}
     assert claim["here"]["ed_mean"] == pytest.approx(100 * (1 - 9 / 25))
     assert claim["paper"]["ed_mean"] == pytest.approx(100 * (1 - 13.52 / 20.84))
@@ -185,7 +197,9 @@ def test_a_model_with_unscored_runs_is_not_tested_and_its_missing_runs_are_lost(
     table = by_title(board, "Paired")
     assert [(r["first"], r["second"]) for r in table.rows] in ([("a", "b")], [("b", "a")])
     assert any(note.startswith("Not tested: `lucky`") for note in table.notes)
-    assert next(r for r in by_title(board, "Ranking").rows if r["model"] == "lucky")["wins"] == pytest.approx(100 * 29 / 30, abs=0.2)
+    assert next(r for r in by_title(board, "Ranking").rows if r["model"] == "lucky")["wins"] == pytest.approx(
+        100 * 29 / 30, abs=0.2
+    )
 
 
 def test_pairs_are_tested_once_for_all_tables(monkeypatch):
@@ -214,7 +228,9 @@ def test_seeds_are_averaged_inside_a_run_and_their_spread_has_a_column():
     plain, table = (by_title(build_board(r, "toy"), "Ranking") for r in (one, several))
     first, second = plain.rows[0], next(r for r in table.rows if r["model"] == plain.rows[0]["model"])
     assert second["ed_mean"] == pytest.approx(first["ed_mean"])
-    assert (second["ed_mean_low"], second["ed_mean_high"]) == pytest.approx((first["ed_mean_low"], first["ed_mean_high"]))  # no more runs than before
+    assert (second["ed_mean_low"], second["ed_mean_high"]) == pytest.approx(
+        (first["ed_mean_low"], first["ed_mean_high"])
+    )  # no more runs than before
     assert (second["seeds"], second["seed_spread"]) == (3, pytest.approx(0.5 * first["ed_mean"]))
     assert "ED \u03c3 over seeds [m]" in {c.header for c in table.columns}
     assert "seeds" not in {c.header for c in plain.columns}
@@ -228,7 +244,9 @@ def test_pieces_of_one_log_are_drawn_together():
     grouped = with_columns(found, {"group": (number // 5).map("log{}".format)})
     assert "over 30 runs" in by_title(build_board(found, "toy"), "Paired").notes[0]
     assert "over 6 runs" in by_title(build_board(grouped, "toy"), "Paired").notes[0]
-    older = with_columns(grouped, {"group": grouped.rows["group"].where(grouped.rows["model"] == "a")})  # rows of b from before the column
+    older = with_columns(
+        grouped, {"group": grouped.rows["group"].where(grouped.rows["model"] == "a")}
+    )  # rows of b from before the column
     assert "over 6 runs" in by_title(build_board(older, "toy"), "Paired").notes[0]
 
 
@@ -242,14 +260,18 @@ def test_the_papers_figures_stand_beside_its_own_task_only():
 
 
 def windows_of(found, **values):
-    frame = found.rows.drop_duplicates(["fold", "run"])[["dataset", "fingerprint", "task", "fold", "run"]].reset_index(drop=True)
+    frame = found.rows.drop_duplicates(["fold", "run"])[["dataset", "fingerprint", "task", "fold", "run"]].reset_index(
+        drop=True
+    )
     blank = dict.fromkeys(REGIMES, 0.0) | dict.fromkeys(TRIAL_NAMES, np.nan)
     return frame.assign(**(blank | values))
 
 
 def test_slices_are_means_over_the_windows_of_each_regime():
     found = results({"m": [[1, 2, 3], [4, 5, 6]]})
-    found.__dict__["windows"] = windows_of(found, speed=[1.0, 2, 3, 4, 5, 6], astern=[0, 0, 0, 0, 0.1, 0.5])  # a cached property
+    found.__dict__["windows"] = windows_of(
+        found, speed=[1.0, 2, 3, 4, 5, 6], astern=[0, 0, 0, 0, 0.1, 0.5]
+    )  # a cached property
     table = by_title(build_board(found, "toy"), "Regime")
     rows = {row["slice"]: (row["windows"], row["m0"]) for row in table.rows}
     assert rows == {
@@ -264,12 +286,25 @@ def test_without_windows_there_are_no_slices():
 
 def test_indices_of_manoeuvres_stand_beside_the_true_ones():
     found = results({"m": [[1, 2], [3, 4]]})
-    found.__dict__["windows"] = windows_of(found, advance=[3.0, 5.0, np.nan, np.nan], overshoot_1=[np.nan, np.nan, 0.1, np.nan])  # a cached property
-    errors = {"advance_error": [-0.5, np.nan, np.nan, np.nan], "overshoot_1_error": [np.nan, np.nan, np.deg2rad(2.0), np.nan]}
+    found.__dict__["windows"] = windows_of(
+        found, advance=[3.0, 5.0, np.nan, np.nan], overshoot_1=[np.nan, np.nan, 0.1, np.nan]
+    )  # a cached property
+    errors = {
+        "advance_error": [-0.5, np.nan, np.nan, np.nan],
+        "overshoot_1_error": [np.nan, np.nan, np.deg2rad(2.0), np.nan],
+    }
     table = by_title(build_board(with_columns(found, errors), "toy"), "Indices")
     rows = {row["index"]: row for row in table.rows}
     assert list(rows) == ["advance [L]", "first overshoot [deg]"]
-    assert rows["advance [L]"] == {"index": "advance [L]", "model": "m", "windows": 2, "reached": 1, "true": 4.0, "error": 0.5, "bias": -0.5}
+    assert rows["advance [L]"] == {
+        "index": "advance [L]",
+        "model": "m",
+        "windows": 2,
+        "reached": 1,
+        "true": 4.0,
+        "error": 0.5,
+        "bias": -0.5,
+    }
     assert rows["first overshoot [deg]"]["error"] == pytest.approx(2.0)
 
 
@@ -330,7 +365,10 @@ def test_a_table_escapes_what_would_break_markdown_and_gives_null_for_nan():
     assert table.as_json()["rows"] == [{"m": "a|b", "v": None}]
 
 
-@pytest.mark.parametrize(("value", "text"), [(12.345, "12.3"), (0.01234, "0.0123"), (1234.5, "1234"), (4e-14, "0"), (1.5e7, "1.5e+07"), (None, "-")])
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(12.345, "12.3"), (0.01234, "0.0123"), (1234.5, "1234"), (4e-14, "0"), (1.5e7, "1.5e+07"), (None, "-")],
+)
 def test_significant_digits(value, text):
     assert significant(3)(value) == text
 

@@ -16,7 +16,8 @@ def test_fields_of_the_bound_class_and_its_bases_are_parameters(tmp_path):
     file.write_text(
         '"""One line on it.\n\nMore."""\nimport nothing_of_that_name\n'
         "class Base:\n    first: int = 1\n    name: ClassVar[str] = 'x'\n    _hidden: int = 2\n"
-        "class Part(Base):\n    needs: ClassVar[tuple[str, ...]] = ('torch',)\n    second: float\n    third: list = field(init=False)\n"
+        "class Part(Base):\n    needs: ClassVar[tuple[str, ...]] = ('torch',)\n    second: float\n"
+        "    third: list = field(init=False)\n"
         "class Other:\n    wrong: int = 0\n"
         "PREDICTOR = Part\n"
     )
@@ -41,6 +42,9 @@ def test_an_unknown_name_is_an_attribute_error():
 
 
 def test_importing_shipbench_imports_nothing_else():
-    code = "import sys; import shipbench; print([m for m in ('numpy', 'pandas', 'torch', 'pydantic', 'typer') if m in sys.modules])"
+    code = (
+        "import sys; import shipbench; print([m for m in ('numpy', 'pandas', 'torch', 'pydantic', 'typer') if m "
+        "in sys.modules])"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -15,7 +15,11 @@ from shipbench.leaderboard.pages import scores_of, write_boards
 
 
 def merged(sets):
-    return Results(pd.concat([s.rows for s in sets], ignore_index=True), [x for s in sets for x in s.summaries], [p for s in sets for p in s.sources])
+    return Results(
+        pd.concat([s.rows for s in sets], ignore_index=True),
+        [x for s in sets for x in s.summaries],
+        [p for s in sets for p in s.sources],
+    )
 
 
 def several(count, **offsets):
@@ -39,7 +43,12 @@ def test_the_number_of_data_sets_needed_is_where_the_smallest_p_passes(models, n
 
 
 def test_ranks_win_rates_and_skill_are_means_over_data_sets():
-    found = merged([results({"hold": [[4, 4]], "a": [[1, 1]], "b": [[2, 2]]}, "x"), results({"hold": [[9, 9]], "a": [[3, 3]], "b": [[1, 1]]}, "y")])
+    found = merged(
+        [
+            results({"hold": [[4, 4]], "a": [[1, 1]], "b": [[2, 2]]}, "x"),
+            results({"hold": [[9, 9]], "a": [[3, 3]], "b": [[1, 1]]}, "y"),
+        ]
+    )
     table = over_data_sets(scores(found)).board.tables[0]
     rows = {row["model"]: row for row in table.rows}
     assert [rows[m]["rank"] for m in ("a", "b", "hold")] == [1.5, 1.5, 3.0]
@@ -74,7 +83,9 @@ def test_a_missing_library_is_a_reason_and_no_failure(monkeypatch):
 
 
 def test_models_that_lack_a_data_set_are_named_and_left_out():
-    found = merged([results({"a": many(0), "b": many(1), "c": many(2)}, "x"), results({"a": many(3), "b": many(4)}, "y")])
+    found = merged(
+        [results({"a": many(0), "b": many(1), "c": many(2)}, "x"), results({"a": many(3), "b": many(4)}, "y")]
+    )
     overall = over_data_sets(scores(found))
     assert sorted(overall.models) == ["a", "b"]
     assert any("`c`" in line for line in overall.board.head)

@@ -26,14 +26,18 @@ def card(tmp_path_factory):
 @pytest.fixture(scope="session")
 def board(study, tmp_path_factory):
     """A leaderboard with tracks, of four models on runs with hostile names."""
-    [(_, page)] = write_boards(read_results([study]), tmp_path_factory.mktemp("board"), f"shipbench leaderboard {HOSTILE}", formats=["html"])
+    [(_, page)] = write_boards(
+        read_results([study]), tmp_path_factory.mktemp("board"), f"shipbench leaderboard {HOSTILE}", formats=["html"]
+    )
     return str(page)
 
 
 @pytest.fixture(scope="session")
 def tables(study, tmp_path_factory):
     """The same without plots."""
-    found = write_boards(read_results([study]), tmp_path_factory.mktemp("tables"), "shipbench leaderboard", plots=False, formats=["html"])
+    found = write_boards(
+        read_results([study]), tmp_path_factory.mktemp("tables"), "shipbench leaderboard", plots=False, formats=["html"]
+    )
     return str(found[0][1])
 
 
@@ -55,7 +59,9 @@ def test_it_fits_every_width_in_light_and_dark(name, width, scheme, request, tmp
 @pytest.mark.parametrize("name", ["card", "board", "tables"])
 def test_nothing_of_a_hostile_name_runs_and_nothing_is_asked_of_a_network(name, request):
     page = request.getfixturevalue(name)
-    _, (alerted, images), asked = browse([["open", page, 1280], ["js", "[window.alerted ?? 0, document.images.length]"], ["requests"]])
+    _, (alerted, images), asked = browse(
+        [["open", page, 1280], ["js", "[window.alerted ?? 0, document.images.length]"], ["requests"]]
+    )
     assert (alerted, images) == (0, 0)
     assert [url for url in asked if not url.startswith(("data:", "blob:"))] == []
 
@@ -65,7 +71,8 @@ def test_runs_of_a_card_are_chosen_and_read_off(card):
     text = "[...document.querySelectorAll('[data-histories] .hoverlayer text')].map(e => e.textContent).join(' ')"
     _, first, _, second, _, told, marked = browse([
         ["open", card, 1280], ["js", name], ["click", "button[data-step='1']"], ["js", name],
-        ["hover", "[data-histories] .nsewdrag[data-subplot='xy']", 0.5, 0.5], ["js", text], ["js", f"{TRACK}.data.at(-1).x.length"],
+        ["hover", "[data-histories] .nsewdrag[data-subplot='xy']", 0.5, 0.5], ["js", text],
+        ["js", f"{TRACK}.data.at(-1).x.length"],
     ])  # fmt: skip
     assert HOSTILE in first  # as text
     assert first != second
@@ -75,7 +82,10 @@ def test_runs_of_a_card_are_chosen_and_read_off(card):
 
 def test_what_cannot_be_identified_folds_on_a_phone_and_is_a_table_elsewhere(card):
     shown = "getComputedStyle(document.querySelector('#gaps thead')).display"
-    assert browse([["open", card, 390], ["js", shown], ["open", card, 820], ["js", shown]])[1::2] == ["none", "table-header-group"]
+    assert browse([["open", card, 390], ["js", shown], ["open", card, 820], ["js", shown]])[1::2] == [
+        "none",
+        "table-header-group",
+    ]
 
 
 def test_a_click_sorts_a_leaderboard_and_every_name_and_interval_is_in_sight(board):
@@ -83,9 +93,13 @@ def test_a_click_sorts_a_leaderboard_and_every_name_and_interval_is_in_sight(boa
     values = f"[...{table}.tBodies[0].rows].map(r => r.cells[4].dataset.by)"
     head = "#t0 ~ .scroll thead th:nth-child(5) button"
     names = f"[...{table}.querySelectorAll('th.model[scope=row]')].map(e => e.textContent)"
-    strips = "[...document.querySelectorAll('#intervals .strip .dot')].map(e => e.getBoundingClientRect()).map(b => [b.left, b.right])"
+    strips = (
+        "[...document.querySelectorAll('#intervals .strip .dot')].map(e => e.getBoundingClientRect()).map(b => "
+        "[b.left, b.right])"
+    )
     _, _, up, _, down, shown, dots = browse([
-        ["open", board, 390], ["click", head], ["js", values], ["click", head], ["js", values], ["js", names], ["js", strips],
+        ["open", board, 390], ["click", head], ["js", values], ["click", head], ["js", values], ["js", names],
+        ["js", strips],
     ])  # fmt: skip
     known = [float(v) for v in up if v]
     assert known == sorted(known)

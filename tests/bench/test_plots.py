@@ -9,7 +9,16 @@ import pytest
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.submissions import read_results
 from shipbench.bench.task import make_task
-from shipbench.leaderboard.plots import against_horizon, boxes, choose_runs, draw_all, outline, short_name, style, tracks
+from shipbench.leaderboard.plots import (
+    against_horizon,
+    boxes,
+    choose_runs,
+    draw_all,
+    outline,
+    short_name,
+    style,
+    tracks,
+)
 
 
 @pytest.fixture
@@ -69,7 +78,13 @@ def test_box_plots_have_a_panel_with_unit_for_each_metric_of_table_iii(study):
 
 def test_chosen_runs_are_good_median_and_bad_by_the_models_and_not_by_the_floor():
     errors = {f"r{i}": float(i) for i in range(11)}
-    rows = pd.DataFrame([{"run": r, "model": m, "status": "ok", "ed": e if m == "a" else 100 - e} for r, e in errors.items() for m in ("a", "hold")])
+    rows = pd.DataFrame(
+        [
+            {"run": r, "model": m, "status": "ok", "ed": e if m == "a" else 100 - e}
+            for r, e in errors.items()
+            for m in ("a", "hold")
+        ]
+    )
     assert choose_runs(rows, ["a", "hold"]) == {"good": "r1", "median": "r5", "bad": "r9"}
 
 
@@ -80,7 +95,10 @@ def test_the_outline_points_its_bow_along_the_heading():
     assert np.ptp(corners[:, 1]) == pytest.approx(6.0)
 
 
-@pytest.mark.parametrize(("spec", "name"), [("mlp[epochs=3]", "mlp[epochs=3]"), ("a/b/model.py:Mine", "model.py:Mine"), ("m" * 40, "m" * 25 + "...")])
+@pytest.mark.parametrize(
+    ("spec", "name"),
+    [("mlp[epochs=3]", "mlp[epochs=3]"), ("a/b/model.py:Mine", "model.py:Mine"), ("m" * 40, "m" * 25 + "...")],
+)
 def test_names_in_legends_stay_short(spec, name):
     assert short_name(spec) == name
 

@@ -26,7 +26,10 @@ def test_lines_count_and_tell_the_remaining_time(monkeypatch):
     lines.start(3)
     lines.done("a", "ok")
     lines.done("b", "failed, 1 of 2 runs: no")
-    assert stream.getvalue().splitlines() == ["   [1/3] a: ok; about 20 s left", "   [2/3] b: failed, 1 of 2 runs: no; about 10 s left"]
+    assert stream.getvalue().splitlines() == [
+        "   [1/3] a: ok; about 20 s left",
+        "   [2/3] b: failed, 1 of 2 runs: no; about 10 s left",
+    ]
 
 
 def test_the_remaining_time_counts_each_kind_at_its_own_cost():
@@ -62,7 +65,9 @@ def test_quiet_means_silent_and_a_pipe_gets_lines():
 
 def test_the_bar_prints_a_line_only_for_what_went_wrong(monkeypatch):
     bar, printed = Bar(), []
-    monkeypatch.setattr(bar.progress.console, "print", lambda *parts, **_: printed.extend(p for p in parts if isinstance(p, str)))
+    monkeypatch.setattr(
+        bar.progress.console, "print", lambda *parts, **_: printed.extend(p for p in parts if isinstance(p, str))
+    )
     bar.start(2)
     bar.working("a")
     bar.done("a", "ok, 18 runs, fit 1.0 s")

@@ -40,11 +40,15 @@ def test_a_click_on_a_column_head_sorts_and_a_second_one_turns_it_round(page):
 
 
 def test_another_run_and_other_models_can_be_chosen(page):
-    name, track = "document.querySelector('[data-run]').textContent", f"JSON.stringify({TRACK}.data.find(t => t.meta === 0).y)"
+    name, track = (
+        "document.querySelector('[data-run]').textContent",
+        f"JSON.stringify({TRACK}.data.find(t => t.meta === 0).y)",
+    )
     shown = f"[{name}, {track}, document.querySelector('[data-cell=\"0-0\"]').textContent]"
     results = browse([
         ["open", page, 1280], ["js", shown], ["click", "#d0 button[data-step='1']"], ["js", shown],
-        ["key", "#d0 select", "Home"], ["js", name], ["click", "#d0 input[data-toggle='0']"], ["js", HIDDEN], ["click", "#d0 button[data-step='1']"],
+        ["key", "#d0 select", "Home"], ["js", name], ["click", "#d0 input[data-toggle='0']"], ["js", HIDDEN],
+        ["click", "#d0 button[data-step='1']"],
         ["js", HIDDEN], ["click", "#d0 button[data-all='1']"], ["js", HIDDEN],
     ])  # fmt: skip
     before, after, first, hidden, still, back = results[1::2]
@@ -64,7 +68,8 @@ def test_a_model_switched_off_by_box_or_legend_leaves_track_and_histories(page):
     legend = f"[...{TRACK}.querySelectorAll('.legendtoggle')].forEach((e, i) => e.id = `legend${{i}}`)"
     box = "document.querySelector(\"#d0 input[data-toggle='0']\").checked"
     _, on, _, off, _, again, _, _, gone, boxed = browse([
-        ["open", page, 1280], ["js", DRAWN], ["click", "#d0 input[data-toggle='0']"], ["js", DRAWN], ["click", "#d0 button[data-all='1']"],
+        ["open", page, 1280], ["js", DRAWN], ["click", "#d0 input[data-toggle='0']"], ["js", DRAWN],
+        ["click", "#d0 button[data-all='1']"],
         ["js", DRAWN], ["js", legend], ["click", "#legend1"], ["js", DRAWN], ["js", box],
     ])  # fmt: skip
     assert on[0] == 1
@@ -81,7 +86,9 @@ PANEL = "[data-histories] .nsewdrag[data-subplot='xy2']"
 
 def test_pointing_at_a_history_shows_time_value_and_unit_and_marks_that_time_on_the_track(page):
     text = "[...document.querySelectorAll('[data-histories] .hoverlayer text')].map(e => e.textContent).join(' ')"
-    told, marked = browse([["open", page, 1280], ["hover", PANEL, 0.5, 0.5], ["js", text], ["js", f"{TRACK}.data.at(-1).x.length"]])[2:]
+    told, marked = browse(
+        [["open", page, 1280], ["hover", PANEL, 0.5, 0.5], ["js", text], ["js", f"{TRACK}.data.at(-1).x.length"]]
+    )[2:]
     assert re.search(r"\b15\.0 s\b", told)
     assert re.search(r"measured : -?\d+\.\d{3} m/s", told)
     assert marked >= 2  # measured and at least one model
@@ -104,7 +111,8 @@ def test_pointing_at_the_track_shows_time_and_position_and_marks_that_time_in_th
 def test_a_zoom_in_time_cuts_the_track_and_a_double_click_shows_the_whole_run(page):
     points, span = f"{TRACK}.data.find(t => t.meta === 'measured').x.length", f"{HISTORIES}.layout.xaxis.range"
     messages, before, _, cut, zoomed, _, after, back, asked, said = browse([
-        ["open", page, 1280], ["js", points], ["drag", PANEL, 0.25, 0.5, 0.75, 0.5], ["js", points], ["js", span], ["double", PANEL, 0.5, 0.5],
+        ["open", page, 1280], ["js", points], ["drag", PANEL, 0.25, 0.5, 0.75, 0.5], ["js", points], ["js", span],
+        ["double", PANEL, 0.5, 0.5],
         ["js", points], ["js", span], ["requests"], ["open", page, 390],
     ])  # fmt: skip
     assert messages == said == []  # no error, nothing that the policy refused
@@ -117,7 +125,10 @@ def test_a_zoom_in_time_cuts_the_track_and_a_double_click_shows_the_whole_run(pa
 
 
 def test_tracks_have_the_same_scale_in_both_directions(page):
-    scale = f"(() => {{ const a = {TRACK}._fullLayout; return ['xaxis', 'yaxis'].map(n => a[n]._length / (a[n].range[1] - a[n].range[0])); }})()"
+    scale = (
+        f"(() => {{ const a = {TRACK}._fullLayout; return ['xaxis', 'yaxis'].map(n => a[n]._length / "
+        "(a[n].range[1] - a[n].range[0])); })()"
+    )
     for width in (1280, 390):
         east, north = browse([["open", page, width], ["js", scale]])[1]
         assert east == pytest.approx(north, rel=1e-3)
@@ -127,7 +138,9 @@ def test_tracks_have_the_same_scale_in_both_directions(page):
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_a_laptop_and_a_phone_light_and_dark(page, width, scheme, tmp_path):
     messages, window, scroll, contrast, saved = browse([
-        ["open", page, width], ["js", "innerWidth"], ["js", "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"],
+        ["open", page, width], ["js", "innerWidth"],
+        ["js", ("[document.documentElement.scrollWidth, "
+                "document.documentElement.clientWidth]")],
         ["js", CONTRAST], ["shot", str(tmp_path / "page.png")],
     ], scheme)  # fmt: skip
     assert messages == []  # no error, nothing refused

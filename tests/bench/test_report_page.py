@@ -1,4 +1,5 @@
-"""The page of `shipbench report`: what it holds, what it leaves out, what it refuses, and that no name can break out of its text."""
+"""The page of `shipbench report`: what it holds, what it leaves out, what it refuses, and that no name can break out of
+its text."""
 
 from __future__ import annotations
 
@@ -59,8 +60,14 @@ def study(tmp_path_factory):
     (folder / "m.py").write_text(MODELS)
     models = ["hold", f"{folder}/m.py:Still", f"{folder}/m.py:Fails", f"{folder}/m.py:Blows"]
     patch = pytest.MonkeyPatch()
-    patch.setattr("shipbench.bench.runner.load_dataset", lambda name: Dataset("toy", TOY_SHIP, 1.0, tuple(runs), source=HOSTILE))
-    run_tasks([make_task({"dataset": "toy", "models": models, "horizon_s": 30, "folds": 3})], folder / "out", command=f"shipbench run {HOSTILE}")
+    patch.setattr(
+        "shipbench.bench.runner.load_dataset", lambda name: Dataset("toy", TOY_SHIP, 1.0, tuple(runs), source=HOSTILE)
+    )
+    run_tasks(
+        [make_task({"dataset": "toy", "models": models, "horizon_s": 30, "folds": 3})],
+        folder / "out",
+        command=f"shipbench run {HOSTILE}",
+    )
     patch.undo()
     return folder / "out"
 
@@ -91,7 +98,9 @@ def test_the_page_holds_all_parts_and_fetches_nothing(study, tmp_path):
         assert f'id="d0-{part}"' in text
         assert f'href="#d0-{part}"' in text
     assert re.search(
-        r"default-src 'none'; .*style-src-elem( 'sha256-[\w+/=]+'){2}; style-src-attr 'unsafe-inline'; script-src( 'sha256-[\w+/=]+'){4}\">", text
+        r"default-src 'none'; .*style-src-elem( 'sha256-[\w+/=]+'){2}; style-src-attr 'unsafe-inline'; script-src( "
+        r"'sha256-[\w+/=]+'){4}\">",
+        text,
     )
     for tag, attributes in Elements(text).tags:
         assert "src" not in attributes, tag
@@ -139,7 +148,12 @@ def test_the_plots_hold_what_was_measured_and_predicted_to_the_last_decimal(stud
     for run in data["runs"]:
         track = whole[run["name"]]
         for line, S in ((0, track.truth), (hold, track.predicted["hold"])):
-            for name, factor, column in (("u", 1.0, 3), ("r", 180 / np.pi, 5), ("delta", 180 / np.pi, 7), ("east", 1.0, 1)):
+            for name, factor, column in (
+                ("u", 1.0, 3),
+                ("r", 180 / np.pi, 5),
+                ("delta", 180 / np.pi, 7),
+                ("east", 1.0, 1),
+            ):
                 c = names.index(name)
                 steps, decimals = run["values"][line][c], data["columns"][c]["decimals"]
                 got = np.cumsum([s for s in steps if s is not None]) / 10.0**decimals
@@ -199,7 +213,9 @@ def test_the_growth_ends_at_the_median_error_of_the_rows(study):
     series = gather(read_results([study]), "toy", ["hold"])
     rows = read_results([study]).rows
     assert series.t[-1] == 30.0
-    assert np.median(series.errors["hold"][0][:, -1]) == pytest.approx(rows.loc[rows["model"] == "hold", "final_displacement"].median())
+    assert np.median(series.errors["hold"][0][:, -1]) == pytest.approx(
+        rows.loc[rows["model"] == "hold", "final_displacement"].median()
+    )
 
 
 def test_regimes_are_means_over_the_windows_of_the_slice(study, tmp_path):
@@ -220,7 +236,13 @@ def test_regimes_are_means_over_the_windows_of_the_slice(study, tmp_path):
 def diagnosis(folder: Path, fingerprint: str, dataset: str = "toy") -> Path:
     cause = {"effect": f"current{HOSTILE}", "parameters": {"speed": {"value": 0.3, "unit": "m/s", "ci95": [0.2, None]}},
              "gain": {"metric": "ED", "relative": 0.25}}  # fmt: skip
-    document = {"dataset": dataset, "verdict": "found", "causes": [cause], "extended_model": "physics+current", "fingerprint": fingerprint}
+    document = {
+        "dataset": dataset,
+        "verdict": "found",
+        "causes": [cause],
+        "extended_model": "physics+current",
+        "fingerprint": fingerprint,
+    }
     folder.mkdir(parents=True)
     (folder / "diagnosis.json").write_text(json.dumps(document))
     (folder / "report.html").write_text("<p>diagnosis</p>")
@@ -259,13 +281,18 @@ def test_a_diagnosis_that_cannot_be_read_is_refused_where_given_and_told_where_f
     ("change", "message"),
     [
         ({"causes": 5}, "causes = 5; accepted: a valid list"), ({"causes": [5]}, "causes.0 = 5"),
-        ({"causes": [{"parameters": [1]}]}, "causes.0.parameters = [1]"), ({"causes": [{"gain": 1}]}, "causes.0.gain = 1"),
+        ({"causes": [{"parameters": [1]}]}, "causes.0.parameters = [1]"),
+        ({"causes": [{"gain": 1}]}, "causes.0.gain = 1"),
         ({"causes": [{"parameters": {"speed": {"value": "3"}}}]}, "causes.0.parameters.speed.value"),
-        ({"causes": [{"gain": {"relative": 10**400}}]}, "causes.0.gain.relative"), ({"extended_model": 1}, "extended_model = 1"),
-        ({"fingerprint": None}, "fingerprint = None"), ({"verdict": ["found"]}, "verdict = "), ({"dataset": 3}, "dataset = 3"),
+        ({"causes": [{"gain": {"relative": 10**400}}]}, "causes.0.gain.relative"),
+        ({"extended_model": 1}, "extended_model = 1"),
+        ({"fingerprint": None}, "fingerprint = None"), ({"verdict": ["found"]}, "verdict = "),
+        ({"dataset": 3}, "dataset = 3"),
     ],
 )  # fmt: skip
-def test_a_diagnosis_with_an_entry_of_another_type_is_refused_where_given_and_told_where_found(study, tmp_path, change, message):
+def test_a_diagnosis_with_an_entry_of_another_type_is_refused_where_given_and_told_where_found(
+    study, tmp_path, change, message
+):
     folder = diagnosis(tmp_path / "copy/diagnosis", "f")
     shutil.copytree(study, tmp_path / "copy", dirs_exist_ok=True)
     document = json.loads((folder / "diagnosis.json").read_text())
@@ -287,7 +314,9 @@ def test_fitted_numbers_are_compared_over_the_fits(study, tmp_path):
     text = page_of(study, tmp_path).path.read_text()
     assert "1/s [1, 3] some &lt;b&gt;gain&lt;/b&gt;" in text
     assert _numbers(["  p = 1.2.3 m x\n  q = 1e999 m x"]) == [("q", np.inf, np.inf, np.inf, "m x")]
-    found = _numbers(["a\n  p1 = 2 N s/m [1, 3] x\n  p1 = 7 1 y", "  p1 = 4e1 N s/m z\n  p1 = 7 1 y", "  p1 = -1 N s/m z"])
+    found = _numbers(
+        ["a\n  p1 = 2 N s/m [1, 3] x\n  p1 = 7 1 y", "  p1 = 4e1 N s/m z\n  p1 = 7 1 y", "  p1 = -1 N s/m z"]
+    )
     assert found == [("p1", 2.0, -1.0, 40.0, "N s/m [1, 3] x"), ("p1", 7.0, 7.0, 7.0, "1 y")]
 
 
@@ -329,5 +358,11 @@ def test_the_command_writes_the_page_and_says_what_it_left_out(study, tmp_path):
 
 def test_intervals_of_a_table_stand_under_their_figures():
     column = TableColumn("ED", "ed", number(2))
-    cells = table_cells(Table("T", [column], [{"ed": 1.0, "ed_low": 0.5, "ed_high": 2.0}, {"ed": 1.0}, {"ed": float("nan")}]))["rows"]
-    assert [(row["cells"][0]["between"], row["cells"][0]["by"]) for row in cells] == [("0.50 to 2.00", "1.0"), ("", "1.0"), ("", "")]
+    cells = table_cells(
+        Table("T", [column], [{"ed": 1.0, "ed_low": 0.5, "ed_high": 2.0}, {"ed": 1.0}, {"ed": float("nan")}])
+    )["rows"]
+    assert [(row["cells"][0]["between"], row["cells"][0]["by"]) for row in cells] == [
+        ("0.50 to 2.00", "1.0"),
+        ("", "1.0"),
+        ("", ""),
+    ]

@@ -62,7 +62,7 @@ class Trained:
 '''
 
 KILLED_AT_EVERY_STEP = '''
-"""Forks a study that kills itself at its n-th step on the file system, then one that resumes, for every n in the steps given."""
+"""Forks a study that kills itself at its n-th step on the file system, then one that resumes; for every n given."""
 import os, signal, sys
 from pathlib import Path
 import pandas as pd
@@ -130,7 +130,11 @@ def folder(tmp_path, toy_folder) -> Path:
 
 
 def environment() -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, sys.path)]), "OMP_NUM_THREADS": "1"}
+    return {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, sys.path)]),
+        "OMP_NUM_THREADS": "1",
+    }
 
 
 @pytest.mark.long
@@ -145,16 +149,37 @@ def test_a_study_killed_at_any_step_on_the_file_system_resumes_to_the_same_table
 @pytest.mark.long
 def test_the_command_killed_again_and_again_resumes_to_the_same_table(folder, monkeypatch):
     (folder / "models.py").write_text(f"PAUSE = 0.2\n{MODELS}")
-    options = ["-m", "models.py:Drawn", "-m", "models.py:Together", "-d", "toyset", "--horizon", "20", "--folds", "2", "--seeds", "0,1,2"]
+    options = [
+        "-m",
+        "models.py:Drawn",
+        "-m",
+        "models.py:Together",
+        "-d",
+        "toyset",
+        "--horizon",
+        "20",
+        "--folds",
+        "2",
+        "--seeds",
+        "0,1,2",
+    ]
 
     def start(out: str, *more: str) -> subprocess.Popen[str]:
         command = [sys.executable, "-m", "shipbench", "run", *options, "-o", out, *more]
-        return subprocess.Popen(command, cwd=folder, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        return subprocess.Popen(
+            command, cwd=folder, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
 
     monkeypatch.chdir(folder)
     models = ["models.py:Drawn", "models.py:Together"]
-    run_tasks([make_task({"dataset": "toyset", "models": models, "horizon_s": 20, "folds": 2, "seeds": [0, 1, 2]})], "whole")
-    for cells, more in ((1, ["--executor", "processes", "--workers", "2"]), (5, ["--resume"]), (9, ["--resume", "--executor", "processes"])):
+    run_tasks(
+        [make_task({"dataset": "toyset", "models": models, "horizon_s": 20, "folds": 2, "seeds": [0, 1, 2]})], "whole"
+    )
+    for cells, more in (
+        (1, ["--executor", "processes", "--workers", "2"]),
+        (5, ["--resume"]),
+        (9, ["--resume", "--executor", "processes"]),
+    ):
         study, end = start("killed", *more), time.monotonic() + 60
         while len(list(folder.glob("killed/cells/*/*/fold*/summary.json"))) < cells:
             assert time.monotonic() < end
@@ -166,15 +191,22 @@ def test_the_command_killed_again_and_again_resumes_to_the_same_table(folder, mo
     said, _ = last.communicate()
     assert last.returncode == 0, said
     assert said.count("(kept)") >= 6
-    tables = [pd.read_parquet(folder / out / "rows.parquet").drop(columns=["fit_s", "predict_s"]) for out in ("whole", "killed")]
+    tables = [
+        pd.read_parquet(folder / out / "rows.parquet").drop(columns=["fit_s", "predict_s"])
+        for out in ("whole", "killed")
+    ]
     pd.testing.assert_frame_equal(*tables, check_exact=True)
 
 
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_no_process_outlives_a_study_that_is_stopped(folder, sent):
     (folder / "models.py").write_text(f"PAUSE = 600\n{MODELS}")
-    command = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # tests in the background inherit that it is ignored
-    command += "from shipbench.bench import executors, runner, task; runner.run_tasks([task.make_task(TASK)], 'out', execution=HOW)"
+    # tests in the background inherit that it is ignored
+    command = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    command += (
+        "from shipbench.bench import executors, runner, task; runner.run_tasks([task.make_task(TASK)], "
+        "'out', execution=HOW)"
+    )
     settings = {"dataset": "toyset", "models": ["models.py:Drawn"], "horizon_s": 20, "folds": 2}
     command = command.replace("TASK", repr(settings)).replace("HOW", "executors.Execution('processes', workers=2)")
     study = subprocess.Popen([sys.executable, "-c", command], cwd=folder, env=environment(), stderr=subprocess.DEVNULL)
@@ -199,8 +231,24 @@ def test_a_study_is_stopped_while_lightning_trains_and_counts_no_failure(folder,
     (folder / "trained.py").write_text(TRAINED)
     command = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # as above
     command += "from shipbench.cli.app import main; main()"
-    options = ["run", "-m", "trained.py:Trained", "-d", "toyset", "--horizon", "20", "--folds", "2", "-o", "out", "--executor", "local"]
-    study = subprocess.Popen([sys.executable, "-c", command, *options], cwd=folder, env=environment(), stderr=subprocess.PIPE, text=True)
+    options = [
+        "run",
+        "-m",
+        "trained.py:Trained",
+        "-d",
+        "toyset",
+        "--horizon",
+        "20",
+        "--folds",
+        "2",
+        "-o",
+        "out",
+        "--executor",
+        "local",
+    ]
+    study = subprocess.Popen(
+        [sys.executable, "-c", command, *options], cwd=folder, env=environment(), stderr=subprocess.PIPE, text=True
+    )
     end = time.monotonic() + 120
     while not (folder / "training").exists():
         assert time.monotonic() < end

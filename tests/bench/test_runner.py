@@ -25,7 +25,8 @@ class Spy:
     """Holds the state and writes down what it was shown."""
     seen = ()
     def fit(self, train, valid=None, *, seed=0):
-        entry = {"train": [r.id for r in train.runs], "valid": [r.id for r in valid.runs] if valid else [], "seed": seed}
+        ids = [r.id for r in valid.runs] if valid else []
+        entry = {"train": [r.id for r in train.runs], "valid": ids, "seed": seed}
         with LOG.open("a") as f:
             f.write(json.dumps(entry) + "\\n")
         self.seen = {row.tobytes() for d in (train, valid) if d for r in d.runs for row in r.states}
@@ -102,7 +103,9 @@ def test_one_row_per_model_fold_seed_and_run(study):
 
 
 def test_a_model_never_sees_the_runs_it_is_scored_on(study):
-    outcome = study("Spy", runs=20)  # Spy itself asserts that no scored sample was in training, and tampers with its inputs
+    outcome = study(
+        "Spy", runs=20
+    )  # Spy itself asserts that no scored sample was in training, and tampers with its inputs
     assert outcome.failed == []
     for entry, summary in zip(log(study), outcome.summaries, strict=True):
         assert entry["train"] == summary["runs"]["train"]
@@ -152,7 +155,8 @@ def test_a_failed_fit_gives_a_row_for_every_run_of_the_fold_and_stops_nothing(st
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("model", "reason"), [("FailsToPredict", "predict: KeyError: 'u'"), ("ReturnsS0", "shape (2, 21, 10); accepted: (2, 20, 10)")]
+    ("model", "reason"),
+    [("FailsToPredict", "predict: KeyError: 'u'"), ("ReturnsS0", "shape (2, 21, 10); accepted: (2, 20, 10)")],
 )
 def test_a_failed_or_misshapen_prediction_says_why(study, model, reason):
     rows = study(model).rows
@@ -215,7 +219,9 @@ def test_resume_runs_again_what_other_data_code_or_task_made(study, change):
     study("Spy")
     if change == "file":
         study.file.write_text(MODELS + "\n# changed\n")
-    study("Spy", resume=True, task={"valid_runs": 2} if change == "task" else None, steps=21 if change == "data" else 20)
+    study(
+        "Spy", resume=True, task={"valid_runs": 2} if change == "task" else None, steps=21 if change == "data" else 20
+    )
     assert len(log(study)) == 10
 
 
@@ -228,7 +234,9 @@ def test_without_resume_everything_is_run_again(study):
 
 def test_the_same_seed_gives_the_same_rows(study):
     first, second = (study("hold", out=out).rows for out in ("a", "b"))
-    pd.testing.assert_frame_equal(first.drop(columns=["fit_s", "predict_s"]), second.drop(columns=["fit_s", "predict_s"]))
+    pd.testing.assert_frame_equal(
+        first.drop(columns=["fit_s", "predict_s"]), second.drop(columns=["fit_s", "predict_s"])
+    )
 
 
 def test_fitted_models_are_saved_and_run_again_as_a_spec(study):
@@ -260,7 +268,9 @@ def test_unknown_models_are_refused_before_anything_runs(toy, tmp_path, monkeypa
 def test_a_model_file_with_a_fault_is_named_in_one_message(toy, tmp_path, monkeypatch):
     monkeypatch.setattr("shipbench.bench.runner.load_dataset", lambda name: toy())
     (tmp_path / "bad.py").write_text("import nothing_of_that_name\n")
-    with pytest.raises(InputError, match=r"bad\.py:Model' cannot be made: ModuleNotFoundError: No module named 'nothing_of_that_name'"):
+    with pytest.raises(
+        InputError, match=r"bad\.py:Model' cannot be made: ModuleNotFoundError: No module named 'nothing_of_that_name'"
+    ):
         run_tasks([make_task({"dataset": "toy", "models": [f"{tmp_path}/bad.py:Model"]})], tmp_path / "out")
 
 

@@ -14,7 +14,9 @@ def matched(errors, models=("a", "b"), codes=None, weights=None, resamples=999):
     errors = np.asarray(errors, float)
     codes = np.arange(len(errors)) if codes is None else np.asarray(codes)
     boot = Bootstrap([f"{i:04d}" for i in range(codes.max() + 1)], resamples)
-    return Matched(list(models), errors, np.ones(len(errors)) if weights is None else np.asarray(weights, float), codes, boot)
+    return Matched(
+        list(models), errors, np.ones(len(errors)) if weights is None else np.asarray(weights, float), codes, boot
+    )
 
 
 def test_spread_of_a_resample_is_numpys_on_the_drawn_runs_written_out():
@@ -34,16 +36,22 @@ def test_blocks_of_resamples_are_the_whole(monkeypatch):
     spread = whole.spread(np.arange(60), values)
     monkeypatch.setattr(statistics, "_CELLS", 60 * 8)
     blocks = Bootstrap(names, 99)
-    assert np.array_equal(blocks.counts, np.random.default_rng(statistics.DRAW_SEED).multinomial(60, np.full(60, 1 / 60), size=99))
+    assert np.array_equal(
+        blocks.counts, np.random.default_rng(statistics.DRAW_SEED).multinomial(60, np.full(60, 1 / 60), size=99)
+    )
     assert np.array_equal(blocks.counts, whole.counts)
     np.testing.assert_allclose(blocks.spread(np.arange(60), values), spread, rtol=1e-13)
 
 
 def test_mean_of_a_resample_weighs_windows_and_leaves_out_what_has_no_score():
     boot = Bootstrap(list("ab"), 200)
-    drawn = boot.means(np.array([0, 0, 1, 1]), np.array([[1.0], [3.0], [10.0], [np.nan]]), np.array([[1.0], [1.0], [2.0], [5.0]]))[:, 0]
+    drawn = boot.means(
+        np.array([0, 0, 1, 1]), np.array([[1.0], [3.0], [10.0], [np.nan]]), np.array([[1.0], [1.0], [2.0], [5.0]])
+    )[:, 0]
     expected = {(2, 0): 2.0, (1, 1): (1 + 3 + 2 * 10) / 4, (0, 2): 10.0}
-    assert all(value == pytest.approx(expected[tuple(c)]) for value, c in zip(drawn, boot.counts.astype(int), strict=True))
+    assert all(
+        value == pytest.approx(expected[tuple(c)]) for value, c in zip(drawn, boot.counts.astype(int), strict=True)
+    )
 
 
 def test_windows_of_one_run_add_no_certainty():
@@ -91,7 +99,14 @@ def test_p_is_holms_step_down_over_all_pairs():
     rng = np.random.default_rng(5)
     errors = rng.normal(size=(30, 4)) + np.array([0.0, 0.4, 0.8, 1.2]) + 10.0
     pairs = matched(errors, "abcd").pairs(list("abcd"))
-    assert [(p.first, p.second) for p in pairs] == [("a", "b"), ("a", "c"), ("a", "d"), ("b", "c"), ("b", "d"), ("c", "d")]
+    assert [(p.first, p.second) for p in pairs] == [
+        ("a", "b"),
+        ("a", "c"),
+        ("a", "d"),
+        ("b", "c"),
+        ("b", "d"),
+        ("c", "d"),
+    ]
     expected, running = {}, 0.0
     for i, pair in enumerate(sorted(pairs, key=lambda p: p.p)):
         running = max(running, min(1.0, (6 - i) * pair.p))

@@ -54,7 +54,21 @@ def study(toy_folder, tmp_path):
 
 def command(study, *more: str, limit: int) -> subprocess.CompletedProcess[str]:
     """`shipbench run` on the same study, where no file may be larger than `limit` bytes."""
-    options = ["-m", f"{study.file}:Drawn", "-d", str(study.data), "--horizon", "20", "--folds", "2", "--seeds", "0,1", "-o", str(study.out), "-q"]
+    options = [
+        "-m",
+        f"{study.file}:Drawn",
+        "-d",
+        str(study.data),
+        "--horizon",
+        "20",
+        "--folds",
+        "2",
+        "--seeds",
+        "0,1",
+        "-o",
+        str(study.out),
+        "-q",
+    ]
     path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, sys.path)])
 
     return subprocess.run(
@@ -68,7 +82,9 @@ def test_a_full_disk_stops_with_a_message_keeps_what_is_finished_and_resume_goes
     before = study()
     shutil.rmtree(study.cell(1, 1))
     table = (study.out / "rows.parquet").read_bytes()
-    room = max(path.stat().st_size for path in study.out.glob("truth/*/*")) + 100  # enough for the truth, too little for a cell
+    room = (
+        max(path.stat().st_size for path in study.out.glob("truth/*/*")) + 100
+    )  # enough for the truth, too little for a cell
     assert room < max(path.stat().st_size for path in study.cell(1, 0).iterdir())
     full = command(study, "--resume", limit=room)
     assert full.returncode == 1
@@ -101,7 +117,9 @@ def test_a_read_only_folder_is_refused_before_anything_is_fitted(study, request)
         folder.chmod(folder.stat().st_mode | 0o755)
     study.out.chmod(0o555)
     request.getfixturevalue("somebody_else")
-    with pytest.raises(InputError, match=r"cannot write to .*out: Permission denied. Give another folder with out=FOLDER."):
+    with pytest.raises(
+        InputError, match=r"cannot write to .*out: Permission denied. Give another folder with out=FOLDER."
+    ):
         study(model="hold")  # a model file would need a process, and Python here may not be somebody else's to run
     assert study.fits() == 4
 
@@ -125,7 +143,11 @@ def test_two_studies_do_not_write_into_one_folder(study):
 
 def test_leftovers_of_killed_studies_are_taken_away_and_no_other_hidden_file(study):
     study()
-    left = [study.out / ".rows.parquet.123.tmp", study.cell(0, 0).parent / ".fold0-seed0.123.tmp", study.out / "truth/toyset/.fold0.npz.123.tmp"]
+    left = [
+        study.out / ".rows.parquet.123.tmp",
+        study.cell(0, 0).parent / ".fold0-seed0.123.tmp",
+        study.out / "truth/toyset/.fold0.npz.123.tmp",
+    ]
     for path in left:
         path.mkdir()
     (study.out / ".mine").write_text("kept")
@@ -185,7 +207,10 @@ def test_a_damaged_table_of_the_study_is_refused_by_its_readers_and_mended_by_re
 def test_resume_tries_failed_cells_again(study):
     text = study.file.read_text()
     study.file.write_text(
-        text.replace("self.bias =", 'if seed == 1 and not Path(__file__).with_suffix(".ok").exists(): raise ValueError\n        self.bias =')
+        text.replace(
+            "self.bias =",
+            'if seed == 1 and not Path(__file__).with_suffix(".ok").exists(): raise ValueError\n        self.bias =',
+        )
     )
     assert sorted(set(study()["status"])) == ["failed", "ok"]
     study.file.with_suffix(".ok").touch()
@@ -197,7 +222,9 @@ def test_resume_tries_failed_cells_again(study):
 def test_resume_sees_runs_that_moved_to_another_fold(study):
     study()
     toml = study.data / "dataset.toml"
-    toml.write_text(toml.read_text() + '\n[runs.r00]\ngroup = "a"\n\n[runs.r01]\ngroup = "a"\n\n[runs.r02]\ngroup = "a"\n')
+    toml.write_text(
+        toml.read_text() + '\n[runs.r00]\ngroup = "a"\n\n[runs.r01]\ngroup = "a"\n\n[runs.r02]\ngroup = "a"\n'
+    )
     fingerprints = [json.loads((study.cell(0, 0) / "summary.json").read_text())["fingerprint"]]
     study(resume=True)
     fingerprints.append(json.loads((study.cell(0, 0) / "summary.json").read_text())["fingerprint"])
@@ -215,7 +242,9 @@ def test_a_study_that_finishes_nothing_leaves_the_older_table(study, monkeypatch
     monkeypatch.setattr("shipbench.bench.runner.answers_of", lost)
     with pytest.raises(WorkError):
         study()
-    pd.testing.assert_frame_equal(read_results([study.out]).rows.drop(columns=["fit_s", "predict_s"]), before, check_exact=True)
+    pd.testing.assert_frame_equal(
+        read_results([study.out]).rows.drop(columns=["fit_s", "predict_s"]), before, check_exact=True
+    )
 
 
 @pytest.mark.long
@@ -244,7 +273,9 @@ def test_nothing_that_the_study_did_not_make_is_removed(study):
 
 def test_another_study_is_replaced_only_where_resume_is_asked_for(study):
     before = study()
-    with pytest.raises(InputError, match=r"out holds the results of another study.*another folder with out=FOLDER.*resume=True"):
+    with pytest.raises(
+        InputError, match=r"out holds the results of another study.*another folder with out=FOLDER.*resume=True"
+    ):
         study(horizon_s=10)
     refused = command(study, "--folds", "3", limit=10**9)
     assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
@@ -263,7 +294,9 @@ def test_a_study_writes_through_no_link_in_its_folder(study, link):
     elsewhere.mkdir()
     (study.out / link).parent.mkdir(parents=True, exist_ok=True)
     (study.out / link).symlink_to(elsewhere)
-    with pytest.raises(InputError, match=f"out/{link} is a link; accepted: (folders|a folder), so that a study writes only below .*out"):
+    with pytest.raises(
+        InputError, match=f"out/{link} is a link; accepted: (folders|a folder), so that a study writes only below .*out"
+    ):
         study()
     assert not list(elsewhere.iterdir())
 

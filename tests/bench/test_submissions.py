@@ -48,7 +48,9 @@ def template(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         for name, model in (("anna", "hold"), ("ben", "mine.py:Still")):
-            run_tasks([make_task({"dataset": "./toyset", "models": [model], "horizon_s": 20, "folds": 2})], Path("runs", name))
+            run_tasks(
+                [make_task({"dataset": "./toyset", "models": [model], "horizon_s": 20, "folds": 2})], Path("runs", name)
+            )
     return folder
 
 
@@ -99,14 +101,21 @@ def test_a_submission_is_one_folder_of_three_files_that_renders_the_same_page(cl
     assert "## Regime slices" in page
     assert cli("leaderboard", "mine", "--no-plots", "-q").exit_code == 0
     again = (tmp_path / "leaderboards/toyset.md").read_text()
-    assert [x for x in again.splitlines() if "Rendered by" not in x] == [x for x in page.splitlines() if "Rendered by" not in x]
+    assert [x for x in again.splitlines() if "Rendered by" not in x] == [
+        x for x in page.splitlines() if "Rendered by" not in x
+    ]
 
 
 @pytest.mark.long
 def test_every_format_is_written_and_holds_the_same_figure(cli, two, tmp_path):
     result = cli("leaderboard", two / "anna", two / "ben", "--format", "md,latex,csv,html", "--out", "pages", "-q")
     assert result.exit_code == 0, result.output
-    assert sorted(p.name for p in (tmp_path / "pages").iterdir() if p.is_file()) == ["toyset.csv", "toyset.html", "toyset.md", "toyset.tex"]
+    assert sorted(p.name for p in (tmp_path / "pages").iterdir() if p.is_file()) == [
+        "toyset.csv",
+        "toyset.html",
+        "toyset.md",
+        "toyset.tex",
+    ]
     table = pd.read_csv(tmp_path / "pages/toyset.csv")
     figure = table[table["figure"].eq("ED [m]") & table["row"].eq("hold")].iloc[0]
     assert figure["low"] < figure["value"] < figure["high"]
@@ -114,12 +123,17 @@ def test_every_format_is_written_and_holds_the_same_figure(cli, two, tmp_path):
     assert f"| hold | {shown}<br>" in (tmp_path / "pages/toyset.md").read_text()
     assert rf"hold & \shortstack[r]{{{shown}\\" in (tmp_path / "pages/toyset.tex").read_text()
     html = (tmp_path / "pages/toyset.html").read_text()
-    assert re.search(rf'<th scope="row" class="model" data-by="hold">hold</th>\s*<td[^>]*>16/16</td>\s*<td[^>]*>{shown}<br><small>', html)
+    assert re.search(
+        rf'<th scope="row" class="model" data-by="hold">hold</th>\s*<td[^>]*>16/16</td>\s*<td[^>]*>{shown}<br><small>',
+        html,
+    )
     tags = Tags()
     tags.feed(html)
     assert tags.open == []
     assert not {"img", "link", "iframe"} & set(tags.seen)
-    assert len(json.loads(re.search(r'<script type="application/json">(.*?)</script>', html, re.DOTALL)[1])["runs"]) == 16
+    assert (
+        len(json.loads(re.search(r'<script type="application/json">(.*?)</script>', html, re.DOTALL)[1])["runs"]) == 16
+    )
 
 
 class Tags(HTMLParser):
@@ -148,7 +162,9 @@ def test_a_models_name_cannot_break_the_page_or_the_tables(cli, two, tmp_path):
     name = "<script>alert(1)</script>&_%$#|{}"
     edit_rows(two / "ben", lambda rows: rows.assign(model=name))
     edit_summary(two / "ben", lambda s: s.update(model=name))
-    assert cli("leaderboard", two / "ben", "--no-plots", "-q", "--format", "html,latex", "--out", "pages").exit_code == 0
+    assert (
+        cli("leaderboard", two / "ben", "--no-plots", "-q", "--format", "html,latex", "--out", "pages").exit_code == 0
+    )
     tags = Tags()
     tags.feed((tmp_path / "pages/toyset.html").read_text())
     assert tags.open == []
@@ -195,7 +211,10 @@ def test_verify_passes_what_the_predictions_give_and_names_the_row_that_differs(
     good = cli("leaderboard", two / "anna", two / "ben", "--verify", "--no-plots")
     assert good.exit_code == 0, good.output
     assert "Verified: 32 rows are what the saved predictions give." in good.stdout
-    edit_rows(two / "ben", lambda rows: rows.assign(edh=np.where(rows["run"] == rows["run"].iloc[3], 0.5 * rows["edh"], rows["edh"])))
+    edit_rows(
+        two / "ben",
+        lambda rows: rows.assign(edh=np.where(rows["run"] == rows["run"].iloc[3], 0.5 * rows["edh"], rows["edh"])),
+    )
     run = read_results([two / "ben"]).rows["run"].iloc[3]
     bad = cli("leaderboard", two / "anna", two / "ben", "--verify", "--no-plots", "--out", "none")
     assert bad.exit_code == 1
@@ -234,18 +253,36 @@ def test_verify_counts_a_diverged_run_that_is_called_ok(cli, two):
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda f: edit_summary(f, lambda s: s.update(protocol=2)), "is of protocol 2, this version ranks protocol 1. Run the models again"),
+        (
+            lambda f: edit_summary(f, lambda s: s.update(protocol=2)),
+            "is of protocol 2, this version ranks protocol 1. Run the models again",
+        ),
         (lambda f: edit_summary(f, lambda s: s["task"].update(metric="x")), "this version does not know the task"),
         (lambda f: edit_summary(f, lambda s: s["task"].update(horizon_s=10.0)), "unknown task '"),
-        (lambda f: edit_summary(f, lambda s: s.update(task_key="abc")), "unknown task 'abc'; the task that is written beside it has the key"),
+        (
+            lambda f: edit_summary(f, lambda s: s.update(task_key="abc")),
+            "unknown task 'abc'; the task that is written beside it has the key",
+        ),
         (lambda f: edit_summary(f, lambda s: s.pop("runs")), "an entry of summary.json lacks runs"),
-        (lambda f: edit_summary(f, lambda s: s.update(seed=4)), "rows of toyset mine.py:Still fold 0 seed 0 have no entry in summary.json"),
+        (
+            lambda f: edit_summary(f, lambda s: s.update(seed=4)),
+            "rows of toyset mine.py:Still fold 0 seed 0 have no entry in summary.json",
+        ),
         (lambda f: edit_rows(f, lambda r: pd.concat([r, r.iloc[:1]])), "stands twice"),
-        (lambda f: edit_rows(f, lambda r: r.iloc[1:]), "the runs of the rows are not the scored runs of summary.json (7 and 8)"),
+        (
+            lambda f: edit_rows(f, lambda r: r.iloc[1:]),
+            "the runs of the rows are not the scored runs of summary.json (7 and 8)",
+        ),
         (lambda f: edit_rows(f, lambda r: r.iloc[:8]), "fold 1 seed 0 has an entry in summary.json and no rows"),
-        (lambda f: edit_rows(f, lambda r: r.drop(columns=["cvdm", "parent"])), "rows.parquet lacks the columns parent, cvdm"),
+        (
+            lambda f: edit_rows(f, lambda r: r.drop(columns=["cvdm", "parent"])),
+            "rows.parquet lacks the columns parent, cvdm",
+        ),
         (lambda f: edit_rows(f, lambda r: r.assign(fingerprint="other")), "fingerprint is other in the rows and"),
-        (lambda f: edit_rows(f, lambda r: r.assign(status="fine")), "unknown status 'fine'; accepted: ok, diverged, failed, skipped"),
+        (
+            lambda f: edit_rows(f, lambda r: r.assign(status="fine")),
+            "unknown status 'fine'; accepted: ok, diverged, failed, skipped",
+        ),
         (lambda f: edit_rows(f, lambda r: r.assign(ed=np.nan)), "status 'ok' with ED = nan"),
         (lambda f: edit_rows(f, lambda r: r.assign(status="failed")), "status 'failed' with ED = "),
         (lambda f: edit_rows(f, lambda r: r.assign(ed=-1.0)), "status 'ok' with ED = -1.0"),
@@ -255,8 +292,14 @@ def test_verify_counts_a_diverged_run_that_is_called_ok(cli, two):
         (lambda f: edit_rows(f, lambda r: r.assign(rmse_psi=-0.1)), "status 'ok' with rmse_psi = -0.1"),
         (lambda f: edit_rows(f, lambda r: r.assign(advance_error=-np.inf)), "status 'ok' with advance_error = -inf"),
         (lambda f: edit_rows(f, lambda r: r.assign(ed="x")), "column 'ed' is of type str; accepted: numbers"),
-        (lambda f: edit_rows(f, lambda r: r.assign(fold=r["fold"].astype(str))), "column 'fold' is of type str; accepted: whole numbers"),
-        (lambda f: edit_rows(f, lambda r: r.assign(kind=None)), "column 'kind' is of type object; accepted: text in every row"),
+        (
+            lambda f: edit_rows(f, lambda r: r.assign(fold=r["fold"].astype(str))),
+            "column 'fold' is of type str; accepted: whole numbers",
+        ),
+        (
+            lambda f: edit_rows(f, lambda r: r.assign(kind=None)),
+            "column 'kind' is of type object; accepted: text in every row",
+        ),
         (lambda f: edit_rows(f, lambda r: r.assign(kind="\x1b[2J")), "kind = '\\x1b[2J' holds control characters"),
         (lambda f: edit_rows(f, lambda r: r.assign(fit_s=-1.0)), "fit_s = -1.0; accepted: seconds, at least 0"),
         (lambda f: edit_rows(f, lambda r: r.assign(predict_s=1e-9)), "predict_s is 1e-09 in the rows and"),
@@ -270,22 +313,52 @@ def test_verify_counts_a_diverged_run_that_is_called_ok(cli, two):
         (lambda f: edit_summary(f, lambda s: s["code"].pop("git")), "an entry of summary.json lacks code.git"),
         (lambda f: edit_summary(f, lambda s: s.update(columns=[1, 2])), "columns.0 = 1; accepted: a valid dictionary"),
         (lambda f: edit_summary(f, lambda s: s["columns"].pop()), "columns are not those of task.metrics"),
-        (lambda f: edit_summary(f, lambda s: s["columns"][0].update(label="EDH")), "columns are not those of task.metrics"),
-        (lambda f: edit_summary(f, lambda s: s["task"].update(metrics=["ed"])), "columns are not those of task.metrics: ed, ed_at_10s"),
-        (lambda f: edit_summary(f, lambda s: s["task"].update(horizon_s="20")), "this version does not know the task (task: horizon_s"),
+        (
+            lambda f: edit_summary(f, lambda s: s["columns"][0].update(label="EDH")),
+            "columns are not those of task.metrics",
+        ),
+        (
+            lambda f: edit_summary(f, lambda s: s["task"].update(metrics=["ed"])),
+            "columns are not those of task.metrics: ed, ed_at_10s",
+        ),
+        (
+            lambda f: edit_summary(f, lambda s: s["task"].update(horizon_s="20")),
+            "this version does not know the task (task: horizon_s",
+        ),
         (lambda f: edit_summary(f, lambda s: s["task"].pop("history_s")), "task lacks history_s"),
-        (lambda f: edit_summary(f, lambda s: s.update(run_status=["ok"])), "1 statuses in run_status for 8 scored runs"),
-        (lambda f: edit_summary(f, lambda s: s.update(status="diverged")), "status is 'diverged' in summary.json; its rows make it 'ok'"),
-        (lambda f: edit_summary(f, lambda s: s.update(parameters=-5)), "parameters = -5; accepted: greater than or equal to 0"),
+        (
+            lambda f: edit_summary(f, lambda s: s.update(run_status=["ok"])),
+            "1 statuses in run_status for 8 scored runs",
+        ),
+        (
+            lambda f: edit_summary(f, lambda s: s.update(status="diverged")),
+            "status is 'diverged' in summary.json; its rows make it 'ok'",
+        ),
+        (
+            lambda f: edit_summary(f, lambda s: s.update(parameters=-5)),
+            "parameters = -5; accepted: greater than or equal to 0",
+        ),
         (lambda f: edit_summary(f, lambda s: s.update(dataset="../../x")), "dataset = '../../x' is no name"),
         (lambda f: edit_summary(f, lambda s: s.update(model="\x9b2J")), "model = '\\x9b2J' holds control characters"),
-        (lambda f: edit_summary(f, lambda s: s.update(ship_B=2.0 + s["fold"])), "ship_B of 'toyset' is 2.0; another entry"),
+        (
+            lambda f: edit_summary(f, lambda s: s.update(ship_B=2.0 + s["fold"])),
+            "ship_B of 'toyset' is 2.0; another entry",
+        ),
         (lambda f: (f / "summary.json").write_text("5"), "summary.json is no list of entries"),
         (lambda f: (f / "summary.json").write_text("[5]"), "summary.json: an entry = 5; accepted:"),
-        (lambda f: (f / "summary.json").write_text("[" * 100_000), "summary.json is not valid JSON: it is nested too deeply"),
+        (
+            lambda f: (f / "summary.json").write_text("[" * 100_000),
+            "summary.json is not valid JSON: it is nested too deeply",
+        ),
         (lambda f: [(f / "summary.json").unlink(), os.mkfifo(f / "summary.json")], "summary.json: it is a named pipe"),
-        (lambda f: edit_windows(f, lambda w: w.assign(speed="fast")), "windows.parquet column 'speed' is of type str; accepted: numbers"),
-        (lambda f: edit_windows(f, lambda w: w.assign(speed=np.nan)), "windows.parquet holds values that no window has"),
+        (
+            lambda f: edit_windows(f, lambda w: w.assign(speed="fast")),
+            "windows.parquet column 'speed' is of type str; accepted: numbers",
+        ),
+        (
+            lambda f: edit_windows(f, lambda w: w.assign(speed=np.nan)),
+            "windows.parquet holds values that no window has",
+        ),
         (lambda f: edit_windows(f, lambda w: w.drop(columns="drift")), "windows.parquet lacks the columns drift"),
         (
             lambda f: edit_windows(f, lambda w: pd.concat([w, w.iloc[:1].assign(run="r99")])),
@@ -309,7 +382,10 @@ def test_a_folder_that_contradicts_itself_is_refused_with_its_name(cli, two, spo
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["runs/anna", "runs/anna"], "'hold' on 'toyset', fold 0, seed 0 stands in runs/anna and in runs/anna; leave one of them out."),
+        (
+            ["runs/anna", "runs/anna"],
+            "'hold' on 'toyset', fold 0, seed 0 stands in runs/anna and in runs/anna; leave one of them out.",
+        ),
         (["runs/anna", "--format", "pdf"], "unknown format 'pdf'"),
         (["runs/anna", "--format", ","], "no format is given; accepted: md, latex, csv, html"),
         (["runs/anna", "--baseline", "physics"], "--baseline: data set 'toyset' has no rows of it"),
@@ -330,10 +406,22 @@ def test_what_cannot_be_done_is_one_message(cli, two, arguments, message):
         (lambda f: edit_rows(f, lambda r: r.assign(group="one")), "group is 'one' in the rows, 'r0"),
         (lambda f: edit_rows(f, lambda r: r.assign(edh=1e90)), "edh is 1e+90 in the rows"),
         (lambda f: edit_windows(f, lambda w: w.assign(speed=w["speed"] + 1.0)), "in windows.parquet, "),
-        (lambda f: edit_summary(f, lambda s: s.update(ship_L=60.0)), "ship_L of 'toyset' is 60.0 in summary.json, 50.0 in the data set."),
-        (lambda f: edit_summary(f, lambda s: s.update(ship="queen")), "ship of 'toyset' is queen in summary.json, toy in the data set."),
-        (lambda f: edit_summary(f, lambda s: s["runs"].update(train=s["runs"]["train"] + s["runs"]["test"])), "runs.train of 'toyset', fold 0, is"),
-        (lambda f: edit_summary(f, lambda s: s.update(parameters=3)), "parameters is 3 in summary.json, 0 in the saved model."),
+        (
+            lambda f: edit_summary(f, lambda s: s.update(ship_L=60.0)),
+            "ship_L of 'toyset' is 60.0 in summary.json, 50.0 in the data set.",
+        ),
+        (
+            lambda f: edit_summary(f, lambda s: s.update(ship="queen")),
+            "ship of 'toyset' is queen in summary.json, toy in the data set.",
+        ),
+        (
+            lambda f: edit_summary(f, lambda s: s["runs"].update(train=s["runs"]["train"] + s["runs"]["test"])),
+            "runs.train of 'toyset', fold 0, is",
+        ),
+        (
+            lambda f: edit_summary(f, lambda s: s.update(parameters=3)),
+            "parameters is 3 in summary.json, 0 in the saved model.",
+        ),
     ],
 )
 def test_verify_computes_again_what_is_no_score(cli, two, spoil, message):
@@ -359,10 +447,16 @@ def test_verify_computes_the_reason_of_a_diverged_run_again(cli, two):
         return rows
 
     edit_rows(two / "ben", diverged)
-    edit_summary(two / "ben", lambda s: s["fold"] or s.update(status="diverged", run_status=["ok", "ok", "diverged"] + ["ok"] * 5))
+    edit_summary(
+        two / "ben",
+        lambda s: s["fold"] or s.update(status="diverged", run_status=["ok", "ok", "diverged"] + ["ok"] * 5),
+    )
     result = cli("leaderboard", two / "ben", "--verify", "--no-plots")
     assert result.exit_code == 1
-    assert "the reason is 'it was the weather' in the rows, 'x is nan at t = 6 s after the start' from the predictions." in result.stderr
+    assert (
+        "the reason is 'it was the weather' in the rows, 'x is nan at t = 6 s after the start' from the predictions."
+        in result.stderr
+    )
 
 
 def test_a_failed_model_with_predictions_is_noticed(cli, two):
@@ -372,7 +466,10 @@ def test_a_failed_model_with_predictions_is_noticed(cli, two):
     edit_summary(two / "ben", lambda s: s.update(status="failed", run_status=["failed"] * 8))
     result = cli("leaderboard", two / "ben", "--verify", "--no-plots")
     assert result.exit_code == 1
-    assert "toyset mine.py:Still fold 0 seed 0: status is 'failed' in the rows, and there are predictions." in result.stderr
+    assert (
+        "toyset mine.py:Still fold 0 seed 0: status is 'failed' in the rows, and there are predictions."
+        in result.stderr
+    )
 
 
 @pytest.mark.long
@@ -429,4 +526,6 @@ def test_verify_without_predictions_says_what_it_needs(cli, two):
     shutil.rmtree(two / "ben/cells")
     result = cli("leaderboard", two / "ben", "--verify", "--no-plots")
     assert result.exit_code == 2
-    assert "no saved predictions of toyset mine.py:Still fold 0 seed 0; --verify needs the whole folder" in result.stderr
+    assert (
+        "no saved predictions of toyset mine.py:Still fold 0 seed 0; --verify needs the whole folder" in result.stderr
+    )

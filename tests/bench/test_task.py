@@ -98,11 +98,23 @@ def test_the_key_tells_tasks_apart_by_what_changes_a_score_only():
     key = task().key("data")
     assert task(models=["physics"], seeds=[3], title="x", metrics=["ed"]).key("data") == key
     assert task(dataset="the same data elsewhere").key("data") == key
-    assert len({key, task(folds=3).key("data"), task(horizon_s=60).key("data"), task(fold_seed=1).key("data"), task().key("other")}) == 5
+    assert (
+        len(
+            {
+                key,
+                task(folds=3).key("data"),
+                task(horizon_s=60).key("data"),
+                task(fold_seed=1).key("data"),
+                task().key("other"),
+            }
+        )
+        == 5
+    )
 
 
 def test_a_task_without_the_newer_keys_keeps_its_key():
-    """Rows from before `train_runs` must stay rankable: the key of the paper's task is the one in the committed rows."""
+    """Rows from before `train_runs` must stay rankable: the key of the paper's task is the one in the committed
+    rows."""
     assert load_tasks("paper")[0].key("e102babe79cc29d8") == "ea05ddf8a550"
     assert task(train_runs=8).key("data") != task().key("data")
     assert len({task(split=s).key("data") for s in ("folds", "published", "kind", "speed")}) == 4

@@ -25,7 +25,8 @@ def findings(*lines: str) -> list[Finding]:
         ("[bias]\nr = 0.01", "[runs.a.bias]\nr = 0.02", {"bias": {"r": 0.01}, "runs": {"a": {"bias": {"r": 0.03}}}}),
         ("[delay]\nr = 1.0", "[delay]\nr = 2.0", {"delay": {"r": 3.0}}),
         ("antenna = [1.0, 2.0]", "antenna = [3.0, -2.0]", {"antenna": [4.0, 0.0]}),
-        ("[runs.a]\ncut = [[1.0, 2.0]]", "[runs.a]\ncut = [[1.0, 2.0], [0.0, 0.5]]", {"runs": {"a": {"cut": [[0.0, 0.5], [1.0, 2.0]]}}}),
+        ("[runs.a]\ncut = [[1.0, 2.0]]", "[runs.a]\ncut = [[1.0, 2.0], [0.0, 0.5]]",
+            {"runs": {"a": {"cut": [[0.0, 0.5], [1.0, 2.0]]}}}),
         ('[signs]\nx = "south"', '[signs]\nx = "north"', {"signs": {"x": "north"}}),
     ],
 )  # fmt: skip
@@ -60,7 +61,11 @@ def test_comments_and_order_stay_and_each_old_file_is_kept(tmp_path):
     _, second = write_lines(tmp_path, findings("[scale]\nu = 1.5"))
     assert first is not None
     assert second is not None
-    assert (first.read_text(), first.name, second.name) == (old, "dataset.toml.before-check", "dataset.toml.before-check.2")
+    assert (first.read_text(), first.name, second.name) == (
+        old,
+        "dataset.toml.before-check",
+        "dataset.toml.before-check.2",
+    )
     text = path.read_text()
     assert "# speeds of the log" in text
     assert "# not km/h" in text

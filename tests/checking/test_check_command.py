@@ -1,4 +1,5 @@
-"""`shipbench data check` as a user meets it: what it prints and writes, exit codes, and one message for files that cannot be read."""
+"""`shipbench data check` as a user meets it: what it prints and writes, exit codes, and one message for files that
+cannot be read."""
 
 from __future__ import annotations
 
@@ -82,13 +83,20 @@ def test_json_is_one_document_and_out_holds_a_picture_of_each_finding(tmp_path):
     assert finding["kind"] == "outliers"
     assert finding["evidence"]["samples"] == 4
     assert tomllib.loads(document["lines"]) == tomllib.loads(finding["line"])
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"check.html", "findings.json", "dataset_lines.toml", "01-outliers.png"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {
+        "check.html",
+        "findings.json",
+        "dataset_lines.toml",
+        "01-outliers.png",
+    }
     assert (tmp_path / "out" / "01-outliers.png").read_bytes()[:4] == b"\x89PNG"
     assert json.loads((tmp_path / "out" / "findings.json").read_text()) == document
 
 
 def test_pictures_of_an_earlier_check_do_not_stay(clean, tmp_path):
-    check(write_planted(base_set(SHIP, SEED), BY_NAME["outliers of x"], SEED, tmp_path / "set"), "--out", tmp_path / "out")
+    check(
+        write_planted(base_set(SHIP, SEED), BY_NAME["outliers of x"], SEED, tmp_path / "set"), "--out", tmp_path / "out"
+    )
     check(clean, "--out", tmp_path / "out")
     assert not list((tmp_path / "out").glob("*.png"))
 
@@ -112,7 +120,12 @@ def test_apply_writes_the_lines_keeps_comments_and_the_old_file_and_leaves_nothi
     assert text.startswith("# my ship\n")
     assert tomllib.loads(text)["units"] == {"u": "kn", "v": "kn"}
     assert "0 errors, 0 warnings, 0 notes" in check(folder, "--apply").stdout
-    assert sorted(p.name for p in folder.iterdir()) == ["dataset.toml", "dataset.toml.before-check", "ship.toml", "trajectories.parquet"]
+    assert sorted(p.name for p in folder.iterdir()) == [
+        "dataset.toml",
+        "dataset.toml.before-check",
+        "ship.toml",
+        "trajectories.parquet",
+    ]
 
 
 def test_apply_on_a_registered_set_exits_2():
@@ -163,7 +176,9 @@ def test_a_table_that_cannot_be_read_exits_2_with_one_message_and_writes_nothing
 @pytest.mark.parametrize(
     ("file", "content"),
     [("dataset.toml", b"\xff\xfe\x00"), ("dataset.toml", b""), ("dataset.toml", b"name = "), ("ship.toml", b'L = "x"'),
-     ("dataset.toml", b'name = "a"\ndt = 0\nactuators = "measured"'), ("dataset.toml", b'name = "a"\ndt = 1e9999\nactuators = "measured"')],
+     ("dataset.toml", b'name = "a"\ndt = 0\nactuators = "measured"'),
+     ("dataset.toml", b'name = "a"\ndt = 1e9999\n'
+                      b'actuators = "measured"')],
 )  # fmt: skip
 def test_a_description_that_cannot_be_read_exits_2(file, content, table, folder, tmp_path):
     path = folder(table.head(50))
@@ -194,7 +209,11 @@ def test_a_table_that_ends_inside_a_row_is_a_finding_of_that_row(table, folder):
 
 
 def test_a_ship_that_never_moves_is_no_fault(table, folder):
-    still = table.assign(**dict.fromkeys(("x", "y", "psi", "u", "v", "r", "n", "n_c", "delta", "delta_c", "F_b", "F_s", "F_b_c", "F_s_c"), 0.0))
+    still = table.assign(
+        **dict.fromkeys(
+            ("x", "y", "psi", "u", "v", "r", "n", "n_c", "delta", "delta_c", "F_b", "F_s", "F_b_c", "F_s_c"), 0.0
+        )
+    )
     assert "0 errors, 0 warnings, 0 notes" in check(folder(still)).stdout
 
 
@@ -240,7 +259,9 @@ def test_names_on_the_page_stay_text(table, folder, tmp_path):
     jumped.loc[jumped.index[names == odd][60:], "psi"] += 0.3
     path = folder(jumped.to_csv(index=False).encode())
     toml = path / "dataset.toml"
-    toml.write_text("licence = '<script>alert(2)</script>'\n" + re.sub(r"^licence = .*$", "", toml.read_text(), flags=re.MULTILINE))
+    toml.write_text(
+        "licence = '<script>alert(2)</script>'\n" + re.sub(r"^licence = .*$", "", toml.read_text(), flags=re.MULTILINE)
+    )
     page = page_of(path, tmp_path / "out")
     assert "<script>alert" not in page
     assert "&lt;/script&gt;&lt;script&gt;alert(1)" in page

@@ -18,11 +18,14 @@ from shipbench.suites.checks.suite import apply_lines
 SHARED = Path(__file__).parents[3] / "shared" / "data" / "esso-osaka-frt"
 FILES = sorted(SHARED.glob("*/*.csv.gz"))
 COLUMNS = {
-    "t [s]": "t", "x_position_mid [m]": "x", "y_position_mid [m]": "y", "psi_hat [rad]": "psi", "u_velo [m/s]": "u", "vm_velo [m/s]": "v",
+    "t [s]": "t", "x_position_mid [m]": "x", "y_position_mid [m]": "y", "psi_hat [rad]": "psi", "u_velo [m/s]": "u",
+    "vm_velo [m/s]": "v",
     "r_angvelo [rad/s]": "r", "n_prop [rps]": "n", "delta_rudder [rad]": "delta", "wind_velo_true [m/s]": "wind_speed",
     "wind_dir_true [rad]": "wind_from",
 }  # fmt: skip
-pytestmark = pytest.mark.skipif(not FILES, reason="the Esso Osaka data are not here (non-commercial licence): shipbench data get esso_osaka")
+pytestmark = pytest.mark.skipif(
+    not FILES, reason="the Esso Osaka data are not here (non-commercial licence): shipbench data get esso_osaka"
+)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +34,9 @@ def folder(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("esso")
     table = pd.concat([pd.read_csv(f).assign(trajectory=f.name.removesuffix(".csv.gz")) for f in FILES])
     table.to_parquet(path / "trajectories.parquet", index=False)
-    (path / "dataset.toml").write_text(tomli_w.dumps({"name": "raw", "dt": 0.1, "actuators": "measured", "columns": COLUMNS}))
+    (path / "dataset.toml").write_text(
+        tomli_w.dumps({"name": "raw", "dt": 0.1, "actuators": "measured", "columns": COLUMNS})
+    )
     (path / "ship.toml").write_text(SHIP.to_toml())
     return path
 
@@ -102,11 +107,20 @@ def test_the_heading_is_wrapped_and_the_rudder_coarse(found):
 def test_what_is_right_is_not_called_wrong(found):
     """Units and signs of all but n, the frame, the wind, the reference of the heading, and ground for water."""
     assert [f.channels for f in found if f.kind in ("unit", "sign", "sign and unit", "unit and sign")] == [("n",)]
-    assert not {f.kind for f in found} & {"ENU", "heading from east", "earth-fixed velocities", "through water", "wind to", "heading bias", "scale"}
+    assert not {f.kind for f in found} & {
+        "ENU",
+        "heading from east",
+        "earth-fixed velocities",
+        "through water",
+        "wind to",
+        "heading bias",
+        "scale",
+    }
 
 
 def test_the_lines_heal(folder, found, tmp_path):
-    """What the loader refused it loads, and of the quirks only single outliers of the satellite position are left to a second look."""
+    """What the loader refused it loads, and of the quirks only single outliers of the satellite position are left to a
+    second look."""
     again = tmp_path / "healed"
     again.mkdir()
     for name in ("trajectories.parquet", "dataset.toml", "ship.toml"):

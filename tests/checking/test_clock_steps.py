@@ -1,4 +1,5 @@
-"""A clock that is set back or ahead while the log goes on is named as that where the motion shows it; a gap and a jump are not."""
+"""A clock that is set back or ahead while the log goes on is named as that where the motion shows it; a gap and a jump
+are not."""
 
 from __future__ import annotations
 

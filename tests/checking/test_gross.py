@@ -1,4 +1,5 @@
-"""Frames, hemispheres and earth-fixed velocities are named as such, and not as other errors that explain the same track."""
+"""Frames, hemispheres and earth-fixed velocities are named as such, and not as other errors that explain the same
+track."""
 
 from __future__ import annotations
 
@@ -42,7 +43,10 @@ def test_speeds_and_shaft_that_count_astern_are_not_taken_for_it(clean):
     def reverse(S: np.ndarray) -> None:
         S[:, [U, V]] *= -1.0
 
-    assert {(f.kind, f.channels) for f in check_dataset(changed(clean, reverse))} == {("sign", ("u",)), ("sign", ("v",))}
+    assert {(f.kind, f.channels) for f in check_dataset(changed(clean, reverse))} == {
+        ("sign", ("u",)),
+        ("sign", ("v",)),
+    }
 
 
 def small_turns(S: np.ndarray) -> None:
@@ -56,7 +60,9 @@ def small_turns(S: np.ndarray) -> None:
 
 def test_earth_fixed_velocities_on_small_turns_are_not_a_heading_in_degrees(clean):
     data = changed(clean, small_turns)
-    one_second = replace(data, dt=1.0, runs=tuple(replace(run, t=np.arange(len(run), dtype=float)) for run in data.runs))
+    one_second = replace(
+        data, dt=1.0, runs=tuple(replace(run, t=np.arange(len(run), dtype=float)) for run in data.runs)
+    )
     found = [f for f in check_dataset(one_second) if "psi" in f.channels or "u" in f.channels]
     assert [f.line for f in found] == ['velocities = "earth"']
 
@@ -77,4 +83,6 @@ def test_shaft_alone_reversed_is_still_found(clean):
     def reverse(S: np.ndarray) -> None:
         S[:, N] *= -1.0
 
-    assert [(f.kind, f.channels) for f in check_dataset(changed(clean, reverse)) if f.kind == "sign" and "n" in f.channels] == [("sign", ("n",))]
+    assert [
+        (f.kind, f.channels) for f in check_dataset(changed(clean, reverse)) if f.kind == "sign" and "n" in f.channels
+    ] == [("sign", ("n",))]

@@ -35,13 +35,20 @@ def test_held_fixes_are_named_also_where_latitude_and_longitude_come_in_turn(eve
 
 def test_positions_in_whole_metres_are_not_held():
     data = base_set("container130", 311)
-    coarse = data.with_runs([replace(run, states=np.hstack([np.round(run.states[:, :2] / 5.0) * 5.0, run.states[:, 2:]])) for run in data.runs])
+    coarse = data.with_runs(
+        [
+            replace(run, states=np.hstack([np.round(run.states[:, :2] / 5.0) * 5.0, run.states[:, 2:]]))
+            for run in data.runs
+        ]
+    )
     assert "held fixes" not in {f.kind for f in check_dataset(coarse)}
 
 
 def test_straight_lines_go_from_fix_to_fix_and_a_rest_stays_a_rest():
     values = np.repeat([0.0, 1.0, 3.0, 3.0, 3.0, 5.0, 6.0], 4)
-    expected = np.concatenate([np.interp(np.arange(16), [0, 4, 8, 16], [0, 1, 3, 3]), np.interp(np.arange(12), [0, 4, 11], [3, 5, 6.75])])
+    expected = np.concatenate(
+        [np.interp(np.arange(16), [0, 4, 8, 16], [0, 1, 3, 3]), np.interp(np.arange(12), [0, 4, 11], [3, 5, 6.75])]
+    )
     assert between_fixes(values)[:24] == pytest.approx(expected[:24], abs=0.76)
     assert between_fixes(values)[8:17] == pytest.approx(np.full(9, 3.0))
     assert between_fixes(np.arange(5.0)) == pytest.approx(np.arange(5.0))

@@ -1,4 +1,5 @@
-"""A block of a value that stands for "not available" is cut as a whole; standstills, steps and rounded records are no such blocks."""
+"""A block of a value that stands for "not available" is cut as a whole; standstills, steps and rounded records are no
+such blocks."""
 
 from __future__ import annotations
 
@@ -22,7 +23,15 @@ def with_block(data: Dataset, channels: list[int], value: float, first: int, las
 
 @pytest.mark.parametrize(
     ("channels", "value"),
-    [([PSI], np.deg2rad(511.0)), ([U], 102.3 * 0.5144), ([U], -999.0), ([R], 9999.0), ([DELTA], np.deg2rad(-128.0)), ([X, Y], 0.0), ([X, Y], 1e7)],
+    [
+        ([PSI], np.deg2rad(511.0)),
+        ([U], 102.3 * 0.5144),
+        ([U], -999.0),
+        ([R], 9999.0),
+        ([DELTA], np.deg2rad(-128.0)),
+        ([X, Y], 0.0),
+        ([X, Y], 1e7),
+    ],
 )
 def test_the_cut_covers_the_whole_block(channels, value):
     data = base_set("container130", 311)
@@ -50,6 +59,9 @@ def test_a_channel_that_freezes_at_its_last_value_is_no_placeholder():
 
 def test_a_rudder_in_degrees_held_hard_over_is_a_unit_and_no_placeholder():
     data = base_set("container130", 311)
-    runs = [replace(run, states=np.where(np.arange(run.states.shape[1]) == DELTA, np.rad2deg(run.states), run.states)) for run in data.runs]
+    runs = [
+        replace(run, states=np.where(np.arange(run.states.shape[1]) == DELTA, np.rad2deg(run.states), run.states))
+        for run in data.runs
+    ]
     kinds = {(f.kind, f.channels) for f in check_dataset(data.with_runs(runs)) if "delta" in f.channels}
     assert kinds == {("unit", ("delta",))}

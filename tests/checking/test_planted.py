@@ -1,4 +1,5 @@
-"""Every planted fault is found, its lines heal it, a second check and clean sets are silent. `shipbench suite check` does it on more sets."""
+"""Every planted fault is found, its lines heal it, a second check and clean sets are silent. `shipbench suite check`
+does it on more sets."""
 
 from __future__ import annotations
 
@@ -39,7 +40,9 @@ def case(tmp_path_factory) -> Callable[[str], tuple[Outcome, Path]]:
     return get
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.long] if i % 3 else []) for i, name in enumerate(BY_NAME)])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.long] if i % 3 else []) for i, name in enumerate(BY_NAME)]
+)
 def test_a_planted_fault_is_found_and_healed(name: str, case):
     outcome, _ = case(name)
     assert outcome.found
@@ -57,16 +60,21 @@ def test_a_clean_set_gives_no_finding_from_its_files(tmp_path):
     assert found == []
 
 
-@pytest.mark.parametrize("kind", ["MMG ships, no noise, calm", "MMG ships, wind recorded", "MMG ships under real effects"])
+@pytest.mark.parametrize(
+    "kind", ["MMG ships, no noise, calm", "MMG ships, wind recorded", "MMG ships under real effects"]
+)
 def test_what_is_real_is_no_fault(kind: str):
     make = [make for k, make in clean_sets([SEED]) if k == kind][-1]
     assert check_dataset(replace(make(), simulation=None)) == []
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["MMG ships, rounded", pytest.param("port manoeuvres, rounded", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "kind", ["MMG ships, rounded", pytest.param("port manoeuvres, rounded", marks=pytest.mark.long)]
+)
 def test_values_that_repeat_themselves_for_their_last_digit_are_no_fault(kind: str):
-    """Where there is little noise, a yaw rate in steps of a degree a minute stands still for half a minute, and runs agree for some samples."""
+    """Where there is little noise, a yaw rate in steps of a degree a minute stands still for half a minute, and runs
+    agree for some samples."""
     for make in [make for k, make in clean_sets([SEED]) if k == kind]:
         assert check_dataset(replace(make(), simulation=None)) == []
 
@@ -95,7 +103,8 @@ def test_the_side_of_the_rudder_shows_in_a_single_log(sign: float, seed: int):
 
 
 def test_a_rudder_that_answers_the_motion_on_a_straight_course_does_not_seem_to_lie_on_the_other_side():
-    """A ship of Nomoto's first order in gusts and waves, whose autopilot works against the yaw rate: just after a rudder she turns against it."""
+    """A ship of Nomoto's first order in gusts and waves, whose autopilot works against the yaw rate: just after a
+    rudder she turns against it."""
     rng = np.random.default_rng(SEED)
     S = np.zeros((3600, len(STATES)))
     gust = psi = r = delta = 0.0
@@ -107,21 +116,28 @@ def test_a_rudder_that_answers_the_motion_on_a_straight_course_does_not_seem_to_
         state[[PSI, U, R, N, DELTA]] = psi, 7.0, r + 0.002 * np.sin(0.45 * k), 100.0, delta
     S[:, X], S[:, Y] = np.cumsum(7.0 * np.cos(S[:, PSI])), np.cumsum(7.0 * np.sin(S[:, PSI]))
     data = base_set(SHIP, SEED)
-    logs = [replace(data.runs[0], id=f"log{i}", t=np.arange(300.0), states=part, inputs=part[:, N:]) for i, part in enumerate(np.split(S, 12))]
+    logs = [
+        replace(data.runs[0], id=f"log{i}", t=np.arange(300.0), states=part, inputs=part[:, N:])
+        for i, part in enumerate(np.split(S, 12))
+    ]
     assert np.rad2deg(np.std(S[:, DELTA])) > 1.0
     assert "sign" not in [f.kind for f in check_dataset(data.with_runs(logs))]
 
 
 @pytest.mark.parametrize(
     "name",
-    ["heading in degrees", "heading in degrees, 0 to 360", "rudder in degrees", "yaw rate in deg/min", "speeds in knots", "revolutions in rev/s",
-     "rudder sign", "west positive", "x east, y north", "ENU, v and r ours", "heading from east", "velocities north, east", "velocities east, north"],
+    ["heading in degrees", "heading in degrees, 0 to 360", "rudder in degrees", "yaw rate in deg/min",
+        "speeds in knots", "revolutions in rev/s",
+     "rudder sign", "west positive", "x east, y north", "ENU, v and r ours", "heading from east",
+     "velocities north, east", "velocities east, north"],
 )  # fmt: skip
 def test_healed_gross_errors_give_the_clean_samples(name: str, case):
     clean, loaded = base_set(SHIP, SEED), read_dataset(case(name)[1])
     for a, b in zip(clean.runs, loaded.runs, strict=True):
         turn = 2.0 * np.pi * np.round((b.states[0, PSI] - a.states[0, PSI]) / (2.0 * np.pi))
-        np.testing.assert_allclose(b.states - turn * (np.arange(len(STATES)) == PSI), a.states, rtol=1e-5, atol=1e-6 * np.max(np.abs(a.states)))
+        np.testing.assert_allclose(
+            b.states - turn * (np.arange(len(STATES)) == PSI), a.states, rtol=1e-5, atol=1e-6 * np.max(np.abs(a.states))
+        )
 
 
 @pytest.mark.parametrize("name", [n for n, fault in BY_NAME.items() if fault.wind])
@@ -132,31 +148,46 @@ def test_healed_wind_is_the_true_one(name: str, case):
         np.testing.assert_allclose(read, true, atol=1e-6)
 
 
-@pytest.mark.parametrize(("wrong", "right"), [({"wind": "apparent"}, "wind = "), ({"signs": {"wind_from": "to"}}, "clockwise")])
+@pytest.mark.parametrize(
+    ("wrong", "right"), [({"wind": "apparent"}, "wind = "), ({"signs": {"wind_from": "to"}}, "clockwise")]
+)
 def test_a_declaration_that_makes_the_wind_wrong_is_what_the_finding_speaks_of(wrong: dict, right: str, tmp_path):
-    folder = write_planted(base_set(SHIP, SEED, wind=True), Fault("declared", lambda p: p.toml.update(wrong), []), SEED, tmp_path / "set")
+    folder = write_planted(
+        base_set(SHIP, SEED, wind=True), Fault("declared", lambda p: p.toml.update(wrong), []), SEED, tmp_path / "set"
+    )
     (finding,) = check_path(str(folder))[1]
     assert finding.channels[-1] == "wind_from"
     assert right in finding.line + finding.todo
 
 
 def test_a_kind_of_wind_without_a_wind_is_refused(tmp_path):
-    folder = write_planted(base_set(SHIP, SEED), Fault("declared", lambda p: p.toml.update(wind="apparent"), []), SEED, tmp_path / "set")
+    folder = write_planted(
+        base_set(SHIP, SEED), Fault("declared", lambda p: p.toml.update(wind="apparent"), []), SEED, tmp_path / "set"
+    )
     with pytest.raises(InputError, match="needs the columns wind_speed and wind_from"):
         read_dataset(folder)
 
 
 @pytest.mark.parametrize(
     ("name", "channel", "within"),
-    [("speeds 8 % high", U, 0.08), ("heading bias", PSI, np.deg2rad(0.5)), ("yaw rate bias", R, np.deg2rad(0.01)), ("speeds through water", V, 0.12)],
+    [
+        ("speeds 8 % high", U, 0.08),
+        ("heading bias", PSI, np.deg2rad(0.5)),
+        ("yaw rate bias", R, np.deg2rad(0.01)),
+        ("speeds through water", V, 0.12),
+    ],
 )
 def test_healed_biases_are_the_clean_samples_to_within_their_error(name: str, channel: int, within: float, case):
     clean, loaded = base_set(SHIP, SEED), read_dataset(case(name)[1])
-    off = np.concatenate([b.states[:, channel] - a.states[:, channel] for a, b in zip(clean.runs, loaded.runs, strict=True)])
+    off = np.concatenate(
+        [b.states[:, channel] - a.states[:, channel] for a, b in zip(clean.runs, loaded.runs, strict=True)]
+    )
     assert np.sqrt(np.mean(off**2)) < within
 
 
-@pytest.mark.parametrize(("name", "channel", "seconds"), [("yaw rate late", R, 3.0), ("position late", X, 3.0), ("rudder late", DELTA, 5.0)])
+@pytest.mark.parametrize(
+    ("name", "channel", "seconds"), [("yaw rate late", R, 3.0), ("position late", X, 3.0), ("rudder late", DELTA, 5.0)]
+)
 def test_healed_lags_are_the_planted_ones(name: str, channel: int, seconds: float, case):
     delay = tomllib.loads((case(name)[1] / "dataset.toml").read_text())["delay"]
     assert delay[STATES[channel]] == pytest.approx(seconds * (base_set(SHIP, SEED).ship.L / 130.0) ** 0.5, rel=0.2)

@@ -1,4 +1,5 @@
-"""A log that reads nothing where the ship makes way is told and replaced by the track; a ship that stops, or drifts with the water, is neither."""
+"""A log that reads nothing where the ship makes way is told and replaced by the track; a ship that stops, or drifts
+with the water, is neither."""
 
 from __future__ import annotations
 
@@ -35,7 +36,8 @@ def silent(data: Dataset, share: float = 0.3) -> Dataset:
 
 
 def drifting(slowly: float, water: tuple[float, float], noise: float = 0.02) -> Dataset:
-    """Ships of 130 m that hardly move through water which does: speeds are through water, positions over ground; noise: of the log [m/s]."""
+    """Ships of 130 m that hardly move through water which does: speeds are through water, positions over ground; noise:
+    of the log [m/s]."""
     plan, t, runs = trials(), np.arange(200.0), []
     for i, run in enumerate(plan.runs):
         rng = np.random.default_rng(i)
@@ -50,7 +52,9 @@ def drifting(slowly: float, water: tuple[float, float], noise: float = 0.02) -> 
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("ship", "noise", "share"), [("container130", 1.0, 0.3), ("kcs", 1.0, 0.5), ("kvlcc2_l7", 0.0, 0.3)])
+@pytest.mark.parametrize(
+    ("ship", "noise", "share"), [("container130", 1.0, 0.3), ("kcs", 1.0, 0.5), ("kvlcc2_l7", 0.0, 0.3)]
+)
 def test_it_is_told_on_ships_of_any_size(ship, noise, share):
     data = trials(ship, noise)
     assert silence(data) is None
@@ -61,7 +65,10 @@ def test_it_is_told_on_ships_of_any_size(ship, noise, share):
 
 
 def test_runs_of_a_few_samples_tell_nothing_and_hinder_nothing():
-    short = [replace(run, id=f"{run.id}-short", t=run.t[:3], states=run.states[:3], inputs=run.inputs[:3]) for run in trials().runs]
+    short = [
+        replace(run, id=f"{run.id}-short", t=run.t[:3], states=run.states[:3], inputs=run.inputs[:3])
+        for run in trials().runs
+    ]
     assert silence(trials().with_runs(short)) is None
     whole = silent(trials())
     assert silence(whole.with_runs([*whole.runs, *short])).pieces == silence(whole).pieces
@@ -93,7 +100,9 @@ def test_the_diagnosis_takes_the_speeds_of_the_track():
     assert line.startswith("u and v read nothing (below ")
     assert line.endswith("u and v are taken from the positions in all runs instead.")
     assert mended.derived == ("u", "v")
-    error = np.concatenate([a.states[10:-10, U] - b.states[10:-10, U] for a, b in zip(mended.runs, trials(noise=0.0).runs, strict=True)])
+    error = np.concatenate(
+        [a.states[10:-10, U] - b.states[10:-10, U] for a, b in zip(mended.runs, trials(noise=0.0).runs, strict=True)]
+    )
     assert np.sqrt(np.mean(error**2)) < 0.1
     verdict = diagnose(silent(data), gain=False)
     assert (verdict.verdict, verdict.causes) == ("none", ())

@@ -1,4 +1,5 @@
-"""An actuator that never moves is spoken of where only it can do what the ship does; not where she coasts, drifts or is held in a turn."""
+"""An actuator that never moves is spoken of where only it can do what the ship does; not where she coasts, drifts or is
+held in a turn."""
 
 from __future__ import annotations
 

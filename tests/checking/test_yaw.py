@@ -1,4 +1,5 @@
-"""A yaw rate of another channel is called unrelated; no scale, lag or bias that explains nothing is told, nor one of a derived channel."""
+"""A yaw rate of another channel is called unrelated; no scale, lag or bias that explains nothing is told, nor one of a
+derived channel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""A stranger's model that keeps every rule, and one for each way to break one; the test copies this file to where the user's would be."""
+"""A stranger's model that keeps every rule, and one for each way to break one; the test copies this file to where the
+user's would be."""
 
 import json
 import pickle

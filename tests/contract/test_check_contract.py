@@ -1,4 +1,5 @@
-"""`shipbench check`: a model that keeps the contract passes, and each way to break a rule is found by exactly that rule."""
+"""`shipbench check`: a model that keeps the contract passes, and each way to break a rule is found by exactly that
+rule."""
 
 from __future__ import annotations
 
@@ -27,13 +28,19 @@ STRANGERS = Path(__file__).with_name("strangers.py")
 BROKEN_BY = {
     "FitRaises": "fit", "TakesAnything": "parameters", "IgnoresItsParameter[lag=20.0]": "parameters",
     "ForgetsItsParameterInFit[lag=20.0]": "parameters", "ReturnsNothing": "fit_returns", "NeedsValid": "valid_optional",
-    "CentresTheData": "fit_inputs", "NeedsHistory": "history", "KnowsNoHistory": "history", "GivesS0Too": "shape", "GivesNaN": "shape",
-    "OnlyTheTrainedHorizon": "shape", "GivesLists": "dtype", "RefusesFloat32": "dtype", "OneStepLate": "start", "Counts": "repeatable",
-    "DrawsWhenAsked": "repeatable", "WritesIntoS0": "predict_inputs", "WritesIntoHistory": "predict_inputs", "NeedsABatch": "single_run",
-    "MixesTheBatch": "batch", "KnowsItsPlaceInTheBatch": "batch", "SeesTheNextOrder": "causality", "ScalesByTheWholeHorizon": "causality",
-    "WrapsItsHeading": "heading", "KnowsItsHarbour": "translation", "PrefersNorth": "rotation", "IgnoresItsSeed": "seed",
+    "CentresTheData": "fit_inputs", "NeedsHistory": "history", "KnowsNoHistory": "history", "GivesS0Too": "shape",
+    "GivesNaN": "shape",
+    "OnlyTheTrainedHorizon": "shape", "GivesLists": "dtype", "RefusesFloat32": "dtype", "OneStepLate": "start",
+    "Counts": "repeatable",
+    "DrawsWhenAsked": "repeatable", "WritesIntoS0": "predict_inputs", "WritesIntoHistory": "predict_inputs",
+    "NeedsABatch": "single_run",
+    "MixesTheBatch": "batch", "KnowsItsPlaceInTheBatch": "batch", "SeesTheNextOrder": "causality",
+    "ScalesByTheWholeHorizon": "causality",
+    "WrapsItsHeading": "heading", "KnowsItsHarbour": "translation", "PrefersNorth": "rotation",
+    "IgnoresItsSeed": "seed",
     "DrawsFromTheGlobalGenerator": "seed", "RaisesWhenItDiverges": "diverging", "StopsAllWhenOneDiverges": "diverging",
-    "HidesNaN": "not_finite", "SpreadsNaN": "not_finite", "TripsOverNaN": "not_finite", "Pickles": "saved", "PicklesInsideNpz": "saved",
+    "HidesNaN": "not_finite", "SpreadsNaN": "not_finite", "TripsOverNaN": "not_finite", "Pickles": "saved",
+    "PicklesInsideNpz": "saved",
     "RoundsWhenSaved": "saved", "CannotLoad": "saved",
 }  # fmt: skip
 
@@ -94,7 +101,14 @@ def test_a_saved_model_is_checked_without_a_fit(tmp_path, data):
     make_predictor(parse_spec("hold")).fit(data).save(tmp_path / "m")
     report = check_model(str(tmp_path / "m"))
     assert report.of(BROKEN) == []
-    assert {v.rule for v in report.of(NOT_APPLICABLE)} == {"fit", "parameters", "fit_returns", "valid_optional", "fit_inputs", "seed"}
+    assert {v.rule for v in report.of(NOT_APPLICABLE)} == {
+        "fit",
+        "parameters",
+        "fit_returns",
+        "valid_optional",
+        "fit_inputs",
+        "seed",
+    }
 
 
 def test_a_saved_model_with_measured_wind_gets_wind(tmp_path):
@@ -130,9 +144,12 @@ def test_json_is_one_document_and_nothing_else(stranger):
 @pytest.mark.parametrize(
     ("spec", "says"),
     [
-        ("lstn", "Did you mean 'lstm'"), ("nowhere.py:Model", "does not exist"), ("hold[x=1]", "has no parameter"), ("mlp[", "cannot be read"),
-        ("{file}:Nobody", "unknown class"), ("{spoiled}:Model", "cannot be made: SyntaxError"), ("{file}:Path", "has no method fit"),
-        ("mlp:Ridge", "'mlp' takes no ':Ridge'"), ("sklearn", "names no regressor"), ("sklearn:Rigde", "Did you mean 'Ridge'"),
+        ("lstn", "Did you mean 'lstm'"), ("nowhere.py:Model", "does not exist"), ("hold[x=1]", "has no parameter"),
+        ("mlp[", "cannot be read"),
+        ("{file}:Nobody", "unknown class"), ("{spoiled}:Model", "cannot be made: SyntaxError"),
+        ("{file}:Path", "has no method fit"),
+        ("mlp:Ridge", "'mlp' takes no ':Ridge'"), ("sklearn", "names no regressor"),
+        ("sklearn:Rigde", "Did you mean 'Ridge'"),
         ("sklearn:Ridge[alhpa=1]", "Did you mean 'alpha'"), ("sklearn:StackingRegressor", "needs no other estimator"),
     ],
 )  # fmt: skip
@@ -145,7 +162,9 @@ def test_bad_input_is_one_message_and_exit_code_two(stranger, tmp_path, spec, sa
 
 
 def test_the_oracle_is_not_checked_on_data_that_were_not_simulated(data):
-    with pytest.raises(InputError, match="cannot be checked here: data set 'small_harbour' was not made by this simulator"):
+    with pytest.raises(
+        InputError, match="cannot be checked here: data set 'small_harbour' was not made by this simulator"
+    ):
         check_model("oracle", small_harbour(inputs=("n_c", "delta_c", "F_b_c", "F_s_c", "depth")))
 
 
@@ -164,5 +183,10 @@ def test_pickles_are_told_from_other_files_without_reading_them_in():
     for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
         assert pickle_in("a.bin", pickle.dumps([1.5, "x"], protocol))
     assert pickle_in("model.pt", packed.getvalue()) == "model.pt: archive/data.pkl is a pickle"
-    for name, harmless in (("a.json", b'{"a": 1}'), ("a.txt", b"1.5\n2.5\n"), ("a.npz", arrays.getvalue()), ("empty", b"")):
+    for name, harmless in (
+        ("a.json", b'{"a": 1}'),
+        ("a.txt", b"1.5\n2.5\n"),
+        ("a.npz", arrays.getvalue()),
+        ("empty", b""),
+    ):
         assert pickle_in(name, harmless) == "", name

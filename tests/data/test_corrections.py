@@ -1,4 +1,5 @@
-"""What dataset.toml says of frames, clocks, biases, bad samples and gaps is applied by the loader, and what it cannot mean is refused."""
+"""What dataset.toml says of frames, clocks, biases, bad samples and gaps is applied by the loader, and what it cannot
+mean is refused."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ __all__ = ["toy_folder"]  # a fixture
 
 @pytest.fixture
 def load(toy_folder) -> Callable[..., Dataset]:
-    """Loads the toy folder with a changed table and lines added to dataset.toml; `load.clean` is the set without either."""
+    """Loads the toy folder with a changed table and lines added to dataset.toml; `load.clean` is the set without
+    either."""
     folder: Path = toy_folder(runs=2)
     path = next(folder.glob("trajectories*"))
     table = pd.read_csv(path)
@@ -52,17 +54,25 @@ def test_frames(load):
 
 def test_velocities_in_earth_axes(load):
     def turned(t: pd.DataFrame) -> pd.DataFrame:
-        north, east = np.cos(t["psi"]) * t["u"] - np.sin(t["psi"]) * t["v"], np.sin(t["psi"]) * t["u"] + np.cos(t["psi"]) * t["v"]
+        north, east = (
+            np.cos(t["psi"]) * t["u"] - np.sin(t["psi"]) * t["v"],
+            np.sin(t["psi"]) * t["u"] + np.cos(t["psi"]) * t["v"],
+        )
         return t.assign(u=north, v=east)
 
     assert_same(load('velocities = "earth"', turned), load.clean)
-    assert_same(load('velocities = "earth-east-north"', lambda t: turned(t).assign(u=turned(t)["v"], v=turned(t)["u"])), load.clean)
+    assert_same(
+        load('velocities = "earth-east-north"', lambda t: turned(t).assign(u=turned(t)["v"], v=turned(t)["u"])),
+        load.clean,
+    )
 
 
 def test_a_current_of_all_runs_and_of_one(load):
     loaded = load('velocities = "water"\ncurrent = [0.3, -0.2]\nruns.r01.current = [0.0, 0.5]')
     for run, clean, (north, east) in zip(loaded.runs, load.clean.runs, ((0.3, -0.2), (0.0, 0.5)), strict=True):
-        added = (run.states[:, U] - clean.states[:, U] + 1j * (run.states[:, V] - clean.states[:, V])) * np.exp(1j * clean.states[:, PSI])
+        added = (run.states[:, U] - clean.states[:, U] + 1j * (run.states[:, V] - clean.states[:, V])) * np.exp(
+            1j * clean.states[:, PSI]
+        )
         np.testing.assert_allclose(added, north + 1j * east, atol=1e-9)
 
 
@@ -89,15 +99,23 @@ def test_a_delay_is_undone_and_costs_its_samples_at_the_end(load):
 
 
 def test_a_late_command_moves_by_whole_samples(load):
-    loaded = load("delay.delta_c = 2.3", lambda t: t.assign(delta_c=t.groupby("trajectory")["delta_c"].shift(2).bfill()))
+    loaded = load(
+        "delay.delta_c = 2.3", lambda t: t.assign(delta_c=t.groupby("trajectory")["delta_c"].shift(2).bfill())
+    )
     for run, clean in zip(loaded.runs, load.clean.runs, strict=True):
-        np.testing.assert_array_equal(run.inputs[:, COMMANDS.index("delta_c")], clean.inputs[: len(run), COMMANDS.index("delta_c")])
+        np.testing.assert_array_equal(
+            run.inputs[:, COMMANDS.index("delta_c")], clean.inputs[: len(run), COMMANDS.index("delta_c")]
+        )
 
 
 def test_fill_bridges_and_cut_splits_into_pieces_of_one_group(load):
     spoilt = load("runs.r00.fill.delta = [[5.0, 6.0]]\nruns.r01.cut = [[10.0, 12.0]]")
     np.testing.assert_allclose(np.diff(spoilt.runs[0].states[4:8, DELTA], n=2), 0.0, atol=1e-12)
-    assert [(run.id, len(run), run.meta.get("group")) for run in spoilt.runs] == [("r00", 41, None), ("r01#1", 10, "r01"), ("r01#2", 28, "r01")]
+    assert [(run.id, len(run), run.meta.get("group")) for run in spoilt.runs] == [
+        ("r00", 41, None),
+        ("r01#1", 10, "r01"),
+        ("r01#2", 28, "r01"),
+    ]
 
 
 def test_gaps_split_and_no_delay_reaches_over_them(load):
@@ -127,10 +145,13 @@ def test_a_set_written_again_is_not_corrected_twice(load, tmp_path):
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
-        ("bias.speed = 1.0", "signal in [bias]"), ("scale.u = 0.0", "other than 0"), ("scale.u = 1e300", "within 1e-09 to 1e+09"),
+        ("bias.speed = 1.0", "signal in [bias]"), ("scale.u = 0.0", "other than 0"),
+        ("scale.u = 1e300", "within 1e-09 to 1e+09"),
         ("bias.x = -1e300", "within 0 to 1e+09"), ("delay.r = inf", "finite"), ('frame = "up"', "frame"),
-        ('velocities = "water"', "current"), ("current = [1.0, 0.0]", 'velocities = "body"'), ("runs.r00.cut = [1.0, 2.0]", "[runs.r00] cut"),
-        ("runs.r00.fill.r = [[-1.0, 1e9]]", "covers the whole run"), ("runs.r00.cut = [[-1.0, 1e9]]", "delays leave no two samples"),
+        ('velocities = "water"', "current"), ("current = [1.0, 0.0]", 'velocities = "body"'),
+        ("runs.r00.cut = [1.0, 2.0]", "[runs.r00] cut"),
+        ("runs.r00.fill.r = [[-1.0, 1e9]]", "covers the whole run"),
+        ("runs.r00.cut = [[-1.0, 1e9]]", "delays leave no two samples"),
         ('gaps = "ignore"', "gaps"), ("antenna = [1.0]", "antenna"), ("antenna = [inf, 0.0]", "finite"),
     ],
 )  # fmt: skip

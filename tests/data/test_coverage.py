@@ -24,7 +24,8 @@ RUNS, STEPS = 8, 240
 
 @cache
 def trial(kind: str) -> Dataset:
-    """Eight runs of 240 s of the container ship: dead straight, small zig-zags on one course, turns at one speed, or everything."""
+    """Eight runs of 240 s of the container ship: dead straight, small zig-zags on one course, turns at one speed, or
+    everything."""
     ship, rng, t = load_mmg_ship("container130"), np.random.default_rng(0), np.arange(STEPS)
     s0, U = np.zeros((RUNS, 10)), np.zeros((RUNS, STEPS, 4))
     s0[:, 3], s0[:, 6], U[..., 0] = 5.0, 100.0, 100.0
@@ -53,7 +54,8 @@ def scaled(data: Dataset, factor: float) -> Dataset:
         if key in particulars:
             particulars[key] *= factor**power
     for part, keys in {"propeller": {"diameter": 1, "x": 1}, "rudder": {"area": 2, "height": 1, "x": 1},
-                       "thrusters": {"x_bow": 1, "x_stern": 1, "max_force": 3}, "wind": {"frontal_area": 2, "lateral_area": 2}}.items():  # fmt: skip
+                       "thrusters": {"x_bow": 1, "x_stern": 1, "max_force": 3},
+                       "wind": {"frontal_area": 2, "lateral_area": 2}}.items():  # fmt: skip
         for key in keys.keys() & particulars.get(part, {}).keys():
             particulars[part][key] *= factor ** keys[key]
     force = factor**3
@@ -66,7 +68,11 @@ def subjects(data: Dataset) -> set[str]:
     return {gap.subject for gap in gaps(data)}
 
 
-REVERSING, STERNWAY, STALL = "reversed propeller: stopping, propeller walk astern", "forces going astern", "stall of the rudder"
+REVERSING, STERNWAY, STALL = (
+    "reversed propeller: stopping, propeller walk astern",
+    "forces going astern",
+    "stall of the rudder",
+)
 DRIFT, TURNING = "cross-flow drag of the hull", "turning: yaw damping and its nonlinear terms"
 HEADINGS = "current and wind apart from offsets of rudder, hull and propeller"
 ONE_RPM = "propeller walk apart from a rudder offset; thrust and race against the revolutions"
@@ -81,7 +87,10 @@ NEVER_SLOW = {REVERSING, STERNWAY, ZERO_SPEED}
 @pytest.mark.parametrize(
     ("kind", "expected"),
     [
-        ("straight", {STALL, DRIFT, TURNING, HEADINGS, ONE_RPM, ONE_SPEED} | NEVER_SLOW | THRUSTERS | RUDDER | CHANNELS),
+        (
+            "straight",
+            {STALL, DRIFT, TURNING, HEADINGS, ONE_RPM, ONE_SPEED} | NEVER_SLOW | THRUSTERS | RUDDER | CHANNELS,
+        ),
         ("zigzag", {STALL, DRIFT, HEADINGS, ONE_RPM} | NEVER_SLOW | THRUSTERS | RUDDER | CHANNELS),
         ("turns", {ONE_RPM} | NEVER_SLOW | THRUSTERS | CHANNELS),
         ("all", CHANNELS),
@@ -96,7 +105,9 @@ def test_every_gap_has_a_figure_or_a_missing_channel_and_a_manoeuvre():
         assert any(c.isdigit() for c in gap.because) or "not recorded" in gap.because
         assert gap.manoeuvre
     because = {gap.subject: gap.because for gap in gaps(trial("turns"))}
-    assert because[REVERSING] == "revolutions below -10 % of the usual most: 0 s, at least 109 s are needed; least 100 rpm"
+    assert (
+        because[REVERSING] == "revolutions below -10 % of the usual most: 0 s, at least 109 s are needed; least 100 rpm"
+    )
 
 
 def test_a_model_and_its_ship_are_judged_alike():
@@ -135,7 +146,11 @@ def test_headings_are_an_arc_on_the_circle():
     def arc(degrees: np.ndarray) -> float:
         S = np.zeros((len(degrees), 10))
         S[:, 2] = np.deg2rad(degrees)
-        return np.rad2deg(Samples(Dataset("h", ship, 1.0, (Run("a", np.arange(float(len(S))), S, np.zeros((len(S), 4))),))).heading_arc())
+        return np.rad2deg(
+            Samples(
+                Dataset("h", ship, 1.0, (Run("a", np.arange(float(len(S))), S, np.zeros((len(S), 4))),))
+            ).heading_arc()
+        )
 
     assert arc(np.linspace(-20.0, 20.0, 400)) == pytest.approx(38.0, abs=0.3)  # across north, 5 % left out
     assert arc(np.linspace(340.0, 380.0, 400)) == pytest.approx(38.0, abs=0.3)
@@ -156,7 +171,9 @@ def test_the_models_sensitivities_tell_what_is_alike():
 
 
 def test_on_one_course_a_current_cannot_be_told_apart_and_in_turns_it_can():
-    current = {kind: next(t for t in tellings(trial(kind))[0] if t.subject == "current") for kind in ("straight", "turns")}
+    current = {
+        kind: next(t for t in tellings(trial(kind))[0] if t.subject == "current") for kind in ("straight", "turns")
+    }
     assert current["straight"].imitated > IMITATED > current["turns"].imitated
 
 
@@ -184,7 +201,9 @@ def test_white_noise_is_measured_on_a_moving_signal(sigma):
 
 def test_the_noise_of_simulated_trials_is_found():
     rng, clean = np.random.default_rng(2), trial("turns")
-    noisy = clean.with_runs(Run(r.id, r.t, r.states + NOISE * rng.standard_normal(r.states.shape), r.inputs, COMMANDS) for r in clean.runs)
+    noisy = clean.with_runs(
+        Run(r.id, r.t, r.states + NOISE * rng.standard_normal(r.states.shape), r.inputs, COMMANDS) for r in clean.runs
+    )
     for c, true in itertools.islice(zip(channel_noise(noisy), NOISE, strict=True), 6):
         assert c.noise == pytest.approx(true, rel=0.12)
         assert c.greatest >= c.noise

@@ -1,4 +1,5 @@
-"""Specs and cache of named data sets: nothing that a user writes is ignored silently, and a spoilt cache never reaches a result."""
+"""Specs and cache of named data sets: nothing that a user writes is ignored silently, and a spoilt cache never reaches
+a result."""
 
 from __future__ import annotations
 
@@ -161,7 +162,9 @@ def test_a_fault_of_the_maker_is_not_blamed_on_the_user(made, monkeypatch):
     def broken(seed: int = 0) -> Dataset:
         raise WorkError("the simulator diverged") if seed else TypeError("a bug")
 
-    monkeypatch.setattr(base.DATASETS, "get", lambda name: DatasetPart(name, "", "MIT", broken, cached=False), raising=False)
+    monkeypatch.setattr(
+        base.DATASETS, "get", lambda name: DatasetPart(name, "", "MIT", broken, cached=False), raising=False
+    )
     with pytest.raises(TypeError, match="a bug"):
         load_dataset("made")
     with pytest.raises(WorkError, match="diverged"):
@@ -188,4 +191,8 @@ def test_the_plain_difference_makes_no_allowance_for_rounding():
     table = compare_with_paper(still).set_index(["signal", "statistic"])
     assert table.at[("r", "std"), "plain difference / paper std"] == pytest.approx(-1.0)
     assert table.at[("r", "std"), "difference / paper std"] == pytest.approx(-0.5)
-    assert table.at[("u", "mean"), "plain difference / paper std"] == table.at[("u", "mean"), "difference / paper std"] == pytest.approx(-3.82 / 0.74)
+    assert (
+        table.at[("u", "mean"), "plain difference / paper std"]
+        == table.at[("u", "mean"), "difference / paper std"]
+        == pytest.approx(-3.82 / 0.74)
+    )

@@ -91,7 +91,9 @@ def test_a_damaged_cache_is_made_anew_and_said_so(harbour90, cache, caplog):
 def test_a_cache_that_cannot_be_written_costs_no_result(monkeypatch, tmp_path, caplog):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("SHIPBENCH_CACHE", str(tmp_path / "file"))
-    monkeypatch.setattr(base, "_make", lambda part, params: load_dataset.__globals__["DATASETS"].get("harbour90").make())
+    monkeypatch.setattr(
+        base, "_make", lambda part, params: load_dataset.__globals__["DATASETS"].get("harbour90").make()
+    )
     with caplog.at_level(logging.WARNING):
         assert len(load_dataset("harbour90")) == 90
     assert "cannot be kept" in caplog.text
@@ -124,7 +126,8 @@ def test_a_folder_without_a_description_is_refused(tmp_path):
         load_dataset(str(tmp_path))
 
 
-# -- real measured runs ----------------------------------------------------------------------------------------------------------
+# -- real measured runs
+# ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

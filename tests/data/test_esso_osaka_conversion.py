@@ -23,13 +23,16 @@ FILES = {
 
 
 def recorded(rows: int = 63, start: float = 0.0) -> pd.DataFrame:
-    """A steady turn to starboard at 10 Hz: the heading wraps, the commands jump inside an interval, the wind is southerly (from pi)."""
+    """A steady turn to starboard at 10 Hz: the heading wraps, the commands jump inside an interval, the wind is
+    southerly (from pi)."""
     k = np.arange(rows)
     t, psi = start + 0.1 * k, 2.9 + 0.05 * k * 0.1 * 20
     return pd.DataFrame(
         {
-            "t [s]": np.round(t, 1), "x_position_mid [m]": np.sin(psi), "u_velo [m/s]": 0.3 + 0 * t, "y_position_mid [m]": -np.cos(psi),
-            "vm_velo [m/s]": 0.01 * k, "psi_hat [rad]": (psi + np.pi) % (2 * np.pi) - np.pi, "r_angvelo [rad/s]": 1.0 + 0 * t,
+            "t [s]": np.round(t, 1), "x_position_mid [m]": np.sin(psi), "u_velo [m/s]": 0.3 + 0 * t,
+            "y_position_mid [m]": -np.cos(psi),
+            "vm_velo [m/s]": 0.01 * k, "psi_hat [rad]": (psi + np.pi) % (2 * np.pi) - np.pi,
+            "r_angvelo [rad/s]": 1.0 + 0 * t,
             "n_prop [rps]": np.where(k < 7, 10.0, -20.0), "delta_rudder [rad]": np.where(k < 12, 0.1, 0.6),
             "wind_velo_relative_mid [m/s]": 0 * t, "wind_dir_relative_mid [rad]": 0 * t,
             "wind_velo_true [m/s]": 2.0 + 0 * t, "wind_dir_true [rad]": np.where(k % 2, np.pi - 0.2, np.pi + 0.2),
@@ -39,7 +42,9 @@ def recorded(rows: int = 63, start: float = 0.0) -> pd.DataFrame:
 
 def blank(first: int, last: int) -> Callable[[pd.DataFrame], pd.DataFrame]:
     """Rows [first, last) lose their values."""
-    return lambda table: pd.DataFrame({name: column.mask((table.index >= first) & (table.index < last)) for name, column in table.items()})
+    return lambda table: pd.DataFrame(
+        {name: column.mask((table.index >= first) & (table.index < last)) for name, column in table.items()}
+    )
 
 
 @pytest.fixture
@@ -52,7 +57,9 @@ def copy(tmp_path) -> Callable[..., Path]:
             file.parent.mkdir(exist_ok=True)
             (change(recorded()) if place == 0 else recorded(start=1176.1 * (place == 3))).to_csv(file, index=False)
         kinds = [name.split("/")[0] for name in FILES]
-        index = pd.DataFrame({"file": [f"{n}.csv.gz" for n in FILES], "kind": kinds, "wakita2022": list(FILES.values())})
+        index = pd.DataFrame(
+            {"file": [f"{n}.csv.gz" for n in FILES], "kind": kinds, "wakita2022": list(FILES.values())}
+        )
         index.to_csv(tmp_path / "runs.csv", index=False)
         return tmp_path
 

@@ -25,21 +25,46 @@ ODD_IDS = ("1-2 (port)", "日本/é", "001", "NA", " spaced ", "a,b\"c'", "x" * 
 
 
 def odd() -> Dataset:
-    """Runs of different length, odd names, environment channels, metadata of every kind, and numbers with all their digits."""
+    """Runs of different length, odd names, environment channels, metadata of every kind, and numbers with all their
+    digits."""
     rng = np.random.default_rng(3)
     runs = []
     for i, name in enumerate(ODD_IDS):
         S, C = sail(5 + 3 * i, i)
         S = S + rng.standard_normal(S.shape) * 1e-3 / 3
-        environment = np.column_stack([rng.uniform(0, 9, len(S)), rng.uniform(-9, 9, len(S)), np.full(len(S), 1e-7 / 3)])
-        meta = {"manoeuvre": "zig-zag 10°/10°", "group": i, "calm": True, "list": [1.5, "two"], "crew": {"watch": "B", "12": 0.1}} if i else {}
+        environment = np.column_stack(
+            [rng.uniform(0, 9, len(S)), rng.uniform(-9, 9, len(S)), np.full(len(S), 1e-7 / 3)]
+        )
+        meta = (
+            {
+                "manoeuvre": "zig-zag 10°/10°",
+                "group": i,
+                "calm": True,
+                "list": [1.5, "two"],
+                "crew": {"watch": "B", "12": 0.1},
+            }
+            if i
+            else {}
+        )
         names = (*COMMANDS, "wind_speed", "wind_from", "depth")
         runs.append(Run(name, 0.1 / 3 + np.arange(len(S)) * 0.7, S, np.hstack([C, environment]), names, meta))
     ship = Ship(
-        name="Ørsted 7", L=50.0, B=8.0, T=3.0, mass=9e5, propeller=Propeller(diameter=2.0, blades=4, kt=(0.3, -0.3, -0.1)),
+        name="Ørsted 7", L=50.0, B=8.0, T=3.0, mass=9e5,
+        propeller=Propeller(diameter=2.0, blades=4, kt=(0.3, -0.3, -0.1)),
         rudder=Rudder(area=4.0, x=-24.0), thrusters=Thrusters(x_bow=20.0, max_force=1e4),
     )  # fmt: skip
-    return Dataset("odd set", ship, 0.7, tuple(runs), "commanded", "a formula", "CC BY 4.0", "container130", ("one — note", "two"), ("u", "r"))
+    return Dataset(
+        "odd set",
+        ship,
+        0.7,
+        tuple(runs),
+        "commanded",
+        "a formula",
+        "CC BY 4.0",
+        "container130",
+        ("one — note", "two"),
+        ("u", "r"),
+    )
 
 
 def assert_same(ours: Dataset, theirs: Dataset) -> None:
@@ -120,7 +145,15 @@ def test_one_run_without_environment_and_metadata_comes_back_too(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"not a mat file", b"MATLAB 5.0 MAT-file" + b" " * 105 + b"\x00\x01IM" + b"\xff" * 64, "cut", "other", "short"]
+    "content",
+    [
+        b"",
+        b"not a mat file",
+        b"MATLAB 5.0 MAT-file" + b" " * 105 + b"\x00\x01IM" + b"\xff" * 64,
+        "cut",
+        "other",
+        "short",
+    ],
 )
 def test_a_file_that_is_no_data_set_is_one_message(cli, tmp_path, content):
     path = tmp_path / "bad.mat"

@@ -74,7 +74,9 @@ def test_units_and_signs_are_converted_to_ours(folder, harbour):
 
     _change(folder, change)
     with (folder / "dataset.toml").open("a") as file:
-        file.write('\n[units]\npsi = "deg"\nu = "kn"\nn = "rev/s"\ndelta = "deg"\n[signs]\ndelta = "port"\ny = "west"\n')
+        file.write(
+            '\n[units]\npsi = "deg"\nu = "kn"\nn = "rev/s"\ndelta = "deg"\n[signs]\ndelta = "port"\ny = "west"\n'
+        )
     for ours, theirs in zip(harbour.subset([0, 1]).runs, read_dataset(folder).runs, strict=True):
         turns = (theirs.states[0, 2] - ours.states[0, 2]) / (2 * np.pi)
         assert turns == pytest.approx(round(turns))
@@ -150,7 +152,10 @@ BAD = {
     "not TOML": (_write("dataset.toml", b"name = "), "not valid TOML"),
     "unknown unit": (lambda f: _edit(f / "dataset.toml", "notes = []", "notes = []\nunits = {u = 'knot'}"), "kn"),
     "unknown sign": (lambda f: _edit(f / "dataset.toml", "notes = []", "notes = []\nsigns = {delta = 'left'}"), "port"),
-    "unit of nothing": (lambda f: _edit(f / "dataset.toml", "notes = []", "notes = []\nunits = {heading = 'deg'}"), "heading"),
+    "unit of nothing": (
+        lambda f: _edit(f / "dataset.toml", "notes = []", "notes = []\nunits = {heading = 'deg'}"),
+        "heading",
+    ),
     "ship without length": (lambda f: _edit(f / "ship.toml", "L = 130.0\n", ""), "L: "),
     "ship without mass": (lambda f: _edit(f / "ship.toml", "displacement = 9402.0\n", ""), "displacement"),
     "ship with a negative beam": (lambda f: _edit(f / "ship.toml", "B = 18.2", "B = -18.2"), "B: "),

@@ -1,4 +1,5 @@
-"""Data sets on disk where it is easy to read them wrongly without an error: names like NA, units of commands, stale or damaged tables."""
+"""Data sets on disk where it is easy to read them wrongly without an error: names like NA, units of commands, stale or
+damaged tables."""
 
 from __future__ import annotations
 
@@ -24,7 +25,10 @@ Edit = Callable[[pd.DataFrame], pd.DataFrame]
 
 def toy(ids: tuple[str, ...] = ("a", "b"), steps: int = 6) -> Dataset:
     made = [sail(steps, i) for i in range(len(ids))]
-    runs = tuple(Run(i, np.arange(steps + 1.0), S, C, COMMANDS, {"manoeuvre": "weave"}) for i, (S, C) in zip(ids, made, strict=True))
+    runs = tuple(
+        Run(i, np.arange(steps + 1.0), S, C, COMMANDS, {"manoeuvre": "weave"})
+        for i, (S, C) in zip(ids, made, strict=True)
+    )
     return Dataset("toyset", TOY_SHIP, 1.0, runs, source="formula", licence="MIT", simulation="toy", notes=("a note",))
 
 
@@ -69,7 +73,13 @@ def test_writing_another_format_leaves_no_stale_table(tmp_path):
 
 @pytest.mark.parametrize(
     ("signal", "unit", "value", "ours"),
-    [("x", "nmi", 1, 1852), ("u", "km/h", 3.6, 1), ("r", "deg/min", 180 * 60, np.pi), ("n", "rad/s", 2 * np.pi, 60), ("F_s", "tf", 1, 9806.65)],
+    [
+        ("x", "nmi", 1, 1852),
+        ("u", "km/h", 3.6, 1),
+        ("r", "deg/min", 180 * 60, np.pi),
+        ("n", "rad/s", 2 * np.pi, 60),
+        ("F_s", "tf", 1, 9806.65),
+    ],
 )
 def test_a_unit_has_its_textbook_factor(signal, unit, value, ours):
     assert value * unit_factor(signal, unit) == pytest.approx(ours, rel=1e-12)
@@ -132,12 +142,27 @@ def _toml(folder: Path, old: str, new: str) -> None:
 BAD: dict[str, tuple[Edit | None, str, Callable[[Path], object] | None, str]] = {
     "column misspelt": (lambda t: t.rename(columns={"psi": "Psi"}), "", None, "Did you mean 'Psi'"),
     "infinite": (_spoil("u", np.inf), "", None, "u is inf"),
-    "text and a gap": (lambda t: _spoil("u", "fast")(t).assign(u=lambda s: s.u.where(s.index != 1)), "", None, "u is 'fast'"),
+    "text and a gap": (
+        lambda t: _spoil("u", "fast")(t).assign(u=lambda s: s.u.where(s.index != 1)),
+        "",
+        None,
+        "u is 'fast'",
+    ),
     "NaN in time": (_spoil("t", np.nan), "", None, "nan s"),
     "interleaved runs": (lambda t: t.sort_values(["t", "trajectory"]), "", None, "rows of run 'a' are in 7 places"),
-    "a run's name twice": (lambda t: pd.concat([t, t[t.trajectory == "a"]]), "", None, "rows of run 'a' are in 2 places"),
+    "a run's name twice": (
+        lambda t: pd.concat([t, t[t.trajectory == "a"]]),
+        "",
+        None,
+        "rows of run 'a' are in 2 places",
+    ),
     "one name for all": (lambda t: t.assign(trajectory="a"), "", None, "t goes from 6 s to 0 s"),
-    "a row without a name": (lambda t: t.assign(trajectory=t.trajectory.where(t.index != 2)), "", None, "row 4 has no run name"),
+    "a row without a name": (
+        lambda t: t.assign(trajectory=t.trajectory.where(t.index != 2)),
+        "",
+        None,
+        "row 4 has no run name",
+    ),
     "column map from nowhere": (None, '\n[columns]\nspeed = "u"\n', None, "'speed'"),
     "column map to nowhere": (None, '\n[columns]\nu = "speed"\n', None, "'speed'"),
     "two columns for one": (lambda t: t.assign(a=0.0), '\n[columns]\na = "x"\n', None, "two columns are 'x'"),
@@ -155,10 +180,25 @@ BAD: dict[str, tuple[Edit | None, str, Callable[[Path], object] | None, str]] = 
     "scale as text": (None, '\n[scale]\nu = "2"\n', None, "scale.u: .*not text"),
     "bias as truth value": (None, "\n[bias]\nu = true\n", None, "bias.u: .*not true or false"),
     "delay beyond the run": (None, "\n[delay]\nu = 1e8\ndelta_c = 1e8\n", None, "leave no two samples"),
-    "antenna as texts": (None, "", lambda f: _toml(f, "dt = 1.0", 'dt = 1.0\nantenna = ["1", 2]'), "antenna.0: .*not text"),
+    "antenna as texts": (
+        None,
+        "",
+        lambda f: _toml(f, "dt = 1.0", 'dt = 1.0\nantenna = ["1", 2]'),
+        "antenna.0: .*not text",
+    ),
     "notes of numbers": (None, "", lambda f: _toml(f, "notes = [", "notes = [3, "), "notes.0: "),
-    "a cut that ends before it begins": (None, "\n[runs.a]\ncut = [[4, 2]]\n", None, r"\[runs.a\] cut.0: .*such as \[2, 4\]"),
-    "a fill that ends before it begins": (None, "\n[runs.a]\nfill = {r = [[4, 2]]}\n", None, "fill.r.0: .*ends before it begins"),
+    "a cut that ends before it begins": (
+        None,
+        "\n[runs.a]\ncut = [[4, 2]]\n",
+        None,
+        r"\[runs.a\] cut.0: .*such as \[2, 4\]",
+    ),
+    "a fill that ends before it begins": (
+        None,
+        "\n[runs.a]\nfill = {r = [[4, 2]]}\n",
+        None,
+        "fill.r.0: .*ends before it begins",
+    ),
     "a cut of texts": (None, '\n[runs.a]\ncut = [["1", "2"]]\n', None, "cut.0.0: .*not text"),
     "a cut without an end": (None, "\n[runs.a]\ncut = [[1]]\n", None, "cut.0.1: "),
     "a run as a number": (None, "\n[runs]\na = 3\n", None, "runs.a: "),
@@ -168,7 +208,12 @@ BAD: dict[str, tuple[Edit | None, str, Callable[[Path], object] | None, str]] = 
     "binary gzip": (None, "", _raw("trajectories.csv.gz", bytes(range(256))), "cannot be read"),
     "damaged gzip": (None, "", _torn_gz, "cannot be read"),
     "binary parquet": (None, "", _raw("trajectories.parquet", bytes(range(256))), "cannot be read"),
-    "more fields than headers": (None, "", _lines(lambda s: s.replace("\n", ",1\n").replace("F_s_c,1", "F_s_c", 1)), "cannot be read"),
+    "more fields than headers": (
+        None,
+        "",
+        _lines(lambda s: s.replace("\n", ",1\n").replace("F_s_c,1", "F_s_c", 1)),
+        "cannot be read",
+    ),
 }
 
 
@@ -199,7 +244,11 @@ def test_what_cannot_be_written_is_said_and_leaves_the_old_files(tmp_path):
 def test_an_interrupted_write_leaves_the_old_table_whole(tmp_path, monkeypatch):
     write_dataset(toy(), tmp_path, "csv")
     calls = itertools.count()
-    monkeypatch.setattr(os, "replace", lambda *a: (_ for _ in ()).throw(OSError(28, "No space left on device")) if next(calls) == 0 else None)
+    monkeypatch.setattr(
+        os,
+        "replace",
+        lambda *a: (_ for _ in ()).throw(OSError(28, "No space left on device")) if next(calls) == 0 else None,
+    )
     with pytest.raises(InputError, match="No space left"):
         write_dataset(toy(("z",)), tmp_path, "csv")
     monkeypatch.undo()

@@ -1,4 +1,5 @@
-"""Public data sets: licence first, checksums always, from a server, from a local copy, and with nothing at hand (all on files made from formulas)."""
+"""Public data sets: licence first, checksums always, from a server, from a local copy, and with nothing at hand (all on
+files made from formulas)."""
 
 from __future__ import annotations
 
@@ -27,7 +28,11 @@ from shipbench.data.base import DATASETS, load_dataset
 from shipbench.data.public import PublicData
 from shipbench.errors import WorkError
 
-NAMES = ("turning/turn_14-Oct-2020_14_08_51.csv", "zigzag/zigzag_31-Jul-2020_13_42_53.csv", "random/random_06-Aug-2020_16_24_25_1.csv")
+NAMES = (
+    "turning/turn_14-Oct-2020_14_08_51.csv",
+    "zigzag/zigzag_31-Jul-2020_13_42_53.csv",
+    "random/random_06-Aug-2020_16_24_25_1.csv",
+)
 SHARED = Path(__file__).parents[3] / "shared" / "data" / "esso-osaka-frt"
 
 
@@ -59,7 +64,9 @@ def server(copy):
 def public(copy, server, tmp_path, monkeypatch) -> PublicData:
     """esso_osaka with the checksums and the address of these files, and an empty cache."""
     registry = tmp_path / "files.txt"
-    registry.write_text("# a comment\n" + "".join(f"{n} sha256:{hashlib.sha256((copy / n).read_bytes()).hexdigest()}\n" for n in NAMES))
+    registry.write_text(
+        "# a comment\n" + "".join(f"{n} sha256:{hashlib.sha256((copy / n).read_bytes()).hexdigest()}\n" for n in NAMES)
+    )
     found = replace(esso_osaka.PUBLIC, registry=registry, url=server)
     monkeypatch.setattr(esso_osaka, "PUBLIC", found)
     monkeypatch.setattr(esso_osaka, "DATASET", replace(esso_osaka.DATASET, public=found))
@@ -85,7 +92,9 @@ def test_a_download_after_the_licence_is_accepted_loads_and_is_not_repeated(publ
     for word in ("NON-COMMERCIAL", "Wakita et al. (2022)", "10.1007/s00773-022-00889-3", public.url):
         assert word in result.stderr
     data = load_dataset("esso_osaka")
-    assert {r.id: r.meta["split"] for r in data.runs} == {Path(n).stem: "test" if "zigzag" in n else "train" for n in NAMES}
+    assert {r.id: r.meta["split"] for r in data.runs} == {
+        Path(n).stem: "test" if "zigzag" in n else "train" for n in NAMES
+    }
     assert [r.meta["manoeuvre"] for r in data.runs] == ["turn", "zigzag", "random"]
     again = get()
     assert again.exit_code == 0
@@ -104,12 +113,16 @@ def test_without_acceptance_nothing_is_fetched(public, tmp_path):
 @pytest.mark.parametrize(("answer", "code", "files"), [(b"n\n", 2, 0), (b"y\n", 0, 3)])
 def test_on_a_terminal_the_user_is_asked(public, tmp_path, answer, code, files):
     program = (
-        "import sys; from dataclasses import replace; from pathlib import Path; from shipbench.data import esso_osaka as e\n"
-        f"p = replace(e.PUBLIC, registry=Path({str(public.registry)!r}), url={public.url!r}); e.DATASET = replace(e.DATASET, public=p)\n"
+        "import sys; from dataclasses import replace; from pathlib import Path; from shipbench.data import "
+        "esso_osaka as e\n"
+        f"p = replace(e.PUBLIC, registry=Path({str(public.registry)!r}), url={public.url!r}); e.DATASET = "
+        "replace(e.DATASET, public=p)\n"
         "from shipbench.cli.app import main; sys.argv = ['shipbench', 'data', 'get', 'esso_osaka']; main()"
     )
     ours, theirs = pty.openpty()
-    with subprocess.Popen([sys.executable, "-c", program], stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
         os.close(theirs)
         os.write(ours, answer)
         _, said = process.communicate(timeout=60)

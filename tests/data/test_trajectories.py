@@ -1,4 +1,5 @@
-"""Tables of strangers: the size is known before memory is taken, metadata decide nothing, and no damage ends in a traceback."""
+"""Tables of strangers: the size is known before memory is taken, metadata decide nothing, and no damage ends in a
+traceback."""
 
 from __future__ import annotations
 
@@ -41,7 +42,11 @@ def parquet(folder: Path, **columns: object) -> pa.Table:
     made = pa.Table.from_pandas(table(), preserve_index=False)
     for name, values in columns.items():
         values = pa.array(values) if not isinstance(values, pa.Array) else values
-        made = made.set_column(made.column_names.index(name), name, values) if name in made.column_names else made.append_column(name, values)
+        made = (
+            made.set_column(made.column_names.index(name), name, values)
+            if name in made.column_names
+            else made.append_column(name, values)
+        )
     pq.write_table(made, folder / "trajectories.parquet")
     return made
 
@@ -57,7 +62,9 @@ def test_a_text_that_unpacks_without_end_is_refused_before_it_is_parsed(tmp_path
     monkeypatch.setattr(trajectories, "MOST_BYTES", 3_000_000)
     parsed = []
     monkeypatch.setattr(pd, "read_csv", lambda *args, **options: parsed.append(args))
-    (described(tmp_path) / "trajectories.csv.gz").write_bytes(gzip.compress(csv() + b"a,8" + b",0" * 14 + b"\n" * 4_000_000))
+    (described(tmp_path) / "trajectories.csv.gz").write_bytes(
+        gzip.compress(csv() + b"a,8" + b",0" * 14 + b"\n" * 4_000_000)
+    )
     refused(tmp_path, r"holds more than 3 MB of text; accepted")
     assert not parsed
 
@@ -157,10 +164,15 @@ def test_kinds_of_numbers_and_of_names_are_read(tmp_path):
     np.testing.assert_array_equal(run.states[:, [0, 1, 3]], np.tile(np.arange(8.0)[:, None], 3))
 
 
-PANDAS = {"index_columns": ["x"], "columns": [{"field_name": "x", "name": None, "pandas_type": "unicode", "metadata": {"encoding": "rot13"}}]}
+PANDAS = {
+    "index_columns": ["x"],
+    "columns": [{"field_name": "x", "name": None, "pandas_type": "unicode", "metadata": {"encoding": "rot13"}}],
+}
 
 
-@pytest.mark.parametrize("about", [b"{", b"[]", b"\xff", str(PANDAS).replace("'", '"').replace("None", "null").encode()])
+@pytest.mark.parametrize(
+    "about", [b"{", b"[]", b"\xff", str(PANDAS).replace("'", '"').replace("None", "null").encode()]
+)
 def test_what_pandas_wrote_beside_the_columns_decides_nothing(tmp_path, about):
     made = parquet(described(tmp_path))
     pq.write_table(made.replace_schema_metadata({"pandas": about}), tmp_path / "trajectories.parquet")
@@ -208,7 +220,9 @@ def test_a_link_to_a_table_elsewhere_is_followed(tmp_path):
     assert len(read_dataset(tmp_path).runs[0]) == 8
 
 
-@pytest.mark.parametrize("ship", ["../ship.toml", "/etc/passwd", "a/../../ship.toml", "..\\\\ship.toml", "C:/ship.toml"])
+@pytest.mark.parametrize(
+    "ship", ["../ship.toml", "/etc/passwd", "a/../../ship.toml", "..\\\\ship.toml", "C:/ship.toml"]
+)
 def test_the_ship_lies_in_the_folder(tmp_path, ship):
     (described(tmp_path) / "trajectories.csv").write_bytes(csv())
     with (tmp_path / "dataset.toml").open("a") as file:
@@ -219,9 +233,15 @@ def test_the_ship_lies_in_the_folder(tmp_path, ship):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (table().to_csv(index=False, sep=";", decimal=","), "has semicolons between its columns, as with decimal commas; accepted: commas there"),
+        (
+            table().to_csv(index=False, sep=";", decimal=","),
+            "has semicolons between its columns, as with decimal commas; accepted: commas there",
+        ),
         (table().to_csv(index=False, sep="\t"), "has tabs between its columns"),
-        (table().assign(x=["0,0", "4,126667", *["5,5"] * 6]).to_csv(index=False), "row 2: 'x' is '0,0', with a comma; accepted: decimal points"),
+        (
+            table().assign(x=["0,0", "4,126667", *["5,5"] * 6]).to_csv(index=False),
+            "row 2: 'x' is '0,0', with a comma; accepted: decimal points",
+        ),
         (table().assign(n=["990", "1,090", *["999"] * 6]).to_csv(index=False), "row 3: 'n' is '1,090', with a comma"),
     ],
 )

@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.inference.gauss_newton import Origin, fit, start
-from shipbench.diagnosis.inference.gram import ETA_PRECISION, Hyper, Prior, Products, accelerated, by_run, ornstein_uhlenbeck, solve
+from shipbench.diagnosis.inference.gram import (
+    ETA_PRECISION,
+    Hyper,
+    Prior,
+    Products,
+    accelerated,
+    by_run,
+    ornstein_uhlenbeck,
+    solve,
+)
 from shipbench.diagnosis.inference.laplace import Model, products_of, settle
 from shipbench.diagnosis.inference.linalg import inverses, log_determinant
 from shipbench.diagnosis.model.between_ships import STRUCTURE
@@ -34,7 +43,9 @@ def test_the_evidence_is_that_of_the_joint_gaussian():
     knots, G, T = 3, 2, 6 * 5
     Z = rng.standard_normal((2, T, 6 + 3 * knots + G + 1))
     hyper = Hyper(np.array([0.1, -0.3, 0.2]), rng.normal(0.0, 0.2, 6), 2.0)
-    gram = Products.of(np.moveaxis(Z.reshape(2, 5, 6, -1), 2, 0), np.ones((2, 5), dtype=bool), knots, 1.0, np.array([0, 1]), 2).weigh(hyper)
+    gram = Products.of(
+        np.moveaxis(Z.reshape(2, 5, 6, -1), 2, 0), np.ones((2, 5), dtype=bool), knots, 1.0, np.array([0, 1]), 2
+    ).weigh(hyper)
     prior = Prior(np.array([0]), np.array([0.7]), np.array([1]), np.array([0.4]))
     found = solve(gram.reduce(hyper.log_force), prior).log_evidence
     K = np.linalg.inv(ornstein_uhlenbeck(knots, 1.0, 2.0)[0])
@@ -139,7 +150,11 @@ def test_a_refit_ends_where_another_start_does(plant):
 def test_environment_comes_before_the_forces_that_follow_the_flow():
     """A current beside a cross-flow drag, named in either order, is the same model."""
     items = [Term(EFFECTS.get(name), ()) for name in ("cross_flow_drag", "current")]
-    assert [i.effect.name for i in flow_first(items)] == ["current", "cross_flow_drag"] == [i.effect.name for i in flow_first(items[::-1])]
+    assert (
+        [i.effect.name for i in flow_first(items)]
+        == ["current", "cross_flow_drag"]
+        == [i.effect.name for i in flow_first(items[::-1])]
+    )
 
 
 def test_what_was_chosen_among_many_costs_more():
@@ -156,9 +171,16 @@ def test_ordinary_differences_have_a_value_at_which_eq_2_is_alone(plant, u):
     """Astern, too, where the race does not reach the rudder and hull and rudder have parameters of their own."""
     flow = Flow(*([0.0] * 4), u, 0.3, 0.01, -60.0, 0.2, 0.0, 0.0)
     found, alone = Modifiers(), Modifiers()
-    STRUCTURE.force(found, flow, tuple(p.typical * v for p, v in zip(STRUCTURE.parameters, STRUCTURE.plain(), strict=True)), plant.ship)
+    STRUCTURE.force(
+        found,
+        flow,
+        tuple(p.typical * v for p, v in zip(STRUCTURE.parameters, STRUCTURE.plain(), strict=True)),
+        plant.ship,
+    )
     p = (0.0,) + (1e3,) * 3 + (1.0,) * 7
-    changed, usual = (eq2.accelerations(u, 0.3, 0.01, -60.0, 0.2, 0.0, 0.0, None, plant.c, p, m) for m in (found, alone))
+    changed, usual = (
+        eq2.accelerations(u, 0.3, 0.01, -60.0, 0.2, 0.0, 0.0, None, plant.c, p, m) for m in (found, alone)
+    )
     assert changed == pytest.approx(usual, rel=1e-9)
 
 
@@ -170,7 +192,9 @@ def test_a_reversed_propeller_stops_the_flow_at_the_rudder_with_headway_alone(pl
         return mods
 
     assert of(2.0, "race", 1.0).race > of(2.0, "race", 0.0).race
-    assert of(-2.0, "race", 1.0).race == of(2.0, "race", 1.0).race  # the flow has a sign: what drives ahead meets sternway there
+    assert (
+        of(-2.0, "race", 1.0).race == of(2.0, "race", 1.0).race
+    )  # the flow has a sign: what drives ahead meets sternway there
     assert of(2.0, "backing", 1.0).backing > of(2.0, "backing", 0.0).backing > of(-2.0, "backing", 1.0).backing == 0.0
     assert of(-2.0, "N_v_astern", 1.0).hull.N_v < of(-2.0, "N_v_astern", 0.0).hull.N_v < 0.0
     assert of(2.0, "N_v_astern", 1.0).hull.N_v == pytest.approx(1.0, abs=0.02)
@@ -185,11 +209,18 @@ def test_sums_by_run_are_those_of_reduceat():
 def test_products_of_some_channels_are_rows_of_those_of_all(plant):
     """With noise that lasts in one of them, and a piece that ends early."""
     scales = Scales(plant)
-    seg = replace(plant.seg, mask=plant.seg.mask & (np.arange(plant.steps + 1) < plant.steps - 3 * (np.arange(len(plant.seg.run)) == 1)[:, None]))
+    seg = replace(
+        plant.seg,
+        mask=plant.seg.mask
+        & (np.arange(plant.steps + 1) < plant.steps - 3 * (np.arange(len(plant.seg.run)) == 1)[:, None]),
+    )
     short = copy(plant)
     short.seg = seg
     point, _ = start(plant)
-    columns, coloured = Linearisation(short, scales, point).columns(), scales.coloured(scales.colour.with_channel(2, 4.0, 6.0))
+    columns, coloured = (
+        Linearisation(short, scales, point).columns(),
+        scales.coloured(scales.colour.with_channel(2, 4.0, 6.0)),
+    )
     whole, some = products_of(short, coloured, point, columns), products_of(short, coloured, point, columns, [2, 5])
     assert coloured.colour.differs(scales.colour) == [2]
     np.testing.assert_allclose(some.P, whole.P[[2, 5]], rtol=1e-12)
@@ -224,7 +255,8 @@ def test_inverses_of_many_matrices_are_those_of_each(count, size):
 
 
 def test_a_fit_that_has_not_come_to_rest_is_charged_with_the_cost_it_has(plant):
-    """One step from far away promises much; the evidence counts what was reached, and the best point of the path is kept."""
+    """One step from far away promises much; the evidence counts what was reached, and the best point of the path is
+    kept."""
     scales = Scales(plant)
     origin = Origin.of(plant, scales)
     far = replace(origin.point, base=origin.point.base + 2.0 * np.cos(np.arange(len(origin.point.base))))
@@ -237,7 +269,12 @@ def test_a_fit_that_has_not_come_to_rest_is_charged_with_the_cost_it_has(plant):
 
 @pytest.mark.parametrize(
     ("name", "estimate", "wrong"),
-    [("rudder_lag", -0.2, True), ("rudder_lag", 0.2, False), ("shallow_water", -0.1, True), ("heading_bias", -0.2, False)],
+    [
+        ("rudder_lag", -0.2, True),
+        ("rudder_lag", 0.2, False),
+        ("shallow_water", -0.1, True),
+        ("heading_bias", -0.2, False),
+    ],
 )
 def test_what_only_slows_or_narrows_is_no_candidate_for_the_contrary(name, estimate, wrong):
     assert _wrong_way(Term(EFFECTS.get(name)), np.array([estimate])) == wrong

@@ -48,8 +48,10 @@ def test_samples_are_averaged_at_the_middle_of_what_they_stand_for():
         assert np.all(np.abs(after.inputs[:, 4] - 6.0 * np.cos(0.3)) < 0.1)
 
 
-@pytest.mark.parametrize(("dt", "length", "shortest", "expected"), [(1.0, 130.0, 60, 1), (0.4, 130.0, 60, 1), (0.1, 130.0, 60, 9), (0.1, 3.0, 60, 1),
-                                                                     (0.02, 3.0, 60, 7), (0.1, 130.0, 9, 3), (0.1, 130.0, 4, 1)])  # fmt: skip
+@pytest.mark.parametrize(("dt", "length", "shortest", "expected"),
+    [(1.0, 130.0, 60, 1), (0.4, 130.0, 60, 1), (0.1, 130.0, 60, 9), (0.1, 3.0, 60, 1),
+                                                                     (0.02, 3.0, 60, 7), (0.1, 130.0, 9, 3),
+                                                                     (0.1, 130.0, 4, 1)])  # fmt: skip
 def test_as_many_as_a_second_at_130_m_holds_and_the_shortest_run_allows(dt, length, shortest, expected):
     data = fast(dt, 100, shortest, L=length)
     slow = averaged(data)

@@ -37,7 +37,10 @@ def test_a_sensor_fault_is_seen_by_the_residuals_and_not_by_the_regression():
 
 def test_rankings_are_sorted_and_name_every_candidate_once():
     data = trials("current", (0.3, 0.0))
-    for method, known in ((white_residual_test, NAMES), (derivative_regression, [n for n in NAMES if n != "heading_bias"])):
+    for method, known in (
+        (white_residual_test, NAMES),
+        (derivative_regression, [n for n in NAMES if n != "heading_bias"]),
+    ):
         ranking = method(data, NAMES).ranking
         assert sorted(name for name, _ in ranking) == sorted(known)
         scores = [score for _, score in ranking]

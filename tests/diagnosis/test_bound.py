@@ -29,7 +29,9 @@ def test_power_is_that_of_the_two_sided_normal_test():
     assert power(0.0) == pytest.approx(LEVEL)
     for ratio in (1.0, 4.0, 9.0):
         edge = norm.isf(0.5 * LEVEL)
-        assert power(ratio) == pytest.approx(norm.sf(edge - np.sqrt(ratio)) + norm.cdf(-edge - np.sqrt(ratio)), rel=1e-6)
+        assert power(ratio) == pytest.approx(
+            norm.sf(edge - np.sqrt(ratio)) + norm.cdf(-edge - np.sqrt(ratio)), rel=1e-6
+        )
     assert power(-3.0) == pytest.approx(LEVEL)
 
 

@@ -31,7 +31,9 @@ from shipbench.simulate.trials import Trials, sea_trials
 @pytest.fixture(scope="module")
 def turned() -> Dataset:
     """A compass 3 degrees off."""
-    return sea_trials(load_mmg_ship("kcs"), 3, (Hidden(EFFECTS.get("heading_bias"), (0.05,)),), Trials(runs=8, samples=60))
+    return sea_trials(
+        load_mmg_ship("kcs"), 3, (Hidden(EFFECTS.get("heading_bias"), (0.05,)),), Trials(runs=8, samples=60)
+    )
 
 
 def test_work_is_counted_inside_and_a_limit_is_remembered():
@@ -123,9 +125,17 @@ def test_noise_is_not_looked_for_after_the_limit(turned, monkeypatch):
 def test_no_gain_is_measured_with_a_training_part_that_was_stopped(turned):
     def work(fold: int, threshold: float, hull: bool) -> FoldGain:
         test = whole._folds(turned, 0)[fold]
-        return FoldGain(test, np.ones(len(test)), np.zeros(len(test)), np.zeros(len(test)), ("heading_bias",), stopped=fold == 1)
+        return FoldGain(
+            test, np.ones(len(test)), np.zeros(len(test)), np.zeros(len(test)), ("heading_bias",), stopped=fold == 1
+        )
 
-    found = SimpleNamespace(hull=0.0, final=SimpleNamespace(model=SimpleNamespace(terms=("heading_bias",))), gears=(), unknown=None, threshold=10.0)
+    found = SimpleNamespace(
+        hull=0.0,
+        final=SimpleNamespace(model=SimpleNamespace(terms=("heading_bias",))),
+        gears=(),
+        unknown=None,
+        threshold=10.0,
+    )
     worth = whole._cross_validated(turned, found, 0, work, None, None)
     assert (worth.gain, worth.per_run) == (None, ())
     assert "1 of 5 training parts were stopped" in worth.told[0]

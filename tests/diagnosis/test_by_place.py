@@ -1,4 +1,5 @@
-"""What the values of single runs go with is told: a current that differs from place to place is not one drawn anew for each run."""
+"""What the values of single runs go with is told: a current that differs from place to place is not one drawn anew for
+each run."""
 
 from __future__ import annotations
 
@@ -20,19 +21,25 @@ def sailed():
     run = np.repeat(np.arange(RUNS), 2)
     states = places[run][:, None, :] + rng.normal(0.0, 50.0, (2 * RUNS, SAMPLES, 2))
     return places, SimpleNamespace(
-        plant=SimpleNamespace(seg=SimpleNamespace(run=run, runs=RUNS, mask=np.ones((2 * RUNS, SAMPLES), bool), states=states))
+        plant=SimpleNamespace(
+            seg=SimpleNamespace(run=run, runs=RUNS, mask=np.ones((2 * RUNS, SAMPLES), bool), states=states)
+        )
     )
 
 
 def test_a_current_that_differs_from_place_to_place_is_told_so(sailed):
     places, fit = sailed
-    current = np.stack([0.05 + 2e-4 * places[:, 1], np.full(RUNS, 0.1)], axis=1) + np.random.default_rng(1).normal(0.0, 0.05, (RUNS, 2))
+    current = np.stack([0.05 + 2e-4 * places[:, 1], np.full(RUNS, 0.1)], axis=1) + np.random.default_rng(1).normal(
+        0.0, 0.05, (RUNS, 2)
+    )
     assert goes_with(fit, current).startswith("it differs from place to place: ")
     assert goes_with(fit, 5.0 * current) == goes_with(fit, current)
 
 
 def test_a_tide_goes_with_the_number_of_the_run(sailed):
-    tide = np.stack([np.linspace(-0.3, 0.3, RUNS), np.zeros(RUNS)], axis=1) + np.random.default_rng(1).normal(0.0, 0.05, (RUNS, 2))
+    tide = np.stack([np.linspace(-0.3, 0.3, RUNS), np.zeros(RUNS)], axis=1) + np.random.default_rng(1).normal(
+        0.0, 0.05, (RUNS, 2)
+    )
     assert goes_with(sailed[1], tide).startswith("it differs with time: ")
 
 

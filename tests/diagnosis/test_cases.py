@@ -37,7 +37,10 @@ def test_a_case_is_drawn_again_from_seed_kind_and_index(kind):
 
 
 def test_singles_cover_every_effect_at_both_sizes():
-    drawn = {(case.truth[0], case.size[0]) for case in (draw_case("single", i, 0, plan=TINY) for i in range(0, count("single", 1), 7))}
+    drawn = {
+        (case.truth[0], case.size[0])
+        for case in (draw_case("single", i, 0, plan=TINY) for i in range(0, count("single", 1), 7))
+    }
     expected = {(name, size) for name in EFFECTS.names() if name not in OWN_KINDS for size in SIZES}
     assert drawn <= expected
     assert len(drawn) == len(range(0, count("single", 1), 7))
@@ -54,9 +57,13 @@ def test_what_is_hidden_has_the_size_that_is_said():
 
 def test_signs_and_directions_are_drawn_both_ways():
     names = singles()
-    signs = {np.sign(draw_case("single", names.index("rudder_offset"), seed, plan=TINY).effects[0].q[0]) for seed in range(8)}
+    signs = {
+        np.sign(draw_case("single", names.index("rudder_offset"), seed, plan=TINY).effects[0].q[0]) for seed in range(8)
+    }
     assert signs == {-1.0, 1.0}
-    assert all(draw_case("single", names.index("rudder_stall"), seed, plan=TINY).effects[0].q[0] > 0 for seed in range(4))
+    assert all(
+        draw_case("single", names.index("rudder_stall"), seed, plan=TINY).effects[0].q[0] > 0 for seed in range(4)
+    )
 
 
 def test_effects_of_one_run_each_have_as_many_values_as_runs():
@@ -154,7 +161,9 @@ def test_development_and_test_ships_come_from_other_hulls():
 def test_the_ship_file_agrees_with_the_ship_that_is_sailed():
     ship = draw_ship(np.random.default_rng(3), "test", True)
     p = ship.particulars
-    assert (p.L, p.rudder.area, p.propeller.diameter, p.Izz) == pytest.approx((ship.L, ship.rudder.A_R, ship.propeller.D, ship.I_zG))
+    assert (p.L, p.rudder.area, p.propeller.diameter, p.Izz) == pytest.approx(
+        (ship.L, ship.rudder.A_R, ship.propeller.D, ship.I_zG)
+    )
     assert p.rho * p.displacement == pytest.approx(ship.m)
     assert p.wind.lateral_area == pytest.approx(ship.A_L)
 
@@ -164,7 +173,8 @@ def test_a_scaled_ship_turns_in_the_same_circle_measured_in_its_length():
     half = scaled(ship, 65.0)
     big = turning_circle(Simulator(ship, 1.0), 4.5, 93.0, 35.0, 1.0, 400.0)
     small = turning_circle(Simulator(half, 1.0), 4.5 / 2**0.5, 93.0 * 2**0.5, 35.0, 1.0 / 2**0.5, 400.0 / 2**0.5)
-    # the speed that regularises the hull forces and the thrusters' loss scale as well: the circles agree to the integrator
+    # the speed that regularises the hull forces and the thrusters' loss scale as well: the circles agree to the
+    # integrator
     assert small.tactical_diameter == pytest.approx(big.tactical_diameter, rel=2e-3)
 
 
@@ -173,7 +183,11 @@ def test_trials_of_the_fitted_model_can_be_sailed_and_repeated(seed):
     ship = draw_ship(np.random.default_rng(seed), "test", False)
     data = fitted_trials(ship, seed, TINY)
     assert is_sane(states(fitted_trials(ship, seed, Trials(runs=4, samples=40, noise=0.0))), ship.L)
-    assert data.fingerprint == fitted_trials(ship, seed, TINY).fingerprint != fitted_trials(ship, seed + 1, TINY).fingerprint
+    assert (
+        data.fingerprint
+        == fitted_trials(ship, seed, TINY).fingerprint
+        != fitted_trials(ship, seed + 1, TINY).fingerprint
+    )
     assert data.ship == ship.particulars
 
 

@@ -1,4 +1,5 @@
-"""A cause that begins with a run: runs in the order in which they were sailed, and not where other manoeuvres begin with it."""
+"""A cause that begins with a run: runs in the order in which they were sailed, and not where other manoeuvres begin
+with it."""
 
 from __future__ import annotations
 
@@ -22,8 +23,12 @@ RUNS, BEGINS = 12, 6
 def changed(**meta: object) -> Dataset:
     """A compass error from the seventh run on; meta: key of the runs' metadata, and its value for each."""
     values = np.where(np.arange(RUNS) >= BEGINS, 0.04, 0.0)
-    data = sea_trials(load_mmg_ship("kcs"), 3, (Hidden(EFFECTS.get("heading_bias"), (values,)),), Trials(runs=RUNS, samples=90))
-    return data.with_runs([replace(r, meta={**r.meta, **{k: v[i] for k, v in meta.items()}}) for i, r in enumerate(data.runs)])
+    data = sea_trials(
+        load_mmg_ship("kcs"), 3, (Hidden(EFFECTS.get("heading_bias"), (values,)),), Trials(runs=RUNS, samples=90)
+    )
+    return data.with_runs(
+        [replace(r, meta={**r.meta, **{k: v[i] for k, v in meta.items()}}) for i, r in enumerate(data.runs)]
+    )
 
 
 @pytest.mark.long
@@ -41,19 +46,31 @@ def test_a_change_is_named_among_mixed_manoeuvres_and_not_where_other_manoeuvres
     assert [c.effect for c in diagnose(mixed, gain=False).causes] == ["change_point"]
     verdict = diagnose(apart, gain=False)
     assert "change_point" not in [c.effect for c in verdict.causes]
-    assert "not looked for at 7 of 7 places" in next(c for c in verdict.candidates if c.effect == "change_point").rejected_because
+    assert (
+        "not looked for at 7 of 7 places"
+        in next(c for c in verdict.candidates if c.effect == "change_point").rejected_because
+    )
 
 
 @pytest.mark.parametrize(
     ("kinds", "other"),
-    [("tztztztz", []), ("ttttzzzz", [3, 4, 5]), ("tttttttt", []), ("tttt?zzz", []), ("ttztttzttz", []), ("ttttttttzz", [7]), ("tz", [])],
+    [
+        ("tztztztz", []),
+        ("ttttzzzz", [3, 4, 5]),
+        ("tttttttt", []),
+        ("tttt?zzz", []),
+        ("ttztttzttz", []),
+        ("ttttttttzz", [7]),
+        ("tz", []),
+    ],
 )
 def test_other_kinds_of_manoeuvre_begin_where_less_than_half_is_alike(kinds: str, other: list[int]):
     assert other_kinds_from(["" if k == "?" else k for k in kinds]) == other
 
 
 def test_kinds_that_come_in_random_order_leave_places_for_a_change():
-    """Of six kinds in 24 runs less than half is alike before and after any run, as in most random orders; apart in order, all places are barred."""
+    """Of six kinds in 24 runs less than half is alike before and after any run, as in most random orders; apart in
+    order, all places are barred."""
     barred = other_kinds_from("szzzzrrczcttteetssreress")
     assert 15 not in barred
     assert len(barred) < 13
@@ -63,7 +80,8 @@ def test_kinds_that_come_in_random_order_leave_places_for_a_change():
 @pytest.mark.parametrize(
     ("given", "began"),
     [
-        ("2026-05-01T10:30:00Z", datetime(2026, 5, 1, 10, 30, tzinfo=UTC)), ("2026-05-01 10:30", datetime(2026, 5, 1, 10, 30, tzinfo=UTC)),
+        ("2026-05-01T10:30:00Z", datetime(2026, 5, 1, 10, 30, tzinfo=UTC)),
+        ("2026-05-01 10:30", datetime(2026, 5, 1, 10, 30, tzinfo=UTC)),
         (datetime(2026, 5, 1), datetime(2026, 5, 1, tzinfo=UTC)), (12.5, None), ("soon", None), (None, None),
     ],
 )  # fmt: skip

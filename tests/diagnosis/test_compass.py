@@ -1,4 +1,5 @@
-"""A compass that is off by a constant, with velocities of a log or of satellites, which the same compass turned into the ship's axes."""
+"""A compass that is off by a constant, with velocities of a log or of satellites, which the same compass turned into
+the ship's axes."""
 
 from __future__ import annotations
 
@@ -18,11 +19,16 @@ from shipbench.simulate.trials import Trials, sea_trials
 
 def trials(ship: str, runs: int = 24) -> Dataset:
     plan = Trials(runs=runs)
-    return published_trials(PUBLISHED[ship], 5015, (), plan) if ship in PUBLISHED else sea_trials(load_mmg_ship(ship), 5, (), plan)
+    return (
+        published_trials(PUBLISHED[ship], 5015, (), plan)
+        if ship in PUBLISHED
+        else sea_trials(load_mmg_ship(ship), 5, (), plan)
+    )
 
 
 def read_by(data: Dataset, bias: float, velocities: bool) -> Dataset:
-    """The runs by a compass that reads too much by `bias` [rad]; velocities: over ground from satellites, in its axes."""
+    """The runs by a compass that reads too much by `bias` [rad]; velocities: over ground from satellites, in its
+    axes."""
 
     def turned(states: np.ndarray) -> np.ndarray:
         states = states.copy()
@@ -59,7 +65,9 @@ CASES = [("kcs", 3.0, True, 12)] + [
 
 @pytest.mark.long
 @pytest.mark.parametrize(("ship", "degrees", "velocities", "runs"), CASES)
-def test_a_compass_error_is_named_in_either_form_and_nothing_else_is(ship: str, degrees: float, velocities: bool, runs: int):
+def test_a_compass_error_is_named_in_either_form_and_nothing_else_is(
+    ship: str, degrees: float, velocities: bool, runs: int
+):
     """With the velocities it was a list of 12 degrees, and the ship file in doubt."""
     found = diagnose(read_by(trials(ship, runs), np.deg2rad(degrees), velocities), gain=False)
     assert ([c.effect for c in found.causes], found.unknown) == (["heading_bias"], None)

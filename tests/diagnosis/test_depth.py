@@ -23,20 +23,30 @@ RATIOS = (0.15, 0.45, 0.7)
 
 def sounded(data: Dataset, depth: float) -> Dataset:
     names = (*data.inputs, "depth")
-    return data.with_runs([replace(run, inputs=np.column_stack([run.inputs, np.full(len(run), depth)]), inputs_names=names) for run in data.runs])
+    return data.with_runs(
+        [
+            replace(run, inputs=np.column_stack([run.inputs, np.full(len(run), depth)]), inputs_names=names)
+            for run in data.runs
+        ]
+    )
 
 
 @pytest.fixture(scope="module")
 def trials() -> Dataset:
     """Runs in water of three depths."""
     ship, shallow = load_mmg_ship("container130"), EFFECTS.get("shallow_water")
-    parts = [sounded(sea_trials(ship, seed, [Hidden(shallow, (q,))], Trials(runs=5)), ship.T / q) for seed, q in enumerate(RATIOS)]
+    parts = [
+        sounded(sea_trials(ship, seed, [Hidden(shallow, (q,))], Trials(runs=5)), ship.T / q)
+        for seed, q in enumerate(RATIOS)
+    ]
     runs = [replace(run, id=f"{i}-{run.id}") for i, part in enumerate(parts) for run in part.runs]
     return replace(parts[0], runs=tuple(runs))
 
 
 def unsounded(data: Dataset) -> Dataset:
-    return data.with_runs([replace(run, inputs=run.inputs[:, :-1], inputs_names=run.inputs_names[:-1]) for run in data.runs])
+    return data.with_runs(
+        [replace(run, inputs=run.inputs[:, :-1], inputs_names=run.inputs_names[:-1]) for run in data.runs]
+    )
 
 
 @pytest.mark.long

@@ -26,8 +26,8 @@ FAULTS = ("heading_bias", "speed_scale", "yaw_rate_bias", "antenna_offset", "pos
 
 @pytest.fixture(scope="module")
 def recorded() -> Dataset:
-    """The first 200 s of every sixteenth run, wind columns withheld, commands taken for positions (the search for quicker gears has nothing to do
-    with sensors)."""
+    """The first 200 s of every sixteenth run, wind columns withheld, commands taken for positions (the search for
+    quicker gears has nothing to do with sensors)."""
     try:
         data = load_dataset("esso_osaka[wind=false]")
     except InputError as error:
@@ -55,8 +55,13 @@ def _scores(data: Dataset) -> dict[str, tuple[float, float]]:
     """Score and size of every fault of a sensor beside the plain model, in its first form."""
     plant = Plant.of(data)
     scales = Scales(plant)
-    scores = screen(null_fit(plant, scales, [t for t in candidates_for(plant) if t.label in FAULTS and not any(t.setting)]))
-    return {s.term.label: (s.score, float(s.estimate[0] * scales.amplitudes(s.term, plant.c.L)[0])) for s in reversed(scores)}
+    scores = screen(
+        null_fit(plant, scales, [t for t in candidates_for(plant) if t.label in FAULTS and not any(t.setting)])
+    )
+    return {
+        s.term.label: (s.score, float(s.estimate[0] * scales.amplitudes(s.term, plant.c.L)[0]))
+        for s in reversed(scores)
+    }
 
 
 @pytest.fixture(scope="module")

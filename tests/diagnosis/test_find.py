@@ -36,7 +36,8 @@ from shipbench.suites.diagnosis.unmodelled import canonical
 
 SEED = int(os.environ.get("SHIPBENCH_SEED", secrets.randbelow(10_000)))
 CLEAR = (
-    "current", "heading_bias", "yaw_rate_bias", "speed_scale", "antenna_offset", "velocity_delay", "rudder_lag", "rudder_backlash",
+    "current", "heading_bias", "yaw_rate_bias", "speed_scale", "antenna_offset", "velocity_delay", "rudder_lag",
+    "rudder_backlash",
     "shaft_rate_limit",
 )  # fmt: skip
 DRAWN = tuple(random.Random(SEED).sample(CLEAR, 4))
@@ -76,7 +77,8 @@ def drifting() -> tuple[Dataset, Diagnosis]:
 @pytest.mark.long
 @pytest.mark.parametrize("found", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_two_processes_say_what_one_says(drifting, found):
-    """The first part is fitted beside the whole there, before it is known whether anything is found and what the threshold is."""
+    """The first part is fitted beside the whole there, before it is known whether anything is found and what the
+    threshold is."""
     plain = _trials(runs=8, samples=50)
     data, one = drifting if found else (plain, diagnose(plain, workers=1))
     assert one.verdict == ("found" if found else "none")
@@ -98,7 +100,9 @@ def test_nothing_is_named_on_most_fresh_ships_without_a_hidden_effect():
 def test_causes_are_found_on_ships_of_the_literature_in_their_own_equations(ship):
     """One of a current, a compass error and a speed log's: the three share no equation with the fit."""
     effect = ("current", "heading_bias", "speed_scale")[(SEED + ship) % 3]
-    case = draw_case("published", len(PUBLISHED) * ON_PUBLISHED.index(effect) + ship, SEED, plan=Trials(runs=16, samples=80))
+    case = draw_case(
+        "published", len(PUBLISHED) * ON_PUBLISHED.index(effect) + ship, SEED, plan=Trials(runs=16, samples=80)
+    )
     assert case.truth == (effect,)
     named = [c.effect for c in diagnose(case.dataset(), gain=False).causes]
     assert named[:1] == [effect], f"seed {SEED}: {named} on {case.ship.name}"
@@ -106,7 +110,8 @@ def test_causes_are_found_on_ships_of_the_literature_in_their_own_equations(ship
 
 @pytest.mark.long
 def test_what_ships_differ_in_is_not_named_for_a_hull_of_another_form():
-    """A container ship that heels, with nothing hidden: what her forces lack of the fit's form looks like a rudder that answers late."""
+    """A container ship that heels, with nothing hidden: what her forces lack of the fit's form looks like a rudder that
+    answers late."""
     verdict = diagnose(published_trials(PUBLISHED["s175"], 40), gain=False)
     late = next(c for c in verdict.candidates if c.effect == "rudder_delay")
     assert late.score > THRESHOLD
@@ -116,7 +121,8 @@ def test_what_ships_differ_in_is_not_named_for_a_hull_of_another_form():
 
 @pytest.mark.long
 def test_a_change_that_one_run_alone_speaks_for_is_none():
-    """A container ship that heels, with nothing hidden: one run of 24 carries a score of 16 for a centre of gravity that moved."""
+    """A container ship that heels, with nothing hidden: one run of 24 carries a score of 16 for a centre of gravity
+    that moved."""
     data = published_trials(PUBLISHED["s175"], 25)
     plant = Plant.of(data)
     null = null_fit(plant, Scales(plant), candidates_for(plant))
@@ -125,7 +131,8 @@ def test_a_change_that_one_run_alone_speaks_for_is_none():
 
 @pytest.mark.long
 def test_a_current_shows_where_the_plain_model_rests_and_where_nothing_is_fitted_yet():
-    """A hull damped the wrong way had absorbed it: nothing of it was left where the plain model rested, but for a refit from the origin."""
+    """A hull damped the wrong way had absorbed it: nothing of it was left where the plain model rested, but for a refit
+    from the origin."""
     plant = Plant.of(_trials(Hidden(EFFECTS.get("current"), (0.25, -0.2))))
     null = null_fit(plant, Scales(plant), candidates_for(plant, ("current", "heading_bias", "speed_scale")))
     at_rest, at_origin = screen(null), absorbed([], null, THRESHOLD, Origin.of(null.plant, null.scales))
@@ -174,7 +181,9 @@ def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
     verdict = diagnose(_trials(Hidden(EFFECTS.get("heading_bias"), (values,))), gain=False)
     cause = verdict.causes[0]
     assert cause.effect == "change_point"
-    assert next(c for c in verdict.candidates if c.effect == "heading_bias").rejected_because == "named as a change_point"
+    assert (
+        next(c for c in verdict.candidates if c.effect == "heading_bias").rejected_because == "named as a change_point"
+    )
     assert "heading_bias" in cause.evidence
     assert abs(cause.parameters["from_run"].value - 6) <= 1
     assert not np.isfinite(cause.parameters["from_run"].ci95).any()  # none is known: no width of zero is claimed
@@ -183,8 +192,16 @@ def test_a_cause_that_begins_with_a_run_is_named_with_that_run():
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("index", "plan"),
-    [(1, SHORT), *(pytest.param(i, plan, marks=pytest.mark.long) for i, plan in ((3, Trials()), (6, SHORT), (8, SHORT)))],
-    ids=["slow force in time", "thrust lost with the rudder angle, not just lost", "force that goes with the place", "turned log"],
+    [
+        (1, SHORT),
+        *(pytest.param(i, plan, marks=pytest.mark.long) for i, plan in ((3, Trials()), (6, SHORT), (8, SHORT))),
+    ],
+    ids=[
+        "slow force in time",
+        "thrust lost with the rudder angle, not just lost",
+        "force that goes with the place",
+        "turned log",
+    ],
 )
 def test_a_force_or_a_fault_of_a_sensor_that_follows_no_known_cause_is_called_unknown_with_its_variable(index, plan):
     case = draw_case("outside", index, 3, "development", plan)
@@ -197,7 +214,8 @@ def test_a_force_or_a_fault_of_a_sensor_that_follows_no_known_cause_is_called_un
 
 @pytest.mark.long
 def test_what_an_unknown_fault_replaces_raises_no_doubt_of_the_ship_file():
-    """A log mounted at an angle: a list of 3.8 times its size had been the doubt, and a compass error was told beside it."""
+    """A log mounted at an angle: a list of 3.8 times its size had been the doubt, and a compass error was told beside
+    it."""
     verdict = diagnose(draw_case("outside", 58, 7, "test", Trials(runs=12, samples=90)).dataset(), gain=False)
     assert (verdict.verdict, verdict.causes, verdict.warnings) == ("unknown", (), ())
     assert verdict.unknown is not None
@@ -238,7 +256,8 @@ def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship
 @pytest.mark.parametrize(
     ("name", "told"),
     [
-        ("wind_per_run", False), ("bank_suction", False), ("current_per_run", True), ("wind", True), ("heading_bias", True), ("mass_change", False),
+        ("wind_per_run", False), ("bank_suction", False), ("current_per_run", True), ("wind", True),
+        ("heading_bias", True), ("mass_change", False),
     ],
 )  # fmt: skip
 def test_under_doubt_a_wind_of_each_run_and_a_bank_are_not_told(name, told):
@@ -248,9 +267,11 @@ def test_under_doubt_a_wind_of_each_run_and_a_bank_are_not_told(name, told):
 
 @pytest.mark.long
 def test_the_file_of_a_ship_of_another_size_is_doubted():
-    """A container ship with the file of a navy ship of a third of her length: no parameter of the fit is out of the ordinary there. That her ordinary
-    rudder is slow for so short a ship is not named."""
-    trials = replace(published_trials(PUBLISHED["s175"], 3, (), Trials(runs=16, samples=100)), ship=PUBLISHED["navy"].particulars)
+    """A container ship with the file of a navy ship of a third of her length: no parameter of the fit is out of the
+    ordinary there. That her ordinary rudder is slow for so short a ship is not named."""
+    trials = replace(
+        published_trials(PUBLISHED["s175"], 3, (), Trials(runs=16, samples=100)), ship=PUBLISHED["navy"].particulars
+    )
     verdict = diagnose(trials, gain=False)
     assert verdict.warnings[0].startswith("a similar ship of 2.5 times the size explains the runs better")
     assert "Is the ship file that of this ship" in verdict.warnings[0]
@@ -263,7 +284,9 @@ def test_the_file_of_a_ship_of_another_size_is_doubted():
 @pytest.mark.long
 def test_where_every_fit_creeps_no_refit_is_given_up_for_its_first_promise():
     """With another ship's file the current's refit promises less than nothing at first; it ends far ahead."""
-    trials = sea_trials(load_mmg_ship("container130"), 0, (Hidden(EFFECTS.get("current"), (0.3, 0.2)),), Trials(runs=12, samples=100))
+    trials = sea_trials(
+        load_mmg_ship("container130"), 0, (Hidden(EFFECTS.get("current"), (0.3, 0.2)),), Trials(runs=12, samples=100)
+    )
     verdict = diagnose(replace(trials, ship=PUBLISHED["s175"].particulars), gain=False)
     assert [c.effect for c in verdict.causes] == ["current"]
     assert verdict.causes[0].parameters["speed"].value == pytest.approx(np.hypot(0.3, 0.2), rel=0.2)
@@ -279,7 +302,9 @@ def test_too_few_runs_rank_candidates_but_name_none():
 def test_a_ship_that_never_moves_is_refused():
     data = _trials(runs=6, samples=40)
     states = [r.states * np.array([1, 1, 1, 0, 0, 0, 1, 1, 1, 1]) for r in data.runs]
-    still = data.with_runs([type(r)(r.id, r.t, s, r.inputs, r.inputs_names) for r, s in zip(data.runs, states, strict=True)])
+    still = data.with_runs(
+        [type(r)(r.id, r.t, s, r.inputs, r.inputs_names) for r, s in zip(data.runs, states, strict=True)]
+    )
     with pytest.raises(InputError, match="never moves"):
         diagnose(still)
 
@@ -291,7 +316,8 @@ def test_twenty_samples_are_refused_or_name_nothing():
 
 @pytest.mark.long
 def test_where_the_wind_is_measured_it_is_not_missing_but_its_coefficients_may_be():
-    """A container ship in a strong measured wind that turns it the other way, twice as hard as the formula says; and as it says."""
+    """A container ship in a strong measured wind that turns it the other way, twice as hard as the formula says; and as
+    it says."""
     ship, plan = load_mmg_ship("container130"), Trials(runs=24, samples=120, gusts=9.0)
     for hidden in ((), (Hidden(EFFECTS.get("wind_coefficients"), (0.0, 0.0, -3.0, 0.0)),)):
         data = sea_trials(ship, 4, hidden, plan, wind_recorded=True)

@@ -32,7 +32,10 @@ def test_every_feature_is_of_order_one_over_the_samples_that_are_there(plant, of
     for variable, forms in found.items():
         for form in forms:
             real = plant.seg.mask[:, -form.on.shape[1] :].T
-            assert np.sqrt(np.mean(form.on[:, real] ** 2, axis=1)) == pytest.approx(np.ones(form.size)), (variable, form.form)
+            assert np.sqrt(np.mean(form.on[:, real] ** 2, axis=1)) == pytest.approx(np.ones(form.size)), (
+                variable,
+                form.form,
+            )
             if variable in ("heading", "position", "run"):
                 assert np.abs(form.on[:, real].mean(axis=1)).max() < 1e-9
 
@@ -46,7 +49,12 @@ def test_errors_of_sensors_follow_the_samples(plant):
 
 def test_what_changes_its_sign_with_the_mirror_image_is_odd(plant):
     found, _ = _features(plant)
-    odd = {f.form for v in ("speed", "sway velocity", "yaw rate", "rudder", "revolutions", "revolutions and rudder") for f in found[v] if f.odd}
+    odd = {
+        f.form
+        for v in ("speed", "sway velocity", "yaw rate", "rudder", "revolutions", "revolutions and rudder")
+        for f in found[v]
+        if f.odd
+    }
     assert odd == {"v", "v|v|", "r", "r|r|", "delta", "delta|delta|", "n delta", "n|n| delta"}
 
 
@@ -60,12 +68,17 @@ def test_features_are_what_their_names_say_between_the_knots_too(plant):
     assert np.array_equal(form.on, form.aside)  # rudder and revolutions are the same beside the trajectory
     (speed,) = (f for f in found["speed"] if f.form == "u")
     moved = lin.turn == 3
-    assert (speed.aside - speed.on)[0][moved] == pytest.approx(lin.away[moved] * np.median(speed.on[0] / lin.middle[0, ..., 3]))
+    assert (speed.aside - speed.on)[0][moved] == pytest.approx(
+        lin.away[moved] * np.median(speed.on[0] / lin.middle[0, ..., 3])
+    )
 
 
 def test_periods_are_told_in_seconds_of_this_ship_and_one_is_near_to_any(plant):
     found, _ = _features(plant)
-    slow, of_waves = ([float(f.form.split()[4]) for f in found[variable] if f.form.startswith("cos")] for variable in ("time", "waves"))
+    slow, of_waves = (
+        [float(f.form.split()[4]) for f in found[variable] if f.form.startswith("cos")]
+        for variable in ("time", "waves")
+    )
     assert min(slow) > 1.8 * plant.c.L**0.5 > max(of_waves)
     periods = slow + of_waves
     assert periods[0] == pytest.approx(200.0 * plant.froude, rel=0.01)
@@ -76,7 +89,10 @@ def test_periods_are_told_in_seconds_of_this_ship_and_one_is_near_to_any(plant):
 
 def test_thrusters_that_are_not_used_are_not_looked_at(plant):
     assert "thrusters" not in _features(plant)[0]
-    assert "thrusters" in _features(Plant.of(sea_trials(load_mmg_ship("container130"), 5, (), Trials(runs=4, samples=40))))[0]
+    assert (
+        "thrusters"
+        in _features(Plant.of(sea_trials(load_mmg_ship("container130"), 5, (), Trials(runs=4, samples=40))))[0]
+    )
 
 
 @pytest.mark.parametrize("blows", [True, False])
@@ -84,7 +100,9 @@ def test_a_measured_wind_pushes_only_where_it_blows_and_abeam_to_one_side(blows:
     """What air at rest does is a resistance: none of these forms follows it."""
     data = sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=6, samples=80, wind=(6.0, -5.0)), wind_recorded=True)
     if not blows:
-        data = data.with_runs([replace(run, inputs=run.inputs * (np.array(run.inputs_names) != "wind_speed")) for run in data.runs])
+        data = data.with_runs(
+            [replace(run, inputs=run.inputs * (np.array(run.inputs_names) != "wind_speed")) for run in data.runs]
+        )
     forms = _features(Plant.of(data))[0]["measured wind"]
     assert [f.form for f in forms if np.any(f.on)] == ([f.form for f in forms] if blows else [])
     if blows:

@@ -37,7 +37,9 @@ def compiler():
 
 
 def trials(name: str, *values: float) -> Plant:
-    return Plant.of(sea_trials(load_mmg_ship("kcs"), 4, (Hidden(EFFECTS.get(name), values),), Trials(runs=4, samples=70)))
+    return Plant.of(
+        sea_trials(load_mmg_ship("kcs"), 4, (Hidden(EFFECTS.get(name), values),), Trials(runs=4, samples=70))
+    )
 
 
 @pytest.mark.parametrize("which", range(6))
@@ -72,7 +74,8 @@ def test_findings_do_not_depend_on_the_compiler(compiler, name, value, monkeypat
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["rudder_delay", "rudder_backlash", "rudder_lag", "rudder_rate_limit", "shaft_lag"])
 def test_from_the_smallest_size_that_is_told_on_an_effect_is_found(name):
-    """The same trials and noise with nothing hidden, with more than the size that they would have shown, and with less."""
+    """The same trials and noise with nothing hidden, with more than the size that they would have shown, and with
+    less."""
     ship, effect = load_mmg_ship("kcs"), EFFECTS.get(name)
 
     def score(*hidden: Hidden) -> GearFinding:
@@ -86,7 +89,8 @@ def test_from_the_smallest_size_that_is_told_on_an_effect_is_found(name):
 
 @pytest.mark.parametrize("dt", [0.1, 1.0])
 def test_an_ordinary_gear_is_found_at_any_sampling(dt):
-    """Ten samples a second are no reason for quicker gears: the least rate that is looked for was one of the samples, and every gear seemed slow."""
+    """Ten samples a second are no reason for quicker gears: the least rate that is looked for was one of the samples,
+    and every gear seemed slow."""
     data, rng = sea_trials(load_mmg_ship("kcs"), 4, (), Trials(runs=4, samples=90)), np.random.default_rng(0)
     each = round(data.dt / dt)
     runs = []
@@ -104,7 +108,8 @@ def test_an_ordinary_gear_is_found_at_any_sampling(dt):
 
 
 def test_a_record_that_is_late_by_less_than_a_stage_has_a_slope_to_be_found_by():
-    """Orders alone: held for a sample each, they would else not move at all with a small delay, and the fit would rest at none."""
+    """Orders alone: held for a sample each, they would else not move at all with a small delay, and the fit would rest
+    at none."""
     data = sea_trials(load_mmg_ship("kcs"), 3, (), Trials(runs=2, samples=60))
     plant = Plant.of(replace(data, actuators="commanded"))
     still, effect = plant.path_of([]), EFFECTS.get("rudder_delay")
@@ -165,7 +170,14 @@ def _recorded_before(ship: MMGShip, gear: Behind, size: float, channel: int, tri
     ("effect", "gear", "size", "channel", "told"),
     [
         pytest.param("rudder_lag", Behind("delta", "T2"), 3.0, DELTA, "by [delay] delta = -", marks=pytest.mark.long),
-        pytest.param("rudder_backlash", Behind("delta", "backlash"), 0.05, DELTA, "Measure behind that play.", marks=pytest.mark.long),
+        pytest.param(
+            "rudder_backlash",
+            Behind("delta", "backlash"),
+            0.05,
+            DELTA,
+            "Measure behind that play.",
+            marks=pytest.mark.long,
+        ),
         pytest.param("shaft_lag", Behind("n", "T2"), 8.0, N, "by [delay] n = -", marks=pytest.mark.long),
     ],
 )
@@ -183,7 +195,10 @@ def test_a_gear_behind_its_record_is_named(effect: str, gear: Behind, size: floa
 @pytest.mark.long
 def test_play_is_judged_beside_a_lag_that_is_too_small_to_matter(monkeypatch: pytest.MonkeyPatch):
     """On a boat a record that is 0.2 s early was passed over, and play that is not there named for it."""
-    ship, trials = scaled(load_mmg_ship("kcs"), 12.0), Trials(runs=12, samples=120, thrusters=False, astern=False, gusts=0.5, noise=0.3)
+    ship, trials = (
+        scaled(load_mmg_ship("kcs"), 12.0),
+        Trials(runs=12, samples=120, thrusters=False, astern=False, gusts=0.5, noise=0.3),
+    )
     margin = replace(THRESHOLDS.rows["refit_margin"], value=np.inf)  # no refit is given up
     monkeypatch.setitem(THRESHOLDS.rows, margin.name, margin)
     found = select(plain_model(Plant.of(_recorded_before(ship, Behind("delta", "T2"), 0.2, DELTA, trials))), 10.0)
@@ -198,7 +213,10 @@ def test_a_lag_behind_the_record_follows_the_motor_where_orders_drive_the_ship(a
     """Before the motor, whose rate is limited, it hardly shows: held-out gains of it were 21 %, now 31."""
     data = replace(sea_trials(load_mmg_ship("kcs"), 3, (), Trials(runs=2, samples=60)), actuators=actuators)
     ordinary = Gear(2.0, 0.05)
-    plant, goal = (rollout_plant(data, {"delta": gear}) for gear in (ordinary, replace(ordinary, **{field: getattr(ordinary, field) + 3.0})))
+    plant, goal = (
+        rollout_plant(data, {"delta": gear})
+        for gear in (ordinary, replace(ordinary, **{field: getattr(ordinary, field) + 3.0}))
+    )
     np.testing.assert_allclose(plant.path_of([Active(EFFECTS.get("rudder_lag"), (3.0,))]), goal.path, atol=1e-12)
 
 

@@ -73,7 +73,8 @@ def test_a_pull_on_two_axes_is_judged_on_both_and_not_taken_for_the_hull(kcs):
 
 @pytest.mark.parametrize("seed", [11, *(pytest.param(seed, marks=pytest.mark.long) for seed in (13, 15))])
 def test_a_force_of_its_own_in_each_run_is_not_taken_for_one_that_follows_place_or_heading(seed):
-    """Every run has its own of both: place scored 26 and 58, heading 31 and 47, where 16 are asked. What does follow the place still does."""
+    """Every run has its own of both: place scored 26 and 58, heading 31 and 47, where 16 are asked. What does follow
+    the place still does."""
 
     def push(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.push(q[0] * ship.mass, 0.0, 0.0)
@@ -83,7 +84,10 @@ def test_a_force_of_its_own_in_each_run_is_not_taken_for_one_that_follows_place_
         return {(d.axis, d.variable) for d in dependences(null_fit(plant, Scales(plant))) if d.score > 16.0}
 
     own = 0.01 * np.random.default_rng(seed).standard_normal(12)
-    assert not found(Hidden(Outside("a push of its own in each run", ("run",), push), (own,))) & {("surge", "position"), ("surge", "heading")}
+    assert not found(Hidden(Outside("a push of its own in each run", ("run",), push), (own,))) & {
+        ("surge", "position"),
+        ("surge", "heading"),
+    }
     assert ("sway", "position") in found(Hidden(get("side force that goes with the place"), (1.0, 0.3)))
 
 
@@ -112,7 +116,8 @@ def test_a_drag_of_thrusters_that_work_either_way_follows_their_size():
 
 @pytest.mark.long
 def test_a_sail_follows_the_measured_wind_and_nothing_does_without_one():
-    """A force across the wind that is felt on board. A current of each run, waves and a bank were named for two rotor sails."""
+    """A force across the wind that is felt on board. A current of each run, waves and a bank were named for two rotor
+    sails."""
 
     def sail(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         ahead, abeam = s.u + 6.0 * np.cos(s.psi) - 5.0 * np.sin(s.psi), s.v - 6.0 * np.sin(s.psi) - 5.0 * np.cos(s.psi)
@@ -120,7 +125,9 @@ def test_a_sail_follows_the_measured_wind_and_nothing_does_without_one():
         e.push(-lift * abeam, lift * ahead, 0.2 * ship.L * lift * ahead)
 
     def found(*hidden: Hidden) -> Dependence:
-        data = sea_trials(load_mmg_ship("container130"), 41, hidden, Trials(runs=12, wind=(6.0, -5.0)), wind_recorded=True)
+        data = sea_trials(
+            load_mmg_ship("container130"), 41, hidden, Trials(runs=12, wind=(6.0, -5.0)), wind_recorded=True
+        )
         plant = Plant.of(data)
         return dependences(null_fit(plant, Scales(plant)))[0]
 
@@ -147,7 +154,8 @@ def test_waves_that_rock_the_ship_are_no_force_that_follows_the_time_but_one_in_
 
 @pytest.mark.parametrize("in_order", [False, True])
 def test_what_goes_with_the_number_of_the_run_explains_more_than_a_force_of_each_run(in_order):
-    """A side force of its own in each run, by chance greater in the later ones, passed for one that follows the number."""
+    """A side force of its own in each run, by chance greater in the later ones, passed for one that follows the
+    number."""
 
     def push(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.push(0.0, q[0] * ship.mass * q[1], 0.0)
@@ -161,12 +169,17 @@ def test_what_goes_with_the_number_of_the_run_explains_more_than_a_force_of_each
 
 
 def test_a_constant_ahead_is_no_part_of_a_pull(kcs):
-    """Another form of resistance comes near one, and much is asked of it alone: with a trace of yaw beside it, it was `unknown` on a tug."""
+    """Another form of resistance comes near one, and much is asked of it alone: with a trace of yaw beside it, it was
+    `unknown` on a tug."""
 
     def push(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.push(q[0] * ship.mass, 0.0, 0.03 * ship.L * q[0] * ship.mass)
 
-    constants = [d for d in dependences(kcs(Hidden(Outside("a push", ("nothing",), push), (8e-3,)))) if d.variable == "nothing" and not d.of_sensor]
+    constants = [
+        d
+        for d in dependences(kcs(Hidden(Outside("a push", ("nothing",), push), (8e-3,))))
+        if d.variable == "nothing" and not d.of_sensor
+    ]
     assert {d.axis for d in constants} == {"surge", "sway", "yaw"}
     assert min(d.score for d in constants if d.axis != "sway") > 4.0
 
@@ -176,7 +189,10 @@ def test_errors_of_sensors_are_told_from_forces(kcs):
     calm = [d for d in dependences(kcs()) if d.of_sensor]
     assert {d.axis for d in calm} == set(SENSORS)
     assert max(d.score for d in calm) < 16.0
-    for name, axis in (("compass deviation that goes with the heading", "recorded heading"), ("scale of the yaw rate", "recorded yaw rate")):
+    for name, axis in (
+        ("compass deviation that goes with the heading", "recorded heading"),
+        ("scale of the yaw rate", "recorded yaw rate"),
+    ):
         cause = get(name)
         first = dependences(kcs(Hidden(cause, (1.0, 0.3))))[0]
         assert (first.axis, {first.variable}) == (axis, cause.variables)
@@ -196,7 +212,14 @@ def test_an_error_that_is_a_cause_of_the_library_is_worth_what_that_cause_is_wor
     null = kcs(Hidden(EFFECTS.get("heading_bias"), (0.035,)))
     search = Search(null)
     constant = next(d for d in search.found if (d.axis, d.variable) == ("recorded heading", "nothing"))
-    named = fit(null.plant, null.scales, Model(terms=(Term(EFFECTS.get("heading_bias"), ()),)), null.point, null.hyper, guess=null.motion)
+    named = fit(
+        null.plant,
+        null.scales,
+        Model(terms=(Term(EFFECTS.get("heading_bias"), ()),)),
+        null.point,
+        null.hyper,
+        guess=null.motion,
+    )
     worth = 2.0 * (named.evidence - null.evidence)
     assert search.settled(constant).score == pytest.approx(worth, abs=10.0)
     assert constant.score < search.settled(constant).score

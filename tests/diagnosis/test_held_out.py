@@ -1,4 +1,5 @@
-"""What is held out is held out whole: pieces of one log, or copies, are never on both sides; nor do they count as so many runs of their own."""
+"""What is held out is held out whole: pieces of one log, or copies, are never on both sides; nor do they count as so
+many runs of their own."""
 
 from __future__ import annotations
 
@@ -21,7 +22,9 @@ from shipbench.simulate.trials import Trials, sea_trials
 def grouped(groups: str, samples: int = 5, *hidden: Hidden) -> Dataset:
     """Runs whose groups are the letters; "-" is a run without one."""
     data = sea_trials(load_mmg_ship("kcs"), 3, hidden, Trials(runs=len(groups), samples=samples))
-    return data.with_runs([r if g == "-" else replace(r, meta={**r.meta, "group": g}) for r, g in zip(data.runs, groups, strict=True)])
+    return data.with_runs(
+        [r if g == "-" else replace(r, meta={**r.meta, "group": g}) for r, g in zip(data.runs, groups, strict=True)]
+    )
 
 
 @pytest.mark.parametrize("groups", ["a----a--a---", "aabbccddeeff", "aaaaaaab", "abab", "------------", "---"])
@@ -56,7 +59,8 @@ def test_of_a_single_group_nothing_is_held_out_and_it_is_said():
 
 
 def test_a_part_in_a_process_of_its_own_takes_one_thread(monkeypatch):
-    """Two processes on two cores with two threads each wait for each other: 24 runs with a current took 85 s, 12 s with one."""
+    """Two processes on two cores with two threads each wait for each other: 24 runs with a current took 85 s, 12 s with
+    one."""
     threads: list[int] = []
 
     def counted(*_: object) -> None:

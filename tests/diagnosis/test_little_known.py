@@ -1,4 +1,5 @@
-"""What most users have: a trial and main dimensions, or commands without the places of the actuators; and ships that go astern for long."""
+"""What most users have: a trial and main dimensions, or commands without the places of the actuators; and ships that go
+astern for long."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ def with_commands_alone(data: Dataset) -> Dataset:
 @pytest.mark.parametrize(
     ("ship", "known"),
     [
-        ("kcs", with_main_dimensions_alone), ("kvlcc2_l7", with_main_dimensions_alone), ("kvlcc2_l7", with_commands_alone),
+        ("kcs", with_main_dimensions_alone), ("kvlcc2_l7", with_main_dimensions_alone),
+        ("kvlcc2_l7", with_commands_alone),
         pytest.param("kcs", with_commands_alone, marks=pytest.mark.long),
     ],
 )  # fmt: skip
@@ -47,7 +49,9 @@ def test_nothing_is_named_where_nothing_is_hidden(ship, known):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("known", [with_main_dimensions_alone, pytest.param(with_commands_alone, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "known", [with_main_dimensions_alone, pytest.param(with_commands_alone, marks=pytest.mark.long)]
+)
 def test_a_current_is_found_with_its_size(known):
     verdict = diagnose(known(trials(CURRENT)), gain=False)
     assert [c.effect for c in verdict.causes] == ["current"]
@@ -76,7 +80,9 @@ def test_a_ship_that_goes_astern_for_long_has_nothing_missing():
 def test_what_is_certain_but_tiny_is_not_named(typical: float, named: bool):
     """Exact sensors in a calm see a gyro that is 0.1 deg off."""
     bias = EFFECTS.get("heading_bias")
-    verdict = diagnose(trials(Hidden(bias, (typical * bias.parameters[0].typical,)), runs=8, noise=0, gusts=0), gain=False)
+    verdict = diagnose(
+        trials(Hidden(bias, (typical * bias.parameters[0].typical,)), runs=8, noise=0, gusts=0), gain=False
+    )
     (line,) = (c for c in verdict.candidates if c.effect == "heading_bias")
     assert line.score > 30.0
     assert ("not practically significant" in line.rejected_because, [c.effect for c in verdict.causes]) == (

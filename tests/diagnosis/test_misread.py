@@ -70,7 +70,13 @@ def test_a_zero_error_is_none_of_them():
     assert named(recorded(trials(), DELTA, lambda d: d + 0.035)) == ([], [])
 
 
-CAUSES = {"rudder_deadband": 0.026, "rudder_backlash": 0.026, "rudder_lag": 3.0, "rudder_delay": 1.5, "rudder_rate_limit": 0.02}
+CAUSES = {
+    "rudder_deadband": 0.026,
+    "rudder_backlash": 0.026,
+    "rudder_lag": 3.0,
+    "rudder_delay": 1.5,
+    "rudder_rate_limit": 0.02,
+}
 
 
 @pytest.mark.long
@@ -83,7 +89,8 @@ def test_what_is_wrong_with_a_gear_is_no_error_of_its_record_and_is_seen_beside_
 
 
 def driven(gear: Callable[[np.ndarray, float, float], np.ndarray], noise: float = 0.2) -> Dataset:
-    """Trials whose rudder is at positions (samples,) that a gear gives for commands (samples * 50,), steps of time and a scale of times."""
+    """Trials whose rudder is at positions (samples,) that a gear gives for commands (samples * 50,), steps of time and
+    a scale of times."""
     data, rng, runs = trials(), np.random.default_rng(0), []
     for run in data.runs:
         position = gear(np.repeat(run.inputs[:-1, 1], 50), data.dt / 50, (data.ship.L / 130.0) ** 0.5)[::50]
@@ -94,7 +101,9 @@ def driven(gear: Callable[[np.ndarray, float, float], np.ndarray], noise: float 
 
 
 def followed(command: np.ndarray, dt: float, scale: float, **more: float) -> np.ndarray:
-    return gear_path(np.zeros(1), command[None], dt, Gear(scale, 0.044 / scale, **{k: np.full(1, v) for k, v in more.items()}))[0]
+    return gear_path(
+        np.zeros(1), command[None], dt, Gear(scale, 0.044 / scale, **{k: np.full(1, v) for k, v in more.items()})
+    )[0]
 
 
 @pytest.mark.long
@@ -111,10 +120,14 @@ def test_a_gear_of_two_stages_is_an_ordinary_one(noise):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("more", "names"), [({}, []), ({"deadband": 0.026}, ["rudder_deadband"]), ({"delay": 2.0}, ["rudder_delay"])])
+@pytest.mark.parametrize(
+    ("more", "names"), [({}, []), ({"deadband": 0.026}, ["rudder_deadband"]), ({"delay": 2.0}, ["rudder_delay"])]
+)
 def test_orders_beyond_the_end_stops_are_ordinary(more, names):
     """Stops at 20 degrees, orders up to 35."""
-    effects, errors = named(driven(lambda command, dt, scale: followed(np.clip(command, -0.35, 0.35), dt, scale, **more)))
+    effects, errors = named(
+        driven(lambda command, dt, scale: followed(np.clip(command, -0.35, 0.35), dt, scale, **more))
+    )
     assert (effects[:1], errors) == (names, [])
 
 
@@ -134,7 +147,10 @@ def test_the_motion_tells_whether_record_or_order_is_wrong():
     data = sea_trials(load_mmg_ship("kcs"), 7, (), Trials(runs=12))
     read_low = recorded(data, N, lambda n: 0.9 * n)
     low = diagnose(read_low, gain=False)
-    ordered = diagnose(data.with_runs([replace(r, inputs=r.inputs * np.r_[1.1, np.ones(r.inputs.shape[1] - 1)]) for r in data.runs]), gain=False)
+    ordered = diagnose(
+        data.with_runs([replace(r, inputs=r.inputs * np.r_[1.1, np.ones(r.inputs.shape[1] - 1)]) for r in data.runs]),
+        gain=False,
+    )
     for result, axis, taken in ((low, "recorded revolutions", "ordered"), (ordered, "ordered revolutions", "recorded")):
         assert (result.verdict, result.causes) == ("unknown", ())
         assert (result.unknown["axis"], result.unknown["variable"]) == (axis, "revolutions")
@@ -146,7 +162,11 @@ def test_the_motion_tells_whether_record_or_order_is_wrong():
 @pytest.mark.long
 def test_beside_a_named_cause_it_is_a_warning_and_of_a_rudder_the_motion_does_not_tell():
     result = diagnose(
-        recorded(sea_trials(load_mmg_ship("kcs"), 7, (Hidden(EFFECTS.get("current"), (0.3, 0.2)),), Trials(runs=12)), DELTA, ERRORS["10 % high"]),
+        recorded(
+            sea_trials(load_mmg_ship("kcs"), 7, (Hidden(EFFECTS.get("current"), (0.3, 0.2)),), Trials(runs=12)),
+            DELTA,
+            ERRORS["10 % high"],
+        ),
         gain=False,
     )
     assert [c.effect for c in result.causes] == ["current"]

@@ -1,4 +1,5 @@
-"""Parameters far from what is ordinary: wide enough a spread for them, none for the others, and no cause named in their place."""
+"""Parameters far from what is ordinary: wide enough a spread for them, none for the others, and no cause named in their
+place."""
 
 from __future__ import annotations
 
@@ -59,7 +60,8 @@ def test_with_it_less_is_left_for_a_cause_of_the_same_kind(mariner):
 
 @pytest.mark.parametrize("gain", [-1.0, 1.0])
 def test_a_wider_spread_is_taken_only_where_its_fit_is_no_worse(mariner, monkeypatch, gain: float):
-    """Winds of single runs of 10 m/s: the fit with wider spreads ended 68 of log evidence below the one before, with winds of 1.5 m/s."""
+    """Winds of single runs of 10 m/s: the fit with wider spreads ended 68 of log evidence below the one before, with
+    winds of 1.5 m/s."""
     narrow = replace(mariner, model=replace(mariner.model, widths=()))
     other = SimpleNamespace(evidence=narrow.evidence + gain, model=mariner.model)
     monkeypatch.setattr(ordinary, "widths_of", lambda found: np.asarray(mariner.model.widths))
@@ -68,7 +70,8 @@ def test_a_wider_spread_is_taken_only_where_its_fit_is_no_worse(mariner, monkeyp
 
 
 def test_behind_a_propeller_that_drives_the_flow_is_that_of_one_that_drives():
-    """With exact sensors a leak of what holds for one that stands was enough to doubt the navy ship's file (21 spreads)."""
+    """With exact sensors a leak of what holds for one that stands was enough to doubt the navy ship's file (21
+    spreads)."""
     ship, zero = complete(load_mmg_ship("kcs").particulars), np.zeros(3)
     u, names = 5.0, [p.name for p in STRUCTURE.parameters]
     V_A = u * (1.0 - ship.w_P0)
@@ -115,14 +118,16 @@ EXACT = Trials(noise=0.0, gusts=0.0)
 
 @pytest.mark.parametrize(("name", "value"), [("windmilling", 0.31), ("thrust_backing", 0.8)])
 def test_a_propeller_of_the_b_series_is_that_of_an_ordinary_ship(name, value):
-    """B4-70 lay 6 and 4 spreads off, ships of a third simulator up to 6 in both: half of the sum that doubts a ship file."""
+    """B4-70 lay 6 and 4 spreads off, ships of a third simulator up to 6 in both: half of the sum that doubts a ship
+    file."""
     p = next(p for p in STRUCTURE.parameters if p.name == name)
     assert value / (p.typical * STRUCTURE.wider(load_mmg_ship("kcs").particulars)[name]) < 2.5
 
 
 @pytest.mark.parametrize(("Cb", "factor"), [(0.55, 1.0), (0.65, 1.0), (0.81, 3.4), (0.88, 9.4), (0.99, 39.1)])
 def test_a_full_hull_makes_waves_at_a_lower_froude_number(Cb: float, factor: float):
-    """A barge with a block coefficient of 0.88 needed 9 spreads of it at a Froude number of 0.18, and her file was doubted."""
+    """A barge with a block coefficient of 0.88 needed 9 spreads of it at a Froude number of 0.18, and her file was
+    doubted."""
     assert STRUCTURE.wider(SimpleNamespace(Cb=Cb))["wave_resistance"] == pytest.approx(factor, rel=0.02)
 
 
@@ -138,14 +143,18 @@ def test_what_ships_differ_by_more_counts_for_less(exact_mariner, monkeypatch):
     before = needed(exact_mariner)
     narrow = PLACES["thrust_backing"]
     assert less[narrow] == pytest.approx(before[narrow] / 2.5)
-    np.testing.assert_array_equal(np.delete(less, [narrow, PLACES["windmilling"]]), np.delete(before, [narrow, PLACES["windmilling"]]))
+    np.testing.assert_array_equal(
+        np.delete(less, [narrow, PLACES["windmilling"]]), np.delete(before, [narrow, PLACES["windmilling"]])
+    )
 
 
 def test_what_a_small_force_could_stand_for_is_not_asked_of_the_ship(exact_mariner):
     found = exact_mariner
     moved, less = found.solution.mean[:NUM_BASE], needed(found, NOTICEABLE)
     assert np.sum(less**2) < 0.9 * np.sum(moved**2)
-    np.testing.assert_allclose(needed(found, 1e-6), moved, atol=0.2)  # where the force is as it was, so are the parameters
+    np.testing.assert_allclose(
+        needed(found, 1e-6), moved, atol=0.2
+    )  # where the force is as it was, so are the parameters
     assert np.max(np.abs(less)) < STRANGE
     assert np.sum(less**2) < STRANGE_SUM
 
@@ -153,7 +162,8 @@ def test_what_a_small_force_could_stand_for_is_not_asked_of_the_ship(exact_marin
 @pytest.mark.long
 @pytest.mark.parametrize(("ship", "runs"), [pytest.param("mariner", 24, marks=pytest.mark.long), ("tanker", 12)])
 def test_exact_sensors_in_a_calm_make_no_cause_of_the_form_of_a_hull(ship, runs):
-    """Before a least force both were `unknown` and their ship files doubted: a parameter at 12.5 spreads, a mass changed by 3.3 typical sizes."""
+    """Before a least force both were `unknown` and their ship files doubted: a parameter at 12.5 spreads, a mass
+    changed by 3.3 typical sizes."""
     verdict = diagnose(published_trials(PUBLISHED[ship], 43, plan=replace(EXACT, runs=runs)), gain=False)
     assert (verdict.verdict, verdict.causes) == ("none", ())
     assert not any("Is the ship file" in w for w in verdict.warnings)
@@ -170,15 +180,18 @@ def test_exact_sensors_in_a_calm_still_show_a_small_cause():
 @pytest.mark.long
 @pytest.mark.parametrize(("runs", "samples"), [(10, 600), (8, 400)])
 def test_standard_manoeuvres_make_no_cause_and_no_doubt_of_the_form_of_a_hull(runs, samples):
-    """At the limits of the rudder, S175 with heel: once ten runs gave a `rudder_delay` and a doubt of her file, and eight a `mass_change`, for inflow
-    that rises with the square of the angle."""
-    verdict = diagnose(published_trials(PUBLISHED["s175"], 185, plan=Trials(runs=runs, samples=samples, standard=True)), gain=False)
+    """At the limits of the rudder, S175 with heel: once ten runs gave a `rudder_delay` and a doubt of her file, and
+    eight a `mass_change`, for inflow that rises with the square of the angle."""
+    verdict = diagnose(
+        published_trials(PUBLISHED["s175"], 185, plan=Trials(runs=runs, samples=samples, standard=True)), gain=False
+    )
     assert (verdict.verdict, verdict.causes, verdict.warnings) == ("none", (), ())
 
 
 @pytest.mark.long
 def test_resistance_that_grows_with_the_speed_itself_is_no_sign_of_a_wrong_ship_file():
-    """As in the linear models of control engineers. With the spread of ships (1 of the units) instead: doubt, and `unknown`."""
+    """As in the linear models of control engineers. With the spread of ships (1 of the units) instead: doubt, and
+    `unknown`."""
     tanker = PUBLISHED["tanker"]
     drag = 9.0 * parameter_scale(coefficients(complete(tanker.particulars)))[1]
 
@@ -207,10 +220,21 @@ def test_a_ship_with_more_drag_forward_is_turned_where_she_is_pushed_sideways():
 
 @pytest.mark.long
 def test_the_waves_of_a_fast_ship_are_no_added_resistance():
-    """A fourth power of the Froude number beside the square of the speed was named with a score of 27, the latent force 16 times as large."""
+    """A fourth power of the Froude number beside the square of the speed was named with a score of 27, the latent force
+    16 times as large."""
 
     def of_waves(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
-        e.push(-q[0] * 0.5 * ship.rho * ship.L * ship.T * 0.015 * (s.u * s.u / (9.81 * ship.L * 0.25**2)) ** 2 * s.u * np.abs(s.u))
+        e.push(
+            -q[0]
+            * 0.5
+            * ship.rho
+            * ship.L
+            * ship.T
+            * 0.015
+            * (s.u * s.u / (9.81 * ship.L * 0.25**2)) ** 2
+            * s.u
+            * np.abs(s.u)
+        )
 
     hidden = Hidden(Outside("wave resistance", ("speed",), of_waves), (1.0,))
     found = diagnose(published_trials(PUBLISHED["navy"], 5, (hidden,), Trials(runs=12)), gain=False)
@@ -219,17 +243,24 @@ def test_the_waves_of_a_fast_ship_are_no_added_resistance():
 
 
 def test_a_propeller_whose_curve_is_not_given_is_not_named_for_what_it_does_beside_that_curve():
-    """More thrust in the estimate and less in `thrust_gain` was a way to twice the drag of a propeller that is turned against the flow."""
+    """More thrust in the estimate and less in `thrust_gain` was a way to twice the drag of a propeller that is turned
+    against the flow."""
     ship = complete(load_mmg_ship("kcs").particulars.model_copy(update={"propeller": Propeller(diameter=4.0)}))
     c, p = coefficients(ship), np.zeros(11)
     names = [q.name for q in STRUCTURE.parameters]
 
     def surge(log_thrust: float, gain: float) -> np.ndarray:
         e, q = Modifiers(), np.zeros(len(names))
-        q[names.index("log_thrust")], q[names.index("thrust_backing")], q[names.index("windmilling")] = log_thrust, 1.0, 0.3
+        q[names.index("log_thrust")], q[names.index("thrust_backing")], q[names.index("windmilling")] = (
+            log_thrust,
+            1.0,
+            0.3,
+        )
         n, still = np.array([-80.0, 0.0, 90.0]), np.zeros(3)
         STRUCTURE.force(e, Flow(still, still, still, still, still + 4.0, still, still, n, still, still, still), q, ship)
-        EFFECTS.get("thrust_gain").force(e, Flow(still, still, still, still, still + 4.0, still, still, n, still, still, still), (gain,), ship)
+        EFFECTS.get("thrust_gain").force(
+            e, Flow(still, still, still, still, still + 4.0, still, still, n, still, still, still), (gain,), ship
+        )
         return accelerations(still + 4.0, still, still, n, still, still, still, None, c, p, e)[0]
 
     np.testing.assert_allclose(surge(np.log(1.8), 1.0 / 1.8 - 1.0), surge(0.0, 0.0))
@@ -238,7 +269,8 @@ def test_a_propeller_whose_curve_is_not_given_is_not_named_for_what_it_does_besi
 @pytest.mark.long
 @pytest.mark.parametrize("diameter", [1.9, *(pytest.param(d, marks=pytest.mark.long) for d in (2.26, 2.6))])
 def test_a_fit_finds_its_way_from_regressions_that_are_far_off(diameter: float):
-    """A small fast ship whose two screws the file gives as one: of the right size, or with up to three times the thrust. Her rudders have no race."""
+    """A small fast ship whose two screws the file gives as one: of the right size, or with up to three times the
+    thrust. Her rudders have no race."""
     navy = PUBLISHED["navy"]
     ship = replace(navy, particulars=navy.particulars.model_copy(update={"propeller": Propeller(diameter=diameter)}))
     plant = Plant.of(published_trials(ship, 1, (), Trials(runs=12, samples=80)))

@@ -53,6 +53,8 @@ def test_a_size_that_suits_an_estimated_propeller_needs_more_evidence(plant, mon
     evidence = {True: 0.0, False: gain}
     monkeypatch.setattr(other_size, "first_evidence", lambda *_: gain)
     monkeypatch.setattr(other_size, "null_fit", lambda at, _: SimpleNamespace(plant=at, evidence=evidence[at is few]))
-    monkeypatch.setattr(plant, "ship", complete(Ship(name="bare", L=175.0, B=25.4, T=8.5, displacement=21222.0)) if bare else plant.ship)
+    monkeypatch.setattr(
+        plant, "ship", complete(Ship(name="bare", L=175.0, B=25.4, T=8.5, displacement=21222.0)) if bare else plant.ship
+    )
     few = plant.thinned(99)
     assert bool(better_size(SimpleNamespace(plant=plant, evidence=0.0))) is doubted

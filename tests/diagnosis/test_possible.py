@@ -52,7 +52,9 @@ def without(*channels: int, value: float = 0.0) -> Plant:
 @pytest.mark.parametrize(("channels", "family"), [((DELTA,), "rudder"), ((F_B, F_S), "thruster"), ((N,), "propulsion")])
 def test_what_acts_through_an_actuator_that_never_works_is_not_asked(channels: tuple[int, ...], family: str):
     asked = {t.label for t in candidates_for(without(*channels))}
-    of_family = {name for name in EFFECTS.names() if EFFECTS.get(name).family == family and EFFECTS.get(name).acts_through}
+    of_family = {
+        name for name in EFFECTS.names() if EFFECTS.get(name).family == family and EFFECTS.get(name).acts_through
+    }
     assert of_family
     assert not asked & of_family
     assert {t.label for t in candidates_for(Plant.of(trials()))} & of_family
@@ -61,7 +63,9 @@ def test_what_acts_through_an_actuator_that_never_works_is_not_asked(channels: t
 
 def test_a_rudder_that_stands_still_while_the_ship_turns_does_not_work(monkeypatch):
     assert why_not(EFFECTS.get("rudder_offset"), without(DELTA, value=1e-3)) == ""  # held, for all that is known
-    monkeypatch.setattr("shipbench.diagnosis.model.forward.standing", lambda _: {"delta": ("it turns all the same", {})})
+    monkeypatch.setattr(
+        "shipbench.diagnosis.model.forward.standing", lambda _: {"delta": ("it turns all the same", {})}
+    )
     assert "rudder never moves" in why_not(EFFECTS.get("rudder_offset"), without(DELTA, value=1e-3))
 
 
@@ -101,4 +105,6 @@ def _found(effect: Effect, values: np.ndarray) -> SimpleNamespace:
     typical = np.array([abs(p.typical) for p in effect.sized(130.0) if not p.shape])
     plant = SimpleNamespace(c=SimpleNamespace(L=130.0), ship=SimpleNamespace(L=130.0, B=20.0, x_bow=50.0))
     model = SimpleNamespace(terms=(Term(effect),))
-    return SimpleNamespace(values=(values,), model=model, plant=plant, scales=SimpleNamespace(amplitudes=lambda *_: typical))
+    return SimpleNamespace(
+        values=(values,), model=model, plant=plant, scales=SimpleNamespace(amplitudes=lambda *_: typical)
+    )

@@ -1,4 +1,5 @@
-"""What makes the search for causes quick leaves what it finds: shared linearisations, all changes at once, traces without the matrices."""
+"""What makes the search for causes quick leaves what it finds: shared linearisations, all changes at once, traces
+without the matrices."""
 
 from __future__ import annotations
 
@@ -28,7 +29,9 @@ NAMES = ("current", "heading_bias", "wind_per_run", "speed_scale", "rudder_delay
 @pytest.fixture(scope="module")
 def null() -> Fit:
     """A compass error is hidden; candidates of all three kinds, one with values per run."""
-    plant = Plant.of(sea_trials(load_mmg_ship("kcs"), 3, (Hidden(EFFECTS.get("heading_bias"), (0.04,)),), Trials(runs=8, samples=60)))
+    plant = Plant.of(
+        sea_trials(load_mmg_ship("kcs"), 3, (Hidden(EFFECTS.get("heading_bias"), (0.04,)),), Trials(runs=8, samples=60))
+    )
     return null_fit(plant, Scales(plant), candidates_for(plant, NAMES))
 
 
@@ -36,7 +39,9 @@ def null() -> Fit:
 @pytest.mark.parametrize("actuators", ["measured", pytest.param("commanded", marks=pytest.mark.long)])
 def test_every_candidate_has_a_slope_at_whatever_size(actuators):
     """Else its fit rests where it begins: the delay of a recorded rudder had one at zero alone, and was never found."""
-    plant = Plant.of(replace(sea_trials(load_mmg_ship("container130"), 4, (), Trials(runs=8, samples=70)), actuators=actuators))
+    plant = Plant.of(
+        replace(sea_trials(load_mmg_ship("container130"), 4, (), Trials(runs=8, samples=70)), actuators=actuators)
+    )
     found = null_fit(plant, Scales(plant))
     for term in candidates_for(plant):
         value = np.full((plant.seg.runs, term.size) if term.per_run else term.size, 0.31)
@@ -53,7 +58,8 @@ def test_a_refit_from_the_shared_linearisation_is_the_one_from_its_own(null):
 
 
 def test_where_free_steps_lead_astray_each_step_lowers_the_cost(null, monkeypatch):
-    """A current on a ship of 56 m with positions of 1.5 m noise: the first step raised the cost twelve times, and no later one came back."""
+    """A current on a ship of 56 m with positions of 1.5 m noise: the first step raised the cost twelve times, and no
+    later one came back."""
     origin, model, real = Origin.of(null.plant, null.scales), Model(), refit._step
 
     def astray(lin, found, free, share):
@@ -70,7 +76,8 @@ def test_where_free_steps_lead_astray_each_step_lowers_the_cost(null, monkeypatc
 
 
 def test_a_fit_that_goes_on_near_rest_takes_no_free_steps(null, monkeypatch):
-    """They led 200 of log evidence away and back: the plain model of 90 runs took 13 linearisations from rest to the same place."""
+    """They led 200 of log evidence away and back: the plain model of 90 runs took 13 linearisations from rest to the
+    same place."""
     taken, real = [], refit._step
 
     def step(lin, found, free, share):
@@ -119,7 +126,9 @@ def test_changes_at_many_runs_are_those_of_each_alone():
     for k, score, value in zip((3, 6), scores, values, strict=True):
         total, late = S.sum(axis=0), S[k:].sum(axis=0)
         plain = total[np.ix_(keep, keep)] + np.diag(precision)
-        both = np.block([[plain, late[np.ix_(keep, cols)]], [late[np.ix_(cols, keep)], late[np.ix_(cols, cols)] + np.eye(2)]])
+        both = np.block(
+            [[plain, late[np.ix_(keep, cols)]], [late[np.ix_(cols, keep)], late[np.ix_(cols, cols)] + np.eye(2)]]
+        )
         b = np.append(total[keep, -1], late[cols, -1])
         gain = b @ np.linalg.solve(both, b) - np.linalg.slogdet(both)[1]
         gain -= b[:4] @ np.linalg.solve(plain, b[:4]) - np.linalg.slogdet(plain)[1]
@@ -129,7 +138,9 @@ def test_changes_at_many_runs_are_those_of_each_alone():
 
 def test_variances_of_the_force_need_no_matrix_of_a_segment(null):
     term = next(t for t in null.candidates if t.per_run)
-    lin = Linearisation(null.plant, null.scales, replace(null.point, terms=(term,), values=(np.zeros((8, 2)),)), null.motion)
+    lin = Linearisation(
+        null.plant, null.scales, replace(null.point, terms=(term,), values=(np.zeros((8, 2)),)), null.motion
+    )
     found = settle(lin, replace(null.model, terms=(term,)), null.hyper, {0: -1.0}, leap=0.0)
     gram, reduced, prior, solution = found.gram, found.reduced, found.prior, found.solution
     estimate, cov = background(gram, reduced, prior, solution), background_cov(gram, reduced, prior, solution)
@@ -140,10 +151,15 @@ def test_variances_of_the_force_need_no_matrix_of_a_segment(null):
         expected.append(np.log((np.sum(w @ gram.K_inv * w) + np.sum(gram.K_inv * cov[:, at, at].sum(axis=0))) / w.size))
     free = np.array(expected) > 2.0 * np.log(0.1)  # the least that a force may be
     assert free.any()
-    assert update_force(gram, reduced, prior, solution, estimate)[free] == pytest.approx(np.array(expected)[free], abs=1e-9)
+    assert update_force(gram, reduced, prior, solution, estimate)[free] == pytest.approx(
+        np.array(expected)[free], abs=1e-9
+    )
 
 
 def test_the_evidence_for_a_hull_off_the_regressions_is_that_of_two_linear_models(null):
     lin = Linearisation(null.plant, null.scales, null.point, null.motion)
-    wide, narrow = (settle(lin, replace(null.model, hull=width), null.hyper, null.log_tau2).solution.log_evidence for width in (1.0, 0.1))
+    wide, narrow = (
+        settle(lin, replace(null.model, hull=width), null.hyper, null.log_tau2).solution.log_evidence
+        for width in (1.0, 0.1)
+    )
     assert hull_evidence(null) == pytest.approx(2.0 * (wide - narrow), abs=0.05)

@@ -12,7 +12,15 @@ from test_robust import RUNS, fit_of
 
 from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection import requirements
-from shipbench.diagnosis.selection.requirements import REQUIREMENTS, SURE, Requirement, Standard, Verdict, detection_limit, first_unmet
+from shipbench.diagnosis.selection.requirements import (
+    REQUIREMENTS,
+    SURE,
+    Requirement,
+    Standard,
+    Verdict,
+    detection_limit,
+    first_unmet,
+)
 from shipbench.diagnosis.selection.screening import Score
 from shipbench.effects.base import EFFECTS, Effect
 from shipbench.effects.traits import Traits
@@ -79,7 +87,9 @@ def test_the_effect_of_the_example_package_is_a_candidate_and_meets_the_same_req
     monkeypatch.syspath_prepend(str(EXAMPLE))
     effect = importlib.import_module("shipbench_example.barge_alongside").EFFECT
     term, standard = Term(effect), Standard(fit_of(np.zeros(RUNS)), 10.0, off_form=5.0)
-    assert standard.asked_besides(term) == standard.asked_besides(Term(EFFECTS.get("current"))) == 0.0  # neither differs between ships
+    assert (
+        standard.asked_besides(term) == standard.asked_besides(Term(EFFECTS.get("current"))) == 0.0
+    )  # neither differs between ships
     assert standard.asked_besides(Term(effect, since=3)) == 5.0
     own = fit_of(np.full(RUNS, 0.5))
     own.model.terms = (term,)
@@ -87,8 +97,15 @@ def test_the_effect_of_the_example_package_is_a_candidate_and_meets_the_same_req
     assert met == Verdict(True)
     scattered = fit_of(0.5 + 3.0 * np.resize([1.0, -1.0], RUNS))
     scattered.model.terms = (term,)
-    assert first_unmet(SURE[1:], scattered, 0, standard) == Verdict(False, "the runs do not agree that its size differs from zero")
+    assert first_unmet(SURE[1:], scattered, 0, standard) == Verdict(
+        False, "the runs do not agree that its size differs from zero"
+    )
 
 
 def test_whoever_is_told_the_names_asks_for_no_evidence():
-    assert Standard(fit_of(np.zeros(RUNS)), 0.0, off_form=5.0, careful=False).asked_besides(Term(EFFECTS.get("mass_change"))) == 0.0
+    assert (
+        Standard(fit_of(np.zeros(RUNS)), 0.0, off_form=5.0, careful=False).asked_besides(
+            Term(EFFECTS.get("mass_change"))
+        )
+        == 0.0
+    )

@@ -14,7 +14,16 @@ from shipbench.diagnosis.model.linearisation import NUM_BASE, PLACES
 from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection import agreement as robust
 from shipbench.diagnosis.selection import requirements
-from shipbench.diagnosis.selection.agreement import bends, covariance, imitates, inflation, is_borne_by_one, is_on_a_ship, least_size, matters
+from shipbench.diagnosis.selection.agreement import (
+    bends,
+    covariance,
+    imitates,
+    inflation,
+    is_borne_by_one,
+    is_on_a_ship,
+    least_size,
+    matters,
+)
 from shipbench.diagnosis.selection.requirements import SURE, Standard, first_unmet
 from shipbench.effects.base import EFFECTS
 from shipbench.signals import DELTA
@@ -32,8 +41,11 @@ def _reduced(S: np.ndarray) -> Reduced:
     return Reduced(S, np.zeros(len(S)), np.zeros(0), np.zeros(0))
 
 
-def fit_of(estimates: np.ndarray, since: int | None = None, effect: str = "rudder_offset", setting: tuple[float, ...] = ()) -> SimpleNamespace:
-    """Runs (N,) with information 9 each on every amplitude, whose own least squares estimates of the first are given, of others 0; prior N(0, 1)."""
+def fit_of(
+    estimates: np.ndarray, since: int | None = None, effect: str = "rudder_offset", setting: tuple[float, ...] = ()
+) -> SimpleNamespace:
+    """Runs (N,) with information 9 each on every amplitude, whose own least squares estimates of the first are given,
+    of others 0; prior N(0, 1)."""
     term, information, num = Term(EFFECTS.get(effect), setting, since=since), 9.0, len(estimates)
     S = np.zeros((num, term.size + 1, term.size + 1))
     S[:] = np.diag(np.append(np.full(term.size, information), 1.0))
@@ -42,7 +54,8 @@ def fit_of(estimates: np.ndarray, since: int | None = None, effect: str = "rudde
     mean = cov[0] * information * estimates.sum()
     at, typical = np.arange(term.size), np.array([p.typical for p in term.effect.parameters if not p.shape])
     return SimpleNamespace(
-        reduced=_reduced(S), solution=SimpleNamespace(mean=mean, cov=cov), prior=Prior(at, np.ones(term.size), *_NONE), values=(mean,),
+        reduced=_reduced(S), solution=SimpleNamespace(mean=mean, cov=cov), prior=Prior(at, np.ones(term.size), *_NONE),
+        values=(mean,),
         columns_of=lambda index: at, plant=SimpleNamespace(seg=SimpleNamespace(runs=num), c=SimpleNamespace(L=130.0)),
         model=SimpleNamespace(terms=(term,)), scales=SimpleNamespace(amplitudes=lambda *_: typical),
     )  # fmt: skip
@@ -68,15 +81,21 @@ def test_a_beginning_needs_runs_that_agree_much_better(scatter: float, sure: boo
     assert is_sure(fit_of(estimates, since=4), 0) is sure
 
 
-@pytest.mark.parametrize(("informed", "sure"), [(9.0, False), (0.0, True)], ids=["the others say no", "the others cannot say"])
+@pytest.mark.parametrize(
+    ("informed", "sure"), [(9.0, False), (0.0, True)], ids=["the others say no", "the others cannot say"]
+)
 def test_what_one_run_alone_bears_is_sure_only_if_the_others_do_not_speak_against_it(informed: float, sure: bool):
-    """A cause that is strong in the first run, as a bank near which it went; what its run says alone agrees with itself."""
+    """A cause that is strong in the first run, as a bank near which it went; what its run says alone agrees with
+    itself."""
     S, weights = np.zeros((RUNS, 2, 2)), np.append(400.0, np.full(RUNS - 1, informed))
     S[:, 0, 0], S[0, 0, 1], S[0, 1, 0] = weights, 400.0, 400.0
     reduced, prior = _reduced(S), Prior(np.array([0]), np.ones(1), *_NONE)
     fit = SimpleNamespace(reduced=reduced, prior=prior, columns_of=lambda index: np.array([0]))
     assert is_borne_by_one(fit, 0) is not sure
-    whole, nothing = solve(reduced, prior).log_evidence, solve(reduced, Prior(prior.shared[:0], prior.precision[:0], *_NONE)).log_evidence
+    whole, nothing = (
+        solve(reduced, prior).log_evidence,
+        solve(reduced, Prior(prior.shared[:0], prior.precision[:0], *_NONE)).log_evidence,
+    )
     assert 2.0 * (whole - nothing) > 100.0
 
 
@@ -90,8 +109,10 @@ def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
     prior = Prior(np.array([0]), np.ones(1), np.array([1]), np.log([25.0]))
     solution = solve(reduced, prior)
     fit = SimpleNamespace(
-        reduced=reduced, prior=prior, solution=solution, values=(solution.mean,), columns_of=lambda index: np.array([0]),
-        plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS), c=SimpleNamespace(L=130.0)), scales=SimpleNamespace(amplitudes=lambda *_: np.ones(1)),
+        reduced=reduced, prior=prior, solution=solution, values=(solution.mean,),
+        columns_of=lambda index: np.array([0]),
+        plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS), c=SimpleNamespace(L=130.0)),
+        scales=SimpleNamespace(amplitudes=lambda *_: np.ones(1)),
         model=SimpleNamespace(terms=(Term(EFFECTS.get("rudder_offset")),)),
     )  # fmt: skip
     assert solution.mean[0] == pytest.approx(0.5, abs=0.05)
@@ -100,8 +121,11 @@ def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
 
 
 @pytest.mark.parametrize(("forward", "own", "sure"), [(0.08, True, False), (0.3, True, True), (0.08, False, True)])
-def test_how_far_ahead_velocities_are_is_as_sure_as_where_the_forces_of_a_hull_act(forward: float, own: bool, sure: bool):
-    """An antenna 4 m astern with velocities of its own was named on a patrol vessel of 52 m that had none; positions alone tell it by the track."""
+def test_how_far_ahead_velocities_are_is_as_sure_as_where_the_forces_of_a_hull_act(
+    forward: float, own: bool, sure: bool
+):
+    """An antenna 4 m astern with velocities of its own was named on a patrol vessel of 52 m that had none; positions
+    alone tell it by the track."""
     fit = fit_of(np.full(RUNS, forward * 130.0 / 12.0), effect="antenna_offset", setting=(float(own),))
     assert is_sure(fit, 0) is sure
 
@@ -110,7 +134,8 @@ def _of_runs(gram: Gram, prior: Prior) -> SimpleNamespace:
     """A fit of causes with values of single runs."""
     reduced = gram.reduce(np.zeros(3))
     return SimpleNamespace(
-        gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, reduced=reduced, solution=solve(reduced, prior),
+        gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, reduced=reduced,
+        solution=solve(reduced, prior),
         model=SimpleNamespace(terms=tuple(Term(EFFECTS.get("current_per_run"), per_run=True) for _ in prior.random)),
     )  # fmt: skip
 
@@ -123,7 +148,9 @@ def test_a_value_for_each_run_is_sure_only_if_it_lasts_for_the_run(pieces: int, 
     value = rng.standard_normal((RUNS if steady else len(run), 1))
     Z = rng.standard_normal((len(run), 50, 11))  # eta, w of one knot for each axis, own, e
     Z[..., -1] += 2.0 * (value[run] if steady else value) * Z[..., -2]
-    gram = Gram(np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 2)), run, RUNS)
+    gram = Gram(
+        np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 2)), run, RUNS
+    )
     prior = Prior(*_NONE, np.array([0]), np.log([4.0]))
     assert is_sure(_of_runs(gram, prior), 0) is sure
 
@@ -137,7 +164,9 @@ def test_a_wind_with_gusts_is_sure_beside_a_current_that_lasts(steady: bool):
     wind = 0.2 * rng.standard_normal((RUNS, 1))[run] + 0.3 * rng.standard_normal((len(run), 1))
     current = 2.0 * (rng.standard_normal((RUNS, 1))[run] if steady else rng.standard_normal((len(run), 1)))
     Z[..., -1] += wind * Z[..., 9] + current * Z[..., 10]
-    gram = Gram(np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 3)), run, RUNS)
+    gram = Gram(
+        np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 3)), run, RUNS
+    )
     for random, sure in ((np.array([0]), False), (np.array([0, 1]), steady)):
         prior = Prior(*_NONE, random, np.log([0.1, 4.0])[random])
         assert is_sure(_of_runs(gram, prior), 0) is sure
@@ -151,7 +180,9 @@ def test_a_value_for_each_run_is_sure_only_if_little_else_differs_between_runs(o
     Z = rng.standard_normal((len(run), 50, 11))  # eta, w of one knot for each axis, own, e
     Z[..., -1] += rng.standard_normal((RUNS, 1))[run] * Z[..., -2]
     Z[..., -1] += np.einsum("bkj,bj->bk", Z[..., 6:9], own * rng.standard_normal((RUNS, 3))[run])
-    gram = Gram(np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 2)), run, RUNS)
+    gram = Gram(
+        np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 2)), run, RUNS
+    )
     assert is_sure(_of_runs(gram, Prior(*_NONE, np.array([0]), np.zeros(1))), 0) is sure
 
 
@@ -168,12 +199,19 @@ def _least(effect: str) -> float:
     return least_size(some, some.model.terms[0])
 
 
-def _sized(effect: str, values: np.ndarray, dt: float = 1.0, L: float = 130.0, setting: tuple[float, ...] = ()) -> SimpleNamespace:
+def _sized(
+    effect: str, values: np.ndarray, dt: float = 1.0, L: float = 130.0, setting: tuple[float, ...] = ()
+) -> SimpleNamespace:
     term = Term(EFFECTS.get(effect), setting)
     c, ship = SimpleNamespace(L=L), SimpleNamespace(L=L, B=0.12 * L, x_bow=0.38 * L)
     plant = SimpleNamespace(seg=SimpleNamespace(dt=dt), c=c, ship=ship)
     typical = np.array([abs(p.typical) for p in term.effect.sized(L) if not p.shape])
-    return SimpleNamespace(values=(values,), model=SimpleNamespace(terms=(term,)), plant=plant, scales=SimpleNamespace(amplitudes=lambda *_: typical))
+    return SimpleNamespace(
+        values=(values,),
+        model=SimpleNamespace(terms=(term,)),
+        plant=plant,
+        scales=SimpleNamespace(amplitudes=lambda *_: typical),
+    )
 
 
 @pytest.mark.parametrize(("dt", "wanted"), [(1.0, True), (2.5, False)])
@@ -185,25 +223,35 @@ def test_a_time_of_less_than_half_a_sample_does_not_matter(dt: float, wanted: bo
 @pytest.mark.parametrize(("lag", "wanted"), [(0.93, False), (4.3, True)])
 def test_a_ship_whose_lift_follows_late_has_no_slow_gear(lag: float, wanted: bool):
     """A tanker of 120 m without a cause, whose lift builds up over a third of a length."""
-    assert matters(_sized("rudder_lag", np.array([lag]) / EFFECTS.get("rudder_lag").sized(120.0)[0].typical, L=120.0), 0) is wanted
+    assert (
+        matters(_sized("rudder_lag", np.array([lag]) / EFFECTS.get("rudder_lag").sized(120.0)[0].typical, L=120.0), 0)
+        is wanted
+    )
 
 
 PLAYS = [(1.0, 0.2, False, False), (1.0, 0.05, False, True), (1.0, 0.2, True, True), (0.64, 0.05, False, False)]
 
 
 @pytest.mark.parametrize(("play", "noise", "commanded", "wanted"), PLAYS)
-def test_play_that_takes_the_noise_out_of_a_record_or_the_lag_out_of_a_ship_is_none(play: float, noise: float, commanded: bool, wanted: bool):
-    """0.5 deg of it, with noise of 0.1 deg on a boat of 12 m that had none (beside orders there is no noise to take out); 0.64 deg on a trainer of
-    50 m that answers her rudder late."""
+def test_play_that_takes_the_noise_out_of_a_record_or_the_lag_out_of_a_ship_is_none(
+    play: float, noise: float, commanded: bool, wanted: bool
+):
+    """0.5 deg of it, with noise of 0.1 deg on a boat of 12 m that had none (beside orders there is no noise to take
+    out); 0.64 deg on a trainer of 50 m that answers her rudder late."""
     fit, states = _sized("rudder_backlash", np.array([play / 2.0])), np.zeros((8, 61, 10))
     states[..., DELTA] = np.deg2rad(noise * np.random.default_rng(2).standard_normal(states.shape[:2]))
-    fit.plant.seg = SimpleNamespace(dt=0.5, commanded=commanded, states=states, mask=np.ones(states.shape[:2], dtype=bool))
+    fit.plant.seg = SimpleNamespace(
+        dt=0.5, commanded=commanded, states=states, mask=np.ones(states.shape[:2], dtype=bool)
+    )
     assert matters(fit, 0) is wanted
 
 
-@pytest.mark.parametrize(("others", "wanted"), [(("position_delay",), False), (("rudder_delay", "current"), True), ((), True)])
+@pytest.mark.parametrize(
+    ("others", "wanted"), [(("position_delay",), False), (("rudder_delay", "current"), True), ((), True)]
+)
 def test_of_two_sensors_that_are_late_each_must_be_so_by_more(others: tuple[str, ...], wanted: bool):
-    """Velocities early by 0.14 s stood beside positions 0.3 s late on a model whose positions alone were late, by 0.5 s."""
+    """Velocities early by 0.14 s stood beside positions 0.3 s late on a model whose positions alone were late, by 0.5
+    s."""
     fit = _sized("velocity_delay", np.array([-0.4]))
     fit.model.terms += tuple(Term(EFFECTS.get(name)) for name in others)
     assert matters(fit, 0) is wanted
@@ -211,9 +259,16 @@ def test_of_two_sensors_that_are_late_each_must_be_so_by_more(others: tuple[str,
 
 @pytest.mark.parametrize(
     ("effect", "strange", "wanted"),
-    [("rudder_delay", ("with",), True), ("rudder_delay", ("with", "null"), False), ("rudder_delay", (), False), ("current", ("with",), False)],
+    [
+        ("rudder_delay", ("with",), True),
+        ("rudder_delay", ("with", "null"), False),
+        ("rudder_delay", (), False),
+        ("current", ("with",), False),
+    ],
 )
-def test_what_asks_for_a_stranger_ship_than_nothing_does_is_no_cause(monkeypatch, effect: str, strange: tuple[str, ...], wanted: bool):
+def test_what_asks_for_a_stranger_ship_than_nothing_does_is_no_cause(
+    monkeypatch, effect: str, strange: tuple[str, ...], wanted: bool
+):
     """Else the ship file was doubted for it; a current shows whatever the ship is."""
     fit = _sized(effect, np.array([1.0]))
     monkeypatch.setattr(robust, "needed", lambda found: "with" if found is fit else "null")
@@ -233,17 +288,22 @@ def test_a_ship_floats_with_her_centre_of_gravity_where_it_is(shift: float, want
     assert is_on_a_ship(_sized("center_of_gravity_shift", np.array([shift]), L=132.0), 0) is wanted
 
 
-@pytest.mark.parametrize(("forward", "starboard", "wanted"), [(-30.0, -9.0, True), (0.0, 9.0, True), (-4.4, -14.7, False), (70.0, 0.0, False)])
+@pytest.mark.parametrize(
+    ("forward", "starboard", "wanted"),
+    [(-30.0, -9.0, True), (0.0, 9.0, True), (-4.4, -14.7, False), (70.0, 0.0, False)],
+)
 def test_an_antenna_stands_on_the_ship(forward: float, starboard: float, wanted: bool):
     """14.7 m to port were named on a barge 85 m long and 9.5 m wide, whose log read nothing below 1.1 m/s."""
     at = np.array([forward, starboard]) / [p.typical for p in EFFECTS.get("antenna_offset").sized(85.0) if not p.shape]
     assert is_on_a_ship(_sized("antenna_offset", at, L=85.0), 0) is wanted
 
 
-@pytest.mark.parametrize(("towards", "bank", "wanted"), [(4.7, (1.57, 4.3, 0.0), True), (1.6, (1.57, 4.3, 0.0), True), (2.0, (1.57, 4.3, 0.0), False),
+@pytest.mark.parametrize(("towards", "bank", "wanted"),
+    [(4.7, (1.57, 4.3, 0.0), True), (1.6, (1.57, 4.3, 0.0), True), (2.0, (1.57, 4.3, 0.0), False),
                                                          (4.7, None, False)])  # fmt: skip
 def test_a_wind_straight_at_a_bank_mends_its_law(towards: float, bank: tuple[float, ...] | None, wanted: bool):
-    """A wind of 5.3 m/s from 270 deg and a current to 270 deg were named beside a bank at 90 deg that all runs of a barge followed."""
+    """A wind of 5.3 m/s from 270 deg and a current to 270 deg were named beside a bank at 90 deg that all runs of a
+    barge followed."""
     fit = _sized("wind", np.array([np.cos(towards), np.sin(towards)]))
     if bank is not None:
         fit.model.terms = (*fit.model.terms, Term(EFFECTS.get("bank_suction"), bank))
@@ -257,13 +317,15 @@ def test_a_drift_of_a_few_thousandths_of_the_wind_is_none(share: float, wanted: 
 
 
 def test_thrusters_known_by_their_orders_may_be_as_slow_as_ordinary_ones():
-    """A lag of 2 s and a limit of a quarter of the force per second were named 1.2 to 1.3 s too slow on two ships with nothing hidden."""
+    """A lag of 2 s and a limit of a quarter of the force per second were named 1.2 to 1.3 s too slow on two ships with
+    nothing hidden."""
     lag = ORDINARY["F"].T - ordinary_gears(130.0)["F"].T
     assert _least("thruster_lag") * EFFECTS.get("thruster_lag").parameters[0].typical > lag > 1.0
 
 
 def test_lift_that_grows_more_slowly_than_the_sine_is_no_stall():
-    """A rudder with a flap, of aspect ratio 0.65, whose lift goes as tanh up to 1.35, at 35 deg: named 0.19 with nothing hidden."""
+    """A rudder with a flap, of aspect ratio 0.65, whose lift goes as tanh up to 1.35, at 35 deg: named 0.19 with
+    nothing hidden."""
     sine = 1.5 * 6.13 * 0.65 / (0.65 + 2.25) * np.sin(np.deg2rad(35.0)) / 1.35
     lost = 1.0 - np.tanh(sine) / sine
     assert _least("rudder_stall") * EFFECTS.get("rudder_stall").parameters[0].typical > lost > 0.15
@@ -276,17 +338,24 @@ def test_a_wing_that_stalls_smoothly_about_35_deg_is_an_ordinary_rudder(begins: 
 
 
 def test_more_is_asked_of_what_the_form_of_a_hull_could_be():
-    """Where each run is another manoeuvre, what a polynomial lacks differs from run to run and passes for winds of single runs."""
+    """Where each run is another manoeuvre, what a polynomial lacks differs from run to run and passes for winds of
+    single runs."""
     standard = Standard(fit_of(np.zeros(RUNS)), 10.0, off_form=3.0)
     current, mass, bank = (EFFECTS.get(name) for name in ("current", "mass_change", "bank_suction"))
-    plain, late, mistaken, near = (standard.asked_besides(t) for t in (Term(current), Term(current, since=3), Term(mass), Term(bank)))
+    plain, late, mistaken, near = (
+        standard.asked_besides(t) for t in (Term(current), Term(current, since=3), Term(mass), Term(bank))
+    )
     assert (plain, late, near) == (0.0, 3.0, 3.0)
     assert 3.0 < mistaken < standard.asked_besides(Term(EFFECTS.get("wind_per_run"), per_run=True))
 
 
-@pytest.mark.parametrize(("effect", "lever", "sure"), [("wind_per_run", 2.0, True), ("wind_per_run", -9.3, False), ("current_per_run", -9.3, True)])
+@pytest.mark.parametrize(
+    ("effect", "lever", "sure"),
+    [("wind_per_run", 2.0, True), ("wind_per_run", -9.3, False), ("current_per_run", -9.3, True)],
+)
 def test_a_wind_that_needs_a_superstructure_of_no_ship_is_none(monkeypatch, effect: str, lever: float, sure: bool):
-    """Two ships of a third simulator without wind: what their model lacked passed for winds, with the centre of the area 0.35 lengths off."""
+    """Two ships of a third simulator without wind: what their model lacked passed for winds, with the centre of the
+    area 0.35 lengths off."""
     z = np.zeros(NUM_BASE)
     z[PLACES["wind_lever"]] = lever
     monkeypatch.setattr(robust, "needed", lambda fit: z)

@@ -19,7 +19,11 @@ from shipbench.records import Dataset, Run
 from shipbench.ship import complete
 from shipbench.simulate.trials import Trials, sea_trials
 
-FORCES = tuple(name for name in EFFECTS.names() if name != "change_point" and EFFECTS.get(name).enters == "force" and not EFFECTS.get(name).channels)
+FORCES = tuple(
+    name
+    for name in EFFECTS.names()
+    if name != "change_point" and EFFECTS.get(name).enters == "force" and not EFFECTS.get(name).channels
+)
 
 
 @pytest.fixture(scope="module", params=["kcs", "windy kcs", "every 6 s"])
@@ -29,7 +33,13 @@ def data(request) -> Dataset:
     if request.param == "windy kcs":
         wind = np.stack([4.0 + np.sin(np.arange(61) / 9.0), np.arange(61) / 20.0], axis=1)
         runs = [
-            Run(r.id, r.t, r.states, np.concatenate([r.inputs, wind[: len(r)]], axis=1), (*r.inputs_names, "wind_speed", "wind_from"))
+            Run(
+                r.id,
+                r.t,
+                r.states,
+                np.concatenate([r.inputs, wind[: len(r)]], axis=1),
+                (*r.inputs_names, "wind_speed", "wind_from"),
+            )
             for r in made.runs
         ]
         made = replace(made, runs=tuple(runs))
@@ -50,7 +60,9 @@ def point(plant: Plant, *names: str, since: int | None = None, size: float = 0.3
     for name in names:
         effect = EFFECTS.get(name)
         begins = since if effect.enters == "force" and not effect.per_run else None
-        terms.append(Term(effect, tuple(effect.settings(plant.seg.states[..., :2], plant.ship)[0]), effect.per_run, begins))
+        terms.append(
+            Term(effect, tuple(effect.settings(plant.seg.states[..., :2], plant.ship)[0]), effect.per_run, begins)
+        )
     values = tuple(size * rng.standard_normal((plant.seg.runs, t.size) if t.per_run else t.size) for t in terms)
     eta, w = (size * rng.standard_normal((len(plant.seg.run), *shape)) for shape in ((6,), (plant.knots, 3)))
     return Point(size * rng.standard_normal(NUM_BASE), eta, w, tuple(terms), values)
@@ -82,7 +94,9 @@ def assert_agree(code: np.ndarray, loops: np.ndarray, within: float = 1e-9) -> N
     np.testing.assert_allclose(code / size, loops / size, rtol=within, atol=within)
 
 
-@pytest.mark.parametrize("names", [(), ("current",), ("current_per_run", "bank_suction", "rudder_lag"), ("cross_flow_drag", "wave_drift")])
+@pytest.mark.parametrize(
+    "names", [(), ("current",), ("current_per_run", "bank_suction", "rudder_lag"), ("cross_flow_drag", "wave_drift")]
+)
 def test_machine_code_and_numpy_agree(compiler, plant, names, monkeypatch):
     code, loops = both(plant, point(plant, *names, since=1), monkeypatch)
     for name in ("motion", "here", "rates"):
@@ -108,7 +122,8 @@ def test_a_run_that_blows_up_is_not_finite_in_either(compiler, plant, monkeypatc
 
 
 def test_a_trial_that_blows_up_is_not_warned_of():
-    """Numbers that are infinite, and not merely not numbers, come out of some of these; a warning is an error in these tests."""
+    """Numbers that are infinite, and not merely not numbers, come out of some of these; a warning is an error in these
+    tests."""
     part = rollout_plant(sea_trials(load_mmg_ship("kcs"), 3, (), Trials(runs=4, samples=100)), {})
     base = plain_base() + 20.0 * np.random.default_rng(0).standard_normal(NUM_BASE)
     still = Point(base, np.zeros((4, 6)), np.zeros((4, part.knots, 3)))
@@ -118,7 +133,9 @@ def test_a_trial_that_blows_up_is_not_warned_of():
 
 
 def test_one_compilation_serves_all_ships(compiler):
-    plants = [Plant.of(sea_trials(load_mmg_ship(ship), 5, (), Trials(runs=2, samples=30))) for ship in ("kcs", "container130")]
+    plants = [
+        Plant.of(sea_trials(load_mmg_ship(ship), 5, (), Trials(runs=2, samples=30))) for ship in ("kcs", "container130")
+    ]
     for plant in plants:
         Linearisation(plant, Scales(plant), point(plant))
     assert len(rolling._built) == 2
@@ -163,7 +180,9 @@ class Shallow(Effect):
 
 def test_one_that_asks_for_proportions_is_compiled_for_each_ship_and_number(compiler, plant):
     x0, still = plant.seg.states[:, 0, :6], np.zeros((len(plant.seg.run), plant.steps + 1, 3))
-    ends = [plant.roll(x0, [0.0] * 11, [rolling.Active(Shallow(depth), (1e-2,))], still)[0, 1, 3] for depth in (1000.0, 5.0)]
+    ends = [
+        plant.roll(x0, [0.0] * 11, [rolling.Active(Shallow(depth), (1e-2,))], still)[0, 1, 3] for depth in (1000.0, 5.0)
+    ]
     assert ends[1] > ends[0]
     assert sum(code is not None for code in rolling._built.values()) == 2
 

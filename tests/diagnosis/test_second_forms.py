@@ -55,7 +55,8 @@ def test_a_side_force_that_is_a_share_of_the_thrust_astern_is_named():
 @pytest.mark.long
 @pytest.mark.xfail(strict=True, reason="known defect: a compass error is named in its place")
 def test_a_list_with_another_side_force_is_named():
-    """To the other side of what the formula has with this moment, and much larger: it had been an `unknown` yaw moment that goes with the speed."""
+    """To the other side of what the formula has with this moment, and much larger: it had been an `unknown` yaw moment
+    that goes with the speed."""
     data = sea_trials(load_mmg_ship("kcs"), 2, (Hidden(EFFECTS.get("list"), (0.149, -0.0031)),), Trials(runs=12))
     (cause,) = diagnose(data, gain=False).causes
     assert cause.effect == "list"
@@ -85,7 +86,8 @@ def test_a_race_that_meets_the_rudder_a_little_more_on_one_side_is_ordinary_and_
 
 @pytest.mark.long
 def test_a_rudder_that_stalls_beyond_30_deg_is_ordinary_but_one_that_stalls_before_is_named():
-    """With half of the lift lost from 26 to 37 deg it was `rudder_stall` (score 78), as on ships with Whicker & Fehlner's curves."""
+    """With half of the lift lost from 26 to 37 deg it was `rudder_stall` (score 78), as on ships with Whicker &
+    Fehlner's curves."""
 
     def late(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.late_stall = q[0]
@@ -97,7 +99,8 @@ def test_a_rudder_that_stalls_beyond_30_deg_is_ordinary_but_one_that_stalls_befo
 
 @pytest.mark.long
 def test_a_rudder_that_stalls_early_is_named_with_its_angle():
-    """Beginning at 0.2 rad it scored 21, on a model that stalled at 15 deg the flow at the rudder was 15 spreads off, and the ship file in doubt."""
+    """Beginning at 0.2 rad it scored 21, on a model that stalled at 15 deg the flow at the rudder was 15 spreads off,
+    and the ship file in doubt."""
     (cause,) = diagnose(trials("rudder_stall", 0.6, 0.1, ship="kcs", runs=12), gain=False).causes
     assert cause.effect == "rudder_stall"
     assert cause.parameters["angle"].value == 0.1
@@ -106,7 +109,8 @@ def test_a_rudder_that_stalls_early_is_named_with_its_angle():
 
 @pytest.mark.long
 def test_waves_that_push_ahead_as_those_of_the_ship_s_length_are_no_wind():
-    """Five times the drift force ahead of short waves: wind, whose force ahead is fitted, was named in four simulators that had it so."""
+    """Five times the drift force ahead of short waves: wind, whose force ahead is fitted, was named in four simulators
+    that had it so."""
     long = EFFECTS.get("wave_drift").fitted(130.0)[2]
     data = sea_trials(load_mmg_ship("container130"), 5, (Hidden(long, (0.08, -0.06)),), Trials(runs=12))
     assert named(data) == ["wave_drift"]
@@ -114,8 +118,11 @@ def test_waves_that_push_ahead_as_those_of_the_ship_s_length_are_no_wind():
 
 @pytest.mark.long
 def test_waves_four_times_as_strong_as_typical_ones_are_no_wind():
-    """Their force grows with the square: at none of it, another way of waves seems best, and fitted that does worse than a wind."""
-    data = sea_trials(scaled(load_mmg_ship("kcs"), 160.0), 3, (Hidden(EFFECTS.get("wave_drift"), (0.54, -0.54)),), Trials(runs=12))
+    """Their force grows with the square: at none of it, another way of waves seems best, and fitted that does worse
+    than a wind."""
+    data = sea_trials(
+        scaled(load_mmg_ship("kcs"), 160.0), 3, (Hidden(EFFECTS.get("wave_drift"), (0.54, -0.54)),), Trials(runs=12)
+    )
     assert named(data) == ["wave_drift"]
 
 
@@ -125,14 +132,18 @@ def test_the_banks_of_a_channel_are_named_with_its_breadth():
     ship, bank = load_mmg_ship("container130"), EFFECTS.get("bank_suction")
     places = np.concatenate([run.states[:, :2] for run in sea_trials(ship, 5, (), Trials(runs=12)).runs])
     bearing, line, channel = bank.settings(places, complete(ship.particulars))[4]
-    (cause,) = diagnose(sea_trials(ship, 5, (Hidden(bank, (0.3, 0.0, bearing, line, channel)),), Trials(runs=12)), gain=False).causes
+    (cause,) = diagnose(
+        sea_trials(ship, 5, (Hidden(bank, (0.3, 0.0, bearing, line, channel)),), Trials(runs=12)), gain=False
+    ).causes
     assert cause.effect == "bank_suction"
     assert cause.parameters["channel"].value == pytest.approx(channel, rel=0.1)
 
 
 def test_no_hull_is_damped_the_wrong_way():
     many = np.linspace(-9.0, 9.0, 7)
-    changes = dict(zip((p.name for p in HULL.parameters), hull_changes(np.repeat(many[:, None], NUM_HULL, axis=1)).T, strict=True))
+    changes = dict(
+        zip((p.name for p in HULL.parameters), hull_changes(np.repeat(many[:, None], NUM_HULL, axis=1)).T, strict=True)
+    )
     for name, change in changes.items():
         assert np.all(np.diff(change) > 0.0)
         assert (np.min(change) > -1.0) == (name in ("Y_v", "N_v", "N_r"))
@@ -167,8 +178,12 @@ def test_what_is_asked_of_an_unknown_force(variable, axis, taken, told):
 
 
 def test_what_is_asked_of_an_unknown_force_does_not_leap_at_what_is_noticeable():
-    """S175, ten standard manoeuvres, nothing hidden: 101 for a sway force that took 1 % more than that, where the leap asked 88."""
-    scores = [asked(Dependence("rudder", "sway", "form", 100.0, 0.6, 0.6, taken), off_form=5.0) for taken in np.linspace(0.08, 0.32, 49)]
+    """S175, ten standard manoeuvres, nothing hidden: 101 for a sway force that took 1 % more than that, where the leap
+    asked 88."""
+    scores = [
+        asked(Dependence("rudder", "sway", "form", 100.0, 0.6, 0.6, taken), off_form=5.0)
+        for taken in np.linspace(0.08, 0.32, 49)
+    ]
     assert scores[12] == pytest.approx(80.0)
     assert scores[-1] == 40.0
     assert -2.0 < np.min(np.diff(scores)) < 0.0

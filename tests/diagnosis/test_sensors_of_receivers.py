@@ -1,4 +1,5 @@
-"""What receivers and compasses of real ships do to a record: errors that last, and velocities that were filtered in the earth's axes."""
+"""What receivers and compasses of real ships do to a record: errors that last, and velocities that were filtered in the
+earth's axes."""
 
 from __future__ import annotations
 
@@ -55,7 +56,9 @@ def _changed(data: Dataset, change) -> Dataset:
     return data.with_runs([replace(run, states=S) for run, S in zip(data.runs, states, strict=True)])
 
 
-@pytest.mark.parametrize(("effect", "delay"), [("position_delay", 0.0), ("position_delay", 1.0), ("velocity_delay", 1.0)])
+@pytest.mark.parametrize(
+    ("effect", "delay"), [("position_delay", 0.0), ("position_delay", 1.0), ("velocity_delay", 1.0)]
+)
 def test_no_delay_is_looked_for_where_the_track_shows_none(effect: str, delay: float):
     """What a hull's form lacks passed for velocities that are early by a second."""
     cause = EFFECTS.get(effect)
@@ -64,7 +67,8 @@ def test_no_delay_is_looked_for_where_the_track_shows_none(effect: str, delay: f
 
 
 def _filter_in_earth_axes(data: Dataset, T: float) -> Dataset:
-    """Surge and sway behind a first-order filter of the earth-fixed velocity, turned back by the heading of the moment."""
+    """Surge and sway behind a first-order filter of the earth-fixed velocity, turned back by the heading of the
+    moment."""
     keep = float(np.exp(-data.dt / T))
 
     def change(S: np.ndarray) -> None:
@@ -96,11 +100,15 @@ def test_whitened_noise_is_white_and_its_determinant_right(time, period, smooth,
     covariance = np.eye(7) + 16.0 * correlation(lag)
     assert colour.factor[2] @ covariance @ colour.factor[2].T == pytest.approx(np.eye(7), abs=1e-9)
     for length in (3, 7):
-        assert colour.log_determinant(np.array([length]))[0] == pytest.approx(np.linalg.slogdet(covariance[:length, :length])[1])
+        assert colour.log_determinant(np.array([length]))[0] == pytest.approx(
+            np.linalg.slogdet(covariance[:length, :length])[1]
+        )
     values = np.random.default_rng(0).standard_normal((2, 7, 6))
     white = colour.whitened(values)
     assert white[:, :, [0, 1, 3, 4, 5]] == pytest.approx(values[:, :, [0, 1, 3, 4, 5]])
-    assert colour.whitened(np.where(np.arange(7)[:, None] < 4, values, 9.0))[:, :4] == pytest.approx(white[:, :4])  # what follows does not matter
+    assert colour.whitened(np.where(np.arange(7)[:, None] < 4, values, 9.0))[:, :4] == pytest.approx(
+        white[:, :4]
+    )  # what follows does not matter
 
 
 def _colour(data: Dataset) -> Colour:
@@ -137,7 +145,8 @@ def _low_passed(data: Dataset) -> Dataset:
 
 @pytest.mark.long
 def test_what_a_cause_does_to_a_sensor_is_no_noise_once_it_is_named():
-    """Beside the noise that a late position had been taken for, half of the delay was found in other sensors on a model."""
+    """Beside the noise that a late position had been taken for, half of the delay was found in other sensors on a
+    model."""
     late = Hidden(EFFECTS.get("position_delay"), (3.0,))
     null = plain_model(Plant.of(sea_trials(load_mmg_ship("kcs"), 4, (late,), Trials(runs=12, samples=80, noise=0.3))))
     assert null.scales.colour.share[:2].any()
@@ -154,7 +163,9 @@ def test_a_record_that_was_filtered_shows_its_cause_and_nothing_else():
     hidden = Hidden(EFFECTS.get("rudder_offset"), (0.03,))
     found = diagnose(_low_passed(published_trials(PUBLISHED["mariner"], 5015, (hidden,))), gain=False)
     assert ([c.effect for c in found.causes], found.unknown) == (["rudder_offset"], None)
-    assert found.causes[0].parameters["offset"].value == pytest.approx(0.03, rel=0.35), "the filter takes of the motion, too"
+    assert found.causes[0].parameters["offset"].value == pytest.approx(0.03, rel=0.35), (
+        "the filter takes of the motion, too"
+    )
     assert "smooth" in found.unexplained_after["taken_as_noise"]["heading"]
 
 
@@ -177,7 +188,9 @@ def test_a_log_through_water_is_seen_and_put_over_ground(number):
         c, s = np.cos(S[:, PSI]), np.sin(S[:, PSI])
         S[:, U], S[:, V] = S[:, U] - c * drift[0] - s * drift[1], S[:, V] - c * drift[1] + s * drift[0]
 
-    data = sea_trials(load_mmg_ship("container130"), 20 + number, [Hidden(EFFECTS.get("current"), tuple(drift))], Trials(runs=12))
+    data = sea_trials(
+        load_mmg_ship("container130"), 20 + number, [Hidden(EFFECTS.get("current"), tuple(drift))], Trials(runs=12)
+    )
     assert speeds_over_ground(Prepared(data)) == Prepared(data)
     logged = _changed(data, through_water)
     ready = speeds_over_ground(Prepared(logged))
@@ -204,7 +217,9 @@ def test_motion_with_the_waves_is_told_from_the_ships_own(ship):
 def test_a_cause_is_seen_through_the_motion_with_the_waves():
     """Its score is 17 where that motion passes for errors that last."""
     hidden = [Hidden(EFFECTS.get("rudder_offset"), (0.05,))]
-    found = diagnose(sea_trials(load_mmg_ship("container130"), 11, hidden, Trials(runs=12, samples=120, waves=1.0)), gain=False)
+    found = diagnose(
+        sea_trials(load_mmg_ship("container130"), 11, hidden, Trials(runs=12, samples=120, waves=1.0)), gain=False
+    )
     (cause,) = found.causes
     assert cause.effect == "rudder_offset"
     assert cause.score > 30.0
@@ -215,7 +230,9 @@ def test_a_cause_is_seen_through_the_motion_with_the_waves():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("ship", "period"), [pytest.param("container130", 16.0, marks=pytest.mark.long), ("kcs", 20.0)])
+@pytest.mark.parametrize(
+    ("ship", "period"), [pytest.param("container130", 16.0, marks=pytest.mark.long), ("kcs", 20.0)]
+)
 def test_a_swell_is_told_from_the_ships_own_motion_though_the_latent_force_follows_it(ship, period, monkeypatch):
     """The force in yaw was 24 and 12 times the ordinary one, and hid whatever turns a ship."""
     monkeypatch.setattr(shipbench.simulate.trials, "WAVE_PERIOD", period)
@@ -223,7 +240,9 @@ def test_a_swell_is_told_from_the_ships_own_motion_though_the_latent_force_follo
     plant = Plant.of(data)
     found = null_fit(plant, Scales(plant))
     assert np.exp(0.5 * found.hyper.log_force) == pytest.approx(0.1, abs=0.1)
-    assert found.scales.colour.period[[V, R]] == pytest.approx(period * (data.ship.L / 130.0) ** 0.5 / data.dt, rel=0.25)
+    assert found.scales.colour.period[[V, R]] == pytest.approx(
+        period * (data.ship.L / 130.0) ** 0.5 / data.dt, rel=0.25
+    )
 
 
 @pytest.mark.long
@@ -244,7 +263,9 @@ def test_velocities_filtered_in_the_earths_axes_are_seen_and_put_back(trials, fi
     assert late.delay == pytest.approx(LATE, rel=0.2)
     assert min(late.score, late.over_position) > 50.0
     assert late.filtered
-    assert [len(r) for r in mended_runs.runs] == [len(r) - 2 * int(np.ceil(late.delay / filtered.dt)) for r in filtered.runs]
+    assert [len(r) for r in mended_runs.runs] == [
+        len(r) - 2 * int(np.ceil(late.delay / filtered.dt)) for r in filtered.runs
+    ]
     assert late_velocities_of(mended_runs) is None
     edge = int(np.ceil(late.delay / filtered.dt))
     for mended, recorded, true in zip(mended_runs.runs, filtered.runs, trials.runs, strict=True):
@@ -277,14 +298,23 @@ def test_clocks_that_agree_or_a_late_position_are_left_to_the_model(trials):
         S[by:, :2] = S[:-by, :2].copy()
 
     behind = _changed(trials, late)
-    assert late_velocities_of(behind.with_runs([replace(r, t=r.t[by:], states=r.states[by:], inputs=r.inputs[by:]) for r in behind.runs])) is None
+    assert (
+        late_velocities_of(
+            behind.with_runs([replace(r, t=r.t[by:], states=r.states[by:], inputs=r.inputs[by:]) for r in behind.runs])
+        )
+        is None
+    )
 
 
 @pytest.mark.parametrize(("scatter", "late"), [(60.0, True), (1.0, False)])
-def test_a_position_that_is_early_is_believed_only_where_the_runs_agree(filtered, monkeypatch, scatter: float, late: bool):
+def test_a_position_that_is_early_is_believed_only_where_the_runs_agree(
+    filtered, monkeypatch, scatter: float, late: bool
+):
     num = len(filtered.runs)
     early = 5.0 + scatter * np.resize([1.0, -1.0], num)
-    shares = iter([np.zeros(num), -np.ones(num), early, np.full(num, -50.0)])  # filtered, late, position early, as recorded
+    shares = iter(
+        [np.zeros(num), -np.ones(num), early, np.full(num, -50.0)]
+    )  # filtered, late, position early, as recorded
     monkeypatch.setattr(clocks, "_evidence", lambda *_: next(shares))
     assert (late_velocities_of(filtered) is not None) is late
 
@@ -302,26 +332,34 @@ def test_filtered_velocities_are_named_first_and_nothing_else_is(filtered):
 
 
 DELAYS = [
-    ("velocity_delay", 0.0, 1.8, (0.5, 0.4), True), ("velocity_delay", 0.0, 1.2, (0.5, 0.4), False), ("velocity_delay", 0.0, 1.8, (1.4, 0.1), False),
+    ("velocity_delay", 0.0, 1.8, (0.5, 0.4), True), ("velocity_delay", 0.0, 1.2, (0.5, 0.4), False),
+    ("velocity_delay", 0.0, 1.8, (1.4, 0.1), False),
     ("velocity_delay", 1.0, 1.8, (0.5, 0.4), False), ("position_delay", None, 1.8, (0.5, 0.4), True),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "earth", "delay", "track", "out"), DELAYS)
-def test_a_delay_that_the_track_rules_out_is_none(trials, monkeypatch, name: str, earth: float | None, delay: float, track, out: bool):
-    """Of the forces of a supply vessel with nothing hidden; where the track shows a lag, or cannot tell, the forces are asked."""
+def test_a_delay_that_the_track_rules_out_is_none(
+    trials, monkeypatch, name: str, earth: float | None, delay: float, track, out: bool
+):
+    """Of the forces of a supply vessel with nothing hidden; where the track shows a lag, or cannot tell, the forces are
+    asked."""
     monkeypatch.setattr(clocks, "lags", lambda _: (track, (-1.9, 0.3) if earth else (0.1, 0.2)))
     term = Term(EFFECTS.get(name), () if earth is None else (earth,))
     model = SimpleNamespace(terms=(term,))
     fit = SimpleNamespace(
-        model=model, values=(np.array([delay]),), scales=SimpleNamespace(amplitudes=lambda *_: np.ones(1)), plant=SimpleNamespace(c=trials.ship)
+        model=model,
+        values=(np.array([delay]),),
+        scales=SimpleNamespace(amplitudes=lambda *_: np.ones(1)),
+        plant=SimpleNamespace(c=trials.ship),
     )
     assert clocks.ruled_out(trials, fit) == ((name,) if out else ())
 
 
 @pytest.mark.long
 def test_an_antenna_whose_velocities_are_its_own_is_no_other_hull(trials):
-    """Track and velocities agree, so that only the forces tell where on the ship they belong; on a barge it was another hull (2716), and none."""
+    """Track and velocities agree, so that only the forces tell where on the ship they belong; on a barge it was another
+    hull (2716), and none."""
 
     def change(S: np.ndarray) -> None:
         arm = np.exp(1j * S[:, PSI]) * (-50.0 + 6.0j)
@@ -338,7 +376,9 @@ def test_an_antenna_whose_velocities_are_its_own_is_no_other_hull(trials):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("channels", "named"), [pytest.param((U, V, R), ["velocity_delay"], marks=pytest.mark.long), ((R,), [])])
+@pytest.mark.parametrize(
+    ("channels", "named"), [pytest.param((U, V, R), ["velocity_delay"], marks=pytest.mark.long), ((R,), [])]
+)
 def test_a_late_yaw_rate_is_put_back_and_no_late_rudder(trials, channels: tuple[int, ...], named: list[str]):
     def change(S: np.ndarray) -> None:
         S[:] = delayed(S[None], channels, LATE, trials.dt)[0]
@@ -377,4 +417,6 @@ def test_actuators_of_a_piece_stand_where_the_commands_before_it_have_brought_th
     second = int(np.flatnonzero(plant.seg.start > 0)[0])
     run, begins = data.runs[plant.seg.run[second]], round(plant.seg.start[second] / data.dt)
     whole = gear_path(run.inputs[:1, 1], run.inputs[None, :, 1], data.dt, slow)[0]
-    np.testing.assert_allclose(plant.path[second, :: plant.substeps, 0, 1], whole[begins : begins + plant.steps], atol=1e-4)
+    np.testing.assert_allclose(
+        plant.path[second, :: plant.substeps, 0, 1], whole[begins : begins + plant.steps], atol=1e-4
+    )

@@ -42,7 +42,9 @@ def test_a_thrust_that_a_ship_of_nearly_the_same_size_explains_too_is_told_with_
     verdict = diagnose(replace(sea_trials(tankers[1], 0), ship=tankers[0].particulars), gain=False)
     assert [c.effect for c in verdict.causes] == ["thrust_gain"]
     (warning,) = [w for w in verdict.warnings if QUESTION in w]
-    assert warning.startswith("a similar ship of 1.4 times the size explains the runs about as well as thrust_gain (log evidence ")
+    assert warning.startswith(
+        "a similar ship of 1.4 times the size explains the runs about as well as thrust_gain (log evidence "
+    )
 
 
 @pytest.mark.long
@@ -60,13 +62,18 @@ def test_a_slow_gear_of_an_odd_ship_is_told_with_a_warning():
     named = [c.effect for c in verdict.causes]
     assert named == ["rudder_lag", "shaft_lag"]
     (warning,) = [w for w in verdict.warnings if QUESTION in w]
-    assert warning.endswith("The file of another ship, too, may make rudder_lag and shaft_lag: believe them only when that is sure.")
+    assert warning.endswith(
+        "The file of another ship, too, may make rudder_lag and shaft_lag: believe them only when that is sure."
+    )
 
 
 def test_sizes_are_compared_beside_noise_of_their_own(monkeypatch):
-    """Of a ferry in wind the speed log was 4.5 % off: beside the noise that suits a log so far off, not the sound one of the other size, the ship of
-    the file was 4878 of log evidence behind one of 2.5 times her size; beside her own she was ahead."""
-    data = sea_trials(load_mmg_ship("kcs"), 3, (Hidden(EFFECTS.get("speed_scale"), (0.045,)),), Trials(runs=8, samples=80))
+    """Of a ferry in wind the speed log was 4.5 % off: beside the noise that suits a log so far off, not the sound one
+    of the other size, the ship of the file was 4878 of log evidence behind one of 2.5 times her size; beside her own
+    she was ahead."""
+    data = sea_trials(
+        load_mmg_ship("kcs"), 3, (Hidden(EFFECTS.get("speed_scale"), (0.045,)),), Trials(runs=8, samples=80)
+    )
     null = plain_model(Plant.of(data), ("speed_scale",))
     found = select(null, THRESHOLD)
     assert found.null.evidence < null.evidence
@@ -76,7 +83,9 @@ def test_sizes_are_compared_beside_noise_of_their_own(monkeypatch):
     assert doubt.startswith("beside its own noise")
 
 
-@pytest.mark.parametrize(("changed", "shows"), [("heading_bias", True), ("rudder_offset", True), ("thrust_gain", False)])
+@pytest.mark.parametrize(
+    ("changed", "shows"), [("heading_bias", True), ("rudder_offset", True), ("thrust_gain", False)]
+)
 def test_of_a_change_what_has_changed_decides_whether_it_shows_whatever_the_ship(changed, shows):
     terms = (Term(EFFECTS.get("current")), Term(EFFECTS.get(changed), since=9))
     found = SimpleNamespace(final=SimpleNamespace(model=SimpleNamespace(terms=terms)), gears=())
@@ -85,7 +94,8 @@ def test_of_a_change_what_has_changed_decides_whether_it_shows_whatever_the_ship
 
 @pytest.mark.long
 def test_of_a_ship_in_doubt_no_actuator_is_read_to_the_other_side(monkeypatch):
-    """Thrusters of a research ship, beside the file of a ship of 300 m, were all four named as of the wrong sign, with certainty."""
+    """Thrusters of a research ship, beside the file of a ship of 300 m, were all four named as of the wrong sign, with
+    certainty."""
     monkeypatch.setattr(whole, "turned_actuators", lambda *_: [UnitFinding("delta", "sign", -1.0, "as if it were")])
     trials = published_trials(PUBLISHED["navy"], 3, (), Trials(runs=8, samples=100))
     verdict = diagnose(replace(trials, ship=PUBLISHED["s175"].particulars), gain=False)

@@ -60,7 +60,13 @@ def test_slopes_by_parameters_are_those_of_the_log_determinant(fitted):
 
 
 ANTENNAS = [Term(EFFECTS.get("antenna_offset"), (own,)) for own in (0.0, 1.0)]
-CAUSES = [*(Term(EFFECTS.get(name)) for name in ("mass_change", "rudder_gain", "added_resistance", "speed_scale", "rudder_delay")), *ANTENNAS]
+CAUSES = [
+    *(
+        Term(EFFECTS.get(name))
+        for name in ("mass_change", "rudder_gain", "added_resistance", "speed_scale", "rudder_delay")
+    ),
+    *ANTENNAS,
+]
 
 
 @pytest.mark.parametrize("term", CAUSES)
@@ -80,18 +86,25 @@ def test_slopes_by_a_sensor_that_errs_already_are_those_of_the_log_determinant(f
     now = settle(lin, Model((term,)), fitted.hyper, {}, leap=0.0)
     found = slopes(lin, now.columns, now.reduced.inverse, fitted.hyper).sum(axis=0)[NUM_BASE:]
     for a in range(term.size):
-        ends = [_log_determinant(fitted, replace(at, values=(at.values[0] + step * np.eye(term.size)[a],))) for step in (0.1, -0.1)]
+        ends = [
+            _log_determinant(fitted, replace(at, values=(at.values[0] + step * np.eye(term.size)[a],)))
+            for step in (0.1, -0.1)
+        ]
         assert found[a] == pytest.approx((ends[0] - ends[1]) / 0.2, rel=0.15, abs=0.5)
 
 
-@pytest.mark.parametrize("term", [Term(EFFECTS.get("position_delay")), *(Term(EFFECTS.get("velocity_delay"), (axes,)) for axes in (0.0, 1.0))])
+@pytest.mark.parametrize(
+    "term",
+    [Term(EFFECTS.get("position_delay")), *(Term(EFFECTS.get("velocity_delay"), (axes,)) for axes in (0.0, 1.0))],
+)
 def test_a_late_sensor_tells_as_much_of_the_force(fitted, term):
     """Shifted in time, nothing is lost but where a piece begins, and that is the cutting's doing."""
     assert np.all(_by_column(fitted, [term])[NUM_BASE:] == 0.0)
 
 
 def test_where_pieces_begin_is_no_evidence_for_a_late_sensor():
-    """A slow ship in short runs says little of a delay; the fewer samples of the force in its pieces had been worth 11 of 2 log evidence for 3 s."""
+    """A slow ship in short runs says little of a delay; the fewer samples of the force in its pieces had been worth 11
+    of 2 log evidence for 3 s."""
     plant = Plant.of(published_trials(PUBLISHED["tanker"], 54, (), Trials(runs=90, samples=40)))
     (score,) = screen(null_fit(plant, Scales(plant), [Term(EFFECTS.get("position_delay"))]))
     assert score.score < 0.0
@@ -112,7 +125,8 @@ def test_slopes_by_a_pushed_moment_agree_with_those_by_a_parameter(fitted):
 
 
 def test_estimates_are_nearer_to_the_truth_where_the_log_determinant_counts(monkeypatch):
-    """Motions of the fitted model itself under drawn forces, with little noise: squares alone make the ship less damped than she is."""
+    """Motions of the fitted model itself under drawn forces, with little noise: squares alone make the ship less damped
+    than she is."""
     plant = Plant.of(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=8, samples=120)))
     rng, scales, (still, hyper) = np.random.default_rng(4), Scales(plant), start(plant)
     true = 0.3 * rng.standard_normal(NUM_BASE)
@@ -139,7 +153,8 @@ def test_estimates_are_nearer_to_the_truth_where_the_log_determinant_counts(monk
 
 
 def test_evidence_does_not_favour_a_ship_that_forgets_how_a_run_began():
-    """A tanker in many short runs, whose initial states nobody knows: integrated out like the force, they gave her a negative added mass."""
+    """A tanker in many short runs, whose initial states nobody knows: integrated out like the force, they gave her a
+    negative added mass."""
     plant = Plant.of(published_trials(PUBLISHED["tanker"], 54, (), Trials(runs=60, samples=40)))
     found = null_fit(plant, Scales(plant))
     inertia = found.point.base[[BASE.index(name) for name in ("m_y", "J_z", "coupling")]]

@@ -41,7 +41,8 @@ FAULTS = {
     "revolutions in rad/s": ({N: 2.0 * np.pi / 60.0}, {"n": "rad/s", "n_c": "rad/s"}),
 }
 ORDINARY = (
-    "antenna_offset", "current", "current_per_run", "heading_bias", "position_delay", "rudder_offset", "shallow_water", "speed_scale",
+    "antenna_offset", "current", "current_per_run", "heading_bias", "position_delay", "rudder_offset", "shallow_water",
+    "speed_scale",
     "velocity_delay", "wind", "wind_per_run", "yaw_rate_bias",
 )  # fmt: skip
 
@@ -97,7 +98,9 @@ def test_thrusters_in_kilonewton_are_found():
     assert {(f.channel, f.kind) for f in findings} == {(c, "kN") for c in ("F_b", "F_s", "F_b_c", "F_s_c")}
 
 
-@pytest.mark.parametrize(("channel", "factor", "kind"), [(DELTA, DEG, "degrees"), (DELTA, -1.0, "sign"), (N, 1.0 / 60.0, "rev/s")])
+@pytest.mark.parametrize(
+    ("channel", "factor", "kind"), [(DELTA, DEG, "degrees"), (DELTA, -1.0, "sign"), (N, 1.0 / 60.0, "rev/s")]
+)
 def test_an_actuator_in_another_unit_than_its_command_is_told_from_it(channel: int, factor: float, kind: str):
     findings = check_units(misread(trials("kcs"), {channel: factor}, commands=False))
     assert [(f.channel, f.kind) for f in findings] == [(STATES[channel], kind)]
@@ -118,10 +121,17 @@ def test_ordinary_effects_raise_no_finding(seed: int):
         effect = EFFECTS.get(str(name))
         size = rng.uniform(0.5, 1.5)
         if effect.per_run:
-            hidden.append(Hidden(effect, tuple(size * p.typical * rng.standard_normal(24) for p in effect.sized(ship.L))))
+            hidden.append(
+                Hidden(effect, tuple(size * p.typical * rng.standard_normal(24) for p in effect.sized(ship.L)))
+            )
         else:
             q = [size * p.typical * (1.0 if p.low == 0.0 else rng.choice([-1.0, 1.0])) for p in effect.sized(ship.L)]
-            hidden.append(Hidden(effect, tuple(float(np.clip(v, p.low, p.high)) for v, p in zip(q, effect.sized(ship.L), strict=True))))
+            hidden.append(
+                Hidden(
+                    effect,
+                    tuple(float(np.clip(v, p.low, p.high)) for v, p in zip(q, effect.sized(ship.L), strict=True)),
+                )
+            )
     findings = check_units(sea_trials(ship, 1000 + seed, hidden))
     assert findings == [], [h.effect.name for h in hidden]
 
@@ -146,6 +156,10 @@ def test_the_noise_of_a_thruster_at_rest_is_no_unit():
 
     def at_rest(run):
         still = np.pad(50.0 * rng.uniform(-1.0, 1.0, (len(run), 2)), ((0, 0), (8, 0)))
-        return replace(run, states=np.where(np.arange(10) < 8, run.states, still), inputs=np.where(np.arange(4) < 2, run.inputs, 0.0))
+        return replace(
+            run,
+            states=np.where(np.arange(10) < 8, run.states, still),
+            inputs=np.where(np.arange(4) < 2, run.inputs, 0.0),
+        )
 
     assert check_units(data.with_runs([at_rest(run) for run in data.runs])) == []

@@ -30,7 +30,21 @@ def make_trace(runs: int = 12, samples: int = 61, seed: int = 0) -> Trace:
     force = 1e-4 * rng.standard_normal((runs, len(knots), 3))
     white = rng.standard_normal((runs, samples, 6))
     names = tuple(f"r{i}" for i in range(runs))
-    return Trace(np.arange(runs), names, np.zeros(runs), t, measured, before, before, inputs, knots, force, 0.1 + 0 * force, force, white)
+    return Trace(
+        np.arange(runs),
+        names,
+        np.zeros(runs),
+        t,
+        measured,
+        before,
+        before,
+        inputs,
+        knots,
+        force,
+        0.1 + 0 * force,
+        force,
+        white,
+    )
 
 
 def test_a_force_that_follows_the_heading_is_said_to():
@@ -45,7 +59,9 @@ def test_a_force_that_follows_the_heading_is_said_to():
 def test_nothing_is_said_of_headings_that_nobody_sailed():
     """On a passage of two courses the harmonics went to 49 m/s^2 between them."""
     trace = make_trace()
-    trace.measured[..., 2] = np.deg2rad(np.where(np.arange(12) < 6, 190.0, 250.0))[:, None] + 0.05 * np.sin(trace.t / 20.0)
+    trace.measured[..., 2] = np.deg2rad(np.where(np.arange(12) < 6, 190.0, 250.0))[:, None] + 0.05 * np.sin(
+        trace.t / 20.0
+    )
     trace.force[..., 0] += 3e-3 * np.cos(trace.measured[:, ::5, 2])
     found = curve(trace, 0, "heading")
     assert found is not None

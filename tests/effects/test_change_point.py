@@ -1,4 +1,5 @@
-"""`change_point`: any effect from a run on, forces also from a time on; `unit_or_sign_error`: one channel times a factor."""
+"""`change_point`: any effect from a run on, forces also from a time on; `unit_or_sign_error`: one channel times a
+factor."""
 
 from __future__ import annotations
 
@@ -38,7 +39,11 @@ def test_a_force_from_a_run_on_leaves_the_runs_before_as_they_were():
 
 def test_rows_say_which_run_each_row_belongs_to():
     effect = CHANGE.of(EFFECTS.get("current"), from_run=1, rows=[1, 0, 0, 1])
-    changed, always, plain = sailed([Hidden(effect, (0.3, 0.1))]), sailed([Hidden(EFFECTS.get("current"), (0.3, 0.1))]), sailed([])
+    changed, always, plain = (
+        sailed([Hidden(effect, (0.3, 0.1))]),
+        sailed([Hidden(EFFECTS.get("current"), (0.3, 0.1))]),
+        sailed([]),
+    )
     np.testing.assert_allclose(changed[[0, 3]], always[[0, 3]], atol=1e-12)
     np.testing.assert_allclose(changed[[1, 2]], plain[[1, 2]], atol=1e-12)
 
@@ -147,7 +152,9 @@ def test_a_unit_error_has_a_name_in_words(channel: str, factor: float, words: st
     assert UNIT.describe(UNIT.internal({"channel": channel, "factor": factor})) == words
 
 
-@pytest.mark.parametrize("values", [{"factor": 2.0}, {"channel": "r"}, {"channel": "q", "factor": 2.0}, {"channel": 10.0, "factor": 2.0}])
+@pytest.mark.parametrize(
+    "values", [{"factor": 2.0}, {"channel": "r"}, {"channel": "q", "factor": 2.0}, {"channel": 10.0, "factor": 2.0}]
+)
 def test_a_unit_error_without_factor_or_channel_is_refused(values: dict):
     with pytest.raises(InputError, match="channel"):
         UNIT.internal(values)

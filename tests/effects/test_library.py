@@ -1,4 +1,5 @@
-"""Every effect of the contract: present, described, neutral at zero, felt at its typical size, symmetric, the same on every back end and per run."""
+"""Every effect of the contract: present, described, neutral at zero, felt at its typical size, symmetric, the same on
+every back end and per run."""
 
 from __future__ import annotations
 
@@ -18,19 +19,27 @@ from shipbench.simulate.hidden import Hidden, actuator_paths, gears_of, sail
 
 CONTRACT = (
     "current", "current_per_run", "wind", "wind_per_run", "wave_drift", "shallow_water", "bank_suction",
-    "rudder_offset", "rudder_gain", "race_gain", "rudder_stall", "rudder_asymmetry", "rudder_delay", "rudder_lag", "rudder_rate_limit",
-    "rudder_deadband", "rudder_backlash", "thrust_gain", "added_resistance", "propeller_walk", "propeller_walk_astern", "wake_variation", "shaft_lag",
-    "shaft_rate_limit", "thruster_gain", "thruster_speed_loss", "thruster_lag", "thruster_lever", "cross_flow_drag", "mass_change",
-    "center_of_gravity_shift", "hull_derivatives", "list", "heading_bias", "yaw_rate_bias", "antenna_offset", "speed_scale", "position_delay",
+    "rudder_offset", "rudder_gain", "race_gain", "rudder_stall", "rudder_asymmetry", "rudder_delay", "rudder_lag",
+    "rudder_rate_limit",
+    "rudder_deadband", "rudder_backlash", "thrust_gain", "added_resistance", "propeller_walk", "propeller_walk_astern",
+    "wake_variation", "shaft_lag",
+    "shaft_rate_limit", "thruster_gain", "thruster_speed_loss", "thruster_lag", "thruster_lever", "cross_flow_drag",
+    "mass_change",
+    "center_of_gravity_shift", "hull_derivatives", "list", "heading_bias", "yaw_rate_bias", "antenna_offset",
+    "speed_scale", "position_delay",
     "velocity_delay", "unit_or_sign_error", "change_point",
 )  # fmt: skip
 FAMILIES = {"environment", "rudder", "propulsion", "thruster", "hull", "sensor", "time"}
-NAMES = [name for name in EFFECTS.names() if name != "change_point"]  # it has no values of its own: see test_change_point
+NAMES = [
+    name for name in EFFECTS.names() if name != "change_point"
+]  # it has no values of its own: see test_change_point
 
 MIRROR: dict[str, tuple[int, ...]] = {
-    "current": (1,), "current_per_run": (1,), "wind": (1,), "wind_per_run": (1,), "wave_drift": (1,),  # the east component, at psi -> -psi
+    # the east component, at psi -> -psi
+    "current": (1,), "current_per_run": (1,), "wind": (1,), "wind_per_run": (1,), "wave_drift": (1,),
     "bank_suction": (2,),  # the bearing
-    "rudder_offset": (0,), "rudder_asymmetry": (0,), "propeller_walk": (0,), "propeller_walk_astern": (0, 1), "list": (0, 1),
+    "rudder_offset": (0,), "rudder_asymmetry": (0,), "propeller_walk": (0,), "propeller_walk_astern": (0, 1),
+    "list": (0, 1),
     "heading_bias": (0,), "yaw_rate_bias": (0,), "antenna_offset": (1,),
 }  # fmt: skip
 """Indices of the values that change sign in a mirror that exchanges port and starboard; none for the others."""
@@ -61,12 +70,14 @@ def nothing(effect: Effect) -> tuple[float, ...]:
 
 @cache
 def flow() -> Flow:
-    """Motion at twelve instants, ahead and astern, with large rudder angles, both thrusters and reversed screws among them."""
+    """Motion at twelve instants, ahead and astern, with large rudder angles, both thrusters and reversed screws among
+    them."""
     rng = np.random.default_rng(12)
     n = 12
     u, back = rng.uniform(1.0, 6.0, n), np.arange(n) >= 9
     return Flow(
-        x=rng.uniform(-200, 150, n), y=rng.uniform(-200, 150, n), t=np.zeros(n), psi=rng.uniform(-3, 3, n), u=np.where(back, -0.4 * u, u),
+        x=rng.uniform(-200, 150, n), y=rng.uniform(-200, 150, n), t=np.zeros(n), psi=rng.uniform(-3, 3, n),
+        u=np.where(back, -0.4 * u, u),
         v=rng.uniform(-1, 1, n), r=rng.uniform(-0.015, 0.015, n), n=np.where(back, -1.0, 1.0) * rng.uniform(60, 120, n),
         delta=rng.uniform(-0.6, 0.6, n), F_b=rng.uniform(-4e4, 4e4, n), F_s=rng.uniform(-4e4, 4e4, n),
     )  # fmt: skip
@@ -153,7 +164,9 @@ def test_sizes_follow_froude(name: str):
     effect = get(name)
     for large, small in zip(effect.parameters, effect.sized(130.0 / 4.0), strict=True):
         factor = 4.0 ** -powers[large.unit]
-        assert (small.typical, small.low, small.high) == pytest.approx((large.typical * factor, large.low * factor, large.high * factor))
+        assert (small.typical, small.low, small.high) == pytest.approx(
+            (large.typical * factor, large.low * factor, large.high * factor)
+        )
     assert effect.sized(130.0) == effect.parameters
 
 
@@ -180,7 +193,9 @@ def test_no_size_leaves_the_record_as_it_is(name: str):
 
 
 @pytest.mark.parametrize("ship", SHIPS)
-@pytest.mark.parametrize("name", [name for name in of("force") if name != "wind_drift"])  # there is no wind here: see below
+@pytest.mark.parametrize(
+    "name", [name for name in of("force") if name != "wind_drift"]
+)  # there is no wind here: see below
 def test_a_typical_size_is_felt(name: str, ship: str):
     effect = get(name)
     plain, moved = np.array(SHIPS[ship](flow(), None)), np.array(SHIPS[ship](flow(), effect, typical(effect)))
@@ -201,7 +216,10 @@ def test_a_typical_size_changes_the_record(name: str):
 
 
 @pytest.mark.parametrize("value", [1.0, 1])
-@pytest.mark.parametrize(("name", "ship"), [("current", "eq2"), ("current", "mmg"), ("center_of_gravity_shift", "eq2"), ("rudder_asymmetry", "mmg")])
+@pytest.mark.parametrize(
+    ("name", "ship"),
+    [("current", "eq2"), ("current", "mmg"), ("center_of_gravity_shift", "eq2"), ("rudder_asymmetry", "mmg")],
+)
 def test_a_size_of_one_is_not_taken_for_nothing(name: str, ship: str, value: float):
     effect, s = get(name), flow()._replace(psi=0.0)
     q = (value, 0.0)[: len(effect.parameters)]
@@ -233,7 +251,10 @@ def test_what_breaks_a_symmetry_is_not_its_own_mirror_image(name: str):
     """The same values on both sides: a symmetric effect is its own mirror image."""
     q, _ = mirrored_values(name)
     here, there = (on_eq2(s, get(name), q) for s in (flow(), mirrored(flow())))
-    alike = all(np.allclose(b, sign * a, rtol=1e-9, atol=1e-15) for a, b, sign in zip(here, there, (1.0, -1.0, -1.0), strict=True))
+    alike = all(
+        np.allclose(b, sign * a, rtol=1e-9, atol=1e-15)
+        for a, b, sign in zip(here, there, (1.0, -1.0, -1.0), strict=True)
+    )
     assert get(name).breaks_symmetry != alike
 
 
@@ -248,7 +269,9 @@ def test_sensors_see_mirror_images(name: str):
 def test_gears_treat_both_sides_alike(name: str):
     gear = gears_of(CONTAINER, [Hidden(get(name), typical(get(name)))])["delta"]
     side = commands()[..., 1]
-    np.testing.assert_allclose(gear_path(np.zeros(2), -side, 1.0, gear, 4), -gear_path(np.zeros(2), side, 1.0, gear, 4), atol=1e-15)
+    np.testing.assert_allclose(
+        gear_path(np.zeros(2), -side, 1.0, gear, 4), -gear_path(np.zeros(2), side, 1.0, gear, 4), atol=1e-15
+    )
 
 
 # --- back ends and values per run
@@ -266,7 +289,9 @@ def test_numpy_torch_and_casadi_agree(name: str):
     state, size = casadi.SX.sym("s", len(s)), casadi.SX.sym("q", len(q))
     found = on_eq2(Flow(*casadi.vertsplit(state)), effect, casadi.vertsplit(size))
     f = casadi.Function("f", [state, size], [casadi.vertcat(*found)])
-    np.testing.assert_allclose(np.array(f.map(len(s.u))(np.array(s), np.tile(np.array(q)[:, None], len(s.u)))), wanted, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(
+        np.array(f.map(len(s.u))(np.array(s), np.tile(np.array(q)[:, None], len(s.u)))), wanted, rtol=1e-9, atol=1e-15
+    )
 
 
 @pytest.mark.parametrize("ship", SHIPS)
@@ -287,7 +312,10 @@ def test_records_with_values_per_run_are_those_of_each_run(name: str):
     together = effect.measure(record(), q, 1.0)
     for i in range(3):
         np.testing.assert_allclose(
-            together[i : i + 1], effect.measure(record()[i : i + 1], tuple(float(v[i]) for v in q), 1.0), rtol=1e-12, atol=1e-12
+            together[i : i + 1],
+            effect.measure(record()[i : i + 1], tuple(float(v[i]) for v in q), 1.0),
+            rtol=1e-12,
+            atol=1e-12,
         )
 
 
@@ -329,7 +357,15 @@ def test_values_not_given_are_zero_and_shapes_typical():
 
 
 def test_the_states_stand_in_the_order_that_the_mirror_assumes():
-    assert [s for s, f in zip(STATES, FLIPPED_STATES, strict=True) if f < 0] == ["y", "psi", "v", "r", "delta", "F_b", "F_s"]
+    assert [s for s, f in zip(STATES, FLIPPED_STATES, strict=True) if f < 0] == [
+        "y",
+        "psi",
+        "v",
+        "r",
+        "delta",
+        "F_b",
+        "F_s",
+    ]
 
 
 # --- delays, and wind as a fit sees it
@@ -346,11 +382,14 @@ def test_a_delay_goes_on_as_the_run_began_and_ended():
     S = np.zeros((1, 8, 10))
     S[0, :, 0] = 3.0 * np.arange(8)
     for delay in (1.7, -2.4):
-        np.testing.assert_allclose(get("position_delay").measure(S, (delay,), 1.0)[0, :, 0], 3.0 * (np.arange(8) - delay), atol=1e-12)
+        np.testing.assert_allclose(
+            get("position_delay").measure(S, (delay,), 1.0)[0, :, 0], 3.0 * (np.arange(8) - delay), atol=1e-12
+        )
 
 
 def test_velocities_late_in_the_earths_axes_turn_with_the_ship():
-    """A ship that drifts in a straight line while it turns: its earth-fixed velocity is constant, so that no delay of it shows."""
+    """A ship that drifts in a straight line while it turns: its earth-fixed velocity is constant, so that no delay of
+    it shows."""
     S, effect = np.zeros((1, 30, 10)), get("velocity_delay")
     S[0, :, 2] = 0.05 * np.arange(30)
     S[0, :, 3], S[0, :, 4] = 4.0 * np.cos(S[0, :, 2]), -4.0 * np.sin(S[0, :, 2])
@@ -379,7 +418,9 @@ def test_stretched_wind_says_the_wind_that_it_pushes_with(name: str):
             stretched, wind = Modifiers(), Modifiers()
             fitted.force(stretched, flow(), q, PARTICULARS)
             plain.force(wind, flow(), plain.internal(said), PARTICULARS)
-            np.testing.assert_allclose((stretched.air_u, stretched.air_v), (wind.air_u, wind.air_v), rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(
+                (stretched.air_u, stretched.air_v), (wind.air_u, wind.air_v), rtol=1e-9, atol=1e-9
+            )
         assert fitted.public((7.0, 0.0))["speed"] == pytest.approx(7.0, rel=1e-6)  # the typical wind is itself
         assert (fitted.name, fitted.enters, fitted.per_run) == (plain.name, plain.enters, plain.per_run)
 
@@ -402,7 +443,9 @@ def test_wind_coefficients_scale_the_wind_alone():
     one = eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, air, C, list(P), still)
     other = eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, air, C, list(P), moved)
     calm = eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, None, C, list(P), moved)
-    np.testing.assert_allclose(calm, eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, None, C, list(P), still))
+    np.testing.assert_allclose(
+        calm, eq2.accelerations(s.u, s.v, s.r, s.n, s.delta, s.F_b, s.F_s, None, C, list(P), still)
+    )
     X, Y, N = wind.harmonic(*air, C.A_F, C.A_L, C.L)
     np.testing.assert_allclose((other[0] - one[0]) * (C.m + C.m_x), 0.5 * X, rtol=1e-9)
     dY = C.m11 * (other[1] - one[1]) + C.m12_Y * (other[2] - one[2])
@@ -412,7 +455,8 @@ def test_wind_coefficients_scale_the_wind_alone():
 
 
 def test_the_water_drifts_with_the_wind():
-    """In both ships: a drift of 2 % of the measured wind is the current of that size beside the same wind; without wind it is nothing."""
+    """In both ships: a drift of 2 % of the measured wind is the current of that size beside the same wind; without wind
+    it is nothing."""
     drift, current, s = get("wind_drift"), get("current"), flow()
     speed, bearing = 8.0, 0.7
     air = wind.apparent_wind(s.psi, s.u, s.v, speed, bearing)
@@ -432,7 +476,8 @@ def test_the_water_drifts_with_the_wind():
 
 
 def test_going_astern_turns_the_moment_of_drift_over():
-    """At q = 1 the linear moment of drift is that of v u: ahead as it was, astern with its sign changed; alone, without rudder and yaw."""
+    """At q = 1 the linear moment of drift is that of v u: ahead as it was, astern with its sign changed; alone, without
+    rudder and yaw."""
     effect, plain = get("going_astern"), np.zeros(11)
     v, zero = np.array([0.3, 0.3, -0.3, -0.3]), np.zeros(4)
     u = np.array([5.0, -5.0, 5.0, -5.0])

@@ -15,13 +15,21 @@ from shipbench.effects.traits import SEARCHES, Traits
 PACKAGE = Path(shipbench.__file__).parent
 GENERIC = {"current", "wind", "list"}
 """Names of effects that are words of their own: a group of channels, a command."""
-FILES = [p for folder in ("diagnosis", "predictors", "bench", "leaderboard", "reports") for p in sorted((PACKAGE / folder).rglob("*.py"))]
+FILES = [
+    p
+    for folder in ("diagnosis", "predictors", "bench", "leaderboard", "reports")
+    for p in sorted((PACKAGE / folder).rglob("*.py"))
+]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_no_algorithm_knows_the_name_of_an_effect(path: Path) -> None:
     names = set(EFFECTS.built_in()) - GENERIC
-    texts = [node for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    texts = [
+        node
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
     assert not {f"{node.lineno}: {node.value}" for node in texts if node.value in names}
 
 
@@ -47,4 +55,6 @@ def test_what_has_a_search_of_its_own_is_one_effect(search: str) -> None:
 
 def test_every_trait_is_used_by_an_effect() -> None:
     for field in dataclasses.fields(Traits):
-        assert any(getattr(EFFECTS.get(name).traits, field.name) != field.default for name in EFFECTS.names()), field.name
+        assert any(getattr(EFFECTS.get(name).traits, field.name) != field.default for name in EFFECTS.names()), (
+            field.name
+        )

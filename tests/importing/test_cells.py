@@ -1,4 +1,5 @@
-"""Numbers as logs write them: thousands, decimal commas, minus signs. Advice on what can be read in two ways fits the other cells."""
+"""Numbers as logs write them: thousands, decimal commas, minus signs. Advice on what can be read in two ways fits the
+other cells."""
 
 from __future__ import annotations
 
@@ -30,7 +31,11 @@ def read(cells: list[str | None], others: pa.Array = POINTS, **layout) -> list[f
         (["990", "1.090"], {"decimal": "."}, [990.0, 1.09]),
         (["\u22123.5", "\u22123.7e\u221205", "+2", None], {}, [-3.5, -3.7e-05, 2.0, None]),
         (["1.5D+03", "-2d-1"], {}, [1500.0, -0.2]),
-        (["52.1234", "52.123"], {"decimal": ","}, [52.1234, 52.123]),  # only a decimal point can stand before four digits
+        (
+            ["52.1234", "52.123"],
+            {"decimal": ","},
+            [52.1234, 52.123],
+        ),  # only a decimal point can stand before four digits
         (["350", "1.125", "0.5"], {}, [350.0, 1.125, 0.5]),
     ],
 )

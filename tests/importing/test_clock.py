@@ -21,15 +21,25 @@ START = pd.Timestamp("2025-05-04 10:00:00", tz="UTC").timestamp()
 def seconds(cells, **clock):
     """Times of one column of text, or of typed cells."""
     column = cells if isinstance(cells, pa.Array) else pa.array(cells)
-    return to_seconds(Clock(column="t", **clock), [column], lambda name: np.array([float(c) for c in column.to_pylist()]), "log", [])
+    return to_seconds(
+        Clock(column="t", **clock), [column], lambda name: np.array([float(c) for c in column.to_pylist()]), "log", []
+    )
 
 
 def two(first, second, **clock):
     columns = {"a": pa.array(first), "b": pa.array(second)}
-    return to_seconds(Clock(columns=("a", "b"), **clock), list(columns.values()), lambda name: columns[name].to_numpy().astype(float), "log", [])
+    return to_seconds(
+        Clock(columns=("a", "b"), **clock),
+        list(columns.values()),
+        lambda name: columns[name].to_numpy().astype(float),
+        "log",
+        [],
+    )
 
 
-@pytest.mark.parametrize("form", ["%H:%M:%S %d-%m-%Y", "%d-%m-%Y %H:%M:%S", "%H:%M:%S %m-%d-%Y", "%H:%M %z%d-%m-%Y", "%H.%M.%S %d+%Y%m"])
+@pytest.mark.parametrize(
+    "form", ["%H:%M:%S %d-%m-%Y", "%d-%m-%Y %H:%M:%S", "%H:%M:%S %m-%d-%Y", "%H:%M %z%d-%m-%Y", "%H.%M.%S %d+%Y%m"]
+)
 def test_what_ends_like_an_offset_is_none_and_the_zone_is_used(form):
     moment = datetime.datetime(2025, 1, 15, 10, 0, 0, tzinfo=datetime.UTC)
     if "%z" in form:
@@ -47,7 +57,14 @@ def test_a_format_with_a_zone_of_its_own_refuses_another(trial_import, form):
 
 
 @pytest.mark.parametrize(
-    "form", ["%d/%m/%Y %H:%M:%S.%f", "%d/%m/%Y %H:%M:%S,%f", "%Y%m%d %H%M%S.%f", "%H:%M:%S.%f %d-%m-%Y", "%Y-%m-%dT%H:%M:%S.%fZ"]
+    "form",
+    [
+        "%d/%m/%Y %H:%M:%S.%f",
+        "%d/%m/%Y %H:%M:%S,%f",
+        "%Y%m%d %H%M%S.%f",
+        "%H:%M:%S.%f %d-%m-%Y",
+        "%Y-%m-%dT%H:%M:%S.%fZ",
+    ],
 )
 def test_a_stamp_without_its_fraction_is_a_whole_second(form):
     whole = form.replace(".%f", "").replace(",%f", "")
@@ -56,7 +73,9 @@ def test_a_stamp_without_its_fraction_is_a_whole_second(form):
     np.testing.assert_allclose(seconds(texts, format=form), START + 0.5 * np.arange(5), atol=1e-6)
 
 
-@pytest.mark.parametrize("cells", [[330.0, 330.5, 95959.0, 100000.0], ["330", "330.5", "95959", "100000.00"], [330, 330, 95959, 100000]])
+@pytest.mark.parametrize(
+    "cells", [[330.0, 330.5, 95959.0, 100000.0], ["330", "330.5", "95959", "100000.00"], [330, 330, 95959, 100000]]
+)
 @pytest.mark.parametrize("form", ["hhmmss", "%H%M%S.%f"])
 def test_times_of_day_without_leading_zeros(cells, form):
     got = seconds(cells if isinstance(cells[0], str) else pa.array(cells), format=form)
@@ -81,7 +100,9 @@ def test_numbers_that_are_no_time_of_day_are_refused(trial_import, value):
 def test_counted_nanoseconds_and_microseconds(trial_import, unit, per_second):
     for form, zero in ((unit, 0.0), (f"unix_{unit}", START)):
         stamps = [f"{round((zero + t) * per_second)}" for t in T]
-        result = trial_import(logged(T).assign(time=stamps), mapping(time=f'column = "time"\nformat = "{form}"'), "--force")
+        result = trial_import(
+            logged(T).assign(time=stamps), mapping(time=f'column = "time"\nformat = "{form}"'), "--force"
+        )
         assert result.exit_code == 0, result.output
         run = load_dataset("out").runs[0]
         assert run.t[-1] - run.t[0] == pytest.approx(60.0)
@@ -93,9 +114,13 @@ def test_seconds_and_nanoseconds_in_two_columns(trial_import):
         result = trial_import(table, mapping(time=f'columns = ["secs", "nsecs"]\nformat = "{form}"'), "--force")
         assert result.exit_code == 0, result.output
         assert "every 0.5 s" in result.stdout
-    refused = trial_import(table.assign(nsecs=2_000_000_000), mapping(time='columns = ["secs", "nsecs"]\nformat = "unix+ns"'), "--force")
+    refused = trial_import(
+        table.assign(nsecs=2_000_000_000), mapping(time='columns = ["secs", "nsecs"]\nformat = "unix+ns"'), "--force"
+    )
     assert "accepted: 0 to 999999999 ns" in refused.stderr
-    refused = trial_import(table.rename(columns={"nsecs": "part"}), mapping(time='columns = ["secs", "part"]\nformat = "unix"'), "--force")
+    refused = trial_import(
+        table.rename(columns={"nsecs": "part"}), mapping(time='columns = ["secs", "part"]\nformat = "unix"'), "--force"
+    )
     assert "'unix+ns' for seconds and nanoseconds" in refused.stderr
 
 
@@ -152,8 +177,10 @@ def test_typed_columns_of_date_and_time(date, time, order):
     clock = [datetime.time(10, 0, 0), datetime.time(10, 0, 0, 500_000)]
     since = [datetime.timedelta(hours=10), datetime.timedelta(hours=10, seconds=0.5)]
     times = {
-        "time32": lambda: pa.array(clock, pa.time32("ms")), "time64": lambda: pa.array(clock, pa.time64("us")), "duration": lambda: pa.array(since),
-        "text": lambda: pa.array(["10:00:00", "10:00:00.5"]), "stamp": lambda: pa.array([datetime.datetime(1900, 1, 1) + s for s in since]),
+        "time32": lambda: pa.array(clock, pa.time32("ms")), "time64": lambda: pa.array(clock, pa.time64("us")),
+        "duration": lambda: pa.array(since),
+        "text": lambda: pa.array(["10:00:00", "10:00:00.5"]),
+        "stamp": lambda: pa.array([datetime.datetime(1900, 1, 1) + s for s in since]),
     }[time]()  # fmt: skip
     if pa.types.is_string(date) and (order < 0 or time in ("duration", "stamp")):
         pytest.skip("text is joined in its order")
@@ -167,7 +194,8 @@ def test_a_column_of_dates_that_holds_the_time_too_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("form", "stamp"), [("iso", "2016-12-31T23:59:60Z"), ("%d/%m/%Y %H:%M:%S.%f", "31/12/2016 23:59:60.25"), ("%H%M%S", "235960")]
+    ("form", "stamp"),
+    [("iso", "2016-12-31T23:59:60Z"), ("%d/%m/%Y %H:%M:%S.%f", "31/12/2016 23:59:60.25"), ("%H%M%S", "235960")],
 )
 def test_a_leap_second_is_the_next_midnight(form, stamp):
     expected = 86400.0 if is_daily(Clock(column="t", format=form)) else 1483228800.0 + 0.25 * ("." in stamp)
@@ -177,7 +205,10 @@ def test_a_leap_second_is_the_next_midnight(form, stamp):
 
 def test_an_hour_that_the_change_of_clocks_repeats_is_refused(trial_import):
     stamps = pd.date_range("2024-10-27 02:59:00", periods=len(T), freq="500ms").strftime("%d/%m/%Y %H:%M:%S.%f")
-    result = trial_import(logged(T).assign(time=stamps), mapping(time='column = "time"\nformat = "%d/%m/%Y %H:%M:%S.%f"\nzone = "Europe/Berlin"'))
+    result = trial_import(
+        logged(T).assign(time=stamps),
+        mapping(time='column = "time"\nformat = "%d/%m/%Y %H:%M:%S.%f"\nzone = "Europe/Berlin"'),
+    )
     assert result.exit_code == 2
     assert "no one meaning in the zone 'Europe/Berlin'" in result.stderr
 
@@ -185,7 +216,11 @@ def test_an_hour_that_the_change_of_clocks_repeats_is_refused(trial_import):
 def test_local_time_beside_utc_is_merged_at_the_same_moment(trial_import, tmp_path):
     times = pd.Timestamp("2025-01-15 09:00:00") + pd.to_timedelta(T, unit="s")
     table = logged(T)
-    gps = write(tmp_path, "gps.csv", table[["north", "east", "HDG"]].assign(unix=times.astype("datetime64[us]").astype("int64") / 1e6))
+    gps = write(
+        tmp_path,
+        "gps.csv",
+        table[["north", "east", "HDG"]].assign(unix=times.astype("datetime64[us]").astype("int64") / 1e6),
+    )
     stamps = (times + pd.Timedelta(hours=1)).strftime("%H:%M:%S.%f %d-%m-%Y")
     bridge = write(tmp_path, "bridge.csv", table[["rpm", "rudder"]].assign(clock=stamps))
     plan = """
@@ -194,7 +229,9 @@ dt = 1.0
 [sources.gps]
 files = "gps.csv"
 time = { column = "unix", format = "unix" }
-channels = { x = { column = "north", unit = "m" }, y = { column = "east", unit = "m" }, psi = { column = "HDG", unit = "deg" } }
+channels.x = { column = "north", unit = "m" }
+channels.y = { column = "east", unit = "m" }
+channels.psi = { column = "HDG", unit = "deg" }
 [sources.bridge]
 files = "bridge.csv"
 time = { column = "clock", format = "%H:%M:%S.%f %d-%m-%Y", zone = "Europe/Amsterdam" }

@@ -24,9 +24,15 @@ def encoded(name: str) -> str:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (TEXT + ROWS[-1].replace("60.0", "60.5", 1)[:60], "log.csv, row 123, left out: 4 of 10 fields at the end of the file"),
+        (
+            TEXT + ROWS[-1].replace("60.0", "60.5", 1)[:60],
+            "log.csv, row 123, left out: 4 of 10 fields at the end of the file",
+        ),
         (TEXT + "\nEnd of log\n121 rows\n", "row 123, left out: 1 of 10 fields at the end of the file: 'End of log'"),
-        (TEXT + "Total" + "," * 9 + "\n" + "," * 9 + "\n", "2 rows at the end, left out: 'Total' stands for their time"),
+        (
+            TEXT + "Total" + "," * 9 + "\n" + "," * 9 + "\n",
+            "2 rows at the end, left out: 'Total' stands for their time",
+        ),
     ],
 )
 def test_a_cut_last_line_and_a_footer_are_left_out_and_reported(trial_import, text, told):
@@ -42,7 +48,10 @@ def test_a_cut_last_line_and_a_footer_are_left_out_and_reported(trial_import, te
     [
         ("\n".join([*ROWS[:50], ROWS[50] + ",7", *ROWS[51:]]), "row 51 has 11 fields; accepted: 10"),
         ("\n".join([*ROWS[:50], "lost", *ROWS[51:]]), "row 51 has 1 fields; accepted: 10"),
-        ("\n".join([*ROWS[:-9], *(row.rpartition(",")[0] for row in ROWS[-9:])]), "row 114 has 9 fields"),  # nine whole rows without a channel
+        (
+            "\n".join([*ROWS[:-9], *(row.rpartition(",")[0] for row in ROWS[-9:])]),
+            "row 114 has 9 fields",
+        ),  # nine whole rows without a channel
         ("\n".join([ROWS[0], *(row + ",7" for row in ROWS[1:])]), "row 2 has 11 fields; accepted: 10"),
         (TEXT.replace(",110.0,", ",1,110.0,"), 'needs quotes: "1,090"'),
     ],
@@ -53,7 +62,9 @@ def test_other_rows_that_do_not_fit_are_refused_with_their_number(trial_import, 
     assert told in refused.stderr
 
 
-@pytest.mark.parametrize("name", ["rot13", "base64", "punycode", "idna", "undefined", "unicode_escape", "no-such", "utf-8\0", ""])
+@pytest.mark.parametrize(
+    "name", ["rot13", "base64", "punycode", "idna", "undefined", "unicode_escape", "no-such", "utf-8\0", ""]
+)
 def test_what_is_no_encoding_of_a_file_is_refused(trial_import, name):
     refused = trial_import(TEXT, encoded(name).replace("\0", "\\u0000"))
     assert refused.exit_code == 2

@@ -1,4 +1,5 @@
-"""The public files of the Esso Osaka through the import, against the loader that was written for them (needs a copy of the data)."""
+"""The public files of the Esso Osaka through the import, against the loader that was written for them (needs a copy of
+the data)."""
 
 from __future__ import annotations
 
@@ -12,8 +13,10 @@ from shipbench.data.esso_osaka import SHIP, find_copy
 from shipbench.errors import InputError
 
 COLUMNS = {
-    "x": ("x_position_mid [m]", "m"), "y": ("y_position_mid [m]", "m"), "psi": ("psi_hat [rad]", "rad"), "u": ("u_velo [m/s]", "m/s"),
-    "v": ("vm_velo [m/s]", "m/s"), "r": ("r_angvelo [rad/s]", "rad/s"), "n_c": ("n_prop [rps]", "rev/s"), "delta_c": ("delta_rudder [rad]", "rad"),
+    "x": ("x_position_mid [m]", "m"), "y": ("y_position_mid [m]", "m"), "psi": ("psi_hat [rad]", "rad"),
+    "u": ("u_velo [m/s]", "m/s"),
+    "v": ("vm_velo [m/s]", "m/s"), "r": ("r_angvelo [rad/s]", "rad/s"), "n_c": ("n_prop [rps]", "rev/s"),
+    "delta_c": ("delta_rudder [rad]", "rad"),
     "wind_speed": ("wind_velo_true [m/s]", "m/s"), "wind_from": ("wind_dir_true [rad]", "rad"),
 }  # fmt: skip
 
@@ -27,13 +30,30 @@ def imported(tmp_path):
         pytest.skip("no copy of the Esso Osaka data here (SHIPBENCH_ESSO_OSAKA)")
 
     def run(pattern, top="", without=()):
-        lines = [f'{ours} = {{ column = "{name}", unit = "{unit}" }}\n' for ours, (name, unit) in COLUMNS.items() if ours not in without]
-        (tmp_path / "map.toml").write_text(f'name = "e"\ndt = 0.5\n{top}\n[time]\ncolumn = "t [s]"\n[channels]\n{"".join(lines)}')
+        lines = [
+            f'{ours} = {{ column = "{name}", unit = "{unit}" }}\n'
+            for ours, (name, unit) in COLUMNS.items()
+            if ours not in without
+        ]
+        (tmp_path / "map.toml").write_text(
+            f'name = "e"\ndt = 0.5\n{top}\n[time]\ncolumn = "t [s]"\n[channels]\n{"".join(lines)}'
+        )
         (tmp_path / "ship.toml").write_text(SHIP.to_toml())
         files = [str(f) for f in sorted(copy.glob(pattern)) if "turn_cut_14-Sep-2020_15" not in f.name]
         out = str(tmp_path / "out")
         result = CliRunner().invoke(
-            app, ["data", "import", *files, "-m", str(tmp_path / "map.toml"), "--ship", str(tmp_path / "ship.toml"), "-o", out]
+            app,
+            [
+                "data",
+                "import",
+                *files,
+                "-m",
+                str(tmp_path / "map.toml"),
+                "--ship",
+                str(tmp_path / "ship.toml"),
+                "-o",
+                out,
+            ],
         )
         assert result.exit_code == 0, result.output
         theirs = {r.id: r for r in load_dataset("esso_osaka").runs}

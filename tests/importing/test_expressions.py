@@ -27,13 +27,20 @@ def wrapped(angle: np.ndarray) -> np.ndarray:
 def test_two_shafts(trial_import):
     table = logged(T).assign(port=100.0, stbd=130.0)
     assert imported(trial_import, table, n='{ mean = ["port", "stbd"], unit = "rpm" }')[:, 6] == pytest.approx(115.0)
-    assert imported(trial_import, table, n='{ sum = ["port", "stbd"], unit = "rpm", factor = 0.5 }')[:, 6] == pytest.approx(115.0)
-    assert imported(trial_import, table, n='{ diff = ["stbd", "port"], unit = "rev/s", offset = 1.0 }')[:, 6] == pytest.approx(31.0 * 60.0)
+    assert imported(trial_import, table, n='{ sum = ["port", "stbd"], unit = "rpm", factor = 0.5 }')[
+        :, 6
+    ] == pytest.approx(115.0)
+    assert imported(trial_import, table, n='{ diff = ["stbd", "port"], unit = "rev/s", offset = 1.0 }')[
+        :, 6
+    ] == pytest.approx(31.0 * 60.0)
 
 
 def test_the_mean_of_two_headings_crosses_north(trial_import):
     table = logged(T)
-    table["a"], table["b"] = (table["HDG"] + 182.0) % 360.0, (table["HDG"] + 178.0) % 360.0  # the ship crosses 180, these cross north
+    table["a"], table["b"] = (
+        (table["HDG"] + 182.0) % 360.0,
+        (table["HDG"] + 178.0) % 360.0,
+    )  # the ship crosses 180, these cross north
     psi = imported(trial_import, table, psi='{ mean = ["a", "b"], unit = "deg", offset = 180.0 }')[:, 2]
     np.testing.assert_allclose(wrapped(psi - S["psi"]), 0.0, atol=1e-3)
 
@@ -62,11 +69,17 @@ def test_rudder_in_percent_of_35_degrees_and_pulses(trial_import):
     percent, pulse = table["rudder"] / 0.35, 1500.0 + table["rudder"] / 35.0 * 500.0
     expected = imported(trial_import, table)[:, 7]
     entry = '{ column = "rudder", unit = "%", full = 35.0, full_unit = "deg" }'
-    np.testing.assert_allclose(imported(trial_import, table.assign(rudder=percent), delta=entry)[:, 7], expected, atol=1e-9)
+    np.testing.assert_allclose(
+        imported(trial_import, table.assign(rudder=percent), delta=entry)[:, 7], expected, atol=1e-9
+    )
     entry = '{ column = "rudder", unit = "pwm", full = 35.0, full_unit = "deg" }'
-    np.testing.assert_allclose(imported(trial_import, table.assign(rudder=pulse), delta=entry)[:, 7], expected, atol=1e-9)
+    np.testing.assert_allclose(
+        imported(trial_import, table.assign(rudder=pulse), delta=entry)[:, 7], expected, atol=1e-9
+    )
     told = trial_import(table, mapping(body=channels(delta='{ column = "rudder", unit = "%" }'))).stderr
-    assert 'unit "%" without full; accepted: the value at full deflection, such as full = 35.0, full_unit = "deg"' in told
+    assert (
+        'unit "%" without full; accepted: the value at full deflection, such as full = 35.0, full_unit = "deg"' in told
+    )
 
 
 def test_no_pulse_is_no_reading_and_a_short_pulse_is_one(trial_import):
@@ -83,7 +96,9 @@ def test_centidegrees_and_steps_of_a_unit(trial_import):
     table = logged(T)
     expected = imported(trial_import, table)
     table["HDG"], table["surge"] = np.round(table["HDG"] * 100.0), np.round(table["surge"] * 10.0)
-    found = imported(trial_import, table, psi='{ column = "HDG", unit = "cdeg" }', u='{ column = "surge", unit = "0.1 kn" }')
+    found = imported(
+        trial_import, table, psi='{ column = "HDG", unit = "cdeg" }', u='{ column = "surge", unit = "0.1 kn" }'
+    )
     np.testing.assert_allclose(found[:, 2], expected[:, 2], atol=1e-3)
     np.testing.assert_allclose(found[:, 3], expected[:, 3], atol=0.03)
 

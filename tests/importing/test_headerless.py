@@ -30,7 +30,9 @@ def written(separator: str, preamble: str) -> str:
 
 @pytest.mark.parametrize(("separator", "delimiter"), [("   ", " "), (" \t ", " "), (",", ","), (";", ";")])
 @pytest.mark.parametrize("preamble", ["", " A basin, experimental data\n Z10/5\n"])
-def test_a_table_without_a_header_is_read_by_the_numbers_of_its_columns(trial_import, tmp_path, separator, delimiter, preamble):
+def test_a_table_without_a_header_is_read_by_the_numbers_of_its_columns(
+    trial_import, tmp_path, separator, delimiter, preamble
+):
     layout = f'[file]\nheader = 0\nskip = {preamble.count(chr(10))}\ndelimiter = "{delimiter}"\n'
     done = trial_import(written(separator, preamble), mapping(time='column = "1"', tables=layout, body=NUMBERED))
     assert done.exit_code == 0, done.output
@@ -41,7 +43,9 @@ def test_a_table_without_a_header_is_read_by_the_numbers_of_its_columns(trial_im
 
 def test_a_workbook_without_a_header_is_read_by_the_numbers_of_its_columns(trial_import, tmp_path):
     logged(T)[["time", "north", "east", "HDG"]].to_excel(tmp_path / "log.xlsx", index=False, header=False)
-    done = trial_import([tmp_path / "log.xlsx"], mapping(time='column = "1"', tables="[file]\nheader = 0\n", body=NUMBERED))
+    done = trial_import(
+        [tmp_path / "log.xlsx"], mapping(time='column = "1"', tables="[file]\nheader = 0\n", body=NUMBERED)
+    )
     assert done.exit_code == 0, done.output
     np.testing.assert_allclose(load_dataset(tmp_path / "out").runs[0].states[:, 1], logged(T)["east"], atol=1e-6)
 
@@ -63,7 +67,10 @@ def test_a_header_with_blanks_names_the_columns(tmp_path):
 
 def test_rows_of_delimiters_alone_are_empty_lines(trial_import, tmp_path):
     table = logged(T)[["time", "north", "east", "HDG"]].to_csv(index=False, header=False, sep="\t")
-    done = trial_import(table + 2000 * "\t\t\n", mapping(time='column = "1"', tables='[file]\nheader = 0\ndelimiter = "\\t"\n', body=NUMBERED))
+    done = trial_import(
+        table + 2000 * "\t\t\n",
+        mapping(time='column = "1"', tables='[file]\nheader = 0\ndelimiter = "\\t"\n', body=NUMBERED),
+    )
     assert done.exit_code == 0, done.output
     assert len(load_dataset(tmp_path / "out").runs[0].t) == len(T)
 

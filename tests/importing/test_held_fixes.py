@@ -46,7 +46,9 @@ def test_fixes_that_come_with_jitter(trial_import):
     at = np.cumsum(rng.integers(8, 13, 200))
     which = np.searchsorted(at, np.arange(len(T)), side="right")
     fix = motion(np.r_[0.0, T[np.minimum(at, len(T) - 1)]][which])
-    result = trial_import(logged(T).assign(north=fix["x"], east=fix["y"]), mapping(top="dt = 0.5", body=channels("u", "v")))
+    result = trial_import(
+        logged(T).assign(north=fix["x"], east=fix["y"]), mapping(top="dt = 0.5", body=channels("u", "v"))
+    )
     (run,) = load_dataset("out").runs
     np.testing.assert_allclose(run.states[:, 0], motion(run.t)["x"], atol=0.2)
     assert "held between fixes" in result.stdout

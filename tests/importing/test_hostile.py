@@ -56,7 +56,11 @@ LOGS = {
     "truncated bzip2": ("log.csv.bz2", bz2.compress(TEXT.encode())[:2000], "cannot be read"),
     "gzip of nothing": ("log.csv.gz", gzip.compress(b""), "holds no text"),
     "cut in a row": ("log.csv", TEXT[:-60] + "\n" + ROWS[-1] + "\n", "row 122 has 7 fields; accepted: 10"),
-    "a row too long": ("log.csv", TEXT + ROWS[-1] + ",1,2\n", "row 123 has 12 fields; accepted: 10, as the header has columns"),
+    "a row too long": (
+        "log.csv",
+        TEXT + ROWS[-1] + ",1,2\n",
+        "row 123 has 12 fields; accepted: 10, as the header has columns",
+    ),
     "wrong delimiter": ("log.csv", TEXT.replace(",", "#"), "no column|unknown column"),
     "decimal commas": ("log.csv", TEXT.replace(",", ";").replace(".", ","), 'decimal = ","'),
     "duplicate columns": ("log.csv", TEXT.replace("sway", "surge", 1), "2 columns are named 'surge'"),
@@ -66,7 +70,11 @@ LOGS = {
     "a formula": ("log.csv", with_cell(7, 4, "=1+1"), r"row 9: 'surge' is '=1\+1', not a number"),
     "a dangerous formula": ("log.csv", with_cell(0, 4, "=cmd|' /C calc'!A0"), "not a number"),
     "a row of units": ("log.csv", f"{ROWS[0]}\ns,m,m,deg,kn,m/s,deg/min,rpm,deg,deg\n", r"\[file\] skip"),
-    "many columns": ("log.csv", ",".join(f"c{i}" for i in range(1_000_000)) + "\n" + ",".join("0" * 1_000_000) + "\n", "1000000|longer than"),
+    "many columns": (
+        "log.csv",
+        ",".join(f"c{i}" for i in range(1_000_000)) + "\n" + ",".join("0" * 1_000_000) + "\n",
+        "1000000|longer than",
+    ),
     "one endless line": ("log.csv", "a" * 6_000_000, "longer than"),
     "old excel": ("log.xls", b"\xd0\xcf\x11\xe0" + bytes(100), "old format"),
     "no excel": ("log.xlsx", b"PK\x03\x04" + bytes(100), "no Excel workbook"),
@@ -76,12 +84,18 @@ LOGS = {
     "no parquet": ("log.parquet", b"PAR1" + bytes(100), "cannot be read"),
     "all values missing": ("log.csv", re.sub(r"(?m)^([\d.]+),.*$", r"\1,,,,,,,,,", TEXT), "no run is left"),
     "too short": ("log.csv", "\n".join(ROWS[:5]) + "\n", "shorter than 20 s"),
-    "all one time": ("log.csv", "\n".join([ROWS[0], *["5.0," + r.split(",", 1)[1] for r in ROWS[1:]]]) + "\n", "coarser|no run"),
+    "all one time": (
+        "log.csv",
+        "\n".join([ROWS[0], *["5.0," + r.split(",", 1)[1] for r in ROWS[1:]]]) + "\n",
+        "coarser|no run",
+    ),
 }
 
 
 def test_a_run_column_that_holds_no_names_is_one_message(trial_import, tmp_path):
-    table = pa.table({name: pa.array(values) for name, values in logged(T).items()} | {"runs": pa.array([{"a": 1}] * len(T))})
+    table = pa.table(
+        {name: pa.array(values) for name, values in logged(T).items()} | {"runs": pa.array([{"a": 1}] * len(T))}
+    )
     pa.parquet.write_table(table, tmp_path / "log.parquet")
     result = trial_import([tmp_path / "log.parquet"], mapping(top='run = "runs"'))
     assert result.exit_code == 2, result.output
@@ -125,7 +139,9 @@ def excel_of_zeros(path):
         ("log.xlsx", excel_of_zeros, "11 MB unpacked"),
     ],
 )
-def test_a_small_file_that_unpacks_to_a_large_one_is_refused_before_it_is_read(trial_import, tmp_path, monkeypatch, name, write_log, expected):
+def test_a_small_file_that_unpacks_to_a_large_one_is_refused_before_it_is_read(
+    trial_import, tmp_path, monkeypatch, name, write_log, expected
+):
     monkeypatch.setattr("shipbench.matlab_files.MOST_MATLAB", 1_000_000)
     write_log(tmp_path / name)
     assert (tmp_path / name).stat().st_size < 1_000_000
@@ -182,8 +198,24 @@ def test_a_full_disk_is_one_message_and_leaves_nothing(tmp_path):
     write(tmp_path, "log.csv", logged(np.arange(0.0, 4000.0, 0.5)))
     write(tmp_path, "mapping.toml", mapping())
     write(tmp_path, "ship.toml", SHIP)
-    code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)); from shipbench.cli.app import app; app(sys.argv[1:])"
-    command = [sys.executable, "-c", code, "data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ship.toml", "--out", "out"]
+    code = (
+        "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)); from "
+        "shipbench.cli.app import app; app(sys.argv[1:])"
+    )
+    command = [
+        sys.executable,
+        "-c",
+        code,
+        "data",
+        "import",
+        "log.csv",
+        "--map",
+        "mapping.toml",
+        "--ship",
+        "ship.toml",
+        "--out",
+        "out",
+    ]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "cannot write the data set to out" in done.stderr
@@ -207,16 +239,20 @@ MAPPINGS = {
     "no TOML": ("name = ", "not valid TOML"),
     "unknown key": (mapping(top="delimitter = 3"), "unknown key 'delimitter'"),
     "unknown key in a table": (mapping(tables='[file]\ndelimitter = ";"'), "Did you mean 'delimiter'"),
-    "unknown key of a channel": (mapping(body=channels(psi='{ column = "HDG", units = "deg" }')), "Did you mean 'unit'|unit: Field required"),
+    "unknown key of a channel": (mapping(body=channels(psi='{ column = "HDG", units = "deg" }')),
+        "Did you mean 'unit'|unit: Field required"),
     "unknown key in split": (mapping(tables="[split]\nwindows = 300"), "Did you mean 'window'"),
-    "unknown channel": (mapping(body=channels(heading='{ column = "HDG", unit = "deg" }')), "unknown channel.*'heading'"),
+    "unknown channel": (mapping(body=channels(heading='{ column = "HDG", unit = "deg" }')),
+        "unknown channel.*'heading'"),
     "no unit": (mapping(body=channels(psi='{ column = "HDG" }')), "channels.psi.unit: Field required"),
     "unknown unit": (mapping(body=channels(psi='{ column = "HDG", unit = "gon" }')), "unit of 'psi' 'gon'.*deg, rad"),
-    "unknown sign": (mapping(body=channels(r='{ column = "ROT", unit = "deg/min", sign = "minus" }')), "sign of 'r' 'minus'.*port, starboard"),
+    "unknown sign": (mapping(body=channels(r='{ column = "ROT", unit = "deg/min", sign = "minus" }')),
+        "sign of 'r' 'minus'.*port, starboard"),
     "no heading": (mapping(body=channels("psi")), "no channel 'psi'"),
     "no position": (mapping(body=channels("x", "y")), "no position"),
     "half a position": (mapping(body=channels("y")), "no position|without 'y'"),
-    "course without speed": (mapping(body=channels(cog='{ column = "HDG", unit = "deg" }')), "'cog' is mapped without 'sog'"),
+    "course without speed": (mapping(body=channels(cog='{ column = "HDG", unit = "deg" }')),
+        "'cog' is mapped without 'sog'"),
     "no time": ('name = "a"\ndt = 1.0\n' + channels(), "time: Field required"),
     "no time column": (mapping(time='format = "s"'), r"\[time\] has no column"),
     "unknown format": (mapping(time='column = "time"\nformat = "seconds"'), "format = 'seconds'; accepted: s, ms"),
@@ -224,8 +260,11 @@ MAPPINGS = {
     "negative dt": (mapping(top="dt = -1.0"), "dt: Input should be greater than 0"),
     "gap below dt": (mapping(tables="[split]\ngap = 0.1"), "below dt"),
     "stamps that are numbers": (mapping(time='column = "time"\nformat = "iso"'), "not of the format 'iso'"),
-    "merged run column": (mapping().replace("[time]", '[sources.a]\nrun = "b"\n[sources.a.time]').replace("[channels]", "[sources.a.channels]")
-                          + '[sources.b.time]\ncolumn = "t"\n[sources.b.channels]\ndepth = { column = "d", unit = "m" }\n', "one source"),
+    "merged run column": (mapping().replace("[time]", '[sources.a]\nrun = "b"\n[sources.a.time]').replace("[channels]",
+            "[sources.a.channels]")
+                          + '[sources.b.time]\ncolumn = "t"\n[sources.b.channels]\n'
+                            'depth = { column = "d", unit '
+                                                                                     '= "m" }\n', "one source"),
 }  # fmt: skip
 
 
@@ -361,20 +400,31 @@ def test_a_missing_log_or_ship_is_named(trial_import, tmp_path):
 def test_a_ship_file_of_no_ship_is_refused_before_anything_is_written(trial_import, tmp_path):
     result = trial_import(TEXT, ship=SHIP + "[propeller]\ndiameter = 2400.0\n")
     assert result.exit_code == 2
-    assert "ship.toml: ship 'trial': propeller.diameter is 2400 m; accepted: up to 2 T = 6" in " ".join(result.stderr.split())
+    assert "ship.toml: ship 'trial': propeller.diameter is 2400 m; accepted: up to 2 T = 6" in " ".join(
+        result.stderr.split()
+    )
     assert not (tmp_path / "out").exists()
 
 
 def test_a_latitude_out_of_range_names_unit_and_format(trial_import):
-    plan = mapping(body=channels("x", "y", lat='{ column = "north", unit = "deg" }', lon='{ column = "east", unit = "deg" }'))
+    plan = mapping(
+        body=channels("x", "y", lat='{ column = "north", unit = "deg" }', lon='{ column = "east", unit = "deg" }')
+    )
     result = trial_import(TEXT, plan)
     assert result.exit_code == 2
     assert "'lat' reaches" in result.stderr
 
 
 def test_a_source_without_its_file_is_named(trial_import, tmp_path):
-    plan = mapping().replace("[time]", '[sources.a]\nfiles = "gps*"\n[sources.a.time]').replace("[channels]", "[sources.a.channels]")
-    plan += '[sources.b]\nfiles = "sonar*"\n[sources.b.time]\ncolumn = "t"\n[sources.b.channels]\ndepth = { column = "d", unit = "m" }\n'
+    plan = (
+        mapping()
+        .replace("[time]", '[sources.a]\nfiles = "gps*"\n[sources.a.time]')
+        .replace("[channels]", "[sources.a.channels]")
+    )
+    plan += (
+        '[sources.b]\nfiles = "sonar*"\n[sources.b.time]\ncolumn = "t"\n[sources.b.channels]\n'
+        'depth = { column = "d", unit = "m" }\n'
+    )
     result = trial_import(TEXT, plan, name="gps.csv")
     assert result.exit_code == 2
     assert "no log for the source 'b'" in result.stderr
@@ -386,10 +436,14 @@ def test_what_is_no_regular_file_is_refused_and_not_waited_for(kind, which, tmp_
     monkeypatch.chdir(tmp_path)
     for name in ("log.csv", "mapping.toml", "ship.toml"):
         (tmp_path / name).write_text("t,x\n0,1\n" if name == "log.csv" else "")
-    (tmp_path / "mapping.toml").write_text('name = "a"\ndt = 1.0\n[time]\ncolumn = "t"\n[channels]\nx = {column = "x", unit = "m"}\n')
+    (tmp_path / "mapping.toml").write_text(
+        'name = "a"\ndt = 1.0\n[time]\ncolumn = "t"\n[channels]\nx = {column = "x", unit = "m"}\n'
+    )
     (tmp_path / "ship.toml").write_text('name = "toy"\nL = 50.0\nB = 8.0\nT = 3.0\nmass = 9e5\n')
     (tmp_path / which).unlink()
     os.mkfifo(tmp_path / which) if kind == "pipe" else (tmp_path / which).symlink_to("/dev/zero")
-    result = CliRunner().invoke(app, ["data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ship.toml", "--out", "out"])
+    result = CliRunner().invoke(
+        app, ["data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ship.toml", "--out", "out"]
+    )
     assert result.exit_code == 2
     assert "not a regular file" in result.stderr or "mapping.toml" in result.stderr

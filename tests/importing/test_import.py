@@ -62,8 +62,17 @@ def test_every_kind_of_file_gives_the_same_data(trial_import, tmp_path, kind):
         from scipy.io import savemat
 
         nested = {name.replace(" ", "_"): table[name].to_numpy() for name in table if name not in ("time", "north")}
-        savemat(path, {"time": table["time"].to_numpy(), "log": nested, "track": np.column_stack([table["time"], table["north"]])})
-        names = {"north": "track(2)"} | {name: f"log.{name.replace(' ', '_')}" for name in table if name not in ("time", "north")}
+        savemat(
+            path,
+            {
+                "time": table["time"].to_numpy(),
+                "log": nested,
+                "track": np.column_stack([table["time"], table["north"]]),
+            },
+        )
+        names = {"north": "track(2)"} | {
+            name: f"log.{name.replace(' ', '_')}" for name in table if name not in ("time", "north")
+        }
         for theirs, matlab in names.items():
             plan = plan.replace(f'column = "{theirs}"', f'column = "{matlab}"')
     elif kind == "xlsx":
@@ -92,10 +101,12 @@ def test_every_kind_of_file_gives_the_same_data(trial_import, tmp_path, kind):
         ('column = "time"\nformat = "ms"', lambda t: (1000 * t).round().astype(int)),
         ('column = "time"\nformat = "unix"', lambda t: 1.6e9 + t),
         ('column = "time"\nformat = "iso"', lambda t: pd.Timestamp("2024-02-29 23:59:00") + pd.to_timedelta(t, "s")),
-        ('column = "time"\nformat = "iso"', lambda t: [f"{s.isoformat()}+02:00" for s in pd.Timestamp("2024-02-29") + pd.to_timedelta(t, "s")]),
+        ('column = "time"\nformat = "iso"',
+            lambda t: [f"{s.isoformat()}+02:00" for s in pd.Timestamp("2024-02-29") + pd.to_timedelta(t, "s")]),
         ('column = "time"\nformat = "excel"', lambda t: 45000.25 + t / 86400),
         ('column = "time"\nformat = "matlab"', lambda t: 739000.25 + t / 86400),
-        (f'column = "time"\nformat = "{DAY_FIRST}"', lambda t: (pd.Timestamp("2024-02-29") + pd.to_timedelta(t, "s")).strftime(DAY_FIRST)),
+        (f'column = "time"\nformat = "{DAY_FIRST}"',
+            lambda t: (pd.Timestamp("2024-02-29") + pd.to_timedelta(t, "s")).strftime(DAY_FIRST)),
         ("rate = 2.0", lambda t: np.zeros(len(t))),
     ],
 )  # fmt: skip
@@ -165,7 +176,10 @@ def test_a_header_in_latin_1(trial_import, tmp_path):
     named = trial_import([path], plan.replace("[channels]", '[file]\nencoding = "latin-1"\n[channels]'), "--force")
     assert named.exit_code == 0
     assert "is not UTF-8" not in named.stdout
-    assert "is not utf-8 text" in trial_import([path], plan.replace("[channels]", '[file]\nencoding = "utf-8"\n[channels]'), "--force").stderr
+    assert (
+        "is not utf-8 text"
+        in trial_import([path], plan.replace("[channels]", '[file]\nencoding = "utf-8"\n[channels]'), "--force").stderr
+    )
 
 
 def test_a_gap_splits_and_is_never_bridged(trial_import):
@@ -205,10 +219,20 @@ def test_a_run_longer_than_the_longest_comes_in_parts_of_one_group(trial_import)
 
 
 def test_a_run_column_names_the_runs_and_time_may_start_anew(trial_import):
-    table = pd.concat([logged(T[:500]).assign(test="ZZ 10/10"), logged(T[:400]).assign(test="=1+1"), logged(T[:300]).assign(test="ZZ 10/10")])
+    table = pd.concat(
+        [
+            logged(T[:500]).assign(test="ZZ 10/10"),
+            logged(T[:400]).assign(test="=1+1"),
+            logged(T[:300]).assign(test="ZZ 10/10"),
+        ]
+    )
     result = trial_import(table, mapping(top='run = "test"'))
     assert result.exit_code == 0, result.output
-    assert [r.id for r in load_dataset("out").runs] == ["ZZ_10_10", "1_1", "ZZ_10_10_2"]  # no name is a formula in a spreadsheet
+    assert [r.id for r in load_dataset("out").runs] == [
+        "ZZ_10_10",
+        "1_1",
+        "ZZ_10_10_2",
+    ]  # no name is a formula in a spreadsheet
 
 
 def test_standing_still_is_cut(trial_import):
@@ -225,9 +249,13 @@ def test_standing_still_is_cut(trial_import):
 
 def test_times_of_day_count_on_over_midnight_and_rows_may_end_with_a_delimiter(trial_import):
     table = logged(T[::5])
-    table["time"] = (pd.Timestamp("2024-02-29 23:59:00") + pd.to_timedelta(table["time"], "s")).dt.strftime("%H:%M:%S.%f")
+    table["time"] = (pd.Timestamp("2024-02-29 23:59:00") + pd.to_timedelta(table["time"], "s")).dt.strftime(
+        "%H:%M:%S.%f"
+    )
     header, rows = table.to_csv(index=False).split("\n", 1)
-    result = trial_import(f"{header}\n{rows.replace(chr(10), f',{chr(10)}')}", mapping(time='column = "time"\nformat = "%H:%M:%S.%f"'))
+    result = trial_import(
+        f"{header}\n{rows.replace(chr(10), f',{chr(10)}')}", mapping(time='column = "time"\nformat = "%H:%M:%S.%f"')
+    )
     assert result.exit_code == 0, result.output
     run = load_dataset("out").runs[0]
     assert run.meta["from"] == 86_340.0
@@ -275,7 +303,8 @@ delta_c = { column = "order", unit = "deg", sign = "port", gap = inf }
 
 
 def instruments(folder, end=150.0):
-    """GPS at 1 Hz with an antenna ahead of midship, gyro at 10 Hz, rudder orders logged on change with a clock half a second fast."""
+    """GPS at 1 Hz with an antenna ahead of midship, gyro at 10 Hz, rudder orders logged on change with a clock half a
+    second fast."""
     start = pd.Timestamp("2024-05-04 10:00:00")
     epoch = start.timestamp()
     t = np.arange(0.0, end, 1.0) + 0.03 * np.sin(np.arange(0.0, end))
@@ -288,15 +317,19 @@ def instruments(folder, end=150.0):
     meridian = 6378137.0 * (1 - 0.00669438) / (1 - 0.00669438 * np.sin(lat0) ** 2) ** 1.5
     normal = 6378137.0 / np.sqrt(1 - 0.00669438 * np.sin(lat0) ** 2)
     gps = pd.DataFrame({
-        "utc": (start + pd.to_timedelta(t, "s")).strftime("%Y-%m-%dT%H:%M:%S.%fZ"), "lat": 52.0 + np.rad2deg(north / meridian),
-        "lon": 4.0 + np.rad2deg(east / normal / np.cos(lat0)), "SOG": np.hypot(vn, ve) * 3600 / 1852, "COG": np.rad2deg(np.arctan2(ve, vn)) % 360,
+        "utc": (start + pd.to_timedelta(t, "s")).strftime("%Y-%m-%dT%H:%M:%S.%fZ"),
+        "lat": 52.0 + np.rad2deg(north / meridian),
+        "lon": 4.0 + np.rad2deg(east / normal / np.cos(lat0)), "SOG": np.hypot(vn, ve) * 3600 / 1852,
+        "COG": np.rad2deg(np.arctan2(ve, vn)) % 360,
     })  # fmt: skip
     t = np.arange(-3.0, end, 0.1)
     g = motion(t)
     gyro = pd.DataFrame({"t": epoch + t, "hdg": np.rad2deg(g["psi"]) % 360, "rot": -np.rad2deg(g["r"])})
     t = np.arange(0.0, end, 20.0)
     orders = pd.DataFrame({"t": epoch + t + 0.5, "order": -np.rad2deg(motion(t)["delta_c"])})
-    return [write(folder, name, table) for name, table in (("gps1.csv", gps), ("gyro.csv", gyro), ("orders.csv", orders))]
+    return [
+        write(folder, name, table) for name, table in (("gps1.csv", gps), ("gyro.csv", gyro), ("orders.csv", orders))
+    ]
 
 
 def test_gps_gyro_and_rudder_at_their_own_rates_are_merged_on_time(trial_import, tmp_path):
@@ -310,7 +343,10 @@ def test_gps_gyro_and_rudder_at_their_own_rates_are_merged_on_time(trial_import,
     # Position is relative to where the antenna was first, which is where the plane touches the earth.
     first = motion(at[:1])
     moved = np.array(
-        [first["x"] + 12 * np.cos(first["psi"]) + 1.5 * np.sin(first["psi"]), first["y"] + 12 * np.sin(first["psi"]) - 1.5 * np.cos(first["psi"])]
+        [
+            first["x"] + 12 * np.cos(first["psi"]) + 1.5 * np.sin(first["psi"]),
+            first["y"] + 12 * np.sin(first["psi"]) - 1.5 * np.cos(first["psi"]),
+        ]
     )
     np.testing.assert_allclose(run.states[:, :2], np.column_stack([truth["x"], truth["y"]]) - moved.T, atol=0.1)
     check_motion(run, at, names=("psi", "r"))
@@ -331,7 +367,10 @@ def test_apparent_wind_becomes_true_wind(trial_import):
     ahead = wind * np.cos(come_from - s["psi"]) + s["u"]
     abeam = wind * np.sin(come_from - s["psi"]) + s["v"]
     table["AWS"], table["AWA"] = np.hypot(ahead, abeam), np.rad2deg(np.arctan2(abeam, ahead)) % 360
-    extra = {"apparent_wind_speed": '{ column = "AWS", unit = "m/s" }', "apparent_wind_from": '{ column = "AWA", unit = "deg" }'}
+    extra = {
+        "apparent_wind_speed": '{ column = "AWS", unit = "m/s" }',
+        "apparent_wind_from": '{ column = "AWA", unit = "deg" }',
+    }
     result = trial_import(table, mapping(body=channels(**extra)))
     assert result.exit_code == 0, result.output
     data = load_dataset("out")
@@ -387,7 +426,14 @@ def test_json_is_one_document_and_quiet_is_quiet(trial_import):
     result = trial_import(logged(T), None, "--json", "-q")
     document = json.loads(result.stdout)
     assert result.stderr == ""
-    assert document["runs"][0] == {"id": "log", "seconds": 120.0, "samples": 121, "file": "log.csv", "from": 0.0, "to": 120.0}
+    assert document["runs"][0] == {
+        "id": "log",
+        "seconds": 120.0,
+        "samples": 121,
+        "file": "log.csv",
+        "from": 0.0,
+        "to": 120.0,
+    }
     assert document["table"] == "trajectories.csv"
     quiet = trial_import(logged(T), None, "-q", "--force")
     assert quiet.stderr == ""

@@ -40,13 +40,17 @@ def test_antenna_is_moved_to_midship_and_its_velocity_with_it():
     y_p = s["y"] + 12.0 * np.sin(s["psi"]) - 3.0 * np.cos(s["psi"])
     x, y = to_midship(x_p, y_p, s["psi"], (12.0, -3.0))
     np.testing.assert_allclose([x, y], [s["x"], s["y"]], atol=1e-9)
-    body = to_body(np.gradient(x_p, t), np.gradient(y_p, t), s["psi"])  # fine, noise-free samples: differences serve as the reference
+    body = to_body(
+        np.gradient(x_p, t), np.gradient(y_p, t), s["psi"]
+    )  # fine, noise-free samples: differences serve as the reference
     u, v = velocity_at_midship(*body, s["r"], (12.0, -3.0))
     np.testing.assert_allclose([u[5:-5], v[5:-5]], [s["u"][5:-5], s["v"][5:-5]], atol=1e-4)
 
 
 def test_wind_felt_on_a_ship_that_makes_way_in_calm_air_is_no_wind():
-    north, east = true_wind(np.array([1.0]), np.array([5.0]), np.array([0.0]), np.array([5.0]), np.array([0.0]), "apparent")
+    north, east = true_wind(
+        np.array([1.0]), np.array([5.0]), np.array([0.0]), np.array([5.0]), np.array([0.0]), "apparent"
+    )
     np.testing.assert_allclose([north, east], 0.0, atol=1e-12)
 
 
@@ -129,9 +133,14 @@ def test_speeds_from_an_exact_track_and_from_next_to_nothing():
     t = np.arange(0.0, 100.0, 0.5)
     s = motion(t)
     found = derivative(t, np.column_stack([s["x"], s["y"]]), t, 1.0, 2.0)
-    north, east = s["u"] * np.cos(s["psi"]) - s["v"] * np.sin(s["psi"]), s["u"] * np.sin(s["psi"]) + s["v"] * np.cos(s["psi"])
+    north, east = (
+        s["u"] * np.cos(s["psi"]) - s["v"] * np.sin(s["psi"]),
+        s["u"] * np.sin(s["psi"]) + s["v"] * np.cos(s["psi"]),
+    )
     truth = np.column_stack([north, east])
-    np.testing.assert_allclose(found.rate, truth, atol=0.1)  # of 4 m/s, in the middle of a hard turn that the log cuts into
+    np.testing.assert_allclose(
+        found.rate, truth, atol=0.1
+    )  # of 4 m/s, in the middle of a hard turn that the log cuts into
     np.testing.assert_allclose(found.rate[20:-20], truth[20:-20], atol=0.02)
     few = derivative(t[:3], s["x"][:3, None], t[:3], 1.0, 2.0)
     np.testing.assert_allclose(few.rate[:, 0], north[1], atol=0.02)
@@ -150,7 +159,8 @@ def test_stretches_of_two_rates_do_not_depend_on_the_blocks(size):
     found = Stretches(feeds, {"x": 3.0, "psi": 1.0}, frozenset(), 100.0, 1.0, 10.0)
     spans = [(round(s.start, 6), round(s.end, 6), s.part, s.last) for s in found]
     assert spans == [
-        (2.05, 99.0, 0, True), (130.0, 230.0, 0, False), (231.0, 301.95, 1, True), (312.05, 412.05, 0, False), (413.05, 479.95, 1, True),
+        (2.05, 99.0, 0, True), (130.0, 230.0, 0, False), (231.0, 301.95, 1, True), (312.05, 412.05, 0, False),
+        (413.05, 479.95, 1, True),
     ]  # fmt: skip
     assert [(round(c.start, 6), round(c.end, 6), c.channels) for c in found.cuts] == [
         (0.0, 2.05, ("psi",)), (99.0, 130.0, ("x",)), (301.95, 312.05, ("psi",)), (479.95, 499.0, ("psi",)),
@@ -176,6 +186,9 @@ def test_a_dense_stream_comes_in_parts_that_fit_into_memory(monkeypatch):
 @pytest.mark.parametrize("split", ["3", "[1]", '"x"'])
 def test_a_split_that_is_no_table_is_refused_also_with_a_window_of_the_command(tmp_path, split):
     path = tmp_path / "mapping.toml"
-    path.write_text(f'name = "t"\ndt = 1.0\nsplit = {split}\ntime = {{ column = "t" }}\nchannels.psi = {{ column = "psi", unit = "rad" }}\n')
+    path.write_text(
+        f'name = "t"\ndt = 1.0\nsplit = {split}\ntime = {{ column = "t" }}\n'
+        'channels.psi = { column = "psi", unit = "rad" }\n'
+    )
     with pytest.raises(InputError, match="split"):
         load_mapping(path, window=30.0)

@@ -1,4 +1,5 @@
-"""MATLAB 7.3 files, written in MATLAB's layout (HDF5 behind 512 bytes, arrays transposed, the class of each as an attribute)."""
+"""MATLAB 7.3 files, written in MATLAB's layout (HDF5 behind 512 bytes, arrays transposed, the class of each as an
+attribute)."""
 
 from __future__ import annotations
 
@@ -25,7 +26,9 @@ for theirs, matlab in NAMES.items():
 
 def put(group, name: str, values: np.ndarray, kind: bytes = b"double", **options) -> None:
     """A MATLAB array: its transpose, with its class."""
-    group.create_dataset(name, data=np.atleast_2d(values).T if values.ndim > 1 else values, **options).attrs["MATLAB_class"] = np.bytes_(kind)
+    group.create_dataset(name, data=np.atleast_2d(values).T if values.ndim > 1 else values, **options).attrs[
+        "MATLAB_class"
+    ] = np.bytes_(kind)
 
 
 def write_mat(path, table: pd.DataFrame, stamps: list[str] | None = None, **options) -> None:
@@ -42,7 +45,12 @@ def write_mat(path, table: pd.DataFrame, stamps: list[str] | None = None, **opti
         file["log/again"] = file["log"]  # a group in itself
         file.create_dataset("cells", data=np.array([file["time"].ref, file["track"].ref], dtype=h5py.ref_dtype))
     with path.open("r+b") as raw:
-        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Tue Mar 05 13:59:00 2024 HDF5 schema 1.00 .".ljust(124) + b"\x00\x02IM")
+        raw.write(
+            b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Tue Mar 05 13:59:00 2024 HDF5 schema 1.00 .".ljust(
+                124
+            )
+            + b"\x00\x02IM"
+        )
 
 
 @pytest.mark.parametrize("options", [{}, {"chunks": True, "compression": "gzip"}])

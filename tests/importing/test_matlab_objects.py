@@ -13,7 +13,10 @@ from trial import channels, logged, mapping
 from shipbench.data.base import load_dataset
 
 T = np.arange(0.0, 60.05, 0.5)
-PLAN = mapping(time='column = "T.time"', body=channels().replace('column = "', 'column = "T.').replace("rudder order", "rudder_order"))
+PLAN = mapping(
+    time='column = "T.time"',
+    body=channels().replace('column = "', 'column = "T.').replace("rudder order", "rudder_order"),
+)
 
 
 @pytest.fixture
@@ -59,7 +62,10 @@ def test_an_object_that_is_not_read_says_how_to_save_it(trial_import, tmp_path):
         raw.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
     refused = trial_import([path], PLAN)
     assert refused.exit_code == 2
-    assert "holds objects of MATLAB (T) that are not read. Save it in MATLAB with writetable(T, 'log.csv')" in refused.stderr
+    assert (
+        "holds objects of MATLAB (T) that are not read. Save it in MATLAB with writetable(T, 'log.csv')"
+        in refused.stderr
+    )
 
 
 @pytest.mark.parametrize("chunks", [(1, 1000), None])

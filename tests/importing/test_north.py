@@ -1,4 +1,5 @@
-"""A heading that was interpolated linearly across 360/0 is found in a log and left out; a ship that turns a circle is not."""
+"""A heading that was interpolated linearly across 360/0 is found in a log and left out; a ship that turns a circle is
+not."""
 
 from __future__ import annotations
 
@@ -43,16 +44,28 @@ def test_degrees_are_read_by_their_own_turn():
 
 @pytest.mark.parametrize("rate", [0.01, 0.06, 0.3])
 def test_a_turning_circle_is_none(rate):
-    turning = np.cumsum(np.concatenate([np.zeros(100), np.linspace(0.0, rate, 8), np.full(round(2.0 * np.pi / rate) - 4, rate), np.zeros(100)]))
+    turning = np.cumsum(
+        np.concatenate(
+            [np.zeros(100), np.linspace(0.0, rate, 8), np.full(round(2.0 * np.pi / rate) - 4, rate), np.zeros(100)]
+        )
+    )
     noise = 1e-3 * np.random.default_rng(2).standard_normal(len(turning))
     assert interpolated(np.remainder(turning + 1.0 + noise, 2.0 * np.pi)) == []
 
 
 @pytest.mark.parametrize("rate", [0.0087, 0.026, 0.05])
 def test_a_long_turn_in_a_record_that_is_mostly_straight_is_none(rate):
-    """A research vessel turned circles at 3 deg/s; most of her record was straight, and 230 good headings were replaced by a straight line."""
+    """A research vessel turned circles at 3 deg/s; most of her record was straight, and 230 good headings were replaced
+    by a straight line."""
     rng = np.random.default_rng(4)
-    turning = np.concatenate([np.full(1500, 1e-4), np.linspace(0.0, rate, 12), np.full(round(3.2 * 2.0 * np.pi / rate), rate), np.full(900, 1e-4)])
+    turning = np.concatenate(
+        [
+            np.full(1500, 1e-4),
+            np.linspace(0.0, rate, 12),
+            np.full(round(3.2 * 2.0 * np.pi / rate), rate),
+            np.full(900, 1e-4),
+        ]
+    )
     steps = turning * (1.0 + 0.03 * rng.standard_normal(len(turning)))
     assert interpolated(np.remainder(np.cumsum(steps) + 0.2, 2.0 * np.pi)) == []
     assert interpolated(np.remainder(np.cumsum(turning) + 0.2, 2.0 * np.pi)) == []  # at one rate, to the last digit

@@ -1,4 +1,5 @@
-"""Rows out of order, ships that share a log, and clocks that were set: sorted, split or refused, never joined wrongly."""
+"""Rows out of order, ships that share a log, and clocks that were set: sorted, split or refused, never joined
+wrongly."""
 
 from __future__ import annotations
 
@@ -73,7 +74,8 @@ def test_time_that_goes_back_is_refused_with_what_may_be_set(trial_import):
 @pytest.mark.parametrize("how", ["drop", "sort"])
 def test_late_rows_are_no_clock_that_was_set_back(trial_import, how, kind, noise):
     order = {
-        "one row": np.r_[:50, 51:54, 50, 54:361], "a burst": np.r_[:50, 53:56, 50:53, 56:361], "sent again": np.r_[:60, 50:361],
+        "one row": np.r_[:50, 51:54, 50, 54:361], "a burst": np.r_[:50, 53:56, 50:53, 56:361],
+        "sent again": np.r_[:60, 50:361],
         "shuffled": np.r_[:20, 20 + np.argsort(np.arange(341) + np.random.default_rng(0).uniform(0, 4, 341))],
     }[kind]  # fmt: skip
     table = log_with_clock(T, T, noise).iloc[order]
@@ -140,7 +142,9 @@ def test_a_clock_that_steps_ahead_in_a_pause_is_joined_nowhere(trial_import, ahe
 @pytest.mark.parametrize("back", [2.0, 4.0])
 def test_a_clock_that_was_set_back_within_a_pause_is_found(trial_import, back):
     true = np.r_[np.arange(0.0, 90.5), np.arange(96.0, 181.0)]
-    result = trial_import(log_with_clock(np.where(true > 90.0, true - back, true), true), mapping(tables="[split]\ngap = 5.0"))
+    result = trial_import(
+        log_with_clock(np.where(true > 90.0, true - back, true), true), mapping(tables="[split]\ngap = 5.0")
+    )
     assert len(load_dataset("out").runs) == 2, result.stdout
     assert "stepped back by about" in result.stdout
 
@@ -160,7 +164,8 @@ def test_a_plain_pause_stays_one(trial_import, pause, at, rate, noise):
 @pytest.mark.parametrize("correlation", [0.0, 20.0])
 @pytest.mark.parametrize("kind", ["lost rows", "reports"])
 def test_thousands_of_plain_pauses_are_no_steps(kind, correlation, speeds):
-    """Positions with errors of 2 m, white or lasting for 20 s, at rows that are lost by chance, or at intervals as of AIS reports."""
+    """Positions with errors of 2 m, white or lasting for 20 s, at rows that are lost by chance, or at intervals as of
+    AIS reports."""
     rng = np.random.default_rng(0)
     t = np.arange(4000.0)
     t = t[rng.uniform(size=len(t)) > 0.3] if kind == "lost rows" else np.cumsum(rng.choice([2.0, 3.0, 6.0, 10.0], 800))
@@ -170,7 +175,9 @@ def test_thousands_of_plain_pauses_are_no_steps(kind, correlation, speeds):
         error[k] = keep * error[k - 1] + np.sqrt(1.0 - keep**2) * error[k]
     names = ("x", "y", "psi", *(("u", "v") if speeds else ()))
     values = np.column_stack([s["x"] + error[:, 0], s["y"] + error[:, 1], *(s[name] for name in names[2:])])
-    channels_of = {name: {"column": name, "unit": {"psi": "rad", "u": "m/s", "v": "m/s"}.get(name, "m")} for name in names}
+    channels_of = {
+        name: {"column": name, "unit": {"psi": "rad", "u": "m/s", "v": "m/s"}.get(name, "m")} for name in names
+    }
     source = Source.model_validate({"time": {"column": "t"}, "channels": channels_of})
     met = Counts()
     assert sum(len(b.t) for b in steps_marked([Block(t, values)], source, 60.0, met)) == len(t)
@@ -206,7 +213,9 @@ def fleet(ships: int, rows: int = 120) -> pd.DataFrame:
     """Ships on courses of their own, their rows interleaved."""
     tables = []
     for k in range(ships):
-        tables.append(logged(np.arange(rows) + 0.1 * k).assign(mmsi=244_000_000 + k, north=lambda d, k=k: d["north"] + 500.0 * k))
+        tables.append(
+            logged(np.arange(rows) + 0.1 * k).assign(mmsi=244_000_000 + k, north=lambda d, k=k: d["north"] + 500.0 * k)
+        )
     return pd.concat(tables).sort_values("time", kind="stable")
 
 
@@ -247,7 +256,9 @@ dt = 1.0
 [sources.gps]
 files = "gps.csv"
 time = { column = "time", backwards = "drop" }
-channels = { x = { column = "north", unit = "m" }, y = { column = "east", unit = "m" }, psi = { column = "HDG", unit = "deg" } }
+channels.x = { column = "north", unit = "m" }
+channels.y = { column = "east", unit = "m" }
+channels.psi = { column = "HDG", unit = "deg" }
 [sources.bridge]
 files = "bridge.csv"
 time = { column = "time" }

@@ -54,16 +54,30 @@ COLUMN = '{{ column = "{}", unit = "{}"{} }}'
         (lambda a: [f"{-v:.8f} S" for v in a], lambda o: [f"W{-v:.8f}" for v in o], "deg"),
         (lambda a: [f"{v + 'S'}" for v in nmea(a, 2)], lambda o: [f"{v}W" for v in nmea(o, 3)], "ddmm.mmmmN"),
         (lambda a: [f"-{v}" for v in nmea(a, 2)], lambda o: [f"-{v}" for v in nmea(o, 3)], "ddmm.mmmm"),
-        (lambda a: [f"{int(-v)}°{(-v % 1) * 60:.6f}'S" for v in a], lambda o: [f"{int(-v)}° {(-v % 1) * 60:.6f}' W" for v in o], "deg"),
-        (lambda a: [f"S {int(-v)} {(-v % 1) * 60:.6f}" for v in a], lambda o: [f"{int(-v)} {(-v % 1) * 60:.6f} W" for v in o], "deg"),
+        (
+            lambda a: [f"{int(-v)}°{(-v % 1) * 60:.6f}'S" for v in a],
+            lambda o: [f"{int(-v)}° {(-v % 1) * 60:.6f}' W" for v in o],
+            "deg",
+        ),
+        (
+            lambda a: [f"S {int(-v)} {(-v % 1) * 60:.6f}" for v in a],
+            lambda o: [f"{int(-v)} {(-v % 1) * 60:.6f} W" for v in o],
+            "deg",
+        ),
         (lambda a: [seconds(v) + '"S' for v in a], lambda o: [seconds(v) + "W" for v in o], "deg"),
         (lambda a: np.round(a * 1e7).astype(int), lambda o: np.round(o * 1e7).astype(int), "1e-7 deg"),
-        (lambda a: [f"{v:.8f}S" for v in a], lambda o: [f"{v:.8f}W" for v in o], "deg"),  # minus and letter say the same
+        (
+            lambda a: [f"{v:.8f}S" for v in a],
+            lambda o: [f"{v:.8f}W" for v in o],
+            "deg",
+        ),  # minus and letter say the same
     ],
 )
 def test_positions_in_a_cell(trial_import, lat, lon, unit):
     a, o = track()
-    result = trial_import(log(lat=lat(a), lon=lon(o)), plan(COLUMN.format("lat", unit, ""), COLUMN.format("lon", unit, "")))
+    result = trial_import(
+        log(lat=lat(a), lon=lon(o)), plan(COLUMN.format("lat", unit, ""), COLUMN.format("lon", unit, ""))
+    )
     np.testing.assert_allclose(end_of_track(result), TRUTH, atol=0.5)
 
 
@@ -71,7 +85,10 @@ def test_positions_in_a_cell(trial_import, lat, lon, unit):
 def test_letters_in_columns_of_their_own(trial_import, letters):
     a, o = track()
     table = log(lat=nmea(a, 2), ns=letters[0], lon=nmea(o, 3), ew=letters[1])
-    told = plan(COLUMN.format("lat", "ddmm.mmmm", ', hemisphere = "ns"'), COLUMN.format("lon", "ddmm.mmmm", ', hemisphere = "ew"'))
+    told = plan(
+        COLUMN.format("lat", "ddmm.mmmm", ', hemisphere = "ns"'),
+        COLUMN.format("lon", "ddmm.mmmm", ', hemisphere = "ew"'),
+    )
     np.testing.assert_allclose(end_of_track(trial_import(table, told)), TRUTH, atol=0.5)
 
 
@@ -82,14 +99,29 @@ def test_letters_that_are_not_read_are_refused_with_the_line_that_reads_them(tri
     assert refused.exit_code == 2
     assert "column 'N/S' says S" in refused.stderr
     assert 'lat = { column = "lat", unit = "deg", hemisphere = "N/S" }' in refused.stderr
-    kept = trial_import(table, plan(COLUMN.format("lat", "deg", ', sign = "north"'), COLUMN.format("lon", "deg", ', sign = "east"')))
+    kept = trial_import(
+        table, plan(COLUMN.format("lat", "deg", ', sign = "north"'), COLUMN.format("lon", "deg", ', sign = "east"'))
+    )
     assert kept.exit_code == 0, kept.output
     signed = log(lat=a, lon=o, **{"N/S": "S", "E/W": "W"})
-    assert trial_import(signed, plan(COLUMN.format("lat", "deg", ""), COLUMN.format("lon", "deg", "")), "--force").exit_code == 0
+    assert (
+        trial_import(
+            signed, plan(COLUMN.format("lat", "deg", ""), COLUMN.format("lon", "deg", "")), "--force"
+        ).exit_code
+        == 0
+    )
 
 
 @pytest.mark.parametrize(
-    "form", ["{:.8f} {:.8f}", "({:.8f}, {:.8f})", "{:.8f};{:.8f}", "POINT ({1:.8f} {0:.8f})", "S {2:.8f} W {3:.8f}", "{2:.8f} S, {3:.8f} W"]
+    "form",
+    [
+        "{:.8f} {:.8f}",
+        "({:.8f}, {:.8f})",
+        "{:.8f};{:.8f}",
+        "POINT ({1:.8f} {0:.8f})",
+        "S {2:.8f} W {3:.8f}",
+        "{2:.8f} S, {3:.8f} W",
+    ],
 )
 def test_both_in_one_cell(trial_import, form):
     table = log(GPS=[form.format(a, o, -a, -o) for a, o in zip(*track(), strict=True)])
@@ -116,7 +148,11 @@ def test_both_in_one_cell_without_part_says_part(trial_import):
         ("-52.0N", COLUMN.format("lat", "deg", ""), "contradicts the letter N"),
         ("5215.50", COLUMN.format("lat", "ddmm.mmmmN", ""), "needs a letter"),
         ("52.0S", COLUMN.format("lat", "deg", ', sign = "south"'), "Remove sign"),
-        ("52.0", COLUMN.format("lat", "deg", ', hemisphere = "rpm"'), "names the hemisphere 110.0; accepted for lat: N and S"),
+        (
+            "52.0",
+            COLUMN.format("lat", "deg", ', hemisphere = "rpm"'),
+            "names the hemisphere 110.0; accepted for lat: N and S",
+        ),
         ("52.0S", COLUMN.format("lat", "deg", ', hemisphere = "ns"'), "Remove hemisphere"),
         ("52.0", COLUMN.format("lat", "deg", ', hemisphere = "ns", sign = "south"'), "Remove sign"),
     ],

@@ -35,28 +35,42 @@ def columns(text: str) -> dict[str, tuple[str, str]]:
 
 def test_the_draft_of_a_clear_log_imports_as_it_is(propose, tmp_path):
     table = logged(np.arange(0.0, 60.0, 0.5)).rename(columns={
-        "surge": "u_velo [kn]", "sway": "vm_velo [m/s]", "HDG": "HDG (deg)", "ROT": "ROT [deg/min]", "rpm": "shaft speed [rpm]",
+        "surge": "u_velo [kn]", "sway": "vm_velo [m/s]", "HDG": "HDG (deg)", "ROT": "ROT [deg/min]",
+        "rpm": "shaft speed [rpm]",
         "rudder": "Rudder Angle [°]", "rudder order": "rudder_cmd [deg]", "time": "t [s]",
     }).assign(remark="calm")  # fmt: skip
     result = propose(write(tmp_path, "log.csv", table))
     assert result.exit_code == 0, result.output
     text = (tmp_path / "draft.toml").read_text()
     assert columns(text) == {
-        "x": ("north", "m"), "y": ("east", "m"), "psi": ("HDG (deg)", "deg"), "u": ("u_velo [kn]", "kn"), "v": ("vm_velo [m/s]", "m/s"),
+        "x": ("north", "m"), "y": ("east", "m"), "psi": ("HDG (deg)", "deg"), "u": ("u_velo [kn]", "kn"),
+        "v": ("vm_velo [m/s]", "m/s"),
         "r": ("ROT [deg/min]", "deg/min"), "n": ("shaft speed [rpm]", "rpm"), "delta": ("Rudder Angle [°]", "deg"),
         "delta_c": ("rudder_cmd [deg]", "deg"),
     }  # fmt: skip
     for line in re.findall(r"(?m)^\w+ = \{.*$", text):
         assert "# GUESS" in line
     assert "1 column was not taken: remark" in result.stdout
-    done = CliRunner().invoke(app, ["data", "import", "log.csv", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"])
+    done = CliRunner().invoke(
+        app, ["data", "import", "log.csv", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"]
+    )
     assert done.exit_code == 0, done.output
     assert len(load_dataset("out")) == 1
 
 
-@pytest.mark.parametrize("name", ["Rudder angle [deg] (port +)", "Rudder [deg], + = PS", "rudder (deg) positive to port", "rudder_deg_port_positive"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Rudder angle [deg] (port +)",
+        "Rudder [deg], + = PS",
+        "rudder (deg) positive to port",
+        "rudder_deg_port_positive",
+    ],
+)
 def test_a_rudder_that_is_positive_to_port_by_its_name_is_drafted_so(propose, tmp_path, name):
-    table = logged(np.arange(0.0, 60.0, 0.5)).rename(columns={"rudder": name, "rudder order": "rudder order, starboard + [deg]"})
+    table = logged(np.arange(0.0, 60.0, 0.5)).rename(
+        columns={"rudder": name, "rudder order": "rudder order, starboard + [deg]"}
+    )
     assert propose(write(tmp_path, "log.csv", table)).exit_code == 0
     channels = tomllib.loads((tmp_path / "draft.toml").read_text())["channels"]
     assert channels["delta"]["column"] == name
@@ -125,7 +139,9 @@ def test_vectors_of_several_lengths_in_one_matlab_file_are_instruments(propose, 
     assert propose(tmp_path / "log.mat").exit_code == 0
     sources = tomllib.loads((tmp_path / "draft.toml").read_text())["sources"].values()
     assert [set(source["channels"]) for source in sources] == [{"lat", "lon"}, {"psi"}]
-    done = CliRunner().invoke(app, ["data", "import", "log.mat", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"])
+    done = CliRunner().invoke(
+        app, ["data", "import", "log.mat", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"]
+    )
     assert done.exit_code == 0, done.output
     assert load_dataset("out").runs[0].t[-1] == pytest.approx(59.0)
 
@@ -139,7 +155,9 @@ def test_decimal_commas_and_german_dates_are_seen(propose, tmp_path):
     plan = tomllib.loads((tmp_path / "draft.toml").read_text())
     assert plan["file"]["decimal"] == ","
     assert plan["time"]["format"] == "%d.%m.%Y %H:%M:%S"
-    done = CliRunner().invoke(app, ["data", "import", "log.csv", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"])
+    done = CliRunner().invoke(
+        app, ["data", "import", "log.csv", "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"]
+    )
     assert done.exit_code == 0, done.output
 
 
@@ -174,20 +192,34 @@ def test_the_mapping_in_the_docs_imports_a_log(tmp_path, monkeypatch):
     write(tmp_path, "ship.toml", SHIP)
     t = np.arange(0.0, 700.0)
     stamps = (pd.Timestamp("2024-05-04") + pd.to_timedelta(t, "s")).strftime("%Y-%m-%d %H:%M:%S")
-    table = pd.DataFrame({"UTC": stamps, "Latitude": 52 + 4e-5 * t, "Longitude": 4.0, "HDG": 0.0, "shaft [rpm]": 90.0, "rudder": 5.0})
+    table = pd.DataFrame(
+        {"UTC": stamps, "Latitude": 52 + 4e-5 * t, "Longitude": 4.0, "HDG": 0.0, "shaft [rpm]": 90.0, "rudder": 5.0}
+    )
     table.to_csv("bridge.csv", index=False)
-    done = CliRunner().invoke(app, ["data", "import", "bridge.csv", "--map", "mapping.toml", "--ship", "ship.toml", "--out", "my_trial"])
+    done = CliRunner().invoke(
+        app, ["data", "import", "bridge.csv", "--map", "mapping.toml", "--ship", "ship.toml", "--out", "my_trial"]
+    )
     assert done.exit_code == 0, done.output
     data = load_dataset("my_trial")
     assert [len(run) for run in data.runs] == [301, 301]
-    np.testing.assert_allclose(data.runs[0].states[:, 3], 4e-5 * 111_270, rtol=1e-3)  # a degree of latitude at 52 north is 111.27 km
+    np.testing.assert_allclose(
+        data.runs[0].states[:, 3], 4e-5 * 111_270, rtol=1e-3
+    )  # a degree of latitude at 52 north is 111.27 km
     np.testing.assert_allclose(data.runs[0].states[:, 7], -np.deg2rad(5.0), rtol=1e-9)
 
 
 def test_the_columns_of_the_readme_are_taken_and_clearance_is_no_depth(propose, tmp_path):
-    """A rudder of 5 without a unit is no angle in radians, and what is below the keel is less than the depth by the draught."""
+    """A rudder of 5 without a unit is no angle in radians, and what is below the keel is less than the depth by the
+    draught."""
     table = pd.DataFrame(
-        {"t": np.arange(40.0), "HDG": 10.0, "shaft [rpm]": 80.0, "shaft power [kW]": 900.0, "rudder": 5.0 * np.sin(np.arange(40.0)), "UKC [m]": 4.0}
+        {
+            "t": np.arange(40.0),
+            "HDG": 10.0,
+            "shaft [rpm]": 80.0,
+            "shaft power [kW]": 900.0,
+            "rudder": 5.0 * np.sin(np.arange(40.0)),
+            "UKC [m]": 4.0,
+        }
     )
     assert propose(write(tmp_path, "log.csv", table)).exit_code == 0
     channels = tomllib.loads(Path("draft.toml").read_text())["channels"]

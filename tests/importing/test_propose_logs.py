@@ -1,4 +1,5 @@
-"""Proposals for logs that leave something open: options, partial mappings, several runs and vessels, words among numbers, what cannot be known."""
+"""Proposals for logs that leave something open: options, partial mappings, several runs and vessels, words among
+numbers, what cannot be known."""
 
 from __future__ import annotations
 
@@ -27,7 +28,9 @@ def propose(tmp_path, monkeypatch):
     write(tmp_path, "ship.toml", SHIP)
 
     def run(*logs, options=()):
-        done = CliRunner().invoke(app, ["data", "import", *map(str, logs), "--propose", "draft.toml", "--force", *options])
+        done = CliRunner().invoke(
+            app, ["data", "import", *map(str, logs), "--propose", "draft.toml", "--force", *options]
+        )
         text = (tmp_path / "draft.toml").read_text() if done.exit_code == 0 else ""
         return done, text, tomllib.loads(text)
 
@@ -35,7 +38,10 @@ def propose(tmp_path, monkeypatch):
 
 
 def imported(*logs):
-    done = CliRunner().invoke(app, ["data", "import", *map(str, logs), "--map", "draft.toml", "--ship", "ship.toml", "--out", "out", "--force"])
+    done = CliRunner().invoke(
+        app,
+        ["data", "import", *map(str, logs), "--map", "draft.toml", "--ship", "ship.toml", "--out", "out", "--force"],
+    )
     assert done.exit_code == 0, done.output
     return load_dataset("out")
 
@@ -88,8 +94,10 @@ def test_quiet_leaves_out_the_notes_and_not_what_was_written(propose, tmp_path):
 
 def test_what_a_partial_mapping_says_is_kept_and_the_rest_is_drafted(propose, tmp_path):
     log = write(tmp_path, "log.csv", logged(T).rename(columns={"HDG": "A7", "rudder": "A8"}))
-    write(tmp_path, "part.toml", 'name = "mine"\nlicence = "ours"\n[split]\nwindow = 30.0\n[channels]\n'
-          'psi = { column = "A7", unit = "deg" }\ndelta = { column = "A8", unit = "deg", sign = "port" }\n')  # fmt: skip
+    write(tmp_path, "part.toml",
+          'name = "mine"\nlicence = "ours"\n[split]\nwindow = 30.0\n[channels]\n'
+          'psi = { column = "A7", unit = "deg" }\n'
+          'delta = { column = "A8", unit = "deg", sign = "port" }\n')  # fmt: skip
     _, text, plan = propose(log, options=["--map", "part.toml"])
     assert (plan["name"], plan["licence"], plan["split"]["window"]) == ("mine", "ours", 30.0)
     assert plan["channels"]["delta"] == {"column": "A8", "unit": "deg", "sign": "port"}
@@ -138,7 +146,10 @@ def test_a_column_of_runs(propose, tmp_path):
 
 def test_a_course_is_no_heading(propose, tmp_path):
     s = motion(T)
-    east, north = s["u"] * np.sin(s["psi"]) + s["v"] * np.cos(s["psi"]), s["u"] * np.cos(s["psi"]) - s["v"] * np.sin(s["psi"])
+    east, north = (
+        s["u"] * np.sin(s["psi"]) + s["v"] * np.cos(s["psi"]),
+        s["u"] * np.cos(s["psi"]) - s["v"] * np.sin(s["psi"]),
+    )
     table = pd.DataFrame({"t": T, "north": s["x"], "east": s["y"], "Kurs": np.rad2deg(np.arctan2(east, north)) % 360.0})
     done, _, plan = propose(write(tmp_path, "log.csv", table))
     assert "psi" not in plan["channels"]
@@ -175,7 +186,9 @@ def test_words_among_numbers_are_missing_readings(propose, tmp_path):
 
 def test_a_word_far_down_in_the_log_is_found_by_the_trial(propose, tmp_path):
     t = np.arange(0.0, 21_000.0)
-    table = pd.DataFrame({"t [s]": t, "north": t, "east": 0 * t, "heading [deg]": 0.0, "rpm": 90.0}).astype({"rpm": object})
+    table = pd.DataFrame({"t [s]": t, "north": t, "east": 0 * t, "heading [deg]": 0.0, "rpm": 90.0}).astype(
+        {"rpm": object}
+    )
     table.loc[20_500, "rpm"] = "out of range"
     done, _, plan = propose(write(tmp_path, "log.csv", table))
     assert plan["missing"] == ["out of range"]
@@ -198,7 +211,9 @@ def test_speed_through_the_water_is_not_taken(propose, tmp_path):
 
 
 def test_velocities_in_earth_axes_are_told(propose, tmp_path):
-    done, _, plan = propose(write(tmp_path, "log.csv", logged(T).rename(columns={"surge": "Vn [m/s]", "sway": "Ve [m/s]"})))
+    done, _, plan = propose(
+        write(tmp_path, "log.csv", logged(T).rename(columns={"surge": "Vn [m/s]", "sway": "Ve [m/s]"}))
+    )
     assert not {"u", "v"} & set(plan["channels"])
     assert "velocities in earth axes" in done.stdout
 
@@ -207,7 +222,9 @@ def test_stamps_without_a_zone_beside_moments_are_told(propose, tmp_path):
     t = 1.7e9 + T
     gps = pd.DataFrame({"unix": t, "north": T, "east": 0 * T, "heading": 0.0})
     local = (pd.to_datetime(t, unit="s") + pd.Timedelta("1h")).strftime("%d.%m.%Y %H:%M:%S")
-    done, _, _ = propose(write(tmp_path, "gps.csv", gps), write(tmp_path, "bridge.csv", pd.DataFrame({"Zeit": local, "Drehzahl": 90.0})))
+    done, _, _ = propose(
+        write(tmp_path, "gps.csv", gps), write(tmp_path, "bridge.csv", pd.DataFrame({"Zeit": local, "Drehzahl": 90.0}))
+    )
     assert "bridge.csv name no zone" in done.stdout
     assert "+1.00 h from the other" in " ".join(done.stdout.split())
 
@@ -221,7 +238,15 @@ def test_day_and_month_that_can_be_either_are_told(propose, tmp_path):
 
 
 def test_a_decimal_or_thousands_mark_that_cannot_be_told_is_told(propose, tmp_path):
-    table = pd.DataFrame({"t": T.astype(int), "north": (4 * T).astype(int), "east": 0, "heading": 10, "rpm": [f"1.{90 + int(k) % 3:03d}" for k in T]})
+    table = pd.DataFrame(
+        {
+            "t": T.astype(int),
+            "north": (4 * T).astype(int),
+            "east": 0,
+            "heading": 10,
+            "rpm": [f"1.{90 + int(k) % 3:03d}" for k in T],
+        }
+    )
     done, _, plan = propose(write(tmp_path, "log.csv", table))
     assert "decimal or a thousands mark" in done.stdout
     assert "thousands" not in plan.get("file", {})
@@ -230,7 +255,13 @@ def test_a_decimal_or_thousands_mark_that_cannot_be_told_is_told(propose, tmp_pa
 def test_thousands_are_seen_where_a_column_runs_over_1000(propose, tmp_path):
     n = 990.0 + T / 4
     table = pd.DataFrame(
-        {"t": T.astype(int), "north": (4 * T).astype(int), "east": 0, "heading": 10, "rpm": [f"{v:,.0f}".replace(",", ".") for v in n]}
+        {
+            "t": T.astype(int),
+            "north": (4 * T).astype(int),
+            "east": 0,
+            "heading": 10,
+            "rpm": [f"{v:,.0f}".replace(",", ".") for v in n],
+        }
     )
     log = write(tmp_path, "log.csv", table.to_csv(index=False, sep=";"))
     _, _, plan = propose(log)
@@ -238,14 +269,19 @@ def test_thousands_are_seen_where_a_column_runs_over_1000(propose, tmp_path):
     np.testing.assert_allclose(imported(log).runs[0].states[:, 6], np.round(n), atol=1.0)
 
 
-@pytest.mark.parametrize("order", [("north", "east", "HDG", "surge", "sway", "ROT", "rpm"), ("rpm", "ROT", "sway", "HDG", "east", "surge", "north")])
+@pytest.mark.parametrize(
+    "order",
+    [("north", "east", "HDG", "surge", "sway", "ROT", "rpm"), ("rpm", "ROT", "sway", "HDG", "east", "surge", "north")],
+)
 def test_columns_without_heads_are_known_by_the_motion(propose, tmp_path, order):
     """What does not take part in the motion, such as the shaft speed, stays with the reader."""
     t = np.arange(0.0, 240.0)
     log = write(tmp_path, "log.csv", logged(t)[["time", *order]].to_csv(index=False, header=False).encode())
     done, text, plan = propose(log)
     wanted = {"x": "north", "y": "east", "psi": "HDG", "u": "surge", "v": "sway", "r": "ROT"}
-    assert {c: e["column"] for c, e in plan["channels"].items()} == {c: str(order.index(name) + 2) for c, name in wanted.items()}
+    assert {c: e["column"] for c, e in plan["channels"].items()} == {
+        c: str(order.index(name) + 2) for c, name in wanted.items()
+    }
     assert "NOT SURE: the columns have no heads" in done.stdout
     assert f'column "{order.index("rpm") + 2}": first values 110' in text
     run = imported(log).runs[0]
@@ -254,7 +290,9 @@ def test_columns_without_heads_are_known_by_the_motion(propose, tmp_path, order)
 
 def test_columns_without_heads_are_not_guessed_where_the_ship_does_not_turn(propose, tmp_path):
     t = np.arange(0.0, 240.0)
-    table = pd.DataFrame({"t": t, "x": 4.0 * t, "y": 0.01 * np.sin(t), "psi": 0.01 * np.cos(t / 9), "r": -0.001 * np.sin(t / 9)})
+    table = pd.DataFrame(
+        {"t": t, "x": 4.0 * t, "y": 0.01 * np.sin(t), "psi": 0.01 * np.cos(t / 9), "r": -0.001 * np.sin(t / 9)}
+    )
     done, text, plan = propose(write(tmp_path, "log.csv", table.to_csv(index=False, header=False).encode()))
     assert not plan["channels"]
     assert "MISSING" in done.stdout
@@ -263,7 +301,11 @@ def test_columns_without_heads_are_not_guessed_where_the_ship_does_not_turn(prop
 
 def test_words_of_a_log_cannot_write_into_the_draft(propose, tmp_path):
     """A line break or an escape code in a head or a cell stays inside of its comment."""
-    table = logged(T).rename(columns={"HDG": "heading\nlicence = 'theirs'\x1b[2J"}).assign(**{"note\n[split]\ngap = 9": "calm\n[antenna]\nx = 1"})
+    table = (
+        logged(T)
+        .rename(columns={"HDG": "heading\nlicence = 'theirs'\x1b[2J"})
+        .assign(**{"note\n[split]\ngap = 9": "calm\n[antenna]\nx = 1"})
+    )
     table.to_parquet(tmp_path / "log.parquet")
     done, text, plan = propose("log.parquet")
     assert plan["channels"]["psi"]["column"] == "heading\nlicence = 'theirs'\x1b[2J"
@@ -277,7 +319,9 @@ def test_sources_of_a_partial_mapping_keep_their_names_and_patterns(propose, tmp
     table = logged(T)
     gps = write(tmp_path, "gps_1.csv", table[["time", "north", "east"]])
     bridge = write(tmp_path, "bridge.csv", table[["time", "HDG", "rpm", "rudder"]].rename(columns={"rudder": "A4"}))
-    write(tmp_path, "part.toml", '[sources.gnss]\nfiles = "gps*"\n[sources.other]\nfiles = "bridge*"\n[sources.other.channels]\n'
+    write(tmp_path, "part.toml",
+        '[sources.gnss]\nfiles = "gps*"\n[sources.other]\nfiles = "bridge*"\n'
+        '[sources.other.channels]\n'
           'delta = { column = "A4", unit = "deg", sign = "port" }\n')  # fmt: skip
     _, _, plan = propose(gps, bridge, options=["--map", "part.toml"])
     assert {name: source["files"] for name, source in plan["sources"].items()} == {"gnss": "gps*", "other": "bridge*"}
@@ -306,9 +350,13 @@ def test_json_is_one_document(propose, tmp_path):
 @pytest.mark.parametrize(
     ("body", "told"),
     [
-        ("channels = 3", "channels"), ("[channels]\npsi = 3", "psi"), ("file = 3", "file"), ("sources = 3", "sources"), ("time = 3", "time"),
-        ("split = 3", "split"), ("name = 3", "name"), ("dt = 'x'", "dt"), ("[file]\nheader = 'x'", "header"), ("[time]\ncolum = 't'", "'column'"),
-        ("[channels]\npsy = { column = 'HDG', unit = 'deg' }", "psy"), ("[channels]\npsi = { column = 'HDG', unit = 'grad' }", "grad"),
+        ("channels = 3", "channels"), ("[channels]\npsi = 3", "psi"), ("file = 3", "file"), ("sources = 3", "sources"),
+        ("time = 3", "time"),
+        ("split = 3", "split"), ("name = 3", "name"), ("dt = 'x'", "dt"), ("[file]\nheader = 'x'", "header"),
+        ("[time]\ncolum = 't'", "'column'"),
+        ("[channels]\npsy = { column = 'HDG', unit = 'deg' }", "psy"),
+        ("[channels]\npsi = { column = 'HDG', unit = "
+         "'grad' }", "grad"),
         ("x = ", "part.toml"),
     ],
 )  # fmt: skip

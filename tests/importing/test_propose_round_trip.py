@@ -1,4 +1,5 @@
-"""One simulated trial, written as loggers of several countries and kinds write it: the draft imports to the truth, without a word changed."""
+"""One simulated trial, written as loggers of several countries and kinds write it: the draft imports to the truth,
+without a word changed."""
 
 from __future__ import annotations
 
@@ -41,7 +42,8 @@ def log(time: object, names: dict[str, str], scale: dict[str, float] | None = No
     return pd.DataFrame(columns)
 
 
-PLAIN = {"t": "t [s]", "x": "x [m]", "y": "y [m]", "psi": "HDG [deg]", "u": "u [m/s]", "v": "v [m/s]", "r": "ROT [deg/min]", "n": "RPM",
+PLAIN = {"t": "t [s]", "x": "x [m]", "y": "y [m]", "psi": "HDG [deg]", "u": "u [m/s]", "v": "v [m/s]",
+    "r": "ROT [deg/min]", "n": "RPM",
          "delta": "rudder [deg]"}  # fmt: skip
 
 
@@ -73,8 +75,11 @@ def minutes(degrees: np.ndarray, digits: int) -> list[str]:
 
 
 def german() -> bytes:
-    table = log(T, {"t": "Zeit [s]", "x": "Hochwert [m]", "y": "Rechtswert [m]", "psi": "Kurs rechtweisend [°]", "u": "Längsgeschwindigkeit [Knoten]",
-                    "v": "Quergeschwindigkeit [Knoten]", "r": "Drehrate [°/min]", "n": "Drehzahl [U/min]", "delta": "Ruderlage [Grad]"},
+    table = log(T,
+        {"t": "Zeit [s]", "x": "Hochwert [m]", "y": "Rechtswert [m]", "psi": "Kurs rechtweisend [°]",
+            "u": "Längsgeschwindigkeit [Knoten]",
+                    "v": "Quergeschwindigkeit [Knoten]", "r": "Drehrate [°/min]", "n": "Drehzahl [U/min]",
+                    "delta": "Ruderlage [Grad]"},
                 {"u": KN, "v": KN})  # fmt: skip
     cells = table.map(lambda v: f"{v:,.3f}".translate(str.maketrans(",.", ".,")))
     return text(cells, sep=";", encoding="latin-1", before="Messfahrt;Schiff A;;;;;;;\n")
@@ -88,7 +93,10 @@ def thousands() -> bytes:
 def course(names: tuple[str, ...], encoding: str = "utf-8") -> bytes:
     """Speed and course over ground instead of u and v."""
     s = truth()
-    east, north = s["u"] * np.sin(s["psi"]) + s["v"] * np.cos(s["psi"]), s["u"] * np.cos(s["psi"]) - s["v"] * np.sin(s["psi"])
+    east, north = (
+        s["u"] * np.sin(s["psi"]) + s["v"] * np.cos(s["psi"]),
+        s["u"] * np.cos(s["psi"]) - s["v"] * np.sin(s["psi"]),
+    )
     t, x, y, psi, sog, cog, r, n, delta = names
     table = log(T, {"t": t, "x": x, "y": y, "psi": psi, "r": r, "n": n, "delta": delta})
     table[sog] = np.round(np.hypot(north, east) * KN, 4)
@@ -96,11 +104,14 @@ def course(names: tuple[str, ...], encoding: str = "utf-8") -> bytes:
     return text(table, sep=";", decimal=",", encoding=encoding)
 
 
-FRENCH = ("temps [s]", "nord [m]", "est [m]", "cap (°)", "vitesse fond (nœuds)", "route fond (°)", "taux de giration (°/min)", "régime [tr/min]",
+FRENCH = ("temps [s]", "nord [m]", "est [m]", "cap (°)", "vitesse fond (nœuds)", "route fond (°)",
+    "taux de giration (°/min)", "régime [tr/min]",
           "angle de barre (degrés)")  # fmt: skip
-SPANISH = ("tiempo (s)", "norte (m)", "este (m)", "rumbo (°)", "velocidad (nudos)", "rumbo sobre el fondo (grados)", "velocidad de giro (grados/min)",
+SPANISH = ("tiempo (s)", "norte (m)", "este (m)", "rumbo (°)", "velocidad (nudos)", "rumbo sobre el fondo (grados)",
+    "velocidad de giro (grados/min)",
            "revoluciones (rpm)", "timón (grados)")  # fmt: skip
-NORWEGIAN = ("tid [s]", "nord [m]", "øst [m]", "kurs [°]", "fart over grunn [knop]", "kurs over grunn [°]", "svinghastighet [°/min]",
+NORWEGIAN = ("tid [s]", "nord [m]", "øst [m]", "kurs [°]", "fart over grunn [knop]", "kurs over grunn [°]",
+    "svinghastighet [°/min]",
              "turtall [o/min]", "rorvinkel [grader]")  # fmt: skip
 
 
@@ -113,7 +124,13 @@ def seconds_and_nanoseconds() -> bytes:
 
 def fractions_left_out() -> bytes:
     t = np.arange(0.0, 240.0, 0.5)
-    return text(log([f"{s:%d.%m.%Y %H:%M:%S}" + (".5" if k % 2 else "") for k, s in enumerate(START + pd.to_timedelta(t, "s"))], PLAIN, t=t))
+    return text(
+        log(
+            [f"{s:%d.%m.%Y %H:%M:%S}" + (".5" if k % 2 else "") for k, s in enumerate(START + pd.to_timedelta(t, "s"))],
+            PLAIN,
+            t=t,
+        )
+    )
 
 
 def quaternion() -> bytes:
@@ -144,7 +161,8 @@ def preamble() -> bytes:
 
 def nameless_units() -> bytes:
     s = truth()
-    table = pd.DataFrame({"time": T, "north": s["x"], "east": s["y"], "heading": s["psi"], "u": s["u"], "v": s["v"], "r": s["r"] * DEG, "rpm": s["n"],
+    table = pd.DataFrame({"time": T, "north": s["x"], "east": s["y"], "heading": s["psi"], "u": s["u"], "v": s["v"],
+            "r": s["r"] * DEG, "rpm": s["n"],
                           "rudder": s["delta"] * DEG})  # fmt: skip
     return text(table.round(5))
 
@@ -152,7 +170,9 @@ def nameless_units() -> bytes:
 def mirrored() -> bytes:
     """A yaw rate that counts to port, without a word about it, and x to the east."""
     table = log(T, PLAIN)
-    return text(table.rename(columns={"x [m]": "y [m]", "y [m]": "x [m]"}).assign(**{"ROT [deg/min]": -table["ROT [deg/min]"]}))
+    return text(
+        table.rename(columns={"x [m]": "y [m]", "y [m]": "x [m]"}).assign(**{"ROT [deg/min]": -table["ROT [deg/min]"]})
+    )
 
 
 def from_east() -> bytes:
@@ -187,13 +207,15 @@ CSV: dict[str, Callable[[], bytes]] = {
         log(STAMPS.strftime("%H:%M:%S"), PLAIN | {"t": "Time"}).assign(Date=STAMPS.strftime("%d.%m.%Y"))
     ),
     "ddmm.mmmm with columns of hemispheres": lambda: placed(lat=minutes(LATS, 2), ns="S", lon=minutes(LONS, 3), ew="W"),
-    "degrees with letters in the cell": lambda: placed(lat=[f"{-v:.7f} S" for v in LATS], lon=[f"{-v:.7f} W" for v in LONS]),
+    "degrees with letters in the cell": lambda: placed(lat=[f"{-v:.7f} S" for v in LATS],
+        lon=[f"{-v:.7f} W" for v in LONS]),
     "1e-7 degrees": lambda: placed(lat=np.round(LATS * 1e7).astype(int), lon=np.round(LONS * 1e7).astype(int)),
     "both in one cell": lambda: placed(GPS=[f"{a:.7f}, {b:.7f}" for a, b in zip(LATS, LONS, strict=True)]),
     "west counted as positive": lambda: placed(Latitude=LATS, Longitude=-LONS),
     "quaternion": quaternion,
     "two shafts": two_shafts,
-    "centidegrees": lambda: text(log(T, PLAIN | {"psi": "hdg"}, {"psi": 100 * DEG}).assign(hdg=lambda d: d["hdg"].round().astype(int))),
+    "centidegrees": lambda: text(log(T, PLAIN | {"psi": "hdg"},
+            {"psi": 100 * DEG}).assign(hdg=lambda d: d["hdg"].round().astype(int))),
     "rudder in percent of 35 degrees": lambda: text(log(T, PLAIN | {"delta": "rudder [%]"}, {"delta": DEG / 0.35})),
     "runs of blanks": lambda: blanks(True),
     "preamble and row of units": preamble,
@@ -220,8 +242,16 @@ def with_commas_before_fractions() -> bytes:
 
 
 def ardupilot() -> bytes:
-    table = log((T * 1e6).astype(int), PLAIN | {"t": "TimeUS", "psi": "Yaw"}, {"psi": 100 * DEG}).drop(columns=["x [m]", "y [m]"])
-    return text(table.assign(Yaw=table["Yaw"].round().astype(int), Lat=np.round(LATS * 1e7).astype(int), Lng=np.round(LONS * 1e7).astype(int)))
+    table = log((T * 1e6).astype(int), PLAIN | {"t": "TimeUS", "psi": "Yaw"}, {"psi": 100 * DEG}).drop(
+        columns=["x [m]", "y [m]"]
+    )
+    return text(
+        table.assign(
+            Yaw=table["Yaw"].round().astype(int),
+            Lat=np.round(LATS * 1e7).astype(int),
+            Lng=np.round(LONS * 1e7).astype(int),
+        )
+    )
 
 
 def east_north_up() -> bytes:
@@ -243,19 +273,33 @@ def sexagesimal(degrees: np.ndarray, letter: str) -> list[str]:
     return [f"{int(-d)}°{(-d % 1) * 60:.5f}'{letter}" for d in degrees]
 
 
-GERMAN = ("Uhrzeit [s]", "Nord [m]", "Ost [m]", "Kreiselkurs [°]", "Fahrt über Grund [kn]", "Kurs über Grund [°]", "Wendegeschwindigkeit [°/min]",
+GERMAN = ("Uhrzeit [s]", "Nord [m]", "Ost [m]", "Kreiselkurs [°]", "Fahrt über Grund [kn]", "Kurs über Grund [°]",
+    "Wendegeschwindigkeit [°/min]",
           "Propellerdrehzahl [min-1]", "Ruderwinkel [°]")  # fmt: skip
-FRENCH_TOO = ("heure [s]", "x nord [m]", "y est [m]", "cap gyro [°]", "vitesse [nds]", "route [°]", "vitesse de lacet [°/min]",
+FRENCH_TOO = ("heure [s]", "x nord [m]", "y est [m]", "cap gyro [°]", "vitesse [nds]", "route [°]",
+    "vitesse de lacet [°/min]",
               "tours hélice [tr/min]", "safran [°]")  # fmt: skip
-SPANISH_TOO = ("hora [s]", "norte [m]", "este [m]", "proa [°]", "velocidad sobre fondo [nudos]", "rumbo sobre fondo [°]", "razón de giro [°/min]",
+SPANISH_TOO = ("hora [s]", "norte [m]", "este [m]", "proa [°]", "velocidad sobre fondo [nudos]",
+    "rumbo sobre fondo [°]", "razón de giro [°/min]",
                "régimen del motor [rpm]", "ángulo de pala [°]")  # fmt: skip
-NORWEGIAN_TOO = ("Tid [s]", "nord [m]", "aust [m]", "Heading [°]", "Fart [knop]", "Kurs [°]", "ROT [°/min]", "Turtall [rpm]", "Ror [°]")
+NORWEGIAN_TOO = (
+    "Tid [s]",
+    "nord [m]",
+    "aust [m]",
+    "Heading [°]",
+    "Fart [knop]",
+    "Kurs [°]",
+    "ROT [°/min]",
+    "Turtall [rpm]",
+    "Ror [°]",
+)
 CSV |= {
     "apostrophes": lambda: grouped("'", "."),
     "narrow blanks and decimal commas": lambda: grouped("\u202f", ","),
     "commas before fractions of a second": with_commas_before_fractions,
     "hhmmss over midnight": lambda: stamped([f"{s:%H%M%S}" for s in STAMPS + pd.Timedelta("14h")]),
-    "the date and time of NMEA": lambda: stamped([f"{s:%H%M%S}.00" for s in STAMPS], date=[f"{s:%d%m%y}" for s in STAMPS]),
+    "the date and time of NMEA": lambda: stamped([f"{s:%H%M%S}.00" for s in STAMPS],
+        date=[f"{s:%d%m%y}" for s in STAMPS]),
     "one number for date and time": lambda: stamped([f"{s:%Y%m%d%H%M%S}" for s in STAMPS], "timestamp"),
     "seconds and nanoseconds of ROS 2": lambda: stamped(
         [str(1_746_352_800 + int(t)) for t in T], "header.stamp.sec", **{"header.stamp.nanosec": 0}
@@ -265,15 +309,19 @@ CSV |= {
     "days of Excel": lambda: clocked([f"{45000.4 + t / 86400:.9f}" for t in T], "Datum Zeit"),
     "days of MATLAB": lambda: clocked([f"{739000.4 + t / 86400:.9f}" for t in T], "datenum"),
     "minutes and seconds": lambda: clocked([f"{int(t) // 60:02d}:{int(t) % 60:02d}.0" for t in T]),
-    "ddmm.mmmm with letters": lambda: placed(lat=[m + "S" for m in minutes(LATS, 2)], lon=[m + "W" for m in minutes(LONS, 3)]),
+    "ddmm.mmmm with letters": lambda: placed(lat=[m + "S" for m in minutes(LATS, 2)],
+        lon=[m + "W" for m in minutes(LONS, 3)]),
     "degrees and minutes with their marks": lambda: placed(lat=sexagesimal(LATS, "S"), lon=sexagesimal(LONS, "W")),
-    "longitude before latitude in one cell": lambda: placed(**{"lon/lat": [f"{b:.7f} {a:.7f}" for a, b in zip(LATS, LONS, strict=True)]}),
+    "longitude before latitude in one cell": lambda: placed(**{"lon/lat": [f"{b:.7f} {a:.7f}" for a,
+            b in zip(LATS, LONS, strict=True)]}),
     "points of WKT": lambda: placed(geom=[f"POINT ({b:.7f} {a:.7f})" for a, b in zip(LATS, LONS, strict=True)]),
-    "coordinates in radians, without a word": lambda: placed(lat=np.deg2rad(LATS).round(10), lon=np.deg2rad(LONS).round(10)),
+    "coordinates in radians, without a word": lambda: placed(lat=np.deg2rad(LATS).round(10),
+        lon=np.deg2rad(LONS).round(10)),
     "the integers of ArduPilot": ardupilot,
     "quaternion from east": east_north_up,
     "positions in one row of ten": renewed_each_second,
-    "UTM": lambda: text(log(T, {"t": "t", "psi": "HDG", "u": "u", "v": "v", "r": "ROT", "n": "RPM", "delta": "rudder"}).assign(
+    "UTM": lambda: text(log(T,
+            {"t": "t", "psi": "HDG", "u": "u", "v": "v", "r": "ROT", "n": "RPM", "delta": "rudder"}).assign(
         Northing=truth()["x"] + 5_760_000, Easting=truth()["y"] + 570_000)),
     "a mark of comment before the heads": lambda: b"# " + text(log(T, PLAIN)),
     "a footer": lambda: text(log(T, PLAIN)) + b"# end of log\n",
@@ -293,7 +341,9 @@ def there_and_back(tmp_path, monkeypatch):
         done = CliRunner().invoke(app, ["data", "import", name, "--propose", "draft.toml", *options])
         assert done.exit_code == 0, done.output
         assert "FAILS" not in done.output
-        back = CliRunner().invoke(app, ["data", "import", name, "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"])
+        back = CliRunner().invoke(
+            app, ["data", "import", name, "--map", "draft.toml", "--ship", "ship.toml", "--out", "out"]
+        )
         assert back.exit_code == 0, (tmp_path / "draft.toml").read_text() + back.output
         return load_dataset("out"), (tmp_path / "draft.toml").read_text()
 
@@ -345,18 +395,27 @@ def test_fields_of_a_matlab_struct(there_and_back, tmp_path):
     from scipy.io import savemat
 
     s = truth()
-    savemat(tmp_path / "log.mat", {"ship": {"time": T, "pos_n": s["x"], "pos_e": s["y"], "heading_deg": s["psi"] * DEG, "u": s["u"], "v": s["v"],
-                                            "r_deg_s": s["r"] * DEG, "shaft_rpm": s["n"], "rudder_angle_deg": s["delta"] * DEG}})  # fmt: skip
+    savemat(tmp_path / "log.mat",
+        {"ship": {"time": T, "pos_n": s["x"], "pos_e": s["y"], "heading_deg": s["psi"] * DEG, "u": s["u"], "v": s["v"],
+                                            "r_deg_s": s["r"] * DEG, "shaft_rpm": s["n"],
+                                            "rudder_angle_deg": s["delta"] * DEG}})  # fmt: skip
     check_truth(there_and_back("log.mat")[0].runs[0])
 
 
 def test_a_table_without_heads_with_a_partial_mapping(there_and_back, tmp_path):
     (tmp_path / "log.csv").write_bytes(blanks(False))
-    plan = {"x": ("2", "m"), "y": ("3", "m"), "psi": ("4", "deg"), "u": ("5", "m/s"), "v": ("6", "m/s"), "r": ("7", "deg/min"), "n": ("8", "rpm"),
+    plan = {"x": ("2", "m"), "y": ("3", "m"), "psi": ("4", "deg"), "u": ("5", "m/s"), "v": ("6", "m/s"),
+        "r": ("7", "deg/min"), "n": ("8", "rpm"),
             "delta": ("9", "deg")}  # fmt: skip
     lines = [f'{c} = {{ column = "{k}", unit = "{unit}" }}' for c, (k, unit) in plan.items()]
     write(tmp_path, "partial.toml", "\n".join(['name = "basin"', "dt = 2.0", "[channels]", *lines]))
     data, draft = there_and_back("log.csv", "--map", "partial.toml")
     check_truth(data.runs[0])
     kept = tomllib.loads(draft)
-    assert (kept["name"], kept["dt"], kept["time"]["column"], kept["file"]["header"], kept["file"]["skip"]) == ("basin", 2.0, "1", 0, 2)
+    assert (kept["name"], kept["dt"], kept["time"]["column"], kept["file"]["header"], kept["file"]["skip"]) == (
+        "basin",
+        2.0,
+        "1",
+        0,
+        2,
+    )

@@ -1,6 +1,8 @@
-"""A simulated data set, written as the instruments of another ship would log it, imported and compared with what it was.
+"""A simulated data set, written as the instruments of another ship would log it, imported and compared with what it
+was.
 
-Three files with clocks, rates, units and signs of their own; an antenna off midship; two runs an hour apart; a receiver that fails; noise.
+Three files with clocks, rates, units and signs of their own; an antenna off midship; two runs an hour apart; a receiver
+that fails; noise.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ from shipbench.physics.mmg import load_mmg_ship
 from shipbench.signals import STATES, wrap_angle
 from shipbench.simulate.harbour import draw_plan, fly
 
-START = pd.Timestamp("2024-10-27 00:20:00", tz="UTC")  # the clocks of Amsterdam are put back at 01:00 UTC, between the two runs
+START = pd.Timestamp(
+    "2024-10-27 00:20:00", tz="UTC"
+)  # the clocks of Amsterdam are put back at 01:00 UTC, between the two runs
 LENGTH, PAUSE = 240, 3600.0
 LOST = (120.0, 150.0)  # of the second run, without positions
 ANTENNA = (-40.0, 3.0)
@@ -62,9 +66,12 @@ RATE = 'r = { column = "ROT", unit = "deg/min", sign = "port" }'
 
 
 def geodetic(north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Latitude and longitude [rad] of points in the plane that touches the ellipsoid at LAT, LON, by iteration (Hofmann-Wellenhof)."""
+    """Latitude and longitude [rad] of points in the plane that touches the ellipsoid at LAT, LON, by iteration
+    (Hofmann-Wellenhof)."""
     normal = A / np.sqrt(1 - E2 * np.sin(LAT) ** 2)
-    x = normal * np.cos(LAT) - north * np.sin(LAT)  # in the meridian plane of the origin, then turned about the axis of the earth
+    x = normal * np.cos(LAT) - north * np.sin(
+        LAT
+    )  # in the meridian plane of the origin, then turned about the axis of the earth
     z = normal * (1 - E2) * np.sin(LAT) + north * np.cos(LAT)
     across = np.hypot(x, east)
     lat = np.full_like(north, LAT)
@@ -87,7 +94,9 @@ def instruments(folder, states: np.ndarray, commands: np.ndarray, noise: float):
     parts: dict[str, list[pd.DataFrame]] = {"gps": [], "gyro": [], "engine": []}
     for k, run in enumerate(states):
         zero, motion = START + pd.Timedelta(PAUSE * k, "s"), CubicSpline(np.arange(LENGTH + 1.0), run)
-        t = np.clip(np.sort(np.arange(0.0, LENGTH + 0.1, 0.2) + rng.uniform(-0.05, 0.05, 5 * LENGTH + 1)), 0.0, LENGTH).round(3)
+        t = np.clip(
+            np.sort(np.arange(0.0, LENGTH + 0.1, 0.2) + rng.uniform(-0.05, 0.05, 5 * LENGTH + 1)), 0.0, LENGTH
+        ).round(3)
         x, y, psi, u, v, r = motion(t)[:, :6].T
         north = x + ANTENNA[0] * np.cos(psi) - ANTENNA[1] * np.sin(psi) + noise * rng.standard_normal(len(t))
         east = y + ANTENNA[0] * np.sin(psi) + ANTENNA[1] * np.cos(psi) + noise * rng.standard_normal(len(t))
@@ -96,20 +105,28 @@ def instruments(folder, states: np.ndarray, commands: np.ndarray, noise: float):
         lat, lon = geodetic(north, east)
         local = (zero + pd.to_timedelta(t, "s")).tz_convert("Europe/Amsterdam")
         gps = pd.DataFrame({
-            "Breite": np.rad2deg(lat).round(8), "Laenge": -np.rad2deg(lon).round(8), "SOG": np.hypot(vn, ve) * 3600 / 1852,
-            "COG": np.rad2deg(np.arctan2(ve, vn)) % 360, "local": local.strftime("%H:%M:%S.%f%z"), "day": local.strftime("%d.%m.%Y"),
+            "Breite": np.rad2deg(lat).round(8), "Laenge": -np.rad2deg(lon).round(8),
+            "SOG": np.hypot(vn, ve) * 3600 / 1852,
+            "COG": np.rad2deg(np.arctan2(ve, vn)) % 360, "local": local.strftime("%H:%M:%S.%f%z"),
+            "day": local.strftime("%d.%m.%Y"),
         })  # fmt: skip
         if k == 1:
             gps.loc[(t > LOST[0]) & (t < LOST[1]), ["Breite", "Laenge"]] = -9999.0
         t = np.arange(0.0, LENGTH + 0.05, 0.1)
         s = motion(t)
-        gyro = pd.DataFrame({"epoch": ((zero.timestamp() + t + 0.3) * 1000).round().astype(np.int64), "heading": -np.rad2deg(s[:, 2]) % 360})
+        gyro = pd.DataFrame(
+            {
+                "epoch": ((zero.timestamp() + t + 0.3) * 1000).round().astype(np.int64),
+                "heading": -np.rad2deg(s[:, 2]) % 360,
+            }
+        )
         gyro["ROT"] = -np.rad2deg(s[:, 5]) * 60.0
         s, c, days = run, commands[k], (zero.timestamp() + np.arange(LENGTH + 1.0)) / 86400 + 25569
         changed = np.r_[True, np.any(np.diff(c[:, :2], axis=0) != 0.0, axis=1)]
         order = np.where(changed[:, None], c[:, :2], np.nan)  # logged on change
         engine = pd.DataFrame({
-            "date": days, "shaft": s[:, 6] / 60, "rudder": -np.rad2deg(s[:, 7]), "bow": -s[:, 8] / 1e3, "stern": s[:, 9] / 9806.65,
+            "date": days, "shaft": s[:, 6] / 60, "rudder": -np.rad2deg(s[:, 7]), "bow": -s[:, 8] / 1e3,
+            "stern": s[:, 9] / 9806.65,
             "telegraph": order[:, 0], "order": -order[:, 1],
         })  # fmt: skip
         for name, part in (("gps", gps), ("gyro", gyro), ("engine", engine)):
@@ -125,9 +142,11 @@ def instruments(folder, states: np.ndarray, commands: np.ndarray, noise: float):
 
 
 def errors(run, states: np.ndarray, commands: np.ndarray) -> dict[str, np.ndarray]:
-    """Differences from the simulated signals at the same moments; the runs begin between the simulation's samples, where the receiver does.
+    """Differences from the simulated signals at the same moments; the runs begin between the simulation's samples,
+    where the receiver does.
 
-    Motion by the spline that the instruments saw, the actuators by their samples at 1 Hz, commands held from second to second.
+    Motion by the spline that the instruments saw, the actuators by their samples at 1 Hz, commands held from second to
+    second.
     """
     k, first = divmod((pd.Timestamp(run.meta["from"]) - START).total_seconds(), PAUSE)
     assert k in (0, 1)
@@ -136,14 +155,18 @@ def errors(run, states: np.ndarray, commands: np.ndarray) -> dict[str, np.ndarra
     actuators = np.column_stack([np.interp(at, seconds, column) for column in states[int(k)][:, 6:].T])
     second, part = np.divmod(at[:-1] + 1e-6, 1.0)
     held = commands[int(k)][:, :2]
-    means = (1 - part)[:, None] * held[second.astype(int)] + part[:, None] * held[np.minimum(second.astype(int) + 1, LENGTH)]
+    means = (1 - part)[:, None] * held[second.astype(int)] + part[:, None] * held[
+        np.minimum(second.astype(int) + 1, LENGTH)
+    ]
     found = dict(zip(STATES, (run.states - np.hstack([motion, actuators])).T, strict=True))
     found["psi"] = wrap_angle(found["psi"])  # a compass does not count turns
     return found | dict(zip(("n_c", "delta_c"), (run.inputs[:-1, :2] - means).T, strict=True))
 
 
-TOLERANCES = {  # largest error of any sample, without noise; heading, position and speed at 5 and 10 Hz, the engine at 1 Hz
-    "x": 0.02, "y": 0.02, "psi": np.deg2rad(0.02), "u": 0.002, "v": 0.002, "r": np.deg2rad(0.01), "n": 1e-3, "delta": 1e-5, "F_b": 1.0, "F_s": 1.0,
+# largest error of any sample, without noise; heading, position and speed at 5 and 10 Hz, the engine at 1 Hz
+TOLERANCES = {
+    "x": 0.02, "y": 0.02, "psi": np.deg2rad(0.02), "u": 0.002, "v": 0.002, "r": np.deg2rad(0.01), "n": 1e-3,
+    "delta": 1e-5, "F_b": 1.0, "F_s": 1.0,
     "n_c": 1e-3, "delta_c": 1e-5,
 }  # fmt: skip
 
@@ -178,7 +201,11 @@ def test_derived_speeds_agree_within_the_stated_tolerance(trial_import, tmp_path
     assert data.derived == ("u", "v", "r")
     assert len(data.runs) == 3
     every = [errors(run, states, commands) for run in data.runs]
-    for name, within, worst in (("u", 0.015, 0.08), ("v", 0.015, 0.08), ("r", np.deg2rad(0.005), np.deg2rad(0.05))):  # r.m.s. and largest, m/s, rad/s
+    for name, within, worst in (
+        ("u", 0.015, 0.08),
+        ("v", 0.015, 0.08),
+        ("r", np.deg2rad(0.005), np.deg2rad(0.05)),
+    ):  # r.m.s. and largest, m/s, rad/s
         error = np.concatenate([e[name] for e in every])
         assert np.sqrt(np.mean(error**2)) < within, name
         assert np.abs(error).max() < worst, name

@@ -1,4 +1,5 @@
-"""Readings that stand for "not available": known ones are taken as missing, each in its channel, and reported; readings that may be real are kept."""
+"""Readings that stand for "not available": known ones are taken as missing, each in its channel, and reported; readings
+that may be real are kept."""
 
 from __future__ import annotations
 
@@ -98,7 +99,9 @@ def test_headings_of_511_are_bridged_and_reported(trial_import):
     assert "4 readings of psi that are 511 deg (AIS: not available), taken as missing" in result.stdout
     run = load_dataset("out").runs[0]
     trial_import(clean, None, "--force")
-    assert np.abs(run.states[:, 2] - load_dataset("out").runs[0].states[:, 2]).max() < 0.02  # rad; a heading of 511 deg is off by more than 1 rad
+    assert (
+        np.abs(run.states[:, 2] - load_dataset("out").runs[0].states[:, 2]).max() < 0.02
+    )  # rad; a heading of 511 deg is off by more than 1 rad
 
 
 def test_clean_readings_are_not_reported(trial_import):
@@ -136,4 +139,6 @@ def test_an_empty_list_makes_every_number_a_reading(trial_import):
     assert "readings of delta that are 99.9 (a fill value), taken as missing" in told
     plan = mapping(body=channels(delta='{ column = "rudder", unit = "deg", missing = [] }'))
     assert trial_import(table, plan, "--force").exit_code == 0
-    assert np.rad2deg(load_dataset("out").runs[0].states[:, 7]).max() > 50.0  # three readings of 99.9 deg on a grid of twice their step
+    assert (
+        np.rad2deg(load_dataset("out").runs[0].states[:, 7]).max() > 50.0
+    )  # three readings of 99.9 deg on a grid of twice their step

@@ -10,7 +10,8 @@ from scipy.integrate import cumulative_simpson
 
 SHIP = 'name = "trial"\nL = 50.0\nB = 8.0\nT = 3.0\nmass = 9e5\n'
 COLUMNS = {
-    "x": ("north", "m"), "y": ("east", "m"), "psi": ("HDG", "deg"), "u": ("surge", "kn"), "v": ("sway", "m/s"), "r": ("ROT", "deg/min"),
+    "x": ("north", "m"), "y": ("east", "m"), "psi": ("HDG", "deg"), "u": ("surge", "kn"), "v": ("sway", "m/s"),
+    "r": ("ROT", "deg/min"),
     "n": ("rpm", "rpm"), "delta": ("rudder", "deg"), "delta_c": ("rudder order", "deg"),
 }  # fmt: skip
 
@@ -40,14 +41,20 @@ def logged(t: np.ndarray) -> pd.DataFrame:
     """The same as a bridge would log it: other names and units, heading 0 to 360."""
     s = motion(t)
     return pd.DataFrame({
-        "time": t, "north": s["x"], "east": s["y"], "HDG": np.rad2deg(s["psi"]) % 360.0, "surge": s["u"] * 3600 / 1852, "sway": s["v"],
-        "ROT": np.rad2deg(s["r"]) * 60.0, "rpm": s["n"], "rudder": np.rad2deg(s["delta"]), "rudder order": np.rad2deg(s["delta_c"]),
+        "time": t, "north": s["x"], "east": s["y"], "HDG": np.rad2deg(s["psi"]) % 360.0, "surge": s["u"] * 3600 / 1852,
+        "sway": s["v"],
+        "ROT": np.rad2deg(s["r"]) * 60.0, "rpm": s["n"], "rudder": np.rad2deg(s["delta"]),
+        "rudder order": np.rad2deg(s["delta_c"]),
     })  # fmt: skip
 
 
 def channels(*without: str, **extra: str) -> str:
     """[channels] of a mapping for `logged`, less some, plus some as TOML."""
-    lines = [f'{ours} = {{ column = "{name}", unit = "{unit}" }}' for ours, (name, unit) in COLUMNS.items() if ours not in (*without, *extra)]
+    lines = [
+        f'{ours} = {{ column = "{name}", unit = "{unit}" }}'
+        for ours, (name, unit) in COLUMNS.items()
+        if ours not in (*without, *extra)
+    ]
     return "\n".join(["[channels]", *lines, *(f"{ours} = {entry}" for ours, entry in extra.items())]) + "\n"
 
 

@@ -57,7 +57,9 @@ def test_edh_adds_half_a_length_times_the_heading_error():
     np.testing.assert_allclose(score("edh", true, pred, L=130.0)["edh"], [2.0 + 65.0 * 0.1])
 
 
-@pytest.mark.parametrize(("true_psi", "pred_psi"), [(np.pi - 0.05, -np.pi + 0.05), (-np.pi + 0.05, np.pi - 0.05), (0.05, 4 * np.pi - 0.05)])
+@pytest.mark.parametrize(
+    ("true_psi", "pred_psi"), [(np.pi - 0.05, -np.pi + 0.05), (-np.pi + 0.05, np.pi - 0.05), (0.05, 4 * np.pi - 0.05)]
+)
 def test_heading_errors_are_taken_the_short_way_round(true_psi, pred_psi):
     true, pred = straight(), straight()
     true[..., PSI], pred[..., PSI] = true_psi, pred_psi

@@ -1,4 +1,5 @@
-"""Indices of standard manoeuvres: circles and headings with known answers, the simulator's own reading, and what is no manoeuvre."""
+"""Indices of standard manoeuvres: circles and headings with known answers, the simulator's own reading, and what is no
+manoeuvre."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ L = 100.0
 
 
 def circle(radius=300.0, course=0.7, side=1.0, samples=800, speed=5.0):
-    """States (1, samples, 10) of a steady turn from the origin that begins on `course`, its s0, and the rudder order."""
+    """States (1, samples, 10) of a steady turn from the origin that begins on `course`, its s0, and the rudder
+    order."""
     t = np.arange(1, samples + 1)
     turned = speed * t / radius
     ahead, aside = radius * np.sin(turned), side * radius * (1 - np.cos(turned))
@@ -99,7 +101,10 @@ def test_an_overshoot_whose_end_is_not_seen_is_none():
         (lambda s0, U: s0.__setitem__((0, 3), 0.0), "the ship lies still"),
         (lambda s0, U: U.__setitem__((0, slice(300, None), 1), np.deg2rad(10)), "the rudder goes elsewhere"),
         (lambda s0, U: U.__imul__(0.05), "the rudder hardly moves"),
-        (lambda s0, U: U.__setitem__((0, slice(None), 1), np.random.default_rng(0).uniform(-0.6, 0.6, 800)), "random orders"),
+        (
+            lambda s0, U: U.__setitem__((0, slice(None), 1), np.random.default_rng(0).uniform(-0.6, 0.6, 800)),
+            "random orders",
+        ),
     ],
 )
 def test_other_runs_have_no_index(change, why):

@@ -37,7 +37,8 @@ def _mmg(u, v, r, n, delta, F_b, F_s):
 
 @dataclass(frozen=True)
 class Part:
-    """A formula, the ranges of its arguments, and which arguments and results change sign in the mirror (None: no such symmetry)."""
+    """A formula, the ranges of its arguments, and which arguments and results change sign in the mirror (None: no such
+    symmetry)."""
 
     name: str
     f: Callable
@@ -50,22 +51,68 @@ U_, V_, R_, N_, D_, F_ = (-2.0, 7.0), (-1.0, 1.0), (-0.02, 0.02), (-3.0, 3.0), (
 RPM = (-180.0, 180.0)
 BLADE = replace(SHIP.rudder, gamma_plus=0.4, gamma_minus=0.4)
 PARTS = [
-    Part("hull.polynomial", lambda u, v, r: hull.polynomial(u, v, r, POLY, 130.0, 6.1, 1025.0), (U_, V_, R_), (1, 2), (1, 2)),
-    Part("hull.unified", lambda u, v, r: hull.unified(u, v, r, SHIP.hull, 130.0, 6.1, 1025.0), (U_, V_, R_), (1, 2), (1, 2)),
+    Part(
+        "hull.polynomial",
+        lambda u, v, r: hull.polynomial(u, v, r, POLY, 130.0, 6.1, 1025.0),
+        (U_, V_, R_),
+        (1, 2),
+        (1, 2),
+    ),
+    Part(
+        "hull.unified",
+        lambda u, v, r: hull.unified(u, v, r, SHIP.hull, 130.0, 6.1, 1025.0),
+        (U_, V_, R_),
+        (1, 2),
+        (1, 2),
+    ),
     Part("hull.cross_flow", lambda v, r: hull.cross_flow(v, r, 130.0, 2.2, 1.9), (V_, R_), (0, 1), (0, 1)),
     Part("hull.tilted_cross_flow", lambda v, r: hull.tilted_cross_flow(v, r, 130.0), (V_, R_), (0, 1), (0, 1)),
-    Part("propeller.quadratic", lambda n, a: (propeller.thrust_quadratic(n, a, 3.8, (0.356, -0.3055, -0.1338), 1025.0),), (N_, U_)),
+    Part(
+        "propeller.quadratic",
+        lambda n, a: (propeller.thrust_quadratic(n, a, 3.8, (0.356, -0.3055, -0.1338), 1025.0),),
+        (N_, U_),
+    ),
     Part("propeller.four_quadrant", lambda n, a: (propeller.thrust_four_quadrant(n, a, 3.8, 1025.0),), (N_, U_)),
-    Part("propeller.wake", lambda u, v, r: (propeller.wake_fraction(u, v, r, 0.33, -59.0, 2.0, 1.4, 1.4),), (U_, V_, R_), (1, 2), ()),
+    Part(
+        "propeller.wake",
+        lambda u, v, r: (propeller.wake_fraction(u, v, r, 0.33, -59.0, 2.0, 1.4, 1.4),),
+        (U_, V_, R_),
+        (1, 2),
+        (),
+    ),
     Part("propeller.side_force", lambda n, u: propeller.side_force_astern(n, u, 3.8, 130.0, 6.1, 1025.0), (N_, U_)),
     Part("propeller.race_through", lambda a, t: (propeller.race_through(a, t, 3.8, 1025.0),), (U_, (0.0, 5e5))),
     Part("propeller.race", lambda a, t: (propeller.race_speed(a, t, 3.8, 1025.0),), (U_, (0.0, 5e5))),
     Part("rudder.inflow", lambda u, n, t: (_inflow(u, n, t),), (U_, N_, (-3e5, 5e5))),
-    Part("rudder.mmg", lambda u, v, r, d, w: rudder.mmg_rudder(u, v, r, d, w, BLADE, 130.0, 1025.0), (U_, V_, R_, D_, U_), (1, 2, 3), (1, 2)),
+    Part(
+        "rudder.mmg",
+        lambda u, v, r, d, w: rudder.mmg_rudder(u, v, r, d, w, BLADE, 130.0, 1025.0),
+        (U_, V_, R_, D_, U_),
+        (1, 2, 3),
+        (1, 2),
+    ),
     Part("thruster", lambda u, b, s: thruster.tunnel_thrusters(u, b, s, SHIP.thrusters), (U_, F_, F_), (1, 2), (0, 1)),
-    Part("wind.blendermann", lambda a, b: wind.blendermann(a, b, 350.0, 1800.0, 130.0), ((-20.0, 20.0), (-20.0, 20.0)), (1,), (1, 2)),
-    Part("wind.harmonic", lambda a, b: wind.harmonic(a, b, 350.0, 1800.0, 130.0), ((-20.0, 20.0), (-20.0, 20.0)), (1,), (1, 2)),
-    Part("actuators.lag", lambda a, c: (actuators.lag_with_rate_limit(a, c, 0.7, 2.0, 0.1),), ((-1.0, 1.0), (-1.0, 1.0)), (0, 1), (0,)),
+    Part(
+        "wind.blendermann",
+        lambda a, b: wind.blendermann(a, b, 350.0, 1800.0, 130.0),
+        ((-20.0, 20.0), (-20.0, 20.0)),
+        (1,),
+        (1, 2),
+    ),
+    Part(
+        "wind.harmonic",
+        lambda a, b: wind.harmonic(a, b, 350.0, 1800.0, 130.0),
+        ((-20.0, 20.0), (-20.0, 20.0)),
+        (1,),
+        (1, 2),
+    ),
+    Part(
+        "actuators.lag",
+        lambda a, c: (actuators.lag_with_rate_limit(a, c, 0.7, 2.0, 0.1),),
+        ((-1.0, 1.0), (-1.0, 1.0)),
+        (0, 1),
+        (0,),
+    ),
     Part("shallow_water", lambda h: (shallow_water.depth_factors(h, 130.0, 18.2, 6.1, 0.65).m_y,), ((7.0, 60.0),)),
     Part("eq2", _eq2, (U_, V_, R_, RPM, D_, F_, F_)),
     Part("eq2.symmetric", _eq2_symmetric, (U_, V_, R_, RPM, D_, F_, F_), (1, 2, 4, 5, 6), (1, 2)),
@@ -114,7 +161,9 @@ def test_torch_gradient_is_the_finite_difference(part: Part):
 
 @BY_NAME
 def test_everything_is_finite_at_rest_and_in_all_quadrants(part: Part):
-    corners = np.stack(np.meshgrid(*[(low, 0.0, high) for low, high in part.ranges], indexing="ij")).reshape(len(part.ranges), -1)
+    corners = np.stack(np.meshgrid(*[(low, 0.0, high) for low, high in part.ranges], indexing="ij")).reshape(
+        len(part.ranges), -1
+    )
     corners = np.clip(corners, [[low] for low, _ in part.ranges], [[high] for _, high in part.ranges])
     for out in part.f(*corners):
         assert np.isfinite(out).all()
@@ -128,7 +177,8 @@ def test_port_is_the_mirror_of_starboard(part: Part):
         np.testing.assert_allclose(other, -out if j in part.odd else out, rtol=1e-9, atol=1e-9 * np.max(np.abs(out)))
 
 
-# -- limits ----------------------------------------------------------------------------------------------------------------------
+# -- limits
+# ----------------------------------------------------------------------------------------------------------------------
 
 
 def test_hull_and_thrusters_give_nothing_at_rest():
@@ -140,7 +190,9 @@ def test_hull_and_thrusters_give_nothing_at_rest():
 def test_a_drag_that_is_larger_forward_turns_a_ship_pushed_sideways_and_pushes_one_that_turns():
     L, v, r = 130.0, 0.7, 0.01
     Y, N = hull.tilted_cross_flow(np.array([v, 0.0]), np.array([0.0, r]), L)
-    np.testing.assert_allclose(Y, [0.0, (L * r) ** 2 / 16.0], atol=1e-12, rtol=2e-3)  # 2 int xi^3 sign(xi) over the length
+    np.testing.assert_allclose(
+        Y, [0.0, (L * r) ** 2 / 16.0], atol=1e-12, rtol=2e-3
+    )  # 2 int xi^3 sign(xi) over the length
     np.testing.assert_allclose(N, [v**2 / 6.0, 0.0], atol=1e-12)
 
 
@@ -209,21 +261,26 @@ def test_thruster_moment_is_halved_at_four_knots_and_back_at_fifteen():
 def test_actuator_moves_at_its_rate_limit_and_then_settles():
     assert actuators.lag_with_rate_limit(0.0, 1.0, 1.0, 2.0, 0.1) == pytest.approx(0.1)
     assert actuators.lag_with_rate_limit(0.9, 1.0, 3.0, 2.0, 0.1) == pytest.approx(1.0 - 0.1 * np.exp(-1.5))
-    two_halves = actuators.lag_with_rate_limit(actuators.lag_with_rate_limit(0.0, 0.3, 1.0, 2.0, 0.1), 0.3, 1.0, 2.0, 0.1)
+    two_halves = actuators.lag_with_rate_limit(
+        actuators.lag_with_rate_limit(0.0, 0.3, 1.0, 2.0, 0.1), 0.3, 1.0, 2.0, 0.1
+    )
     assert actuators.lag_with_rate_limit(0.0, 0.3, 2.0, 2.0, 0.1) == pytest.approx(two_halves, rel=1e-12)
 
 
-# -- dimension -------------------------------------------------------------------------------------------------------------------
+# -- dimension
+# -------------------------------------------------------------------------------------------------------------------
 
 
 def _scaled(ship: mmg.MMGShip, s: float) -> mmg.MMGShip:
     """The geometrically similar ship at length scale `s` in the same water."""
     p, b = ship.propeller, ship.rudder
     return replace(
-        ship, L=ship.L * s, B=ship.B * s, T=ship.T * s, m=ship.m * s**3, x_G=ship.x_G * s, I_zG=ship.I_zG * s**5, m_x=ship.m_x * s**3,
+        ship, L=ship.L * s, B=ship.B * s, T=ship.T * s, m=ship.m * s**3, x_G=ship.x_G * s, I_zG=ship.I_zG * s**5,
+        m_x=ship.m_x * s**3,
         m_y=ship.m_y * s**3, J_z=ship.J_z * s**5, propeller=replace(p, D=p.D * s, x_P=p.x_P * s),
         rudder=replace(b, A_R=b.A_R * s**2, H_R=b.H_R * s, c_pr=0.0), A_F=ship.A_F * s**2, A_L=ship.A_L * s**2,
-        thrusters=replace(ship.thrusters, x_bow=ship.thrusters.x_bow * s, x_stern=ship.thrusters.x_stern * s, loss_force=0.0, loss_moment=0.0),
+        thrusters=replace(ship.thrusters, x_bow=ship.thrusters.x_bow * s, x_stern=ship.thrusters.x_stern * s,
+            loss_force=0.0, loss_moment=0.0),
     )  # fmt: skip
 
 
@@ -232,7 +289,9 @@ def test_an_actuator_stops_at_the_edge_of_its_deadband_whatever_the_step():
     gear = actuators.Gear(T=1.5, rate=0.05, deadband=0.02)
     coarse, fine = (actuators.gear_path(np.zeros(1), command, 1.0, gear, k)[:, ::k] for k in (1, 40))
     np.testing.assert_allclose(coarse, fine, atol=1e-12)
-    assert coarse[0, 24] == pytest.approx(0.3 - 0.02)  # on its way up it stops within the band and stays, whatever the command does inside it
+    assert coarse[0, 24] == pytest.approx(
+        0.3 - 0.02
+    )  # on its way up it stops within the band and stays, whatever the command does inside it
 
 
 def test_a_froude_scaled_ship_moves_alike():
@@ -252,7 +311,8 @@ def test_eq2_of_a_froude_scaled_ship_scales():
     known = complete(SHIP.particulars)
     small = known.model_copy(
         update={k: getattr(known, k) * s for k in ("L", "B", "T", "xG", "D_P", "x_P", "H_R", "x_R", "x_bow", "x_stern")}
-        | {k: getattr(known, k) * s**2 for k in ("A_R", "A_F", "A_L")} | {"mass": known.mass * s**3, "Izz": known.Izz * s**5}
+        | {k: getattr(known, k) * s**2 for k in ("A_R", "A_F", "A_L")} | {"mass": known.mass * s**3,
+            "Izz": known.Izz * s**5}
     )  # fmt: skip
     u, v, r, n, d, b, f = _points(PARTS[-1], 200)
     k = np.sqrt(s)
@@ -263,7 +323,8 @@ def test_eq2_of_a_froude_scaled_ship_scales():
         np.testing.assert_allclose(c, a * unit, rtol=1e-3, atol=1e-3 * np.max(np.abs(a)) * unit)
 
 
-# -- reference -------------------------------------------------------------------------------------------------------------------
+# -- reference
+# -------------------------------------------------------------------------------------------------------------------
 
 
 def test_four_quadrant_thrust_meets_the_wageningen_polynomial():
@@ -289,7 +350,9 @@ def test_rudder_inflow_is_the_printed_mmg_form():
     T = float(propeller.thrust_four_quadrant(n, (1 - w) * u, D, 1025.0))
     J, K_T = (1 - w) * u / (n * D), T / (1025 * n**2 * D**4)
     eta, eps, kappa = D / 5.04, 0.956, 0.633
-    printed = eps * (1 - w) * u * np.sqrt(eta * (1 + kappa * (np.sqrt(1 + 8 * K_T / (np.pi * J**2)) - 1)) ** 2 + (1 - eta))
+    printed = (
+        eps * (1 - w) * u * np.sqrt(eta * (1 + kappa * (np.sqrt(1 + 8 * K_T / (np.pi * J**2)) - 1)) ** 2 + (1 - eta))
+    )
     assert rudder.inflow_speed(u, n, T, w, SHIP.rudder, D, 1025.0) == pytest.approx(printed, rel=1e-6)
 
 
@@ -299,7 +362,10 @@ def test_a_reversed_propeller_takes_the_rudders_flow_in_eq2():
     still = Modifiers(backing=1.0)
 
     def turn(actuators, mods):
-        sides = [eq2.accelerations(*state, actuators[0], s * actuators[1], 0.0, 0.0, None, C, P_SYMMETRIC, mods)[2] for s in (1.0, -1.0)]
+        sides = [
+            eq2.accelerations(*state, actuators[0], s * actuators[1], 0.0, 0.0, None, C, P_SYMMETRIC, mods)[2]
+            for s in (1.0, -1.0)
+        ]
         return sides[0] - sides[1]
 
     assert turn(ahead, still) == pytest.approx(turn(ahead, Modifiers()))
@@ -356,7 +422,9 @@ def test_turning_is_balanced_by_hand_in_eq2():
     R = u * (2e3 + 5e3 * u + 50.0 * u**2)
     m_x = 2.7 * 1025 * 9402.0 ** (5 / 3) / 130**2
     expected = ((1 - 0.207) * T - R - drag) / (9402.0 * 1025 + m_x)
-    assert eq2.accelerations(u, 0.0, 0.0, n, 0.0, 0.0, 0.0, None, C, P_SYMMETRIC)[0] == pytest.approx(expected, rel=1e-6)
+    assert eq2.accelerations(u, 0.0, 0.0, n, 0.0, 0.0, 0.0, None, C, P_SYMMETRIC)[0] == pytest.approx(
+        expected, rel=1e-6
+    )
 
 
 def test_positive_rudder_turns_both_models_to_starboard():
@@ -381,12 +449,17 @@ def test_a_ship_drifting_with_the_current_feels_no_water():
     psi = 0.2
     u, v = 0.5 * np.cos(0.5), 0.5 * np.sin(0.5)
     assert np.allclose(
-        mmg.accelerations(SHIP, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, replace(env, wind_speed=0.5, wind_from=0.7 + np.pi)), 0.0, atol=1e-9
+        mmg.accelerations(
+            SHIP, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, replace(env, wind_speed=0.5, wind_from=0.7 + np.pi)
+        ),
+        0.0,
+        atol=1e-9,
     )
 
 
 def test_a_beamy_ship_turns_with_added_inertia_about_her_middle():
-    """A tug of 30 m: the regression as printed gives J_z < 0, and Y of an added mass that stands 0.4 L before midship."""
+    """A tug of 30 m: the regression as printed gives J_z < 0, and Y of an added mass that stands 0.4 L before
+    midship."""
     of = regressions.clarke_1983(30.0, 10.0, 4.0, 0.55)
     assert 0.03 < of.N_rd / of.Y_vd < 1.0 / 12.0
     assert abs(of.N_vd / of.Y_vd) < 0.15

@@ -1,7 +1,8 @@
-"""Puts a network on a GPU that is not there: `python fake_gpu.py mlp`. A process of its own, for PyTorch takes a new kind of device once and for all.
+"""Puts a network on a GPU that is not there: `python fake_gpu.py mlp`. A process of its own, for PyTorch takes a new
+kind of device once and for all.
 
-PyTorch's fake tensors know shapes and devices only; as a GPU would, they refuse an operation on tensors of two devices. One step of training with its
-gradients, a validation and a prediction are gone through.
+PyTorch's fake tensors know shapes and devices only; as a GPU would, they refuse an operation on tensors of two devices.
+One step of training with its gradients, a validation and a prediction are gone through.
 """
 
 from __future__ import annotations
@@ -97,7 +98,11 @@ def predict(model, runs) -> None:
 if __name__ == "__main__":
     name = sys.argv[1]
     harbour = small_harbour(num=16, horizon=15)
-    train(importlib.import_module(f"shipbench.predictors.{name}"), make_predictor(parse_spec(f"{name}[epochs=1]")), harbour)
+    train(
+        importlib.import_module(f"shipbench.predictors.{name}"),
+        make_predictor(parse_spec(f"{name}[epochs=1]")),
+        harbour,
+    )
     fitted = make_predictor(parse_spec(f"{name}[epochs=1]")).fit(harbour.subset(range(8)), harbour.subset(range(8, 12)))
     if name == "neural_ode":
         fitted.improved = True  # else the physics predicts

@@ -1,4 +1,5 @@
-"""The contract, put to every registered predictor: a new one is tested by existing. The rules stand in `shipbench.contract`."""
+"""The contract, put to every registered predictor: a new one is tested by existing. The rules stand in
+`shipbench.contract`."""
 
 from __future__ import annotations
 

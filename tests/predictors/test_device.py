@@ -1,4 +1,5 @@
-"""`--device`: what is accepted, who gets it, and that every tensor of a network is where it belongs (`fake_gpu.py`: without a GPU)."""
+"""`--device`: what is accepted, who gets it, and that every tensor of a network is where it belongs (`fake_gpu.py`:
+without a GPU)."""
 
 from __future__ import annotations
 
@@ -35,7 +36,9 @@ def gpu(monkeypatch):
 @pytest.mark.long
 @pytest.mark.parametrize("name", NETWORKS)
 def test_every_tensor_of_training_and_prediction_is_on_the_device(name):
-    done = subprocess.run([sys.executable, Path(__file__).with_name("fake_gpu.py"), name], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, Path(__file__).with_name("fake_gpu.py"), name], capture_output=True, text=True, check=False
+    )
     assert done.stdout == "all on gpu:0\n", done.stderr[-2000:]
 
 
@@ -87,7 +90,9 @@ def test_a_model_saved_on_one_device_loads_on_another(harbour, tmp_path, monkeyp
         make_predictor(parse_spec(str(tmp_path / "model")), "cuda")
 
 
-@pytest.mark.parametrize("command", ["run --model hold", "learning-curve --model hold", "check hold", "predict MODEL harbour90"])
+@pytest.mark.parametrize(
+    "command", ["run --model hold", "learning-curve --model hold", "check hold", "predict MODEL harbour90"]
+)
 def test_a_bad_device_ends_a_command_with_exit_code_2(command, tmp_path, monkeypatch, harbour):
     monkeypatch.chdir(tmp_path)
     make_predictor(parse_spec("hold")).fit(harbour).save("MODEL")
@@ -97,7 +102,9 @@ def test_a_bad_device_ends_a_command_with_exit_code_2(command, tmp_path, monkeyp
 
 
 def test_a_study_takes_the_device_and_says_so(tmp_path):
-    task = make_task({"dataset": "harbour90", "models": ["mlp[epochs=1]", "hold"], "max_runs": 6, "horizon_s": 20, "folds": 2})
+    task = make_task(
+        {"dataset": "harbour90", "models": ["mlp[epochs=1]", "hold"], "max_runs": 6, "horizon_s": 20, "folds": 2}
+    )
     outcome = run_tasks([task], tmp_path / "out", execution=Execution(device="cpu"))
     assert not outcome.failed
     assert outcome.summaries[0]["params"]["device"] == "cpu"
@@ -105,7 +112,9 @@ def test_a_study_takes_the_device_and_says_so(tmp_path):
 
 
 def test_the_device_reaches_the_worker(harbour, gpu):
-    answers = work(Job(parse_spec("mlp[epochs=1]"), 0, {}, device="cuda:1"), [FoldData(harbour, None, *_asked(harbour))])
+    answers = work(
+        Job(parse_spec("mlp[epochs=1]"), 0, {}, device="cuda:1"), [FoldData(harbour, None, *_asked(harbour))]
+    )
     assert answers[0].status == "failed"
     assert "'cuda:1' is not here" in answers[0].reason
 

@@ -46,13 +46,17 @@ def test_thrust_of_the_wrong_sign_is_told_with_the_evidence(harbour):
     model = Physics().fit(_reversed_shaft(harbour))
     right = Physics().fit(harbour).report.error
     assert "physics does not fit these runs" in model.report.note
-    assert f"With the opposite sign of n the training error is {right:.3g} m: the shaft speed looks reversed" in model.report.note
+    assert (
+        f"With the opposite sign of n the training error is {right:.3g} m: the shaft speed looks reversed"
+        in model.report.note
+    )
 
 
 @pytest.mark.parametrize(
     ("at", "error", "fits"),
     [
-        ((), 4.0, True), ((), 10.0, False), ((), np.inf, False), (("p2",), 4.0, True), (("p1", "p2", "p3"), 4.0, False), (("p4",), 4.0, False),
+        ((), 4.0, True), ((), 10.0, False), ((), np.inf, False), (("p2",), 4.0, True), (("p1", "p2", "p3"), 4.0, False),
+        (("p4",), 4.0, False),
         (("p4",), 3.0, True),
     ],
 )  # fmt: skip
@@ -66,7 +70,9 @@ def test_what_counts_as_no_fit(at, error, fits):
 
 def test_the_summary_and_the_table_say_so(harbour, tmp_path):
     write_dataset(_reversed_shaft(harbour), tmp_path / "astern")
-    task = make_task({"dataset": str(tmp_path / "astern"), "models": ["hold", "physics"], "horizon_s": 40.0, "folds": 2})
+    task = make_task(
+        {"dataset": str(tmp_path / "astern"), "models": ["hold", "physics"], "horizon_s": 40.0, "folds": 2}
+    )
     outcome = run_tasks([task], tmp_path / "out")
     assert [s["fit_report"]["of"] for s in outcome.summaries if s["model"] == "physics"] == [11, 11]
     table = build_board(outcome.results, outcome.summaries[0]["dataset"]).tables[0]

@@ -33,7 +33,9 @@ def test_members_of_a_group_come_out_as_they_would_alone(parts, model):
     LSTM.fit_group(group, [train, train.subset(range(8))], [valid, None], [1, 2])
     other = quick().fit(train.subset(range(8)), seed=2)
     for a, b in zip(group, (model, other), strict=True):
-        np.testing.assert_allclose(a.predict(batch.s0, batch.U)[..., MOTION], b.predict(batch.s0, batch.U)[..., MOTION], rtol=1e-3, atol=1e-3)
+        np.testing.assert_allclose(
+            a.predict(batch.s0, batch.U)[..., MOTION], b.predict(batch.s0, batch.U)[..., MOTION], rtol=1e-3, atol=1e-3
+        )
 
 
 def test_history_is_used_and_only_what_lies_before_s0(parts, model):
@@ -87,7 +89,9 @@ def test_commanded_actuators_are_repeated(parts, tmp_path):
     batch = commanded(parts[2]).batch()
     np.testing.assert_allclose(model.predict(batch.s0, batch.U)[..., 6:], batch.U)
     model.save(tmp_path / "m")
-    np.testing.assert_array_equal(LSTM.load(tmp_path / "m").predict(batch.s0, batch.U), model.predict(batch.s0, batch.U))
+    np.testing.assert_array_equal(
+        LSTM.load(tmp_path / "m").predict(batch.s0, batch.U), model.predict(batch.s0, batch.U)
+    )
 
 
 def test_wrong_settings_and_use_before_fit_are_refused(parts):

@@ -19,7 +19,16 @@ def quick(**more):
 
 def test_the_defaults_are_the_papers():
     m = MLP()
-    assert (m.hidden, m.layers, m.epochs, m.batch, m.lr, m.patience, m.min_delta, m.target) == (100, 3, 200, 32, 1e-3, 10, 1e-4, "state")
+    assert (m.hidden, m.layers, m.epochs, m.batch, m.lr, m.patience, m.min_delta, m.target) == (
+        100,
+        3,
+        200,
+        32,
+        1e-3,
+        10,
+        1e-4,
+        "state",
+    )
 
 
 def test_the_network_has_the_papers_layers(parts):
@@ -34,10 +43,18 @@ def test_members_of_a_group_come_out_as_they_would_alone(parts, target):
     other = train.subset(range(3, 12))  # fewer runs: its epochs end elsewhere
     group = [quick(target=target), quick(target=target), quick(target=target)]
     MLP.fit_group(group, [train, other, train], [valid, valid, None], [4, 5, 6])
-    alone = [quick(target=target).fit(train, valid, seed=4), quick(target=target).fit(other, valid, seed=5), quick(target=target).fit(train, seed=6)]
+    alone = [
+        quick(target=target).fit(train, valid, seed=4),
+        quick(target=target).fit(other, valid, seed=5),
+        quick(target=target).fit(train, seed=6),
+    ]
     for a, b in zip(group, alone, strict=True):
-        np.testing.assert_allclose(a.predict(batch.s0, batch.U)[..., U:], b.predict(batch.s0, batch.U)[..., U:], rtol=1e-3, atol=1e-3)
-    assert np.abs(group[0].predict(batch.s0, batch.U) - group[2].predict(batch.s0, batch.U)).max() > 1e-2, "another seed is another model"
+        np.testing.assert_allclose(
+            a.predict(batch.s0, batch.U)[..., U:], b.predict(batch.s0, batch.U)[..., U:], rtol=1e-3, atol=1e-3
+        )
+    assert np.abs(group[0].predict(batch.s0, batch.U) - group[2].predict(batch.s0, batch.U)).max() > 1e-2, (
+        "another seed is another model"
+    )
 
 
 def test_pose_follows_from_the_predicted_velocities_by_equation_10(parts):
@@ -45,7 +62,9 @@ def test_pose_follows_from_the_predicted_velocities_by_equation_10(parts):
     S = model.predict(batch.s0, batch.U)
     psi = batch.s0[:, PSI] + S[:, 0, R]
     np.testing.assert_allclose(S[:, 0, PSI], psi)
-    np.testing.assert_allclose(S[:, 1, 0], S[:, 0, 0] + S[:, 1, U] * np.cos(psi) - S[:, 1, U + 1] * np.sin(psi), rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(
+        S[:, 1, 0], S[:, 0, 0] + S[:, 1, U] * np.cos(psi) - S[:, 1, U + 1] * np.sin(psi), rtol=1e-12, atol=1e-9
+    )
 
 
 def test_it_learns_the_next_state(parts):
@@ -72,7 +91,12 @@ def test_turning_the_frame_turns_the_prediction_also_with_earth_fixed_wind(parts
 
     def windy(data):
         names = (*data.inputs, "wind_speed", "wind_from")
-        runs = [replace(r, inputs=np.column_stack([r.inputs, np.full(len(r), 6.0), np.full(len(r), 1.0)]), inputs_names=names) for r in data.runs]
+        runs = [
+            replace(
+                r, inputs=np.column_stack([r.inputs, np.full(len(r), 6.0), np.full(len(r), 1.0)]), inputs_names=names
+            )
+            for r in data.runs
+        ]
         return data.with_runs(runs)
 
     model = quick().fit(windy(train), windy(valid), seed=0)

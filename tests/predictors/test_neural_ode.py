@@ -56,7 +56,9 @@ def test_with_a_zero_residual_it_is_the_physics(parts, physics, model):
     plain = NeuralODE(hidden=16)
     weights = {k: np.zeros_like(v) if "layers.2" in k else v for k, v in model._weights.items()}
     plain.physics, plain._weights, plain.improved = physics, weights, True
-    np.testing.assert_allclose(plain.predict(batch.s0, batch.U), physics.predict(batch.s0, batch.U), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        plain.predict(batch.s0, batch.U), physics.predict(batch.s0, batch.U), rtol=1e-9, atol=1e-9
+    )
 
 
 def test_training_halves_the_error_of_the_physics(parts, physics, model):
@@ -77,7 +79,9 @@ def test_the_training_solver_agrees_with_the_rollout(parts, physics):
     train = parts[0]
     grid = Grid.of(physics)
     drive = Drive.of([physics], [train], grid)
-    residual = Residual([physics], 8, Scaler.fit([features(drive.S, None)]), typical_accelerations([physics], drive), generators([0]))
+    residual = Residual(
+        [physics], 8, Scaler.fit([features(drive.S, None)]), typical_accelerations([physics], drive), generators([0])
+    )
     with torch.no_grad():
         found = solve(residual, drive.S[None, :, 0], drive.path[None], None, grid.step)[0].numpy()
     batch = train.batch()
@@ -92,7 +96,9 @@ def windy(parts):
 
     def blown(run):
         wind = np.tile([rng.uniform(6.0, 12.0), rng.uniform(0.0, 2.0 * np.pi)], (len(run), 1))
-        return replace(run, inputs=np.hstack([run.inputs, wind]), inputs_names=(*run.inputs_names, "wind_speed", "wind_from"))
+        return replace(
+            run, inputs=np.hstack([run.inputs, wind]), inputs_names=(*run.inputs_names, "wind_speed", "wind_from")
+        )
 
     return [part.with_runs([blown(run) for run in part.runs]) for part in parts]
 
@@ -115,10 +121,16 @@ def test_a_wrong_wind_force_is_learned_and_the_solvers_agree_on_it(windy, tmp_pa
     batch, grid = unseen.batch(), Grid.of(model.physics)
     drive = Drive.of([model.physics], [unseen], grid)
     with torch.no_grad():
-        found = solve(model._residual().float(), drive.S[None, :, 0], drive.path[None], drive.air[None], grid.step)[0].numpy()
-    assert np.abs(found - model.predict(batch.s0, batch.U)[..., VELOCITY]).max(axis=(0, 1)) == pytest.approx(np.zeros(3), abs=5e-3)
+        found = solve(model._residual().float(), drive.S[None, :, 0], drive.path[None], drive.air[None], grid.step)[
+            0
+        ].numpy()
+    assert np.abs(found - model.predict(batch.s0, batch.U)[..., VELOCITY]).max(axis=(0, 1)) == pytest.approx(
+        np.zeros(3), abs=5e-3
+    )
     model.save(tmp_path / "m")
-    np.testing.assert_array_equal(NeuralODE.load(tmp_path / "m").predict(batch.s0, batch.U), model.predict(batch.s0, batch.U))
+    np.testing.assert_array_equal(
+        NeuralODE.load(tmp_path / "m").predict(batch.s0, batch.U), model.predict(batch.s0, batch.U)
+    )
 
 
 @pytest.mark.long
@@ -129,15 +141,23 @@ def test_effects_of_the_physics_act_in_training_and_in_rollouts(parts, tmp_path)
     NeuralODE.fit_group(group, [train, train.subset(range(9))], [valid, None], [0, 1])
     batch = test.batch()
     for m, model in enumerate(group):
-        physics = Physics().extend(effects).fit(train if m == 0 else train.subset(range(9)), valid if m == 0 else None, seed=m)
+        physics = (
+            Physics()
+            .extend(effects)
+            .fit(train if m == 0 else train.subset(range(9)), valid if m == 0 else None, seed=m)
+        )
         drive, grid = Drive.of([model.physics], [test], Grid.of(model.physics)), Grid.of(model.physics)
         model.improved = True  # also where validation kept the physics: the network is in the way, and adds nothing
         with torch.no_grad():
             found = solve(model._residual().float(), drive.S[None, :, 0], drive.path[None], None, grid.step)[0].numpy()
-        assert np.abs(found - model.predict(batch.s0, batch.U)[..., VELOCITY]).max(axis=(0, 1)) == pytest.approx(np.zeros(3), abs=5e-3)
+        assert np.abs(found - model.predict(batch.s0, batch.U)[..., VELOCITY]).max(axis=(0, 1)) == pytest.approx(
+            np.zeros(3), abs=5e-3
+        )
         model._weights = {k: np.zeros_like(v) if "layers.2" in k else v for k, v in model._weights.items()}
         if m == 0:  # the other physics lost its validation runs to the split
-            np.testing.assert_allclose(model.predict(batch.s0, batch.U), physics.predict(batch.s0, batch.U), rtol=1e-5, atol=1e-4)
+            np.testing.assert_allclose(
+                model.predict(batch.s0, batch.U), physics.predict(batch.s0, batch.U), rtol=1e-5, atol=1e-4
+            )
         model.save(tmp_path / f"m{m}")
         again = NeuralODE.load(tmp_path / f"m{m}")
         assert again.effects == tuple(effects)
@@ -158,7 +178,12 @@ def test_members_of_a_group_come_out_as_they_would_alone(parts, model):
     NeuralODE.fit_group(group, [train, train.subset(range(9))], [valid, None], [0, 1])
     assert group[0].improved
     assert group[1].improved
-    np.testing.assert_allclose(group[0].predict(batch.s0, batch.U)[..., MOTION], model.predict(batch.s0, batch.U)[..., MOTION], rtol=1e-3, atol=1e-2)
+    np.testing.assert_allclose(
+        group[0].predict(batch.s0, batch.U)[..., MOTION],
+        model.predict(batch.s0, batch.U)[..., MOTION],
+        rtol=1e-3,
+        atol=1e-2,
+    )
 
 
 def test_a_saved_model_keeps_its_physics(parts, model, tmp_path):

@@ -32,7 +32,8 @@ def _synthetic(harbour: Dataset, p: np.ndarray) -> Dataset:
 
 
 def test_pieces_start_from_the_measured_state(harbour):
-    """Runs cut to 30 s give the fit of the data so cut; a piece as long as the runs changes nothing; a negative one is refused."""
+    """Runs cut to 30 s give the fit of the data so cut; a piece as long as the runs changes nothing; a negative one is
+    refused."""
     few = harbour.subset(range(6))
     whole = Physics().fit(few)
     cut = Physics(piece=30.0).fit(few)
@@ -171,7 +172,8 @@ def test_it_fits_a_small_model_ship_whose_actuators_are_commands(harbour):
 def test_measured_wind_reaches_the_forces(harbour, fitted):
     batch = harbour.subset([0]).batch()
     windy = replace(harbour, runs=tuple(
-        Run(r.id, r.t, r.states, np.concatenate([r.inputs, np.tile([12.0, 0.3], (len(r), 1))], axis=1), (*r.inputs_names, "wind_speed", "wind_from"))
+        Run(r.id, r.t, r.states, np.concatenate([r.inputs, np.tile([12.0, 0.3], (len(r), 1))], axis=1),
+            (*r.inputs_names, "wind_speed", "wind_from"))
         for r in harbour.runs
     ))  # fmt: skip
     model = Physics(iterations=0).fit(windy)
@@ -209,16 +211,27 @@ def test_rolling_is_the_same_model_as_the_formula_step_by_step(harbour, fitted, 
     U = batch.U
     if wind:
         rng = np.random.default_rng(0)
-        U = np.concatenate([U, 20.0 + 0.0 * U[..., :1], rng.uniform(0, 6, (*U.shape[:2], 1)), rng.uniform(0, 15, (*U.shape[:2], 1))], axis=2)
+        U = np.concatenate(
+            [U, 20.0 + 0.0 * U[..., :1], rng.uniform(0, 6, (*U.shape[:2], 1)), rng.uniform(0, 15, (*U.shape[:2], 1))],
+            axis=2,
+        )
     path, measured = model.actuator_path(batch.s0, U), model._wind(U)
     expected = roll([], batch.s0, path, measured, 1.0 / substeps, substeps, model.c, list(model.p), model.particulars)
     S = model.predict(batch.s0, U)
     np.testing.assert_allclose(S[..., :6], expected, rtol=1e-9, atol=1e-9)
-    rolling = Rolling(model.c, None if commanded else model.actuator_params, (0, 1, 2, 3, 6, 5) if wind else (0, 1, 2, 3), 1.0, substeps)
+    rolling = Rolling(
+        model.c,
+        None if commanded else model.actuator_params,
+        (0, 1, 2, 3, 6, 5) if wind else (0, 1, 2, 3),
+        1.0,
+        substeps,
+    )
     again, slopes = rolling.linearised(batch.s0, U, model.p)
     np.testing.assert_allclose(again, S, rtol=1e-9, atol=1e-9)
     step = 1e-4 * parameter_scale(model.c)
     for i in range(len(model.p)):
-        up, down = (rolling.states(batch.s0, U, model.p + sign * step * (np.arange(len(model.p)) == i)) for sign in (1, -1))
+        up, down = (
+            rolling.states(batch.s0, U, model.p + sign * step * (np.arange(len(model.p)) == i)) for sign in (1, -1)
+        )
         slope = (up - down)[..., :6] / (2.0 * step[i])
         np.testing.assert_allclose(slopes[..., i], slope, atol=1e-4 * np.abs(slope).max() + 1e-9)

@@ -57,14 +57,20 @@ def commanded(data: Dataset) -> Dataset:
 def test_a_hidden_current_is_found_and_the_rollouts_gain_on_runs_not_fitted(seed):
     hidden = ("current", (0.3, -0.25))
     data, unseen = trials(seed, hidden), trials(seed + 100, hidden)
-    plain, extended, hull = (fitted(s, data) for s in ("physics", "physics+current", "physics+current+hull_derivatives"))
-    np.testing.assert_allclose(values(extended), hidden[1], atol=0.3 * 0.39)  # eq. (2)'s hull is off by more than the current alone can make good
+    plain, extended, hull = (
+        fitted(s, data) for s in ("physics", "physics+current", "physics+current+hull_derivatives")
+    )
+    np.testing.assert_allclose(
+        values(extended), hidden[1], atol=0.3 * 0.39
+    )  # eq. (2)'s hull is off by more than the current alone can make good
     np.testing.assert_allclose(values(hull), hidden[1], atol=0.2 * 0.39)
     assert rollout_error(extended, unseen) < 0.6 * rollout_error(plain, unseen)
     assert rollout_error(hull, unseen) < rollout_error(extended, unseen)
 
 
-@pytest.mark.parametrize(("name", "q"), [("heading_bias", (-0.05, 0.0)), ("yaw_rate_bias", (0.003,)), ("speed_scale", (0.08,))])
+@pytest.mark.parametrize(
+    ("name", "q"), [("heading_bias", (-0.05, 0.0)), ("yaw_rate_bias", (0.003,)), ("speed_scale", (0.08,))]
+)
 def test_a_fault_of_a_sensor_is_found_within_a_fifth(name, q):
     data, unseen = trials(2, (name, q)), trials(102, (name, q))
     plain, extended = fitted("physics", data), fitted(f"physics+{name}", data)
@@ -73,14 +79,18 @@ def test_a_fault_of_a_sensor_is_found_within_a_fifth(name, q):
 
 
 @pytest.mark.parametrize(
-    ("name", "q"), [("rudder_delay", (2.5,)), ("rudder_lag", (4.0,)), ("rudder_backlash", (0.05,)), ("shaft_rate_limit", (1.0,))]
+    ("name", "q"),
+    [("rudder_delay", (2.5,)), ("rudder_lag", (4.0,)), ("rudder_backlash", (0.05,)), ("shaft_rate_limit", (1.0,))],
 )
 def test_a_gear_is_found_from_command_and_actuator(name, q):
     data = trials(1, (name, q))
     plain, extended = fitted("physics", data), fitted(f"physics+{name}", data)
     np.testing.assert_allclose(values(extended), q, rtol=0.1)
     channel = slice(6, 7) if name.startswith("shaft") else slice(7, 8)
-    same_law = name in ("rudder_lag", "shaft_rate_limit")  # the plain fit has a time constant and a rate limit too: the effect only names them
+    same_law = name in (
+        "rudder_lag",
+        "shaft_rate_limit",
+    )  # the plain fit has a time constant and a rate limit too: the effect only names them
     assert rollout_error(extended, data, channel) < (1.001 if same_law else 0.7) * rollout_error(plain, data, channel)
 
 
@@ -119,7 +129,8 @@ def test_a_rate_limit_is_found_in_the_motion_where_only_commands_are_recorded():
 
 
 @pytest.mark.parametrize("spec", [
-    "physics+current+heading_bias", "physics+rudder_delay+current[speed=0.3,to=1.0]", "physics+bank_suction[bearing=1.57,line=900]",
+    "physics+current+heading_bias", "physics+rudder_delay+current[speed=0.3,to=1.0]",
+    "physics+bank_suction[bearing=1.57,line=900]",
     "physics+change_point[effect=rudder_offset,time=30]+position_delay",
 ])  # fmt: skip
 def test_saved_and_loaded_it_predicts_and_prints_the_same(spec, tmp_path):
@@ -154,7 +165,9 @@ def test_a_change_within_the_run_acts_from_its_time_on():
     before.p = model.p
     batch = data.batch()
     late, never = model.predict(batch.s0, batch.U), before.predict(batch.s0, batch.U)
-    np.testing.assert_allclose(late[:, :19], never[:, :19], rtol=1e-10, atol=1e-10)  # with and without effects: two codes
+    np.testing.assert_allclose(
+        late[:, :19], never[:, :19], rtol=1e-10, atol=1e-10
+    )  # with and without effects: two codes
     assert np.abs(late - never)[:, 25:, 0].min() > 0.01
 
 
@@ -226,7 +239,8 @@ def test_a_given_value_that_no_ship_has_is_refused_before_anything_is_fitted(spe
 
 
 def test_a_river_s_current_on_a_boat_is_within_what_may_be_found():
-    """Currents and winds do not follow Froude's law: 1.8 m/s are a third of what a ship of 130 m may have, on a boat of 25 m much of it."""
+    """Currents and winds do not follow Froude's law: 1.8 m/s are a third of what a ship of 130 m may have, on a boat of
+    25 m much of it."""
     boat, hidden = scaled(SHIP, 25.0), (1.3, -1.2)
     data = sea_trials(boat, 5, [Hidden(EFFECTS.get("current"), hidden)], Trials(runs=8, samples=60))
     np.testing.assert_allclose(values(fitted("physics+current", data)), hidden, rtol=0.15)
@@ -238,7 +252,18 @@ def test_it_runs_beside_the_plain_physics_on_the_command_line(tmp_path):
     write_dataset(trials(3, ("current", (0.3, 0.3)), runs=6, samples=40), tmp_path / "tiny")
     specs = ["physics", "physics+current", "physics+current[speed=0.42,to=0.785]+rudder_delay"]
     models = [part for spec in specs for part in ("-m", spec)]
-    command = ["run", *models, "-d", str(tmp_path / "tiny"), "--folds", "2", "--horizon", "40", "--out", str(tmp_path / "out")]
+    command = [
+        "run",
+        *models,
+        "-d",
+        str(tmp_path / "tiny"),
+        "--folds",
+        "2",
+        "--horizon",
+        "40",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
     for spec in specs:

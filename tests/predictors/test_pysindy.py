@@ -15,7 +15,8 @@ from shipbench.signals import COMMANDS, move_frame
 
 
 def known_ship(runs: int = 6, steps: int = 250, dt: float = 0.2) -> Dataset:
-    """du/dt = 0.002 n - 0.02 u^2, dv/dt = -0.2 v - 0.4 u r, dr/dt = -0.1 r + 0.01 u delta; the actuators swing and are at their commands."""
+    """du/dt = 0.002 n - 0.02 u^2, dv/dt = -0.2 v - 0.4 u r, dr/dt = -0.1 r + 0.01 u delta; the actuators swing and are
+    at their commands."""
     rng, t, made = np.random.default_rng(0), dt * np.arange(steps + 1), []
     for i in range(runs):
         (a, b), (f, g) = rng.uniform(0, 6, 2), rng.uniform(0.1, 0.4, 2)
@@ -27,7 +28,9 @@ def known_ship(runs: int = 6, steps: int = 250, dt: float = 0.2) -> Dataset:
             return [*turned, 0.002 * n(t) - 0.02 * u * u, -0.2 * v - 0.4 * u * r, -0.1 * r + 0.01 * u * delta(t)]
 
         S, U = np.zeros((steps + 1, 10)), np.zeros((steps + 1, 4))
-        S[:, :6] = solve_ivp(rates, (0, t[-1]), [0, 0, 0, rng.uniform(0.5, 4.0), 0, 0], t_eval=t, rtol=1e-9, atol=1e-12).y.T
+        S[:, :6] = solve_ivp(
+            rates, (0, t[-1]), [0, 0, 0, rng.uniform(0.5, 4.0), 0, 0], t_eval=t, rtol=1e-9, atol=1e-12
+        ).y.T
         S[:, 6], S[:, 7] = n(t), delta(t)
         U[:-1, :2], U[-1, :2] = S[1:, 6:8], S[-1, 6:8]
         made.append(Run(f"r{i}", t, S, U))
@@ -54,7 +57,8 @@ def test_the_equations_of_a_known_system_are_found(model):
             if c:
                 terms[name, tuple(int(p) for p in powers)] = c * size / np.prod(scale**powers)
     expected = {
-        ("u", (2, 0, 0, 0, 0)): -0.02, ("u", (0, 0, 0, 1, 0)): 0.002, ("v", (0, 1, 0, 0, 0)): -0.2, ("v", (1, 0, 1, 0, 0)): -0.4,
+        ("u", (2, 0, 0, 0, 0)): -0.02, ("u", (0, 0, 0, 1, 0)): 0.002, ("v", (0, 1, 0, 0, 0)): -0.2,
+        ("v", (1, 0, 1, 0, 0)): -0.4,
         ("r", (0, 0, 1, 0, 0)): -0.1, ("r", (1, 0, 0, 0, 1)): 0.01,
     }  # fmt: skip
     assert terms.keys() == expected.keys()
@@ -82,7 +86,9 @@ def test_a_run_that_diverges_is_nan_from_there_on_and_the_others_are_not(model, 
     s0[2, 3] = -12.0  # astern, its quadratic drag drives it on
     S = model.predict(s0, batch.U)
     assert np.isnan(S[2, -1, :6]).all()
-    assert (np.nanmax(np.abs(S[2, :, 3:6]), axis=0) <= 10.0 * model._found["largest"]).all(), "beyond ten times the data nothing is predicted"
+    assert (np.nanmax(np.abs(S[2, :, 3:6]), axis=0) <= 10.0 * model._found["largest"]).all(), (
+        "beyond ten times the data nothing is predicted"
+    )
     assert np.isfinite(np.delete(S, 2, axis=0)).all()
 
 
@@ -94,13 +100,17 @@ def test_measured_wind_is_seen_from_the_ship():
     batch, turned = data.batch(), data.batch().U.copy()
     turned[..., 5] += 1.2
     moved = model.predict(move_frame(batch.s0, np.zeros(2), 1.2), turned)
-    np.testing.assert_allclose(moved, move_frame(model.predict(batch.s0, batch.U), np.zeros(2), 1.2), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(
+        moved, move_frame(model.predict(batch.s0, batch.U), np.zeros(2), 1.2), rtol=1e-6, atol=1e-6
+    )
 
 
 def test_smoothed_derivatives_bear_noise_better(known):
     rng = np.random.default_rng(1)
     noise = np.array([0, 0, 0, 0.02, 0.005, 0.0005, 0, 0, 0, 0])
-    noisy = known.with_runs(Run(r.id, r.t, r.states + noise * rng.standard_normal(r.states.shape), r.inputs) for r in known.runs[:5])
+    noisy = known.with_runs(
+        Run(r.id, r.t, r.states + noise * rng.standard_normal(r.states.shape), r.inputs) for r in known.runs[:5]
+    )
     batch = known.subset([5]).batch()
     errors = []
     for spec in ("pysindy", "pysindy[derivative=smoothed]"):

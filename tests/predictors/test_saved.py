@@ -1,4 +1,5 @@
-"""Saved models: a damaged one, or one used on other data than it was made for, is one message; what is not fitted says so."""
+"""Saved models: a damaged one, or one used on other data than it was made for, is one message; what is not fitted says
+so."""
 
 from __future__ import annotations
 
@@ -16,14 +17,17 @@ from shipbench.errors import InputError
 from shipbench.predictors._saved import _digest
 from shipbench.predictors.base import make_predictor, parse_spec
 
-SMALL = {"hold": "hold", "physics": "physics[iterations=1]", "mlp": "mlp[hidden=4,epochs=1]", "lstm": "lstm[hidden=4,epochs=1]",
+SMALL = {"hold": "hold", "physics": "physics[iterations=1]", "mlp": "mlp[hidden=4,epochs=1]",
+    "lstm": "lstm[hidden=4,epochs=1]",
          "neural_ode": "neural_ode[hidden=4,epochs=1]"}  # fmt: skip
 
 
 @pytest.fixture(scope="session")
 def fitted(harbour):
     few = harbour.subset(range(4))
-    return {name: make_predictor(parse_spec(text)).fit(few, harbour.subset([4]), seed=0) for name, text in SMALL.items()}
+    return {
+        name: make_predictor(parse_spec(text)).fit(few, harbour.subset([4]), seed=0) for name, text in SMALL.items()
+    }
 
 
 @pytest.fixture
@@ -42,7 +46,9 @@ def _signed_anew(folder, change_meta=lambda meta: meta, change_arrays=lambda arr
         arrays = change_arrays({k: file[k] for k in file.files})
     np.savez(folder / "arrays.npz", **arrays)
     meta = change_meta({k: v for k, v in meta.items() if k != "digest"})
-    (folder / "model.json").write_text(json.dumps({**meta, "digest": _digest(meta, (folder / "arrays.npz").read_bytes())}))
+    (folder / "model.json").write_text(
+        json.dumps({**meta, "digest": _digest(meta, (folder / "arrays.npz").read_bytes())})
+    )
 
 
 def _refused(folder):
@@ -50,7 +56,10 @@ def _refused(folder):
         make_predictor(parse_spec(str(folder)))
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "3", '{"predictor": ["hold"]}', '{"predictor": "hold", "params": 3}', "[" * 100_000, "\udcff"])
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", "3", '{"predictor": ["hold"]}', '{"predictor": "hold", "params": 3}', "[" * 100_000, "\udcff"],
+)
 def test_a_damaged_description_is_one_message(saved, text):
     folder = saved("hold")
     (folder / "model.json").write_text(text, errors="surrogateescape")
@@ -85,13 +94,18 @@ def test_arrays_of_another_shape_are_refused_on_load(saved, name):
     for array in names:
         for change in (lambda a: a.ravel()[:-1], lambda a: np.array(["x"])):
             folder = saved(name)
-            _signed_anew(folder, change_arrays=lambda arrays, array=array, change=change: {**arrays, array: change(arrays[array])})
+            _signed_anew(
+                folder,
+                change_arrays=lambda arrays, array=array, change=change: {**arrays, array: change(arrays[array])},
+            )
             if name == "neural_ode" and array == "p" and change(np.zeros(2)).dtype.kind == "f":
                 continue  # taken from the physics beneath
             _refused(folder)
 
 
-@pytest.mark.parametrize(("key", "value"), [("hidden", 10**9), ("hidden", -1), ("hidden", "x"), ("layers", 10**9), ("no_such", 1)])
+@pytest.mark.parametrize(
+    ("key", "value"), [("hidden", 10**9), ("hidden", -1), ("hidden", "x"), ("layers", 10**9), ("no_such", 1)]
+)
 def test_parameters_that_do_not_fit_the_arrays_are_refused_on_load(saved, key, value):
     folder = saved("mlp")
     _signed_anew(folder, change_meta=lambda meta: {**meta, "params": {**meta["params"], key: value}})
@@ -128,25 +142,34 @@ def test_a_model_saved_before_its_origin_was_kept_refuses_another_sample_time_to
 
 def test_other_channels_are_refused(saved, harbour):
     names = (*harbour.inputs, "depth")
-    runs = [replace(r, inputs=np.column_stack([r.inputs, np.full(len(r), 20.0)]), inputs_names=names) for r in harbour.runs]
+    runs = [
+        replace(r, inputs=np.column_stack([r.inputs, np.full(len(r), 20.0)]), inputs_names=names) for r in harbour.runs
+    ]
     with pytest.raises(InputError, match=r"the model uses the inputs n_c, delta_c, F_b_c, F_s_c; data set .* depth"):
         predict_runs(str(saved("mlp")), harbour.with_runs(runs))
 
 
 def test_a_study_refuses_another_sample_time_before_it_writes_anything(saved, harbour, tmp_path):
     write_dataset(_resampled(harbour, 0.5), tmp_path / "half")
-    task = make_task({"dataset": str(tmp_path / "half"), "models": ["hold", str(saved("hold"))], "horizon_s": 10.0, "folds": 2})
+    task = make_task(
+        {"dataset": str(tmp_path / "half"), "models": ["hold", str(saved("hold"))], "horizon_s": 10.0, "folds": 2}
+    )
     with pytest.raises(InputError, match=r"steps 1 s; .* sampled at 0.5 s"):
         run_tasks([task], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
 def test_another_ship_is_told_in_the_study_and_on_the_terminal(saved, harbour, tmp_path, caplog):
-    longer = replace(harbour.subset(range(4)), ship=harbour.ship.model_copy(update={"L": 1.05 * harbour.ship.L, "name": "long"}))
+    longer = replace(
+        harbour.subset(range(4)), ship=harbour.ship.model_copy(update={"L": 1.05 * harbour.ship.L, "name": "long"})
+    )
     write_dataset(longer, tmp_path / "long")
     task = make_task({"dataset": str(tmp_path / "long"), "models": [str(saved("hold"))], "horizon_s": 10.0, "folds": 2})
     outcome = run_tasks([task], tmp_path / "out")
-    told = f"fitted on ship '{harbour.ship.name}'; these data are of another: L = {1.05 * harbour.ship.L:.4g} m (model: {harbour.ship.L:.4g})"
+    told = (
+        f"fitted on ship '{harbour.ship.name}'; these data are of another: L = {1.05 * harbour.ship.L:.4g} m "
+        f"(model: {harbour.ship.L:.4g})"
+    )
     assert told in caplog.text
     assert any(told in note for note in outcome.summaries[0]["notes"])
 

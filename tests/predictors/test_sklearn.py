@@ -28,10 +28,17 @@ def batch(harbour):
 
 
 @pytest.mark.parametrize(
-    "spec", ["sklearn:Ridge", "sklearn:HistGradientBoostingRegressor[max_iter=10]", "sklearn:SVR", "sklearn:Ridge[target=state]"]
+    "spec",
+    [
+        "sklearn:Ridge",
+        "sklearn:HistGradientBoostingRegressor[max_iter=10]",
+        "sklearn:SVR",
+        "sklearn:Ridge[target=state]",
+    ],
 )
 def test_it_learns_the_next_state(harbour, batch, spec):
-    """One step ahead it beats the mean of the training data by far; regressors with one output (SVR, gradient boosting) are fitted per channel."""
+    """One step ahead it beats the mean of the training data by far; regressors with one output (SVR, gradient boosting)
+    are fitted per channel."""
     S = fitted(spec, harbour).predict(batch.s0, batch.U[:, :1])
     spread = np.stack([r.states for r in harbour.runs])[..., 3:8].std((0, 1))
     error = np.sqrt(np.mean((S[:, 0, 3:8] - batch.truth[:, 0, 3:8]) ** 2, axis=0))
@@ -46,7 +53,9 @@ def test_ridge_is_the_closed_form(harbour):
     z = np.concatenate([r.states[1:, 5] - r.states[:-1, 5] for r in harbour.runs[:12]])
     X = (x - x.mean(0)) / x.std(0)
     w = np.linalg.solve(X.T @ X + 2.0 * np.eye(X.shape[1]), X.T @ (z - z.mean()) / z.std())
-    assert model.predict(S[7, :], harbour.runs[0].inputs[7:8])[0, 5] == pytest.approx(S[7, 5] + z.mean() + z.std() * X[7] @ w, rel=1e-6)
+    assert model.predict(S[7, :], harbour.runs[0].inputs[7:8])[0, 5] == pytest.approx(
+        S[7, 5] + z.mean() + z.std() * X[7] @ w, rel=1e-6
+    )
 
 
 def test_the_seed_is_its_random_state_unless_the_spec_sets_one(harbour, batch):

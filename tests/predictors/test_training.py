@@ -21,7 +21,15 @@ from shipbench.predictors.networks.stacked import (
     trapezoid_pose,
     with_valid,
 )
-from shipbench.predictors.networks.training import BestWeights, Chunk, Recipe, StackedTask, clip_members, epochs_of_samples, train
+from shipbench.predictors.networks.training import (
+    BestWeights,
+    Chunk,
+    Recipe,
+    StackedTask,
+    clip_members,
+    epochs_of_samples,
+    train,
+)
 from shipbench.signals import COMMANDS, PSI, U, V
 
 
@@ -116,7 +124,11 @@ def test_training_stops_when_the_last_member_has_stopped_and_restores_its_best()
 
 def test_training_is_quiet_writes_nothing_and_leaves_the_global_state(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
-    before, level, threads = torch.random.get_rng_state(), logging.getLogger("lightning.pytorch").level, torch.get_num_threads()
+    before, level, threads = (
+        torch.random.get_rng_state(),
+        logging.getLogger("lightning.pytorch").level,
+        torch.get_num_threads(),
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         task = Line([1.0])

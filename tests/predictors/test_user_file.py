@@ -36,11 +36,14 @@ def test_the_code_of_a_model_is_its_file_and_what_it_imports_of_the_users_own(tm
     with file.open("a") as f:
         f.write("import json, numpy, kit.used\n")
     code = (
-        "import sys; from pathlib import Path; from shipbench.predictors._user_file import class_from_file, code_of; p = Path(sys.argv[1]);"
+        "import sys; from pathlib import Path; from shipbench.predictors._user_file import class_from_file, "
+        "code_of; p = Path(sys.argv[1]);"
         "class_from_file(p, 'Model'); print(*code_of(p))"
     )
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([*filter(None, sys.path), str(tmp_path / "elsewhere")])}
-    done = subprocess.run([sys.executable, "-P", "-c", code, str(file)], capture_output=True, text=True, check=True, env=environment)
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code, str(file)], capture_output=True, text=True, check=True, env=environment
+    )
     assert done.stdout.split() == ["helpers_of_test.py", "kit/__init__.py", "kit/later.py", "kit/used.py", "model.py"]
 
 

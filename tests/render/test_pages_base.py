@@ -31,7 +31,13 @@ def test_packed_values_are_steps_from_the_last_finite_one():
 def test_a_page_has_one_header_and_escapes_what_it_is_given(tmp_path):
     (tmp_path / "p.html.j2").write_text('{% extends "base.html.j2" %}{% block content %}{{ word }}{% endblock %}')
     hostile = "<img src=x>"
-    made = {"title": hostile, "dataset": hostile, "command": hostile, "tiles": [Tile(hostile, hostile, hostile)], "word": hostile}
+    made = {
+        "title": hostile,
+        "dataset": hostile,
+        "command": hostile,
+        "tiles": [Tile(hostile, hostile, hostile)],
+        "word": hostile,
+    }
     text = render_page("p.html.j2", folder=tmp_path, **made)
     assert "<img" not in text
     assert text.count("&lt;img") == 8  # title twice, data set, command, tile, word

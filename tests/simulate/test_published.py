@@ -1,4 +1,5 @@
-"""Ships of the literature: the same to port and starboard, carried by a uniform current, and deaf to what their equations do not have."""
+"""Ships of the literature: the same to port and starboard, carried by a uniform current, and deaf to what their
+equations do not have."""
 
 from __future__ import annotations
 
@@ -44,9 +45,15 @@ def test_a_uniform_current_carries_the_ship_and_changes_nothing_else(ship):
     areas = Wind(frontal_area=1e-12, lateral_area=1e-12)
     bare = replace(ship, particulars=ship.particulars.model_copy(update={"wind": areas}))
     rng, north, east, no_wind = np.random.default_rng(1), 0.4, -0.3, np.zeros((4, 2))
-    psi, u, odd = rng.uniform(-3.0, 3.0, 4), ship.cruise * rng.uniform(0.8, 1.0, 4), 0.01 * rng.standard_normal((2 + ship.more, 4))
+    psi, u, odd = (
+        rng.uniform(-3.0, 3.0, 4),
+        ship.cruise * rng.uniform(0.8, 1.0, 4),
+        0.01 * rng.standard_normal((2 + ship.more, 4)),
+    )
     u_c, v_c = north * np.cos(psi) + east * np.sin(psi), -north * np.sin(psi) + east * np.cos(psi)
-    actuators = np.stack([np.full(4, rpm_at(ship, ship.cruise)), rng.uniform(-0.4, 0.4, 4), np.zeros(4), np.zeros(4)], axis=-1)
+    actuators = np.stack(
+        [np.full(4, rpm_at(ship, ship.cruise)), rng.uniform(-0.4, 0.4, 4), np.zeros(4), np.zeros(4)], axis=-1
+    )
     place = np.zeros((2, 4))
     still = _rates(bare, (), (*place, psi, u, *odd), actuators, no_wind, 0.0)
     hidden = (Hidden(EFFECTS.get("current"), (north, east)),)
@@ -59,5 +66,9 @@ def test_a_uniform_current_carries_the_ship_and_changes_nothing_else(ship):
 
 
 def test_what_the_equations_do_not_have_is_refused_by_name():
-    with pytest.raises(InputError, match=r"effect 'race_gain' changes 'race'.*accepted: effects that act through u_c, v_c"):
-        published_trials(PUBLISHED["tanker"], 5, (Hidden(EFFECTS.get("race_gain"), (0.2,)),), Trials(runs=2, samples=20))
+    with pytest.raises(
+        InputError, match=r"effect 'race_gain' changes 'race'.*accepted: effects that act through u_c, v_c"
+    ):
+        published_trials(
+            PUBLISHED["tanker"], 5, (Hidden(EFFECTS.get("race_gain"), (0.2,)),), Trials(runs=2, samples=20)
+        )

@@ -67,7 +67,9 @@ def test_a_batch_is_the_loop_over_its_runs():
     s0, U = _random_runs(5)
     together = sim.rollout(s0, U, 1.0)
     for i in range(5):
-        np.testing.assert_allclose(sim.rollout(s0[i : i + 1], U[i : i + 1], 1.0)[0], together[i], rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(
+            sim.rollout(s0[i : i + 1], U[i : i + 1], 1.0)[0], together[i], rtol=1e-12, atol=1e-12
+        )
 
 
 def test_two_halves_are_one_whole():
@@ -104,7 +106,12 @@ def test_shallow_water_widens_the_turn():
 
 def test_a_beam_wind_sets_the_ship_to_leeward():
     sim = Simulator(load_mmg_ship("container130"))
-    end = sim.rollout(straight_state(3.7, 93.0), np.tile([93.0, 0, 0, 0], (1, 60, 1)), 1.0, Environment(wind_speed=10.0, wind_from=np.pi / 2))[0, -1]
+    end = sim.rollout(
+        straight_state(3.7, 93.0),
+        np.tile([93.0, 0, 0, 0], (1, 60, 1)),
+        1.0,
+        Environment(wind_speed=10.0, wind_from=np.pi / 2),
+    )[0, -1]
     assert end[4] < 0
 
 
@@ -138,7 +145,9 @@ def test_the_fast_rollout_has_the_numbers_of_the_ordinary_one(name):
     env = Environment(rng.uniform(0.0, 0.5, 9), 1.0, rng.uniform(0.0, 8.0, 9), 2.0)
     sim = Simulator(ship, 0.5)
     for around in (env, Environment()):
-        np.testing.assert_allclose(sim.fast_rollout(s0, U, 1.0, around), sim.rollout(s0, U, 1.0, around), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(
+            sim.fast_rollout(s0, U, 1.0, around), sim.rollout(s0, U, 1.0, around), rtol=1e-9, atol=1e-9
+        )
 
 
 def test_the_fast_rollout_refuses_shallow_water():

@@ -12,7 +12,9 @@ from shipbench.simulate.trials import STANDARD, Trials, sea_trials
 
 @pytest.fixture(scope="module")
 def trials():
-    return sea_trials(load_mmg_ship("container130"), 3, (), Trials(runs=10, samples=300, noise=0.0, gusts=0.0, standard=True)).runs
+    return sea_trials(
+        load_mmg_ship("container130"), 3, (), Trials(runs=10, samples=300, noise=0.0, gusts=0.0, standard=True)
+    ).runs
 
 
 def test_a_turn_goes_to_the_side_of_its_rudder_and_a_zig_zag_to_both(trials):

@@ -18,7 +18,8 @@ class BargeAlongside(Effect):
     separate = "turns to both sides at several speeds"
 
     def force(self, e: Any, s: Any, q: Sequence[Any], ship: Any) -> None:
-        """Drag coefficient q[0] on rho/2 L T, at the speed through the water. `e` collects forces, `s` is the motion at an instant.
+        """Drag coefficient q[0] on rho/2 L T, at the speed through the water. `e` collects forces, `s` is the motion at
+        an instant.
 
         Plain arithmetic only (and the functions of shipbench.ops): the same lines run on numpy, torch and casadi.
         """

@@ -1,4 +1,5 @@
-"""Twelve simulated manoeuvres of a 130 m container ship with a barge alongside, with sensor noise; no file says that it is there."""
+"""Twelve simulated manoeuvres of a 130 m container ship with a barge alongside, with sensor noise; no file says that it
+is there."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ from .barge_alongside import EFFECT
 
 
 def make(drag: float = 0.05, seed: int = 1) -> Dataset:
-    """Any function that returns a `Dataset` in SI and shipbench's signs will do; data of your own are read from files here.
+    """Any function that returns a `Dataset` in SI and shipbench's signs will do; data of your own are read from files
+    here.
 
     Its arguments are parameters of the data set: `barge_trial[drag=0.02]`.
     """
@@ -21,4 +23,6 @@ def make(drag: float = 0.05, seed: int = 1) -> Dataset:
 
 
 # name (that of the entry point), one line, licence, function, and whether shipbench keeps what the function made
-DATASET = DatasetPart("barge_trial", "12 simulated manoeuvres with a barge alongside, 60 s at 1 s, sensor noise", "MIT", make, cached=True)
+DATASET = DatasetPart(
+    "barge_trial", "12 simulated manoeuvres with a barge alongside, 60 s at 1 s, sensor noise", "MIT", make, cached=True
+)

@@ -34,10 +34,13 @@ class Nomoto(PredictorBase):
         self.yaw = np.linalg.lstsq(self._yaw_terms(before), change[:, 5], rcond=None)[0]
         self.surge = np.linalg.lstsq(self._surge_terms(before), change[:, 3], rcond=None)[0]
         self.drift = np.array([(v * r).sum() / max((r * r).sum(), 1e-12)])
-        # Share of the way to its command that each actuator goes in one sample; an actuator that never moves goes all the way.
+        # Share of the way to its command that each actuator goes in one sample; an actuator that never moves goes all
+        # the way.
         gap, moved = command - before[:, 6:], after[:, 6:] - before[:, 6:]
         size = (gap * gap).sum(axis=0)
-        self.follow = np.clip(np.where(size > 0, (gap * moved).sum(axis=0) / np.where(size > 0, size, 1.0), 1.0), 0.0, 1.0)
+        self.follow = np.clip(
+            np.where(size > 0, (gap * moved).sum(axis=0) / np.where(size > 0, size, 1.0), 1.0), 0.0, 1.0
+        )
         return self
 
     def _yaw_terms(self, S: np.ndarray) -> np.ndarray:
@@ -49,7 +52,8 @@ class Nomoto(PredictorBase):
         return np.stack([np.ones(len(S)), S[:, 3], S[:, 6]], axis=1)
 
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: Any) -> np.ndarray:
-        """s0 (batch, 10), U (batch, K, inputs) -> S (batch, K, 10); S[:, k] is the state at the end of step k, s0 is not in it."""
+        """s0 (batch, 10), U (batch, K, inputs) -> S (batch, K, 10); S[:, k] is the state at the end of step k, s0 is
+        not in it."""
         S, now = np.empty((*U.shape[:2], 10)), s0
         for k in range(U.shape[1]):
             after = now.copy()

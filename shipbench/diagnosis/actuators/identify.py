@@ -1,4 +1,5 @@
-"""Causes between command and actuator, looked for where both are recorded: every actuator alone, without the ship's motion."""
+"""Causes between command and actuator, looked for where both are recorded: every actuator alone, without the ship's
+motion."""
 
 from __future__ import annotations
 
@@ -26,8 +27,8 @@ _SCAN, _STEP, _PARTS = (4, 12, 24), 0.02, 4
 
 
 def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear], list[RecordError]]:
-    """Findings of every actuator that moves, best first, the best ordinary gears, and what the records err by; nothing where only commands are
-    recorded (those that the motion was fitted with)."""
+    """Findings of every actuator that moves, best first, the best ordinary gears, and what the records err by; nothing
+    where only commands are recorded (those that the motion was fitted with)."""
     if plant.seg.commanded:
         return [], plant.ordinary, []
     seg, gears = plant.long, ordinary_gears(plant.c.L)
@@ -48,8 +49,8 @@ def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear], lis
 
 @dataclass(frozen=True)
 class _Record:
-    """Commands (P, K) and positions (P, K + 1) of one actuator over P pieces; judged (P, K): real samples, after the longest delay looked for:
-    what was ordered before the record began is not known."""
+    """Commands (P, K) and positions (P, K + 1) of one actuator over P pieces; judged (P, K): real samples, after the
+    longest delay looked for: what was ordered before the record began is not known."""
 
     name: str
     scale: float
@@ -65,10 +66,20 @@ class _Record:
         scale, (b, c) = (L / 130.0) ** 0.5, picked.T
         longest = min(THRESHOLDS.value("longest_delay") * scale, 0.25 * seg.states.shape[1] * seg.dt)
         late = np.arange(seg.states.shape[1] - 1) * seg.dt >= longest
-        return cls(name, scale, seg.dt, seg.commands[b, :-1, c], seg.states[b, :, 6 + c], seg.mask[b, 1:] & late, seg.run[b], seg.runs)
+        return cls(
+            name,
+            scale,
+            seg.dt,
+            seg.commands[b, :-1, c],
+            seg.states[b, :, 6 + c],
+            seg.mask[b, 1:] & late,
+            seg.run[b],
+            seg.runs,
+        )
 
     def paths(self, z: np.ndarray, kind: Kind | None) -> np.ndarray:
-        """Positions (M, P, K) that M gears would give; z (M, values): logarithms of time constant, rate[, the value of `kind`]."""
+        """Positions (M, P, K) that M gears would give; z (M, values): logarithms of time constant, rate[, the value of
+        `kind`]."""
         code = _follower(kind and kind.field)
         if code is not None:
             return np.swapaxes(self._followed(code, z, kind, self.command.shape[1])[..., 1], 1, 2)
@@ -93,7 +104,8 @@ class _Record:
         return np.concatenate([np.sum(self.errors(part, kind) ** 2, axis=(1, 2)) for part in parts])
 
     def _followed(self, code: Lanes, z: np.ndarray, kind: Kind | None, kept: int) -> np.ndarray:
-        """Motor, position and sum of squared errors so far, (M, kept, P, 3): at every sample or, if 1 is kept, at the end."""
+        """Motor, position and sum of squared errors so far, (M, kept, P, 3): at every sample or, if 1 is kept, at the
+        end."""
         (P, K), values = self.command.shape, np.exp(z)
         whole = np.zeros(len(z), dtype=int)
         if kind is not None and kind.field == "delay":
@@ -105,9 +117,17 @@ class _Record:
         start = np.stack([self.measured[:, 0], self.measured[:, 0], np.zeros(P)], axis=-1)[:, None]
         for late in np.unique(whole):
             rows, first = np.flatnonzero(whole == late), most - late
-            record = np.stack([held[:, first : first + K], held[:, first - 1 : first - 1 + K], self.measured[:, 1:], self.judged], axis=-1)
+            record = np.stack(
+                [held[:, first : first + K], held[:, first - 1 : first - 1 + K], self.measured[:, 1:], self.judged],
+                axis=-1,
+            )
             found = np.empty((len(rows), kept, P, 3))
-            bundles = [start, values[rows, None, None, None], np.array([self.dt]), np.swapaxes(record, 0, 1)[:, :, None]]
+            bundles = [
+                start,
+                values[rows, None, None, None],
+                np.array([self.dt]),
+                np.swapaxes(record, 0, 1)[:, :, None],
+            ]
             code(bundles, (len(rows), K, P, 1), found, carried=True)
             out[rows] = found
         return out
@@ -115,8 +135,8 @@ class _Record:
     def findings(self, usual: Gear) -> tuple[list[GearFinding], Gear, RecordError | None]:
         """Every effect beside the best ordinary gear, that gear, and what the record errs by.
 
-        Of an actuator whose record reads too little it seems that it stays short of its commands, as with a deadband: where an error of the record
-        explains more than every effect, they are judged without it.
+        Of an actuator whose record reads too little it seems that it stays short of its commands, as with a deadband:
+        where an error of the record explains more than every effect, they are judged without it.
         """
         found, ordinary, error = self._judged(usual)
         if error is None:
@@ -127,8 +147,8 @@ class _Record:
     def _judged(self, usual: Gear) -> tuple[list[GearFinding], Gear, RecordError | None]:
         """Findings of the record as it is, with an error that explains more than every effect.
 
-        Two stages look like a delay, end stops like an error: they are fitted only where something is to be explained, since that takes as long as
-        all the others.
+        Two stages look like a delay, end stops like an error: they are fitted only where something is to be explained,
+        since that takes as long as all the others.
         """
         kinds = kinds_of(self.name, self.scale, float(np.percentile(np.abs(self.command), 98)), usual)
         asked = THRESHOLDS.value("actuator_evidence")
@@ -148,7 +168,10 @@ class _Record:
         for _ in range(3 if error.score > THRESHOLDS.value("record_error_promising") * least else 0):
             z = replace(self, measured=error.taken_out(self.measured))._fitted(second, [ordinary, *fits])
             error = self._misread(z, second, plain)
-        worth, record = max((self._ended(fit, kind, before) for fit, kind in zip((ordinary, *fits), (None, *kinds), strict=True)), key=lambda x: x[0])
+        worth, record = max(
+            (self._ended(fit, kind, before) for fit, kind in zip((ordinary, *fits), (None, *kinds), strict=True)),
+            key=lambda x: x[0],
+        )
         if worth > max(least, error.score):
             return record._judged(usual)
         return found, gear, error if error.score > least else None
@@ -162,7 +185,9 @@ class _Record:
 
         most, record = float(np.max(np.abs(self.command))), self
         for _ in range(2):
-            best = minimize_scalar(lambda limit, z=z: ended(limit).costs(z[None], kind)[0], bounds=(0.2 * most, most), method="bounded")
+            best = minimize_scalar(
+                lambda limit, z=z: ended(limit).costs(z[None], kind)[0], bounds=(0.2 * most, most), method="bounded"
+            )
             record = ended(float(best.x))
             if self._worth(float(self.costs(z[None], kind)[0]), record.errors(z[None], kind)[0], 1) < 0.0:
                 return -np.inf, self
@@ -183,10 +208,14 @@ class _Record:
     def _worth(self, before: float, rest: np.ndarray, values: int) -> float:
         """Score of `values` more values that leave `rest` (P, K) of errors whose squares were `before` together."""
         samples, after = float(self.judged.sum()), max(float(np.sum(rest**2)), 1e-300)
-        return float(samples * _discount(rest) * np.log(max(before, 1e-300) / after) - values * np.log(10.0 * len(np.unique(self.run))))
+        return float(
+            samples * _discount(rest) * np.log(max(before, 1e-300) / after)
+            - values * np.log(10.0 * len(np.unique(self.run)))
+        )
 
     def _fitted(self, kind: Kind | None, near: Sequence[np.ndarray] = ()) -> np.ndarray:
-        """Logarithms of the time constant, the rate[, the value of `kind`] of the best gear; near: gears like whose first two it may be."""
+        """Logarithms of the time constant, the rate[, the value of `kind`] of the best gear; near: gears like whose
+        first two it may be."""
         span = float(np.percentile(np.abs(self.command), 98))
         rate = max(least_rate(self.name, self.scale), 0.01 * span / self.scale)
         most = max(10.0 * span / self.dt, 2.0 * rate)
@@ -222,14 +251,19 @@ class _Record:
         return Kind("", "T2", 0.02 * self.scale, longest)
 
     def _detectable(self, kind: Kind, ordinary: np.ndarray, plain: np.ndarray) -> float:
-        """Size from which `kind` is expected to be found on a gear that is like the `ordinary` one otherwise, whose errors are `plain`: what its time
-        constant, rate and a second stage cannot take up as well is seen. NaN beyond the bounds."""
+        """Size from which `kind` is expected to be found on a gear that is like the `ordinary` one otherwise, whose
+        errors are `plain`: what its time constant, rate and a second stage cannot take up as well is seen. NaN beyond
+        the bounds."""
         least, most = (kind.high, kind.low) if kind.field == "rate" else (kind.low, kind.high)
         begins = ordinary if kind.at == 2 else kind.like(ordinary, least)
         free = _STEP * np.eye(2)[[at for at in (0, 1) if at != kind.at]]
         at_first, squares = self.errors(begins[None], None).ravel(), max(float(np.sum(plain**2)), 1e-300)
-        stages = self.errors(np.stack([self._second.like(begins, part * self._second.low) for part in (1.0, 5.0)]), self._second)
-        slopes = np.concatenate([self.errors(begins + free, None) - self.errors(begins - free, None), np.diff(stages, axis=0)])
+        stages = self.errors(
+            np.stack([self._second.like(begins, part * self._second.low) for part in (1.0, 5.0)]), self._second
+        )
+        slopes = np.concatenate(
+            [self.errors(begins + free, None) - self.errors(begins - free, None), np.diff(stages, axis=0)]
+        )
         slopes = slopes.reshape(len(slopes), -1).T
 
         def is_seen(size: float) -> bool:
@@ -279,8 +313,9 @@ def _discount(rest: np.ndarray) -> float:
 
 @cache
 def _follower(field: str | None) -> Lanes | None:
-    """Machine code of a sample of `gear_step`: motor, position, cost; time constant, rate[, value of `field`, of a delay the part of a sample]; dt;
-    command, the one before it, record, whether it is judged. None where there is no compiler."""
+    """Machine code of a sample of `gear_step`: motor, position, cost; time constant, rate[, value of `field`, of a
+    delay the part of a sample]; dt; command, the one before it, record, whether it is judged. None where there is no
+    compiler."""
     import casadi as ca
 
     from ...compiled import Lanes
@@ -288,7 +323,9 @@ def _follower(field: str | None) -> Lanes | None:
     beside = field if field not in ("T", "rate") else None
     sizes = {"state": 3, "values": 2 + (beside is not None), "dt": 1, "record": 4}
     whole = [ca.SX.sym(name, num) for name, num in sizes.items()]
-    (motor, position, cost), (T, rate, *value), (dt,), (now, before, measured, judged) = (ca.vertsplit(v) for v in whole)
+    (motor, position, cost), (T, rate, *value), (dt,), (now, before, measured, judged) = (
+        ca.vertsplit(v) for v in whole
+    )
     gear, wanted = Gear(T, rate), [(now, dt)]
     if beside == "delay":
         wanted = [(before, value[0] * dt), (now, (1.0 - value[0]) * dt)]

@@ -32,9 +32,9 @@ ORDINARY = {
 
 @dataclass(frozen=True)
 class GearFinding:
-    """An effect of a gear. score: 2 log likelihood ratio against the best ordinary gear, of one stage or two, samples discounted for their
-    correlation, less log(10 N) for the added value; value: of the effect's parameter, ci95; per_run (N,); detectable: the smallest value (of a rate
-    the greatest) that is expected to be found, NaN for none."""
+    """An effect of a gear. score: 2 log likelihood ratio against the best ordinary gear, of one stage or two, samples
+    discounted for their correlation, less log(10 N) for the added value; value: of the effect's parameter, ci95;
+    per_run (N,); detectable: the smallest value (of a rate the greatest) that is expected to be found, NaN for none."""
 
     effect: str
     score: float
@@ -48,7 +48,8 @@ class GearFinding:
 
 @dataclass(frozen=True)
 class Kind:
-    """An effect of one actuator: bounds of its value in the gear, and how a gear takes it; `beyond` is subtracted when it is reported."""
+    """An effect of one actuator: bounds of its value in the gear, and how a gear takes it; `beyond` is subtracted when
+    it is reported."""
 
     effect: str
     field: str
@@ -93,5 +94,7 @@ def kinds_of(actuator: str, scale: float, span: float, ordinary: Gear) -> list[K
         "delay": (0.15 * scale, THRESHOLDS.value("longest_delay") * scale),
         "deadband": (0.004 * span, 0.3 * span), "backlash": (0.004 * span, 0.3 * span),
     }  # fmt: skip
-    found = [e for e in map(EFFECTS.get, EFFECTS.names()) if any(channel.startswith(actuator) for channel in e.acts_through)]
+    found = [
+        e for e in map(EFFECTS.get, EFFECTS.names()) if any(channel.startswith(actuator) for channel in e.acts_through)
+    ]
     return [Kind(e.name, name, *bounds[name]) for name in bounds for e in found if e.traits.gear_field == name]

@@ -26,8 +26,9 @@ class RecordError:
 
     Such are a calibration error and a sensor that is not linear.
 
-    score: 2 log likelihood ratio, as of a gear's effects; size: root mean square without the zero error, relative to that of the record; factors
-    (4,): of `readings`; worth: log evidence of the motion for the record without it (where negative, the gear does not go where it is sent).
+    score: 2 log likelihood ratio, as of a gear's effects; size: root mean square without the zero error, relative to
+    that of the record; factors (4,): of `readings`; worth: log evidence of the motion for the record without it (where
+    negative, the gear does not go where it is sent).
     """
 
     actuator: str

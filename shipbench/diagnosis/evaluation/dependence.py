@@ -14,7 +14,8 @@ from ..thresholds import THRESHOLDS
 
 AXES = ("surge", "sway", "yaw")
 UNITS = {
-    "heading": "deg", "speed": "m/s", "drift angle": "deg", "rudder": "deg", "yaw rate": "deg/s", "revolutions": "rpm", "bow thruster": "kN",
+    "heading": "deg", "speed": "m/s", "drift angle": "deg", "rudder": "deg", "yaw rate": "deg/s", "revolutions": "rpm",
+    "bow thruster": "kN",
     "stern thruster": "kN", "time": "s", "run": "",
 }  # fmt: skip
 _SURROGATES, _GRID = 199, 181
@@ -22,7 +23,8 @@ _SURROGATES, _GRID = 199, 181
 
 
 class Follows(NamedTuple):
-    """One variable against the force of one axis. share: of the variance, less what chance takes; p: of the best of all variables by chance."""
+    """One variable against the force of one axis. share: of the variance, less what chance takes; p: of the best of all
+    variables by chance."""
 
     variable: str
     share: float
@@ -30,8 +32,8 @@ class Follows(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """The fitted curve: x in the variable's unit, y and its band (two standard errors, clustered by run) in the force's unit; NaN at headings that
-    nobody sailed."""
+    """The fitted curve: x in the variable's unit, y and its band (two standard errors, clustered by run) in the force's
+    unit; NaN at headings that nobody sailed."""
 
     x: np.ndarray
     y: np.ndarray
@@ -45,8 +47,10 @@ def variables(trace: Trace) -> dict[str, np.ndarray]:
     n, delta, F_b, F_s = np.moveaxis(trace.inputs, -1, 0)
     here = np.where(np.isfinite(u), 1.0, np.nan)
     found = {
-        "heading": np.rad2deg(psi) % 360.0, "speed": np.hypot(u, v), "drift angle": np.rad2deg(np.arctan2(-v, np.maximum(np.abs(u), 0.05))),
-        "rudder": np.rad2deg(delta), "yaw rate": np.rad2deg(r), "revolutions": n, "bow thruster": 1e-3 * F_b, "stern thruster": 1e-3 * F_s,
+        "heading": np.rad2deg(psi) % 360.0, "speed": np.hypot(u, v),
+        "drift angle": np.rad2deg(np.arctan2(-v, np.maximum(np.abs(u), 0.05))),
+        "rudder": np.rad2deg(delta), "yaw rate": np.rad2deg(r), "revolutions": n, "bow thruster": 1e-3 * F_b,
+        "stern thruster": 1e-3 * F_s,
         "time": here * (trace.start[:, None] + trace.t[None, :]), "run": here * trace.run[:, None],
     }  # fmt: skip
     return {k: x for k, x in found.items() if "thruster" not in k or np.any(np.nan_to_num(x))}
@@ -64,7 +68,8 @@ def samples_of(trace: Trace) -> np.ndarray:
 
 
 def basis(name: str, x: np.ndarray, reference: np.ndarray | None = None) -> np.ndarray:
-    """Smooth functions (..., F) of a variable: two harmonics of the heading, else straight pieces between quartiles (of `reference`)."""
+    """Smooth functions (..., F) of a variable: two harmonics of the heading, else straight pieces between quartiles (of
+    `reference`)."""
     if name == "heading":
         psi = np.deg2rad(x)
         return np.stack([f(k * psi) for k in (1, 2) for f in (np.cos, np.sin)], axis=-1)
@@ -78,8 +83,8 @@ def basis(name: str, x: np.ndarray, reference: np.ndarray | None = None) -> np.n
 def follows(trace: Trace, seed: int = 0) -> dict[str, list[Follows]]:
     """Every variable against the force of every axis, greatest share first.
 
-    In the null the runs have each other's force, turned round in time by a random shift: that keeps how the force varies inside a run and between
-    runs, whatever its colour. p counts the best of all variables.
+    In the null the runs have each other's force, turned round in time by a random shift: that keeps how the force
+    varies inside a run and between runs, whatever its colour. p counts the best of all variables.
     """
     values = at_knots(trace)
     y = _centred(trace.force)
@@ -101,13 +106,16 @@ def follows(trace: Trace, seed: int = 0) -> dict[str, list[Follows]]:
     share = np.clip((R2 - mean) / np.maximum(1.0 - mean, 1e-9), 0.0, 1.0)
     z, z_chance = _standardised(R2, chance)
     p = (1 + np.sum(z_chance.max(axis=0)[None] >= z[:, None] - 1e-9, axis=1)) / (1 + chance.shape[1])
-    rows = {axis: [Follows(n, float(share[i, j]), float(p[i, j])) for i, n in enumerate(names)] for j, axis in enumerate(AXES)}
+    rows = {
+        axis: [Follows(n, float(share[i, j]), float(p[i, j])) for i, n in enumerate(names)]
+        for j, axis in enumerate(AXES)
+    }
     return {axis: sorted(found, key=lambda f: -f.share) for axis, found in rows.items()}
 
 
 def _standardised(R2: np.ndarray, chance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Log odds of the shares (V, 3) and of those by chance (V, S, 3), about the mean and over the spread by chance: alike for all variables, so that
-    one greatest value can be taken over them."""
+    """Log odds of the shares (V, 3) and of those by chance (V, S, 3), about the mean and over the spread by chance:
+    alike for all variables, so that one greatest value can be taken over them."""
 
     def odds(x: np.ndarray) -> np.ndarray:
         x = np.clip(x, 1e-6, 1.0 - 1e-6)
@@ -125,7 +133,8 @@ def _centred(force: np.ndarray) -> np.ndarray:
 
 
 def _orthonormal(name: str, x: np.ndarray) -> np.ndarray:
-    """Orthonormal columns (B, J, F) that span the curves of a variable without the constant; zero where it is missing."""
+    """Orthonormal columns (B, J, F) that span the curves of a variable without the constant; zero where it is
+    missing."""
     known = np.isfinite(x)
     if known.sum() < 20:
         return np.zeros((*x.shape, 0))
@@ -153,7 +162,8 @@ def _surrogates(trace: Trace, y: np.ndarray, rng: np.random.Generator) -> np.nda
 
 
 def curve(trace: Trace, axis: int, name: str) -> Curve | None:
-    """Least-squares curve of the force (mean included) over the middle 96 % of the variable; None where there is nothing to fit."""
+    """Least-squares curve of the force (mean included) over the middle 96 % of the variable; None where there is
+    nothing to fit."""
     x, y = at_knots(trace)[name], trace.force[..., axis]
     known = np.isfinite(x) & np.isfinite(y)
     if known.sum() < 20:
@@ -177,7 +187,8 @@ def curve(trace: Trace, axis: int, name: str) -> Curve | None:
 def with_speed(trace: Trace, axis: int, name: str, seed: int = 0) -> float:
     """Ratio of the force's dependence on `name` in the faster half of the samples to that in the slower one.
 
-    One where the runs leave it open (bootstrap over runs, 95 %), where it changes by less than half, or with fewer than 8 runs.
+    One where the runs leave it open (bootstrap over runs, 95 %), where it changes by less than half, or with fewer than
+    8 runs.
     """
     values, known_curve = at_knots(trace), curve(trace, axis, name)
     runs = np.unique(trace.run)

@@ -17,7 +17,8 @@ AXES = ("surge", "sway", "yaw")
 
 
 def force_of_term(found: Fit, index: int) -> dict[str, float]:
-    """Greatest force of the index-th term on the runs, see `_greatest`; empty for what acts on sensors or between command and actuator."""
+    """Greatest force of the index-th term on the runs, see `_greatest`; empty for what acts on sensors or between
+    command and actuator."""
     now = actives(found.plant, found.scales, _point(found))
     if now[index].effect.enters != "force":
         return {}
@@ -35,10 +36,11 @@ def _point(found: Fit) -> Point:
 
 
 def _greatest(found: Fit, without: Sequence[Active], plain_hull: bool = False) -> dict[str, float]:
-    """99th percentile of the magnitude of a cause's force in surge and sway [N] and moment about midship in yaw [N m], over all time steps.
+    """99th percentile of the magnitude of a cause's force in surge and sway [N] and moment about midship in yaw [N m],
+    over all time steps.
 
-    It is the change of the acceleration in the middle of every step, at the estimated motion, when the cause is left out, times the inertia of the
-    plain model. Axes where it stays below what is noticeable are left out.
+    It is the change of the acceleration in the middle of every step, at the estimated motion, when the cause is left
+    out, times the inertia of the plain model. Axes where it stays below what is noticeable are left out.
     """
     plant, point = found.plant, _point(found)
     now = actives(plant, found.scales, point)

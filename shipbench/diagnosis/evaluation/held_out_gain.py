@@ -55,17 +55,19 @@ def rollout_plant(dataset: Dataset, gears: dict[str, Gear]) -> Plant:
 
 
 def plain_base() -> np.ndarray:
-    """Base parameters of eq. (2) alone: the ordinary differences of `Structure` taken out again, so that "before" is the plain physics model."""
+    """Base parameters of eq. (2) alone: the ordinary differences of `Structure` taken out again, so that "before" is
+    the plain physics model."""
     base = np.zeros(NUM_BASE)
     base[len(FREE) + NUM_HULL :] = STRUCTURE.plain()
     return base
 
 
 def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
-    """Least squares of whole rollouts over p, the named effects (and the hull where it is named), weakly held by their priors.
+    """Least squares of whole rollouts over p, the named effects (and the hull where it is named), weakly held by their
+    priors.
 
-    Channels are weighed by the root mean square of the error before the fit, positions as one: the spread that the model must explain. Once the
-    budget is spent, it ends where it stands.
+    Channels are weighed by the root mean square of the error before the fit, positions as one: the spread that the
+    model must explain. Once the budget is spent, it ends where it stands.
     """
     free = list(range(len(FREE) + (NUM_HULL if extension.hull else 0)))
     terms = tuple(t for t in extension.terms if not t.per_run)  # a run that was not seen has no value of its own
@@ -83,7 +85,8 @@ def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
         at = np.concatenate([lin.point.base[free], *lin.point.values]) if terms else lin.point.base[free]
         prior = np.ones(len(at))
         step = np.linalg.solve(
-            np.einsum("bti,btj->ij", J[ok], J[ok]) + np.diag(prior), np.einsum("bti,bt->i", J[ok], e[ok]) - prior * (at - _centre(free, terms))
+            np.einsum("bti,btj->ij", J[ok], J[ok]) + np.diag(prior),
+            np.einsum("bti,bt->i", J[ok], e[ok]) - prior * (at - _centre(free, terms)),
         )
         share, old = 1.0, _cost(lin, weights)
         while True:
@@ -154,8 +157,8 @@ def distance(plant: Plant, scales: Scales, model: Rollout) -> tuple[np.ndarray, 
 
 @dataclass(frozen=True)
 class FoldGain:
-    """ED [m] of the test runs: by the plain model, with the causes, and with the hull's derivatives fitted as well; what the training runs led to,
-    and whether their selection was stopped by its budget."""
+    """ED [m] of the test runs: by the plain model, with the causes, and with the hull's derivatives fitted as well;
+    what the training runs led to, and whether their selection was stopped by its budget."""
 
     test: np.ndarray
     before: np.ndarray
@@ -166,7 +169,8 @@ class FoldGain:
 
 
 def fold_gain(dataset: Dataset, test: np.ndarray, extension: Extension, plain: dict[str, Gear], hull: bool) -> FoldGain:
-    """Fit the plain model, the extended one (and that with the hull) to the training runs alone, and roll all out on the test runs."""
+    """Fit the plain model, the extended one (and that with the hull) to the training runs alone, and roll all out on
+    the test runs."""
     inside = set(test.tolist())
     part = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i not in inside])
     rest = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i in inside])
@@ -197,4 +201,6 @@ def summarise(before: np.ndarray, after: np.ndarray, seed: int, groups: Sequence
     low, high = np.quantile(relative, [0.025, 0.975])
     better = int(np.sum(after < before))
     mean_b, mean_a = float(before.mean()), float(after.mean())
-    return Gain("ED", mean_b, mean_a, 1.0 - mean_a / max(mean_b, 1e-12), (float(low), float(high)), f"{better}/{len(before)}")
+    return Gain(
+        "ED", mean_b, mean_a, 1.0 - mean_a / max(mean_b, 1e-12), (float(low), float(high)), f"{better}/{len(before)}"
+    )

@@ -13,7 +13,13 @@ from ..thresholds import THRESHOLDS
 from .dependence import AXES, UNITS, Follows, curve, follows, variables, with_speed
 
 CHANNELS = ("position", "heading", "surge", "sway", "yaw rate")
-CHANNEL_UNITS = {"position": ("m", 1.0), "heading": ("deg", 57.29578), "surge": ("m/s", 1.0), "sway": ("m/s", 1.0), "yaw rate": ("deg/s", 57.29578)}
+CHANNEL_UNITS = {
+    "position": ("m", 1.0),
+    "heading": ("deg", 57.29578),
+    "surge": ("m/s", 1.0),
+    "sway": ("m/s", 1.0),
+    "yaw rate": ("deg/s", 57.29578),
+}
 RESIDUALS = ("x", "y", "heading", "surge", "sway", "yaw rate")
 INPUTS = ("revolutions", "rudder", "bow thruster", "stern thruster")
 FORCE_UNITS = (("mm/s^2", 1e3), ("mm/s^2", 1e3), ("mdeg/s^2", 57.29578e3))
@@ -34,10 +40,13 @@ class Slice(NamedTuple):
 class ErrorTables:
     """The figures behind the lines.
 
-    share: of the normalised squared error, per channel. size: root mean square error per channel, in `CHANNEL_UNITS`; scale: what it is divided by.
-    by: variable -> slices of the normalised error of all channels together; by_channel: the same of one channel, in its unit.
+    share: of the normalised squared error, per channel. size: root mean square error per channel, in `CHANNEL_UNITS`;
+    scale: what it is divided by.
+    by: variable -> slices of the normalised error of all channels together; by_channel: the same of one channel, in its
+    unit.
     worst_runs: (name, root mean square of the normalised error), greatest first. follows: see `follows.follows`.
-    white: residual channel -> Ljung-Box statistic over its 95 % limit. inputs: (residual, input) -> greatest correlation over its 95 % bound.
+    white: residual channel -> Ljung-Box statistic over its 95 % limit. inputs: (residual, input) -> greatest
+    correlation over its 95 % bound.
     """
 
     share: dict[str, float]
@@ -52,10 +61,12 @@ class ErrorTables:
 
 
 def squared_error(trace: Trace, predicted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Squared open-loop error (B, K + 1, 5) of `predicted` (B, K + 1, 6) and the scale (5,) that makes channels comparable.
+    """Squared open-loop error (B, K + 1, 5) of `predicted` (B, K + 1, 6) and the scale (5,) that makes channels
+    comparable.
 
-    The scale is how much the channel moves inside a run: its root mean square about each segment's own mean, and no less than 1 deg of heading
-    (1 deg in a tenth of the horizon for the yaw rate), 2 % of the speed. So one metre is never added to one degree.
+    The scale is how much the channel moves inside a run: its root mean square about each segment's own mean, and no
+    less than 1 deg of heading (1 deg in a tenth of the horizon for the yaw rate), 2 % of the speed. So one metre is
+    never added to one degree.
     """
     with np.errstate(all="ignore"):
         error = (predicted - trace.measured) ** 2
@@ -64,7 +75,9 @@ def squared_error(trace: Trace, predicted: np.ndarray) -> tuple[np.ndarray, np.n
     squares = np.concatenate([error[..., :2].sum(axis=-1, keepdims=True), error[..., 2:]], axis=-1)
     known = np.isfinite(trace.measured)
     filled = np.where(known, trace.measured, 0.0)
-    about = np.where(known, filled - filled.sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1), 0.0)
+    about = np.where(
+        known, filled - filled.sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1), 0.0
+    )
     spread = np.sum(about**2, axis=(0, 1)) / np.maximum(known.sum(axis=(0, 1)), 1)
     spread = np.append(spread[0] + spread[1], spread[2:])
     speed2 = float(np.sum(filled[..., 3:5] ** 2) / max(known[..., 3].sum(), 1))
@@ -96,7 +109,8 @@ def error_tables(trace: Trace, seed: int = 0) -> ErrorTables:
         share=dict(zip(CHANNELS, (total / max(float(total.sum()), 1e-300)).tolist(), strict=True)),
         size={c: float(s * u) for c, s, u in zip(CHANNELS, size, units, strict=True)},
         scale={c: float(s * u) for c, s, u in zip(CHANNELS, scale, units, strict=True)},
-        by=slices(trace, trace.before), by_channel=by_channel, worst_runs=sorted(runs, key=lambda r: -r[1]), follows=follows(trace, seed),
+        by=slices(trace, trace.before), by_channel=by_channel, worst_runs=sorted(runs, key=lambda r: -r[1]),
+        follows=follows(trace, seed),
         white=_whiteness(trace), inputs=_against_inputs(trace),
     )  # fmt: skip
 
@@ -162,14 +176,16 @@ def _error_words(tables: ErrorTables, channel: str, variable: str) -> list[str]:
     growth = tables.by_channel[(channel, "horizon")]
     if len(growth) > 1 and growth[-1].rms > larger * growth[0].rms > 0.0:
         text.append(
-            f"the {channel} error is {growth[-1].rms / growth[0].rms:.2g} times larger after {growth[-1].low:.0f} to {growth[-1].high:.0f} s "
+            f"the {channel} error is {growth[-1].rms / growth[0].rms:.2g} times larger after {growth[-1].low:.0f} "
+            f"to {growth[-1].high:.0f} s "
             f"than in the first {growth[0].high:.0f} s"
         )
     rows = tables.by_channel.get((channel, variable), [])
     if len(rows) > 1 and variable != "run":
         worst, least = max(rows, key=lambda r: r.rms), min(rows, key=lambda r: r.rms)
         if worst.rms > larger * least.rms:
-            text.append(f"error worst at {variable} {worst.low:.3g} to {worst.high:.3g} {UNITS[variable]} ({worst.rms / max(least.rms, 1e-12):.1f} "
+            text.append(f"error worst at {variable} {worst.low:.3g} to {worst.high:.3g} {UNITS[variable]} "
+                        f"({worst.rms / max(least.rms, 1e-12):.1f} "
                         "times the least)")  # fmt: skip
     return text
 
@@ -184,18 +200,25 @@ def force_words(trace: Trace, axis: int, found: Follows) -> str:
     unit, factor = FORCE_UNITS[axis]
     ends = sorted((int(np.nanargmax(fitted.y)), int(np.nanargmin(fitted.y))), key=lambda i: fitted.x[i])
     if name == "run":
-        places = [f"{factor * fitted.y[i]:+.2g} {unit} about run {trace.names[round(float(fitted.x[i]))]}" for i in ends]
+        places = [
+            f"{factor * fitted.y[i]:+.2g} {unit} about run {trace.names[round(float(fitted.x[i]))]}" for i in ends
+        ]
     else:
         places = [f"{factor * fitted.y[i]:+.2g} {unit} at {fitted.x[i]:.3g} {UNITS[name]}" for i in ends]
     text = f"{what}: {' and '.join(places)}"
     times = with_speed(trace, axis, name)
     if times != 1.0:
-        text += f", {times:.1f} times stronger in the faster half" if times > 1.0 else f", {1 / times:.1f} times stronger in the slower half"
+        text += (
+            f", {times:.1f} times stronger in the faster half"
+            if times > 1.0
+            else f", {1 / times:.1f} times stronger in the slower half"
+        )
     return text
 
 
 def correlation(a: np.ndarray, b: np.ndarray, lag: int) -> tuple[float, int]:
-    """Correlation of a(t + lag) with b(t) inside runs, and the number of pairs; zero of zero pairs where there are fewer than ten."""
+    """Correlation of a(t + lag) with b(t) inside runs, and the number of pairs; zero of zero pairs where there are
+    fewer than ten."""
     if lag >= a.shape[1]:
         return 0.0, 0
     x, y = a[:, lag:], b[:, : a.shape[1] - lag]
@@ -232,7 +255,8 @@ def _whiteness(trace: Trace) -> dict[str, float]:
 
 
 def _against_inputs(trace: Trace) -> dict[tuple[str, str], float]:
-    """Greatest correlation of residuals with inputs 0 to `LAGS` samples before, over the 95 % bound of the greatest of so many (Bonferroni)."""
+    """Greatest correlation of residuals with inputs 0 to `LAGS` samples before, over the 95 % bound of the greatest of
+    so many (Bonferroni)."""
     from scipy.stats import norm
 
     bound = float(norm.ppf(1.0 - 0.025 / (LAGS + 1)))

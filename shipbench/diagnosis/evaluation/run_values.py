@@ -22,8 +22,13 @@ def goes_with(fit: Fit, values: np.ndarray) -> str:
     """Sentence on what `values` (runs, components) go with, with the share of the variance; empty if nothing."""
     seg = fit.plant.seg
     weight = np.maximum(np.bincount(seg.run, seg.mask.sum(axis=1), minlength=seg.runs), 1.0)
-    x, y = (np.bincount(seg.run, np.sum(seg.states[..., i] * seg.mask, axis=1), minlength=seg.runs) / weight for i in (0, 1))
-    found = [(_chance(values, at), words) for at, words in ((np.stack([x, y], axis=1), "place"), (np.arange(seg.runs)[:, None], "number"))]
+    x, y = (
+        np.bincount(seg.run, np.sum(seg.states[..., i] * seg.mask, axis=1), minlength=seg.runs) / weight for i in (0, 1)
+    )
+    found = [
+        (_chance(values, at), words)
+        for at, words in ((np.stack([x, y], axis=1), "place"), (np.arange(seg.runs)[:, None], "number"))
+    ]
     (chance, share), words = min(found, key=lambda f: f[0][0])
     if chance > THRESHOLDS.value("run_values_by_chance") or share < THRESHOLDS.value("run_values_share"):
         return ""

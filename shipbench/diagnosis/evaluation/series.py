@@ -13,7 +13,8 @@ from .held_out_gain import Extension, distance, fit_rollout, rollout_plant
 
 
 def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
-    """Open-loop rollouts of the models fitted to all runs (the gain is held out, these pictures are not), latent forces before and after."""
+    """Open-loop rollouts of the models fitted to all runs (the gain is held out, these pictures are not), latent forces
+    before and after."""
     extension = found.extension(hull)
     plain = rollout_plant(dataset, found.plain_gears)
     scales = Scales(plain)
@@ -41,7 +42,8 @@ def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
         return np.where(hide, values, np.nan)
 
     return Trace(
-        run=seg.run, names=tuple(r.id for r in dataset.runs), start=seg.start, t=t, measured=shown(seg.states[..., :6]), before=shown(before),
+        run=seg.run, names=tuple(r.id for r in dataset.runs), start=seg.start, t=t, measured=shown(seg.states[..., :6]),
+        before=shown(before),
         after=shown(after), inputs=shown(seg.states[..., 6:]), knots=t[knots], force=shown(lines[0])[:, knots],
         force_sd=shown(lines[1])[:, knots], force_after=shown(lines[2])[:, knots],
         white=shown(lines[3]), held_out=False,

@@ -27,13 +27,15 @@ REFIT_ITERATIONS = 16
 
 
 def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
-    """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit the motion; where sensors err
-    for longer than a sample, with such noise; without the few pieces that no ship's motion explains. Once the budget is spent, that of some pieces
-    alone, where it stands."""
+    """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit
+    the motion; where sensors err for longer than a sample, with such noise; without the few pieces that no ship's
+    motion explains. Once the budget is spent, that of some pieces alone, where it stands."""
     few = plant.thinned(FEW_PIECES)
     found, share = _begun(few, scales), len(few.seg.run) / len(plant.seg.run)
     if plant.seg.commanded:
-        found, scales, _ = _beside_waves(found, scales, share, waves_alone=True)  # a force that follows them says nothing of a gear
+        found, scales, _ = _beside_waves(
+            found, scales, share, waves_alone=True
+        )  # a force that follows them says nothing of a gear
         for i, name, field in ((0, "n", "T"), (1, "delta", "rate"), (1, "delta", "T")):
             if np.ptp(plant.seg.commands[..., i]) > 0.0:
                 found = _with_gear(found, name, field)
@@ -43,19 +45,32 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
     if few is not plant:
         found = _begun(plant.driven(found.plant.ordinary), scales)
     scales = found.scales.coloured(colour)
-    found = _without_strange(fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion))
+    found = _without_strange(
+        fit(found.plant, scales, Model(), found.point, found.hyper, candidates=candidates, guess=found.motion)
+    )
     return widened(found)
 
 
 def beside_noise_of(named: Fit, null: Fit) -> Fit | None:
-    """The plain model `null` fitted again beside the noise that suits the causes of `named`; None where its own does about as well, or is white. What
-    a late or a turned sensor errs by lasts, as noise may, and beside such noise it is worth less, or is taken for something else."""
+    """The plain model `null` fitted again beside the noise that suits the causes of `named`; None where its own does
+    about as well, or is white. What a late or a turned sensor errs by lasts, as noise may, and beside such noise it is
+    worth less, or is taken for something else."""
     if is_spent() or not null.scales.colour.share.any():
         return None
     colour = colour_of(named)
     if evidence_with(named, colour) < evidence_with(named, named.scales.colour) + THRESHOLDS.value("coloured_noise"):
         return None
-    return widened(fit(null.plant, null.scales.coloured(colour), Model(), null.point, null.hyper, candidates=null.candidates, guess=null.motion))
+    return widened(
+        fit(
+            null.plant,
+            null.scales.coloured(colour),
+            Model(),
+            null.point,
+            null.hyper,
+            candidates=null.candidates,
+            guess=null.motion,
+        )
+    )
 
 
 def first_evidence(plant: Plant, null: Fit) -> float:
@@ -64,9 +79,11 @@ def first_evidence(plant: Plant, null: Fit) -> float:
 
 
 def first_fit(plant: Plant, null: Fit, like: Fit | None = None) -> Fit:
-    """The plain model of another reading, or some pieces, of what `null` was fitted to: from the beginning, with the same units; with the forces and
-    the noise of the fit `like`."""
-    return _first(plant, Scales(plant).alike(null.scales), iterations=REFIT_ITERATIONS, hyper=like.hyper if like else None)
+    """The plain model of another reading, or some pieces, of what `null` was fitted to: from the beginning, with the
+    same units; with the forces and the noise of the fit `like`."""
+    return _first(
+        plant, Scales(plant).alike(null.scales), iterations=REFIT_ITERATIONS, hyper=like.hyper if like else None
+    )
 
 
 def _begun(plant: Plant, scales: Scales) -> Fit:
@@ -87,8 +104,9 @@ def _begun(plant: Plant, scales: Scales) -> Fit:
 
 
 def _beside_waves(found: Fit, scales: Scales, share: float, waves_alone: bool = False) -> tuple[Fit, Scales, Colour]:
-    """A first fit, its units, and the noise that suits it (`colour_of`); made again beside the waves, where the ship moves with them: a force that
-    follows them is large, hides what is slow, and leaves residuals that swing too fast."""
+    """A first fit, its units, and the noise that suits it (`colour_of`); made again beside the waves, where the ship
+    moves with them: a force that follows them is large, hides what is slow, and leaves residuals that swing too
+    fast."""
     colour = colour_of(found, share, waves_alone)
     waves = swinging_force(found, colour)
     if np.isfinite(waves.period).any() and not is_spent():
@@ -101,7 +119,9 @@ def _beside_waves(found: Fit, scales: Scales, share: float, waves_alone: bool = 
 def _first(plant: Plant, scales: Scales, iterations: int = 8, weak: bool = False, hyper: Hyper | None = None) -> Fit:
     """Fit from the regressions, briefly: until there is a background, lower variances are rewarded without end."""
     origin = Origin.of(plant, scales)
-    hyper = hyper or (replace(origin.hyper, log_force=np.minimum(origin.hyper.log_force, 0.0)) if weak else origin.hyper)
+    hyper = hyper or (
+        replace(origin.hyper, log_force=np.minimum(origin.hyper.log_force, 0.0)) if weak else origin.hyper
+    )
     return fit(plant, scales, Model(), origin.point, hyper, iterations=iterations, guess=origin.motion, far=True)
 
 
@@ -112,7 +132,9 @@ def _without_strange(found: Fit) -> Fit:
         if not len(pieces) or is_spent():
             break
         plant, candidates = found.plant.without(pieces), found.candidates
-        found = fit(plant, found.scales, found.model, found.point, found.hyper, candidates=candidates, guess=found.motion)
+        found = fit(
+            plant, found.scales, found.model, found.point, found.hyper, candidates=candidates, guess=found.motion
+        )
     return found
 
 
@@ -147,4 +169,6 @@ def _with_gear(found: Fit, name: str, field: str) -> Fit:
 
 def _behind(found: Fit, name: str, field: str, value: float) -> Fit:
     plant = found.plant.driven({name: replace(found.plant.ordinary[name], **{field: value})})
-    return fit(plant, found.scales, found.model, found.point, found.hyper, iterations=REFIT_ITERATIONS, guess=found.motion)
+    return fit(
+        plant, found.scales, found.model, found.point, found.hyper, iterations=REFIT_ITERATIONS, guess=found.motion
+    )

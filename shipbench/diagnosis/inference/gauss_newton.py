@@ -1,4 +1,5 @@
-"""The joint fit: base parameters, effects, initial states and the latent force, with the variances of force and noise (an iterated smoother)."""
+"""The joint fit: base parameters, effects, initial states and the latent force, with the variances of force and noise
+(an iterated smoother)."""
 
 from __future__ import annotations
 
@@ -24,17 +25,20 @@ _AT_REST, _AT_REST_EVIDENCE = 0.5, 0.1
 
 
 def fit(
-    plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *, iterations: int = 20,
+    plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *,
+    iterations: int = 20,
     candidates: Sequence[Term] = (), guess: np.ndarray | None = None, hope: float = -np.inf, far: bool = False,
     begun: tuple[Linearisation, Fit] | None = None, free_steps: int = _FREE_STEPS,
 ) -> Fit:  # fmt: skip
-    """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at zero), until it rests or promises
-    less log evidence than `hope`, when it is not worth its time; or, once the budget is spent, where it stands.
+    """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at
+    zero), until it rests or promises less log evidence than `hope`, when it is not worth its time; or, once the budget
+    is spent, where it stands.
 
-    A step is at first halved only where the cost explodes: the cost of a step that is right for the parameters rises until the latent force has
-    followed, and the path would else end where parameters compensate each other. The best point of the path is kept, by its evidence once the force
-    has followed; there it does. If that led astray, each step must lower the cost from the first on. `candidates` get columns there. far: `point` is
-    that of an `Origin`; begun: its linearisation, and a fit there whose products hold.
+    A step is at first halved only where the cost explodes: the cost of a step that is right for the parameters rises
+    until the latent force has followed, and the path would else end where parameters compensate each other. The best
+    point of the path is kept, by its evidence once the force has followed; there it does. If that led astray, each step
+    must lower the cost from the first on. `candidates` get columns there. far: `point` is that of an `Origin`; begun:
+    its linearisation, and a fit there whose products hold.
     """
     log_tau2, began = dict(log_tau2 or {}), (hyper, dict(log_tau2 or {}))
     if len(point.terms) < len(model.terms):
@@ -65,7 +69,9 @@ def fit(
         if is_spent() or stale == 3 or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
             break
         before = found.evidence
-        after, seen = _step(lin, found, number + 1 < free_steps, 0.5**stale) if number < iterations - 1 else (None, None)
+        after, seen = (
+            _step(lin, found, number + 1 < free_steps, 0.5**stale) if number < iterations - 1 else (None, None)
+        )
         if after is None:
             break
         lin = after
@@ -73,33 +79,43 @@ def fit(
     found, lin = _followed(*best[1:])
     if free_steps and found.excess > THRESHOLDS.value("led_astray") and not is_spent():
         again = fit(
-            plant, scales, model, point, *began, iterations=iterations, candidates=candidates, guess=guess, hope=hope, far=far, begun=begun,
+            plant, scales, model, point, *began, iterations=iterations, candidates=candidates, guess=guess, hope=hope,
+            far=far, begun=begun,
             free_steps=0,
         )  # fmt: skip
         if again.evidence > found.evidence:
             return again
-    return replace(settle(lin, model, found.hyper, found.log_tau2, candidates, leap=0.0) if candidates else found, early=early)
+    return replace(
+        settle(lin, model, found.hyper, found.log_tau2, candidates, leap=0.0) if candidates else found, early=early
+    )
 
 
 def looking_at(found: Fit, candidates: Sequence[Term]) -> Fit:
-    """`found` with columns of `candidates`, fitted on if it does not rest on the linearisation with which fits begin."""
+    """`found` with columns of `candidates`, fitted on if it does not rest on the linearisation with which fits
+    begin."""
     plant, scales, model, hyper, log_tau2 = found.plant, found.scales, found.model, found.hyper, found.log_tau2
-    again = settle(Linearisation(plant, scales, found.point, found.motion), model, hyper, log_tau2, candidates, leap=0.0)
+    again = settle(
+        Linearisation(plant, scales, found.point, found.motion), model, hyper, log_tau2, candidates, leap=0.0
+    )
     if again.excess < _AT_REST or is_spent():
         return again
     return fit(plant, scales, model, found.point, hyper, log_tau2, candidates=candidates, guess=found.motion)
 
 
 def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Linearisation | None, Fit | None]:
-    """Towards the point that the linear model thinks best, and the fit there if one was made; None where no part of the way, from `share` on, is any
-    better (the first steps are `free`).
+    """Towards the point that the linear model thinks best, and the fit there if one was made; None where no part of the
+    way, from `share` on, is any better (the first steps are `free`).
 
-    A point is better if its cost is lower, or would be once the latent force has followed: on exact sensors the trajectory of a new point is nearly
-    always dearer than that of the old one, whose force has been fitted.
+    A point is better if its cost is lower, or would be once the latent force has followed: on exact sensors the
+    trajectory of a new point is nearly always dearer than that of the old one, whose force has been fitted.
     """
     plant, scales, model, may_rise = lin.plant, lin.scales, found.model, 1.1 if free else 1.0
     target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
-    at, followed, share = objective(lin, model, found.hyper, found.log_tau2, found.gram), at_point(found, lin.point), share
+    at, followed, share = (
+        objective(lin, model, found.hyper, found.log_tau2, found.gram),
+        at_point(found, lin.point),
+        share,
+    )
     while not is_spent():
         part = between(lin.point, target, share)
         trial = Linearisation(plant, scales, part, lin.towards(part), coarse=free)
@@ -118,14 +134,17 @@ def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Lin
 
 
 def _followed(found: Fit, lin: Linearisation) -> tuple[Fit, Linearisation]:
-    """Initial states and latent force where they suit the parameters of the point best; the step of a segment is halved while its cost rises."""
+    """Initial states and latent force where they suit the parameters of the point best; the step of a segment is halved
+    while its cost rises."""
     for _ in range(6):
         if found.excess < _AT_REST or is_spent():
             break
         here, (eta, w), before = lin.point, suiting(found, lin.point), by_segment(lin, found.hyper, found.gram)
         share = np.ones(len(before))
         for _ in range(5):
-            part = replace(here, eta=here.eta + share[:, None] * (eta - here.eta), w=here.w + share[:, None, None] * (w - here.w))
+            part = replace(
+                here, eta=here.eta + share[:, None] * (eta - here.eta), w=here.w + share[:, None, None] * (w - here.w)
+            )
             trial = Linearisation(found.plant, found.scales, part, lin.towards(part), coarse=False)
             costs = by_segment(trial, found.hyper, found.gram)
             worse = ~(costs <= before)
@@ -150,11 +169,18 @@ def between(a: Point, b: Point, share: float) -> Point:
         return p + share * (q - p)
 
     old = [a.values[i] if i < len(a.values) else np.zeros_like(v) for i, v in enumerate(b.values)]
-    return Point(mix(a.base, b.base), mix(a.eta, b.eta), mix(a.w, b.w), b.terms, tuple(mix(p, q) for p, q in zip(old, b.values, strict=True)))
+    return Point(
+        mix(a.base, b.base),
+        mix(a.eta, b.eta),
+        mix(a.w, b.w),
+        b.terms,
+        tuple(mix(p, q) for p, q in zip(old, b.values, strict=True)),
+    )
 
 
 def within_bounds(plant: Plant, scales: Scales, point: Point) -> Point:
-    """Amplitudes held inside the bounds of their effects; those of single runs are held by what the runs have in common."""
+    """Amplitudes held inside the bounds of their effects; those of single runs are held by what the runs have in
+    common."""
     values = []
     for term, value in zip(point.terms, point.values, strict=True):
         if term.per_run:
@@ -162,7 +188,13 @@ def within_bounds(plant: Plant, scales: Scales, point: Point) -> Point:
             continue
         unit = scales.amplitudes(term, plant.c.L)
         sized = [p for p in term.effect.sized(plant.c.L) if not p.shape]
-        values.append(np.clip(value, [p.low / s for p, s in zip(sized, unit, strict=True)], [p.high / s for p, s in zip(sized, unit, strict=True)]))
+        values.append(
+            np.clip(
+                value,
+                [p.low / s for p, s in zip(sized, unit, strict=True)],
+                [p.high / s for p, s in zip(sized, unit, strict=True)],
+            )
+        )
     return replace(point, values=tuple(values))
 
 

@@ -1,7 +1,10 @@
-"""Linear Gaussian algebra on the sensitivities: evidence, estimates and variances of the background, without another simulation.
+"""Linear Gaussian algebra on the sensitivities: evidence, estimates and variances of the background, without another
+simulation.
 
-Model of a segment: e = S_eta eta + S_w w + S_g g + noise, with w ~ N(0, sigma_j^2 K) per axis (stationary, Ornstein-Uhlenbeck), a weak prior of the
-initial state eta, and shared coefficients g: base parameters and effects, each with a zero-mean prior; or one set per run (random effects).
+Model of a segment: e = S_eta eta + S_w w + S_g g + noise, with w ~ N(0, sigma_j^2 K) per axis (stationary,
+Ornstein-Uhlenbeck), a weak prior of the
+initial state eta, and shared coefficients g: base parameters and effects, each with a zero-mean prior; or one set per
+run (random effects).
 Source: model discrepancy of Kennedy & O'Hagan (2001) put on the force side as in Hooker (2009).
 """
 
@@ -21,7 +24,8 @@ ETA_PRECISION = THRESHOLDS.value("initial_state_precision")
 
 @dataclass(frozen=True)
 class Hyper:
-    """Variances: log_force (3,) of the latent acceleration in units of its scales; log_noise (6,) of the samples, likewise; tau [s] of the force."""
+    """Variances: log_force (3,) of the latent acceleration in units of its scales; log_noise (6,) of the samples,
+    likewise; tau [s] of the force."""
 
     log_force: np.ndarray
     log_noise: np.ndarray
@@ -30,10 +34,11 @@ class Hyper:
 
 @dataclass(frozen=True)
 class Products:
-    """Products of columns [eta, w, shared, e] per channel and segment, (6, B, Z + G + 1, Z + G + 1), before the noise is known.
+    """Products of columns [eta, w, shared, e] per channel and segment, (6, B, Z + G + 1, Z + G + 1), before the noise
+    is known.
 
-    run (B,): the segment's run; samples (B,): of real samples; colour (B,): log determinant of the noise's correlations; initial (B,), slope
-    (B, G + 1): as in `sloped`.
+    run (B,): the segment's run; samples (B,): of real samples; colour (B,): log determinant of the noise's
+    correlations; initial (B,), slope (B, G + 1): as in `sloped`.
     """
 
     P: np.ndarray
@@ -48,12 +53,29 @@ class Products:
 
     @classmethod
     def of(
-        cls, Z: np.ndarray, mask: np.ndarray, knots: int, spacing: float, run: np.ndarray, runs: int, colour: np.ndarray | None = None
+        cls,
+        Z: np.ndarray,
+        mask: np.ndarray,
+        knots: int,
+        spacing: float,
+        run: np.ndarray,
+        runs: int,
+        colour: np.ndarray | None = None,
     ) -> Products:
         """From columns Z (6, B, K + 1, Z + G + 1), zero where `mask` (B, K + 1) has no real sample."""
         B, P = len(mask), np.swapaxes(Z, 2, 3) @ Z
         slope = np.zeros((B, P.shape[-1] - 6 - 3 * knots))
-        return cls(P, knots, spacing, run, runs, mask.sum(axis=1), np.zeros(B) if colour is None else colour, np.zeros(B), slope)
+        return cls(
+            P,
+            knots,
+            spacing,
+            run,
+            runs,
+            mask.sum(axis=1),
+            np.zeros(B) if colour is None else colour,
+            np.zeros(B),
+            slope,
+        )
 
     @property
     def latent(self) -> int:
@@ -67,7 +89,8 @@ class Products:
         """Some segments; `runs` are the numbers of the runs that are kept, which are numbered anew."""
         new = np.searchsorted(runs, self.run[rows])
         return replace(
-            self, P=self.P[:, rows], run=new, runs=len(runs), samples=self.samples[rows], colour=self.colour[rows], initial=self.initial[rows],
+            self, P=self.P[:, rows], run=new, runs=len(runs), samples=self.samples[rows], colour=self.colour[rows],
+            initial=self.initial[rows],
             slope=self.slope[rows],
         )  # fmt: skip
 
@@ -84,21 +107,26 @@ class Products:
     def only(self, columns: np.ndarray) -> Products:
         """With some shared columns alone (and the residual)."""
         keep = np.concatenate([np.arange(self.latent), self.latent + columns, [self.P.shape[-1] - 1]])
-        return replace(self, P=self.P.take(keep, axis=2).take(keep, axis=3), slope=self.slope[:, keep[self.latent :] - self.latent])
+        return replace(
+            self, P=self.P.take(keep, axis=2).take(keep, axis=3), slope=self.slope[:, keep[self.latent :] - self.latent]
+        )
 
     def sloped(self, slopes: np.ndarray, at: np.ndarray, initial: np.ndarray) -> Products:
-        """With the part (B,) of initial states in the segments' log determinants taken off, and derivatives (B, G) of what is left by the shared
-        columns, which stand at coefficients `at` (B, G).
+        """With the part (B,) of initial states in the segments' log determinants taken off, and derivatives (B, G) of
+        what is left by the shared columns, which stand at coefficients `at` (B, G).
 
-        Nothing is known of initial states, and integrated out so they would favour parameters by which a ship forgets hers: such a likelihood depends
-        on the parameters by more than the data (Francke, Koopman & de Vos, J. Time Ser. Anal. 31 (2010) 407). Without that part they are fixed but
-        unknown (Durbin & Koopman, Time Series Analysis by State Space Methods, 2nd ed., 2012, 7.2.4).
+        Nothing is known of initial states, and integrated out so they would favour parameters by which a ship forgets
+        hers: such a likelihood depends on the parameters by more than the data (Francke, Koopman & de Vos, J. Time Ser.
+        Anal. 31 (2010) 407). Without that part they are fixed but unknown (Durbin & Koopman, Time Series Analysis by
+        State Space Methods, 2nd ed., 2012, 7.2.4).
         """
         return replace(self, initial=initial, slope=beside_products(slopes, at))
 
     def weigh(self, hyper: Hyper) -> Gram:
         """The Gram under given noise."""
-        G = (np.exp(-hyper.log_noise) @ self.P.reshape(6, -1)).reshape(self.P.shape[1:])  # BLAS, which einsum does without
+        G = (np.exp(-hyper.log_noise) @ self.P.reshape(6, -1)).reshape(
+            self.P.shape[1:]
+        )  # BLAS, which einsum does without
         K_inv, K_logdet = ornstein_uhlenbeck(self.knots, self.spacing, hyper.tau)
         log_noise = self.samples * float(np.sum(hyper.log_noise)) + self.colour - self.initial
         return Gram(G, self.knots, K_inv, K_logdet, log_noise, self.slope, self.run, self.runs)
@@ -116,7 +144,8 @@ def ornstein_uhlenbeck(knots: int, spacing: float, tau: float) -> tuple[np.ndarr
 
 
 def by_run(values: np.ndarray, run: np.ndarray) -> np.ndarray:
-    """Sums (N, ...) over the segments of every run, which stand in the order of their runs (`np.add.reduceat`, but quick for matrices)."""
+    """Sums (N, ...) over the segments of every run, which stand in the order of their runs (`np.add.reduceat`, but
+    quick for matrices)."""
     first = np.flatnonzero(np.diff(run, prepend=-1))
     counts, total = np.diff(first, append=len(run)), values[first]
     for j in range(1, counts.max()):
@@ -127,7 +156,8 @@ def by_run(values: np.ndarray, run: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Gram:
-    """Whitened products per segment, (B, Z + G + 1, Z + G + 1); log_noise (B,): sums of log variances of the samples, less `Products.initial`."""
+    """Whitened products per segment, (B, Z + G + 1, Z + G + 1); log_noise (B,): sums of log variances of the samples,
+    less `Products.initial`."""
 
     G: np.ndarray
     knots: int
@@ -145,7 +175,11 @@ class Gram:
     def only(self, columns: np.ndarray) -> Gram:
         """The Gram of some shared columns (the residual is kept)."""
         keep = np.concatenate([np.arange(self.latent), self.latent + columns, [self.G.shape[-1] - 1]])
-        return replace(self, G=np.ascontiguousarray(self.G[:, keep][:, :, keep]), slope=self.slope[:, keep[self.latent :] - self.latent])
+        return replace(
+            self,
+            G=np.ascontiguousarray(self.G[:, keep][:, :, keep]),
+            slope=self.slope[:, keep[self.latent :] - self.latent],
+        )
 
     def precision(self, log_force: np.ndarray) -> np.ndarray:
         """Prior precision of [eta, w]."""
@@ -165,13 +199,16 @@ class Gram:
         S = self.G[:, Z:, Z:] - np.swapaxes(self.G[:, :Z, Z:], 1, 2) @ solved
         S[:, :-1, -1] += self.slope[:, :-1]
         S[:, -1, :] += self.slope
-        logdet = logdet + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
+        logdet = (
+            logdet + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
+        )
         return Reduced(by_run(S, self.run), by_run(logdet, self.run), inverse, solved)
 
 
 @dataclass(frozen=True)
 class Reduced:
-    """Per run, with eta and w integrated out: S (N, G + 1, G + 1) of [shared, e] and logdet (N,); inverse, solved per segment for going back."""
+    """Per run, with eta and w integrated out: S (N, G + 1, G + 1) of [shared, e] and logdet (N,); inverse, solved per
+    segment for going back."""
 
     S: np.ndarray
     logdet: np.ndarray
@@ -196,9 +233,9 @@ class Prior:
 
 @dataclass(frozen=True)
 class Solution:
-    """Posterior of the coefficients. log_evidence without constants; squares: twice the negative log posterior at its mode, as the linear model
-    expects it; mean, cov of `prior.shared`; means (N, R), covs (N, R, R) of `prior.random`; per_run (N,): share of each run in the log evidence given
-    the mean."""
+    """Posterior of the coefficients. log_evidence without constants; squares: twice the negative log posterior at its
+    mode, as the linear model expects it; mean, cov of `prior.shared`; means (N, R), covs (N, R, R) of `prior.random`;
+    per_run (N,): share of each run in the log evidence given the mean."""
 
     log_evidence: float
     squares: float
@@ -210,8 +247,9 @@ class Solution:
 
 
 def shared_alone(reduced: Reduced, prior: Prior) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """S (N, P + 1, P + 1) of [prior.shared, e] and logdet (N,) with the values of single runs integrated out, and for going back to these: covs
-    (N, R, R) given the shared coefficients, and covs times their products with [shared, e]."""
+    """S (N, P + 1, P + 1) of [prior.shared, e] and logdet (N,) with the values of single runs integrated out, and for
+    going back to these: covs (N, R, R) given the shared coefficients, and covs times their products with [shared,
+    e]."""
     keep, random = np.append(prior.shared, reduced.S.shape[1] - 1), prior.random
     S = reduced.S[:, keep][:, :, keep]
     if not len(random):
@@ -250,13 +288,16 @@ def background(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -
 def background_cov(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -> np.ndarray:
     """Covariances (B, Z, Z) of [eta, w], with the uncertainty of the shared coefficients."""
     J, R = reduced.solved[:, :, prior.shared], reduced.solved[:, :, prior.random]
-    return reduced.inverse + J @ solution.cov @ np.swapaxes(J, 1, 2) + R @ solution.covs[gram.run] @ np.swapaxes(R, 1, 2)
+    return (
+        reduced.inverse + J @ solution.cov @ np.swapaxes(J, 1, 2) + R @ solution.covs[gram.run] @ np.swapaxes(R, 1, 2)
+    )
 
 
 def update_force(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution, estimate: np.ndarray) -> np.ndarray:
     """One EM step for the variances of the latent force, log (3,).
 
-    Of the force's covariance (`background_cov`) it takes the trace with K^-1 alone, for which no matrix of a segment is made.
+    Of the force's covariance (`background_cov`) it takes the trace with K^-1 alone, for which no matrix of a segment is
+    made.
     """
     B, covs, log_force = len(estimate), solution.covs[gram.run], np.empty(3)
     for j in range(3):
@@ -265,7 +306,11 @@ def update_force(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution,
         J, R = solved[:, :, prior.shared], solved[:, :, prior.random]
         shared = J.reshape(B * gram.knots, -1).T @ (gram.K_inv @ J).reshape(B * gram.knots, -1)
         own = np.swapaxes(R, 1, 2) @ (gram.K_inv @ R)
-        spread = np.sum(gram.K_inv * reduced.inverse[:, at, at].sum(axis=0)) + np.sum(shared * solution.cov) + np.sum(own * covs)
+        spread = (
+            np.sum(gram.K_inv * reduced.inverse[:, at, at].sum(axis=0))
+            + np.sum(shared * solution.cov)
+            + np.sum(own * covs)
+        )
         log_force[j] = np.log((np.sum(w @ gram.K_inv * w) + spread) / (B * gram.knots))
     least, most = THRESHOLDS.value("least_latent_force"), THRESHOLDS.value("most_latent_force")
     return np.clip(log_force, float(np.log(least**2)), float(np.log(most**2)))
@@ -282,11 +327,18 @@ def coefficients_of(gram: Gram, prior: Prior, solution: Solution, estimate: np.n
 
 
 def update_noise(
-    products: Products, gram: Gram, reduced: Reduced, prior: Prior, solution: Solution, estimate: np.ndarray, floor: float
+    products: Products,
+    gram: Gram,
+    reduced: Reduced,
+    prior: Prior,
+    solution: Solution,
+    estimate: np.ndarray,
+    floor: float,
 ) -> np.ndarray:
     """One EM step for the variances of the noise, log (6,); of a channel that is not seen, 0.
 
-    Given the shared coefficients: theirs are few beside the samples, and their errors are cancelled by those of the force that they cause.
+    Given the shared coefficients: theirs are few beside the samples, and their errors are cancelled by those of the
+    force that they cause.
     """
     theta = coefficients_of(gram, prior, solution, estimate, products.P.shape[-1])
     second = theta[:, :, None] * theta[:, None, :]
@@ -299,7 +351,8 @@ def update_noise(
 def accelerated(step: Callable[[np.ndarray], tuple[float, np.ndarray]], theta: np.ndarray, cycles: int) -> np.ndarray:
     """Logarithms of variances after EM steps, extrapolated: plain EM creeps where the data say little of the force.
 
-    `step` takes theta to (log evidence at theta, next theta). Three steps a cycle, fewer once it rests; a leap that loses evidence is not taken.
+    `step` takes theta to (log evidence at theta, next theta). Three steps a cycle, fewer once it rests; a leap that
+    loses evidence is not taken.
 
     Source: Varadhan & Roland, Scand. J. Stat. 35 (2008) 335, scheme S3 (SQUAREM).
     """

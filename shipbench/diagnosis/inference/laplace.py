@@ -1,4 +1,5 @@
-"""One linearisation of the joint fit: the variances of force, noise and random effects, the posterior, and what points cost."""
+"""One linearisation of the joint fit: the variances of force, noise and random effects, the posterior, and what points
+cost."""
 
 from __future__ import annotations
 
@@ -39,8 +40,9 @@ _EM_CYCLES = 3
 
 @dataclass(frozen=True)
 class Model:
-    """Structure: terms, and how far the hull may lie from the regressions and the other parameters from their centres (factors of the prior
-    standard deviations), and each base parameter besides (`widths`: such a factor for each, none for 1)."""
+    """Structure: terms, and how far the hull may lie from the regressions and the other parameters from their centres
+    (factors of the prior standard deviations), and each base parameter besides (`widths`: such a factor for each, none
+    for 1)."""
 
     terms: tuple[Term, ...] = ()
     hull: float = 1.0
@@ -65,13 +67,16 @@ class Model:
 
 def base_precision(model: Model) -> np.ndarray:
     """Prior precisions of the base parameters in units of their spreads."""
-    usual = np.repeat([model.base**-2, model.hull**-2, model.base**-2], [len(FREE), NUM_HULL, NUM_BASE - len(FREE) - NUM_HULL])
+    usual = np.repeat(
+        [model.base**-2, model.hull**-2, model.base**-2], [len(FREE), NUM_HULL, NUM_BASE - len(FREE) - NUM_HULL]
+    )
     return usual / np.square(model.widths or 1.0)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate: of [eta, w] per segment;
+    """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate: of
+    [eta, w] per segment;
     early: what the fit promised at its second linearisation."""
 
     plant: Plant
@@ -96,7 +101,8 @@ class Fit:
     def evidence(self) -> float:
         """Log evidence, without constants, less the costs of the terms.
 
-        Laplace's: with the cost that the point has, not the lower one that the linear model promises. Where the fit rests they are the same.
+        Laplace's: with the cost that the point has, not the lower one that the linear model promises. Where the fit
+        rests they are the same.
         """
         return self.promise - 0.5 * self.excess
 
@@ -107,7 +113,8 @@ class Fit:
 
     @property
     def evidence_followed(self) -> float:
-        """Log evidence once initial states and latent force have followed the parameters of the point, as the linear model expects it."""
+        """Log evidence once initial states and latent force have followed the parameters of the point, as the linear
+        model expects it."""
         return self.evidence + 0.5 * (self.excess - at_point(self, self.point) + self.solution.squares)
 
     @cached_property
@@ -117,14 +124,17 @@ class Fit:
 
     @property
     def values(self) -> tuple[np.ndarray, ...]:
-        """Estimates of the terms' amplitudes, in units of their typical sizes: (size,), or (runs, size) of a random effect."""
+        """Estimates of the terms' amplitudes, in units of their typical sizes: (size,), or (runs, size) of a random
+        effect."""
         return point_from(self.model, self.point, self.solution, self.prior, self.estimate).values
 
     def solution_without(self, index: int) -> Solution:
         """The posterior on the same linearisation with the model's index-th term left out."""
         columns, prior = self.columns_of(index), self.prior
         keep, random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
-        return solve(self.reduced, Prior(prior.shared[keep], prior.precision[keep], prior.random[random], prior.log_tau2[random]))
+        return solve(
+            self.reduced, Prior(prior.shared[keep], prior.precision[keep], prior.random[random], prior.log_tau2[random])
+        )
 
     def worth(self, index: int) -> float:
         """Twice the log evidence that the index-th term adds on this linearisation, its cost taken off."""
@@ -137,18 +147,35 @@ class Fit:
         return np.arange(at, at + self.model.terms[index].size)
 
 
-def products_of(plant: Plant, scales: Scales, point: Point, columns: Columns, channels: Sequence[int] = range(6)) -> Products:
+def products_of(
+    plant: Plant, scales: Scales, point: Point, columns: Columns, channels: Sequence[int] = range(6)
+) -> Products:
     """Products of `whitened` columns, of some channels."""
     Z, seg = whitened(plant, scales, point, columns, channels), plant.seg
-    return Products.of(Z, seg.mask, plant.knots, plant.knot_time, seg.run, seg.runs, scales.colour.log_determinant(seg.mask.sum(axis=1)))
+    return Products.of(
+        Z,
+        seg.mask,
+        plant.knots,
+        plant.knot_time,
+        seg.run,
+        seg.runs,
+        scales.colour.log_determinant(seg.mask.sum(axis=1)),
+    )
 
 
-def whitened(plant: Plant, scales: Scales, point: Point, columns: Columns, channels: Sequence[int] = range(6)) -> np.ndarray:
-    """[eta, w, base, own, candidates, e] (channels, B, K + 1, ...) in units of the scales, as if the noise were white; e is the residual with
-    everything linear added back, so that all of it competes anew."""
+def whitened(
+    plant: Plant, scales: Scales, point: Point, columns: Columns, channels: Sequence[int] = range(6)
+) -> np.ndarray:
+    """[eta, w, base, own, candidates, e] (channels, B, K + 1, ...) in units of the scales, as if the noise were white;
+    e is the residual with everything linear added back, so that all of it competes anew."""
     seg, B = plant.seg, len(point.eta)
     e = (seg.states[..., :6] - columns.predicted).reshape(B, -1)
-    e = e + _times(columns.eta, point.eta) + _times(columns.w, np.moveaxis(point.w, -1, 1).reshape(B, -1)) + columns.base @ point.base
+    e = (
+        e
+        + _times(columns.eta, point.eta)
+        + _times(columns.w, np.moveaxis(point.w, -1, 1).reshape(B, -1))
+        + columns.base @ point.base
+    )
     for term, value, own in zip(point.terms, point.values, columns.own, strict=True):
         e = e + _times(own, value[seg.run] if term.per_run else np.broadcast_to(value, (B, term.size)))
     blocks = [columns.eta, columns.w, columns.base, *columns.own, *columns.candidates, e[..., None]]
@@ -194,7 +221,8 @@ def objective(lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int
 
 
 def by_segment(lin: Linearisation, hyper: Hyper, gram: Gram) -> np.ndarray:
-    """Twice the negative log posterior of every segment (B,) given the parameters: errors, initial state, latent force; infinite if it diverges."""
+    """Twice the negative log posterior of every segment (B,) given the parameters: errors, initial state, latent force;
+    infinite if it diverges."""
     plant, point = lin.plant, lin.point
     w = np.moveaxis(point.w, -1, 1)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -206,17 +234,20 @@ def by_segment(lin: Linearisation, hyper: Hyper, gram: Gram) -> np.ndarray:
 
 
 def suiting(found: Fit, point: Point) -> tuple[np.ndarray, np.ndarray]:
-    """Initial states (B, 6) and latent force (B, knots, 3) that suit the parameters and values of a point best, on the linearisation of `found`."""
+    """Initial states (B, 6) and latent force (B, knots, 3) that suit the parameters and values of a point best, on the
+    linearisation of `found`."""
     theta = _coefficients(found, point)[found.plant.seg.run]
     estimate = -(found.reduced.solved @ theta[:, :, None])[..., 0]
     return estimate[:, :6], np.moveaxis(estimate[:, 6:].reshape(len(estimate), 3, -1), 1, 2)
 
 
 def at_point(found: Fit, point: Point) -> float:
-    """Twice the negative log posterior at the parameters and values of a point, with the initial states and the latent force that suit them best on
-    the linearisation of `found`."""
+    """Twice the negative log posterior at the parameters and values of a point, with the initial states and the latent
+    force that suit them best on the linearisation of `found`."""
     theta = _coefficients(found, point)
-    return float(np.einsum("ni,nij,nj", theta, found.reduced.S, theta)) + prior_squares(found.model, point, found.log_tau2)
+    return float(np.einsum("ni,nij,nj", theta, found.reduced.S, theta)) + prior_squares(
+        found.model, point, found.log_tau2
+    )
 
 
 def leaning(found: Fit, point: Point) -> float:
@@ -228,7 +259,9 @@ def leaning(found: Fit, point: Point) -> float:
 def _coefficients(found: Fit, point: Point) -> np.ndarray:
     """(N, G + 1): parameters and values of a point by run, -1 for the residual."""
     runs = found.plant.seg.runs
-    own = [v if t.per_run else np.broadcast_to(v, (runs, t.size)) for t, v in zip(point.terms, point.values, strict=True)]
+    own = [
+        v if t.per_run else np.broadcast_to(v, (runs, t.size)) for t, v in zip(point.terms, point.values, strict=True)
+    ]
     return np.concatenate([np.broadcast_to(point.base, (runs, NUM_BASE)), *own, -np.ones((runs, 1))], axis=1)
 
 
@@ -241,17 +274,20 @@ def prior_squares(model: Model, point: Point, log_tau2: dict[int, float]) -> flo
 
 
 def settle(
-    lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (), cycles: int = _EM_CYCLES,
+    lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float], candidates: Sequence[Term] = (),
+    cycles: int = _EM_CYCLES,
     leap: float = np.inf, seen: Fit | None = None, far: bool = False,
 ) -> Fit:  # fmt: skip
-    """Variances, whose logarithms move by `leap` at most, and posterior on one linearisation; seen: an earlier fit on it, whose products hold; far:
-    see `sloped`."""
+    """Variances, whose logarithms move by `leap` at most, and posterior on one linearisation; seen: an earlier fit on
+    it, whose products hold; far: see `sloped`."""
     plant, scales, point = lin.plant, lin.scales, lin.point
     columns = lin.columns(candidates) if seen is None else seen.columns
     products = products_of(plant, scales, point, columns) if seen is None else seen.products
     products = sloped(lin, columns, products, hyper, far, known=seen is not None)
     if leap > 0.0:
-        hyper, log_tau2 = _variances(products.without(sum(t.size for t in candidates)), model, hyper, log_tau2, cycles, leap)
+        hyper, log_tau2 = _variances(
+            products.without(sum(t.size for t in candidates)), model, hyper, log_tau2, cycles, leap
+        )
     gram = products.weigh(hyper)
     reduced = gram.reduce(hyper.log_force)
     prior = model.prior(log_tau2)
@@ -259,17 +295,20 @@ def settle(
     estimate = background(gram, reduced, prior, solution)
     excess = max(objective(lin, model, hyper, log_tau2, gram) - solution.squares, 0.0)
     return Fit(
-        plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), lin.motion, products, gram, reduced, solution, estimate,
+        plant, scales, model, point, hyper, log_tau2, prior, columns, tuple(candidates), lin.motion, products, gram,
+        reduced, solution, estimate,
         excess,
     )  # fmt: skip
 
 
-def sloped(lin: Linearisation, columns: Columns, products: Products, hyper: Hyper, far: bool = False, known: bool = False) -> Products:
+def sloped(
+    lin: Linearisation, columns: Columns, products: Products, hyper: Hyper, far: bool = False, known: bool = False
+) -> Products:
     """Products that know how the log determinants depend on what is shared.
 
-    What initial states take off is seen at the same variances in all fits of a diagnosis: it would else reward lower ones. Where the force does what
-    the parameters should (`far`), the slopes mean nothing: followed from there, they made the yaw inertia of a navy ship negative. known: the
-    products are of an earlier fit on this linearisation.
+    What initial states take off is seen at the same variances in all fits of a diagnosis: it would else reward lower
+    ones. Where the force does what the parameters should (`far`), the slopes mean nothing: followed from there, they
+    made the yaw inertia of a navy ship negative. known: the products are of an earlier fit on this linearisation.
     """
     alone = products.without(products.shared)
 
@@ -307,15 +346,25 @@ def hull_evidence(found: Fit) -> float:
 
 
 def settled_evidence(found: Fit, products: Products, more: int) -> float:
-    """Log evidence of products that hold `more` shared columns behind those of the model of `found`, with all variances fitted anew."""
+    """Log evidence of products that hold `more` shared columns behind those of the model of `found`, with all variances
+    fitted anew."""
     hyper, log_tau2 = _variances(products, found.model, found.hyper, found.log_tau2, _EM_CYCLES, more=more)
-    return solve(products.weigh(hyper).reduce(hyper.log_force), found.model.prior(log_tau2).and_shared(more)).log_evidence
+    return solve(
+        products.weigh(hyper).reduce(hyper.log_force), found.model.prior(log_tau2).and_shared(more)
+    ).log_evidence
 
 
 def _variances(
-    products: Products, model: Model, hyper: Hyper, log_tau2: dict[int, float], cycles: int, leap: float = np.inf, more: int = 0
+    products: Products,
+    model: Model,
+    hyper: Hyper,
+    log_tau2: dict[int, float],
+    cycles: int,
+    leap: float = np.inf,
+    more: int = 0,
 ) -> tuple[Hyper, dict[int, float]]:
-    """Variances of force, noise and random effects on one linearisation; more: shared columns behind those of the model."""
+    """Variances of force, noise and random effects on one linearisation; more: shared columns behind those of the
+    model."""
     random = [i for i, term in enumerate(model.terms) if term.per_run]
     least = np.log(THRESHOLDS.value("least_noise") ** 2)
 
@@ -343,6 +392,8 @@ def _random_variances(model: Model, solution: Solution) -> list[float]:
         if term.per_run:
             sel = slice(at, at + term.size)
             at += term.size
-            second = np.mean(solution.means[:, sel] ** 2) + np.mean(np.diagonal(solution.covs[:, sel, sel], axis1=1, axis2=2))
+            second = np.mean(solution.means[:, sel] ** 2) + np.mean(
+                np.diagonal(solution.covs[:, sel, sel], axis1=1, axis2=2)
+            )
             found.append(float(np.log(second)))
     return found

@@ -1,4 +1,5 @@
-"""Inverses and determinants of many small positive definite matrices: most of the time of the algebra, as machine code where a compiler is."""
+"""Inverses and determinants of many small positive definite matrices: most of the time of the algebra, as machine code
+where a compiler is."""
 
 from __future__ import annotations
 
@@ -38,19 +39,20 @@ void inverses(num count, num size, const double *A, double *inverse, double *log
     for (num l = 0; l < n; l++) {
       double *to = inverse + (b + l) * size * size;
       logdet[b + l] = sum[l];
-      for (num i = 0; i < size; i++) for (num j = 0; j <= i; j++) to[i * size + j] = to[j * size + i] = -a[i * size + j][l];
+      for (num i = 0; i < size; i++)
+        for (num j = 0; j <= i; j++) to[i * size + j] = to[j * size + i] = -a[i * size + j][l];
     }
   }
   free(a);
 }
 """
-"""The sweep operator (Goodnight, The American Statistician 33 (1979) 149) at every pivot in turn; each number is a vector over matrices. LAPACK takes
-one matrix at a time, and at these sizes its blocks and pivots cost most of it."""
+"""The sweep operator (Goodnight, The American Statistician 33 (1979) 149) at every pivot in turn; each number is a
+vector over matrices. LAPACK takes one matrix at a time, and at these sizes its blocks and pivots cost most of it."""
 
 
 def inverses(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Inverses (B, n, n) and log determinants (B,) of positive definite matrices; of those that are only nearly so (sensitivities of a trajectory
-    that blows up) with pivoting."""
+    """Inverses (B, n, n) and log determinants (B,) of positive definite matrices; of those that are only nearly so
+    (sensitivities of a trajectory that blows up) with pivoting."""
     code = _code()
     if code is not None:
         A, out, logdet = np.ascontiguousarray(A), np.empty(A.shape), np.empty(len(A))

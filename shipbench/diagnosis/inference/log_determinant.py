@@ -1,10 +1,12 @@
 """Dependence of the latent force's log determinant on the parameters.
 
-The evidence of parameters is the posterior with the force integrated out: besides the squares it holds the log determinant of the force's precision,
-and a ship that is more damped answers the force less. Squares alone take the ship for one that is less damped and moves with little force: by a few
-standard errors in simulated trials, by ten where noise is small and runs are long (Esso Osaka).
-Sources: Laplace's approximation with states eliminated, Thygesen & Kristensen, arXiv:2503.21358 (2025); the like term of the Onsager-Machlup
-functional, which minimum energy estimates lack, Dutra, arXiv:1704.01847 (2017).
+The evidence of parameters is the posterior with the force integrated out: besides the squares it holds the log
+determinant of the force's precision,
+and a ship that is more damped answers the force less. Squares alone take the ship for one that is less damped and moves
+with little force: by a few standard errors in simulated trials, by ten where noise is small and runs are long (Esso
+Osaka).
+Sources: Laplace's approximation with states eliminated, Thygesen & Kristensen, arXiv:2503.21358 (2025); the like term
+of the Onsager-Machlup functional, which minimum energy estimates lack, Dutra, arXiv:1704.01847 (2017).
 """
 
 from __future__ import annotations
@@ -24,11 +26,12 @@ _MOVE = 1e-4
 
 @np.errstate(over="ignore", invalid="ignore")
 def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyper) -> np.ndarray:
-    """Derivatives (B, G) of the log determinants of the segments by base, own terms and candidates, for trajectories that stay where they are.
+    """Derivatives (B, G) of the log determinants of the segments by base, own terms and candidates, for trajectories
+    that stay where they are.
 
-    With Phi the sensitivities to w, R the noise and A = Phi' R^-1 Phi + P: d log det A = 2 tr(A^-1 Phi' R^-1 d Phi). `inverse` (B, Z, Z) is that of
-    [eta, w], which holds A^-1 once eta is known. Phi is a chain of single steps, so that the derivative by the Jacobian of each comes from an adjoint
-    one. A trial that blows up has none.
+    With Phi the sensitivities to w, R the noise and A = Phi' R^-1 Phi + P: d log det A = 2 tr(A^-1 Phi' R^-1 d Phi).
+    `inverse` (B, Z, Z) is that of [eta, w], which holds A^-1 once eta is known. Phi is a chain of single steps, so that
+    the derivative by the Jacobian of each comes from an adjoint one. A trial that blows up has none.
     """
     phi = _finite(np.concatenate([columns.eta, columns.w], axis=-1))
     B, _, Z = phi.shape
@@ -38,7 +41,10 @@ def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyp
     weight = _by_noise(lin, hyper, phi) @ of_force[:, None]
     by_rate = _by_rate(lin, phi, weight)
     turned = len(ASIDE) * np.take_along_axis(by_rate, lin.turn[..., None, None], axis=-1)[..., 0] / lin.away[..., None]
-    found = [_of_sensors(lin, bend, phi, weight) if bend.rates is None else np.einsum("kbi,ckbi->bc", turned, bend.rates) for bend in columns.bends]
+    found = [
+        _of_sensors(lin, bend, phi, weight) if bend.rates is None else np.einsum("kbi,ckbi->bc", turned, bend.rates)
+        for bend in columns.bends
+    ]
     return _finite(2.0 * np.concatenate(found, axis=1))
 
 
@@ -57,7 +63,9 @@ def _finite(values: np.ndarray) -> np.ndarray:
 def _by_noise(lin: Linearisation, hyper: Hyper, phi: np.ndarray) -> np.ndarray:
     """R^-1 Phi, (B, K + 1, 6, Z)."""
     colour, precision = lin.scales.colour, np.exp(-hyper.log_noise) / lin.scales.noise**2
-    return colour.unwhitened(colour.whitened(phi) * (lin.plant.seg.mask[..., None] * lin.plant.seg.seen * precision)[..., None])
+    return colour.unwhitened(
+        colour.whitened(phi) * (lin.plant.seg.mask[..., None] * lin.plant.seg.seen * precision)[..., None]
+    )
 
 
 def _by_rate(lin: Linearisation, phi: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -81,7 +89,10 @@ def _of_sensors(lin: Linearisation, bend: Bend, phi: np.ndarray, weight: np.ndar
     def seen(active: Sequence[Active]) -> np.ndarray:
         return lin.plant.measured(lin.motion + moves, active) - lin.plant.measured(lin.motion, active)
 
-    found, changed = np.zeros((len(phi), len(bend.sensors))), [(i, active) for i, active in enumerate(bend.sensors) if active is not None]
+    found, changed = (
+        np.zeros((len(phi), len(bend.sensors))),
+        [(i, active) for i, active in enumerate(bend.sensors) if active is not None],
+    )
     now = seen(lin.now) if changed else np.zeros(0)
     for i, active in changed:
         found[:, i] = np.sum(weight * np.moveaxis(seen(active) - now, 0, -1), axis=(1, 2, 3)) / (_MOVE * bend.unit)

@@ -23,15 +23,18 @@ _WAVES = (_LASTING[0], (1.7, 2.0, 2.3), (0.1, 0.25))
 
 
 def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colour:
-    """Correlation of the noise of each channel that suits the residuals by far better than none; found: of this share of the pieces. waves_alone:
-    look for motion with the waves, and for nothing that lasts. Channels that are not reached before the budget is spent keep white noise."""
+    """Correlation of the noise of each channel that suits the residuals by far better than none; found: of this share
+    of the pieces. waves_alone: look for motion with the waves, and for nothing that lasts. Channels that are not
+    reached before the budget is spent keep white noise."""
     worth = THRESHOLDS.value("coloured_noise") * share
     colour = Colour.white(found.plant.steps + 1)
     best = evidence_with(found, colour)
     for channel in np.flatnonzero(found.plant.seg.seen).tolist():
         if is_spent():
             break
-        grids = _swinging(found, colour, channel) + ([] if waves_alone else _lasting(found, colour, channel, best + worth))
+        grids = _swinging(found, colour, channel) + (
+            [] if waves_alone else _lasting(found, colour, channel, best + worth)
+        )
         reached, way = max((_climbed(found, grid) for grid in grids), key=lambda c: c[0], default=(best, colour))
         if reached > best + worth:
             best, colour = _tuned(found, way, channel, reached)
@@ -39,11 +42,14 @@ def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colo
 
 
 def _climbed(found: Fit, grid: np.ndarray) -> tuple[float, Colour]:
-    """Log evidence and noise of a grid's summit, from its second entry along the first two axes on, as far as a neighbour is better."""
+    """Log evidence and noise of a grid's summit, from its second entry along the first two axes on, as far as a
+    neighbour is better."""
     at = (1, 1, *[0] * (grid.ndim - 2))
     known = {at: evidence_with(found, grid[at])}
     while True:
-        steps = [(axis, step) for axis in range(grid.ndim) for step in (-1, 1) if 0 <= at[axis] + step < grid.shape[axis]]
+        steps = [
+            (axis, step) for axis in range(grid.ndim) for step in (-1, 1) if 0 <= at[axis] + step < grid.shape[axis]
+        ]
         for axis, step in steps:
             beside = (*at[:axis], at[axis] + step, *at[axis + 1 :])
             if beside not in known and not is_spent():
@@ -55,8 +61,8 @@ def _climbed(found: Fit, grid: np.ndarray) -> tuple[float, Colour]:
 
 
 def _tuned(found: Fit, colour: Colour, channel: int, best: float) -> tuple[float, Colour]:
-    """Log evidence and noise of `colour`, which has the evidence `best`, with a longer or a shorter period in a channel, as far as that is better
-    and a piece holds one, a sample no more than half of one."""
+    """Log evidence and noise of `colour`, which has the evidence `best`, with a longer or a shorter period in a
+    channel, as far as that is better and a piece holds one, a sample no more than half of one."""
     share, time, period = (float(x[channel]) for x in (colour.share, colour.time, colour.period))
     for factor in (1.15, 1.0 / 1.15):
         stretch = factor
@@ -70,7 +76,8 @@ def _tuned(found: Fit, colour: Colour, channel: int, best: float) -> tuple[float
 
 
 def _lasting(found: Fit, colour: Colour, channel: int, least: float) -> list[np.ndarray]:
-    """Errors that last for seconds, or were filtered, where such noise reaches the `least` evidence: grids of share and time."""
+    """Errors that last for seconds, or were filtered, where such noise reaches the `least` evidence: grids of share and
+    time."""
     if max(evidence_with(found, colour.with_channel(channel, share, time)) for share, time in _FIRST) < least:
         return []
     return [
@@ -104,8 +111,8 @@ def _swinging(found: Fit, colour: Colour, channel: int) -> list[np.ndarray]:
 
 
 def swinging_force(found: Fit, colour: Colour) -> Colour:
-    """`colour` with noise that swings in the velocities of the axes in which the latent force does: it follows waves that are long to its knots, and
-    no residual shows them."""
+    """`colour` with noise that swings in the velocities of the axes in which the latent force does: it follows waves
+    that are long to its knots, and no residual shows them."""
     for axis, channel in enumerate((U, V, R)):
         w = np.where(found.plant.seg.mask, found.point.w[..., axis] @ found.plant.hat.T, 0.0)
         lags = range(1, min(THRESHOLDS.count("swell_lag"), w.shape[1] - 1) + 1)

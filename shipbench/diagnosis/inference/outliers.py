@@ -25,7 +25,9 @@ def strange_pieces(found: Fit) -> np.ndarray:
     squares = np.empty((len(z), 3))
     for axis in range(3):
         at = slice(6 + axis * knots, 6 + (axis + 1) * knots)
-        squares[:, axis] = np.sum(z[:, at] @ gram.K_inv * z[:, at], axis=1) + np.sum(gram.K_inv * found.cov[:, at, at], axis=(1, 2))
+        squares[:, axis] = np.sum(z[:, at] @ gram.K_inv * z[:, at], axis=1) + np.sum(
+            gram.K_inv * found.cov[:, at, at], axis=(1, 2)
+        )
     others = (squares.sum(axis=0) - squares) / (len(z) - 1)
     worst = np.max(squares / others, axis=1)
     order = np.argsort(-worst)[:left]
@@ -35,11 +37,15 @@ def strange_pieces(found: Fit) -> np.ndarray:
 def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
     """Say what was left out of the fit: the share of a long record, and outliers, in the times of their runs."""
     seg = plant.seg
-    fitted, whole = seg.dt * float(np.maximum(seg.mask.sum(axis=1) - 1, 0).sum()), float(sum(run.t[-1] - run.t[0] - seg.dt for run in runs))
+    fitted, whole = (
+        seg.dt * float(np.maximum(seg.mask.sum(axis=1) - 1, 0).sum()),
+        float(sum(run.t[-1] - run.t[0] - seg.dt for run in runs)),
+    )
     found = []
     if fitted < THRESHOLDS.value("fitted_share") * whole:
         found.append(
-            f"{fitted / whole:.0%} of the record is fitted, {len(seg.run)} pieces of {plant.steps * seg.dt:.0f} s, spread over all runs; "
+            f"{fitted / whole:.0%} of the record is fitted, {len(seg.run)} pieces of {plant.steps * seg.dt:.0f} s, "
+            "spread over all runs; "
             "`--thorough` fits up to twice as much."
         )
     pieces = []

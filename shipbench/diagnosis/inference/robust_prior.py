@@ -28,7 +28,8 @@ _SAME = 0.05
 
 
 def widths_of(found: Fit, reduced: Reduced | None = None) -> np.ndarray:
-    """(NUM_BASE,) factors of the spreads, 1 for what is ordinary: Huber's weights, at the optimum of this linearisation (iteratively reweighted)."""
+    """(NUM_BASE,) factors of the spreads, 1 for what is ordinary: Huber's weights, at the optimum of this linearisation
+    (iteratively reweighted)."""
     widths, knee = np.ones(NUM_BASE), THRESHOLDS.value("huber_knee")
     for _ in range(20):
         new = np.sqrt(np.maximum(np.abs(_base(found, reduced or found.reduced, widths)) / knee, 1.0))
@@ -39,7 +40,8 @@ def widths_of(found: Fit, reduced: Reduced | None = None) -> np.ndarray:
 
 
 def needed(found: Fit, least: float = NOTICEABLE) -> np.ndarray:
-    """(NUM_BASE,) parameters in units of what ships differ by (`STRUCTURE.wider`), as they would be beside a latent force of at least the size
+    """(NUM_BASE,) parameters in units of what ships differ by (`STRUCTURE.wider`), as they would be beside a latent
+    force of at least the size
     `least`: what so small a force could stand for need not be the ship's."""
     reduced = found.gram.reduce(np.maximum(found.hyper.log_force, 2.0 * np.log(least)))
     z = _base(found, reduced, widths_of(found, reduced))
@@ -68,7 +70,16 @@ def widened(found: Fit) -> Fit:
         if is_spent() or np.max(np.abs(widths / np.asarray(found.model.widths or 1.0) - 1.0)) < _SAME:
             break
         model = replace(found.model, widths=tuple(widths))
-        wider = fit(found.plant, found.scales, model, found.point, found.hyper, found.log_tau2, candidates=found.candidates, guess=found.motion)
+        wider = fit(
+            found.plant,
+            found.scales,
+            model,
+            found.point,
+            found.hyper,
+            found.log_tau2,
+            candidates=found.candidates,
+            guess=found.motion,
+        )
         if wider.evidence < found.evidence:
             break
         found = wider

@@ -83,7 +83,8 @@ class Structure(Effect):
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
 
     def spreads(self, ship: Particulars, measured_wind: bool) -> np.ndarray:
-        """Standard deviations of the values. The side force of a wind that is not measured cannot be told from the wind itself."""
+        """Standard deviations of the values. The side force of a wind that is not measured cannot be told from the wind
+        itself."""
         thrust = np.hypot(0.8 * ship.lacks("propeller"), 0.2 * ship.lacks("propeller.kt"))
         own = {"wind_Y": float(measured_wind), "log_thrust": float(thrust)}
         return np.array([p.typical * own.get(p.name, 1.0) for p in self.parameters])
@@ -116,7 +117,9 @@ class Structure(Effect):
         e.coupling = q[16] * ship.mass * ship.L
         e.m_x = 1.0 + self.m_x + q[24]
         WIND.force(e, s, (*q[20:23], q[23] * ship.L), ship)
-        ahead = smoothstep(s.u - e.u_c, -0.02 * (9.81 * ship.L) ** 0.5, 0.0)  # astern the rudder leads: a reversed propeller stops no flow there
+        ahead = smoothstep(
+            s.u - e.u_c, -0.02 * (9.81 * ship.L) ** 0.5, 0.0
+        )  # astern the rudder leads: a reversed propeller stops no flow there
         GOING_ASTERN.force(e, s, (self.astern + q[25], self.astern + q[26], 0.0, ahead * (self.backing + q[19])), ship)
         e.reversal = self.astern + q[27]
         e.thrust = e.thrust * exp(q[28]) * (1.0 + q[18] * smoothstep(-s.n, 0.0, 1.0))
@@ -134,7 +137,9 @@ class Structure(Effect):
         I_Y, I_N = tilted_cross_flow(v, s.r, ship.L)
         e.push(0.0, -unit * q[41] * I_Y, -unit * ship.L * q[41] * I_N)
         beta_P = arctan2(-(v + ship.x_P * s.r), maximum(u, 0.0) + 0.1)
-        in_turns = q[10] * (1.0 - exp(-2.0 * absolute(beta_P))) * tanh(beta_P / 0.05) + q[37] * (1.0 - exp(-4.0 * beta_P * beta_P))
+        in_turns = q[10] * (1.0 - exp(-2.0 * absolute(beta_P))) * tanh(beta_P / 0.05) + q[37] * (
+            1.0 - exp(-4.0 * beta_P * beta_P)
+        )
         e.wake = e.wake - (1.0 - ship.w_P0) * in_turns
 
     def _off_design(self, e: Modifiers, s: Flow, q: Sequence[Array], headway: Array, ship: Particulars) -> None:

@@ -1,4 +1,5 @@
-"""The fitted model as the diagnosis sees it: batches of segments, rolled out with a latent force, for many changed directions at once."""
+"""The fitted model as the diagnosis sees it: batches of segments, rolled out with a latent force, for many changed
+directions at once."""
 
 from __future__ import annotations
 
@@ -35,21 +36,26 @@ FEW_PIECES = THRESHOLDS.count("segments_for_noise")
 
 
 def ordinary_gears(L: float) -> dict[str, Gear]:
-    """Shaft [rpm], steering gear [rad] and thrusters [N] of an ordinary ship of length L, where no actuator is recorded: time constants and rates of
-    `actuator_fit.DEFAULT_ACTUATORS`, Froude-scaled."""
+    """Shaft [rpm], steering gear [rad] and thrusters [N] of an ordinary ship of length L, where no actuator is
+    recorded: time constants and rates of `actuator_fit.DEFAULT_ACTUATORS`, Froude-scaled."""
     T_n, rate_n, T_delta, rate_delta, T_F, _ = (float(v) for v in DEFAULT_ACTUATORS)
     scale = (L / 130.0) ** 0.5
-    return {"n": Gear(T_n * scale, rate_n / scale**2), "delta": Gear(T_delta * scale, rate_delta / scale), "F": Gear(T_F * scale, 1e12)}
+    return {
+        "n": Gear(T_n * scale, rate_n / scale**2),
+        "delta": Gear(T_delta * scale, rate_delta / scale),
+        "F": Gear(T_F * scale, 1e12),
+    }
 
 
 @dataclass(frozen=True)
 class Segments:
     """Pieces of runs of at most `steps` transitions, padded to equal length.
 
-    Shapes: states (B, K + 1, 10), commands (B, K + 1, 4), wind (B, K + 1, 2) or None, mask (B, K + 1) of real samples, run (B,) index of the run,
-    start (B,) time since the run began [s]; earlier (B, P, 4): the commands before the piece (the first, before the run), without any where actuators
-    are recorded; kinds: of manoeuvre, by run, "" where not given; seen (6,): what of the motion was measured; depth (B,): mean of the recorded one
-    [m], None where none is, or deep water, or less than the draught; working: names of the actuators that work in any run.
+    Shapes: states (B, K + 1, 10), commands (B, K + 1, 4), wind (B, K + 1, 2) or None, mask (B, K + 1) of real samples,
+    run (B,) index of the run, start (B,) time since the run began [s]; earlier (B, P, 4): the commands before the piece
+    (the first, before the run), without any where actuators are recorded; kinds: of manoeuvre, by run, "" where not
+    given; seen (6,): what of the motion was measured; depth (B,): mean of the recorded one [m], None where none is, or
+    deep water, or less than the draught; working: names of the actuators that work in any run.
     """
 
     dt: float
@@ -84,7 +90,8 @@ class Segments:
     def _of(self, rows: np.ndarray) -> Segments:
         wind, depth = (None if v is None else v[rows] for v in (self.wind, self.depth))
         return replace(
-            self, states=self.states[rows], commands=self.commands[rows], earlier=self.earlier[rows], wind=wind, mask=self.mask[rows],
+            self, states=self.states[rows], commands=self.commands[rows], earlier=self.earlier[rows], wind=wind,
+            mask=self.mask[rows],
             run=self.run[rows], start=self.start[rows], depth=depth,
         )  # fmt: skip
 
@@ -109,18 +116,27 @@ def cut(dataset: Dataset, steps: int) -> Segments:
         edges = np.linspace(0, len(run) - 1, num + 1).round().astype(int)
         pieces += [(index, run, a, b) for a, b in pairwise(edges)]
     K = max(b - a for _, _, a, b in pieces)
-    wind_columns = [dataset.inputs.index(n) for n in ("wind_speed", "wind_from")] if {"wind_speed", "wind_from"} <= set(dataset.inputs) else None
+    wind_columns = (
+        [dataset.inputs.index(n) for n in ("wind_speed", "wind_from")]
+        if {"wind_speed", "wind_from"} <= set(dataset.inputs)
+        else None
+    )
     at = [np.minimum(np.arange(a, a + K + 1), b) for _, _, a, b in pieces]
     states = np.stack([run.states[i] for (_, run, _, _), i in zip(pieces, at, strict=True)])
     inputs = np.stack([run.inputs[i] for (_, run, _, _), i in zip(pieces, at, strict=True)])
     ship, commanded = complete(dataset.ship), dataset.actuators == "commanded"
     scale = (ship.L / 130.0) ** 0.5
-    depth = inputs[..., dataset.inputs.index("depth")].mean(axis=1) if ship.T < least_depth(dataset) < DEEP * ship.T else None
+    depth = (
+        inputs[..., dataset.inputs.index("depth")].mean(axis=1)
+        if ship.T < least_depth(dataset) < DEEP * ship.T
+        else None
+    )
     back = np.arange(-round(THRESHOLDS.value("commands_before_segment") * scale / dataset.dt) if commanded else 0, 0)
     return Segments(
         dt=dataset.dt, commanded=commanded, states=states, commands=inputs[..., :4],
         earlier=np.stack([run.inputs[np.maximum(a + back, 0), :4] for _, run, a, _ in pieces]),
-        wind=None if wind_columns is None else inputs[..., wind_columns], mask=np.stack([np.arange(K + 1) <= b - a for _, _, a, b in pieces]),
+        wind=None if wind_columns is None else inputs[..., wind_columns],
+        mask=np.stack([np.arange(K + 1) <= b - a for _, _, a, b in pieces]),
         run=np.array([p[0] for p in pieces]), start=np.array([p[2] * dataset.dt for p in pieces]), runs=len(dataset),
         kinds=tuple(run.kind for run in dataset.runs),
         seen=~np.isin(STATES[MOTION], dataset.derived), depth=depth, working=working(dataset),
@@ -146,18 +162,24 @@ def _substeps(dt: float, L: float) -> int:
 
 def _known(inputs: Mapping[str, np.ndarray], ship: Particulars) -> list[Active]:
     """Effects whose values the measured `inputs` give."""
-    return [Active(e, e.known(inputs, ship)) for e in map(EFFECTS.get, EFFECTS.names()) if e.known_with and set(e.known_with) <= set(inputs)]
+    return [
+        Active(e, e.known(inputs, ship))
+        for e in map(EFFECTS.get, EFFECTS.names())
+        if e.known_with and set(e.known_with) <= set(inputs)
+    ]
 
 
 class Plant:
     """Rollouts of eq. (2) over all segments.
 
     The motion is driven by the recorded actuators (interpolated), so that
-    what happens between command and actuator cannot be mistaken for a force; where only commands are recorded, by the held commands.
+    what happens between command and actuator cannot be mistaken for a force; where only commands are recorded, by the
+    held commands.
     """
 
     def __init__(
-        self, dataset_ship: Particulars, segments: Segments, long: Segments | None = None, gears: dict[str, Gear] | None = None,
+        self, dataset_ship: Particulars, segments: Segments, long: Segments | None = None,
+        gears: dict[str, Gear] | None = None,
         froude: float | None = None, recorded: bool = False,
     ) -> None:  # fmt: skip
         self.recorded = recorded
@@ -184,7 +206,10 @@ class Plant:
         self.inputs = frozenset(("wind_speed", "wind_from") * (wind is not None) + ("depth",) * bool(self.water))
         """Measured inputs that the model takes into account."""
         self.ordinary: dict[str, Gear] = {}
-        self.drive((ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR)) | (gears or {}))
+        self.drive(
+            (ordinary_gears(self.c.L) if segments.commanded else dict.fromkeys(("n", "delta", "F"), NO_GEAR))
+            | (gears or {})
+        )
 
     def drive(self, gears: dict[str, Gear]) -> None:
         """Take these gears for the ordinary ones between the commands and the actuators."""
@@ -233,9 +258,10 @@ class Plant:
 
     @classmethod
     def of(cls, dataset: Dataset, most_steps: int = MOST_STEPS) -> Plant:
-        """The plant of a data set, cut into segments of about 60 s at 130 m (Froude-scaled): over longer ones the motion is far from linear in its
-        parameters, and little is learnt from the place where the next one begins. Fast records are averaged, long ones thinned to `most_steps`
-        integration steps. `long` are longer pieces, with every sample, for what has no such limit: the gears."""
+        """The plant of a data set, cut into segments of about 60 s at 130 m (Froude-scaled): over longer ones the
+        motion is far from linear in its parameters, and little is learnt from the place where the next one begins. Fast
+        records are averaged, long ones thinned to `most_steps` integration steps. `long` are longer pieces, with every
+        sample, for what has no such limit: the gears."""
         ship, motion, longer = complete(dataset.ship), averaged(dataset), THRESHOLDS.count("long_segment")
         length = SEGMENT * (ship.L / 130.0) ** 0.5
         segments = cut(motion, max(20, round(length / motion.dt)))
@@ -247,8 +273,8 @@ class Plant:
     def path_of(self, active: Sequence[Active]) -> np.ndarray:
         """Actuators at the three stages of every integration step, (B, steps * substeps, 3, 4): n, delta, F_b, F_s.
 
-        Recorded actuators are interpolated and pass through what gear effects add; where only commands are recorded, these pass through
-        ordinary gears as well.
+        Recorded actuators are interpolated and pass through what gear effects add; where only commands are recorded,
+        these pass through ordinary gears as well.
         """
         gears = dict(self.ordinary)
         for a in active:
@@ -265,12 +291,15 @@ class Plant:
         return path
 
     def _stages(self, i: int, gear: Gear) -> np.ndarray:
-        """One actuator behind a gear, (B, steps * substeps, 3). A negative delay means that the record is late. Recorded actuators are read at the
-        time that a delay points to: a gear that follows them at once moves from stage to stage, and would leave a delay without a slope."""
+        """One actuator behind a gear, (B, steps * substeps, 3). A negative delay means that the record is late.
+        Recorded actuators are read at the
+        time that a delay points to: a gear that follows them at once moves from stage to stage, and would leave a delay
+        without a slope."""
         seg, n, before = self.seg, 2 * self.substeps, self.seg.earlier.shape[1]
         fine = np.arange(-before * n, self.steps * n + 1) / n
         if seg.commanded:
-            # between stages linear: else a record that is late by less than the next stage would have no slope to find it by
+            # between stages linear: else a record that is late by less than the next stage would have no slope to find
+            # it by
             whole, part = divmod(-min(gear.delay, 0.0) / seg.dt * n, 1.0)
             orders = np.concatenate([seg.earlier[..., i], seg.commands[..., i]], axis=1)
             at = [np.clip(np.floor(fine + (whole + k) / n + 1e-9).astype(int), -before, self.steps - 1) for k in (0, 1)]
@@ -282,7 +311,8 @@ class Plant:
             values = seg.states[:, low, 6 + i] * (1.0 - (at - low)) + seg.states[:, low + 1, 6 + i] * (at - low)
             follow = replace(gear, delay=0.0)
         if follow != NO_GEAR:
-            # recorded actuators: the value at the end of the step is what the gear follows; commands are held from its beginning
+            # recorded actuators: the value at the end of the step is what the gear follows; commands are held from its
+            # beginning
             wanted = values[:, :-1] if seg.commanded else values[:, 1:]
             begins = values[:, 0] if before or not seg.commanded else seg.states[:, 0, 6 + i]
             if np.any(wanted != begins[:, None]):  # thrusters are often at rest
@@ -290,24 +320,43 @@ class Plant:
         values = values[:, before * n :]
         return np.stack([values[:, stage : stage + n * self.steps - 1 : 2] for stage in range(3)], axis=-1)
 
-    def roll(self, x0: np.ndarray, p: Sequence[Array], active: Sequence[Active], w: np.ndarray, path: np.ndarray | None = None) -> np.ndarray:
-        """Motion (B, K + 1, 6) from x0 (B, 6), with parameters p0..p10, effects, and a latent acceleration w (B, K + 1, 3) at the samples."""
+    def roll(
+        self,
+        x0: np.ndarray,
+        p: Sequence[Array],
+        active: Sequence[Active],
+        w: np.ndarray,
+        path: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Motion (B, K + 1, 6) from x0 (B, 6), with parameters p0..p10, effects, and a latent acceleration w (B, K + 1,
+        3) at the samples."""
         return self.course.rolled(x0, p, [*active, *self.water], self._by_sample(path), self.pushes(w))
 
     def steps_from(
-        self, states: np.ndarray, p: Sequence[Array], active: Sequence[Active], push: np.ndarray, path: np.ndarray | None = None
+        self,
+        states: np.ndarray,
+        p: Sequence[Array],
+        active: Sequence[Active],
+        push: np.ndarray,
+        path: np.ndarray | None = None,
     ) -> np.ndarray:
         """One sample ahead of every state at once: (D, K, B, 6) from states (D or 1, K, B, 6) and `pushes`.
 
-        Along a known trajectory this replaces the loop over time: the sensitivities of the single steps are chained afterwards.
+        Along a known trajectory this replaces the loop over time: the sensitivities of the single steps are chained
+        afterwards.
         """
         return self.course.ends(states, p, [*active, *self.water], self._by_sample(path), push)
 
     def rates_from(
-        self, middle: np.ndarray, p: Sequence[Array], active: Sequence[Active], path: np.ndarray | None = None, often: bool = True
+        self,
+        middle: np.ndarray,
+        p: Sequence[Array],
+        active: Sequence[Active],
+        path: np.ndarray | None = None,
+        often: bool = True,
     ) -> np.ndarray:
-        """Accelerations (D, K, B, 3) that forces give in the middle of every step, from the states there (1, K, B, 6); `often` as in
-        `Course.rates`."""
+        """Accelerations (D, K, B, 3) that forces give in the middle of every step, from the states there (1, K, B, 6);
+        `often` as in `Course.rates`."""
         return self.course.rates(middle, p, [*active, *self.water], self._by_sample(path), often)
 
     def midway(self, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

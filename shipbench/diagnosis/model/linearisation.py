@@ -40,8 +40,9 @@ PLACES = {p.name: len(FREE) + NUM_HULL + i for i, p in enumerate(STRUCTURE.param
 class Point:
     """Values, all in units of their scales.
 
-    base (15,): free parameters of eq. (2) and relative changes of the hull, as differences from their prior means. terms: effects in the model, with
-    values (amplitudes,) or (runs, amplitudes). eta (B, 6): initial state beside the first sample. w (B, knots, 3): latent acceleration.
+    base (15,): free parameters of eq. (2) and relative changes of the hull, as differences from their prior means.
+    terms: effects in the model, with values (amplitudes,) or (runs, amplitudes). eta (B, 6): initial state beside the
+    first sample. w (B, knots, 3): latent acceleration.
     """
 
     base: np.ndarray
@@ -52,8 +53,9 @@ class Point:
 
 
 class Scales:
-    """Units of everything that is free, for one ship: chosen so that one unit is a typical size. background: the variances at which all fits that are
-    compared see what initial states take off the evidence; none before there is a first fit."""
+    """Units of everything that is free, for one ship: chosen so that one unit is a typical size. background: the
+    variances at which all fits that are compared see what initial states take off the evidence; none before there is a
+    first fit."""
 
     background: Hyper | None = None
 
@@ -98,8 +100,8 @@ def hull_changes(base: np.ndarray) -> np.ndarray:
 
 
 def parameters(scales: Scales, base: np.ndarray) -> tuple[list[np.ndarray | float], list[Active]]:
-    """p0..p10, and the changes of the hull and of the structure, from `base` (..., 15); leading axes are kept, so that (D, 1) spreads over
-    segments."""
+    """p0..p10, and the changes of the hull and of the structure, from `base` (..., 15); leading axes are kept, so that
+    (D, 1) spreads over segments."""
     p: list[np.ndarray | float] = [0.0] * 11
     for i, index in enumerate(FREE):
         p[index] = (CENTRE[i] + SPREAD[i] * base[..., i]) * scales.p[index]
@@ -120,7 +122,9 @@ def actives(plant: Plant, scales: Scales, point: Point) -> list[Active]:
     found = []
     for term, value in zip(point.terms, point.values, strict=True):
         amplitude = scales.amplitudes(term, plant.c.L) * value
-        q = tuple(amplitude[plant.seg.run, i] if term.per_run else _since(plant, term, amplitude[i]) for i in range(term.size))
+        q = tuple(
+            amplitude[plant.seg.run, i] if term.per_run else _since(plant, term, amplitude[i]) for i in range(term.size)
+        )
         found.append(Active(term.effect, (*q, *term.setting)))
     return found
 
@@ -136,15 +140,19 @@ _quiet = np.errstate(over="ignore", invalid="ignore")
 
 
 class Linearisation:
-    """A trajectory and its sensitivities: forward differences of all single steps at once, chained by the steps' Jacobians.
+    """A trajectory and its sensitivities: forward differences of all single steps at once, chained by the steps'
+    Jacobians.
 
-    The trajectory may be a guess whose steps do not quite meet (lifted Newton, multiple shooting): the gaps are chained into `predicted`, and close
-    as the iterations converge. Without a guess the model is rolled out. `coarse`: vectors in the model are moved by half their typical size; finely a
-    fit comes to rest where it is best, but does not leave the place where a vector is zero.
+    The trajectory may be a guess whose steps do not quite meet (lifted Newton, multiple shooting): the gaps are chained
+    into `predicted`, and close as the iterations converge. Without a guess the model is rolled out. `coarse`: vectors
+    in the model are moved by half their typical size; finely a fit comes to rest where it is best, but does not leave
+    the place where a vector is zero.
     """
 
     @_quiet
-    def __init__(self, plant: Plant, scales: Scales, point: Point, guess: np.ndarray | None = None, coarse: bool = True) -> None:
+    def __init__(
+        self, plant: Plant, scales: Scales, point: Point, guess: np.ndarray | None = None, coarse: bool = True
+    ) -> None:
         self.plant, self.scales, self.point, self.coarse = plant, scales, point, coarse
         self.now = actives(plant, scales, point)
         self.p, self.ship = parameters(scales, point.base)
@@ -152,14 +160,18 @@ class Linearisation:
         self.path = plant.path_of(self.now)
         w = plant.hat @ (scales.w * point.w)
         x0 = plant.seg.states[:, 0, :6] + scales.eta * point.eta
-        self.motion = plant.roll(x0, self.p, [*flow_first(self.forces), *self.ship], w, self.path) if guess is None else guess
+        self.motion = (
+            plant.roll(x0, self.p, [*flow_first(self.forces), *self.ship], w, self.path) if guess is None else guess
+        )
         self.push = plant.pushes(w)
         self.states = np.swapaxes(self.motion[:, :-1], 0, 1)[None]
         self.here = self._steps()[0]
         moved = self._steps(states=self.states + _STEP * np.eye(6)[:, None, None, :] * scales.eta) - self.here
         self.jacobian = np.moveaxis(moved, 0, -1) / (_STEP * scales.eta)  # (K, B, 6, 6)
         half = np.eye(6) + self.jacobian
-        self.reach = 0.5 * plant.seg.dt * half[..., 3:]  # (K, B, 6, 3): end of a step from an acceleration that lasts it
+        self.reach = (
+            0.5 * plant.seg.dt * half[..., 3:]
+        )  # (K, B, 6, 3): end of a step from an acceleration that lasts it
         self.middle = 0.5 * (self.states + self.here)
         self.rates = self._rates()
         self.aside: np.ndarray | None = None
@@ -176,7 +188,9 @@ class Linearisation:
         self.pulses = self._pulses()
         first = np.broadcast_to(np.diag(self.scales.eta), (self.here.shape[1], 6, 6))
         eta, latent = self._chained(np.zeros((*self.here.shape, 6)), first), self._chained(self.pulses)
-        return Columns(self.predicted, eta, latent, base, own, tuple(self._of_candidates(candidates)), tuple(self.bends))
+        return Columns(
+            self.predicted, eta, latent, base, own, tuple(self._of_candidates(candidates)), tuple(self.bends)
+        )
 
     @_quiet
     def parameter_columns(self, free: Sequence[int] = range(NUM_BASE)) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
@@ -189,13 +203,14 @@ class Linearisation:
         return self._chained(self.base_sources), own
 
     def pushed(self, axis: int, on: np.ndarray, aside: np.ndarray) -> tuple[np.ndarray, Bend]:
-        """Columns (B, T, F) of accelerations (F, K, B) along one axis in the middle of every step, in units of the latent force's scales, and how
-        they bend the motion, where they are others beside it. After `columns`."""
+        """Columns (B, T, F) of accelerations (F, K, B) along one axis in the middle of every step, in units of the
+        latent force's scales, and how they bend the motion, where they are others beside it. After `columns`."""
         along = self.scales.w * (np.arange(3) == axis)
         return self._chained(self._ends(on[..., None] * along)), Bend((aside - on)[..., None] * along)
 
     def towards(self, target: Point) -> np.ndarray:
-        """The trajectory that the linear model expects at another point, gaps closed: the guess for the next iteration. After `columns`."""
+        """The trajectory that the linear model expects at another point, gaps closed: the guess for the next iteration.
+        After `columns`."""
         here = self.point
         w = np.moveaxis(target.w - here.w, -1, 1).reshape(len(here.w), -1)
         sources = self.gaps + self.base_sources @ (target.base - here.base) + (self.pulses @ w[..., None])[..., 0]
@@ -208,13 +223,18 @@ class Linearisation:
         x0 = self.plant.seg.states[:, 0, :6] + self.scales.eta * target.eta
         return self.motion + self._chain(sources[..., None], (x0 - self.motion[:, 0])[..., None])[..., 0]
 
-    def _steps(self, states: np.ndarray | None = None, forces: Sequence[Active] | None = None, path: np.ndarray | None = None) -> np.ndarray:
+    def _steps(
+        self, states: np.ndarray | None = None, forces: Sequence[Active] | None = None, path: np.ndarray | None = None
+    ) -> np.ndarray:
         """Ends of all single steps (D, K, B, 6) with something changed."""
         active = [*flow_first(self.forces if forces is None else forces), *self.ship]
-        return self.plant.steps_from(self.states if states is None else states, self.p, active, self.push, self.path if path is None else path)
+        return self.plant.steps_from(
+            self.states if states is None else states, self.p, active, self.push, self.path if path is None else path
+        )
 
     def _rates(
-        self, p: Sequence[Array] | None = None, ship: Sequence[Active] | None = None, forces: Sequence[Active] | None = None,
+        self, p: Sequence[Array] | None = None, ship: Sequence[Active] | None = None,
+        forces: Sequence[Active] | None = None,
         path: np.ndarray | None = None, often: bool = True, states: np.ndarray | None = None,
     ) -> np.ndarray:  # fmt: skip
         """Accelerations (D, K, B, 3) in the middle of all single steps with something changed."""
@@ -223,7 +243,8 @@ class Linearisation:
         return self.plant.rates_from(at, self.p if p is None else p, active, way, often)
 
     def _look_aside(self) -> None:
-        """A point beside the middle of every step, in one direction after the other, for what the forces' derivatives by the motion change with."""
+        """A point beside the middle of every step, in one direction after the other, for what the forces' derivatives
+        by the motion change with."""
         K, B = self.middle.shape[1:3]
         self.turn = np.take(ASIDE, np.add.outer(np.arange(K), np.arange(B)) % len(ASIDE))
         self.away = AWAY * self.scales.eta[self.turn]
@@ -231,15 +252,15 @@ class Linearisation:
         self.rates_aside = self._rates(states=self.aside)
 
     def _changed(self, unit: float, **change: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Changes (D, K, B, 3) of the accelerations by a change of something, per unit: on the trajectory, and beside it less those (none
-        where the derivatives of the log determinant are not asked for)."""
+        """Changes (D, K, B, 3) of the accelerations by a change of something, per unit: on the trajectory, and beside
+        it less those (none where the derivatives of the log determinant are not asked for)."""
         on = self._rates(**change) - self.rates
         aside = on if self.aside is None else self._rates(**change, states=self.aside) - self.rates_aside
         return on / unit, (aside - on) / unit
 
     def _ends(self, rates: np.ndarray) -> np.ndarray:
-        """Changes of the steps' ends (K, B, 6, D) by changes of the acceleration (D, K, B, 3): one evaluation of the forces instead of the four of a
-        step."""
+        """Changes of the steps' ends (K, B, 6, D) by changes of the acceleration (D, K, B, 3): one evaluation of the
+        forces instead of the four of a step."""
         return np.asarray(self.reach @ np.moveaxis(rates, 0, -1))
 
     def _pulses(self) -> np.ndarray:
@@ -249,7 +270,8 @@ class Linearisation:
         return np.asarray(ends.reshape(*self.here.shape, -1))
 
     def _chain(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
-        """Change of the motion (B, K + 1, 6, D) from changes of the steps' ends (K, B, 6, D) and of the initial states (B, 6, D)."""
+        """Change of the motion (B, K + 1, 6, D) from changes of the steps' ends (K, B, 6, D) and of the initial states
+        (B, 6, D)."""
         K, B, _, D = sources.shape
         S, now = np.empty((B, K + 1, 6, D)), np.zeros((B, 6, D)) if first is None else first
         S[:, 0] = now
@@ -276,7 +298,11 @@ class Linearisation:
         columns, sources, bend = self._moved(index, term, steps, step)
         if term.effect.vector and sources is not None and bend.rates is not None:
             back, sources_back, bend_back = self._moved(index, term, -steps, -step)
-            columns, sources, bend = 0.5 * (columns + back), 0.5 * (sources + sources_back), Bend(0.5 * (bend.rates + bend_back.rates))
+            columns, sources, bend = (
+                0.5 * (columns + back),
+                0.5 * (sources + sources_back),
+                Bend(0.5 * (bend.rates + bend_back.rates)),
+            )
         self.own_sources.append(sources)
         self.bends.append(bend)
         return columns
@@ -298,7 +324,9 @@ class Linearisation:
             own = [np.where(np.arange(term.size) == a, unit[a], 0.0)[:, None, None] for a in range(term.size)]
             q = [_since(self.plant, term, value) for value in own]
             sides = (1.0, -1.0) if term.effect.vector else (1.0,)  # its sign differs between headings
-            change, bent = np.mean([self._changed(side * step, forces=self._beside(term, q, side), often=False) for side in sides], axis=0)
+            change, bent = np.mean(
+                [self._changed(side * step, forces=self._beside(term, q, side), often=False) for side in sides], axis=0
+            )
             self.candidate_sources.append(self._ends(change))
             self.bends.append(Bend(bent))
         forces = [source for i, source in enumerate(self.candidate_sources) if i not in found and source is not None]
@@ -324,18 +352,25 @@ class Linearisation:
         return [*self.forces, Active(term.effect, (*(side * v for v in q), *term.setting))]
 
     @_quiet
-    def _moved(self, index: int | None, term: Term, steps: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray | None, Bend]:
-        """Columns (B, T, size) of one term, the index-th of the model or one that is not in it, and its sources where it touches the motion."""
+    def _moved(
+        self, index: int | None, term: Term, steps: np.ndarray, unit: float
+    ) -> tuple[np.ndarray, np.ndarray | None, Bend]:
+        """Columns (B, T, size) of one term, the index-th of the model or one that is not in it, and its sources where
+        it touches the motion."""
         columns, sources, bends, sensors = [], [], [], []
         seen = self.plant.measured(self.motion, self.now)
         for a in range(term.size):
             old = (*(0.0 for _ in range(term.size)), *term.setting) if index is None else self.now[index].q
-            active = Active(term.effect, tuple(v + _since(self.plant, term, steps[a]) if i == a else v for i, v in enumerate(old)))
+            active = Active(
+                term.effect, tuple(v + _since(self.plant, term, steps[a]) if i == a else v for i, v in enumerate(old))
+            )
             changed = [*self.now, active] if index is None else [*self.now[:index], active, *self.now[index + 1 :]]
             if term.effect.enters == "sensor":
                 moved = self.plant.measured(self.motion, changed) - seen
                 columns.append((moved / unit).reshape(len(moved), -1, 1))
-                sensors.append(None if term.effect.late else tuple(changed))  # it tells as much of a force, but where a piece was cut
+                sensors.append(
+                    None if term.effect.late else tuple(changed)
+                )  # it tells as much of a force, but where a piece was cut
                 continue
             if term.effect.enters == "gear":
                 path = self.plant.path_of(changed)

@@ -1,11 +1,14 @@
-"""Sensor noise whose samples go together: a compass or a receiver that filters errs for seconds, and samples taken as independent would say too much.
+"""Sensor noise whose samples go together: a compass or a receiver that filters errs for seconds, and samples taken as
+independent would say too much.
 A ship in waves moves at their frequency besides: samples taken as independent would say too little of her slow motion.
 
-Noise of a channel: white, and `share` times as much variance that forgets itself like exp(-|t - s| / time), or moves to and fro with a `period`, as
-the output of a damped oscillator that has nothing at frequency zero (T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, Wiley,
-2011, 8.2.6: linear wave response), or is smooth, as in a record that was filtered: Matern's correlation of order 5/2 (C. E. Rasmussen and
-C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press, 2006, eq. 4.17). Both sides of the linear model are multiplied by the
-inverse of its Cholesky factor; what is left is white again, also in a piece that ends early, as the factor is triangular.
+Noise of a channel: white, and `share` times as much variance that forgets itself like exp(-|t - s| / time), or moves to
+and fro with a `period`, as the output of a damped oscillator that has nothing at frequency zero (T. I. Fossen, Handbook
+of Marine Craft Hydrodynamics and Motion Control, Wiley,
+2011, 8.2.6: linear wave response), or is smooth, as in a record that was filtered: Matern's correlation of order 5/2
+(C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press, 2006, eq. 4.17). Both sides
+of the linear model are multiplied by the inverse of its Cholesky factor; what is left is white again, also in a piece
+that ends early, as the factor is triangular.
 """
 
 from __future__ import annotations
@@ -18,8 +21,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Colour:
-    """share (6,), variance of the part that lasts over that of the white part; time, period (6,) in samples, no period is infinity; smooth (6,),
-    whether it was filtered; factor (6, K + 1, K + 1) that whitens; logdet (6, K + 2) of the covariance of the first k samples."""
+    """share (6,), variance of the part that lasts over that of the white part; time, period (6,) in samples, no period
+    is infinity; smooth (6,), whether it was filtered; factor (6, K + 1, K + 1) that whitens; logdet (6, K + 2) of the
+    covariance of the first k samples."""
 
     share: np.ndarray
     time: np.ndarray
@@ -32,9 +36,13 @@ class Colour:
     def white(cls, samples: int) -> Colour:
         """Independent samples, in pieces of `samples`."""
         nothing, never = np.zeros(6), np.full(6, np.inf)
-        return cls(nothing, np.ones(6), never, nothing > 0.0, np.tile(np.eye(samples), (6, 1, 1)), np.zeros((6, samples + 1)))
+        return cls(
+            nothing, np.ones(6), never, nothing > 0.0, np.tile(np.eye(samples), (6, 1, 1)), np.zeros((6, samples + 1))
+        )
 
-    def with_channel(self, channel: int, share: float, time: float, period: float = np.inf, smooth: bool = False) -> Colour:
+    def with_channel(
+        self, channel: int, share: float, time: float, period: float = np.inf, smooth: bool = False
+    ) -> Colour:
         """Return it with another noise in one channel."""
         samples = self.factor.shape[1]
         lag = np.abs(np.subtract.outer(np.arange(samples), np.arange(samples)))
@@ -60,12 +68,15 @@ class Colour:
                 values[at] = np.einsum("kl,bl...->bk...", self.factor[channel], values[at], optimize=True)
 
     def unwhitened(self, values: np.ndarray) -> np.ndarray:
-        """(B, K + 1, 6, ...), multiplied by the transposes of the factors that whiten; themselves where there is nothing to whiten."""
+        """(B, K + 1, 6, ...), multiplied by the transposes of the factors that whiten; themselves where there is
+        nothing to whiten."""
         if not self.share.any():
             return values
         out = values.copy()
         for channel in np.flatnonzero(self.share > 0.0):
-            out[:, :, channel] = np.einsum("kl,bk...->bl...", self.factor[channel], values[:, :, channel], optimize=True)
+            out[:, :, channel] = np.einsum(
+                "kl,bk...->bl...", self.factor[channel], values[:, :, channel], optimize=True
+            )
         return out
 
     def differs(self, other: Colour) -> list[int]:

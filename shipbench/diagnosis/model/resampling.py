@@ -16,9 +16,11 @@ from ..thresholds import THRESHOLDS
 
 
 def averaged(dataset: Dataset) -> Dataset:
-    """The mean of every 3, 5, 7, ... samples, at the time of the middle one; of what is held (commands, wind, depth), that until the next such time.
+    """The mean of every 3, 5, 7, ... samples, at the time of the middle one; of what is held (commands, wind, depth),
+    that until the next such time.
 
-    As many as fit into a second at 130 m (Froude-scaled) and leave the shortest run with two samples; the data set itself where that is one.
+    As many as fit into a second at 130 m (Froude-scaled) and leave the shortest run with two samples; the data set
+    itself where that is one.
     """
     every = THRESHOLDS.value("sample_interval")
     most = min(every * (complete(dataset.ship).L / 130.0) ** 0.5 / dataset.dt + 1e-6, min(map(len, dataset.runs)) / 2)

@@ -1,7 +1,9 @@
-"""Steps of eq. (2) with effects over many lanes at once: the formula, and machine code of it for every set of effects that is met.
+"""Steps of eq. (2) with effects over many lanes at once: the formula, and machine code of it for every set of effects
+that is met.
 
-Lanes are (D, K, B): changed directions, samples, segments. What the ship and the effects' values are, the code takes as numbers: one compilation
-serves all ships and all fits with the same effects, in whichever way these are fitted. Without a compiler numpy goes through the formula.
+Lanes are (D, K, B): changed directions, samples, segments. What the ship and the effects' values are, the code takes as
+numbers: one compilation serves all ships and all fits with the same effects, in whichever way these are fitted. Without
+a compiler numpy goes through the formula.
 """
 
 from __future__ import annotations
@@ -60,8 +62,8 @@ class Vessel:
 
 @dataclass(frozen=True)
 class Course:
-    """Times and steps of the lanes: t (K, B, S, 3) [s] since the run began and wind (K, B, 2) or None, S integration steps of h [s] a sample; the
-    stages of a step are its beginning, middle and end."""
+    """Times and steps of the lanes: t (K, B, S, 3) [s] since the run began and wind (K, B, 2) or None, S integration
+    steps of h [s] a sample; the stages of a step are its beginning, middle and end."""
 
     vessel: Vessel
     h: float
@@ -74,14 +76,22 @@ class Course:
         S = self.t.shape[2]
         return slice(None), slice(None), S // 2, S % 2
 
-    def rolled(self, x0: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, push: np.ndarray) -> np.ndarray:
-        """Motion (B, K + 1, 6) from x0 (B, 6), with p0..p10, effects, actuators act (K, B, S, 3, 4) and accelerations push (K, B, S, 3, 3)."""
+    def rolled(
+        self, x0: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, push: np.ndarray
+    ) -> np.ndarray:
+        """Motion (B, K + 1, 6) from x0 (B, 6), with p0..p10, effects, actuators act (K, B, S, 3, 4) and accelerations
+        push (K, B, S, 3, 3)."""
         K, B, S = self.t.shape[:3]
         out = np.empty((B, K + 1, 6))
         out[:, 0] = x0
         code = self._code(active, steps=True)
         if code is not None:
-            code(self._bundles(x0[:, None], p, active, act, self.t, push), (1, K, B, S), np.swapaxes(out[:, 1:], 0, 1)[None], carried=True)
+            code(
+                self._bundles(x0[:, None], p, active, act, self.t, push),
+                (1, K, B, S),
+                np.swapaxes(out[:, 1:], 0, 1)[None],
+                carried=True,
+            )
             return out
         x = tuple(x0.T)
         with np.errstate(all="ignore"):
@@ -90,45 +100,85 @@ class Course:
                 out[:, k + 1] = np.stack(x, axis=-1)
         return out
 
-    def ends(self, states: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, push: np.ndarray) -> np.ndarray:
+    def ends(
+        self, states: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, push: np.ndarray
+    ) -> np.ndarray:
         """One sample ahead of every state at once, (D, K, B, 6), from states (D or 1, K, B, 6)."""
         code = self._code(active, steps=True)
         if code is None:
             with np.errstate(all="ignore"):
-                return _stacked(self._sample(tuple(np.moveaxis(states, -1, 0)), p, active, act, push, self.t, self.wind))
+                return _stacked(
+                    self._sample(tuple(np.moveaxis(states, -1, 0)), p, active, act, push, self.t, self.wind)
+                )
         return self._evaluated(code, 6, self._bundles(states[..., None, :], p, active, act, self.t, push))
 
-    def rates(self, middle: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, often: bool = True) -> np.ndarray:
-        """Accelerations (D, K, B, 3) that forces give in the middle of every sample, from the states there (1, K, B, 6). often: whether these effects
-        come up again and again, so that code of their own pays."""
+    def rates(
+        self, middle: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, often: bool = True
+    ) -> np.ndarray:
+        """Accelerations (D, K, B, 3) that forces give in the middle of every sample, from the states there (1, K, B,
+        6). often: whether these effects come up again and again, so that code of their own pays."""
         at, code = self.midway, self._code(active, steps=False) if often else None
         if code is not None:
-            return self._evaluated(code, 3, self._bundles(middle[..., None, :], p, active, act[at][:, :, None], self.t[at][:, :, None, None]))
+            return self._evaluated(
+                code,
+                3,
+                self._bundles(middle[..., None, :], p, active, act[at][:, :, None], self.t[at][:, :, None, None]),
+            )
         wind = None if self.wind is None else np.moveaxis(self.wind, -1, 0)
         with np.errstate(all="ignore"):
-            return _stacked(accelerations(tuple(np.moveaxis(middle, -1, 0)), np.moveaxis(act[at], -1, 0), self.t[at], wind, p, active, self.vessel))
+            return _stacked(
+                accelerations(
+                    tuple(np.moveaxis(middle, -1, 0)),
+                    np.moveaxis(act[at], -1, 0),
+                    self.t[at],
+                    wind,
+                    p,
+                    active,
+                    self.vessel,
+                )
+            )
 
     def _sample(
-        self, x: tuple[Array, ...], p: Sequence[Array], active: Sequence[Active], act: np.ndarray, push: np.ndarray, t: np.ndarray,
+        self, x: tuple[Array, ...], p: Sequence[Array], active: Sequence[Active], act: np.ndarray, push: np.ndarray,
+        t: np.ndarray,
         wind: np.ndarray | None,
     ) -> tuple[Array, ...]:  # fmt: skip
         """One sample from x; act (.., S, 3, 4), push (.., S, 3, 3), t (.., S, 3)."""
         air = None if wind is None else np.moveaxis(wind, -1, 0)
         for s in range(t.shape[-2]):
-            stages = [(np.moveaxis(act[..., s, i, :], -1, 0), np.moveaxis(push[..., s, i, :], -1, 0), t[..., s, i]) for i in range(3)]
+            stages = [
+                (np.moveaxis(act[..., s, i, :], -1, 0), np.moveaxis(push[..., s, i, :], -1, 0), t[..., s, i])
+                for i in range(3)
+            ]
             x = step(x, stages, air, p, active, self.vessel, self.h)
         return x
 
-    def _bundles(self, x: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, t: np.ndarray, *push: np.ndarray) -> list[Any]:
+    def _bundles(
+        self,
+        x: np.ndarray,
+        p: Sequence[Array],
+        active: Sequence[Active],
+        act: np.ndarray,
+        t: np.ndarray,
+        *push: np.ndarray,
+    ) -> list[Any]:
         """Arguments of the machine code, each spread over (D, K, B, S, its numbers)."""
         values = np.stack(np.broadcast_arrays(*p, *(v for a in active for v in a.q)), axis=-1)[..., None, :]
         stages = [a.reshape(*self.t.shape[:2], a.shape[2], -1) for a in (act, t, *push)]
-        return [x, values, np.array([self.h, *_numbers(active, self.vessel)]), *stages, *([] if self.wind is None else [self.wind[:, :, None]])]
+        return [
+            x,
+            values,
+            np.array([self.h, *_numbers(active, self.vessel)]),
+            *stages,
+            *([] if self.wind is None else [self.wind[:, :, None]]),
+        ]
 
     def _evaluated(self, code: Lanes, num: int, bundles: Sequence[np.ndarray]) -> np.ndarray:
         """(D, K, B, num); D is that of the states or of the values."""
         D = max(a.shape[0] for a in bundles[:2] if a.ndim == 5)
-        out = np.moveaxis(np.empty((*self.t.shape[:2], num, D)), -1, 0)  # as matrices over the directions, which sensitivities are
+        out = np.moveaxis(
+            np.empty((*self.t.shape[:2], num, D)), -1, 0
+        )  # as matrices over the directions, which sensitivities are
         code(bundles, (*out.shape[:3], bundles[3].shape[2]), out)
         return out
 
@@ -142,16 +192,27 @@ class Course:
             _built[key] = _compiled(active, self.vessel, *kind, any_ship=True)
         if _built[key] is not None:
             return _built[key]
-        own = (*key, self.h, *_numbers(active, self.vessel))  # a formula that asks for the ship's proportions is traced for every ship
+        own = (
+            *key,
+            self.h,
+            *_numbers(active, self.vessel),
+        )  # a formula that asks for the ship's proportions is traced for every ship
         if own not in _built:
             _built[own] = _compiled(active, self.vessel, *kind, any_ship=False)
         return _built[own]
 
 
 def accelerations(
-    state: Sequence[Array], act: Array, t: Array, wind: Array | None, p: Sequence[Array], active: Sequence[Active], vessel: Vessel
+    state: Sequence[Array],
+    act: Array,
+    t: Array,
+    wind: Array | None,
+    p: Sequence[Array],
+    active: Sequence[Active],
+    vessel: Vessel,
 ) -> tuple[Array, ...]:
-    """(du, dv, dr) [m/s^2, m/s^2, rad/s^2] of forces at one instant; act: n, delta, F_b, F_s; wind: speed and direction, or None."""
+    """(du, dv, dr) [m/s^2, m/s^2, rad/s^2] of forces at one instant; act: n, delta, F_b, F_s; wind: speed and
+    direction, or None."""
     px, py, psi, u, v, r = state
     n, delta, F_b, F_s = act
     air = (u, v) if wind is None else apparent_wind(psi, u, v, wind[0], wind[1])
@@ -165,10 +226,12 @@ def accelerations(
 
 
 def step(
-    x: tuple[Array, ...], stages: Sequence[tuple[Array, Array, Array]], wind: Array | None, p: Sequence[Array], active: Sequence[Active],
+    x: tuple[Array, ...], stages: Sequence[tuple[Array, Array, Array]], wind: Array | None, p: Sequence[Array],
+    active: Sequence[Active],
     vessel: Vessel, h: Array,
 ) -> tuple[Array, ...]:  # fmt: skip
-    """One integration step of h [s]; stages: actuators, pushes (accelerations to add) and time at its beginning, middle and end."""
+    """One integration step of h [s]; stages: actuators, pushes (accelerations to add) and time at its beginning, middle
+    and end."""
 
     def rhs(state: tuple[Array, ...], stage: int) -> tuple[Array, ...]:
         act, push, t = stages[stage]
@@ -208,7 +271,8 @@ def _compiled(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool,
 
 
 def _traced(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool, any_ship: bool) -> casadi.Function:
-    """The step, or the accelerations, of symbols: state, values of p and effects, h and `_numbers`, actuators, times[, pushes][, wind].
+    """The step, or the accelerations, of symbols: state, values of p and effects, h and `_numbers`, actuators, times[,
+    pushes][, wind].
 
     Raises:
         RuntimeError, TypeError, ValueError: an effect takes no symbols.
@@ -216,7 +280,13 @@ def _traced(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool, a
     import casadi as ca
 
     stages, numbers = 3 if steps else 1, _numbers(active, vessel)
-    sizes = {"x": 6, "values": eq2.NUM_PARAMETERS + sum(len(a.q) for a in active), "numbers": 1 + len(numbers), "act": 4 * stages, "t": stages}
+    sizes = {
+        "x": 6,
+        "values": eq2.NUM_PARAMETERS + sum(len(a.q) for a in active),
+        "numbers": 1 + len(numbers),
+        "act": 4 * stages,
+        "t": stages,
+    }
     sizes |= ({"push": 9} if steps else {}) | ({"wind": 2} if wind else {})
     whole = {name: ca.SX.sym(name, num) for name, num in sizes.items()}
     x, values, (h, *symbols), act, t, *_ = (ca.vertsplit(v) for v in whole.values())
@@ -228,7 +298,15 @@ def _traced(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool, a
     effects = [Active(a.with_own(known) if a.own else a.effect, tuple(next(rest) for _ in a.q)) for a in active]
     if steps:
         push = ca.vertsplit(whole["push"])
-        ends = step(tuple(x), [(act[4 * i : 4 * i + 4], push[3 * i : 3 * i + 3], t[i]) for i in range(3)], air, p, effects, named, h)
+        ends = step(
+            tuple(x),
+            [(act[4 * i : 4 * i + 4], push[3 * i : 3 * i + 3], t[i]) for i in range(3)],
+            air,
+            p,
+            effects,
+            named,
+            h,
+        )
     else:
         ends = accelerations(x, act, t[0], air, p, effects, named)
     if any(ca.SX(value).numel() != 1 for value in ends):

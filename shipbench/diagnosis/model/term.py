@@ -12,7 +12,8 @@ from ..thresholds import THRESHOLDS
 
 @dataclass(frozen=True)
 class Term:
-    """An effect in the model: shape parameters fixed, one of `choices`; amplitudes free, one set or one per run; `since`: absent before that run."""
+    """An effect in the model: shape parameters fixed, one of `choices`; amplitudes free, one set or one per run;
+    `since`: absent before that run."""
 
     effect: Effect
     setting: tuple[float, ...] = ()

@@ -1,4 +1,5 @@
-"""Actuators whose record lastingly differs from where the commands bring them, and which of the two the motion believes."""
+"""Actuators whose record lastingly differs from where the commands bring them, and which of the two the motion
+believes."""
 
 from __future__ import annotations
 
@@ -20,12 +21,18 @@ def judged(null: Fit, errors: Sequence[RecordError]) -> list[RecordError]:
     if not errors:
         return []
     as_recorded, actuators = first_evidence(null.plant, null), null.plant.seg.states[..., ACTUATORS]
-    return [replace(e, worth=first_evidence(null.plant.with_actuators(_true(actuators, [e])), null) - as_recorded) for e in errors]
+    return [
+        replace(e, worth=first_evidence(null.plant.with_actuators(_true(actuators, [e])), null) - as_recorded)
+        for e in errors
+    ]
 
 
 def read_rightly(dataset: Dataset, errors: Sequence[RecordError]) -> Dataset:
     """The data set without these errors."""
-    runs = [replace(r, states=np.concatenate([r.states[:, MOTION], _true(r.states[:, ACTUATORS], errors)], axis=1)) for r in dataset.runs]
+    runs = [
+        replace(r, states=np.concatenate([r.states[:, MOTION], _true(r.states[:, ACTUATORS], errors)], axis=1))
+        for r in dataset.runs
+    ]
     return dataset.with_runs(runs)
 
 
@@ -34,10 +41,16 @@ def said(errors: Sequence[RecordError]) -> list[str]:
     told = []
     for e in errors:
         what = what_it_is({"axis": e.axis, "variable": e.variable, "form": e.form})
-        motion = "does not tell which of the two is right" if e.undecided else f"believes the {'order' if e.contradicted else 'record'}"
+        motion = (
+            "does not tell which of the two is right"
+            if e.undecided
+            else f"believes the {'order' if e.contradicted else 'record'}"
+        )
         told.append(
-            f"the runs show {what}: they differ by {e.size:.0%} (root mean square), however long the order stands. The motion {motion} (log evidence "
-            f"of the plain model {e.worth:+.1f} as ordered): it is taken as {'ordered' if e.contradicted else 'recorded'}. Check the calibration of "
+            f"the runs show {what}: they differ by {e.size:.0%} (root mean square), however long the order stands. "
+            f"The motion {motion} (log evidence "
+            f"of the plain model {e.worth:+.1f} as ordered): it is taken as "
+            f"{'ordered' if e.contradicted else 'recorded'}. Check the calibration of "
             "both; delay, lag, deadband and play are judged without it."
         )
     return told

@@ -17,7 +17,8 @@ _LIFT = FREE.index(5)
 
 
 def turned_actuators(dataset: Dataset, null: Fit) -> list[UnitFinding]:
-    """A rudder, or thrusters, whose record (and order, if it agrees) has the other sign; empty when nothing is beyond doubt.
+    """A rudder, or thrusters, whose record (and order, if it agrees) has the other sign; empty when nothing is beyond
+    doubt.
 
     Args:
         dataset: that was fitted.
@@ -28,13 +29,19 @@ def turned_actuators(dataset: Dataset, null: Fit) -> list[UnitFinding]:
 
 
 def _rudder(null: Fit) -> list[UnitFinding]:
-    slope, sd = CENTRE[_LIFT] + SPREAD[_LIFT] * null.solution.mean[_LIFT], SPREAD[_LIFT] * np.sqrt(null.solution.cov[_LIFT, _LIFT])
+    slope, sd = (
+        CENTRE[_LIFT] + SPREAD[_LIFT] * null.solution.mean[_LIFT],
+        SPREAD[_LIFT] * np.sqrt(null.solution.cov[_LIFT, _LIFT]),
+    )
     if slope > -THRESHOLDS.value("falling_rudder_lift") * sd:
         return []
     gain = first_evidence(null.plant.turned([DELTA - N]), null) - null.evidence
     if gain < 0.0:
         return []
-    text = f"The fitted lift of the rudder falls with its angle, to {slope:.2g} +- {sd:.1g} of the usual slope. {_better(gain)}"
+    text = (
+        f"The fitted lift of the rudder falls with its angle, to {slope:.2g} +- {sd:.1g} of the usual slope. "
+        f"{_better(gain)}"
+    )
     return [UnitFinding("delta", "sign", -1.0, text)]
 
 
@@ -51,7 +58,10 @@ def _thrusters(null: Fit) -> list[UnitFinding]:
         return []
     plant = null.plant.where(np.any(push != 0.0, axis=(1, 2)))
     readings = [[c] for c in used] + ([used] if len(used) > 1 else [])
-    best, turned = max(((first_fit(plant.turned([c - N for c in reading]), null), reading) for reading in readings), key=lambda x: x[0].evidence)
+    best, turned = max(
+        ((first_fit(plant.turned([c - N for c in reading]), null), reading) for reading in readings),
+        key=lambda x: x[0].evidence,
+    )
     gain, least = best.evidence - first_evidence(plant, null), THRESHOLDS.value("thruster_sign_evidence")
     if gain > least:
         gain = min(gain, best.evidence - first_fit(plant, null, like=best).evidence)

@@ -1,5 +1,5 @@
-"""Wind channels that do not hold the true wind: an instrument on board feels the ship's own motion too. Read as true, that is a current, a drag of
-waves or another ship's superstructure."""
+"""Wind channels that do not hold the true wind: an instrument on board feels the ship's own motion too. Read as true,
+that is a current, a drag of waves or another ship's superstructure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ def true_wind(prepared: Prepared) -> Prepared:
     dataset = prepared.dataset
     recorded = [name for name in CHANNELS if name in dataset.inputs]
     if len(recorded) == 1:
-        alone = f"{recorded[0]} is recorded alone: without both {' and '.join(CHANNELS)} the wind counts as not measured."
+        alone = (
+            f"{recorded[0]} is recorded alone: without both {' and '.join(CHANNELS)} the wind counts as not measured."
+        )
         return prepared.corrected(dataset, alone)
     if not recorded:
         return prepared

@@ -11,8 +11,9 @@ from ...records import Dataset
 
 @dataclass(frozen=True)
 class LateVelocities:
-    """Velocities that are late as a vector in the earth's axes. delay, sd [s]; filtered: by a filter of first order, else as they were; score: 2 log
-    evidence of the plain model that mending the velocities adds; over_position: the same over moving the position instead."""
+    """Velocities that are late as a vector in the earth's axes. delay, sd [s]; filtered: by a filter of first order,
+    else as they were; score: 2 log evidence of the plain model that mending the velocities adds; over_position: the
+    same over moving the position instead."""
 
     delay: float
     sd: float

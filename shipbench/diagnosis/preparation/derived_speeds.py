@@ -1,5 +1,5 @@
-"""Speeds that are no measurements: derived from positions and headings by somebody before us. Counted as measurements they would say twice, and with
-great certainty, what is known once."""
+"""Speeds that are no measurements: derived from positions and headings by somebody before us. Counted as measurements
+they would say twice, and with great certainty, what is known once."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from .base import Prepared
 def marked(dataset: Dataset) -> Dataset:
     """The data set with the speeds that follow from its positions or headings among those that are `derived`.
 
-    What such speeds sum up to lies beside the positions by their quick errors alone, as it follows the slow ones; the sums of a sensor's own errors
-    are slow ones besides.
+    What such speeds sum up to lies beside the positions by their quick errors alone, as it follows the slow ones; the
+    sums of a sensor's own errors are slow ones besides.
     """
     found = list(dataset.derived)
     least_track = THRESHOLDS.value("derived_least_track") * dataset.ship.L / 130.0
@@ -46,7 +46,10 @@ def faults_of_derived_speeds(prepared: Prepared) -> Prepared:
     faulty = ((name, EFFECTS.get(name).traits.faults_of) for name in EFFECTS.names())
     absent = [name for name, channels in faulty if channels and channels <= set(derived)]
     names = " and ".join(", ".join(derived).rsplit(", ", 1))
-    note = f"not counted as measured: {names}, derived from positions or headings, which they follow when summed up, errors and all."
+    note = (
+        f"not counted as measured: {names}, derived from positions or headings, which they follow when summed "
+        "up, errors and all."
+    )
     return replace(prepared, excluded=(*prepared.excluded, *absent), notes=(*prepared.notes, note))
 
 

@@ -1,4 +1,5 @@
-"""Speeds of the track in place of those of a log that falls silent: what it does not say would pass for a force, or for another sensor's fault."""
+"""Speeds of the track in place of those of a log that falls silent: what it does not say would pass for a force, or for
+another sensor's fault."""
 
 from __future__ import annotations
 
@@ -21,7 +22,9 @@ def speeds_of_the_track(prepared: Prepared) -> Prepared:
         return prepared
     runs = [_by_track(run, dataset.dt, (dataset.ship.L / 9.81) ** 0.5) for run in dataset.runs]
     line = f"{in_words(found)} u and v are taken from the positions in all runs instead."
-    return prepared.corrected(replace(dataset.with_runs(runs), derived=tuple(dict.fromkeys((*dataset.derived, "u", "v")))), line)
+    return prepared.corrected(
+        replace(dataset.with_runs(runs), derived=tuple(dict.fromkeys((*dataset.derived, "u", "v")))), line
+    )
 
 
 def _by_track(run: Run, dt: float, scale: float) -> Run:

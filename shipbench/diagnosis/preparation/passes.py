@@ -11,7 +11,13 @@ from .splitting import refuse_too_little, sort_by_time, split_long_runs
 from .time_offsets import correct_late_velocities, correct_late_yaw_rate
 from .water_speeds import speeds_over_ground
 
-GIVEN: tuple[Pass, ...] = (split_long_runs, refuse_too_little, refuse_contradictions, sort_by_time, faults_of_derived_speeds)
+GIVEN: tuple[Pass, ...] = (
+    split_long_runs,
+    refuse_too_little,
+    refuse_contradictions,
+    sort_by_time,
+    faults_of_derived_speeds,
+)
 """Passes where the causes are given (an oracle): the runs are taken as recorded."""
 PASSES: tuple[Pass, ...] = (
     split_long_runs,

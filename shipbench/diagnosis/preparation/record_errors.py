@@ -1,5 +1,6 @@
-"""Errors of the record itself, before anything is fitted. What `shipbench data check` calls an error is corrected where the check has a line of
-dataset.toml for it, as often as one correction shows the next; a record that contradicts itself even so is refused: no model explains it."""
+"""Errors of the record itself, before anything is fitted. What `shipbench data check` calls an error is corrected where
+the check has a line of dataset.toml for it, as often as one correction shows the next; a record that contradicts itself
+even so is refused: no model explains it."""
 
 from __future__ import annotations
 
@@ -35,8 +36,8 @@ def joined(errors: Sequence[UnitFinding]) -> list[UnitFinding]:
 
 
 def correct_record_errors(prepared: Prepared) -> Prepared:
-    """Correct units, signs and frames by the errors that the check finds. A fault that an effect of the library is, of a size that it may have, is
-    left to the fit, which tells how large it is and what it is worth.
+    """Correct units, signs and frames by the errors that the check finds. A fault that an effect of the library is, of
+    a size that it may have, is left to the fit, which tells how large it is and what it is worth.
 
     Raises:
         InputError: errors are left however often they are corrected.
@@ -46,13 +47,18 @@ def correct_record_errors(prepared: Prepared) -> Prepared:
     told: dict[str, str] = {}
     ship, rounds = complete(dataset.ship), THRESHOLDS.count("correction_rounds")
     for round_ in range(rounds + 1):
-        found = [f for f in check_dataset(dataset) if f.severity == "error" and f.line and f.text not in told and not _has_effect(f, ship)]
+        found = [
+            f
+            for f in check_dataset(dataset)
+            if f.severity == "error" and f.line and f.text not in told and not _has_effect(f, ship)
+        ]
         if not found:
             break
         lines = laid({}, found)
         if round_ == rounds or lines.refused:
             raise InputError(
-                f"data set '{dataset.name}': {found[0].text} This is left after {round_} corrections, so nothing is fitted. Accepted: a record "
+                f"data set '{dataset.name}': {found[0].text} This is left after {round_} corrections, so nothing is "
+                "fitted. Accepted: a record "
                 "without errors. Correct dataset.toml by the lines of `shipbench data check`, one at a time."
             )
         dataset = reread(dataset, lines.description)
@@ -65,7 +71,8 @@ def refuse_contradictions(prepared: Prepared) -> Prepared:
     """Refuse runs whose positions and speeds, or heading and yaw rate, say different things most of the time.
 
     Raises:
-        InputError: in most pieces in which the ship moves, and in three at least, more than half of the squared way, or turn, is unexplained.
+        InputError: in most pieces in which the ship moves, and in three at least, more than half of the squared way, or
+        turn, is unexplained.
     """
     dataset = prepared.dataset
     length = max(1, round(SEGMENT * (dataset.ship.L / 130.0) ** 0.5 / dataset.dt))
@@ -82,9 +89,12 @@ def refuse_contradictions(prepared: Prepared) -> Prepared:
         if np.sum(against) > max(0.5 * np.sum(moving), 2):
             one, other = (float(np.median(np.abs(values[against]))) for values in (made, said))
             raise InputError(
-                f"data set '{dataset.name}' contradicts itself, so nothing is fitted. In {np.sum(against)} of {np.sum(moving)} pieces {what} by "
-                f"{one:.3g} {unit} where {by} {other:.3g} {unit}, or another way. Accepted: 0.3 to 3.4 times as much, the same way. "
-                f"Correct the unit, sign or column of {channels}, or the unit of t, in dataset.toml. Look with: shipbench data check FOLDER."
+                f"data set '{dataset.name}' contradicts itself, so nothing is fitted. In {np.sum(against)} of "
+                f"{np.sum(moving)} pieces {what} by "
+                f"{one:.3g} {unit} where {by} {other:.3g} {unit}, or another way. Accepted: 0.3 to 3.4 times as "
+                "much, the same way. "
+                f"Correct the unit, sign or column of {channels}, or the unit of t, in dataset.toml. Look with: "
+                "shipbench data check FOLDER."
             )
     return prepared
 
@@ -96,7 +106,10 @@ def _ends(run: Run, length: int) -> tuple[np.ndarray, np.ndarray]:
     """
     edges = np.linspace(0, len(run) - 1, max(1, -(-(len(run) - 1) // length)) + 1).round().astype(int)
     plane = np.array([1.0, 1j])
-    pairs = ((run.states[:, [X, Y]] @ plane, beside_track(run) @ plane), (run.states[:, PSI], beside_heading(run)[:, 0]))
+    pairs = (
+        (run.states[:, [X, Y]] @ plane, beside_track(run) @ plane),
+        (run.states[:, PSI], beside_heading(run)[:, 0]),
+    )
     track, turn = (np.column_stack([np.diff(made[edges]), np.diff((made - off)[edges])]) for made, off in pairs)
     return track, turn
 
@@ -109,11 +122,15 @@ def _has_effect(found: Finding, ship: Particulars) -> bool:
 
 
 def _errors(found: Finding) -> Sequence[UnitFinding]:
-    """Channels that a finding's line reads in another unit, sign or scale, commands beside their actuators; or in another frame."""
+    """Channels that a finding's line reads in another unit, sign or scale, commands beside their actuators; or in
+    another frame."""
     entries = tomllib.loads(found.line)
     factors = {channel: float(value) for channel, value in entries.get("scale", {}).items() if channel in STATES}
     kinds = dict.fromkeys(factors, "recorded in another scale")
-    for table, factor_of, kind in (("units", unit_factor, "recorded in {}"), ("signs", sign_factor, "recorded positive {}")):
+    for table, factor_of, kind in (
+        ("units", unit_factor, "recorded in {}"),
+        ("signs", sign_factor, "recorded positive {}"),
+    ):
         for channel, word in entries.get(table, {}).items():
             for name in (channel, *({f"{channel}_c"} & set(COMMANDS))) if channel in STATES else ():
                 factors[name] = factors.get(name, 1.0) / factor_of(channel, word)

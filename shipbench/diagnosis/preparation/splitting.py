@@ -1,4 +1,5 @@
-"""Parts of runs that are too few but long: a sea trial is often one log of half an hour, and what changed in it did so at some time."""
+"""Parts of runs that are too few but long: a sea trial is often one log of half an hour, and what changed in it did so
+at some time."""
 
 from __future__ import annotations
 
@@ -27,8 +28,8 @@ def is_too_little(dataset: Dataset) -> bool:
 
 
 def split_long_runs(prepared: Prepared) -> Prepared:
-    """Cut runs into parts that count as runs, where they are too few and long enough. Parts of one run are of one group: none is held out without the
-    others."""
+    """Cut runs into parts that count as runs, where they are too few and long enough. Parts of one run are of one
+    group: none is held out without the others."""
     dataset = prepared.dataset
     if len(dataset) >= LEAST_RUNS:
         return prepared
@@ -43,8 +44,10 @@ def split_long_runs(prepared: Prepared) -> Prepared:
     if len(parts) < THRESHOLDS.count("least_parts"):
         return prepared
     line = (
-        f"{runs_in_words(dataset)} of {total:.0f} s in all: cut into {len(parts)} parts of about {total / len(parts):.0f} s, which count as runs. "
-        "What a run has as a whole (its wind and current, its load, the error of a sensor on that day) passes for the ship's own: sail other days "
+        f"{runs_in_words(dataset)} of {total:.0f} s in all: cut into {len(parts)} parts of about "
+        f"{total / len(parts):.0f} s, which count as runs. "
+        "What a run has as a whole (its wind and current, its load, the error of a sensor on that day) passes for "
+        "the ship's own: sail other days "
         "and courses."
     )
     return prepared.corrected(dataset.with_runs(parts), line)
@@ -60,19 +63,22 @@ def refuse_too_little(prepared: Prepared) -> Prepared:
     samples = sum(len(r) for r in dataset.runs)
     if samples < 20:
         raise InputError(
-            f"data set '{dataset.name}' has {samples} samples in {runs_in_words(dataset)}; a diagnosis needs at least 20, better 24 runs of 120 s."
+            f"data set '{dataset.name}' has {samples} samples in {runs_in_words(dataset)}; a diagnosis needs at "
+            "least 20, better 24 runs of 120 s."
         )
     L = dataset.ship.L
     rarest = SEGMENT * (L / 130.0) ** 0.5
     if dataset.dt > rarest:
         raise InputError(
-            f"data set '{dataset.name}' has a sample every {dataset.dt:g} s. A ship of {L:g} m turns in less. Accepted: up to {rarest:.3g} s. "
+            f"data set '{dataset.name}' has a sample every {dataset.dt:g} s. A ship of {L:g} m turns in less. "
+            f"Accepted: up to {rarest:.3g} s. "
             "Give t and dt in dataset.toml in seconds."
         )
     states = np.concatenate([r.states for r in dataset.runs])
     if np.max(np.hypot(states[:, 3], states[:, 4])) < 0.01 * L**0.5:
         raise InputError(
-            f"data set '{dataset.name}': the ship never moves faster than {0.01 * L**0.5:.2f} m/s; check the columns u and v and their units."
+            f"data set '{dataset.name}': the ship never moves faster than {0.01 * L**0.5:.2f} m/s; check the "
+            "columns u and v and their units."
         )
     warnings = []
     if is_too_little(dataset):
@@ -86,7 +92,8 @@ def refuse_too_little(prepared: Prepared) -> Prepared:
 
 
 def sort_by_time(prepared: Prepared) -> Prepared:
-    """Sort runs into the order in which they were sailed, where all say when they began: a change begins with one of them."""
+    """Sort runs into the order in which they were sailed, where all say when they began: a change begins with one of
+    them."""
     dataset = prepared.dataset
     began = {run.id: run.began for run in dataset.runs}
     known = {name: moment for name, moment in began.items() if moment is not None}

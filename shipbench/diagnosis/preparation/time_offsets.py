@@ -1,7 +1,8 @@
-"""Velocities that are late as a vector in the earth's axes: filtered there by a receiver, then turned by the heading of the moment.
+"""Velocities that are late as a vector in the earth's axes: filtered there by a receiver, then turned by the heading of
+the moment.
 
-Kinematics alone show it, over windows of many samples. It is taken out before any model is fitted: pieces of a minute cannot hold it, as what came
-before them is not theirs, and beside it every other fault of a sensor is hidden.
+Kinematics alone show it, over windows of many samples. It is taken out before any model is fitted: pieces of a minute
+cannot hold it, as what came before them is not theirs, and beside it every other fault of a sensor is hidden.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ from .derived_speeds import has_speeds
 
 
 def correct_late_velocities(prepared: Prepared) -> Prepared:
-    """Put velocities back in time that are late as a vector, and exclude the delays that kinematics answer: all once the clocks are put right, or
-    where measured speeds and the track show none."""
+    """Put velocities back in time that are late as a vector, and exclude the delays that kinematics answer: all once
+    the clocks are put right, or where measured speeds and the track show none."""
     dataset = prepared.dataset
     if not has_speeds(dataset):
         return prepared
@@ -39,12 +40,16 @@ def correct_late_velocities(prepared: Prepared) -> Prepared:
     if found is not None:
         late, mended = found
         return replace(prepared, dataset=mended, late=late, excluded=(*prepared.excluded, *late_effects()))
-    return replace(prepared, excluded=(*prepared.excluded, *late_effects())) if keeps_time(Recording(dataset)) else prepared
+    return (
+        replace(prepared, excluded=(*prepared.excluded, *late_effects()))
+        if keeps_time(Recording(dataset))
+        else prepared
+    )
 
 
 def late_velocities_of(dataset: Dataset) -> tuple[LateVelocities, Dataset] | None:
-    """Late velocities and the runs with them taken out, if the track shows them and the plain model agrees that it is they that are late, not the
-    position that is early."""
+    """Late velocities and the runs with them taken out, if the track shows them and the plain model agrees that it is
+    they that are late, not the position that is early."""
     found = late_velocities(Recording(dataset))
     if found is None:
         return None
@@ -63,7 +68,9 @@ def late_velocities_of(dataset: Dataset) -> tuple[LateVelocities, Dataset] | Non
     sure = THRESHOLDS.value("late_velocity_doubt") * len(over) ** 0.5 * np.std(over_position)
     if np.sum(over) < 0.0 or -np.sum(over_position) > sure:
         return None
-    return LateVelocities(delay, sd, best == "filtered", 2.0 * float(np.sum(over)), 2.0 * float(np.sum(over_position))), ways[best]
+    return LateVelocities(
+        delay, sd, best == "filtered", 2.0 * float(np.sum(over)), 2.0 * float(np.sum(over_position))
+    ), ways[best]
 
 
 def late_effects() -> tuple[str, ...]:
@@ -96,22 +103,24 @@ def ruled_out(dataset: Dataset, found: Fit) -> tuple[str, ...]:
 
 
 def correct_late_yaw_rate(prepared: Prepared) -> Prepared:
-    """Put a yaw rate back in time that is late against the heading. A heading cannot be early: of the two it is the yaw rate, and beside it a rudder,
-    or whatever else turns the ship, would seem to be late."""
+    """Put a yaw rate back in time that is late against the heading. A heading cannot be early: of the two it is the yaw
+    rate, and beside it a rudder, or whatever else turns the ship, would seem to be late."""
     dataset = prepared.dataset
     found = None if "r" in dataset.derived else late_yaw_rate(Recording(dataset))
     if found is None:
         return prepared
     delay, sd = found
     line = (
-        f"the yaw rate follows the heading {delay:.2g} s late (standard error {sd:.1g} s; seen by kinematics). It is put back before anything else "
+        f"the yaw rate follows the heading {delay:.2g} s late (standard error {sd:.1g} s; seen by kinematics). It "
+        "is put back before anything else "
         f"is looked for; in dataset.toml: [delay] r = {delay:.3g}."
     )
     return prepared.corrected(put_back(dataset, {"r": delay}, 0.0), line)
 
 
 def put_back(dataset: Dataset, delay: dict[str, float], ends: float) -> Dataset:
-    """The runs with late signals put back in time, less `ends` seconds at both ends; runs that leave less than 3 samples are left out."""
+    """The runs with late signals put back in time, less `ends` seconds at both ends; runs that leave less than 3
+    samples are left out."""
     runs = []
     for run in dataset.runs:
         names = (*STATES, *run.inputs_names)
@@ -120,13 +129,15 @@ def put_back(dataset: Dataset, delay: dict[str, float], ends: float) -> Dataset:
         inside = (frame["t"] >= run.t[0] + ends - 1e-6) & (frame["t"] <= run.t[-1] - ends + 1e-6)
         values = frame[inside].to_numpy()
         if len(values) >= 3:
-            runs.append(replace(run, t=values[:, 0], states=values[:, 1 : 1 + len(STATES)], inputs=values[:, 1 + len(STATES) :]))
+            runs.append(
+                replace(run, t=values[:, 0], states=values[:, 1 : 1 + len(STATES)], inputs=values[:, 1 + len(STATES) :])
+            )
     return dataset.with_runs(runs)
 
 
 def unfiltered(dataset: Dataset, delay: float) -> tuple[Dataset, float]:
-    """The velocities before a filter y_k = a y_{k-1} + (1 - a) x_k of that mean delay, a dt / (1 - a), and the gain 1 / (1 - a) by which each sample
-    is stretched."""
+    """The velocities before a filter y_k = a y_{k-1} + (1 - a) x_k of that mean delay, a dt / (1 - a), and the gain 1 /
+    (1 - a) by which each sample is stretched."""
     keep = delay / (delay + dataset.dt)
 
     def sharpened(run: Run) -> Run:
@@ -142,8 +153,8 @@ def unfiltered(dataset: Dataset, delay: float) -> tuple[Dataset, float]:
 
 
 def _evidence(dataset: Dataset, noise_gain: float) -> np.ndarray:
-    """Shares (N,) of the runs in the log evidence of the plain model for the recorded samples, where those of u and v were stretched by
-    `noise_gain`."""
+    """Shares (N,) of the runs in the log evidence of the plain model for the recorded samples, where those of u and v
+    were stretched by `noise_gain`."""
     plant = Plant.of(dataset)
     scales = Scales(plant)
     origin = Origin.of(plant, scales)

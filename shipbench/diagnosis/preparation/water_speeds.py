@@ -1,5 +1,5 @@
-"""Velocities through water in place of those over ground: a ship's log in a current. Beside them every other fault of a sensor is hidden, and so is
-what the current does to the ship."""
+"""Velocities through water in place of those over ground: a ship's log in a current. Beside them every other fault of a
+sensor is hidden, and so is what the current does to the ship."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ def speeds_over_ground(prepared: Prepared) -> Prepared:
         return prepared
     north, east = found
     line = (
-        f"u and v are through water: the track drifts {np.hypot(north, east):.3g} m/s towards {np.rad2deg(np.arctan2(east, north)) % 360.0:.0f} deg "
-        "more than they say. That is added to them; the current that the ship feels is looked for as any other cause. `shipbench data check` has "
+        f"u and v are through water: the track drifts {np.hypot(north, east):.3g} m/s towards "
+        f"{np.rad2deg(np.arctan2(east, north)) % 360.0:.0f} deg "
+        "more than they say. That is added to them; the current that the ship feels is looked for as any other "
+        "cause. `shipbench data check` has "
         "the lines for dataset.toml."
     )
     return prepared.corrected(dataset.with_runs([_drifting(run, north, east) for run in dataset.runs]), line)

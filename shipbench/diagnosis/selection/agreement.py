@@ -1,5 +1,5 @@
-"""Whether the size of a cause is sure, if runs are independent, not samples (of a model that is not the ship's, its own errors are too small), and
-whether it matters."""
+"""Whether the size of a cause is sure, if runs are independent, not samples (of a model that is not the ship's, its own
+errors are too small), and whether it matters."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ _FACTORS = np.log(np.array([0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0]) ** 2)
 
 
 def inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
-    """Variance of the shared coefficients `at` (P,) by the sandwich clustered by run, over the model's; what single runs have of their own is
-    integrated out, else each run's current would pass for its disagreement with the others."""
+    """Variance of the shared coefficients `at` (P,) by the sandwich clustered by run, over the model's; what single
+    runs have of their own is integrated out, else each run's current would pass for its disagreement with the
+    others."""
     S, *_ = shared_alone(fit.reduced, fit.prior)
     scores = S[:, :-1, -1] - S[:, :-1, :-1] @ fit.solution.mean
     bread = fit.solution.cov
@@ -46,7 +47,8 @@ def covariance(fit: Fit, index: int) -> np.ndarray:
 
 
 def is_borne_by_one(fit: Fit, index: int) -> bool:
-    """Whether one run alone bears a cause, against what the others say: there is evidence for it, and, that run taken away, against it."""
+    """Whether one run alone bears a cause, against what the others say: there is evidence for it, and, that run taken
+    away, against it."""
     S, *_ = shared_alone(fit.reduced, fit.prior)
     inside, whole = np.isin(fit.prior.shared, fit.columns_of(index)), S.sum(axis=0)
 
@@ -74,7 +76,10 @@ def lasts(fit: Fit) -> bool:
 
     def worth(A: np.ndarray, b: np.ndarray) -> float:
         ways = [(A + np.diag(np.exp(-t)), t) for t in fit.prior.log_tau2 + _FACTORS[:, None]]
-        return max(float(np.sum(b * np.linalg.solve(W, b[..., None])[..., 0]) - np.sum(np.linalg.slogdet(W)[1] + np.sum(t))) for W, t in ways)
+        return max(
+            float(np.sum(b * np.linalg.solve(W, b[..., None])[..., 0]) - np.sum(np.linalg.slogdet(W)[1] + np.sum(t)))
+            for W, t in ways
+        )
 
     return worth(by_run(information, fit.gram.run), by_run(left, fit.gram.run)) >= worth(information, left)
 
@@ -97,47 +102,62 @@ def own_forces(fit: Fit) -> float:
 
 
 def tells_runs_apart(fit: Fit) -> bool:
-    """Whether the values of single runs of all causes that have such leave little in which runs differ: a constant force of its own in each run, in
-    the axes of the ship, beside them. What the model lacks of the ship is another force in each manoeuvre, and no current or wind explains it."""
+    """Whether the values of single runs of all causes that have such leave little in which runs differ: a constant
+    force of its own in each run, in the axes of the ship, beside them. What the model lacks of the ship is another
+    force in each manoeuvre, and no current or wind explains it."""
     alone = replace(fit.prior, random=fit.prior.random[:0], log_tau2=fit.prior.log_tau2[:0])
     worth = 2.0 * (fit.solution.log_evidence - solve(fit.reduced, alone).log_evidence)
-    return own_forces(fit) < THRESHOLDS.value("own_forces_left") + THRESHOLDS.value("own_forces_share") * max(worth, 0.0)
+    return own_forces(fit) < THRESHOLDS.value("own_forces_left") + THRESHOLDS.value("own_forces_share") * max(
+        worth, 0.0
+    )
 
 
 def relies_on_a_ship(fit: Fit, effect: Effect) -> bool:
-    """Whether the coefficients of the ship that the effect relies on are those of some ship (a superstructure, of a wind that is not measured): else
-    something else is taken for it."""
+    """Whether the coefficients of the ship that the effect relies on are those of some ship (a superstructure, of a
+    wind that is not measured): else something else is taken for it."""
     places = [PLACES[name] for name in effect.traits.relies_on]
     return not places or bool(np.max(np.abs(needed(fit)[places])) < STRANGE)
 
 
 def is_on_a_ship(fit: Fit, index: int) -> bool:
-    """Whether a ship may have a cause of the size found (`Effect.plausible`); of values of single runs their root mean square counts."""
-    term, values = fit.model.terms[index], fit.values[index] * fit.scales.amplitudes(fit.model.terms[index], fit.plant.c.L)
+    """Whether a ship may have a cause of the size found (`Effect.plausible`); of values of single runs their root mean
+    square counts."""
+    term, values = (
+        fit.model.terms[index],
+        fit.values[index] * fit.scales.amplitudes(fit.model.terms[index], fit.plant.c.L),
+    )
     size = np.sqrt(np.mean(values**2, axis=0)) if term.per_run else values
     return bool(term.effect.plausible((*size, *term.setting), fit.plant.ship))
 
 
 def imitates(fit: Fit, index: int) -> bool:
-    """Whether it is a steady vector along the normal of a cause that it imitates (a bank): what the law of that one leaves looks like it."""
+    """Whether it is a steady vector along the normal of a cause that it imitates (a bank): what the law of that one
+    leaves looks like it."""
     of = fit.model.terms[index].effect.traits.imitates
     normals = [t.effect.normal(t.setting) for t in fit.model.terms if t.label in of]
     if not normals:
         return False
     north, east = fit.values[index]
-    return any(n is not None and abs(np.sin(np.arctan2(east, north) - n)) < THRESHOLDS.value("along_the_normal") for n in normals)
+    return any(
+        n is not None and abs(np.sin(np.arctan2(east, north) - n)) < THRESHOLDS.value("along_the_normal")
+        for n in normals
+    )
 
 
 def shows_on_any_ship(effect: Effect) -> bool:
-    """Whether it shows beside the coefficients of another ship, too: a fault of a sensor, or a force that breaks a symmetry which every ship has (not
-    a wind of each run, nor a bank, which act through coefficients alone)."""
+    """Whether it shows beside the coefficients of another ship, too: a fault of a sensor, or a force that breaks a
+    symmetry which every ship has (not a wind of each run, nor a bank, which act through coefficients alone)."""
     return effect.family == "sensor" or (effect.breaks_symmetry and not effect.traits.by_coefficients)
 
 
 def bends(fit: Fit, index: int, null: Fit) -> bool:
     """Whether a cause that goes by the ship file is in a model that makes the ship an outlier, which she is not in the
     plain model `null`: then it explains one error by another (docs/calibration.md#ship-file)."""
-    return not shows_on_any_ship(fit.model.terms[index].effect) and is_strange(needed(fit)) and not is_strange(needed(null))
+    return (
+        not shows_on_any_ship(fit.model.terms[index].effect)
+        and is_strange(needed(fit))
+        and not is_strange(needed(null))
+    )
 
 
 def runs_agree(fit: Fit, index: int) -> bool:
@@ -148,7 +168,9 @@ def runs_agree(fit: Fit, index: int) -> bool:
     size, free = len(value), max(num - len(value), 1)
     squares = float(value @ np.linalg.solve(covariance(fit, index), value))
     doubt = float(f.sf(squares * free / (size * max(num - 1, 1)), size, free))
-    return doubt < (THRESHOLDS.value("doubt") if fit.model.terms[index].since is None else THRESHOLDS.value("doubt_of_a_change"))
+    return doubt < (
+        THRESHOLDS.value("doubt") if fit.model.terms[index].since is None else THRESHOLDS.value("doubt_of_a_change")
+    )
 
 
 def least_size(fit: Fit, term: Term) -> float:
@@ -164,7 +186,9 @@ def least_size(fit: Fit, term: Term) -> float:
     if term.effect.enters == "gear" and term.effect.parameters[0].unit == "s":
         least = max(least, 0.5 * fit.plant.seg.dt / float(fit.scales.amplitudes(term, fit.plant.c.L)[0]))
     if term.effect.traits.least_unrecorded and not fit.plant.seg.commanded:
-        noise = _record_noise(fit.plant.seg, term.effect.acts_through[0]) / float(fit.scales.amplitudes(term, fit.plant.c.L)[0])
+        noise = _record_noise(fit.plant.seg, term.effect.acts_through[0]) / float(
+            fit.scales.amplitudes(term, fit.plant.c.L)[0]
+        )
         least = max(least, term.effect.traits.least_unrecorded, THRESHOLDS.value("play_over_noise") * noise)
     return least
 

@@ -62,16 +62,22 @@ class Analysis:
         return Standard(self.selection.null, self.threshold, self.selection.off_form)
 
     def score(self, index: int) -> tuple[float, int, str]:
-        """Twice the log evidence that the index-th cause adds, number of runs that support it, and to what: beside the others or where it was added.
+        """Twice the log evidence that the index-th cause adds, number of runs that support it, and to what: beside the
+        others or where it was added.
 
-        The linear model, asked for the fit without it, does not hold so far from its point: what a refit gained is an upper bound, or all there is.
+        The linear model, asked for the fit without it, does not hold so far from its point: what a refit gained is an
+        upper bound, or all there is.
         """
         score, term = self.final.worth(index), self.final.model.terms[index]
         added = max((s for s in self.selection.steps if s.term == term), key=lambda s: s.score, default=None)
         if added is not None and (score < self.threshold or score > added.score):
             return added.score, added.supporters, "before and after it was added"
         supporters = int(np.sum(self.final.solution.per_run > self.final.solution_without(index).per_run))
-        return score, supporters, "with and without it beside the other causes" if len(self.final.model.terms) > 1 else "with and without it"
+        return (
+            score,
+            supporters,
+            "with and without it beside the other causes" if len(self.final.model.terms) > 1 else "with and without it",
+        )
 
     def extension(self, name_hull: bool) -> Extension:
         """Terms, values and gears that the diagnosis adds to the plain model."""
@@ -81,7 +87,9 @@ class Analysis:
         return Extension(self.final.model.terms, self.final.values, name_hull and self.hull > HULL_THRESHOLD, gears)
 
 
-def causes_of(plant: Plant, threshold: float, only: Sequence[str] | None = None, settled: Sequence[str] = ()) -> tuple[Extension, dict[str, Gear]]:
+def causes_of(
+    plant: Plant, threshold: float, only: Sequence[str] | None = None, settled: Sequence[str] = ()
+) -> tuple[Extension, dict[str, Gear]]:
     """Causes of one training part alone, by the same selection, with the threshold of the whole; and the best ordinary
     gears."""
     selection = select(plain_model(plant, only, settled), threshold)
@@ -114,8 +122,16 @@ def plain_model(plant: Plant, only: Sequence[str] | None = None, settled: Sequen
     return null_fit(plant, Scales(plant), candidates)
 
 
-def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, cautious: bool = False, misread: Sequence[RecordError] = ()) -> Analysis:
-    """Look for causes in the motion and in the gears beside the plain model, and for dependences that no cause explains.
+def analyse(
+    null: Fit,
+    *,
+    only: Sequence[str] | None = None,
+    seed: int = 0,
+    cautious: bool = False,
+    misread: Sequence[RecordError] = (),
+) -> Analysis:
+    """Look for causes in the motion and in the gears beside the plain model, and for dependences that no cause
+    explains.
 
     Args:
         only: name none but these effects.
@@ -137,12 +153,18 @@ def analyse(null: Fit, *, only: Sequence[str] | None = None, seed: int = 0, caut
     if only is not None or cautious:
         return replace(known, generic=tuple(dependences(selection.final)))
     estimated = any(null.plant.ship.lacks(part) for part in ("rudder", "propeller"))
-    search = Search(selection.small or selection.null, (*(_HULL_ALONE if hull > HULL_THRESHOLD else ()), *(_ESTIMATED if estimated else ())))
+    search = Search(
+        selection.small or selection.null,
+        (*(_HULL_ALONE if hull > HULL_THRESHOLD else ()), *(_ESTIMATED if estimated else ())),
+    )
     unknown, rival = _unknown(selection, gears, search)
     generic, left = tuple(search.found), None
     if selection.final.model.terms:
         generic = tuple(dependences(selection.final))
-        left = next((d for d in generic if d.score > asked(d, selection.off_form) and (d.of_sensor or d.variable in NO_FORM)), None)
+        left = next(
+            (d for d in generic if d.score > asked(d, selection.off_form) and (d.of_sensor or d.variable in NO_FORM)),
+            None,
+        )
         left = None if left is None or left.has_name else left
     errors = [*misread, *judged(null, [e for e in errors if e.actuator not in {m.actuator for m in misread}])]
     if is_spent():
@@ -164,7 +186,10 @@ def asked(d: Dependence, off_form: float) -> float:
     least = THRESHOLDS.value("error_size") if d.of_sensor else THRESHOLDS.value("force_size")
     if not d.of_sensor and d.variable == "time" and d.taken < least:
         return np.inf
-    ahead = (d.axis, d.variable) == ("surge", "nothing")  # a resistance or a propeller of another form comes near a constant
+    ahead = (d.axis, d.variable) == (
+        "surge",
+        "nothing",
+    )  # a resistance or a propeller of another form comes near a constant
     if d.of_sensor or (d.variable in NO_FORM and not ahead):
         return THRESHOLDS.value("evidence_free_of_form") if d.size > least else np.inf
     seen, hardly = THRESHOLDS.value("off_form_of_large"), THRESHOLDS.value("off_form_of_small")
@@ -173,10 +198,15 @@ def asked(d: Dependence, off_form: float) -> float:
     return THRESHOLDS.value("evidence_of_unknown") + times * off_form if d.taken > least else np.inf
 
 
-def _unknown(selection: Selection, gears: Sequence[GearFinding], search: Search) -> tuple[Dependence | None, Dependence | None]:
-    """The dependence that beats all named causes together, if one does; or a sensor's error that comes about as near."""
+def _unknown(
+    selection: Selection, gears: Sequence[GearFinding], search: Search
+) -> tuple[Dependence | None, Dependence | None]:
+    """The dependence that beats all named causes together, if one does; or a sensor's error that comes about as
+    near."""
     named = bool(selection.final.model.terms) or bool(gears)
-    worth = max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) if named else 0.0
+    worth = (
+        max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) if named else 0.0
+    )
     least, first = THRESHOLDS.value("contender_share") * worth, THRESHOLDS.count("contenders")
     found = [d for d in search.found if d.score > max(asked(d, selection.off_form), least)]
     contenders = [d if is_spent() else search.settled(d) for d in found[:first]] if named else found[:1]
@@ -191,7 +221,8 @@ def _unknown(selection: Selection, gears: Sequence[GearFinding], search: Search)
 def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:
     """Greatest score of all candidates under the fitted null (parametric bootstrap on the fixed linearisation), sorted.
 
-    The reduced right-hand side is Gaussian with the reduced normal matrix as covariance; random effects are left out (their null is narrower).
+    The reduced right-hand side is Gaussian with the reduced normal matrix as covariance; random effects are left out
+    (their null is narrower).
     """
     candidates, at = null.candidates, null.reduced.S.shape[1] - 1 - sum(t.size for t in null.candidates)
     base = null.prior.shared
@@ -208,6 +239,10 @@ def null_maxima(null: Fit, seed: int, draws: int = 1000) -> np.ndarray:
         if term.per_run:
             continue
         A = V[np.ix_(cols, cols)] + np.eye(len(cols))
-        score = np.einsum("cd,cd->d", s[cols], np.linalg.solve(A, s[cols])) - np.linalg.slogdet(A)[1] - term.cost(null.plant.seg.runs)
+        score = (
+            np.einsum("cd,cd->d", s[cols], np.linalg.solve(A, s[cols]))
+            - np.linalg.slogdet(A)[1]
+            - term.cost(null.plant.seg.runs)
+        )
         best = np.maximum(best, score)
     return np.sort(best)

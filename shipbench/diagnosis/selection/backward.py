@@ -17,7 +17,16 @@ def without(before: Fit, index: int) -> Fit:
     values = tuple(v for i, v in enumerate(before.point.values) if i != index)
     log_tau2 = {i - (i > index): v for i, v in before.log_tau2.items() if i != index}
     model, point = replace(before.model, terms=terms), replace(before.point, terms=terms, values=values)
-    return fit(before.plant, before.scales, model, point, before.hyper, log_tau2, iterations=REFIT_ITERATIONS, guess=before.motion)
+    return fit(
+        before.plant,
+        before.scales,
+        model,
+        point,
+        before.hyper,
+        log_tau2,
+        iterations=REFIT_ITERATIONS,
+        guess=before.motion,
+    )
 
 
 def needed_only(found: Fit, standard: Standard, spare_last: bool = True) -> Fit:
@@ -34,7 +43,8 @@ def needed_only(found: Fit, standard: Standard, spare_last: bool = True) -> Fit:
 
 
 def wanted_only(found: Fit, requirements: Iterable[Requirement], standard: Standard) -> tuple[Fit, dict[str, str]]:
-    """Without the terms that do not meet all requirements, the last first; and their effects, with what they do not meet."""
+    """Without the terms that do not meet all requirements, the last first; and their effects, with what they do not
+    meet."""
     dropped: dict[str, str] = {}
     while standard.careful:
         verdicts = [(i, first_unmet(requirements, found, i, standard)) for i in range(len(found.model.terms))]

@@ -1,4 +1,5 @@
-"""Forms of what no named cause explains: what a force, or an error of a sensor, may follow, by the variable that it then depends on."""
+"""Forms of what no named cause explains: what a force, or an error of a sensor, may follow, by the variable that it
+then depends on."""
 
 from __future__ import annotations
 
@@ -45,8 +46,10 @@ Forms = Mapping[str, Mapping[str, Form]]
 
 
 class Feature(NamedTuple):
-    """The features (F, K, B) of one form in the middle of every step, and beside the trajectory (`Linearisation.aside`); or (F, K + 1, B) at the
-    samples. Of order one. odd: whether it changes its sign with the ship's mirror image; ways: number of forms of which it was chosen."""
+    """The features (F, K, B) of one form in the middle of every step, and beside the trajectory
+    (`Linearisation.aside`); or (F, K + 1, B) at the
+    samples. Of order one. odd: whether it changes its sign with the ship's mirror image; ways: number of forms of which
+    it was chosen."""
 
     form: str
     on: np.ndarray
@@ -76,34 +79,43 @@ def _period(seconds: float) -> Form:
 _OF_FORCES: Forms = {
     "nothing": {"constant": lambda s: (np.ones_like(s.u),)},
     "heading": {f"cos({k} psi + phase)": _harmonic(k) for k in (1, 2, 3)},
-    "position": {"a x + b y": lambda s: (s.x, s.y), "a x + b y + c x^2 + d x y + e y^2": lambda s: (s.x, s.y, s.x**2, s.x * s.y, s.y**2)},
+    "position": {"a x + b y": lambda s: (s.x, s.y),
+        "a x + b y + c x^2 + d x y + e y^2": lambda s: (s.x, s.y, s.x**2, s.x * s.y, s.y**2)},
     "speed": {"u": lambda s: (s.u,), "u|u|": lambda s: (s.u * abs(s.u),)},
-    "sway velocity": {"v": lambda s: (s.v,), "v|v|": lambda s: (s.v * abs(s.v),), "|v|": lambda s: (abs(s.v),), "v^2": lambda s: (s.v**2,)},
-    "yaw rate": {"r": lambda s: (s.r,), "r|r|": lambda s: (s.r * abs(s.r),), "|r|": lambda s: (abs(s.r),), "r^2": lambda s: (s.r**2,)},
+    "sway velocity": {"v": lambda s: (s.v,), "v|v|": lambda s: (s.v * abs(s.v),), "|v|": lambda s: (abs(s.v),),
+        "v^2": lambda s: (s.v**2,)},
+    "yaw rate": {"r": lambda s: (s.r,), "r|r|": lambda s: (s.r * abs(s.r),), "|r|": lambda s: (abs(s.r),),
+        "r^2": lambda s: (s.r**2,)},
     "rudder": {
-        "delta": lambda s: (s.delta,), "delta|delta|": lambda s: (s.delta * abs(s.delta),), "|delta|": lambda s: (abs(s.delta),),
+        "delta": lambda s: (s.delta,), "delta|delta|": lambda s: (s.delta * abs(s.delta),),
+        "|delta|": lambda s: (abs(s.delta),),
         "delta^2": lambda s: (s.delta**2,),
     },
     "revolutions": {"n": lambda s: (s.n,), "n|n|": lambda s: (s.n * abs(s.n),)},
     "revolutions and yaw rate": {
-        "n r": lambda s: (s.n * s.r,), "n|n| r": lambda s: (s.n * abs(s.n) * s.r,), "n |r|": lambda s: (s.n * abs(s.r),),
+        "n r": lambda s: (s.n * s.r,), "n|n| r": lambda s: (s.n * abs(s.n) * s.r,),
+        "n |r|": lambda s: (s.n * abs(s.r),),
         "n|n| |r|": lambda s: (s.n * abs(s.n * s.r),),
     },
     "revolutions and sway velocity": {
-        "n v": lambda s: (s.n * s.v,), "n|n| v": lambda s: (s.n * abs(s.n) * s.v,), "n |v|": lambda s: (s.n * abs(s.v),),
+        "n v": lambda s: (s.n * s.v,), "n|n| v": lambda s: (s.n * abs(s.n) * s.v,),
+        "n |v|": lambda s: (s.n * abs(s.v),),
         "n|n| |v|": lambda s: (s.n * abs(s.n * s.v),),
     },
     "revolutions and rudder": {
-        "n delta": lambda s: (s.n * s.delta,), "n|n| delta": lambda s: (s.n * abs(s.n) * s.delta,), "n |delta|": lambda s: (s.n * abs(s.delta),),
+        "n delta": lambda s: (s.n * s.delta,), "n|n| delta": lambda s: (s.n * abs(s.n) * s.delta,),
+        "n |delta|": lambda s: (s.n * abs(s.delta),),
         "n|n| |delta|": lambda s: (s.n * abs(s.n * s.delta),), "n|n| delta^2": lambda s: (s.n * abs(s.n) * s.delta**2,),
     },
     "speed and rudder": {
-        "u delta": lambda s: (s.u * s.delta,), "u^2 delta": lambda s: (s.u**2 * s.delta,), "u^2 |delta|": lambda s: (s.u**2 * abs(s.delta),),
+        "u delta": lambda s: (s.u * s.delta,), "u^2 delta": lambda s: (s.u**2 * s.delta,),
+        "u^2 |delta|": lambda s: (s.u**2 * abs(s.delta),),
         "u^2 delta^2": lambda s: ((s.u * s.delta) ** 2,),
     },
     "run": {"number of the run": lambda s: (s.run,), "its square": lambda s: (s.run**2,)},
     "thrusters": {
-        "F_b": lambda s: (s.F_b,), "F_s": lambda s: (s.F_s,), "F_b u": lambda s: (s.F_b * s.u,), "F_s u": lambda s: (s.F_s * s.u,),
+        "F_b": lambda s: (s.F_b,), "F_s": lambda s: (s.F_s,), "F_b u": lambda s: (s.F_b * s.u,),
+        "F_s u": lambda s: (s.F_s * s.u,),
         "|F_b|": lambda s: (abs(s.F_b),), "|F_s|": lambda s: (abs(s.F_s),),
     },
     "measured wind": {
@@ -126,8 +138,8 @@ _OF_SENSORS: Forms = {
 
 
 def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
-    """The features of all forms of a force about a trajectory, by variable; of thrusters only where they are used; "waves": of time, with the periods
-    of waves. After `lin.columns`."""
+    """The features of all forms of a force about a trajectory, by variable; of thrusters only where they are used;
+    "waves": of time, with the periods of waves. After `lin.columns`."""
     plant, seg = lin.plant, lin.plant.seg
     assert lin.aside is not None
     act, t = plant.midway(lin.path)
@@ -140,9 +152,17 @@ def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
     even = 1 + int(np.ceil(2.0 * max(high - low, 0.0) * ends))
     tried = np.linspace(low, high, min(even, THRESHOLDS.count("periods")))
     rocking = tried > 1.0 / (THRESHOLDS.value("longest_swell") * plant.c.L**0.5)
-    rhythms, periods = ({f"cos(2 pi t / {T:.3g} s + phase)": _period(float(T)) for T in 1.0 / part} for part in (tried[rocking], tried[~rocking]))
+    rhythms, periods = (
+        {f"cos(2 pi t / {T:.3g} s + phase)": _period(float(T)) for T in 1.0 / part}
+        for part in (tried[rocking], tried[~rocking])
+    )
     waves, compared = _waves(lin)
-    forms = {**_OF_FORCES, "time": _grown(ends) | periods, "waves": rhythms, "position": {**_OF_FORCES["position"], **waves}}
+    forms = {
+        **_OF_FORCES,
+        "time": _grown(ends) | periods,
+        "waves": rhythms,
+        "position": {**_OF_FORCES["position"], **waves},
+    }
     if not np.any(seg.states[..., 8:]):
         del forms["thrusters"]
     if wind is None:
@@ -159,8 +179,9 @@ def of_sensors(lin: Linearisation) -> dict[str, list[Feature]]:
 
 
 def _waves(lin: Linearisation) -> tuple[dict[str, Form], int]:
-    """The waves over the places visited, in whatever direction, that the latent force follows best, one for each axis, and of how many: a current, a
-    depth or a shore that differs from place to place. They are compared at the knots of the force, by the share of it that they take."""
+    """The waves over the places visited, in whatever direction, that the latent force follows best, one for each axis,
+    and of how many: a current, a depth or a shore that differs from place to place. They are compared at the knots of
+    the force, by the share of it that they take."""
     plant, seg = lin.plant, lin.plant.seg
     at = np.minimum(np.round(np.arange(plant.knots) * plant.knot_time / seg.dt).astype(int), plant.steps)
     known, (centre, unit) = seg.mask[:, at], _places(seg)
@@ -180,7 +201,9 @@ def _waves(lin: Linearisation) -> tuple[dict[str, Form], int]:
     found = {}
     for k, m in numbers[np.unique(np.argmax(taken, axis=1))]:
         towards = np.degrees(np.arctan2(m, k))
-        found[f"wave of {2.0 * np.pi * unit / np.hypot(k, m):.0f} m over the places, towards {towards:.0f} deg"] = _wave(float(k), float(m))
+        found[f"wave of {2.0 * np.pi * unit / np.hypot(k, m):.0f} m over the places, towards {towards:.0f} deg"] = (
+            _wave(float(k), float(m))
+        )
     return found, len(numbers)
 
 
@@ -198,7 +221,9 @@ def _ends(plant: Plant) -> float:
     return float(np.max(seg.start + seg.dt * (seg.mask.sum(axis=1) - 1)))
 
 
-def _features(of: Forms, on: State, aside: State, real: np.ndarray, ways: Mapping[str, int]) -> dict[str, list[Feature]]:
+def _features(
+    of: Forms, on: State, aside: State, real: np.ndarray, ways: Mapping[str, int]
+) -> dict[str, list[Feature]]:
     """By variable. ways: of forms that were chosen from more than stand here."""
     found: dict[str, list[Feature]] = {}
     to_starboard = np.array([1.0, -1.0])[:, None, None]
@@ -227,7 +252,9 @@ def _state(plant: Plant, motion: np.ndarray, act: np.ndarray, t: np.ndarray, win
     air = calm if wind is None else np.stack(apparent_wind(psi, u, v, wind[..., 0], wind[..., 1]))
     u, v, r = np.stack([u, v, r]) / units[:3]
     n, delta, F_b, F_s = np.moveaxis(act, -1, 0) / units[3:]
-    return State(x, y, psi, u, v, r, n, delta, F_b, F_s, t, np.broadcast_to(seg.run / max(seg.runs - 1, 1), t.shape), air, calm)
+    return State(
+        x, y, psi, u, v, r, n, delta, F_b, F_s, t, np.broadcast_to(seg.run / max(seg.runs - 1, 1), t.shape), air, calm
+    )
 
 
 def _places(seg: Segments) -> tuple[np.ndarray, float]:

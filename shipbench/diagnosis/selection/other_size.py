@@ -1,4 +1,5 @@
-"""Whether a similar ship of quite another size would explain the runs better than that of the ship file: a slip in it, or another ship's file."""
+"""Whether a similar ship of quite another size would explain the runs better than that of the ship file: a slip in it,
+or another ship's file."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ _FACTORS, _NEAR = (0.4, 2.5), (0.7, 0.85, 1.2, 1.4)
 
 
 def better_size(null: Fit) -> list[str]:
-    """A line if a smaller or a larger ship, with masses, inertia and forces of her size, is far better beside no cause; none if not. null: beside its
-    own noise, as the other's is (docs/calibration.md#another-size)."""
+    """A line if a smaller or a larger ship, with masses, inertia and forces of her size, is far better beside no cause;
+    none if not. null: beside its own noise, as the other's is (docs/calibration.md#another-size)."""
     factor, gain = _best(null, _FACTORS)
     if factor == 1.0 or gain < THRESHOLDS.value("other_size") * _times(null):
         return []
@@ -24,12 +25,18 @@ def better_size(null: Fit) -> list[str]:
 
 
 def size_instead_of(causes: str, worth: float, null: Fit) -> list[str]:
-    """A line if a ship of nearly the same size does about what `causes` do for that of the file, which add `worth` to the log evidence."""
+    """A line if a ship of nearly the same size does about what `causes` do for that of the file, which add `worth` to
+    the log evidence."""
     worth *= min(1.0, THRESHOLDS.count("pieces_of_sizes") / len(null.plant.seg.run))
     factor, gain = _best(null, _NEAR)
     if factor == 1.0 or gain < (worth - THRESHOLDS.value("same_size_margin")) * _times(null):
         return []
-    return [f"a similar ship of {factor:g} times the size explains the runs about as well as {causes} (log evidence {gain:.0f}, against {worth:.0f})"]
+    return [
+        (
+            f"a similar ship of {factor:g} times the size explains the runs about as well as {causes} (log evidence "
+            f"{gain:.0f}, against {worth:.0f})"
+        )
+    ]
 
 
 def _best(null: Fit, factors: Sequence[float]) -> tuple[float, float]:

@@ -1,4 +1,5 @@
-"""Requirements that a cause must meet to be named: the one list by which causes are selected, rejections explained and detection limits counted."""
+"""Requirements that a cause must meet to be named: the one list by which causes are selected, rejections explained and
+detection limits counted."""
 
 from __future__ import annotations
 
@@ -11,7 +12,18 @@ from ..inference.laplace import Fit
 from ..inference.robust_prior import STRANGE_SIZE
 from ..model.term import Term
 from ..thresholds import THRESHOLDS
-from .agreement import bends, imitates, is_borne_by_one, is_on_a_ship, lasts, least_size, matters, relies_on_a_ship, runs_agree, tells_runs_apart
+from .agreement import (
+    bends,
+    imitates,
+    is_borne_by_one,
+    is_on_a_ship,
+    lasts,
+    least_size,
+    matters,
+    relies_on_a_ship,
+    runs_agree,
+    tells_runs_apart,
+)
 from .screening import Score
 
 
@@ -22,7 +34,8 @@ class Standard:
     Attributes:
         null: the plain model.
         threshold: least gain of a named cause, 2 log evidence.
-        off_form: gain asked besides of what the form of this hull could pass for: a hull that lies off the regressions is not of the fitted form
+        off_form: gain asked besides of what the form of this hull could pass for: a hull that lies off the regressions
+        is not of the fitted form
             either.
         careful: False where the causes are given: whoever is told the names asks for no evidence.
     """
@@ -33,8 +46,8 @@ class Standard:
     careful: bool = True
 
     def asked_besides(self, term: Term, size: float = 0.0) -> float:
-        """Gain that a term must be worth besides the threshold, since what the form of a hull lacks could pass for it. Not so much of one whose
-        `size`, in typical ones, doubts the ship file: that is no name."""
+        """Gain that a term must be worth besides the threshold, since what the form of a hull lacks could pass for it.
+        Not so much of one whose `size`, in typical ones, doubts the ship file: that is no name."""
         if not self.careful:
             return 0.0
         traits = term.effect.traits
@@ -55,7 +68,8 @@ class Verdict:
 
 
 class Requirement:
-    """One thing that is asked of the index-th cause of a model. `of_size`: it is asked last, when all others are met."""
+    """One thing that is asked of the index-th cause of a model. `of_size`: it is asked last, when all others are
+    met."""
 
     of_size = False
 
@@ -64,12 +78,14 @@ class Requirement:
         raise NotImplementedError
 
     def least_size(self, seen: Score, standard: Standard) -> np.ndarray | float:
-        """Smallest size of each amplitude, in typical ones, that could meet it in these runs; 0 where it asks for none."""
+        """Smallest size of each amplitude, in typical ones, that could meet it in these runs; 0 where it asks for
+        none."""
         return 0.0
 
 
 class Evidence(Requirement):
-    """The cause is worth the threshold, and what is asked of its kind besides. Selection checks it by refits; here it is the linearised model's."""
+    """The cause is worth the threshold, and what is asked of its kind besides. Selection checks it by refits; here it
+    is the linearised model's."""
 
     @staticmethod
     def asked(fit: Fit, index: int, standard: Standard) -> float:
@@ -81,13 +97,16 @@ class Evidence(Requirement):
         return Verdict(bool(worth >= asked), f"score {worth:.1f} below {asked:.1f}")
 
     def least_size(self, seen: Score, standard: Standard) -> np.ndarray | float:
-        """Size x along amplitude i for which x^2 V_ii - log det(1 + V) is what is asked; of values of single runs the root mean square x, where the
-        sum of x^2 tr(V) - log det(1 + x^2 V) is."""
+        """Size x along amplitude i for which x^2 V_ii - log det(1 + V) is what is asked; of values of single runs the
+        root mean square x, where the sum of x^2 tr(V) - log det(1 + x^2 V) is."""
         term = seen.term
         asked = standard.threshold + term.cost(standard.null.plant.seg.runs) + standard.asked_besides(term)
         if term.per_run:
             return _root_mean_square(seen.information, asked)
-        V, volume = np.maximum(np.diag(seen.information), 1e-12), np.linalg.slogdet(np.eye(term.size) + seen.information)[1]
+        V, volume = (
+            np.maximum(np.diag(seen.information), 1e-12),
+            np.linalg.slogdet(np.eye(term.size) + seen.information)[1],
+        )
         return np.asarray(np.sqrt((asked + volume) / V))
 
 
@@ -99,10 +118,13 @@ class Plausible(Requirement):
 
 
 class OrdinaryShip(Requirement):
-    """The ship's coefficients that the cause relies on are those of some ship (a superstructure, for a wind that is not measured)."""
+    """The ship's coefficients that the cause relies on are those of some ship (a superstructure, for a wind that is not
+    measured)."""
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
-        return Verdict(relies_on_a_ship(fit, fit.model.terms[index].effect), "it would need a superstructure that no ship has")
+        return Verdict(
+            relies_on_a_ship(fit, fit.model.terms[index].effect), "it would need a superstructure that no ship has"
+        )
 
 
 class NoImitation(Requirement):
@@ -110,7 +132,10 @@ class NoImitation(Requirement):
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
         of = " and ".join(fit.model.terms[index].effect.traits.imitates)
-        return Verdict(not imitates(fit, index), f"it points straight along the force of {of}, whose own law leaves what looks like it")
+        return Verdict(
+            not imitates(fit, index),
+            f"it points straight along the force of {of}, whose own law leaves what looks like it",
+        )
 
 
 class ConstantWithinRuns(Requirement):
@@ -122,7 +147,8 @@ class ConstantWithinRuns(Requirement):
 
 
 class RunsAgree(Requirement):
-    """The runs, as independent witnesses, agree that the size is not zero, and no single one bears it against the others."""
+    """The runs, as independent witnesses, agree that the size is not zero, and no single one bears it against the
+    others."""
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
         if fit.model.terms[index].per_run:
@@ -146,7 +172,10 @@ class Significant(Requirement):
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
         term = fit.model.terms[index]
-        return Verdict(matters(fit, index), f"less than {least_size(fit, term):.0%} of its typical size: not practically significant")
+        return Verdict(
+            matters(fit, index),
+            f"less than {least_size(fit, term):.0%} of its typical size: not practically significant",
+        )
 
     def least_size(self, seen: Score, standard: Standard) -> np.ndarray | float:
         return least_size(standard.null, seen.term)
@@ -158,7 +187,8 @@ REQUIREMENTS: tuple[Requirement, ...] = (
 )  # fmt: skip
 """All requirements, in the order in which they are asked."""
 SURE = tuple(r for r in REQUIREMENTS if r not in (EVIDENCE, SAME_SHIP) and not r.of_size)
-"""Those of a cause by itself: evidence is asked by refits, and the ship is compared with that of the plain model once the causes are chosen."""
+"""Those of a cause by itself: evidence is asked by refits, and the ship is compared with that of the plain model once
+the causes are chosen."""
 
 
 def first_unmet(requirements: Iterable[Requirement], fit: Fit, index: int, standard: Standard) -> Verdict:
@@ -173,8 +203,11 @@ def detection_limit(seen: Score, standard: Standard) -> np.ndarray:
 
 
 def _root_mean_square(information: np.ndarray, asked: float) -> float:
-    """Root mean square of the values of single runs, whose `information` (N, size, size) is known, where they are expected to score `asked`."""
+    """Root mean square of the values of single runs, whose `information` (N, size, size) is known, where they are
+    expected to score `asked`."""
     from scipy.optimize import brentq
 
     seen = np.maximum(np.linalg.eigvalsh(information), 0.0) + 1e-12
-    return float(np.exp(brentq(lambda x: np.sum(np.exp(2.0 * x) * seen - np.log1p(np.exp(2.0 * x) * seen)) - asked, -20.0, 20.0)))
+    return float(
+        np.exp(brentq(lambda x: np.sum(np.exp(2.0 * x) * seen - np.log1p(np.exp(2.0 * x) * seen)) - asked, -20.0, 20.0))
+    )

@@ -22,10 +22,11 @@ _TAUS = np.log(np.array([0.03, 0.1, 0.3, 1.0, 3.0]) ** 2)
 class Score:
     """A candidate beside a fitted model.
 
-    score: twice the gain in log evidence (2 log Bayes factor with a prior of typical size), less the term's cost; estimate, sd (size,) in units of
-    the typical size (for a random effect: root mean square over runs, and NaN); information (size, size): precision of the estimate that the data
-    give, nuisances integrated out (for a random effect (N, size, size): of each run, what it has of its own integrated out); per_run (N,): gain in
-    log likelihood by run; log_tau2: of a random effect.
+    score: twice the gain in log evidence (2 log Bayes factor with a prior of typical size), less the term's cost;
+    estimate, sd (size,) in units of the typical size (for a random effect: root mean square over runs, and NaN);
+    information (size, size): precision of the estimate that the data give, nuisances integrated out (for a random
+    effect (N, size, size): of each run, what it has of its own integrated out); per_run (N,): gain in log likelihood by
+    run; log_tau2: of a random effect.
     """
 
     term: Term
@@ -40,15 +41,23 @@ class Score:
 def with_columns(prior: Prior, at: np.ndarray, term: Term, log_tau2: float, width: float = 1.0) -> Prior:
     """The prior of a model that holds the columns `at` as well."""
     if term.per_run:
-        return replace(prior, random=np.append(prior.random, at), log_tau2=np.append(prior.log_tau2, np.full(len(at), log_tau2)))
-    return replace(prior, shared=np.append(prior.shared, at), precision=np.append(prior.precision, np.full(len(at), width**-2)))
+        return replace(
+            prior, random=np.append(prior.random, at), log_tau2=np.append(prior.log_tau2, np.full(len(at), log_tau2))
+        )
+    return replace(
+        prior, shared=np.append(prior.shared, at), precision=np.append(prior.precision, np.full(len(at), width**-2))
+    )
 
 
 def evidence(gram: Gram, prior: Prior, log_force: np.ndarray, own_random: int = 0) -> tuple[float, np.ndarray, float]:
-    """Log evidence with the variances of the force, and that of the last `own_random` random columns, re-estimated; and these, logarithms."""
+    """Log evidence with the variances of the force, and that of the last `own_random` random columns, re-estimated; and
+    these, logarithms."""
 
     def with_tau(log_tau2: np.ndarray) -> Prior:
-        return replace(prior, log_tau2=np.append(prior.log_tau2[: len(prior.log_tau2) - own_random], np.repeat(log_tau2, own_random)))
+        return replace(
+            prior,
+            log_tau2=np.append(prior.log_tau2[: len(prior.log_tau2) - own_random], np.repeat(log_tau2, own_random)),
+        )
 
     def step(theta: np.ndarray) -> tuple[float, np.ndarray]:
         reduced, now = gram.reduce(theta[:3]), with_tau(theta[3:])
@@ -57,7 +66,9 @@ def evidence(gram: Gram, prior: Prior, log_force: np.ndarray, own_random: int = 
         if not own_random:
             return solution.log_evidence, force
         own = slice(len(prior.random) - own_random, None)
-        second = np.mean(solution.means[:, own] ** 2) + np.mean(np.diagonal(solution.covs[:, own, own], axis1=1, axis2=2))
+        second = np.mean(solution.means[:, own] ** 2) + np.mean(
+            np.diagonal(solution.covs[:, own, own], axis1=1, axis2=2)
+        )
         return solution.log_evidence, np.append(force, np.log(second))
 
     theta = accelerated(step, np.append(log_force, prior.log_tau2[-1:] if own_random else []), 6)  # cycles
@@ -74,7 +85,8 @@ def _columns(fit: Fit) -> list[np.ndarray]:
 
 
 def _of_all_runs(fit: Fit) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """S (N, P + 1, P + 1) with the values of single runs integrated out, and where the shared columns and those of the candidates stand in it."""
+    """S (N, P + 1, P + 1) with the values of single runs integrated out, and where the shared columns and those of the
+    candidates stand in it."""
     kept = np.setdiff1d(np.arange(fit.reduced.S.shape[1] - 1), fit.prior.random)
     S, *_ = shared_alone(fit.reduced, replace(fit.prior, shared=kept))
     return S, np.searchsorted(kept, fit.prior.shared), [np.searchsorted(kept, at) for at in _columns(fit)]
@@ -88,13 +100,15 @@ def glance(fit: Fit) -> list[Score]:
 
 
 def screen(fit: Fit) -> list[Score]:
-    """Scores of the candidates that `fit` was given, best first; for those that are not hopeless the variances are re-estimated: the force of the
-    plain model has absorbed part of whatever is missing."""
+    """Scores of the candidates that `fit` was given, best first; for those that are not hopeless the variances are
+    re-estimated: the force of the plain model has absorbed part of whatever is missing."""
     gram, candidates, columns, scores = fit.gram, fit.candidates, _columns(fit), glance(fit)
     if is_spent():
         return sorted(scores, key=lambda s: -s.score)
     base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
-    renumbered = replace(fit.prior, shared=np.arange(len(fit.prior.shared)), random=np.arange(len(fit.prior.shared), len(base)))
+    renumbered = replace(
+        fit.prior, shared=np.arange(len(fit.prior.shared)), random=np.arange(len(fit.prior.shared), len(base))
+    )
     before, log_force, _ = evidence(gram.only(base), renumbered, fit.hyper.log_force)
     for i, term in enumerate(candidates):
         if _wrong_way(term, scores[i].estimate):
@@ -111,7 +125,8 @@ def screen(fit: Fit) -> list[Score]:
 
 
 def _wrong_way(term: Term, estimate: np.ndarray) -> bool:
-    """Whether the data ask for less than nothing of what only slows, delays or narrows: a quicker gear, water deeper than deep."""
+    """Whether the data ask for less than nothing of what only slows, delays or narrows: a quicker gear, water deeper
+    than deep."""
     (*others, last) = (p for p in term.effect.parameters if not p.shape)
     return not others and not term.per_run and last.low >= 0.0 and float(estimate[0]) < 0.0
 
@@ -124,7 +139,9 @@ def _score(fit: Fit, term: Term, at: np.ndarray, null: float, null_runs: np.ndar
         values = best.means[:, -term.size :]
         rms = np.sqrt(np.mean(values**2, axis=0))
         score = 2.0 * (best.log_evidence - null) - term.cost(fit.plant.seg.runs)
-        return Score(term, score, rms, np.full(term.size, np.nan), reduced.S[:, at][:, :, at], best.per_run - null_runs, tau)
+        return Score(
+            term, score, rms, np.full(term.size, np.nan), reduced.S[:, at][:, :, at], best.per_run - null_runs, tau
+        )
     found = solve(reduced, with_columns(fit.prior, at, term, 0.0))
     cov = found.cov[-term.size :, -term.size :]
     information = np.linalg.inv(cov) - np.eye(term.size)
@@ -142,7 +159,9 @@ def overlap(fit: Fit, term: Term, value: np.ndarray) -> dict[str, float]:
     by_run, base, places = _of_all_runs(fit)
     columns, S = dict(zip(fit.candidates, places, strict=True)), by_run.sum(axis=0)
     rest = np.arange(len(S) - 1)
-    V = S[rest][:, rest] - S[rest][:, base] @ np.linalg.solve(S[np.ix_(base, base)] + np.diag(fit.prior.precision), S[base][:, rest])
+    V = S[rest][:, rest] - S[rest][:, base] @ np.linalg.solve(
+        S[np.ix_(base, base)] + np.diag(fit.prior.precision), S[base][:, rest]
+    )
     own = columns[term]
     total = float(value @ V[np.ix_(own, own)] @ value)
     shares: dict[str, float] = {}
@@ -156,12 +175,14 @@ def overlap(fit: Fit, term: Term, value: np.ndarray) -> dict[str, float]:
 
 
 def changes(fit: Fit) -> list[Score]:
-    """For every candidate with one value for all runs: its best beginning at a run, if that is better than from the first run on; best first.
+    """For every candidate with one value for all runs: its best beginning at a run, if that is better than from the
+    first run on; best first.
 
-    Two coefficients, one for all runs and one from run k on, are free; the score is that of the second beside the first, less 2 log N for the choice
-    of k. The order of the runs is taken for their order in time. Where the kinds of manoeuvre change with it, a change is not told from what the
-    model lacks in one of them, and none is looked for. What the run that speaks most for it carries nearly alone is no change: a hull or
-    propeller that is not of the fitted form does that.
+    Two coefficients, one for all runs and one from run k on, are free; the score is that of the second beside the
+    first, less 2 log N for the choice of k. The order of the runs is taken for their order in time. Where the kinds of
+    manoeuvre change with it, a change is not told from what the
+    model lacks in one of them, and none is looked for. What the run that speaks most for it carries nearly alone is no
+    change: a hull or propeller that is not of the fitted form does that.
     """
     (S, base, columns), barred = _of_all_runs(fit), other_kinds_from(fit.plant.seg.kinds)
     begins = np.array([k for k in places(len(S)) if k not in barred], dtype=int)
@@ -180,7 +201,11 @@ def changes(fit: Fit) -> list[Score]:
             least = float(np.min(_changes(total - S, from_run[k] - np.where(late, S, 0.0), base, prior, cols, cost)[0]))
         if least >= THRESHOLDS.value("change_without_one_run") * score:
             nan = np.full(term.size, np.nan)
-            found.append(Score(replace(term, since=k), score, means[best], nan, np.zeros((term.size, term.size)), np.zeros(len(S))))
+            found.append(
+                Score(
+                    replace(term, since=k), score, means[best], nan, np.zeros((term.size, term.size)), np.zeros(len(S))
+                )
+            )
     return sorted(found, key=lambda s: -s.score)
 
 
@@ -212,14 +237,18 @@ def _alike(of: np.ndarray, at: np.ndarray) -> np.ndarray:
 def _changes(
     total: np.ndarray, gated: np.ndarray, base: np.ndarray, prior: np.ndarray, cols: np.ndarray, cost: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Scores (K,) of columns that change, and the changes (K, size): what coefficients that are free from then on add to those of all runs.
+    """Scores (K,) of columns that change, and the changes (K, size): what coefficients that are free from then on add
+    to those of all runs.
 
-    total: sum of S over all runs, (G + 1, G + 1) or one for each change; gated: (K, G + 1, G + 1) over those from the change on.
+    total: sum of S over all runs, (G + 1, G + 1) or one for each change; gated: (K, G + 1, G + 1) over those from the
+    change on.
     """
     keep, last, own = np.concatenate([base, cols]), gated.shape[-1] - 1, np.eye(len(cols))
     A = total[..., keep[:, None], keep] + np.diag(np.append(prior, np.ones(len(cols))))
     across = gated[:, keep[:, None], cols]
-    solved = np.linalg.solve(A, np.concatenate([across, np.broadcast_to(total[..., keep, last, None], (*across.shape[:2], 1))], axis=-1))
+    solved = np.linalg.solve(
+        A, np.concatenate([across, np.broadcast_to(total[..., keep, last, None], (*across.shape[:2], 1))], axis=-1)
+    )
     left = gated[:, cols[:, None], np.append(cols, last)] - np.swapaxes(across, 1, 2) @ solved
     V, s = left[..., :-1] + own, left[..., -1:]
     means = np.linalg.solve(V, s)

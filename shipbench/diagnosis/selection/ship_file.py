@@ -20,16 +20,20 @@ _QUESTION = "Is the ship file that of this ship (L, B, T, displacement, propelle
 
 
 def doubts_of(found: Analysis) -> list[str]:
-    """Signs that the model does not belong to the data, in one warning: the fit leaves what is ordinary, hull or propeller would be another ship's,
-    a ship of quite another size explains the runs better, or one of nearly the same size does as well as the causes where the fit is odd. Causes in
-    whose place something unknown is told raise none, nor do parameters that are ordinary without causes."""
+    """Signs that the model does not belong to the data, in one warning: the fit leaves what is ordinary, hull or
+    propeller would be another ship's, a ship of quite another size explains the runs better, or one of nearly the same
+    size does as well as the causes where the fit is odd. Causes in whose place something unknown is told raise none,
+    nor do parameters that are ordinary without causes."""
     fit = found.final if found.unknown is None else found.selection.null
     z = needed(fit)
     signs = []
     if is_strange(z) and is_strange(needed(found.selection.null)):
         signs.append(_moved(z))
     if abs(z[PLACES["log_thrust"]]) > THRESHOLDS.value("thrust_outlier"):
-        signs.append(f"the propeller would have to give {_thrust_factor(fit):.2g} times the thrust that the ship file makes likely")
+        signs.append(
+            f"the propeller would have to give {_thrust_factor(fit):.2g} times the thrust that the ship file makes "
+            "likely"
+        )
     for term, value in zip(fit.model.terms, fit.values, strict=True):
         if term.effect.family in ("hull", "propulsion") and np.max(np.abs(value)) > STRANGE_SIZE:
             signs.append(f"{term.label} would have to be {np.max(np.abs(value)):.1f} times its typical size")
@@ -40,15 +44,17 @@ def doubts_of(found: Analysis) -> list[str]:
     if not signs:
         return []
     return [
-        f"{'; '.join(signs)}. {_QUESTION} Until that is sure, nothing is named but what shows whatever the ship is (faults of sensors, delay and "
-        "play of gears seen in their own record, those slow for any ship, and forces that know port from starboard or a direction of the earth, with "
+        f"{'; '.join(signs)}. {_QUESTION} Until that is sure, nothing is named but what shows whatever the ship is "
+        "(faults of sensors, delay and "
+        "play of gears seen in their own record, those slow for any ship, and forces that know port from starboard "
+        "or a direction of the earth, with "
         "their sizes on the ship of the file); the candidates below are ranked as if it were."
     ]
 
 
 def odd_for(found: Analysis, named: Sequence[str]) -> list[str]:
-    """A warning where a cause is named that the file of another ship may make, too, and the fit is odd, though not beyond all ships, or a ship of
-    nearly the same size does as well as the cause."""
+    """A warning where a cause is named that the file of another ship may make, too, and the fit is odd, though not
+    beyond all ships, or a ship of nearly the same size does as well as the cause."""
     by_file = [name for name in named if not whatever_the_ship(name, found)]
     if not by_file:
         return []
@@ -70,7 +76,11 @@ def _is_odd(z: np.ndarray) -> bool:
 def _size_instead(found: Analysis, among: Sequence[str]) -> list[str]:
     """Return a sign if a ship of nearly the same size does as well as those of the causes `among` that go by the ship
     file and act as forces."""
-    terms = {t.label: i for i, t in enumerate(found.final.model.terms) if t.label in among and not whatever_the_ship(t.label, found)}
+    terms = {
+        t.label: i
+        for i, t in enumerate(found.final.model.terms)
+        if t.label in among and not whatever_the_ship(t.label, found)
+    }
     worth = sum(0.5 * found.score(i)[0] for i in terms.values())
     return size_instead_of(" and ".join(terms), worth, found.selection.plain) if terms else []
 
@@ -96,7 +106,8 @@ def own_propeller(found: Analysis) -> list[str]:
         return []
     what = "diameter, kt" if ship.lacks("propeller") else "kt"
     return [
-        f"the ship file does not give the propeller's {what}: the runs suggest {factor:.2g} times the thrust of the estimate, by which the model "
+        f"the ship file does not give the propeller's {what}: the runs suggest {factor:.2g} times the thrust of the "
+        "estimate, by which the model "
         f"`physics` goes; give [propeller] {what}. Causes are judged with the thrust that suits the runs."
     ]
 

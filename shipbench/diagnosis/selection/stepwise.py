@@ -29,8 +29,8 @@ CONFUSED = THRESHOLDS.value("confused_score")
 
 @dataclass(frozen=True)
 class Step:
-    """A candidate that was refitted in a round, its score at its own optimum (2 log evidence over the model before), or what it promised when it
-    was given up, and the number of runs that are likelier there than by the model before."""
+    """A candidate that was refitted in a round, its score at its own optimum (2 log evidence over the model before), or
+    what it promised when it was given up, and the number of runs that are likelier there than by the model before."""
 
     round: int
     term: Term
@@ -49,10 +49,11 @@ class Step:
 
 @dataclass(frozen=True)
 class Selection:
-    """null: the plain model, beside the noise that suits the causes; plain: beside its own; final: with the causes found; scores: of every candidate
-    in the first round, and `last` beside the final one; off_form: what a cause for which the form of a hull could pass must be worth besides
-    (`Standard.asked_besides`); unmet: effects that gain more than the threshold, and why they are not named (the first requirement that they do not
-    meet); small: the plain model with those of them that are too small to matter, where nothing else was found."""
+    """null: the plain model, beside the noise that suits the causes; plain: beside its own; final: with the causes
+    found; scores: of every candidate in the first round, and `last` beside the final one; off_form: what a cause for
+    which the form of a hull could pass must be worth besides (`Standard.asked_besides`); unmet: effects that gain more
+    than the threshold, and why they are not named (the first requirement that they do not meet); small: the plain model
+    with those of them that are too small to matter, where nothing else was found."""
 
     null: Fit
     plain: Fit
@@ -67,11 +68,14 @@ class Selection:
 
 def push_alike(one: Effect, other: Effect) -> bool:
     """Whether two effects of one group have different formulas, by which alone they are told apart."""
-    return bool(one.traits.group) and one.traits.group == other.traits.group and type(one).force is not type(other).force
+    return (
+        bool(one.traits.group) and one.traits.group == other.traits.group and type(one).force is not type(other).force
+    )
 
 
 def shows_in_record(effect: Effect) -> bool:
-    """Whether it acts between command and actuator alone: where the actuator is recorded, it is looked for in the record, not in the motion."""
+    """Whether it acts between command and actuator alone: where the actuator is recorded, it is looked for in the
+    record, not in the motion."""
     return effect.enters == "gear" and not effect.unrecorded
 
 
@@ -80,7 +84,11 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Se
     found = []
     for name in names if names is not None else EFFECTS.names():
         effect = EFFECTS.get(name)
-        if effect.traits.search != "screening" or name in settled or (not plant.seg.commanded and shows_in_record(effect)):
+        if (
+            effect.traits.search != "screening"
+            or name in settled
+            or (not plant.seg.commanded and shows_in_record(effect))
+        ):
             continue
         if why_not(effect, plant):
             continue
@@ -91,8 +99,8 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Se
 
 @dataclass(frozen=True)
 class Beginning:
-    """A model and candidates at an `Origin`, where it has not been fitted yet: one linearisation `lin`, at which they are `seen`, and from which a
-    refit with any of them starts."""
+    """A model and candidates at an `Origin`, where it has not been fitted yet: one linearisation `lin`, at which they
+    are `seen`, and from which a refit with any of them starts."""
 
     now: Fit
     origin: Origin
@@ -111,23 +119,33 @@ class Beginning:
         place, shared = candidates.index(term), self.seen.products.shared
         at, inside = shared - sum(t.size for t in candidates[place:]), shared - sum(t.size for t in candidates)
         held = replace(
-            self.seen, products=self.seen.products.only(np.append(np.arange(inside), at + np.arange(term.size))), candidates=(),
+            self.seen, products=self.seen.products.only(np.append(np.arange(inside), at + np.arange(term.size))),
+            candidates=(),
             columns=replace(columns, own=(*columns.own, columns.candidates[place]), candidates=()),
         )  # fmt: skip
         lin, model = self.lin.holding(place, term), replace(now.model, terms=(*now.model.terms, term))
         log_tau2 = now.log_tau2 | ({len(now.model.terms): score.log_tau2} if term.per_run else {})
         hope = now.evidence + 0.5 * least
         return fit(
-            now.plant, now.scales, model, lin.point, self.origin.hyper, log_tau2, iterations=REFIT_ITERATIONS, hope=hope, far=True, begun=(lin, held)
+            now.plant,
+            now.scales,
+            model,
+            lin.point,
+            self.origin.hyper,
+            log_tau2,
+            iterations=REFIT_ITERATIONS,
+            hope=hope,
+            far=True,
+            begun=(lin, held),
         )
 
 
 def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) -> list[tuple[Fit, float]]:
-    """`now` with each of the candidates, and what it gains (2 log evidence), or promised to gain when it was given up beside a better one that gains
-    more than the threshold.
+    """`now` with each of the candidates, and what it gains (2 log evidence), or promised to gain when it was given up
+    beside a better one that gains more than the threshold.
 
-    In the order of their scores at `origin`, where refits begin, at a glance: what comes first is mostly the best, beside which others are given up
-    soon.
+    In the order of their scores at `origin`, where refits begin, at a glance: what comes first is mostly the best,
+    beside which others are given up soon.
     """
     if not scores:
         return []
@@ -139,7 +157,9 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
             break
         tried = start.refit(score, least)
         if threshold - THRESHOLDS.value("near_threshold") < 2.0 * (tried.evidence - now.evidence) < threshold:
-            tried = fit(tried.plant, tried.scales, tried.model, tried.point, tried.hyper, tried.log_tau2, guess=tried.motion)
+            tried = fit(
+                tried.plant, tried.scales, tried.model, tried.point, tried.hyper, tried.log_tau2, guess=tried.motion
+            )
         gained, promised = 2.0 * (tried.evidence - now.evidence), 2.0 * (tried.promise - now.evidence)
         found.append((tried, promised if promised < least else gained))
         if gained > best:
@@ -154,10 +174,11 @@ def _least(best: Fit, now: Fit) -> float:
 
 
 def select(null: Fit, threshold: float) -> Selection:
-    """Add the best candidate while it gains more than `threshold` and than what the causes found leave; drop what a later one has made needless.
+    """Add the best candidate while it gains more than `threshold` and than what the causes found leave; drop what a
+    later one has made needless.
 
-    `null` must carry the candidates. Candidates are refitted if their linear score is among the best, or the best of their family. Where other noise
-    suits the first cause than suits the plain model, this begins once more beside that.
+    `null` must carry the candidates. Candidates are refitted if their linear score is among the best, or the best of
+    their family. Where other noise suits the first cause than suits the plain model, this begins once more beside that.
     """
     plain, grown = null, _grown(null, threshold)
     if grown.again is not None:
@@ -182,8 +203,9 @@ def select(null: Fit, threshold: float) -> Selection:
 
 @dataclass(frozen=True)
 class _Grown:
-    """A model `now` with every cause that was worth adding to the plain one, and the steps to it, as in `Selection`; again: the plain model beside
-    other noise, from which to begin once more; then `now` holds the first cause alone. tiny: effects that are too small to matter, and why."""
+    """A model `now` with every cause that was worth adding to the plain one, and the steps to it, as in `Selection`;
+    again: the plain model beside other noise, from which to begin once more; then `now` holds the first cause alone.
+    tiny: effects that are too small to matter, and why."""
 
     now: Fit
     first: list[Score]
@@ -196,12 +218,16 @@ class _Grown:
     def gain(self, tried: Fit) -> float:
         """2 log evidence of the last term of `tried` beyond that; a tiny one gains nothing."""
         term = tried.model.terms[-1]
-        # every ship is a little unequal, every run has a breath of wind, every record is a little late: what is too small of that stays, and others
-        # are judged beside it
-        spared = not self.standard.careful or term.effect.breaks_symmetry or term.per_run or term.effect.enters == "gear"
+        # every ship is a little unequal, every run has a breath of wind, every record is a little late: what is too
+        # small of that stays, and others are judged beside it
+        spared = (
+            not self.standard.careful or term.effect.breaks_symmetry or term.per_run or term.effect.enters == "gear"
+        )
         if not (spared or SIGNIFICANT.check(tried, -1, self.standard).met):
             return -np.inf
-        return 2.0 * (tried.evidence - self.now.evidence) - self.standard.asked_besides(term, np.max(np.abs(tried.values[-1])))
+        return 2.0 * (tried.evidence - self.now.evidence) - self.standard.asked_besides(
+            term, np.max(np.abs(tried.values[-1]))
+        )
 
 
 def _grown(null: Fit, threshold: float, again: bool = False) -> _Grown:
@@ -221,7 +247,11 @@ def _grown(null: Fit, threshold: float, again: bool = False) -> _Grown:
             if score > threshold and not (size := SIGNIFICANT.check(f, -1, standard)).met:
                 state.tiny[f.model.terms[-1].label] = size.reason
         # of a round that is cut short the best is not known
-        best = None if is_spent() else _or_change(now, max((f for f, _ in tried), key=state.gain, default=None), origin, standard)
+        best = (
+            None
+            if is_spent()
+            else _or_change(now, max((f for f, _ in tried), key=state.gain, default=None), origin, standard)
+        )
         # what the causes found leave unexplained, because their formulas are not the ship's, passes for another cause
         left = THRESHOLDS.value("left_by_causes_share") * 2.0 * (now.evidence - null.evidence)
         imprecise = min(left, THRESHOLDS.value("left_by_causes_most"))
@@ -259,7 +289,8 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin, standard: Standard) -
 
 
 def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[Score]:
-    """The best, the best of each family, and whatever could stand in for the best: one way of each effect, or those that tie."""
+    """The best, the best of each family, and whatever could stand in for the best: one way of each effect, or those
+    that tie."""
     present, best = _beside(now), dict[str, Score]()
     for s in scores:
         if s.term.label not in present:
@@ -277,11 +308,17 @@ def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[S
             families.add(s.term.effect.family)
     best_of_all = ranked[0].term.effect
     rivals = overlap(now, ranked[0].term, ranked[0].estimate)
-    if best_of_all.vector or best_of_all.per_run:  # their sensitivities depend on the size too much for the linear overlap
+    if (
+        best_of_all.vector or best_of_all.per_run
+    ):  # their sensitivities depend on the size too much for the linear overlap
         rivals |= {s.term.label: 1.0 for s in ranked if s.term.effect.vector or s.term.effect.per_run}
     near = [s for s in ranked if rivals.get(s.term.label, 0.0) > THRESHOLDS.value("rival_overlap") and s not in chosen]
     chosen += sorted(near, key=lambda s: -rivals[s.term.label])[: THRESHOLDS.count("rivals")]
-    return [s for s in scores if any(s is c or (s.term.label == c.term.label and s.score > c.score - _tie(c)) for c in chosen)]
+    return [
+        s
+        for s in scores
+        if any(s is c or (s.term.label == c.term.label and s.score > c.score - _tie(c)) for c in chosen)
+    ]
 
 
 def _tie(best: Score) -> float:
@@ -301,8 +338,9 @@ def _beside(now: Fit) -> set[str]:
 
 
 def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -> list[Score]:
-    """Vectors and values of single runs that are worth a refit as seen from `origin`, where the model has not been fitted yet: in few or short runs
-    in calm weather latent force and parameters take a current over so well that nothing is left of it where they rest."""
+    """Vectors and values of single runs that are worth a refit as seen from `origin`, where the model has not been
+    fitted yet: in few or short runs in calm weather latent force and parameters take a current over so well that
+    nothing is left of it where they rest."""
     terms = [t for t in now.candidates if t.effect.vector or t.per_run]
     if not terms or np.isinf(threshold):
         return []

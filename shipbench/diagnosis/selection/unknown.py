@@ -36,9 +36,10 @@ are in step by chance."""
 
 @dataclass(frozen=True)
 class Dependence:
-    """A missing force on one axis or more, or the error of a recorded channel, follows one variable, best in this form. score: 2 log Bayes factor,
-    less that of the choice of the form; share: of the variance of that axis's latent force that it takes; size, taken: root mean square of what it
-    is, and of what it takes of the latent force, in units of the latent force, or of ordinary noise."""
+    """A missing force on one axis or more, or the error of a recorded channel, follows one variable, best in this form.
+    score: 2 log Bayes factor, less that of the choice of the form; share: of the variance of that axis's latent force
+    that it takes; size, taken: root mean square of what it is, and of what it takes of the latent force, in units of
+    the latent force, or of ordinary noise."""
 
     variable: str
     axis: str
@@ -97,7 +98,10 @@ class Search:
         lin = Linearisation(fit.plant, fit.scales, fit.point, fit.motion)
         self.fit, self.lin, self.columns = fit, lin, lin.columns()
         forces, errors = of_forces(lin), of_sensors(lin)
-        sides = [_pushed(lin, axis, {v: [f for f in forces[v] if f.odd == (axis > 0)] for v in beside}) for axis in range(len(AXES))]
+        sides = [
+            _pushed(lin, axis, {v: [f for f in forces[v] if f.odd == (axis > 0)] for v in beside})
+            for axis in range(len(AXES))
+        ]
         self.sides = [t for of_axis in sides for t in of_axis]
         base = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
         self.first = len(base) + sum(t.size for t in self.sides)
@@ -110,7 +114,9 @@ class Search:
         free = {v: of for v, of in forces.items() if v not in beside}
         alone = [pair for axis in range(len(AXES)) for pair in self._best(_pushed(lin, axis, free))]
         apart = {v: [pair for pair in alone if pair[0].variable == v] for v in NO_FORM}
-        apart["nothing"] = [pair for pair in apart["nothing"] if pair[0].axis != "surge"]  # where another form of resistance comes near a constant
+        apart["nothing"] = [
+            pair for pair in apart["nothing"] if pair[0].axis != "surge"
+        ]  # where another form of resistance comes near a constant
         joined = [self._together(pairs) for pairs in apart.values()]
         often = fit.plant.seg.dt < THRESHOLDS.value("samples_for_errors") * fit.plant.froude
         channels = [(name, channel) for name, channel in SENSORS.items() if often and fit.plant.seg.seen[channel]]
@@ -118,15 +124,19 @@ class Search:
         self._parts = {d: parts for d, *parts in [*alone, *(pair for pair in joined if pair is not None)]}
         constant = {d.axis: t for d, t in alone if d.variable == "nothing" and d.axis in AXES}
         doubtful = [d for d in self._parts if d.variable in _BY_RUN and not d.of_sensor and d.score > 0.0]
-        own = {d: self._parts[d] if d.variable == "waves" else [constant[axis] for axis in d.axis.split(" and ")] for d in doubtful}
+        own = {
+            d: self._parts[d] if d.variable == "waves" else [constant[axis] for axis in d.axis.split(" and ")]
+            for d in doubtful
+        }
         lost = [d for d in doubtful if not is_spent() and self._of_runs(own[d]) > d.score]
         told = {d: replace(d, variable="time") if d.variable == "waves" else d for d in self._parts if d not in lost}
         self._parts = {named: self._parts[d] for d, named in told.items()}
         self.found = sorted(self._parts, key=lambda d: -d.score)
 
     def settled(self, d: Dependence) -> Dependence:
-        """The same, judged as named causes are, which are fitted: with the variances of the noise re-estimated, and an error of a sensor taken out of
-        the record. Before it is known the noise holds a large one, and the fit is dragged along."""
+        """The same, judged as named causes are, which are fitted: with the variances of the noise re-estimated, and an
+        error of a sensor taken out of the record. Before it is known the noise holds a large one, and the fit is
+        dragged along."""
         parts, usual = self._parts[d], self._settled([])
         score = 2.0 * (self._settled(parts) - usual - sum(t.cost for t in parts))
         return replace(d, score=max(score, d.score, *(self._refitted(t) for t in parts if d.of_sensor)))
@@ -140,8 +150,8 @@ class Search:
         return 2.0 * (evidence(gram, prior, self.usual, num)[0] - self.before)
 
     def _refitted(self, tried: _Tried) -> float:
-        """Score of an error without which the plain model is fitted again, where its coefficients keep prior and precision. At least so much: of an
-        error of several degrees the linear estimate leaves some."""
+        """Score of an error without which the plain model is fitted again, where its coefficients keep prior and
+        precision. At least so much: of an error of several degrees the linear estimate leaves some."""
         now, at = self.fit, self.first + np.arange(tried.size)
         solution = solve(self._gram([tried]).reduce(self.usual), _with(self.prior, at))
         mean, cov = solution.mean[-tried.size :], solution.cov[-tried.size :, -tried.size :]
@@ -152,7 +162,9 @@ class Search:
     def _settled(self, tried: Sequence[_Tried]) -> float:
         more, columns = [*self.sides, *tried], self._columns_with(tried)
         products = products_of(self.fit.plant, self.fit.scales, self.fit.point, columns)
-        return settled_evidence(self.fit, sloped(self.lin, columns, products, self.fit.hyper), sum(t.size for t in more))
+        return settled_evidence(
+            self.fit, sloped(self.lin, columns, products, self.fit.hyper), sum(t.size for t in more)
+        )
 
     def _best(self, tried: Sequence[_Tried]) -> list[tuple[Dependence, _Tried]]:
         """The best form of every variable and axis."""
@@ -164,7 +176,9 @@ class Search:
         places = np.split(self.first + np.arange(sum(t.size for t in tried)), np.cumsum([t.size for t in tried])[:-1])
         found = []
         for _, group in groupby(zip(tried, places, strict=True), key=lambda pair: (pair[0].axis, pair[0].variable)):
-            solution, best, at = max(((solve(reduced, _with(self.prior, at)), t, at) for t, at in group), key=lambda way: way[0].log_evidence)
+            solution, best, at = max(
+                ((solve(reduced, _with(self.prior, at)), t, at) for t, at in group), key=lambda way: way[0].log_evidence
+            )
             gain, log_force = solution.log_evidence - null, self.usual
             if gain - best.cost > THRESHOLDS.value("variances_again") and not is_spent():
                 after, log_force = self._evidence(gram, at)
@@ -174,11 +188,19 @@ class Search:
                 before, after = np.exp([self.usual, log_force])[:, AXES.index(best.axis)]
                 share, taken = float(1.0 - after / before), float(np.sqrt(max(before - after, 0.0)))
             unit = THRESHOLDS.value("error_prior" if best.axis in SENSORS else "force_prior")
-            found.append((Dependence(best.variable, best.axis, best.form, 2.0 * (gain - best.cost), share, unit * size, taken), best))
+            found.append(
+                (
+                    Dependence(
+                        best.variable, best.axis, best.form, 2.0 * (gain - best.cost), share, unit * size, taken
+                    ),
+                    best,
+                )
+            )
         return found
 
     def _together(self, of: Sequence[tuple[Dependence, _Tried]]) -> tuple[Dependence, *tuple[_Tried, ...]] | None:
-        """The best forms of a variable on all axes where they are worth something, the strongest first; None where that is one axis alone."""
+        """The best forms of a variable on all axes where they are worth something, the strongest first; None where that
+        is one axis alone."""
         least = 2.0 * THRESHOLDS.value("variances_again")
         parts = sorted((pair for pair in of if pair[0].score > least), key=lambda pair: -pair[0].score)
         if len(parts) < 2 or is_spent():
@@ -194,7 +216,8 @@ class Search:
         return evidence(gram.only(np.append(self.inside, at)), prior, self.usual)[:2]
 
     def _gram(self, tried: Sequence[_Tried]) -> Gram:
-        """The Gram of the fit with more columns, under its noise (products of single channels would take six times the memory)."""
+        """The Gram of the fit with more columns, under its noise (products of single channels would take six times the
+        memory)."""
         fit, seg, columns = self.fit, self.fit.plant.seg, self._columns_with(tried)
         Z = whitened(fit.plant, fit.scales, fit.point, columns)
         G, part = np.zeros((2, Z.shape[1], Z.shape[3], Z.shape[3]))
@@ -205,11 +228,18 @@ class Search:
         correlation = ornstein_uhlenbeck(fit.plant.knots, fit.plant.knot_time, fit.hyper.tau)
         gram = Gram(G, fit.plant.knots, *correlation, nothing[:, -1], nothing, seg.run, seg.runs)
         inverse = gram.only(np.arange(0)).reduce(fit.hyper.log_force).inverse
-        return replace(gram, slope=beside_products(slopes(self.lin, columns, inverse, fit.hyper), coefficients_at(self.lin, columns)))
+        return replace(
+            gram,
+            slope=beside_products(slopes(self.lin, columns, inverse, fit.hyper), coefficients_at(self.lin, columns)),
+        )
 
     def _columns_with(self, tried: Sequence[_Tried]) -> Columns:
         more = [*self.sides, *tried]
-        return replace(self.columns, candidates=tuple(t.columns for t in more), bends=(*self.columns.bends, *(t.bend for t in more)))
+        return replace(
+            self.columns,
+            candidates=tuple(t.columns for t in more),
+            bends=(*self.columns.bends, *(t.bend for t in more)),
+        )
 
 
 def _pushed(lin: Linearisation, axis: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
@@ -223,7 +253,16 @@ def _pushed(lin: Linearisation, axis: int, of: Mapping[str, Sequence[Feature]]) 
     found, at = [], 0
     for v, f in forms:
         part = np.s_[at : at + f.size]
-        found.append(_Tried(AXES[axis], v, f.form, f.ways, columns[..., part], Bend(None if bend.rates is None else bend.rates[part])))
+        found.append(
+            _Tried(
+                AXES[axis],
+                v,
+                f.form,
+                f.ways,
+                columns[..., part],
+                Bend(None if bend.rates is None else bend.rates[part]),
+            )
+        )
         at += f.size
     return found
 
@@ -235,7 +274,9 @@ def _added(lin: Linearisation, name: str, channel: int, of: Mapping[str, Sequenc
         for f in group:
             error = np.zeros((*lin.motion.shape, f.size))
             error[..., channel, :] = sd * np.moveaxis(f.on, 0, -1).swapaxes(0, 1)
-            found.append(_Tried(name, v, f.form, f.ways, error.reshape(len(error), -1, f.size), Bend(None, (None,) * f.size)))
+            found.append(
+                _Tried(name, v, f.form, f.ways, error.reshape(len(error), -1, f.size), Bend(None, (None,) * f.size))
+            )
     return found
 
 

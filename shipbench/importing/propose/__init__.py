@@ -1,4 +1,5 @@
-"""A draft of mapping.toml from the heads and cells of logs; every guess is called one in the file, for a person to check."""
+"""A draft of mapping.toml from the heads and cells of logs; every guess is called one in the file, for a person to
+check."""
 
 from .proposal import write_proposal
 

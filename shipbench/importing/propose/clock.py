@@ -1,4 +1,5 @@
-"""The clock of a log: of all columns and formats that can be the time, the one with which the import's own clock runs forward most evenly."""
+"""The clock of a log: of all columns and formats that can be the time, the one with which the import's own clock runs
+forward most evenly."""
 
 from __future__ import annotations
 
@@ -17,17 +18,26 @@ from ..mapping import Clock
 from .columns import Column
 from .stamps import day_first_is_sure, formats_of, is_clock, is_date, zone_of
 
-_SIZES = (("unix", 5e8, 4e9), ("unix_ms", 5e11, 4e12), ("unix_us", 5e14, 4e15), ("unix_ns", 5e17, 4e18), ("matlab", 7e5, 8e5), ("excel", 3e4, 6e4))
+_SIZES = (
+    ("unix", 5e8, 4e9),
+    ("unix_ms", 5e11, 4e12),
+    ("unix_us", 5e14, 4e15),
+    ("unix_ns", 5e17, 4e18),
+    ("matlab", 7e5, 8e5),
+    ("excel", 3e4, 6e4),
+)
 """Formats of moments by the size of their numbers, from 1986 (MATLAB: 1916, Excel: 1982) on."""
 _FINE = 0.02
 """Days: numbers of the size of Excel's or MATLAB's days are days where they go on in smaller steps."""
 _FORWARD = 0.6
-"""Share of steps that must not go back: two vessels in turns, or a log in disorder, have more than that; a reading has half."""
+"""Share of steps that must not go back: two vessels in turns, or a log in disorder, have more than that; a reading has
+half."""
 
 
 @dataclass(frozen=True)
 class Time:
-    """The clock found: `spec` is the [time] of the mapping, `t` the seconds of the sample (n,), `step` their usual step [s]."""
+    """The clock found: `spec` is the [time] of the mapping, `t` the seconds of the sample (n,), `step` their usual step
+    [s]."""
 
     spec: dict[str, Any]
     t: np.ndarray
@@ -72,7 +82,9 @@ def read_time(spec: dict[str, Any], columns: Sequence[Column]) -> np.ndarray:
     if missing:
         raise InputError(f"no column '{missing[0]}' for [time]. Columns: {', '.join(by_name)}.")
     check_format(clock, "the log")
-    return to_seconds(clock, [by_name[name].cells for name in clock.names], lambda name: by_name[name].values, "the log")
+    return to_seconds(
+        clock, [by_name[name].cells for name in clock.names], lambda name: by_name[name].values, "the log"
+    )
 
 
 def usual_step(t: np.ndarray) -> float:
@@ -88,11 +100,19 @@ def _candidates(columns: Sequence[Column]) -> Iterator[Time]:
     for column in named:
         if column.head.meaning != "date" or not is_date(column.texts()):
             yield from _of_one(column, 2.0 if column.head.sure else 1.0)
-    stamps = [c for c in columns if c not in named and (_is_stamp(c) or (c.is_text and not c.known.size and formats_of(c.texts(50))))]
+    stamps = [
+        c
+        for c in columns
+        if c not in named and (_is_stamp(c) or (c.is_text and not c.known.size and formats_of(c.texts(50))))
+    ]
     for column in stamps:
         yield from _of_one(column, 0.5)
     if not named and not stamps:
-        forward = (c for c in columns if not c.head.name and len(c.known) > 2 and (np.diff(c.known) >= 0).all() and np.ptp(c.known) > 0)
+        forward = (
+            c
+            for c in columns
+            if not c.head.name and len(c.known) > 2 and (np.diff(c.known) >= 0).all() and np.ptp(c.known) > 0
+        )
         for column in itertools.islice(forward, 1):
             yield from _of_one(column, 0.0)
 
@@ -103,8 +123,17 @@ def _pairs(columns: Sequence[Column]) -> Iterator[Time]:
     for column in fine:
         whole = [c for c in columns if c is not column and _seconds_name(column.name) == c.name.lower()]
         for seconds in whole[:1]:
-            yield from _tried({"columns": [seconds.name, column.name], "format": "unix+ns"}, (seconds, column), 3.0, "seconds and nanoseconds")
-    dates = [c for c in columns if c.head.meaning in ("date", "time") and (is_date(c.texts()) or pa.types.is_date(c.cells.type))]
+            yield from _tried(
+                {"columns": [seconds.name, column.name], "format": "unix+ns"},
+                (seconds, column),
+                3.0,
+                "seconds and nanoseconds",
+            )
+    dates = [
+        c
+        for c in columns
+        if c.head.meaning in ("date", "time") and (is_date(c.texts()) or pa.types.is_date(c.cells.type))
+    ]
     for date in dates:
         for time in columns:
             typed = pa.types.is_time(time.cells.type)
@@ -112,12 +141,20 @@ def _pairs(columns: Sequence[Column]) -> Iterator[Time]:
                 continue
             joined = [f"{a} {b}" for a, b in zip(date.texts(), time.texts(), strict=False)]
             for form in ["iso"] if typed else formats_of(joined):
-                yield from _tried({"columns": [date.name, time.name], "format": form}, (date, time), 2.5, "date and time of day")
+                yield from _tried(
+                    {"columns": [date.name, time.name], "format": form}, (date, time), 2.5, "date and time of day"
+                )
 
 
 def _seconds_name(name: str) -> str:
     low = name.lower()
-    for fine, whole in (("nanoseconds", "seconds"), ("nanosecs", "secs"), ("nanosec", "sec"), ("nsecs", "secs"), ("nsec", "sec")):
+    for fine, whole in (
+        ("nanoseconds", "seconds"),
+        ("nanosecs", "secs"),
+        ("nanosec", "sec"),
+        ("nsecs", "secs"),
+        ("nsec", "sec"),
+    ):
         if fine in low:
             return low.replace(fine, whole)
     return low
@@ -136,7 +173,9 @@ def _of_one(column: Column, trust: float) -> Iterator[Time]:
     if len(column.known) < 0.5 * len(texts) or not len(column.known):
         for form in formats_of(texts):
             zone = {"zone": zone} if (zone := zone_of(form)) else {}
-            yield from _tried({"column": column.name, "format": form} | zone, (column,), trust, f"stamps such as '{texts[0]}'")
+            yield from _tried(
+                {"column": column.name, "format": form} | zone, (column,), trust, f"stamps such as '{texts[0]}'"
+            )
         return
     for form, why in _counted(column, texts):
         yield from _tried({"column": column.name, "format": form}, (column,), trust, why)
@@ -150,7 +189,9 @@ def _counted(column: Column, texts: list[str]) -> Iterator[tuple[str, str]]:
     middle, unit = float(np.median(column.known)), column.head.units.get("time")
     steps = np.abs(np.diff(column.known))
     for form, low, high in _SIZES:
-        if low < middle < high and (form not in ("excel", "matlab") or (unit is None and np.median(steps) < _FINE and (steps > 0).any())):
+        if low < middle < high and (
+            form not in ("excel", "matlab") or (unit is None and np.median(steps) < _FINE and (steps > 0).any())
+        ):
             yield form, "from the size of the numbers"
             return
     if unit == "hhmmss" or "hhmmss" in column.name.lower().replace(":", "") or _looks_packed(column.known, texts):
@@ -160,7 +201,8 @@ def _counted(column: Column, texts: list[str]) -> Iterator[tuple[str, str]]:
 
 
 def _looks_packed(values: np.ndarray, texts: list[str]) -> bool:
-    """Whether numbers are times of day without colons: no minutes or seconds of 60 or more, and leaps of 40 where a minute ends."""
+    """Whether numbers are times of day without colons: no minutes or seconds of 60 or more, and leaps of 40 where a
+    minute ends."""
     whole = np.floor(values)
     if (values < 0).any() or (values >= 240_000).any() or (whole % 100 >= 60).any() or (whole // 100 % 100 >= 60).any():
         return False
@@ -181,7 +223,13 @@ def _tried(spec: dict[str, Any], columns: Sequence[Column], trust: float, why: s
     if len(known) < 2 or (steps >= 0).mean() < _FORWARD or len(known) < 0.5 * len(t) or (not runs and steps.any()):
         return
     yield Time(
-        spec, t, usual_step(t), tuple(c.name for c in columns), why, (), (runs, trust, round(float((steps >= 0).mean()), 2), round(_evenness(t), 2))
+        spec,
+        t,
+        usual_step(t),
+        tuple(c.name for c in columns),
+        why,
+        (),
+        (runs, trust, round(float((steps >= 0).mean()), 2), round(_evenness(t), 2)),
     )
 
 
@@ -199,7 +247,12 @@ def _with_notes(time: Time, columns: Sequence[Column]) -> Time:
     if form.startswith(("%d/%m", "%d.%m", "%d-%m")) and not day_first_is_sure(texts) and "." not in form[:3]:
         notes.append(f"NOT SURE: day or month first? '{texts[0]}' can be both; the day is taken first.")
     if own[0].head.meaning not in ("time", "secs", "date"):
-        notes.append(f"NOT SURE: '{own[0].name}' is taken as the time: it goes forward in even steps of {time.step:.4g}.")
+        notes.append(
+            f"NOT SURE: '{own[0].name}' is taken as the time: it goes forward in even steps of {time.step:.4g}."
+        )
     elif "no unit" in time.why and time.step >= 20.0 and (np.mod(own[0].known, 1.0) == 0).all():
-        notes.append(f"NOT SURE: '{own[0].name}' goes on by {time.step:g}; seconds are taken. If it counts milliseconds, write format = \"ms\".")
+        notes.append(
+            f"NOT SURE: '{own[0].name}' goes on by {time.step:g}; seconds are taken. If it counts milliseconds, "
+            'write format = "ms".'
+        )
     return replace(time, notes=tuple(notes))

@@ -1,4 +1,5 @@
-"""The columns of a log: heads, cells at the beginning, and these as numbers with the decimal and thousands marks that fit all columns."""
+"""The columns of a log: heads, cells at the beginning, and these as numbers with the decimal and thousands marks that
+fit all columns."""
 
 from __future__ import annotations
 
@@ -45,19 +46,26 @@ class Column:
 
     def texts(self, count: int = 2000) -> list[str]:
         """Cells that are not empty, from the beginning."""
-        return [text for cell in self.cells.slice(0, count).to_pylist() if cell is not None and (text := str(cell).strip())]
+        return [
+            text for cell in self.cells.slice(0, count).to_pylist() if cell is not None and (text := str(cell).strip())
+        ]
 
     def evidence(self) -> str:
         """What the beginning of the column shows, for a comment."""
         if len(self.known) and len(self.known) >= 0.5 * len(self.texts(len(self.cells))):
             first = ", ".join(f"{v:.6g}" for v in self.known[:3])
             return f"first values {first}; {self.known.min():.6g} to {self.known.max():.6g}"
-        return f"first values {', '.join(repr(t[:24]) for t in self.texts(50)[:3])}" if self.texts(50) else "empty at the beginning"
+        return (
+            f"first values {', '.join(repr(t[:24]) for t in self.texts(50)[:3])}"
+            if self.texts(50)
+            else "empty at the beginning"
+        )
 
 
 @dataclass(frozen=True)
 class Sample:
-    """The beginning of a log: `columns` that can be mapped, `form` in words, `file`, the [file] of its mapping, and `notes` for the reader."""
+    """The beginning of a log: `columns` that can be mapped, `form` in words, `file`, the [file] of its mapping, and
+    `notes` for the reader."""
 
     path: Path
     form: str
@@ -93,7 +101,9 @@ def _sample(path: Path, form: Form, table: Table, cells: pa.RecordBatch, given: 
     if not {"decimal", "thousands"} & set(given):
         marks, unsure = _marks(cells.columns)
         notes += unsure
-    file |= {key: mark for key, mark, usual in (("decimal", marks[0], "."), ("thousands", marks[1], "")) if mark != usual}
+    file |= {
+        key: mark for key, mark, usual in (("decimal", marks[0], "."), ("thousands", marks[1], "")) if mark != usual
+    }
     by_number = form.layout.header == 0 and table.form.startswith(("text", "Excel"))
     columns = []
     for name, array in zip(cells.schema.names, cells.columns, strict=True):
@@ -145,20 +155,39 @@ def _pattern(decimal: str, thousands: str) -> str:
 
 def _marks(cells: list[pa.Array]) -> tuple[tuple[str, str], list[str]]:
     """The marks with which most cells of all columns are numbers, and a note where two ways fit as well."""
-    texts = [pc.utf8_trim_whitespace(a.cast(pa.string())) for a in cells if pa.types.is_string(a.type) or pa.types.is_large_string(a.type)]
+    texts = [
+        pc.utf8_trim_whitespace(a.cast(pa.string()))
+        for a in cells
+        if pa.types.is_string(a.type) or pa.types.is_large_string(a.type)
+    ]
     counts = {marks: sum(_count(text, _pattern(*marks)) for text in texts) for marks in _MARKS}
     most = max(counts.values(), default=0)
     best = next(marks for marks in _MARKS if counts.get(marks, 0) == most)
-    for other in [marks for marks in _MARKS if counts[marks] == most and marks != best and marks[1] and marks[1] in best]:
+    for other in [
+        marks for marks in _MARKS if counts[marks] == most and marks != best and marks[1] and marks[1] in best
+    ]:
         for text in texts:
             plain, grouped = numbers(text, *best), numbers(text, *other)
             changed = np.isfinite(plain) & (plain != grouped)
             if changed.any() and not changed.all() and _roughness(grouped) < 0.3 * _roughness(plain):
-                return other, [f"NOT SURE: '{text[int(np.argmax(changed))]}' is read as thousands: only so does its column run on without leaps."]
-    grouped_only = [t for t in texts if best[1] == "" and _count(t, rf"^\d{{1,3}}[{best[0]}]\d{{3}}$") == len(t.drop_null()) > 0]
+                return other, [
+                    (
+                        f"NOT SURE: '{text[int(np.argmax(changed))]}' is read as thousands: only so does its column "
+                        "run "
+                        "on without leaps."
+                    )
+                ]
+    grouped_only = [
+        t for t in texts if best[1] == "" and _count(t, rf"^\d{{1,3}}[{best[0]}]\d{{3}}$") == len(t.drop_null()) > 0
+    ]
     others = sum(_count(t, rf"\d[{best[0]}]\d") for t in texts) - sum(len(t.drop_null()) for t in grouped_only)
     if grouped_only and others == 0:
-        return best, [f"NOT SURE: '{grouped_only[0][0]}' may have a decimal or a thousands mark; taken as decimal. Else set [file] thousands."]
+        return best, [
+            (
+                f"NOT SURE: '{grouped_only[0][0]}' may have a decimal or a thousands mark; taken as decimal. Else set "
+                "[file] thousands."
+            )
+        ]
     return best, []
 
 

@@ -1,7 +1,9 @@
 """What the columns say about each other: the track's direction and speed against heading, yaw rate and speeds.
 
-Heads often name no unit, or one word for heading and course. A ship moves about where she points, at the speed that the log has, and her heading
-changes by the yaw rate: whatever unit, axis or clock contradicts that is told, and where the head leaves it open the one that agrees is taken.
+Heads often name no unit, or one word for heading and course. A ship moves about where she points, at the speed that the
+log has, and her heading
+changes by the yaw rate: whatever unit, axis or clock contradicts that is told, and where the head leaves it open the
+one that agrees is taken.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ _WINDOW = 5.0
 _AGREES = 0.9
 """Mean cosine between heading and track: 25 degrees apart."""
 _COURSE = np.deg2rad(1.0)
-"""A column that follows the track's direction so closely through turns is the course: a turning hull drifts by several degrees."""
+"""A column that follows the track's direction so closely through turns is the course: a turning hull drifts by several
+degrees."""
 _TURNING = np.deg2rad(30.0)
 """Range of directions from which on a log turns enough to tell."""
 _ALIKE = 0.9
@@ -48,7 +51,8 @@ class _Track:
 
 
 def examine(sample: Sample, time: Time, found: Assigned, extra: dict[str, Any]) -> None:
-    """Correct units, axes and the meaning of a course in `found`, and the unit of a clock without one in `time`, where the columns agree on them."""
+    """Correct units, axes and the meaning of a course in `found`, and the unit of a clock without one in `time`, where
+    the columns agree on them."""
     specs = {e.channel: e.spec for e in found.entries.values() if not e.missing}
     try:
         source = Source(time=time.spec, file=sample.file, channels=specs, **extra)
@@ -64,9 +68,9 @@ def examine(sample: Sample, time: Time, found: Assigned, extra: dict[str, Any]) 
         before = dict(found.entries["psi"].spec)
         _heading(track, series, found)
         if "psi" in found.entries and found.entries["psi"].spec != before:
-            series = _series(sample, source.model_copy(update={"channels": {"psi": Channel(**found.entries["psi"].spec)}})) | {
-                channel: values for channel, values in series.items() if channel != "psi"
-            }
+            series = _series(
+                sample, source.model_copy(update={"channels": {"psi": Channel(**found.entries["psi"].spec)}})
+            ) | {channel: values for channel, values in series.items() if channel != "psi"}
     if "psi" in found.entries and "r" in series and "psi" in series:
         _yaw_rate(series, found)
     if track is not None:
@@ -78,7 +82,8 @@ def examine(sample: Sample, time: Time, found: Assigned, extra: dict[str, Any]) 
 
 
 def _series(sample: Sample, source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Times and values of each channel in our units, by the import's own reader; of a log with several runs the first."""
+    """Times and values of each channel in our units, by the import's own reader; of a log with several runs the
+    first."""
     first: str | None = None
     t: list[np.ndarray] = []
     values: list[np.ndarray] = []
@@ -147,15 +152,22 @@ def _heading(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], fo
     best = max(plain, key=lambda k: plain[k])
     if plain[best] >= _AGREES:
         _settle_unit(entry, best[0], plain[best], found)
-        _heading_or_course(entry, _at(track.t, raw[0], np.unwrap(raw[1] * unit_factor("psi", best[0]))), track, spread, found)
+        _heading_or_course(
+            entry, _at(track.t, raw[0], np.unwrap(raw[1] * unit_factor("psi", best[0]))), track, spread, found
+        )
         return
     any_way = max(scores, key=lambda k: (round(scores[k], 2), -bool(k[1]), -len(k[2])))
     degrees = np.rad2deg(np.arccos(np.clip(plain[best], -1, 1)))
     if scores[any_way] >= _AGREES and spread > _TURNING:
         _turn(entry, any_way, found)
-        entry.why.append(f"NOT SURE: only so the heading agrees with the track (as it stands they are {degrees:.0f} deg apart)")
+        entry.why.append(
+            f"NOT SURE: only so the heading agrees with the track (as it stands they are {degrees:.0f} deg apart)"
+        )
         return
-    found.notes.append(f"NOT SURE: heading '{entry.columns[0].name}' and the direction of the track are {degrees:.0f} deg apart; check both.")
+    found.notes.append(
+        f"NOT SURE: heading '{entry.columns[0].name}' and the direction of the track are {degrees:.0f} deg apart; "
+        "check both."
+    )
 
 
 def _ways(direction: np.ndarray, found: Assigned) -> dict[str, np.ndarray]:
@@ -169,7 +181,21 @@ def _ways(direction: np.ndarray, found: Assigned) -> dict[str, np.ndarray]:
     return ways
 
 
-_AXES = {"north", "northing", "east", "easting", "nord", "norte", "ost", "est", "este", "n", "e", "hochwert", "rechtswert"}
+_AXES = {
+    "north",
+    "northing",
+    "east",
+    "easting",
+    "nord",
+    "norte",
+    "ost",
+    "est",
+    "este",
+    "n",
+    "e",
+    "hochwert",
+    "rechtswert",
+}
 
 
 def _turn(entry: Entry, way: tuple[str, bool, str], found: Assigned) -> None:
@@ -179,16 +205,23 @@ def _turn(entry: Entry, way: tuple[str, bool, str], found: Assigned) -> None:
         entry.spec["unit"] = unit
     if turned:
         entry.spec |= {"sign": "counterclockwise", "offset": round(-np.pi / 2 / unit_factor("psi", unit), 6)}
-        found.notes.append(f"NOT SURE: '{entry.columns[0].name}' counts from east, counter-clockwise: only so it agrees with the track.")
+        found.notes.append(
+            f"NOT SURE: '{entry.columns[0].name}' counts from east, counter-clockwise: only so it agrees with the "
+            "track."
+        )
     if axes == "exchanged":
         x, y = found.entries["x"], found.entries["y"]
         x.spec["column"], y.spec["column"] = y.spec["column"], x.spec["column"]
         x.columns, y.columns = y.columns, x.columns
-        found.notes.append(f"NOT SURE: x and y are exchanged: '{x.spec['column']}' is taken as north. Only so heading and track agree.")
+        found.notes.append(
+            f"NOT SURE: x and y are exchanged: '{x.spec['column']}' is taken as north. Only so heading and track agree."
+        )
     for word, channel in (("south", "lat"), ("west", "lon")):
         if word in axes:
             found.entries[channel].spec["sign"] = word
-            found.notes.append(f"NOT SURE: {channel} is taken as positive to the {word}: only so heading and track agree.")
+            found.notes.append(
+                f"NOT SURE: {channel} is taken as positive to the {word}: only so heading and track agree."
+            )
 
 
 def _settle_unit(entry: Entry, unit: str, score: float, found: Assigned) -> None:
@@ -209,7 +242,10 @@ def _heading_or_course(entry: Entry, psi: np.ndarray, track: _Track, spread: flo
     if apart < _COURSE:
         del found.entries["psi"]
         found.notes[:] = [n for n in found.notes if f"'{name}' may be the heading" not in n]
-        found.notes.append(f"'{name}' follows the track within {np.rad2deg(apart):.2g} deg through turns: it is the course, no heading.")
+        found.notes.append(
+            f"'{name}' follows the track within {np.rad2deg(apart):.2g} deg through turns: it is the course, no "
+            "heading."
+        )
         return
     entry.why.append(f"{np.rad2deg(apart):.2g} deg r.m.s. from the track's direction, as a drifting hull's heading is")
 
@@ -224,7 +260,9 @@ def _yaw_rate(series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned)
     if len(inside) < 10:
         return
     change = (np.interp(inside + window / 2, t, psi) - np.interp(inside - window / 2, t, psi)) / window
-    steady = np.abs(change) <= 3 * np.quantile(np.abs(change), 0.9)  # leaves out where a heading was interpolated across 360/0
+    steady = np.abs(change) <= 3 * np.quantile(
+        np.abs(change), 0.9
+    )  # leaves out where a heading was interpolated across 360/0
     change, rate = change[steady], _mean_over(inside[steady], at, r, window)
     if np.std(change) == 0 or np.std(rate) == 0 or abs(correlation := float(np.corrcoef(change, rate)[0, 1])) < 0.8:
         return
@@ -233,7 +271,10 @@ def _yaw_rate(series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned)
     if correlation < 0 and "sign" not in entry.spec and "as given" not in entry.why:
         entry.spec["sign"] = "port"
         entry.why.append("NOT SURE: positive to port, against the change of the heading")
-        found.notes.append(f"NOT SURE: '{entry.columns[0].name}' is taken as positive to port: it runs against the change of the heading.")
+        found.notes.append(
+            f"NOT SURE: '{entry.columns[0].name}' is taken as positive to port: it runs against the change of the "
+            "heading."
+        )
 
 
 def _mean_over(times: np.ndarray, at: np.ndarray, values: np.ndarray, window: float) -> np.ndarray:
@@ -244,7 +285,13 @@ def _speed(channel: str, track: _Track, series: dict[str, tuple[np.ndarray, np.n
     recorded = np.abs(_at(track.t, *series[channel]))
     moving = recorded > 0.3 * np.quantile(recorded, 0.9)
     if moving.sum() >= 5:
-        _settle(found.entries[channel], channel, float(np.median(track.speed[moving] / recorded[moving])), "the track", found)
+        _settle(
+            found.entries[channel],
+            channel,
+            float(np.median(track.speed[moving] / recorded[moving])),
+            "the track",
+            found,
+        )
 
 
 def _sway(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned) -> None:
@@ -260,15 +307,20 @@ def _sway(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], found
         v.spec["unit"] = u.spec["unit"]
         v.why.append("the unit of u")
         _no_doubt_of_unit(v, found)
-        found.notes.append(f"NOT SURE: the head of '{v.columns[0].name}' names no unit; v is taken in the unit of u, {u.spec['unit']}.")
+        found.notes.append(
+            f"NOT SURE: the head of '{v.columns[0].name}' names no unit; v is taken in the unit of u, {u.spec['unit']}."
+        )
 
 
 def _no_doubt_of_unit(entry: Entry, found: Assigned) -> None:
-    found.notes[:] = [n for n in found.notes if not n.startswith(f"NOT SURE: the head of '{entry.columns[0].name}' names no unit")]
+    found.notes[:] = [
+        n for n in found.notes if not n.startswith(f"NOT SURE: the head of '{entry.columns[0].name}' names no unit")
+    ]
 
 
 def _settle(entry: Entry, channel: str, ratio: float, what: str, found: Assigned) -> None:
-    """Take the unit with which the channel is `ratio` times what it is now; a unit that the head names is kept and the difference told."""
+    """Take the unit with which the channel is `ratio` times what it is now; a unit that the head names is kept and the
+    difference told."""
     if "as given" in entry.why or not entry.columns:
         return
     like = "u" if channel == "sog" else channel
@@ -284,27 +336,39 @@ def _settle(entry: Entry, channel: str, ratio: float, what: str, found: Assigned
     elif fits:
         found.notes.append(f"NOT SURE: '{name}' says {entry.spec['unit']}; {what} says {unit}. The head is kept.")
     elif abs(np.log(abs(ratio) or 1e-9)) > 2 * _CLOSE:
-        found.notes.append(f"NOT SURE: '{name}' and {what} differ by a factor of {abs(ratio):.3g}, which is no unit that is accepted.")
+        found.notes.append(
+            f"NOT SURE: '{name}' and {what} differ by a factor of {abs(ratio):.3g}, which is no unit that is accepted."
+        )
 
 
 def _in_radians(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned) -> bool:
     """Take latitude and longitude in radians where only so the track is as fast as the recorded speed."""
     pair = [found.entries[c] for c in ("lat", "lon") if c in found.entries]
-    channel = next((c for c in ("sog", "u") if c in series and c in found.entries and found.entries[c].columns[0].head.units), None)
-    if channel is None or len(pair) < 2 or any(e.spec["unit"] != "deg" or e.columns[0].head.units or "as given" in e.why for e in pair):
+    channel = next(
+        (c for c in ("sog", "u") if c in series and c in found.entries and found.entries[c].columns[0].head.units), None
+    )
+    if (
+        channel is None
+        or len(pair) < 2
+        or any(e.spec["unit"] != "deg" or e.columns[0].head.units or "as given" in e.why for e in pair)
+    ):
         return False
     ratio = float(np.median(np.abs(_at(track.t, *series[channel]))) / np.median(track.speed))
     if abs(np.log(ratio * unit_factor("psi", "deg"))) > _CLOSE:
         return False
     for entry in pair:
         entry.spec["unit"] = "rad"
-    found.notes.append("NOT SURE: latitude and longitude are taken in radians: only so the track is as fast as the recorded speed.")
+    found.notes.append(
+        "NOT SURE: latitude and longitude are taken in radians: only so the track is as fast as the recorded speed."
+    )
     return True
 
 
 def _clock_unit(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], time: Time, found: Assigned) -> None:
     """The unit of a clock without one, from the time that the ship takes over her way."""
-    channel = next((c for c in ("sog", "u") if c in series and c in found.entries and found.entries[c].columns[0].head.units), None)
+    channel = next(
+        (c for c in ("sog", "u") if c in series and c in found.entries and found.entries[c].columns[0].head.units), None
+    )
     if channel is None or "no unit" not in time.why:
         return
     recorded = np.abs(_at(track.t, *series[channel]))
@@ -312,7 +376,9 @@ def _clock_unit(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]],
     for factor, form in _CLOCKS.items():
         if abs(np.log(ratio / factor)) < _CLOSE:
             time.spec["format"] = form
-            found.notes.append(f"NOT SURE: the time is taken in {form}: only so the ship runs along her track at the recorded speed.")
+            found.notes.append(
+                f"NOT SURE: the time is taken in {form}: only so the ship runs along her track at the recorded speed."
+            )
 
 
 def _at(times: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:

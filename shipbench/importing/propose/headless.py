@@ -1,7 +1,8 @@
 """Columns without heads, by how a ship moves: which are the position, the heading, the yaw rate and the velocities.
 
-The heading changes by the yaw rate, and the track's velocity, turned into body axes by the heading, is surge and sway. In a log in which the ship
-turns, no other choice of columns fulfils both. Rudder, shaft speed and the rest fulfil nothing of that kind and stay with the reader.
+The heading changes by the yaw rate, and the track's velocity, turned into body axes by the heading, is surge and sway.
+In a log in which the ship turns, no other choice of columns fulfils both. Rudder, shaft speed and the rest fulfil
+nothing of that kind and stay with the reader.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ _MOST = 24
 """Columns that are looked at; the number of choices goes with its third power."""
 _ROWS = 2000
 _CORRELATION = 0.95
-"""Between the change of the heading and the yaw rate, and between sway by the track and by the log. Filters and noise take a few per cent."""
+"""Between the change of the heading and the yaw rate, and between sway by the track and by the log. Filters and noise
+take a few per cent."""
 _CLOSE = 0.1
 """Relative difference within which a factor between two columns is that of a unit."""
 _TURNS = np.deg2rad(5.0)
@@ -50,20 +52,32 @@ def identify(columns: Sequence[Column], t: np.ndarray, found: Assigned) -> None:
     _, units, places = best
     for channel, place in places.items():
         column = free[place]
-        found.entries[channel] = Entry(channel, {"column": column.name, "unit": units[channel]}, (column,), ["no head; identified by the motion"])
+        found.entries[channel] = Entry(
+            channel, {"column": column.name, "unit": units[channel]}, (column,), ["no head; identified by the motion"]
+        )
     told = ", ".join(f"{channel} '{free[place].name}' [{units[channel]}]" for channel, place in places.items())
-    found.notes.append(f"NOT SURE: the columns have no heads; taken as {told}: only so heading, yaw rate, track and speeds agree.")
-    found.notes.append("NOT SURE: x is taken as north. A log with x east and angles counter-clockwise would look the same.")
+    found.notes.append(
+        f"NOT SURE: the columns have no heads; taken as {told}: only so heading, yaw rate, track and speeds agree."
+    )
+    found.notes.append(
+        "NOT SURE: x is taken as north. A log with x east and angles counter-clockwise would look the same."
+    )
 
 
 def _motion(values: np.ndarray, t: np.ndarray) -> _Motion | None:
-    new = np.r_[True, np.diff(np.maximum.accumulate(np.nan_to_num(t, nan=-np.inf))) > 0] & np.isfinite(t) & np.isfinite(values).all(axis=0)
+    new = (
+        np.r_[True, np.diff(np.maximum.accumulate(np.nan_to_num(t, nan=-np.inf))) > 0]
+        & np.isfinite(t)
+        & np.isfinite(values).all(axis=0)
+    )
     t, values = t[new], values[:, new]
     if len(t) < 60:
         return None
     window = max(2.0, 4.0 * float(np.median(np.diff(t))))
     at = np.linspace(t[0] + window / 2, t[-1] - window / 2, min(_ROWS, len(t)))
-    parts = np.array([[np.interp(at + shift * window, t, v) for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)] for v in values])
+    parts = np.array(
+        [[np.interp(at + shift * window, t, v) for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)] for v in values]
+    )
     return _Motion(parts.mean(axis=1), (parts[:, 4] - parts[:, 0]) / window)
 
 
@@ -77,7 +91,9 @@ def _choices(motion: _Motion) -> list[tuple[float, dict[str, str], dict[str, int
             continue
         for psi_unit, r_unit in itertools.product(("deg", "rad"), ("deg/s", "rad/s", "deg/min")):
             heading = motion.means[psi] * unit_factor("psi", psi_unit)
-            if np.ptp(heading) < _TURNS or not _is_unit(fit[0] * unit_factor("psi", psi_unit), unit_factor("r", r_unit)):
+            if np.ptp(heading) < _TURNS or not _is_unit(
+                fit[0] * unit_factor("psi", psi_unit), unit_factor("r", r_unit)
+            ):
                 continue
             for x, y in itertools.permutations([k for k in range(count) if k not in (psi, r)], 2):
                 scored = _track(motion, heading, x, y)
@@ -100,7 +116,10 @@ def _track(motion: _Motion, heading: np.ndarray, x: int, y: int) -> tuple[float,
     for channel, wanted in (("v", sway), ("u", surge)):
         for k in range(len(motion.means)):
             fit = _line(motion.means[k], wanted)
-            unit = next((u for u in ("m/s", "kn") if fit and fit[1] > _CORRELATION and _is_unit(fit[0], unit_factor("u", u))), None)
+            unit = next(
+                (u for u in ("m/s", "kn") if fit and fit[1] > _CORRELATION and _is_unit(fit[0], unit_factor("u", u))),
+                None,
+            )
             if fit and unit and k not in (x, y):
                 units[channel], places[channel] = unit, k
                 score += fit[1]

@@ -16,7 +16,9 @@ from ..entries import CHANNELS, unit_of
 
 QUANTITIES = {"m": "length", "m/s": "speed", "rad": "angle", "rad/s": "rate", "rpm": "shaft", "N": "force"}
 """Kind of unit in units.csv for each unit of ours."""
-_LETTERS = str.maketrans({"ø": "o", "Ø": "O", "æ": "ae", "Æ": "Ae", "œ": "oe", "Œ": "Oe", "ß": "ss", "º": "°", "µ": "u", "μ": "u"})
+_LETTERS = str.maketrans(
+    {"ø": "o", "Ø": "O", "æ": "ae", "Æ": "Ae", "œ": "oe", "Œ": "Oe", "ß": "ss", "º": "°", "µ": "u", "μ": "u"}
+)
 _BRACKETS = r"[\[({<]([^\])}>]*)[\])}>]"
 _SIDE_LETTERS = {"p", "l", "r", "a", "b"}
 _SHORT = 2
@@ -27,8 +29,9 @@ _SHORT = 2
 class Head:
     """What the head of a column says.
 
-    `meaning` is a channel or another word of heads.csv's first column, None where none or several are named; `qualifiers` are those with a "+";
-    `sure` says that no word is left over. `unit` is the text of the unit and `units` maps the quantities that it can be of to the unit's name.
+    `meaning` is a channel or another word of heads.csv's first column, None where none or several are named;
+    `qualifiers` are those with a "+"; `sure` says that no word is left over. `unit` is the text of the unit and `units`
+    maps the quantities that it can be of to the unit's name.
     """
 
     name: str
@@ -54,7 +57,8 @@ class Head:
 
     @property
     def fits(self) -> bool:
-        """Whether the unit, where there is one, can be one of the channel; some controllers steer the rudder by a pulse width."""
+        """Whether the unit, where there is one, can be one of the channel; some controllers steer the rudder by a pulse
+        width."""
         if not self.units or self.channel is None:
             return True
         return bool({QUANTITIES[unit_of(self.channel)], "percent"} & set(self.units)) or (
@@ -63,7 +67,8 @@ class Head:
 
 
 def read_head(name: str, unit_text: str = "") -> Head:
-    """The head `name` of a column; `unit_text` is the unit from a row of units under the heads ("" where there is none)."""
+    """The head `name` of a column; `unit_text` is the unit from a row of units under the heads ("" where there is
+    none)."""
     inside = [part.strip() for part in re.findall(_BRACKETS, name)]
     unit = next((part for part in [unit_text, *inside] if part and units_of(part)), "")
     words = re.sub(_BRACKETS, lambda found: " " if found[1].strip() == unit else f" {found[1]} ", name)
@@ -76,10 +81,14 @@ def read_head(name: str, unit_text: str = "") -> Head:
         of_field = _named(_tokens(path[1]))  # a field of a structure, such as gps.t
         if of_field[0] and not of_field[2]:
             meanings, left, qualifiers = of_field[0], [], qualifiers | of_field[1]
-    if set(tokens) & _SIDE_LETTERS - {"r"} and not {"n", "delta", "F_b", "F_s"} & set(meanings):  # x_p is no position to port
+    if set(tokens) & _SIDE_LETTERS - {"r"} and not {"n", "delta", "F_b", "F_s"} & set(
+        meanings
+    ):  # x_p is no position to port
         meanings, left = [], tokens
     meaning = meanings[0] if len(set(meanings)) == 1 else None
-    base = tuple(t for t in tokens if not ({"+port", "+starboard", "+first", "+second"} & {m for m, _ in _words().get((t,), ())}))
+    base = tuple(
+        t for t in tokens if not ({"+port", "+starboard", "+first", "+second"} & {m for m, _ in _words().get((t,), ())})
+    )
     return Head(name, meaning, frozenset(qualifiers), not left and meaning is not None, unit, units_of(unit), base)
 
 
@@ -132,22 +141,30 @@ def _named(tokens: list[str]) -> tuple[list[str], set[str], list[str]]:
         and len(rest := [t for t in tokens if not _is_mark(t)]) == 1
         and (names := [m for m, _ in table.get((rest[0],), ()) if m[0] != "+"])
     ):
-        meanings, left = names[:1], [t for t in left if t != rest[0]]  # a short word whose neighbours only qualify it, such as 'n_stbd'
+        meanings, left = (
+            names[:1],
+            [t for t in left if t != rest[0]],
+        )  # a short word whose neighbours only qualify it, such as 'n_stbd'
     return meanings, qualifiers, left
 
 
 def _mark_wins(tokens: list[str], phrase: tuple[str, ...]) -> bool:
-    """Whether a word that both names and qualifies qualifies here: in 'shaft speed' the shaft does, in 'shaft' it names."""
+    """Whether a word that both names and qualifies qualifies here: in 'shaft speed' the shaft does, in 'shaft' it
+    names."""
     rest = [t for t in tokens if t not in phrase]
     return any(not m.startswith("+") and len(t) > _SHORT for t in rest for m, _ in _words().get((t,), ()))
 
 
 def _is_mark(token: str) -> bool:
-    return any(m in ("+order", "+port", "+starboard", "+first", "+second", "+plain", "+true") for m, _ in _words().get((token,), ()))
+    return any(
+        m in ("+order", "+port", "+starboard", "+first", "+second", "+plain", "+true")
+        for m, _ in _words().get((token,), ())
+    )
 
 
 def _unit_at_end(words: str, tokens: list[str]) -> tuple[list[str], str]:
-    """A unit without brackets at the end, such as in 'speed_kn', 'Fahrt kn', 'rudder, deg' or 'u_m_s'; something must be left before it."""
+    """A unit without brackets at the end, such as in 'speed_kn', 'Fahrt kn', 'rudder, deg' or 'u_m_s'; something must
+    be left before it."""
     last = re.split(r"[\s,;_]+", words.strip())[-1]
     if (
         len(re.split(r"[\s,;_]+", words.strip())) > 1
@@ -176,7 +193,9 @@ def _unit_at_end(words: str, tokens: list[str]) -> tuple[list[str], str]:
 
 def plain(text: str) -> str:
     """Lower case without accents."""
-    return "".join(c for c in unicodedata.normalize("NFKD", text.translate(_LETTERS)) if not unicodedata.combining(c)).casefold()
+    return "".join(
+        c for c in unicodedata.normalize("NFKD", text.translate(_LETTERS)) if not unicodedata.combining(c)
+    ).casefold()
 
 
 def _tokens(text: str) -> list[str]:
@@ -185,7 +204,11 @@ def _tokens(text: str) -> list[str]:
 
 
 def _plain_unit(text: str) -> str:
-    return re.sub(r"\s+", " ", plain(text.replace("²", "2").replace("·", ".").replace("\u2212", "-").replace("⁻¹", "-1"))).strip().rstrip(".")
+    return (
+        re.sub(r"\s+", " ", plain(text.replace("²", "2").replace("·", ".").replace("\u2212", "-").replace("⁻¹", "-1")))
+        .strip()
+        .rstrip(".")
+    )
 
 
 @cache
@@ -202,7 +225,11 @@ def _words() -> dict[tuple[str, ...], tuple[tuple[str, str], ...]]:
 @cache
 def _joined() -> dict[str, str]:
     """Phrases of several words written as one."""
-    return {"".join(phrase): names[0] for phrase, found in _words().items() if len(phrase) > 1 and (names := [m for m, _ in found if m[0] != "+"])}
+    return {
+        "".join(phrase): names[0]
+        for phrase, found in _words().items()
+        if len(phrase) > 1 and (names := [m for m, _ in found if m[0] != "+"])
+    }
 
 
 @cache

@@ -32,7 +32,8 @@ _NONE = re.compile(r"(?i)\s*(|nan|n/?a|null|none|-+|\*+|#n/a)\s*")
 
 @dataclass(frozen=True)
 class Form:
-    """The layout of a log as found: `heads` and `units` are the texts over the columns, where the layout itself cannot name them."""
+    """The layout of a log as found: `heads` and `units` are the texts over the columns, where the layout itself cannot
+    name them."""
 
     layout: Layout
     heads: tuple[str, ...] = ()
@@ -65,14 +66,17 @@ def find_form(path: Path, given: dict[str, Any]) -> Form:
         text = codecs.getincrementaldecoder(encoding)().decode(head, final=False)
     except UnicodeError:
         example = option("--encoding latin-1", 'encoding="latin-1"')
-        raise InputError(f"{path} is not {encoding} text. Accepted: Python's names of encodings, such as {example}.") from None
+        raise InputError(
+            f"{path} is not {encoding} text. Accepted: Python's names of encodings, such as {example}."
+        ) from None
     lines = [line.rstrip("\n") for line, _ in zip(io.StringIO(text, newline=None), range(_LINES), strict=False)]
     delimiter = given.get("delimiter") or _delimiter(lines)
     return _form(path, [_split(line, delimiter or ",") for line in lines], found, tuple(notes), delimiter, lines)
 
 
 def _form(
-    path: Path, rows: list[list[str]], found: dict[str, Any], notes: tuple[str, ...], delimiter: str | None = None, lines: Sequence[str] = ()
+    path: Path, rows: list[list[str]], found: dict[str, Any], notes: tuple[str, ...], delimiter: str | None = None,
+    lines: Sequence[str] = ()
 ) -> Form:  # fmt: skip
     """The form of a table whose beginning is `rows`; `lines` is their text, where it is a text."""
     width = _width(rows)
@@ -82,12 +86,16 @@ def _form(
     if data is None or not numeric:
         if not any(any(cell.strip() for cell in row) for row in rows):
             raise InputError(f"{path} holds no text. Give a log with a header and rows.")
-        return Form(Layout(**found), notes=notes, given=found)  # nothing looks like numbers; the reader's own message serves
+        return Form(
+            Layout(**found), notes=notes, given=found
+        )  # nothing looks like numbers; the reader's own message serves
     above = [k for k in range(data) if _is_heads(rows[k], width)]
     if "header" in found:
         head = found["header"] - 1 if found["header"] else None
     else:
-        head = max(above, key=lambda k: (sum(read_head(cell).meaning is not None for cell in rows[k]), -k), default=None)
+        head = max(
+            above, key=lambda k: (sum(read_head(cell).meaning is not None for cell in rows[k]), -k), default=None
+        )
     between = [k for k in above if head is not None and k > head]
     units = max(between, key=lambda k: sum(bool(units_of(cell.strip("[]() "))) for cell in rows[k]), default=None)
     texts = tuple(cell.strip("[]() ") for cell in rows[units]) if units is not None else ()
@@ -119,7 +127,11 @@ def _delimiter(lines: list[str]) -> str | None:
         width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
         if width < 2:
             continue
-        good = [sum(bool(_DATUM.fullmatch(cell) or _NONE.fullmatch(cell)) for cell in row) for row in rows if len(row) == width]
+        good = [
+            sum(bool(_DATUM.fullmatch(cell) or _NONE.fullmatch(cell)) for cell in row)
+            for row in rows
+            if len(row) == width
+        ]
         share = sum(good) / (width * len(rows))
         if (round(share, 1), sum(good) / len(rows)) > most:
             best, most = mark, (round(share, 1), sum(good) / len(rows))

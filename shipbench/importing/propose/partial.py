@@ -22,7 +22,9 @@ def read_partial(path: Path) -> dict[str, Any]:
     whole: dict[str, Any] = {"name": "any", "dt": 1.0} | data
     sources = data.get("sources")
     if isinstance(sources, dict) and sources:
-        whole["sources"] = {name: _REST | source if isinstance(source, dict) else source for name, source in sources.items()}
+        whole["sources"] = {
+            name: _REST | source if isinstance(source, dict) else source for name, source in sources.items()
+        }
     elif "sources" not in data:
         whole = _REST | whole
     mapping = validated(whole, path)

@@ -22,10 +22,11 @@ from .trial import try_draft
 
 
 def write_proposal(
-    logs: Sequence[Path], path: Path, force: bool = False, *, file: dict[str, Any] | None = None, partial: Path | None = None
+    logs: Sequence[Path], path: Path, force: bool = False, *, file: dict[str, Any] | None = None,
+    partial: Path | None = None
 ) -> list[str]:  # fmt: skip
-    """Write a draft mapping for `logs` to `path`; return lines that say what is guessed, what is not sure and what is missing,
-    and, last, the command or the call of the import.
+    """Write a draft mapping for `logs` to `path`; return lines that say what is guessed, what is not sure and what is
+    missing, and, last, the command or the call of the import.
 
     Args:
         logs: files of one kind, or of several instruments; each kind becomes a source.
@@ -39,9 +40,15 @@ def write_proposal(
     """
     draft = option("--propose", "out=FILE")
     if path.exists() and not force:
-        raise InputError(f"{path} is there already. Give another name with {draft}, or {option('--force', 'force=True')} to replace it.")
+        raise InputError(
+            f"{path} is there already. Give another name with {draft}, or {option('--force', 'force=True')} to "
+            "replace it."
+        )
     if partial is not None and path.exists() and partial.resolve() == path.resolve():
-        raise InputError(f"the draft and {option('--map', 'partial')} are both {path}; accepted: two files. Give another name with {draft}.")
+        raise InputError(
+            f"the draft and {option('--map', 'partial')} are both {path}; accepted: two files. Give another name "
+            f"with {draft}."
+        )
     check_output(path, logs, option("--propose", "out"))
     known = read_partial(partial) if partial is not None else {}
     sources, notes = _sources(logs, known, file or {})
@@ -62,14 +69,17 @@ def write_proposal(
 
     try:
         if not any(note.startswith("MISSING: no column") or note.startswith("MISSING: no position") for note in notes):
-            notes += try_draft(write, list(dict.fromkeys(log for source in sources for log in source.logs)), sources, split)
+            notes += try_draft(
+                write, list(dict.fromkeys(log for source in sources for log in source.logs)), sources, split
+            )
         put(write(), path)
     finally:
         fresh.unlink(missing_ok=True)
     given = list(dict.fromkeys(str(log) for source in sources for log in source.logs))
     command = option(
         f"shipbench data import {shlex.join(given)} --map {shlex.quote(str(path))} --ship ship.toml --out my_trial",
-        f'shipbench.import_log({(given[0] if len(given) == 1 else given)!r}, {str(path)!r}, "ship.toml", out="my_trial")',
+        f'shipbench.import_log({(given[0] if len(given) == 1 else given)!r}, {str(path)!r}, "ship.toml", '
+        'out="my_trial")',
     )
     return [*map(one_line, notes), f"Draft: {path}. Check every line marked GUESS, then:", command]
 
@@ -103,7 +113,8 @@ def _sources(logs: Sequence[Path], known: dict[str, Any], file: dict[str, Any]) 
         for channel in twice:
             entry = draft.found.entries.pop(channel)
             notes.append(
-                f"{draft.sample.path.name}: {channel} ('{', '.join(c.name for c in entry.columns)}') is in another log, too; that one is taken."
+                f"{draft.sample.path.name}: {channel} ('{', '.join(c.name for c in entry.columns)}') is in another "
+                "log, too; that one is taken."
             )
         seen |= set(draft.found.entries)
     return drafts, notes

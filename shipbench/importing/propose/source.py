@@ -30,7 +30,8 @@ _COARSE = 0.2
 
 @dataclass
 class SourceDraft:
-    """One kind of file. `kept` is what a partial mapping says of it, `extra` further keys of the source (run, missing, ...), `why` their comments."""
+    """One kind of file. `kept` is what a partial mapping says of it, `extra` further keys of the source (run, missing,
+    ...), `why` their comments."""
 
     name: str
     logs: list[Path]
@@ -76,7 +77,11 @@ class SourceDraft:
     @property
     def left(self) -> list[Column]:
         """Columns that do not serve."""
-        used = self.found.used() | set(self.time.names if self.time else ()) | set((self.time_spec or {}).get("columns", ()))
+        used = (
+            self.found.used()
+            | set(self.time.names if self.time else ())
+            | set((self.time_spec or {}).get("columns", ()))
+        )
         used |= {(self.time_spec or {}).get("column", "")}
         return [c for c in self.sample.columns if c.name not in used]
 
@@ -93,7 +98,10 @@ def draft_source(name: str, logs: list[Path], sample: Sample, kept: dict[str, An
     spec = dict(kept["time"]) if "time" in kept else dict(time.spec) if time else None
     if time is None:
         notes += [told] if (told := refusal(sample.columns)) else []
-        notes.append(f"MISSING: no column of {sample.path.name} was taken for the time; write [time] column and format, or rate = 10.0 [Hz].")
+        notes.append(
+            f"MISSING: no column of {sample.path.name} was taken for the time; write [time] column and format, or "
+            "rate = 10.0 [Hz]."
+        )
     else:
         notes += time.notes
     own = set(time.names) if time else set()
@@ -117,7 +125,9 @@ def draft_source(name: str, logs: list[Path], sample: Sample, kept: dict[str, An
         if time.spec.get("format") != form and draft.time_spec is not None:
             draft.time_spec["format"] = time.spec["format"]
             t = read_time(time.spec, sample.columns)
-            draft.time = Time(time.spec, t, usual_step(t), time.names, "from the recorded speed along the track", time.notes)
+            draft.time = Time(
+                time.spec, t, usual_step(t), time.names, "from the recorded speed along the track", time.notes
+            )
             draft.notes[:] = [n for n in draft.notes if "seconds are taken" not in n]
             notes = [n for n in notes if "seconds are taken" not in n]
     draft.notes = notes
@@ -141,7 +151,9 @@ def _marks_of_missing(draft: SourceDraft) -> None:
     for entry in draft.found.entries.values():
         for column in entry.columns:
             if column.is_text and len(column.known):
-                marks.update(t for t in column.texts(len(column.cells)) if not re.search(r"\d", t) and t.casefold() not in _EMPTY)
+                marks.update(
+                    t for t in column.texts(len(column.cells)) if not re.search(r"\d", t) and t.casefold() not in _EMPTY
+                )
     if marks:
         draft.extra["missing"] = list(marks)
         draft.why["missing"] = f"  # GUESS: words in columns of numbers, {sum(marks.values())} times at the beginning"
@@ -163,13 +175,18 @@ def _disorder(draft: SourceDraft) -> None:
     if (steps == 0).mean() > _COARSE and spec.get("format") not in ("unix+ns",):
         spec["repeated"] = "spread"
         draft.found.notes.append(
-            f"NOT SURE: {(steps == 0).mean():.0%} of the rows repeat the time of the row before; they are spread evenly until the next stamp."
+            f"NOT SURE: {(steps == 0).mean():.0%} of the rows repeat the time of the row before; they are spread "
+            "evenly until the next stamp."
         )
     if back.any() and not _over_midnight(spec, steps):
         often = back.mean() > 0.01
         spec["backwards"] = "sort" if often else "split"
-        what = "rows are not in the order of time; sorted" if often else "what follows is taken as a recording of its own"
-        draft.found.notes.append(f"NOT SURE: time goes back in {int(back.sum())} places, by up to {-steps.min():.4g} s: {what}.")
+        what = (
+            "rows are not in the order of time; sorted" if often else "what follows is taken as a recording of its own"
+        )
+        draft.found.notes.append(
+            f"NOT SURE: time goes back in {int(back.sum())} places, by up to {-steps.min():.4g} s: {what}."
+        )
 
 
 def _over_midnight(spec: dict[str, Any], steps: np.ndarray) -> bool:
@@ -179,7 +196,8 @@ def _over_midnight(spec: dict[str, Any], steps: np.ndarray) -> bool:
 
 
 def channel_gaps(draft: SourceDraft, gap: float) -> None:
-    """A limit of its own for each channel that is sampled more slowly than `gap` [s] lets pass; none for a command that is logged on change."""
+    """A limit of its own for each channel that is sampled more slowly than `gap` [s] lets pass; none for a command that
+    is logged on change."""
     t = draft.times
     if t is None:
         return
@@ -223,18 +241,32 @@ def missing_channels(sources: Sequence[SourceDraft]) -> list[str]:
 
 
 def clocks_apart(sources: Sequence[SourceDraft]) -> list[str]:
-    """Sources whose stamps name no zone, where others are merged with them: where they begin tells how far they are apart."""
-    clocks = [(s, Clock(**s.time_spec), float(np.nanmin(s.time.t))) for s in sources if s.time is not None and s.time_spec is not None]
+    """Sources whose stamps name no zone, where others are merged with them: where they begin tells how far they are
+    apart."""
+    clocks = [
+        (s, Clock(**s.time_spec), float(np.nanmin(s.time.t)))
+        for s in sources
+        if s.time is not None and s.time_spec is not None
+    ]
     if len(clocks) < 2:
         return []
     lines = []
     for source, clock, begin in clocks:
         form = clock.format
-        if not is_absolute(clock) or clock.zone or form.startswith("unix") or re.search(r"%[zZ]|Z$", form) or (form == "iso" and _has_offset(source)):
+        if (
+            not is_absolute(clock)
+            or clock.zone
+            or form.startswith("unix")
+            or re.search(r"%[zZ]|Z$", form)
+            or (form == "iso" and _has_offset(source))
+        ):
             continue
         others = [b for s, c, b in clocks if s is not source and is_absolute(c)]
         apart = f"; it begins {(begin - others[0]) / 3600:+.2f} h from the other" if others else ""
-        lines.append(f"NOT SURE: the stamps of {source.sample.path.name} name no zone; UTC is taken{apart}. If it is local time, write [time] zone.")
+        lines.append(
+            f"NOT SURE: the stamps of {source.sample.path.name} name no zone; UTC is taken{apart}. If it is local "
+            "time, write [time] zone."
+        )
     return lines
 
 

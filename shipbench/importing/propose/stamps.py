@@ -28,7 +28,20 @@ def formats_of(texts: list[str]) -> list[str]:
     return [*found, *patterns]
 
 
-_ZONES = {"CET": -1, "CEST": -2, "MEZ": -1, "MESZ": -2, "WEST": -1, "EET": -2, "EEST": -3, "JST": -9, "EST": 5, "EDT": 4, "PST": 8, "PDT": 7}
+_ZONES = {
+    "CET": -1,
+    "CEST": -2,
+    "MEZ": -1,
+    "MESZ": -2,
+    "WEST": -1,
+    "EET": -2,
+    "EEST": -3,
+    "JST": -9,
+    "EST": 5,
+    "EDT": 4,
+    "PST": 8,
+    "PDT": 7,
+}
 """Hours to add to a stamp with such a name to have UTC, as the names of the zones Etc/GMT count."""
 
 
@@ -54,7 +67,11 @@ def day_first_is_sure(texts: list[str]) -> bool:
     """Whether one of the dates can be read in one way only."""
     parts = [found for text in texts if (found := _DATE.search(text))]
     return any(
-        len(p[1]) == 4 or p[3].isalpha() or int(p[1]) > 12 or int(p[3]) > 12 or (p[1].isdigit() and int(p[1]) == int(p[3]) and len(set(texts)) == 1)
+        len(p[1]) == 4
+        or p[3].isalpha()
+        or int(p[1]) > 12
+        or int(p[3]) > 12
+        or (p[1].isdigit() and int(p[1]) == int(p[3]) and len(set(texts)) == 1)
         for p in parts
     )
 
@@ -62,9 +79,17 @@ def day_first_is_sure(texts: list[str]) -> bool:
 def _patterns(text: str) -> list[str]:
     """strptime patterns of a text; none where a part of it is neither date, time of day nor zone."""
     rest = text.replace("%", "%%")
-    rest, dates = _replaced(rest, _DATE, _date_orders) if _DATE.search(rest) else _replaced(rest, _PACKED_DATE, lambda found: ["%Y%m%d"])
-    rest, clocks = _replaced(rest, _CLOCK, _clock) if _CLOCK.search(rest) else _replaced(rest, _PACKED_CLOCK, _packed_clock)
-    if not dates and len(clocks) == 1 and re.fullmatch(r"\d{6} \0", rest):  # the date of NMEA's RMC before the time of day
+    rest, dates = (
+        _replaced(rest, _DATE, _date_orders)
+        if _DATE.search(rest)
+        else _replaced(rest, _PACKED_DATE, lambda found: ["%Y%m%d"])
+    )
+    rest, clocks = (
+        _replaced(rest, _CLOCK, _clock) if _CLOCK.search(rest) else _replaced(rest, _PACKED_CLOCK, _packed_clock)
+    )
+    if (
+        not dates and len(clocks) == 1 and re.fullmatch(r"\d{6} \0", rest)
+    ):  # the date of NMEA's RMC before the time of day
         rest, dates = f"\1{rest[6:]}", ["%d%m%y", "%y%m%d"]
     if not dates and not clocks:
         return []
@@ -104,4 +129,6 @@ def _date_orders(found: re.Match[str]) -> list[str]:
     year = "%Y" if len(last) == 4 else "%y"
     if not second.isdigit():
         return [mark.join(("%d", month, year))]
-    return [mark.join(("%d", "%m", year)), mark.join(("%m", "%d", year))] + ([mark.join(("%y", "%m", "%d"))] if len(last) == 2 else [])
+    return [mark.join(("%d", "%m", year)), mark.join(("%m", "%d", year))] + (
+        [mark.join(("%y", "%m", "%d"))] if len(last) == 2 else []
+    )

@@ -19,20 +19,35 @@ _FORMATS = (
     "or a pattern such as %d/%m/%Y %H:%M:%S.%f"
 )
 _HEAD = (
-    "# Draft by `shipbench data import --propose`. Every entry is a GUESS from names and values: check each unit, sign and time.",
-    "# Signs: psi clockwise from north, r bow to starboard, v to starboard; a positive rudder angle turns the ship to starboard.",
-    '# Where the log counts the other way: sign = "port" (r, v, delta, thrusters), "counterclockwise" (psi), "west", "south", "astern".',
+    "# Draft by `shipbench data import --propose`. Every entry is a GUESS from names and values: check each unit, "
+    "sign and time.",
+    "# Signs: psi clockwise from north, r bow to starboard, v to starboard; a positive rudder angle turns the ship "
+    "to starboard.",
+    '# Where the log counts the other way: sign = "port" (r, v, delta, thrusters), "counterclockwise" (psi), '
+    '"west", "south", "astern".',
     f"# Channels: {', '.join(CHANNELS)}.",
 )
 _SHOWN = 40
 
 
-def draft_text(top: dict[str, Any], split: dict[str, Any], kept: set[str], sources: Sequence[SourceDraft], notes: Sequence[str]) -> str:
+def draft_text(
+    top: dict[str, Any], split: dict[str, Any], kept: set[str], sources: Sequence[SourceDraft], notes: Sequence[str]
+) -> str:
     """The whole file. `kept` names the keys of the top level that a person gave; `notes` go to its end as comments."""
     single = len(sources) == 1 and not sources[0].named
-    lines = [*_HEAD, *(f"{key} = {value(entry)}{_DT if key == 'dt' and 'dt' not in kept else ''}" for key, entry in top.items())]
+    lines = [
+        *_HEAD,
+        *(f"{key} = {value(entry)}{_DT if key == 'dt' and 'dt' not in kept else ''}" for key, entry in top.items()),
+    ]
     lines += _of_source(sources[0]) if single else []
-    lines += ["", "[split]", *(f"{key} = {value(entry)}{_GAP if key == 'gap' and 'split.gap' not in kept else ''}" for key, entry in split.items())]
+    lines += [
+        "",
+        "[split]",
+        *(
+            f"{key} = {value(entry)}{_GAP if key == 'gap' and 'split.gap' not in kept else ''}"
+            for key, entry in split.items()
+        ),
+    ]
     lines += [f"# {line}" for key, line in _IDLE.items() if key not in split]
     for source in sources:
         lines += ["", *_source(source, "" if single else f"sources.{source.name}.")]
@@ -56,11 +71,18 @@ def _of_source(source: SourceDraft) -> list[str]:
 def _source(source: SourceDraft, prefix: str) -> list[str]:
     lines = []
     if prefix:
-        lines += [f"[{prefix.rstrip('.')}]", f"files = {value(source.pattern)}  # GUESS: a pattern for all files of this kind, such as gps*.csv"]
+        lines += [
+            f"[{prefix.rstrip('.')}]",
+            f"files = {value(source.pattern)}  # GUESS: a pattern for all files of this kind, such as gps*.csv",
+        ]
         lines += [*_of_source(source), ""]
     if source.file:
         own = source.kept.get("file", {})
-        lines += [f"[{prefix}file]", *(f"{key} = {value(entry)}{'' if key in own else _GUESS}" for key, entry in source.file.items()), ""]
+        lines += [
+            f"[{prefix}file]",
+            *(f"{key} = {value(entry)}{'' if key in own else _GUESS}" for key, entry in source.file.items()),
+            "",
+        ]
     lines += [f"[{prefix}time]", *_time(source), "", f"[{prefix}channels]"]
     entries = source.found.entries
     lines += [_channel(entries[channel]) for channel in CHANNELS if channel in entries]
@@ -76,12 +98,18 @@ _GUESS = "  # GUESS"
 def _time(source: SourceDraft) -> list[str]:
     spec = source.time_spec
     if spec is None:
-        return ['column = "?"  # MISSING: the column of the time; or write rate = 10.0 [Hz] instead, for a log without one', 'format = "s"']
+        return [
+            'column = "?"  # MISSING: the column of the time; or write rate = 10.0 [Hz] instead, for a log without one',
+            'format = "s"',
+        ]
     lines = [f"{key} = {value(entry)}" for key, entry in spec.items() if key != "format"]
     form = spec.get("format")
     if form is not None:
         given = "format" in source.kept.get("time", {})
-        lines.append(f"format = {value(form)}" + ("" if given else f"  # GUESS: {one_line(source.time_why)}; accepted: {_FORMATS}"))
+        lines.append(
+            f"format = {value(form)}"
+            + ("" if given else f"  # GUESS: {one_line(source.time_why)}; accepted: {_FORMATS}")
+        )
         if ("%" in form or form == "iso") and "zone" not in spec:
             lines.append('# zone = "UTC"  # where the stamps have none')
     return lines
@@ -96,7 +124,9 @@ def _channel(entry: Entry) -> str:
     spec = {k: v for k, v in entry.spec.items() if v is not None}
     evidence = one_line("; ".join(dict.fromkeys(c.evidence() for c in entry.columns)))
     if entry.missing:
-        body = ", ".join([*(f"{k} = {value(v)}" for k, v in spec.items()), *(f"{k} = ?" for k, v in entry.spec.items() if v is None)])
+        body = ", ".join(
+            [*(f"{k} = {value(v)}" for k, v in spec.items()), *(f"{k} = ?" for k, v in entry.spec.items() if v is None)]
+        )
         return f"# {entry.channel} = {{ {body} }}  # MISSING: {one_line(entry.missing)}; {evidence}"
     body = ", ".join(f"{k} = {value(v)}" for k, v in spec.items())
     heads = [c.head.name for c in entry.columns if c.head.name and c.head.name != c.name]
@@ -111,9 +141,12 @@ def _not_taken(source: SourceDraft) -> list[str]:
         return []
     if source.sample.layout.header == 0:
         return ["# Columns not taken; who knows them writes psi, x, y and the rest with these numbers:"] + [
-            one_line(f'#   column "{c.name}"{f" ({c.head.name})" if c.head.name else ""}: {c.evidence()}') for c in left[:_SHOWN]
+            one_line(f'#   column "{c.name}"{f" ({c.head.name})" if c.head.name else ""}: {c.evidence()}')
+            for c in left[:_SHOWN]
         ]
-    return [f"# not taken: {', '.join(value(c.name) for c in left[:_SHOWN])}{' and more' if len(left) > _SHOWN else ''}"]
+    return [
+        f"# not taken: {', '.join(value(c.name) for c in left[:_SHOWN])}{' and more' if len(left) > _SHOWN else ''}"
+    ]
 
 
 def value(entry: Any) -> str:
@@ -123,5 +156,11 @@ def value(entry: Any) -> str:
     if isinstance(entry, list | tuple):
         return "[" + ", ".join(value(v) for v in entry) + "]"
     if isinstance(entry, float | np.floating):
-        return ("inf" if entry > 0 else "-inf") if math.isinf(entry) else "nan" if math.isnan(entry) else repr(float(f"{entry:.12g}"))
+        return (
+            ("inf" if entry > 0 else "-inf")
+            if math.isinf(entry)
+            else "nan"
+            if math.isnan(entry)
+            else repr(float(f"{entry:.12g}"))
+        )
     return json.dumps(entry, ensure_ascii=False).replace("\x7f", "\\u007f")

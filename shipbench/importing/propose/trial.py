@@ -1,4 +1,5 @@
-"""The draft is tried by the import itself; what the import refuses is corrected where the reason says how, else told."""
+"""The draft is tried by the import itself; what the import refuses is corrected where the reason says how, else
+told."""
 
 from __future__ import annotations
 
@@ -19,10 +20,13 @@ _ROWS, _READ = 3000, 200_000
 _MOST_CORRECTIONS = 20
 _NEEDED = ("psi", "x", "y", "lat", "lon")
 _ANY_SHIP = Ship(name="any", L=50.0, B=8.0, T=3.0, mass=9e5)
-"""A ship of middling size: her length sets how smooth speeds are taken from a track, which no answer here depends on."""
+"""A ship of middling size: her length sets how smooth speeds are taken from a track, which no answer here depends on.
+"""
 
 
-def try_draft(write: Callable[[], Path], logs: Sequence[Path], sources: Sequence[SourceDraft], split: dict[str, Any]) -> list[str]:
+def try_draft(
+    write: Callable[[], Path], logs: Sequence[Path], sources: Sequence[SourceDraft], split: dict[str, Any]
+) -> list[str]:
     """Notes on how the import takes the draft; `write` writes it anew after a correction and returns its path."""
     corrected: list[str] = []
     for _ in range(_MOST_CORRECTIONS):
@@ -42,9 +46,17 @@ def _of_success(summary: Summary) -> list[str]:
     seconds = sum(run["seconds"] for run in summary.runs)
     runs = f"{len(summary.runs)} run{'s' * (len(summary.runs) != 1)}"
     lines = [
-        f"Tried with the import on the beginning of each recording: {runs}, {seconds:g} s of {summary.seconds:g} s. Read: {summary.met.rows} rows."
+        (
+            f"Tried with the import on the beginning of each recording: {runs}, {seconds:g} s of "
+            f"{summary.seconds:g} s. "
+            f"Read: {summary.met.rows} rows."
+        )
     ]
-    return [*lines, *(f"The import leaves out: {line}" for line in summary.left_out()), *(n for n in summary.notes() if n.startswith("DOUBTFUL"))]
+    return [
+        *lines,
+        *(f"The import leaves out: {line}" for line in summary.left_out()),
+        *(n for n in summary.notes() if n.startswith("DOUBTFUL")),
+    ]
 
 
 def _correct(message: str, sources: Sequence[SourceDraft], split: dict[str, Any]) -> str | None:
@@ -53,14 +65,22 @@ def _correct(message: str, sources: Sequence[SourceDraft], split: dict[str, Any]
         return _of_cell(found[1], found[2], sources)
     for source in sources:
         spec = source.time_spec
-        if spec is None or (len(sources) > 1 and str(source.sample.path) not in message and source.sample.path.name not in message):
+        if spec is None or (
+            len(sources) > 1 and str(source.sample.path) not in message and source.sample.path.name not in message
+        ):
             continue
         if "time goes back" in message and "backwards" not in spec:
             spec["backwards"] = "split"
-            return "NOT SURE: time goes back in the log; what follows is taken as a recording of its own ([time] backwards)."
+            return (
+                "NOT SURE: time goes back in the log; what follows is taken as a recording of its own ([time] "
+                "backwards)."
+            )
         if "repeat the time of the row before" in message and "repeated" not in spec:
             spec["repeated"] = "spread"
-            return 'NOT SURE: rows repeat the time of the row before; they are spread evenly until the next stamp ([time] repeated = "spread").'
+            return (
+                "NOT SURE: rows repeat the time of the row before; they are spread evenly until the next stamp "
+                '([time] repeated = "spread").'
+            )
     if message.startswith("no run is left") and (steps := re.search(r"Usual time between samples: (.*?)\. ", message)):
         slowest = max((float(s) for s in re.findall(r"([\d.]+(?:e[-+]?\d+)?) s", steps[1])), default=0.0)
         if 3 * slowest > split.get("gap", 3.0):

@@ -11,7 +11,8 @@ from .assign import Assigned, Entry, quantity, sign_of
 from .columns import Column
 
 ACCEPTED = {
-    "m": "m, km, ft, nmi", "m/s": "m/s, kn, km/h, ft/s", "rad": "rad, deg, cdeg", "rad/s": "rad/s, deg/s, deg/min", "rpm": "rpm, rev/s, rad/s",
+    "m": "m, km, ft, nmi", "m/s": "m/s, kn, km/h, ft/s", "rad": "rad, deg, cdeg", "rad/s": "rad/s, deg/s, deg/min",
+    "rpm": "rpm, rev/s, rad/s",
     "N": "N, kN, MN, tf",
 }  # fmt: skip
 _RUDDER_LIMIT = 1.6
@@ -49,7 +50,10 @@ def _set_unit(entry: Entry, found: Assigned) -> None:
     entry.spec["unit"] = unit
     entry.why.append(f"unit {'from the values' if sure else 'NOT SURE'} (accepted {ACCEPTED[unit_of(entry.channel)]})")
     if not sure:
-        found.notes.append(f"NOT SURE: the head of '{column.name}' names no unit; {entry.channel} is taken in {unit} ({column.evidence()}).")
+        found.notes.append(
+            f"NOT SURE: the head of '{column.name}' names no unit; {entry.channel} is taken in {unit} "
+            f"({column.evidence()})."
+        )
 
 
 def _of_full(entry: Entry, unit: str, found: Assigned) -> None:
@@ -59,7 +63,10 @@ def _of_full(entry: Entry, unit: str, found: Assigned) -> None:
     if entry.channel.removesuffix("_c") == "delta":
         entry.spec |= {"full": 35.0, "full_unit": "deg"}
         entry.why.append("NOT SURE: 100 % is taken as 35 deg")
-        found.notes.append(f"NOT SURE: '{name}' is in {unit} of the full rudder angle, which the log does not say; 35 deg is taken. Correct `full`.")
+        found.notes.append(
+            f"NOT SURE: '{name}' is in {unit} of the full rudder angle, which the log does not say; 35 deg is "
+            "taken. Correct `full`."
+        )
         return
     at = "100 %" if unit == "%" else "2000 us (1500 us is neutral)"
     entry.spec |= {"full": None, "full_unit": unit_of(entry.channel)}
@@ -99,7 +106,9 @@ def _of_position(entry: Entry, found: Assigned) -> None:
         entry.why.append(f"hemisphere from '{side.name}'")
         found.helpers.add(side.name)
     digits = [re.sub(r"[^\d.].*$", "", t.strip(" +-NSEWO")) for t in cells[:200]]
-    padded = bool(digits) and all(re.fullmatch(r"\d{4,5}(\.\d+)?", d) for d in digits) and any(d[0] == "0" for d in digits)
+    padded = (
+        bool(digits) and all(re.fullmatch(r"\d{4,5}(\.\d+)?", d) for d in digits) and any(d[0] == "0" for d in digits)
+    )
     numbers = np.array([float(d) for d in digits if re.fullmatch(r"\d+(\.\d+)?", d)])
     size = max(size, float(numbers.max()) if len(numbers) else 0.0)
     minutes = len(numbers) > 0 and bool((np.mod(numbers, 100.0) < 60.0).all())
@@ -115,7 +124,9 @@ def _of_position(entry: Entry, found: Assigned) -> None:
     else:
         entry.spec["unit"] = named or "deg"
         entry.why.append(
-            f"unit from the head, [{column.head.unit}]" if named else f"unit as usual for {entry.channel} (accepted deg, rad, 1e-7 deg, ddmm.mmmm)"
+            f"unit from the head, [{column.head.unit}]"
+            if named
+            else f"unit as usual for {entry.channel} (accepted deg, rad, 1e-7 deg, ddmm.mmmm)"
         )
 
 

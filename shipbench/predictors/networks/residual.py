@@ -1,4 +1,5 @@
-"""Physics plus a learned residual acceleration, for all members at once, and its solution by torchdiffeq over windows of measured runs."""
+"""Physics plus a learned residual acceleration, for all members at once, and its solution by torchdiffeq over windows
+of measured runs."""
 
 from __future__ import annotations
 
@@ -36,20 +37,30 @@ class Residual(nn.Module):
     q: Tensor
     scale_out: Tensor
 
-    def __init__(self, physics: Sequence[Physics], hidden: int, scale_in: Scaler, scale_out: Tensor, draw: Sequence[torch.Generator]) -> None:
+    def __init__(
+        self,
+        physics: Sequence[Physics],
+        hidden: int,
+        scale_in: Scaler,
+        scale_out: Tensor,
+        draw: Sequence[torch.Generator],
+    ) -> None:
         super().__init__()
         self.c, self.ship = physics[0].c, physics[0].particulars
         forces = [_forces(m) for m in physics]
         self.effects = [(a.effect, len(a.q)) for a in forces[0]]
         q = np.array([[v for a in own for v in a.q] for own in forces])
         self.register_buffer("q", torch.as_tensor(q, dtype=scale_out.dtype).T[..., None].contiguous())
-        self.register_buffer("p", torch.as_tensor(np.stack([m.p for m in physics]), dtype=scale_out.dtype).T[..., None].contiguous())
+        self.register_buffer(
+            "p", torch.as_tensor(np.stack([m.p for m in physics]), dtype=scale_out.dtype).T[..., None].contiguous()
+        )
         self.register_buffer("scale_out", scale_out)
         self.scale_in = scale_in
         self.net = StackedMLP([scale_in.mean.shape[-1], hidden, hidden, 3], draw, torch.tanh, zero_last=True)
 
     def learned(self, x: Tensor) -> Tensor:
-        """Residual accelerations (members, batch, 3) of `features` (members, batch, 7 or 9), in units of `scale_out`."""
+        """Residual accelerations (members, batch, 3) of `features` (members, batch, 7 or 9), in units of
+        `scale_out`."""
         return self.net(self.scale_in(x))
 
     def forward(
@@ -76,15 +87,19 @@ def _forces(physics: Physics) -> list[Active]:
 
 
 def features(S: Tensor, air: Tensor | None) -> Tensor:
-    """What the network sees of states (..., 10): u, v, r, n, delta, F_b, F_s, and the speed through the air where true wind (..., 2) is given."""
+    """What the network sees of states (..., 10): u, v, r, n, delta, F_b, F_s, and the speed through the air where true
+    wind (..., 2) is given."""
     seen = S[..., CHANNELS]
     if air is None:
         return seen
-    return torch.cat([seen, torch.stack(apparent_wind(S[..., PSI], S[..., U], S[..., V], *air.unbind(-1)), dim=-1)], dim=-1)
+    return torch.cat(
+        [seen, torch.stack(apparent_wind(S[..., PSI], S[..., U], S[..., V], *air.unbind(-1)), dim=-1)], dim=-1
+    )
 
 
 class Grid(NamedTuple):
-    """How the training integrates: a knot every `stride` samples, `per_knot` midpoint steps of `step` seconds between knots."""
+    """How the training integrates: a knot every `stride` samples, `per_knot` midpoint steps of `step` seconds between
+    knots."""
 
     stride: int
     per_knot: int
@@ -92,7 +107,8 @@ class Grid(NamedTuple):
 
     @classmethod
     def of(cls, physics: Physics) -> Grid:
-        """Steps of about a second for 100 m (the time scale of a ship goes with sqrt(L)), never across a change of the inputs that it misses."""
+        """Steps of about a second for 100 m (the time scale of a ship goes with sqrt(L)), never across a change of the
+        inputs that it misses."""
         if physics.substeps > 1:
             return cls(1, physics.substeps, physics.dt / physics.substeps)
         stride = max(1, int(0.1 * np.sqrt(physics.c.L) / physics.dt))
@@ -123,10 +139,17 @@ class Drive(NamedTuple):
             knots = batch.U.shape[1] // d
             S = np.concatenate([batch.s0[:, None], batch.truth], axis=1)[:, : knots * d + 1 : d]
             full = model.actuator_path(batch.s0, batch.U)
-            begin, middle = full[:, 0 : knots * d * grid.per_knot : d, 0], full[:, d // 2 :: d, d % 2][:, : knots * grid.per_knot]
+            begin, middle = (
+                full[:, 0 : knots * d * grid.per_knot : d, 0],
+                full[:, d // 2 :: d, d % 2][:, : knots * grid.per_knot],
+            )
             air = model._wind(batch.U)
-            wind = np.zeros((len(S), 0, 2)) if air is None else np.repeat(air[:, : knots * d : d], grid.per_knot, axis=1)
-            parts.append([torch.as_tensor(known, dtype=torch.float32) for known in (S, np.stack([begin, middle], axis=2), wind)])
+            wind = (
+                np.zeros((len(S), 0, 2)) if air is None else np.repeat(air[:, : knots * d : d], grid.per_knot, axis=1)
+            )
+            parts.append(
+                [torch.as_tensor(known, dtype=torch.float32) for known in (S, np.stack([begin, middle], axis=2), wind)]
+            )
             counts.append(len(S))
         states, path, held = (torch.cat(known) for known in zip(*parts, strict=True))
         return cls(states, path, held if held.shape[1] else None, tuple(counts))
@@ -146,17 +169,26 @@ def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step
     def rate(t: Tensor, y: Tensor) -> Tensor:
         j, half = divmod(round(2.0 * float(t)), 2)  # time in steps: the rule asks at j and j + 1/2
         u, v, r = y[0], y[1], y[2]
-        rates = model(y[3] if turns else None, u, v, r, stages[j, half].unbind(0), None if wind is None else (wind[j, 0], wind[j, 1]))
+        rates = model(
+            y[3] if turns else None,
+            u,
+            v,
+            r,
+            stages[j, half].unbind(0),
+            None if wind is None else (wind[j, 0], wind[j, 1]),
+        )
         return step * torch.stack((*rates, r) if turns else rates)
 
     turns = wind is not None or bool(model.effects)  # the heading matters
     first = start[..., [U, V, R, PSI] if turns else [U, V, R]].movedim(-1, 0)
     times = torch.arange(path.shape[2] + 1, dtype=start.dtype, device=start.device)
-    return torchdiffeq.odeint(rate, first, times, method="midpoint")[1:, :3].permute(2, 3, 0, 1)  # pyright: ignore[reportIndexIssue, reportCallIssue, reportArgumentType]
+    # pyright: ignore[reportIndexIssue, reportCallIssue, reportArgumentType]
+    return torchdiffeq.odeint(rate, first, times, method="midpoint")[1:, :3].permute(2, 3, 0, 1)
 
 
 def typical_accelerations(physics: Sequence[Physics], drive: Drive) -> Tensor:
-    """Root mean square (members, 1, 3) of the physics' accelerations without measured wind along the measured states."""
+    """Root mean square (members, 1, 3) of the physics' accelerations without measured wind along the measured
+    states."""
     sizes = []
     for model, S in zip(physics, drive.S.double().split(drive.counts), strict=True):
         flow = Flow(0.0, 0.0, 0.0, S[..., PSI].numpy(), *S[..., CHANNELS].movedim(-1, 0).numpy())

@@ -1,4 +1,5 @@
-"""Building blocks of stacked networks: data, scalers and layers with a leading member axis (folds and seeds of one network).
+"""Building blocks of stacked networks: data, scalers and layers with a leading member axis (folds and seeds of one
+network).
 
 Every layer is one batched matrix product, since small networks on a CPU are all overhead.
 """
@@ -25,7 +26,8 @@ def generators(seeds: Sequence[int]) -> list[torch.Generator]:
 
 
 def with_valid(train: Dataset, valid: Dataset | None, seed: int) -> tuple[Dataset, Dataset]:
-    """`train` and `valid`; without `valid`, a tenth of the training runs (at least one) is set aside, drawn from `seed`.
+    """`train` and `valid`; without `valid`, a tenth of the training runs (at least one) is set aside, drawn from
+    `seed`.
 
     A single training run serves as both, since nothing can be set aside.
     """
@@ -72,7 +74,8 @@ class StackedRuns:
 
 
 def padded(counts: Sequence[int]) -> tuple[Tensor, Tensor]:
-    """Indices of all members' items (members, most), repeated where a member has fewer, and weights (members, most) that sum to 1 per member."""
+    """Indices of all members' items (members, most), repeated where a member has fewer, and weights (members, most)
+    that sum to 1 per member."""
     most, first = max(counts), 0
     index, weight = [], []
     for count in counts:
@@ -117,7 +120,8 @@ class Scaler(nn.Module):
 
 
 class StackedLinear(nn.Module):
-    """`torch.nn.Linear` for every member: weight (members, inputs, outputs), bias (members, 1, outputs), same initial values per seed."""
+    """`torch.nn.Linear` for every member: weight (members, inputs, outputs), bias (members, 1, outputs), same initial
+    values per seed."""
 
     def __init__(self, inputs: int, outputs: int, draw: Sequence[torch.Generator], zero: bool = False) -> None:
         super().__init__()
@@ -138,11 +142,19 @@ class StackedLinear(nn.Module):
 class StackedMLP(nn.Module):
     """Fully connected layers of `sizes`; `zero_last` starts with an output of exactly zero."""
 
-    def __init__(self, sizes: Sequence[int], draw: Sequence[torch.Generator], activation: Any = torch.relu, zero_last: bool = False) -> None:
+    def __init__(
+        self,
+        sizes: Sequence[int],
+        draw: Sequence[torch.Generator],
+        activation: Any = torch.relu,
+        zero_last: bool = False,
+    ) -> None:
         super().__init__()
         last = len(sizes) - 2
         pairs = list(pairwise(sizes))
-        self.layers = nn.ModuleList(StackedLinear(a, b, draw, zero=zero_last and i == last) for i, (a, b) in enumerate(pairs))
+        self.layers = nn.ModuleList(
+            StackedLinear(a, b, draw, zero=zero_last and i == last) for i, (a, b) in enumerate(pairs)
+        )
         self.activation = activation
 
     def forward(self, x: Tensor) -> Tensor:
@@ -153,7 +165,8 @@ class StackedMLP(nn.Module):
 
 
 def trapezoid_pose(s0: Tensor, y: Tensor, dt: float) -> Tensor:
-    """Pose (..., K, 3) by the trapezoidal rule, second order in dt (eq. (10) is first order); arguments as `_features.dead_reckoning`."""
+    """Pose (..., K, 3) by the trapezoidal rule, second order in dt (eq. (10) is first order); arguments as
+    `_features.dead_reckoning`."""
     path = torch.cat([s0[..., None, U : R + 1], y[..., :3]], dim=-2)
     turned = 0.5 * dt * torch.cumsum(path[..., 1:, 2] + path[..., :-1, 2], dim=-1)
     psi = s0[..., None, PSI] + torch.cat([torch.zeros_like(turned[..., :1]), turned], dim=-1)
@@ -164,26 +177,34 @@ def trapezoid_pose(s0: Tensor, y: Tensor, dt: float) -> Tensor:
 
 
 def hold_error(S: Tensor, counts: Sequence[int], dt: float, steps: int) -> Tensor:
-    """Root mean square error (members, 5) of u, v, r, position [m] and heading [rad] over `steps` steps when the initial velocities are kept.
+    """Root mean square error (members, 5) of u, v, r, position [m] and heading [rad] over `steps` steps when the
+    initial velocities are kept.
 
     S: (runs, samples, 10) of all members; dt: time between samples [s]. It is the size of what there is to predict.
     """
     start, truth = S[:, 0], S[:, 1 : steps + 1]
     kept = start[:, None, U : R + 1].expand(-1, steps, -1)
     pose = trapezoid_pose(start, kept, dt) - truth[..., :3]
-    square = torch.cat([(kept - truth[..., U : R + 1]).square(), pose[..., :2].square().sum(-1, keepdim=True), pose[..., 2:].square()], dim=-1)
+    square = torch.cat(
+        [(kept - truth[..., U : R + 1]).square(), pose[..., :2].square().sum(-1, keepdim=True), pose[..., 2:].square()],
+        dim=-1,
+    )
     return torch.stack([part.mean((0, 1)).sqrt() for part in square.split(list(counts))]).clamp(min=1e-6)
 
 
-def random_windows(counts: Sequence[int], starts: int, batch: int, draw: Sequence[torch.Generator]) -> tuple[Tensor, Tensor]:
-    """A random run of the member's own and one of `starts` first samples for each window: both (members, batch), runs counted over all members."""
+def random_windows(
+    counts: Sequence[int], starts: int, batch: int, draw: Sequence[torch.Generator]
+) -> tuple[Tensor, Tensor]:
+    """A random run of the member's own and one of `starts` first samples for each window: both (members, batch), runs
+    counted over all members."""
     first = np.concatenate([[0], np.cumsum(counts)[:-1]]).tolist()
     runs = [f + torch.randint(c, (batch,), generator=g) for f, c, g in zip(first, counts, draw, strict=True)]
     return torch.stack(runs), torch.stack([torch.randint(starts, (batch,), generator=g) for g in draw])
 
 
 def position_score(pose: Tensor, truth: Tensor, weight: Tensor) -> Tensor:
-    """Mean position error of each member [m]: pose and truth (members, runs, steps, >= 2), weight (members, runs) summing to 1."""
+    """Mean position error of each member [m]: pose and truth (members, runs, steps, >= 2), weight (members, runs)
+    summing to 1."""
     return (torch.linalg.vector_norm(pose[..., :2] - truth[..., :2], dim=-1).mean(2) * weight).sum(1)
 
 

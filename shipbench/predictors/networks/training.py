@@ -1,11 +1,11 @@
 """Stacked training with Lightning: the folds and seeds of one network train together.
 
-The loss is the sum over members of each member's own loss and Adam works element by element, so that a member's result is the one it
-would reach alone; what is drawn for a member comes from its own generator. Early stopping is per member: the best weights of each are
-kept, and training goes on until the last member stops.
+The loss is the sum over members of each member's own loss and Adam works element by element, so that a member's result
+is the one it would reach alone; what is drawn for a member comes from its own generator. Early stopping is per member:
+the best weights of each are kept, and training goes on until the last member stops.
 
-One Lightning batch is a chunk: all minibatches up to the next validation, stepped through with manual optimisation. What Lightning does
-around a batch is then paid once per validation, not once per minibatch of a small network.
+One Lightning batch is a chunk: all minibatches up to the next validation, stepped through with manual optimisation.
+What Lightning does around a batch is then paid once per validation, not once per minibatch of a small network.
 """
 
 from __future__ import annotations
@@ -98,7 +98,9 @@ class BestWeights:
     @property
     def stopped(self) -> Tensor:
         """(members,) who has stopped."""
-        return torch.zeros_like(self.waited, dtype=torch.bool) if self.patience is None else self.waited >= self.patience
+        return (
+            torch.zeros_like(self.waited, dtype=torch.bool) if self.patience is None else self.waited >= self.patience
+        )
 
     def update(self, task: StackedTask, scores: Tensor, ended: Tensor) -> None:
         """Take in the `scores` of the members whose epoch `ended` (both (members,))."""
@@ -134,7 +136,9 @@ class _Training(lightning.LightningModule):
     def configure_optimizers(self) -> torch.optim.Optimizer:
         fused = self.recipe.device.partition(":")[0] in ("cpu", "cuda")
         if self.recipe.weight_decay:
-            return torch.optim.AdamW(self.task.parameters(), lr=self.recipe.lr, weight_decay=self.recipe.weight_decay, fused=fused)
+            return torch.optim.AdamW(
+                self.task.parameters(), lr=self.recipe.lr, weight_decay=self.recipe.weight_decay, fused=fused
+            )
         return torch.optim.Adam(self.task.parameters(), lr=self.recipe.lr, fused=fused)
 
     def on_fit_start(self) -> None:
@@ -177,7 +181,8 @@ class _Training(lightning.LightningModule):
 
 
 def clip_members(parameters: Iterator[nn.Parameter], limit: float) -> None:
-    """Scale each member's gradient to a norm of at most `limit`; a gradient that is not finite becomes zero (that member skips the step)."""
+    """Scale each member's gradient to a norm of at most `limit`; a gradient that is not finite becomes zero (that
+    member skips the step)."""
     grads = [p.grad for p in parameters if p.grad is not None]
     square = torch.stack([g.flatten(1).square().sum(1) for g in grads]).sum(0)
     factor = torch.nan_to_num(limit / (square.sqrt() + 1e-12), nan=0.0, posinf=0.0).clamp(max=1.0)
@@ -189,14 +194,19 @@ def clip_members(parameters: Iterator[nn.Parameter], limit: float) -> None:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Lightning's banners and hints off, only while it runs."""
-    loggers = [logging.getLogger(name) for name in ("lightning.pytorch", "lightning.fabric", "lightning.pytorch.utilities.rank_zero")]
+    loggers = [
+        logging.getLogger(name)
+        for name in ("lightning.pytorch", "lightning.fabric", "lightning.pytorch.utilities.rank_zero")
+    ]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.ERROR)
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", module="lightning")
-            warnings.filterwarnings("ignore", category=UserWarning, message=".*(does not have many workers|GPU available|barebones).*")
+            warnings.filterwarnings(
+                "ignore", category=UserWarning, message=".*(does not have many workers|GPU available|barebones).*"
+            )
             yield
     finally:
         for logger, level in zip(loggers, levels, strict=True):
@@ -214,7 +224,8 @@ def _threads(number: int | None) -> Iterator[None]:
 
 
 def train(task: StackedTask, recipe: Recipe) -> BestWeights:
-    """Train `task` in place and leave each member with its best weights, on the CPU. Writes no files, draws no global random number.
+    """Train `task` in place and leave each member with its best weights, on the CPU. Writes no files, draws no global
+    random number.
 
     Raises:
         WorkError: a member never had a finite validation score.
@@ -233,7 +244,10 @@ def train(task: StackedTask, recipe: Recipe) -> BestWeights:
     watch = module.watch
     if watch is None or not torch.isfinite(watch.score).all():
         failed = [] if watch is None else (~torch.isfinite(watch.score)).nonzero().flatten().tolist()
-        raise WorkError(f"training: members {failed} never reached a finite validation score; look for outliers in the data, or lower lr.")
+        raise WorkError(
+            f"training: members {failed} never reached a finite validation score; look for outliers in the data, or "
+            "lower lr."
+        )
     watch.restore(task)
     task.cpu()
     return watch
@@ -249,11 +263,13 @@ class _Chunks:
         return self.task.chunks()
 
 
-def epochs_of_samples(counts: Sequence[int], batch: int, epochs: int, draw: Sequence[torch.Generator]) -> Iterator[tuple[Tensor, Tensor]]:
+def epochs_of_samples(
+    counts: Sequence[int], batch: int, epochs: int, draw: Sequence[torch.Generator]
+) -> Iterator[tuple[Tensor, Tensor]]:
     """Shuffled minibatches of every member's samples, cut wherever a member ends an epoch.
 
-    Each member goes through its own samples in its own order and its own time, so that others with more or fewer samples do not matter.
-    The last minibatch of an epoch is filled up from the beginning of the epoch's order.
+    Each member goes through its own samples in its own order and its own time, so that others with more or fewer
+    samples do not matter. The last minibatch of an epoch is filled up from the beginning of the epoch's order.
 
     Yields:
         Indices (steps, members, batch) into each member's samples, and who ends an epoch (members,).

@@ -1,7 +1,8 @@
-"""Effects in the fitted physics: what a spec adds (`physics+current`), which of its values are fitted, and where each effect enters.
+"""Effects in the fitted physics: what a spec adds (`physics+current`), which of its values are fitted, and where each
+effect enters.
 
-The formulas are those of `shipbench.effects`. Forces act in the rollout, gears between command and actuator; faults of sensors are taken off
-s0 and put on the prediction again, since both are what the sensors say.
+The formulas are those of `shipbench.effects`. Forces act in the rollout, gears between command and actuator; faults of
+sensors are taken off s0 and put on the prediction again, since both are what the sensors say.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ _INVERSE_STEPS = 30
 
 @dataclass(frozen=True)
 class Term:
-    """One effect of a spec; `given` holds the values (of `Effect.parameters`) that the spec sets, None where they are found from the data."""
+    """One effect of a spec; `given` holds the values (of `Effect.parameters`) that the spec sets, None where they are
+    found from the data."""
 
     spec: EffectSpec
     effect: Effect
@@ -66,10 +68,11 @@ class Slot:
 
 @dataclass
 class Extension:
-    """The effects of one model, their values and 95 % intervals (one row per value; NaN where it was given, chosen or sits at a bound).
+    """The effects of one model, their values and 95 % intervals (one row per value; NaN where it was given, chosen or
+    sits at a bound).
 
-    A predictor knows no runs: an effect that differs from run to run takes part with one value, that which serves all training runs best, and a
-    run that was not seen gets the same.
+    A predictor knows no runs: an effect that differs from run to run takes part with one value, that which serves all
+    training runs best, and a run that was not seen gets the same.
     """
 
     terms: tuple[Term, ...]
@@ -116,12 +119,15 @@ class Extension:
     def set_intervals(self, slots: Sequence[Slot], ci95: np.ndarray) -> None:
         starts = np.cumsum([0, *map(len, self.values)])
         for slot, interval in zip(slots, ci95, strict=True):
-            self.ci95[starts[slot.term] + slot.at] = interval if interval[1] > interval[0] else np.nan  # no width: the data say nothing of it
+            self.ci95[starts[slot.term] + slot.at] = (
+                interval if interval[1] > interval[0] else np.nan
+            )  # no width: the data say nothing of it
 
     def held(self) -> dict[int, str]:
         """Indices of p that stay at zero, and the fitted effect that does their work: data cannot tell the two apart.
 
-        With the hull's derivatives free, p0 and a rudder offset push the stern alike wherever the revolutions follow the speed; p0 stays zero then.
+        With the hull's derivatives free, p0 and a rudder offset push the stern alike wherever the revolutions follow
+        the speed; p0 stays zero then.
         """
         fitted = [t for t in self.terms if None in t.given]
         held = {p: t.name for t in fitted for p in t.effect.traits.in_place_of}
@@ -132,12 +138,17 @@ class Extension:
         return held
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[Extension]:
-        """One copy per choice of the shape parameters that the spec leaves open, given the places (.., 2) that the ship visited. Beside a given one,
-        what is absent as a rule (the other bank of a channel) stays so: it was placed for another value."""
+        """One copy per choice of the shape parameters that the spec leaves open, given the places (.., 2) that the ship
+        visited. Beside a given one, what is absent as a rule (the other bank of a channel) stays so: it was placed for
+        another value."""
         choices: list[list[tuple[float, ...]]] = []
         for t, now in zip(self.terms, self.values, strict=True):
             shapes = [j for j, p in enumerate(t.effect.parameters) if p.shape]
-            absent = [j for j in shapes if t.effect.parameters[j].typical == 0.0 and any(t.given[i] is not None for i in shapes)]
+            absent = [
+                j
+                for j in shapes
+                if t.effect.parameters[j].typical == 0.0 and any(t.given[i] is not None for i in shapes)
+            ]
             found: list[tuple[float, ...]] = []
             for setting in t.effect.settings(positions, ship):
                 chosen = {j: v for j, v in zip(shapes, setting, strict=True) if t.given[j] is None and j not in absent}
@@ -183,13 +194,18 @@ def _term(spec: EffectSpec) -> Term:
         inner, begins = params.pop("effect", None), params.pop("time", None)
         if not isinstance(inner, str) or not _is_number(begins):
             raise InputError(
-                f"effect '{spec.name}' needs an effect and the time [s] within every run from which it acts; given: {spec.params or 'nothing'}. "
-                f"Write {spec.name}[effect=rudder_offset,time=60]. A change from one run to another cannot extend a model: it knows no runs."
+                f"effect '{spec.name}' needs an effect and the time [s] within every run from which it acts; given: "
+                f"{spec.params or 'nothing'}. "
+                f"Write {spec.name}[effect=rudder_offset,time=60]. A change from one run to another cannot extend a "
+                "model: it knows no runs."
             )
         of = _term(EffectSpec(inner, params))
         return Term(spec, effect.of(of.effect, from_time=float(begins)), of.given)  # type: ignore[attr-defined]
     if effect.traits.describes_data:
-        raise InputError(f"effect '{spec.name}' cannot extend a model: it is mended in the data. Set [units] or [signs] in dataset.toml.")
+        raise InputError(
+            f"effect '{spec.name}' cannot extend a model: it is mended in the data. Set [units] or [signs] in "
+            "dataset.toml."
+        )
     return Term(spec, effect, _given(effect, params))
 
 
@@ -208,14 +224,22 @@ def _given(effect: Effect, params: dict[str, Any]) -> tuple[float | None, ...]:
     if effect.vector is None:
         return tuple(float(params[p.name]) if p.name in params else None for p in effect.parameters)
     if params and len(params) < len(known):
-        raise InputError(f"effect '{effect.name}': only {', '.join(params)} is given; give both {' and '.join(known)}, or neither.")
+        raise InputError(
+            f"effect '{effect.name}': only {', '.join(params)} is given; give both {' and '.join(known)}, or neither."
+        )
     return effect.internal(params) if params else (None,) * len(effect.parameters)
 
 
 def accelerations(
-    active: Sequence[Active], flow: Flow, wind: tuple[Array, Array] | None, c: eq2.Coefficients, p: Sequence[Array], ship: Particulars
+    active: Sequence[Active],
+    flow: Flow,
+    wind: tuple[Array, Array] | None,
+    c: eq2.Coefficients,
+    p: Sequence[Array],
+    ship: Particulars,
 ) -> tuple[Array, Array, Array]:
-    """(du, dv, dr) of eq. (2) with the force effects `active`; `wind` is the measured wind (speed, from) or None. Numbers or symbols."""
+    """(du, dv, dr) of eq. (2) with the force effects `active`; `wind` is the measured wind (speed, from) or None.
+    Numbers or symbols."""
     e = Modifiers()
     for effect, q in flow_first(active):
         effect.force(e, flow, q, ship)
@@ -228,12 +252,14 @@ def accelerations(
 
 
 def roll(
-    active: Sequence[Active], s0: np.ndarray, path: np.ndarray, wind: np.ndarray | None, h: float, substeps: int, c: eq2.Coefficients,
+    active: Sequence[Active], s0: np.ndarray, path: np.ndarray, wind: np.ndarray | None, h: float, substeps: int,
+    c: eq2.Coefficients,
     p: Sequence[float], ship: Particulars,
 ) -> np.ndarray:  # fmt: skip
     """Motion (batch, K, 6) at t_1..t_K from s0 (batch, 10), which is at t = 0.
 
-    path: actuators (batch, K * substeps, 3, 4) at the stages of every integration step of `h` seconds; wind (batch, K, 2) or None.
+    path: actuators (batch, K * substeps, 3, 4) at the stages of every integration step of `h` seconds; wind (batch, K,
+    2) or None.
     """
     motion = tuple(s0[:, MOTION].T)
     out = np.empty((len(s0), path.shape[1] // substeps, len(motion)))
@@ -276,15 +302,25 @@ def true_start(s0: np.ndarray, sensors: Sequence[Active], dt: float) -> np.ndarr
 
 
 def no_gear(h: float) -> Gear:
-    """What lies between command and actuator where only commands are recorded: next to nothing, a lag of a quarter of the integration step `h` [s].
+    """What lies between command and actuator where only commands are recorded: next to nothing, a lag of a quarter of
+    the integration step `h` [s].
 
     Without it the actuator would jump, and no small change of a delay would show.
     """
     return Gear(0.25 * h, 1e12)
 
 
-def geared(path: np.ndarray, s0: np.ndarray, U: np.ndarray, base: dict[str, Gear], active: Sequence[Active], dt: float, substeps: int) -> np.ndarray:
-    """`path` (batch, K * substeps, 3, 4) with the actuators whose gears the effects `active` change taken along these gears, from s0 (batch, 10)."""
+def geared(
+    path: np.ndarray,
+    s0: np.ndarray,
+    U: np.ndarray,
+    base: dict[str, Gear],
+    active: Sequence[Active],
+    dt: float,
+    substeps: int,
+) -> np.ndarray:
+    """`path` (batch, K * substeps, 3, 4) with the actuators whose gears the effects `active` change taken along these
+    gears, from s0 (batch, 10)."""
     gears = dict(base)
     for effect, q in active:
         effect.gear(gears, q)

@@ -1,5 +1,5 @@
-"""The fit of eq. (2) to (8) together with the values of effects: those of forces are symbols of the rollout beside p, those of gears and sensors
-enter before and after it and are differenced."""
+"""The fit of eq. (2) to (8) together with the values of effects: those of forces are symbols of the rollout beside p,
+those of gears and sensors enter before and after it and are differenced."""
 
 from __future__ import annotations
 
@@ -18,30 +18,37 @@ _DIFFERENCE = 1e-3
 """Step of the differences, in typical sizes."""
 
 _PRIOR = 10.0
-"""Standard deviation of the prior of an effect's value, in typical sizes: only directions that the data leave open feel it."""
+"""Standard deviation of the prior of an effect's value, in typical sizes: only directions that the data leave open feel
+it."""
 
 _FIRST, _FIRST_GEAR = 0.1, 1.0
-"""Where the values start, in typical sizes: some forces have no slope at zero, a gear's rate limit acts only where it binds."""
+"""Where the values start, in typical sizes: some forces have no slope at zero, a gear's rate limit acts only where it
+binds."""
 
 
 def fit_extension(
-    data: Data, base: Fit, extension: Extension, ship: Particulars, repath: Callable[[Extension], np.ndarray], commanded: bool, iterations: int,
+    data: Data, base: Fit, extension: Extension, ship: Particulars, repath: Callable[[Extension], np.ndarray],
+    commanded: bool, iterations: int,
     tolerance: float,
 ) -> tuple[Fit, Extension]:  # fmt: skip
-    """p0..p10 and the effects' values together, from the plain fit `base` on; effects' shape parameters stay as they are in `extension`.
+    """p0..p10 and the effects' values together, from the plain fit `base` on; effects' shape parameters stay as they
+    are in `extension`.
 
-    A value has a zero-mean prior of ten typical sizes, whose weight against the rollouts counts every run as one observation.
-    What `Extension.held` names stays zero.
+    A value has a zero-mean prior of ten typical sizes, whose weight against the rollouts counts every run as one
+    observation. What `Extension.held` names stays zero.
 
     Args:
-        repath: the actuators' path under an extension's gears; asked again at every step where only commands are recorded.
+        repath: the actuators' path under an extension's gears; asked again at every step where only commands are
+        recorded.
     """
     model = _Extended(data, extension, ship, repath, commanded)
     start = np.concatenate([base.p / model.p_scale, model.first])
     ridge = np.concatenate([np.zeros(_P), np.full(len(start) - _P, base.cost / (len(data.batch.s0) * _PRIOR**2))])
     start = np.clip(start, model.low, model.high)
     solver = subproblem(len(start), model.p_scale)
-    q, e, J, cost, taken = descend(model.linearise, model.residuals, solver, start, model.low, model.high, ridge, iterations, tolerance)
+    q, e, J, cost, taken = descend(
+        model.linearise, model.residuals, solver, start, model.low, model.high, ridge, iterations, tolerance
+    )
     fitted = model.extension_at(q)
     if not np.isfinite(cost):
         return Fit(q[:_P] * model.p_scale, np.full((_P, 2), np.nan), cost, taken), fitted
@@ -53,7 +60,14 @@ def fit_extension(
 class _Extended:
     """Residuals and their derivatives with respect to p/scale and the effects' values in typical sizes."""
 
-    def __init__(self, data: Data, extension: Extension, ship: Particulars, repath: Callable[[Extension], np.ndarray], commanded: bool) -> None:
+    def __init__(
+        self,
+        data: Data,
+        extension: Extension,
+        ship: Particulars,
+        repath: Callable[[Extension], np.ndarray],
+        commanded: bool,
+    ) -> None:
         self.data, self.extension, self.repath, self.weight = data, extension, repath, data.weight()
         self.forces = extension.slots(ship.L, "force")
         self.slots = [*self.forces, *extension.slots(ship.L, "sensor", *(["gear"] if commanded else []))]

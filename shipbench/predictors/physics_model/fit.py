@@ -1,9 +1,10 @@
-"""Constrained nonlinear least squares over full rollouts (eq. 9): Gauss-Newton steps whose constrained subproblems IPOPT solves.
+"""Constrained nonlinear least squares over full rollouts (eq. 9): Gauss-Newton steps whose constrained subproblems
+IPOPT solves.
 
-CasADi differentiates one integration step; the sensitivities are carried along all runs at once (without effects as machine code,
-`_physics_rollout`). IPOPT then meets a problem of 11 unknowns (and
-the values of effects) with the bounds and the nonlinear constraints exact, so a step costs milliseconds, and the rollouts are evaluated once per
-step instead of once per barrier iteration.
+CasADi differentiates one integration step; the sensitivities are carried along all runs at once (without effects as
+machine code, `_physics_rollout`). IPOPT then meets a problem of 11 unknowns (and
+the values of effects) with the bounds and the nonlinear constraints exact, so a step costs milliseconds, and the
+rollouts are evaluated once per step instead of once per barrier iteration.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ _WORTH_COMPILING = 5000
 
 @dataclass(frozen=True)
 class Fit:
-    """Parameters (11,), their 95 % intervals (11, 2; NaN where a parameter sits at a bound), cost per run and knot, steps taken."""
+    """Parameters (11,), their 95 % intervals (11, 2; NaN where a parameter sits at a bound), cost per run and knot,
+    steps taken."""
 
     p: np.ndarray
     ci95: np.ndarray
@@ -48,19 +50,29 @@ class Fit:
 
 
 def rollout_function(
-    c: eq2.Coefficients, h: float, wind: bool, sensitivities: bool, forces: Forces = (), ship: Any = None, run_steps: int = 0
+    c: eq2.Coefficients,
+    h: float,
+    wind: bool,
+    sensitivities: bool,
+    forces: Forces = (),
+    ship: Any = None,
+    run_steps: int = 0,
 ) -> Rollout:
-    """Rollout with force effects: x the motion (6,), then, with `sensitivities`, its derivatives (6, num) by row; w as in `Data.inputs`.
+    """Rollout with force effects: x the motion (6,), then, with `sensitivities`, its derivatives (6, num) by row; w as
+    in `Data.inputs`.
 
-    p holds p0..p10 and then the values of `forces` that are None; the last column of w is the time at the beginning of the step, if there are forces.
-    `ship` (Particulars) is what effects know of the ship. The code is of this ship and these effects alone: it is compiled where `run_steps`, the
-    integration steps of all runs, are so many that a fit gains more than the 3 s that this takes.
+    p holds p0..p10 and then the values of `forces` that are None; the last column of w is the time at the beginning of
+    the step, if there are forces. `ship` (Particulars) is what effects know of the ship. The code is of this ship and
+    these effects alone: it is compiled where `run_steps`, the integration steps of all runs, are so many that a fit
+    gains more than the 3 s that this takes.
     """
     return _rollout_function(c, h, wind, sensitivities, forces, ship, run_steps >= _WORTH_COMPILING)
 
 
 @lru_cache(maxsize=8)
-def _rollout_function(c: eq2.Coefficients, h: float, wind: bool, sensitivities: bool, forces: Forces, ship: Any, machine_code: bool) -> Rollout:
+def _rollout_function(
+    c: eq2.Coefficients, h: float, wind: bool, sensitivities: bool, forces: Forces, ship: Any, machine_code: bool
+) -> Rollout:
     num = _P + sum(v is None for _, q in forces for v in q)
     x, S, p = ca.SX.sym("x", 6), ca.SX.sym("S", num, 6).T, ca.SX.sym("p", num)
     w = ca.SX.sym("w", (14 if wind else 12) + bool(forces))
@@ -83,10 +95,13 @@ def _rollout_function(c: eq2.Coefficients, h: float, wind: bool, sensitivities: 
 
 
 def parameter_scale(c: eq2.Coefficients) -> np.ndarray:
-    """Typical sizes of p0..p10 for this ship; resistance terms follow rho L T and the speed sqrt(g L)/10 (130 m: 3.6 m/s)."""
+    """Typical sizes of p0..p10 for this ship; resistance terms follow rho L T and the speed sqrt(g L)/10 (130 m: 3.6
+    m/s)."""
     area = 0.5 * c.rho * c.L * c.T
     speed = 0.1 * np.sqrt(9.81 * c.L)
-    return np.array([0.05, 0.01 * area * speed, 0.015 * area, 0.005 * area / speed, 0.05, 2.5, 0.5, 2.0, 0.03, 0.1, 1.5])
+    return np.array(
+        [0.05, 0.01 * area * speed, 0.015 * area, 0.005 * area / speed, 0.05, 2.5, 0.5, 2.0, 0.03, 0.1, 1.5]
+    )
 
 
 def bounds(scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -97,7 +112,8 @@ def bounds(scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _constraints(p: ca.SX) -> ca.SX:
-    """g(p) <= 0: lift rises for |a| <= 20 deg, |c_L| <= 2 for |a| <= 35 deg, drag never negative, at most 3 deg of built-in helm."""
+    """g(p) <= 0: lift rises for |a| <= 20 deg, |c_L| <= 2 for |a| <= 35 deg, drag never negative, at most 3 deg of
+    built-in helm."""
     a, b = np.deg2rad(20.0), np.deg2rad(35.0)
     lift = [p[4] + s * b * (p[5] + s * b * (p[6] + s * b * p[7])) for s in (1, -1)]
     return ca.vertcat(
@@ -111,19 +127,31 @@ def _constraints(p: ca.SX) -> ca.SX:
 
 
 def subproblem(num: int, scale: np.ndarray) -> ca.Function:
-    """IPOPT solver of min_q g'(q - q0) + (q - q0)' H (q - q0)/2 over `num` values q, of which the first 11 are p/scale, with the constraints of the
-    paper's eq. (9)."""
+    """IPOPT solver of min_q g'(q - q0) + (q - q0)' H (q - q0)/2 over `num` values q, of which the first 11 are p/scale,
+    with the constraints of the paper's eq. (9)."""
     q, q0, grad, H = ca.SX.sym("q", num), ca.SX.sym("q0", num), ca.SX.sym("g", num), ca.SX.sym("H", num, num)
     d = q - q0
     constraints = _constraints(q[:_P] * scale)
-    problem: dict[str, Any] = {"x": q, "p": ca.veccat(q0, grad, H), "f": ca.dot(grad, d) + 0.5 * ca.bilin(H, d, d), "g": constraints}
-    options: dict[str, Any] = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-9, "ipopt.max_iter": 200}
+    problem: dict[str, Any] = {
+        "x": q,
+        "p": ca.veccat(q0, grad, H),
+        "f": ca.dot(grad, d) + 0.5 * ca.bilin(H, d, d),
+        "g": constraints,
+    }
+    options: dict[str, Any] = {
+        "ipopt.print_level": 0,
+        "print_time": False,
+        "ipopt.sb": "yes",
+        "ipopt.tol": 1e-9,
+        "ipopt.max_iter": 200,
+    }
     return ca.nlpsol("step", "ipopt", problem, options)
 
 
 @dataclass(frozen=True)
 class Data:
-    """What is fitted. path: actuators at the stages of every substep (batch, K * substeps, 3, 4); wind: (batch, K, 2) speed and direction, or None;
+    """What is fitted. path: actuators at the stages of every substep (batch, K * substeps, 3, 4); wind: (batch, K, 2)
+    speed and direction, or None;
     dt: sample time [s]."""
 
     c: eq2.Coefficients
@@ -155,7 +183,9 @@ class Data:
         """Motion (runs, K, 6) at the samples from start (runs, 10)."""
         return rollout(start[:, MOTION], w, p)[:, self.substeps - 1 :: self.substeps]
 
-    def linearised(self, rollout: Rollout, start: np.ndarray, w: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def linearised(
+        self, rollout: Rollout, start: np.ndarray, w: np.ndarray, p: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Motion and its derivatives (runs, K, 6, num) with respect to p, at the samples."""
         x0 = np.concatenate([start[:, MOTION], np.zeros((len(start), 6 * len(p)))], axis=1)
         found = rollout(x0, w, p)[:, self.substeps - 1 :: self.substeps]
@@ -188,17 +218,21 @@ def fit_parameters(rolling: Rolling, batch: Batch, iterations: int, tolerance: f
             return (S[:, :, MOTION] - truth) * weight, J
 
     solver = subproblem(_P, scale)
-    q, e, J, cost, taken = descend(linearise, residuals, solver, np.clip(_START, low, high), low, high, np.zeros(_P), iterations, tolerance)
+    q, e, J, cost, taken = descend(
+        linearise, residuals, solver, np.clip(_START, low, high), low, high, np.zeros(_P), iterations, tolerance
+    )
     if not np.isfinite(cost):
         return Fit(q * scale, np.full((_P, 2), np.nan), cost, taken)
     return Fit(q * scale, intervals(q, e, J, low, high) * scale[:, None], cost, taken)
 
 
 def descend(
-    linearise: Linearise, residuals: Callable[[np.ndarray], np.ndarray], solver: ca.Function, q: np.ndarray, low: np.ndarray, high: np.ndarray,
+    linearise: Linearise, residuals: Callable[[np.ndarray], np.ndarray], solver: ca.Function, q: np.ndarray,
+    low: np.ndarray, high: np.ndarray,
     ridge: np.ndarray, iterations: int, tolerance: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, int]:  # fmt: skip
-    """Damped Gauss-Newton from q: minimise sum e(q)^2 + sum ridge q^2; returns q, e, J, the cost and the steps taken."""
+    """Damped Gauss-Newton from q: minimise sum e(q)^2 + sum ridge q^2; returns q, e, J, the cost and the steps
+    taken."""
     e, J = linearise(q)
     cost, damping, taken = float(np.sum(e * e) + np.sum(ridge * q * q)), 1e-3, 0
     while taken < iterations and damping < 1e6 and np.isfinite(cost):
@@ -206,7 +240,9 @@ def descend(
         grad = np.einsum("bksp,bks->p", J, e) + ridge * q
         H = np.einsum("bksp,bksq->pq", J, J) + np.diag(ridge)
         damped = H + damping * np.diag(np.maximum(np.diag(H), 1e-9 * np.trace(H)))
-        trial = np.asarray(solver(x0=q, p=ca.veccat(q, grad, damped), lbx=low, ubx=high, lbg=-np.inf, ubg=0.0)["x"]).ravel()
+        trial = np.asarray(
+            solver(x0=q, p=ca.veccat(q, grad, damped), lbx=low, ubx=high, lbg=-np.inf, ubg=0.0)["x"]
+        ).ravel()
         trial = np.clip(trial, low, high)
         with np.errstate(all="ignore"):
             new = float(np.sum(residuals(trial) ** 2) + np.sum(ridge * trial * trial))
@@ -224,7 +260,8 @@ def descend(
 
 
 def inverse_size(batch: Batch, dt: float) -> np.ndarray:
-    """Per signal, the inverse root mean square of how far holding s0's velocities errs: the size of what there is to predict."""
+    """Per signal, the inverse root mean square of how far holding s0's velocities errs: the size of what there is to
+    predict."""
     runs, samples = batch.truth.shape[:2]
     return 1.0 / (_hold_error(batch, dt) * np.sqrt(runs * samples * 6.0))
 
@@ -238,7 +275,8 @@ def _hold_error(batch: Batch, dt: float) -> np.ndarray:
 
 
 def intervals(q: np.ndarray, e: np.ndarray, J: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """95 % intervals (num, 2) of the scaled parameters: sandwich covariance clustered over runs, Student's t; NaN at a bound."""
+    """95 % intervals (num, 2) of the scaled parameters: sandwich covariance clustered over runs, Student's t; NaN at a
+    bound."""
     from scipy.special import stdtrit  # Student's t; scipy.stats would take a second to import
 
     free = (q > low + 1e-6) & (q < high - 1e-6)

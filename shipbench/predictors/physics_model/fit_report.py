@@ -1,4 +1,5 @@
-"""How well fitted physics follows the runs that it was fitted on, beside the floor that keeps the initial velocities (`hold`)."""
+"""How well fitted physics follows the runs that it was fitted on, beside the floor that keeps the initial velocities
+(`hold`)."""
 
 from __future__ import annotations
 
@@ -38,8 +39,8 @@ class FitReport:
 
     @property
     def fits(self) -> bool:
-        """Whether it follows its own runs: it is better than `hold`, and where it still keeps more than a third of that error, no coefficient of the
-        propeller or the rudder, nor the whole resistance, is at a bound."""
+        """Whether it follows its own runs: it is better than `hold`, and where it still keeps more than a third of that
+        error, no coefficient of the propeller or the rudder, nor the whole resistance, is at a bound."""
         telling = set(self.at_bounds) - _RESISTANCE or set(self.at_bounds) >= _RESISTANCE
         if self.error < _NOTHING:  # the ship keeps its velocities: there is nothing to be better at
             return True
@@ -48,7 +49,10 @@ class FitReport:
     @property
     def summary(self) -> str:
         """The figures in words."""
-        return f"{len(self.at_bounds)} of {self.of} parameters at their bounds, training error {self.error:.3g} m (hold {self.hold:.3g} m)"
+        return (
+            f"{len(self.at_bounds)} of {self.of} parameters at their bounds, training error {self.error:.3g} m "
+            f"(hold {self.hold:.3g} m)"
+        )
 
     @property
     def note(self) -> str:
@@ -57,20 +61,27 @@ class FitReport:
             return ""
         hint = "`shipbench data check` looks at signs and units, `shipbench diagnose` at what the physics lacks."
         if self.reversed_error is not None and self.reversed_error < 0.5 * self.error:
-            hint = f"With the opposite sign of n the training error is {self.reversed_error:.3g} m: the shaft speed looks reversed."
+            hint = (
+                f"With the opposite sign of n the training error is {self.reversed_error:.3g} m: the shaft speed "
+                "looks reversed."
+            )
         return f"physics does not fit these runs: {self.summary}. {hint}"
 
     def as_dict(self) -> dict[str, Any]:
         """For a summary; an error that is not finite is None there."""
         kept = asdict(self) | {"at_bounds": list(self.at_bounds)}
-        return {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in kept.items()}
+        return {
+            key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in kept.items()
+        }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> FitReport:
         """What `as_dict` returned."""
         error, hold = (np.inf if data[key] is None else float(data[key]) for key in ("error", "hold"))
         again = data.get("reversed_error")
-        return cls(tuple(map(str, data["at_bounds"])), int(data["of"]), error, hold, None if again is None else float(again))
+        return cls(
+            tuple(map(str, data["at_bounds"])), int(data["of"]), error, hold, None if again is None else float(again)
+        )
 
 
 def position_error(S: np.ndarray, batch: Batch) -> float:
@@ -81,7 +92,8 @@ def position_error(S: np.ndarray, batch: Batch) -> float:
 
 
 def with_reversed_shaft(report: FitReport, batch: Batch, error_on: Callable[[Batch], float]) -> FitReport:
-    """The report with the error of a fit to the same runs with the opposite sign of n, where the physics does not fit."""
+    """The report with the error of a fit to the same runs with the opposite sign of n, where the physics does not
+    fit."""
     if report.fits:
         return report
     s0, truth, U = batch.s0.copy(), batch.truth.copy(), batch.U.copy()

@@ -1,4 +1,5 @@
-"""Effects between command and actuator, fitted where both are recorded: every actuator alone, without the ship's motion."""
+"""Effects between command and actuator, fitted where both are recorded: every actuator alone, without the ship's
+motion."""
 
 from __future__ import annotations
 
@@ -25,17 +26,21 @@ def gears_of(actuators: np.ndarray) -> dict[str, Gear]:
     return {"n": Gear(T_n, rate_n), "delta": Gear(T_delta, rate_delta), "F": Gear(T_F, rate_F)}
 
 
-def fit_gears(batch: Batch, dt: float, substeps: int, extension: Extension, actuators: np.ndarray, ship: Particulars) -> tuple[np.ndarray, Extension]:
+def fit_gears(
+    batch: Batch, dt: float, substeps: int, extension: Extension, actuators: np.ndarray, ship: Particulars
+) -> tuple[np.ndarray, Extension]:
     """Fit the values of the gear effects, with time constant and rate limit of the actuators that they change.
 
-    The data show T + lag, and the smaller of two rate limits: beside a fitted lag the time constant is held at an ordinary one
-    (`DEFAULT_ACTUATORS`, by Froude's law; or the one found without the effect, where that is smaller), beside a fitted rate limit there is no other.
+    The data show T + lag, and the smaller of two rate limits: beside a fitted lag the time constant is held at an
+    ordinary one (`DEFAULT_ACTUATORS`, by Froude's law; or the one found without the effect, where that is smaller),
+    beside a fitted rate limit there is no other.
 
     Args:
         actuators: (6,) as `fit_actuators` found them without the effects.
 
     Returns:
-        The six values and the extension with values and intervals. An actuator that never moves keeps what it had, its effects zero (or their bound).
+        The six values and the extension with values and intervals. An actuator that never moves keeps what it had, its
+        effects zero (or their bound).
     """
     actuators = actuators.copy()
     for g, (name, channels) in enumerate(CHANNELS.items()):
@@ -45,7 +50,9 @@ def fit_gears(batch: Batch, dt: float, substeps: int, extension: Extension, actu
             problem = _Actuator(batch, dt, substeps, extension, slots, name, channels)
             if problem.moves:
                 pair = slice(2 * g, 2 * g + 2)
-                actuators[pair], extension = problem.fit(actuators[pair], DEFAULT_ACTUATORS[2 * g] * (ship.L / 130.0) ** 0.5)
+                actuators[pair], extension = problem.fit(
+                    actuators[pair], DEFAULT_ACTUATORS[2 * g] * (ship.L / 130.0) ** 0.5
+                )
             else:
                 extension = extension.with_values(slots, [max(s.parameter.low, 0.0) for s in slots])
     return actuators, extension
@@ -58,7 +65,9 @@ def _changed(extension: Extension, term: int) -> tuple[str, str]:
     after = dict(before)
     t.effect.gear(after, tuple(p.typical for p in t.effect.parameters))
     name = next(n for n in CHANNELS if after[n] != before[n])
-    return name, next(f for f in ("T", "rate", "delay", "deadband", "backlash") if getattr(after[name], f) != getattr(before[name], f))
+    return name, next(
+        f for f in ("T", "rate", "delay", "deadband", "backlash") if getattr(after[name], f) != getattr(before[name], f)
+    )
 
 
 def _changes(extension: Extension, term: int, name: str) -> bool:
@@ -69,7 +78,14 @@ class _Actuator:
     """One actuator's records and its gear as a function of z = (log T, log rate, values of the effects)."""
 
     def __init__(
-        self, batch: Batch, dt: float, substeps: int, extension: Extension, slots: Sequence[Slot], name: str, channels: tuple[int, ...]
+        self,
+        batch: Batch,
+        dt: float,
+        substeps: int,
+        extension: Extension,
+        slots: Sequence[Slot],
+        name: str,
+        channels: tuple[int, ...],
     ) -> None:
         self.dt, self.num, self.extension, self.slots, self.name = dt, 2 * substeps, extension, slots, name
         self.start = np.concatenate([batch.s0[:, 6 + c] for c in channels])
@@ -119,24 +135,35 @@ class _Actuator:
         if free.any():
             inside = np.clip(z[free], low[free] + 1e-9 * (high - low)[free], high[free] - 1e-9 * (high - low)[free])
             found = least_squares(
-                lambda part: self.residual(whole(part)).ravel(), inside, bounds=(low[free], high[free]), x_scale=(high - low)[free], max_nfev=30
+                lambda part: self.residual(whole(part)).ravel(),
+                inside,
+                bounds=(low[free], high[free]),
+                x_scale=(high - low)[free],
+                max_nfev=30,
             )
             if 2.0 * found.cost < np.sum(self.residual(z) ** 2):
                 z = whole(found.x)
         extension = self.extension.with_values(self.slots, [float(v) for v in z[2:]])
         step = 1e-3 * (high - low)
-        J = np.stack([(self.residual(z + d) - self.residual(z - d)) / (2.0 * max(d.sum(), 1e-300)) for d in np.diag(step)], axis=-1)
+        J = np.stack(
+            [(self.residual(z + d) - self.residual(z - d)) / (2.0 * max(d.sum(), 1e-300)) for d in np.diag(step)],
+            axis=-1,
+        )
         shape = (self.channels, self.runs, -1)
         e, J = np.moveaxis(self.residual(z).reshape(shape), 0, -1), np.moveaxis(J.reshape(*shape, len(z)), 0, 2)
         extension.set_intervals(self.slots, intervals(z, e, J, low, high)[2:])
         return np.exp(z[:2]), extension
 
     def _zoom(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Best point of a grid that shrinks about it round by round: deadband and play leave the cost without a usable slope."""
+        """Best point of a grid that shrinks about it round by round: deadband and play leave the cost without a usable
+        slope."""
         rows = np.unique(np.linspace(0, len(self.start) - 1, min(_MOST_RUNS, len(self.start))).round().astype(int))
         center, half, best = 0.5 * (low + high), 0.5 * (high - low), np.inf
         for _ in range(_ROUNDS):
-            axes = [np.unique(np.clip(np.linspace(c - h, c + h, _POINTS), a, b)) for c, h, a, b in zip(center, half, low, high, strict=True)]
+            axes = [
+                np.unique(np.clip(np.linspace(c - h, c + h, _POINTS), a, b))
+                for c, h, a, b in zip(center, half, low, high, strict=True)
+            ]
             points = np.array(list(product(*axes)))
             tiled = np.repeat(points.T, len(rows), axis=1)
             start, command = np.tile(self.start[rows], len(points)), np.tile(self.command[rows], (len(points), 1))

@@ -1,4 +1,5 @@
-"""Rollouts of eq. (2) to (8) without effects, and their derivatives with respect to p0..p10: the formula as machine code for any number of runs.
+"""Rollouts of eq. (2) to (8) without effects, and their derivatives with respect to p0..p10: the formula as machine
+code for any number of runs.
 
 The ship's coefficients are inputs of that code, so that one compilation serves all ships.
 """
@@ -29,8 +30,11 @@ _ACTUATORS = 6
 _built: dict[tuple[bool, bool, bool], Rollout] = {}
 
 
-def actuators_after(actuators: Sequence[Array], commands: Sequence[Array], dt: Array, values: Sequence[Array]) -> list[Array]:
-    """n, delta, F_b, F_s after `dt` seconds of held commands; `values` as in `DEFAULT_ACTUATORS`. Numbers or symbols."""
+def actuators_after(
+    actuators: Sequence[Array], commands: Sequence[Array], dt: Array, values: Sequence[Array]
+) -> list[Array]:
+    """n, delta, F_b, F_s after `dt` seconds of held commands; `values` as in `DEFAULT_ACTUATORS`. Numbers or
+    symbols."""
     T_n, rate_n, T_d, rate_d, T_F, rate_F = values
     pairs = ((T_n, rate_n), (T_d, rate_d), (T_F, rate_F), (T_F, rate_F))
     return [lag_with_rate_limit(a, c, dt, T, rate) for a, c, (T, rate) in zip(actuators, commands, pairs, strict=True)]
@@ -55,7 +59,8 @@ class Rolling:
     substeps: int
 
     def states(self, s0: np.ndarray, U: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """S (batch, K, 10) at t_1..t_K from s0 (batch, 10) under U (batch, K, inputs); a run that diverges is not finite from there on."""
+        """S (batch, K, 10) at t_1..t_K from s0 (batch, 10) under U (batch, K, inputs); a run that diverges is not
+        finite from there on."""
         return self._rollout(False)(s0, self._inputs(U), self._values(p), self.substeps)
 
     def linearised(self, s0: np.ndarray, U: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -96,12 +101,14 @@ def numbers_of(value: Any) -> list[float]:
 def with_numbers(like: Any, numbers: Iterator[Array]) -> Any:
     """The dataclass `like` with other numbers in the same places."""
     if is_dataclass(like):
-        return replace(like, **{f.name: with_numbers(getattr(like, f.name), numbers) for f in fields(like)})  # type: ignore[type-var]
+        values = {f.name: with_numbers(getattr(like, f.name), numbers) for f in fields(like)}
+        return replace(like, **values)  # type: ignore[type-var]
     return tuple(with_numbers(item, numbers) for item in like) if isinstance(like, tuple) else next(numbers)
 
 
 def _step(like: eq2.Coefficients, commanded: bool, wind: bool, sensitivities: bool) -> casadi.Function:
-    """One integration step (x, w, p) -> x': x the ten states, then, with `sensitivities`, d(motion)/d(p0..p10) row by row."""
+    """One integration step (x, w, p) -> x': x the ten states, then, with `sensitivities`, d(motion)/d(p0..p10) row by
+    row."""
     import casadi as ca
 
     x, w = ca.SX.sym("x", len(STATES)), ca.SX.sym("w", len(COMMANDS) + 2 * wind)
@@ -109,7 +116,9 @@ def _step(like: eq2.Coefficients, commanded: bool, wind: bool, sensitivities: bo
     numbers = ca.SX.sym("c", len(numbers_of(like)))
     c = with_numbers(like, iter(ca.vertsplit(numbers)))
     now, commands = ca.vertsplit(x[_MOTION:]), ca.vertsplit(w[: len(COMMANDS)])
-    middle, end = (commands if commanded else actuators_after(now, commands, dt, ca.vertsplit(values)) for dt in (0.5 * h, h))
+    middle, end = (
+        commands if commanded else actuators_after(now, commands, dt, ca.vertsplit(values)) for dt in (0.5 * h, h)
+    )
     stages = (commands if commanded else now, middle, end)
 
     def rhs(state: tuple[Array, ...], stage: int) -> tuple[Array, ...]:
@@ -125,4 +134,6 @@ def _step(like: eq2.Coefficients, commanded: bool, wind: bool, sensitivities: bo
         return ca.Function("step", [x, w, given], [following], {"cse": True})
     S = ca.SX.sym("S", _P, _MOTION).T
     S_after = ca.jacobian(after, x[:_MOTION]) @ S + ca.jacobian(after, p)
-    return ca.Function("step", [ca.vertcat(x, ca.vec(S.T)), w, given], [ca.vertcat(following, ca.vec(S_after.T))], {"cse": True})
+    return ca.Function(
+        "step", [ca.vertcat(x, ca.vec(S.T)), w, given], [ca.vertcat(following, ca.vec(S_after.T))], {"cse": True}
+    )

@@ -1,4 +1,5 @@
-"""The data card: what a data set holds, how noisy it is, what it covers, and what it cannot identify; as tables, Markdown and one HTML page."""
+"""The data card: what a data set holds, how noisy it is, what it covers, and what it cannot identify; as tables,
+Markdown and one HTML page."""
 
 from __future__ import annotations
 
@@ -18,13 +19,18 @@ from ...steps import step
 from .facts import dataset_facts, describe_tables
 
 _NOISE = (
-    "Noise: standard deviation of what is new in every sample (least of the differences of order 2 to 6, by their median absolute deviation). It "
-    "sees white noise only, some 5 % too small; drifts, biases and filtered noise are not in it, and real gusts are. Step: resolution of the record."
+    "Noise: standard deviation of what is new in every sample (least of the differences of order 2 to 6, by their "
+    "median absolute deviation). It "
+    "sees white noise only, some 5 % too small; drifts, biases and filtered noise are not in it, and real gusts "
+    "are. Step: resolution of the record."
 )
 _FELT = (
-    f"Felt: change of the runs by a typical size, as a share of what holding the speeds gets wrong; below {100 * UNFELT:g} % it is not felt at all. "
-    f"Imitated: share of that change (squared) that the other causes can make together; above {100 * IMITATED:.0f} % (a variance inflation of 10) "
-    "the cause cannot be told apart, whatever the size of the data set. Of a current or wind the direction that is told worst counts."
+    "Felt: change of the runs by a typical size, as a share of what holding the speeds gets wrong; below "
+    f"{100 * UNFELT:g} % it is not felt at all. "
+    f"Imitated: share of that change (squared) that the other causes can make together; above {100 * IMITATED:.0f} "
+    "% (a variance inflation of 10) "
+    "the cause cannot be told apart, whatever the size of the data set. Of a current or wind the direction that is "
+    "told worst counts."
 )
 
 
@@ -33,7 +39,8 @@ _GAPS = "cannot_identify"
 
 @dataclass(frozen=True)
 class Card:
-    """Everything on the card: facts by name, tables by key in the order of a terminal, whose end is read; a page begins with the gaps."""
+    """Everything on the card: facts by name, tables by key in the order of a terminal, whose end is read; a page begins
+    with the gaps."""
 
     name: str
     facts: dict[str, Any]
@@ -43,13 +50,16 @@ class Card:
         """What the data set holds, and how much of it cannot be identified, in two sentences."""
         missing = len(self.tables[_GAPS].rows)
         what = (
-            f"{missing} of the causes that are looked for cannot be identified with it." if missing else "No cause is known that it cannot identify."
+            f"{missing} of the causes that are looked for cannot be identified with it."
+            if missing
+            else "No cause is known that it cannot identify."
         )
         runs, samples = str(self.facts["runs"]).split(" in ", 1)
         return f"{self.name}: {runs} run{'s' * (runs != '1')} in {samples}. {what}"
 
     def brief(self) -> list[Table]:
-        """What a terminal shows unless all tables are asked for: durations, and the trials that would add what is missing."""
+        """What a terminal shows unless all tables are asked for: durations, and the trials that would add what is
+        missing."""
         gaps = self.tables[_GAPS]
         kept = [column for column in gaps.columns if column.key != "because"]
         return [self.tables["durations"], *([replace(gaps, columns=kept, notes=())] if gaps.rows else [])]
@@ -60,7 +70,11 @@ class Card:
 
     def document(self) -> dict[str, Any]:
         """As JSON."""
-        return {"dataset": self.name, "facts": self.facts, **{key: table.as_json() for key, table in self.tables.items()}}
+        return {
+            "dataset": self.name,
+            "facts": self.facts,
+            **{key: table.as_json() for key, table in self.tables.items()},
+        }
 
 
 def make_card(dataset: Dataset) -> Card:
@@ -78,14 +92,29 @@ def make_card(dataset: Dataset) -> Card:
 
 
 def _gap_table(found: Sequence[Gap], dataset: Dataset) -> Table:
-    columns = [TableColumn("cannot be identified", "subject"), TableColumn("because", "because"), TableColumn("what would add it", "manoeuvre")]
+    columns = [
+        TableColumn("cannot be identified", "subject"),
+        TableColumn("because", "because"),
+        TableColumn("what would add it", "manoeuvre"),
+    ]
     rows = [{"subject": g.subject, "because": g.because, "manoeuvre": g.manoeuvre} for g in found]
     unit = unit_time(dataset.ship.L)
     notes = [
-        f"Times are judged in ship lengths: one takes {unit:.3g} s at a Froude number of 0.1 (10 sqrt(L/g)), {NEEDED:g} of them are needed.",
-        "What is not listed can still be weakly determined: fits print intervals, and `shipbench diagnose` prints detection limits.",
+        (
+            f"Times are judged in ship lengths: one takes {unit:.3g} s at a Froude number of 0.1 (10 sqrt(L/g)), "
+            f"{NEEDED:g} of them are needed."
+        ),
+        (
+            "What is not listed can still be weakly determined: fits print intervals, and `shipbench diagnose` prints "
+            "detection limits."
+        ),
     ]
-    return Table("What these data cannot identify", columns, rows, notes if rows else ["Nothing of what is looked for is missing.", *notes])
+    return Table(
+        "What these data cannot identify",
+        columns,
+        rows,
+        notes if rows else ["Nothing of what is looked for is missing.", *notes],
+    )
 
 
 def _alike(told: Sequence[Telling]) -> list[Gap]:
@@ -98,9 +127,18 @@ def _alike(told: Sequence[Telling]) -> list[Gap]:
         alone = t.subject in twins
         if twins.get(t.alike) == t.subject:
             done.add(t.alike)
-        who = f"{t.alike} alone makes {100 * t.cosine**2:.1f} %" if alone else f"most alike: {t.alike} (cosine {t.cosine:.2f})"
-        because = f"{100 * t.imitated:.1f} % of what it does to the runs can be made by other causes, {100 * IMITATED:.0f} % is the limit; {who}"
-        found.append(Gap(f"{t.subject} apart from {t.alike if alone else 'the other causes together'}", because, t.manoeuvre))
+        who = (
+            f"{t.alike} alone makes {100 * t.cosine**2:.1f} %"
+            if alone
+            else f"most alike: {t.alike} (cosine {t.cosine:.2f})"
+        )
+        because = (
+            f"{100 * t.imitated:.1f} % of what it does to the runs can be made by other causes, "
+            f"{100 * IMITATED:.0f} % is the limit; {who}"
+        )
+        found.append(
+            Gap(f"{t.subject} apart from {t.alike if alone else 'the other causes together'}", because, t.manoeuvre)
+        )
     return found
 
 
@@ -111,11 +149,19 @@ def _durations(dataset: Dataset) -> Table:
         kinds.setdefault(str(run.meta.get("manoeuvre", "not given")), []).append((len(run) - 1) * dataset.dt)
     groups = [*kinds.items(), *([("all", [x for times in kinds.values() for x in times])] if len(kinds) > 1 else [])]
     rows = [
-        {"kind": kind, "runs": len(times), "least": min(times), "median": float(np.median(times)), "most": max(times), "sum": sum(times) / 3600.0}
+        {
+            "kind": kind,
+            "runs": len(times),
+            "least": min(times),
+            "median": float(np.median(times)),
+            "most": max(times),
+            "sum": sum(times) / 3600.0,
+        }
         for kind, times in groups
     ]
     columns = [
-        TableColumn("manoeuvre", "kind"), TableColumn("runs", "runs", number(0)), TableColumn("shortest [s]", "least", significant(3)),
+        TableColumn("manoeuvre", "kind"), TableColumn("runs", "runs", number(0)),
+        TableColumn("shortest [s]", "least", significant(3)),
         TableColumn("median [s]", "median", significant(3)), TableColumn("longest [s]", "most", significant(3)),
         TableColumn("together [h]", "sum", significant(3)),
     ]  # fmt: skip
@@ -127,12 +173,15 @@ def _noise(dataset: Dataset) -> Table:
     for c in channel_noise(dataset):
         unit, factor = display_unit(UNITS[c.channel])
         rows.append({
-            "channel": c.channel, "unit": unit, "noise": factor * c.noise, "greatest": factor * c.greatest, "run": c.run, "step": factor * c.step,
+            "channel": c.channel, "unit": unit, "noise": factor * c.noise, "greatest": factor * c.greatest,
+            "run": c.run, "step": factor * c.step,
             "repeated": 100.0 * c.repeated,
         })  # fmt: skip
     columns = [
-        TableColumn("channel", "channel"), TableColumn("unit", "unit"), TableColumn("noise, median run", "noise", significant(2)),
-        TableColumn("noisiest run", "greatest", significant(2)), TableColumn("which", "run"), TableColumn("step", "step", significant(3)),
+        TableColumn("channel", "channel"), TableColumn("unit", "unit"),
+        TableColumn("noise, median run", "noise", significant(2)),
+        TableColumn("noisiest run", "greatest", significant(2)), TableColumn("which", "run"),
+        TableColumn("step", "step", significant(3)),
         TableColumn("repeated samples [%]", "repeated", number(1)),
     ]  # fmt: skip
     return Table("Noise of the channels", columns, rows, [_NOISE])
@@ -144,11 +193,14 @@ def _told_apart(told: Sequence[Telling], how: str) -> Table:
         felt = t.felt > UNFELT
         verdict = "not felt" if not felt else "no" if t.imitated > IMITATED else "yes"
         rows.append({
-            "subject": t.subject, "felt": 100 * t.felt, "imitated": 100 * t.imitated if felt else None, "alike": t.alike,
+            "subject": t.subject, "felt": 100 * t.felt, "imitated": 100 * t.imitated if felt else None,
+            "alike": t.alike,
             "cosine": t.cosine if felt else None, "verdict": verdict,
         })  # fmt: skip
     columns = [
-        TableColumn("cause", "subject"), TableColumn("felt [%]", "felt", significant(2)), TableColumn("imitated [%]", "imitated", number(1)),
-        TableColumn("most alike", "alike"), TableColumn("cosine", "cosine", number(2)), TableColumn("can be told apart", "verdict"),
+        TableColumn("cause", "subject"), TableColumn("felt [%]", "felt", significant(2)),
+        TableColumn("imitated [%]", "imitated", number(1)),
+        TableColumn("most alike", "alike"), TableColumn("cosine", "cosine", number(2)),
+        TableColumn("can be told apart", "verdict"),
     ]  # fmt: skip
     return Table("What the runs tell apart", columns, rows, [f"How: {how}", *([_FELT] if rows else [])])

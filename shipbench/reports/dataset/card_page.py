@@ -26,11 +26,18 @@ def card_page(card: Card, dataset: Dataset, covered: Sequence[Coverage], command
     drawn = [(c.title, c.caption, *svg(c, dataset.dt)) for c in covered]
     gaps, *others = card.page()
     shown = _chosen(dataset.runs)
-    plots = recorded_plots(dataset, {run.id: [run] for run in shown}, {run.id: kind for run in shown if (kind := _kind(run))})
-    which = f"{len(shown)} of {len(dataset)} runs" + (", from every kind of manoeuvre" if len(shown) < len(dataset) else "") + "."
+    plots = recorded_plots(
+        dataset, {run.id: [run] for run in shown}, {run.id: kind for run in shown if (kind := _kind(run))}
+    )
+    which = (
+        f"{len(shown)} of {len(dataset)} runs"
+        + (", from every kind of manoeuvre" if len(shown) < len(dataset) else "")
+        + "."
+    )
     return render_page(
         "data_card.html.j2", title=f"Data card: {card.name}", dataset=card.name, command=command, lead=card.lead(),
-        tiles=_tiles(card, dataset), plots=True, style=STYLE, gaps=table_cells(gaps), covered=drawn, size=f"{WIDTH:g} {HEIGHT:g}",
+        tiles=_tiles(card, dataset), plots=True, style=STYLE, gaps=table_cells(gaps), covered=drawn,
+        size=f"{WIDTH:g} {HEIGHT:g}",
         tables=[table_cells(t) for t in others], tracks=plots, which=which, facts=fact_lines(card.facts),
     )  # fmt: skip
 
@@ -54,8 +61,10 @@ def _tiles(card: Card, dataset: Dataset) -> list[Tile]:
     times = sorted((len(run) - 1) * dataset.dt for run in dataset.runs)
     length = f"{times[0]:g} s" if times[0] == times[-1] else f"{times[0]:g} to {times[-1]:g} s"
     return [
-        Tile("Cannot be identified", str(missing), "causes, each with the trial that would add it" if missing else "no cause that is looked for"),
-        Tile("Runs", str(len(dataset)), f"{kinds} kind{'s' * (kinds != 1)} of manoeuvre" if kinds else "kinds of manoeuvre not given"),
+        Tile("Cannot be identified", str(missing),
+            "causes, each with the trial that would add it" if missing else "no cause that is looked for"),
+        Tile("Runs", str(len(dataset)),
+            f"{kinds} kind{'s' * (kinds != 1)} of manoeuvre" if kinds else "kinds of manoeuvre not given"),
         Tile("Samples", str(samples), f"of {len(dataset.inputs)} inputs and 10 states"),
         Tile("Duration", f"{sum(times) / 3600.0:.3g} h", f"runs of {length}"),
         Tile("Time step dt", f"{dataset.dt:g} s", f"{1.0 / dataset.dt:.3g} Hz"),
@@ -73,7 +82,10 @@ def write_card(card: Card, dataset: Dataset, out: Path, command: str) -> list[Pa
     """
     covered = coverage(dataset)
     files = {f"{c.name}.png": png(c, dataset.dt) for c in covered}
-    files |= {"card.md": markdown(card, covered).encode(), "card.html": card_page(card, dataset, covered, command).encode(errors="replace")}
+    files |= {
+        "card.md": markdown(card, covered).encode(),
+        "card.html": card_page(card, dataset, covered, command).encode(errors="replace"),
+    }
     part = None
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -83,7 +95,9 @@ def write_card(card: Card, dataset: Dataset, out: Path, command: str) -> list[Pa
         for name in files:  # the pages come last, when their pictures are there
             put(part / name, out / name)
     except OSError as error:
-        raise InputError(f"cannot write the data card to {out}: {error.strerror}. Give a folder that can be written with --out.") from None
+        raise InputError(
+            f"cannot write the data card to {out}: {error.strerror}. Give a folder that can be written with --out."
+        ) from None
     finally:
         if part is not None:
             shutil.rmtree(part, ignore_errors=True)

@@ -1,4 +1,5 @@
-"""What a data set covers: the time spent at each speed, drift, rudder angle, shaft speed, heading, thrust and wind; as PNG for Markdown."""
+"""What a data set covers: the time spent at each speed, drift, rudder angle, shaft speed, heading, thrust and wind; as
+PNG for Markdown."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ _SECTORS = 24
 class Coverage:
     """A histogram of time with its file's name, title and caption.
 
-    `seconds` (nx, ny) in the cells between the edges `x` (nx + 1,) and `y` (ny + 1,) with their labels; of headings (nx,) in sectors, `x` in rad.
+    `seconds` (nx, ny) in the cells between the edges `x` (nx + 1,) and `y` (ny + 1,) with their labels; of headings
+    (nx,) in sectors, `x` in rad.
     """
 
     name: str
@@ -34,30 +36,39 @@ class Coverage:
 
 
 def coverage(dataset: Dataset) -> list[Coverage]:
-    """Speed against drift, rudder against shaft speed, headings, yaw rate against speed; thrusters and wind where there are any."""
+    """Speed against drift, rudder against shaft speed, headings, yaw rate against speed; thrusters and wind where there
+    are any."""
     s = Samples(dataset)
     S, dt = s.states, dataset.dt
     speed, drift, delta = np.copysign(s.speed, s.froude), np.rad2deg(s.drift), np.rad2deg(S[:, DELTA])
     moving = np.isfinite(drift)
     headings, sectors = np.histogram(S[:, PSI] % (2 * np.pi), bins=_SECTORS, range=(0.0, 2 * np.pi))
     found = [
-        Coverage("speed_drift", "Speed and drift angle", f"Without the {100 * np.mean(~moving):.1f} % of the time that the ship lies still.",
-                 *_time_in(speed[moving], drift[moving], dt), "speed [m/s], astern negative", "drift angle [deg], to starboard positive"),
+        Coverage("speed_drift", "Speed and drift angle",
+            f"Without the {100 * np.mean(~moving):.1f} % of the time "
+            "that the ship lies still.",
+                 *_time_in(speed[moving], drift[moving], dt), "speed [m/s], astern negative",
+                 "drift angle [deg], to starboard positive"),
         Coverage("rudder_rpm", "Rudder and revolutions", "Positions where they are measured, else commands.",
                  *_time_in(S[:, N], delta, dt), "revolutions [rpm]", "rudder angle [deg], to starboard positive"),
-        Coverage("headings", "Headings", f"95 % of them lie within {np.rad2deg(s.heading_arc()):.0f} deg.", dt * headings, sectors, np.zeros(0)),
+        Coverage("headings", "Headings", f"95 % of them lie within {np.rad2deg(s.heading_arc()):.0f} deg.",
+            dt * headings, sectors, np.zeros(0)),
         Coverage("yaw_speed", "Yaw rate and speed", "", *_time_in(speed, np.rad2deg(S[:, R]), dt),
                  "speed [m/s], astern negative", "yaw rate [deg/s]"),
     ]  # fmt: skip
     if S[:, F_B:].any():
         used = (S[:, F_B] != 0.0) | (S[:, F_S] != 0.0)
-        found.append(Coverage("thrusters", "Thrusters", f"The {100 * np.mean(used):.1f} % of the time that one of them pushes.",
-                              *_time_in(1e-3 * S[used, F_B], 1e-3 * S[used, F_S], dt), "bow thruster [kN]", "stern thruster [kN]"))  # fmt: skip
+        found.append(Coverage("thrusters", "Thrusters",
+                f"The {100 * np.mean(used):.1f} % of the time that one of "
+                "them pushes.",
+                              *_time_in(1e-3 * S[used, F_B], 1e-3 * S[used, F_S], dt), "bow thruster [kN]",
+                              "stern thruster [kN]"))  # fmt: skip
     wind, wind_from = s.environment("wind_speed"), s.environment("wind_from")
     if wind is not None and wind_from is not None:
         bow = np.rad2deg((wind_from - S[:, PSI] + np.pi) % (2 * np.pi) - np.pi)
         found.append(Coverage("wind", "True wind", "Where it comes from, seen from the bow.",
-                              *_time_in(bow, wind, dt), "from [deg], over starboard positive", "wind speed [m/s]"))  # fmt: skip
+                              *_time_in(bow, wind, dt), "from [deg], over starboard positive",
+                              "wind speed [m/s]"))  # fmt: skip
     return found
 
 
@@ -111,7 +122,14 @@ def _rose(axes: Any, covered: Coverage) -> None:
     """The time in every sector of heading, north up and clockwise."""
     axes.set_theta_zero_location("N")
     axes.set_theta_direction(-1)
-    axes.bar(covered.x[:-1], covered.seconds, width=2 * np.pi / len(covered.seconds), align="edge", color="#0072B2", alpha=0.8)
+    axes.bar(
+        covered.x[:-1],
+        covered.seconds,
+        width=2 * np.pi / len(covered.seconds),
+        align="edge",
+        color="#0072B2",
+        alpha=0.8,
+    )
     axes.set_xticks(np.deg2rad([0, 90, 180, 270]), ["north", "east", "south", "west"])
     most = float(covered.seconds.max())
     axes.set_yticks([0.5 * most, most], [f"{0.5 * most / 60.0:.2g} min", f"{most / 60.0:.2g} min"], fontsize=8)

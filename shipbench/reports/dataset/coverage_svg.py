@@ -1,4 +1,5 @@
-"""What a data set covers as drawings of a page: SVG in the colours of its style sheet, so that they are read in light and dark."""
+"""What a data set covers as drawings of a page: SVG in the colours of its style sheet, so that they are read in light
+and dark."""
 
 from __future__ import annotations
 
@@ -13,16 +14,20 @@ WIDTH, HEIGHT = 430.0, 330.0
 _LEVELS = 5
 STYLE = """
 .covered { display: grid; gap: 0 1.2rem; grid-template-columns: repeat(auto-fill, minmax(min(100%, 22rem), 1fr)); }
-.covered h3 { margin-top: 1.2rem; } .levels { display: block; } .levels span { white-space: nowrap; margin-right: .5rem; }
-.level { fill: var(--c0); stroke: none; } .l0 { fill-opacity: .25; } .l1 { fill-opacity: .42; } .l2 { fill-opacity: .6; }
-.l3 { fill-opacity: .8; } .l4 { fill-opacity: 1; } .zero { stroke: var(--dim); stroke-width: 1; } .ring { fill: none; stroke: var(--line); }
+.covered h3 { margin-top: 1.2rem; } .levels { display: block; }
+.levels span { white-space: nowrap; margin-right: .5rem; }
+.level { fill: var(--c0); stroke: none; } .l0 { fill-opacity: .25; } .l1 { fill-opacity: .42; }
+.l2 { fill-opacity: .6; }
+.l3 { fill-opacity: .8; } .l4 { fill-opacity: 1; } .zero { stroke: var(--dim); stroke-width: 1; }
+.ring { fill: none; stroke: var(--line); }
 .halo { paint-order: stroke; stroke: var(--paper); stroke-width: 3; }
 """
 """Rules of the classes that the drawings use beside those of the common style sheet."""
 
 
 def svg(covered: Coverage, dt: float) -> tuple[str, list[str]]:
-    """The content of an SVG element (WIDTH x HEIGHT), and the times that its levels of colour stand for (none for headings).
+    """The content of an SVG element (WIDTH x HEIGHT), and the times that its levels of colour stand for (none for
+    headings).
 
     `dt` [s] is the least time of the scale.
     """
@@ -39,7 +44,8 @@ def _cells(covered: Coverage, dt: float) -> tuple[str, list[str]]:
     parts = [axes.grid(covered.xlabel, covered.ylabel)]
     for k in range(_LEVELS):
         cells = "".join(
-            f"M{px[i]:.1f} {py[j]:.1f}H{px[i + 1]:.1f}V{py[j + 1]:.1f}H{px[i]:.1f}z" for i, j in np.argwhere((seconds > 0) & (level == k))
+            f"M{px[i]:.1f} {py[j]:.1f}H{px[i + 1]:.1f}V{py[j + 1]:.1f}H{px[i]:.1f}z"
+            for i, j in np.argwhere((seconds > 0) & (level == k))
         )
         parts += [f'<path class="level l{k}" d="{cells}"/>'] if cells else []
     if x[0] < 0.0 < x[-1]:
@@ -59,12 +65,23 @@ def _rose(covered: Coverage) -> str:
         if time > 0:
             r = radius * time / most
             (ax, ay), (bx, by) = ((middle + r * np.sin(angle), below - r * np.cos(angle)) for angle in (a, b))
-            parts.append(f'<path class="level l3" d="M{middle:g} {below:g}L{ax:.1f} {ay:.1f}A{r:.1f} {r:.1f} 0 0 1 {bx:.1f} {by:.1f}z"/>')
-    places = (("north", 0.0, -radius - 12.0), ("south", 0.0, radius + 22.0), ("east", radius + 24.0, 4.0), ("west", -radius - 24.0, 4.0))
+            parts.append(
+                f'<path class="level l3" d="M{middle:g} {below:g}L{ax:.1f} {ay:.1f}A{r:.1f} {r:.1f} 0 0 1 {bx:.1f} '
+                f'{by:.1f}z"/>'
+            )
+    places = (
+        ("north", 0.0, -radius - 12.0),
+        ("south", 0.0, radius + 22.0),
+        ("east", radius + 24.0, 4.0),
+        ("west", -radius - 24.0, 4.0),
+    )
     parts += [f'<text class="x" x="{middle + dx:g}" y="{below + dy:g}">{name}</text>' for name, dx, dy in places]
     at = np.sin(np.pi / 4)  # beside the rings, between two names
     parts += [
-        f'<text class="halo" x="{middle + part * radius * at + 3:.1f}" y="{below - part * radius * at - 3:.1f}">{part * most / 60.0:.2g} min</text>'
+        (
+            f'<text class="halo" x="{middle + part * radius * at + 3:.1f}" '
+            f'y="{below - part * radius * at - 3:.1f}">{part * most / 60.0:.2g} min</text>'
+        )
         for part in (0.5, 1.0)
     ]
     return "".join(parts)

@@ -1,4 +1,5 @@
-"""Files of `data check`: one page, one document, the lines for dataset.toml, one picture for each finding that has evidence to look at."""
+"""Files of `data check`: one page, one document, the lines for dataset.toml, one picture for each finding that has
+evidence to look at."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ def check_document(recording: Recording, findings: Sequence[Finding]) -> dict[st
     """Facts of the data set, findings, and all lines for dataset.toml together."""
     lines = laid(recording.given, findings)
     return dataset_facts(recording.dataset) | {
-        "findings": [f.as_json() for f in findings], "lines": toml_line(lines.changed), "contradictions": list(lines.refused),
+        "findings": [f.as_json() for f in findings], "lines": toml_line(lines.changed),
+        "contradictions": list(lines.refused),
     }  # fmt: skip
 
 
@@ -41,11 +43,16 @@ def write_findings(recording: Recording, findings: Sequence[Finding], folder: Pa
         folder.mkdir(parents=True, exist_ok=True)
         for old in folder.glob("[0-9][0-9]-*.png"):
             old.unlink()
-        written = [write_text(folder / "check.html", page), write_text(folder / "findings.json", json.dumps(document, indent=1, default=str) + "\n")]
+        written = [
+            write_text(folder / "check.html", page),
+            write_text(folder / "findings.json", json.dumps(document, indent=1, default=str) + "\n"),
+        ]
         written.append(write_text(folder / "dataset_lines.toml", document["lines"] + "\n"))
         for number, finding in enumerate(findings, 1):
             if finding.picture is not None:
-                written.append(_draw(finding.picture, folder / f"{number:02d}-{file_name(finding.kind.replace(' ', '_'))}.png"))
+                written.append(
+                    _draw(finding.picture, folder / f"{number:02d}-{file_name(finding.kind.replace(' ', '_'))}.png")
+                )
     except OSError as error:
         raise InputError(f"cannot write to {folder}: {error.strerror}. Give a folder that can be written.") from None
     return written
@@ -57,7 +64,15 @@ def _draw(picture: Picture, path: Path) -> Path:
     figure = new_figure(8.0, 4.5)
     axes = figure.add_subplot()
     for i, curve in enumerate(picture.curves):
-        axes.plot(curve.x, curve.y, curve.style, color=_COLOURS[i % len(_COLOURS)], label=plain(curve.label), markersize=4, linewidth=1.2)
+        axes.plot(
+            curve.x,
+            curve.y,
+            curve.style,
+            color=_COLOURS[i % len(_COLOURS)],
+            label=plain(curve.label),
+            markersize=4,
+            linewidth=1.2,
+        )
     axes.set(title=plain(picture.title), xlabel=picture.xlabel, ylabel=picture.ylabel)
     axes.grid(alpha=0.3)
     axes.legend()

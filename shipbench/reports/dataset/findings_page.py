@@ -1,4 +1,5 @@
-"""The page of `data check`: verdict, findings with the lines that correct them, and the runs concerned as linked plots."""
+"""The page of `data check`: verdict, findings with the lines that correct them, and the runs concerned as linked
+plots."""
 
 from __future__ import annotations
 
@@ -42,14 +43,18 @@ def check_page(recording: Recording, findings: Sequence[Finding], document: dict
     plots = recorded_plots(recording.dataset, {name: runs[name] for name in runs if name in shown}, notes, start)
     return render_page(
         "check.html.j2", title=f"Data check: {recording.dataset.name}", dataset=recording.dataset.name, command=command,
-        tiles=_tiles(recording, findings, len(runs)), plots=True, style=_STYLE, findings=[_row(f, runs) for f in findings],
-        lines=document["lines"], contradictions=document["contradictions"], tracks=plots, which=_which(shown, set(concerned), len(runs)),
-        facts=fact_lines({key: value for key, value in document.items() if key not in ("findings", "lines", "contradictions")}),
+        tiles=_tiles(recording, findings, len(runs)), plots=True, style=_STYLE,
+        findings=[_row(f, runs) for f in findings],
+        lines=document["lines"], contradictions=document["contradictions"], tracks=plots,
+        which=_which(shown, set(concerned), len(runs)),
+        facts=fact_lines({key: value for key,
+                value in document.items() if key not in ("findings", "lines", "contradictions")}),
     )  # fmt: skip
 
 
 def _chosen(findings: Sequence[Finding], names: Sequence[str]) -> list[str]:
-    """Runs to draw: of each finding in turn its next one, then the others where a finding concerns all runs or there is none; RUNS at most."""
+    """Runs to draw: of each finding in turn its next one, then the others where a finding concerns all runs or there is
+    none; RUNS at most."""
     known = set(names)
     turns = zip_longest(*([name for name in f.runs if name in known] for f in findings))
     chosen = [name for turn in turns for name in turn if name is not None]
@@ -63,7 +68,10 @@ def _which(shown: Sequence[str], concerned: set[str], total: int) -> str:
     if not concerned:
         return f"{drawn}, the first of the data set. No finding concerns a single run."
     missing = len(concerned - set(shown))
-    named = f"{len(concerned)} run{'s have' if len(concerned) != 1 else ' has'} a finding of {'their' if len(concerned) != 1 else 'its'} own"
+    named = (
+        f"{len(concerned)} run{'s have' if len(concerned) != 1 else ' has'} a finding of "
+        f"{'their' if len(concerned) != 1 else 'its'} own"
+    )
     return f"{drawn}. {named}" + (f"; {missing} of them are not drawn (at most {RUNS} on a page)." if missing else ".")
 
 
@@ -82,9 +90,16 @@ def _tiles(recording: Recording, findings: Sequence[Finding], runs: int) -> list
 
 def _row(finding: Finding, runs: dict[str, list[Run]]) -> dict[str, Any]:
     names, more = finding.runs[:_NAMED], len(finding.runs) - _NAMED
-    where = ", ".join(names) + (f" and {more} more" if more > 0 else "") if names else "all runs" if len(runs) > 1 else next(iter(runs))
+    where = (
+        ", ".join(names) + (f" and {more} more" if more > 0 else "")
+        if names
+        else "all runs"
+        if len(runs) > 1
+        else next(iter(runs))
+    )
     return {
-        "level": finding.severity, "by": SEVERITIES.index(finding.severity), "kind": finding.kind, "channels": ", ".join(finding.channels),
+        "level": finding.severity, "by": SEVERITIES.index(finding.severity), "kind": finding.kind,
+        "channels": ", ".join(finding.channels),
         "text": finding.text, "where": where, "line": finding.line, "todo": finding.todo,
         "evidence": _evidence(finding.picture) if finding.picture is not None else None,
     }  # fmt: skip
@@ -111,7 +126,11 @@ def _evidence(picture: Picture) -> dict[str, Any] | None:
             parts.append(f'<path class="dots {colour}" d="{dots}"/>')
         if set(picture.curves[i].style) & set("-:"):
             parts.append(f'<path class="line {colour}" d="{axes.line(x, y)}"/>')
-    return {"title": picture.title, "svg": "".join(parts), "curves": [(i % COLOURS, c.label) for i, c in enumerate(picture.curves)]}
+    return {
+        "title": picture.title,
+        "svg": "".join(parts),
+        "curves": [(i % COLOURS, c.label) for i, c in enumerate(picture.curves)],
+    }
 
 
 def _span(values: np.ndarray) -> tuple[float, float]:

@@ -1,6 +1,8 @@
-"""The evidence of a diagnosis as drawings of a page: SVG in the colours of its style sheet, so that they are read in light and dark.
+"""The evidence of a diagnosis as drawings of a page: SVG in the colours of its style sheet, so that they are read in
+light and dark.
 
-What belongs to the plain or the extended model carries `data-m`, by which the page shows and hides it. No name from the data enters a drawing.
+What belongs to the plain or the extended model carries `data-m`, by which the page shows and hides it. No name from the
+data enters a drawing.
 """
 
 from __future__ import annotations
@@ -12,7 +14,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ...diagnosis.evaluation.dependence import AXES, UNITS, at_knots, curve, samples_of
-from ...diagnosis.evaluation.residuals import FORCE_UNITS, INPUTS, LAGS, RESIDUALS, ErrorTables, Slice, correlogram, slices, squared_error
+from ...diagnosis.evaluation.residuals import (
+    FORCE_UNITS,
+    INPUTS,
+    LAGS,
+    RESIDUALS,
+    ErrorTables,
+    Slice,
+    correlogram,
+    slices,
+    squared_error,
+)
 from ...diagnosis.result import Trace
 from ...leaderboard.pictures import growth
 from ...leaderboard.series import Series
@@ -28,8 +40,10 @@ _TICKS = {"heading": (0.0, 90.0, 180.0, 270.0, 360.0)}
 _SHOWN = 6
 _LEVELS = 4
 STYLE = """
-svg .dots { stroke-width: 4; stroke-linecap: round; stroke-opacity: .4; } .zero { stroke: var(--dim); stroke-width: 1; fill: none; }
-.ring { fill: var(--paper); stroke-width: 2; } .join { stroke: var(--line); stroke-width: 1.5; } .stem { stroke-width: 5; }
+svg .dots { stroke-width: 4; stroke-linecap: round; stroke-opacity: .4; }
+.zero { stroke: var(--dim); stroke-width: 1; fill: none; }
+.ring { fill: var(--paper); stroke-width: 2; } .join { stroke: var(--line); stroke-width: 1.5; }
+.stem { stroke-width: 5; }
 .bound { fill: var(--ink); fill-opacity: .12; stroke: none; } .place { stroke-width: 5; stroke-linecap: round; }
 .l0 { stroke-opacity: .2; } .l1 { stroke-opacity: .45; } .l2 { stroke-opacity: .7; } .l3 { stroke-opacity: 1; }
 """
@@ -45,14 +59,17 @@ class Drawing(NamedTuple):
 
 
 def error_growth(trace: Trace, extended: bool) -> list[Drawing]:
-    """Position and heading error against the time of prediction: the median of all segments and the middle half of them."""
+    """Position and heading error against the time of prediction: the median of all segments and the middle half of
+    them."""
     models = [str(i) for i in range(len(rollouts(trace, extended)))]
     with np.errstate(all="ignore"):
         squares = [squared_error(trace, p)[0] for p in rollouts(trace, extended)]
     known = np.all([np.isfinite(e[..., :2]).any(axis=0).all(axis=-1) for e in squares], axis=0)
     if not known.any():
         return []
-    errors = {m: (np.sqrt(e[:, known, 0]), np.rad2deg(np.sqrt(e[:, known, 1]))) for m, e in zip(models, squares, strict=True)}
+    errors = {
+        m: (np.sqrt(e[:, known, 0]), np.rad2deg(np.sqrt(e[:, known, 1]))) for m, e in zip(models, squares, strict=True)
+    }
     series = Series(trace.t[known], [], errors, [])
     kinds = (("Position error", "ED [m]"), ("Heading error", "|heading error| [deg]"))
     return [Drawing(title, growth(series, models, i, label)) for i, (title, label) in enumerate(kinds)]
@@ -61,16 +78,30 @@ def error_growth(trace: Trace, extended: bool) -> list[Drawing]:
 def error_slices(trace: Trace, extended: bool) -> list[Drawing]:
     """Root mean square position error against each variable; those with the greatest contrast first."""
     scale = float(squared_error(trace, trace.before)[1][0])
-    found = [slices(trace, np.concatenate([p[..., :2], trace.measured[..., 2:]], axis=-1)) for p in rollouts(trace, extended)]
-    elsewhere = {"horizon", "run"} | ({"time"} if not np.any(trace.start) else set())  # the growth of the error, the errors of every run
-    by_contrast = sorted((v for v, rows in found[0].items() if len(rows) > 1 and v not in elsewhere), key=lambda v: -_contrast(found[0][v]))
+    found = [
+        slices(trace, np.concatenate([p[..., :2], trace.measured[..., 2:]], axis=-1)) for p in rollouts(trace, extended)
+    ]
+    elsewhere = {"horizon", "run"} | (
+        {"time"} if not np.any(trace.start) else set()
+    )  # the growth of the error, the errors of every run
+    by_contrast = sorted(
+        (v for v, rows in found[0].items() if len(rows) > 1 and v not in elsewhere),
+        key=lambda v: -_contrast(found[0][v]),
+    )
     drawn = []
     for name in by_contrast[:_SHOWN]:
         rows = [by[name] for by in found if by.get(name)]
         top = scale * max(r.rms for part in rows for r in part)
         axes = Axes((rows[0][0].low, rows[0][-1].high), (0.0, 1.08 * max(top, _LEAST)), WIDTH, HEIGHT)
-        lines = "".join(f'<path data-m="{i}" {stroke(i)} d="{_steps(axes, part, scale)}"/>' for i, part in enumerate(rows))
-        drawn.append(Drawing(f"Position error against {name}", axes.grid(_axis(name), "RMS position error [m]", xticks=_TICKS.get(name, ())) + lines))
+        lines = "".join(
+            f'<path data-m="{i}" {stroke(i)} d="{_steps(axes, part, scale)}"/>' for i, part in enumerate(rows)
+        )
+        drawn.append(
+            Drawing(
+                f"Position error against {name}",
+                axes.grid(_axis(name), "RMS position error [m]", xticks=_TICKS.get(name, ())) + lines,
+            )
+        )
     return drawn
 
 
@@ -95,7 +126,8 @@ def _axis(name: str) -> str:
 
 
 def gain_per_run(rows: Sequence[tuple[str, float, float]]) -> Drawing:
-    """Held-out position error of every run before (ring) and after (dot), from the greatest of the plain model to the least."""
+    """Held-out position error of every run before (ring) and after (dot), from the greatest of the plain model to the
+    least."""
     order = sorted(((b, a) for _, b, a in rows), key=lambda row: -row[0])
     top = max((max(row) for row in order), default=1.0)
     axes = Axes((0.0, len(order) + 1.0), (0.0, 1.08 * max(top, _LEAST)), WIDTH, HEIGHT)
@@ -103,13 +135,20 @@ def gain_per_run(rows: Sequence[tuple[str, float, float]]) -> Drawing:
     for i, (before, after) in enumerate(order):
         x, low, high = (f"{float(v):.1f}" for v in (axes.px(i + 1.0), axes.py(after), axes.py(before)))
         parts.append(f'<path class="join" d="M{x} {high}V{low}"/>')
-        parts.append(f'<circle data-m="0" class="ring c0" cx="{x}" cy="{high}" r="4"/><circle data-m="1" class="dot c1" cx="{x}" cy="{low}" r="4"/>')
-    return Drawing("Position error of every run", "".join(parts), "Ring: plain physics. Dot: extended model. No run was used to fit its own models.")
+        parts.append(
+            f'<circle data-m="0" class="ring c0" cx="{x}" cy="{high}" r="4"/><circle data-m="1" class="dot c1" '
+            f'cx="{x}" cy="{low}" r="4"/>'
+        )
+    return Drawing(
+        "Position error of every run",
+        "".join(parts),
+        "Ring: plain physics. Dot: extended model. No run was used to fit its own models.",
+    )
 
 
 def missing_forces(trace: Trace, tables: ErrorTables, extended: bool, level: float) -> list[Drawing]:
-    """The force that the plain model lacks, per unit of mass, against the variable that explains most of it; axes where this may be chance
-    (p > `level`) are left out."""
+    """The force that the plain model lacks, per unit of mass, against the variable that explains most of it; axes where
+    this may be chance (p > `level`) are left out."""
     values = at_knots(trace)
     found = []
     for j, axis in enumerate(AXES):
@@ -181,12 +220,16 @@ def over_places(trace: Trace, axes: Sequence[str]) -> list[Drawing]:
             for colour, side in ((0, value < 0), (1, value >= 0)):
                 at = "".join(
                     f"M{a:.1f} {b:.1f}h0"
-                    for a, b in zip(*(f((east, north)[i][side & (level == k)]) for i, f in enumerate((plot.px, plot.py))), strict=True)
+                    for a, b in zip(
+                        *(f((east, north)[i][side & (level == k)]) for i, f in enumerate((plot.px, plot.py))),
+                        strict=True,
+                    )
                 )
                 parts += [f'<path class="place c{colour} l{k}" d="{at}"/>'] if at else []
         step = reach / _LEVELS
         caption = (
-            f"Blue: negative. Orange: positive. Each of the {_LEVELS} shades stands for {step:.2g} {unit}; the darkest begins at {reach - step:.2g}."
+            f"Blue: negative. Orange: positive. Each of the {_LEVELS} shades stands for {step:.2g} {unit}; "
+            f"the darkest begins at {reach - step:.2g}."
         )
         found.append(Drawing(f"Missing {AXES[j]} force over the places [{unit}]", "".join(parts), caption))
     return found
@@ -216,6 +259,11 @@ def _stems(rho: np.ndarray, bound: np.ndarray, first: int) -> str:
     reach = min(1.15 * max(float(np.max(np.abs(rho))), float(np.max(bound)), 1e-3), 1.0)
     axes = Axes((first - 0.6, LAGS + 0.6), (-reach, reach), WIDTH, HEIGHT)
     zero, bound = float(axes.py(0.0)), np.minimum(bound, reach)
-    stems = "".join(f"M{x:.1f} {zero:.1f}V{y:.1f}" for x, y in zip(axes.px(lags), axes.py(np.clip(rho, -reach, reach)), strict=True))
+    stems = "".join(
+        f"M{x:.1f} {zero:.1f}V{y:.1f}" for x, y in zip(axes.px(lags), axes.py(np.clip(rho, -reach, reach)), strict=True)
+    )
     grid = axes.grid("lag [samples]", "correlation")
-    return f'{grid}<path class="bound" d="{axes.band(lags, -bound, bound)}"/><path class="stem c0" d="{stems}"/>{_zero(axes)}'
+    return (
+        f'{grid}<path class="bound" d="{axes.band(lags, -bound, bound)}"/><path class="stem c0" '
+        f'd="{stems}"/>{_zero(axes)}'
+    )

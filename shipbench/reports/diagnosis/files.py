@@ -13,7 +13,8 @@ from .text import in_words, summary_lines
 
 
 def write_diagnosis(d: Diagnosis, folder: Path) -> list[Path]:
-    """Write diagnosis.json, summary.txt and report.html into `folder` (made if missing), each atomically; returns the paths."""
+    """Write diagnosis.json, summary.txt and report.html into `folder` (made if missing), each atomically; returns the
+    paths."""
     content = json.dumps(document(d), indent=1, allow_nan=False)
     return [
         write_text(folder / "diagnosis.json", content + "\n"),

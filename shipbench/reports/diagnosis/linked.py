@@ -24,7 +24,11 @@ _SAMPLES = 25_000
 
 def changed(d: Diagnosis) -> bool:
     """Whether there is an extended model to draw beside the plain one."""
-    return d.trace is not None and d.verdict == "found" and not np.array_equal(d.trace.before, d.trace.after, equal_nan=True)
+    return (
+        d.trace is not None
+        and d.verdict == "found"
+        and not np.array_equal(d.trace.before, d.trace.after, equal_nan=True)
+    )
 
 
 def rollouts(trace: Trace, extended: bool) -> list[np.ndarray]:
@@ -37,11 +41,14 @@ def position_errors(trace: Trace, predicted: np.ndarray) -> np.ndarray:
     with np.errstate(all="ignore"):
         error = ed(true=trace.measured, pred=predicted)
     known = np.isfinite(error)
-    return np.where(known.any(axis=1), np.where(known, error, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1), np.nan)
+    return np.where(
+        known.any(axis=1), np.where(known, error, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1), np.nan
+    )
 
 
 def fits(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
-    """Fit of every motion signal (6,) [%] over the time steps at which measurement and prediction (K + 1, 6) are known."""
+    """Fit of every motion signal (6,) [%] over the time steps at which measurement and prediction (K + 1, 6) are
+    known."""
     known = np.isfinite(measured) & np.isfinite(predicted)
     channels = known.any(axis=0)
     steps = known[:, channels].all(axis=1)
@@ -54,7 +61,8 @@ def fits(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
 
 
 def chosen_segments(trace: Trace, extended: bool) -> list[int]:
-    """Segments to draw, from the greatest error of the plain model to the least: all, or `RUNS` evenly spread with the one that gains least."""
+    """Segments to draw, from the greatest error of the plain model to the least: all, or `RUNS` evenly spread with the
+    one that gains least."""
     before, after = (position_errors(trace, p) for p in (trace.before, trace.after))
     order = [int(b) for b in np.argsort(-np.nan_to_num(before, nan=-1.0), kind="stable")]
     if len(order) <= RUNS:
@@ -70,7 +78,9 @@ def rollout_plots(trace: Trace, extended: bool) -> dict[str, Any]:
     """Tracks and time histories of the chosen segments; the one with the greatest error is shown first."""
     segments = chosen_segments(trace, extended)
     predictions = rollouts(trace, extended)
-    signals = [s for s in SIGNALS if s[0] not in (F_B, F_S) or np.any(np.nan_to_num(trace.inputs[..., s[0] - ACTUATORS.start]))]
+    signals = [
+        s for s in SIGNALS if s[0] not in (F_B, F_S) or np.any(np.nan_to_num(trace.inputs[..., s[0] - ACTUATORS.start]))
+    ]
     motions = [s for s in signals if s[0] < ACTUATORS.start]
     columns = [EAST, NORTH, *(q for _, _, q in signals), ERROR]
     errors = [position_errors(trace, p) for p in predictions]
@@ -83,8 +93,14 @@ def rollout_plots(trace: Trace, extended: bool) -> dict[str, Any]:
         for predicted in predictions:
             close = near(predicted[b, : len(S)], S)[kept]
             lines.append(shown(close, S[kept], motions) | {ERROR.name: ed(true=S[kept], pred=close)})
-        cells = [[_error(e[b]), *_fits(fits(trace.measured[b], p[b]))] for e, p in zip(errors, predictions, strict=True)]
-        runs.append(linked_run(_name(trace, b), " to ".join(_error(e[b]) for e in errors), trace.t[kept], columns, lines, cells=cells))
+        cells = [
+            [_error(e[b]), *_fits(fits(trace.measured[b], p[b]))] for e, p in zip(errors, predictions, strict=True)
+        ]
+        runs.append(
+            linked_run(
+                _name(trace, b), " to ".join(_error(e[b]) for e in errors), trace.t[kept], columns, lines, cells=cells
+            )
+        )
     names = [Line("measured", "measured"), *(Line(MODELS[i], i) for i in range(len(predictions)))]
     return linked_plots(columns, names, [ERROR.name, *(q.name for _, _, q in signals)], runs, ("east", "north"))
 

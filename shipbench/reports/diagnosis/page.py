@@ -1,4 +1,5 @@
-"""The page of `diagnose`: verdict, causes with the line that corrects each, measured and predicted runs as linked plots, the evidence."""
+"""The page of `diagnose`: verdict, causes with the line that corrects each, measured and predicted runs as linked
+plots, the evidence."""
 
 from __future__ import annotations
 
@@ -19,16 +20,31 @@ from . import evidence as svg
 from . import tables as tables
 from .linked import FITS, MODELS, changed, position_errors, rollout_plots, rollouts
 from .remains import remaining_sentences
-from .text import estimate, figure, force_words, gain_share, gain_words, grade, headline, in_words, next_command, strength
+from .text import (
+    estimate,
+    figure,
+    force_words,
+    gain_share,
+    gain_words,
+    grade,
+    headline,
+    in_words,
+    next_command,
+    strength,
+)
 
 _STYLE = (
     svg.STYLE
     + """
-.cause { border-top: 1px solid var(--line); padding-bottom: .6rem; } .cause:first-of-type { border-top: 0; } .cause h3 { margin: .9rem 0 .4rem; }
-.cause dl { margin: 0; } .cause dt { color: var(--dim); font-size: .86rem; margin-top: .45rem; } .cause dd { margin: 0; max-width: 46rem; }
-.aside { background: var(--soft); border-left: .25rem solid var(--accent); padding: .2rem .9rem .5rem; margin-top: .6rem; }
+.cause { border-top: 1px solid var(--line); padding-bottom: .6rem; } .cause:first-of-type { border-top: 0; }
+.cause h3 { margin: .9rem 0 .4rem; }
+.cause dl { margin: 0; } .cause dt { color: var(--dim); font-size: .86rem; margin-top: .45rem; }
+.cause dd { margin: 0; max-width: 46rem; }
+.aside { background: var(--soft); border-left: .25rem solid var(--accent);
+  padding: .2rem .9rem .5rem; margin-top: .6rem; }
 .aside pre { margin: .3rem 0 0; padding: .3rem 0; } .aside button.copy { background: var(--paper); }
-@media (min-width: 50rem) { .beside { display: grid; gap: 0 1.5rem; grid-template-columns: minmax(0, 1fr) minmax(0, 24rem); align-items: start; } }
+@media (min-width: 50rem) { .beside { display: grid; gap: 0 1.5rem;
+  grid-template-columns: minmax(0, 1fr) minmax(0, 24rem); align-items: start; } }
 .drawn h4 { font-size: .95rem; margin: .8rem 0 .2rem; }
 """
 )
@@ -38,11 +54,16 @@ def diagnosis_page(d: Diagnosis) -> str:
     """The HTML of a diagnosis; it needs no network and no other file."""
     return render_page(
         "diagnosis.html.j2", title=f"Diagnosis: {d.dataset}", dataset=d.dataset,
-        command=f"shipbench diagnose {shlex.quote(d.spec or d.dataset)}", lead=headline(d), tiles=_tiles(d), plots=d.trace is not None, style=_STYLE,
-        warnings=d.warnings, causes=[_cause(c, d) for c in d.causes], instead=_no_cause(d), gain=_gain_of_all(d), extended_model=d.extended_model,
-        compare=next_command(d), remains=remaining_sentences(d), wrong=[_wrong(w.channel, w.share_of_error, w.when) for w in d.what_is_wrong],
-        candidates=table_cells(tables.candidates(d)), limits=table_cells(tables.detection_limits(d)), found=d.verdict == "found",
-        gains=table_cells(tables.gains(d)) if d.gain_per_run else None, gain_drawing=svg.gain_per_run(d.gain_per_run) if d.gain_per_run else None,
+        command=f"shipbench diagnose {shlex.quote(d.spec or d.dataset)}", lead=headline(d), tiles=_tiles(d),
+        plots=d.trace is not None, style=_STYLE,
+        warnings=d.warnings, causes=[_cause(c, d) for c in d.causes], instead=_no_cause(d), gain=_gain_of_all(d),
+        extended_model=d.extended_model,
+        compare=next_command(d), remains=remaining_sentences(d),
+        wrong=[_wrong(w.channel, w.share_of_error, w.when) for w in d.what_is_wrong],
+        candidates=table_cells(tables.candidates(d)), limits=table_cells(tables.detection_limits(d)),
+        found=d.verdict == "found",
+        gains=table_cells(tables.gains(d)) if d.gain_per_run else None,
+        gain_drawing=svg.gain_per_run(d.gain_per_run) if d.gain_per_run else None,
         size=f"{svg.WIDTH:g} {svg.HEIGHT:g}", fingerprint=d.fingerprint, seconds=d.seconds, **_evidence(d),
     )  # fmt: skip
 
@@ -58,24 +79,34 @@ def _tiles(d: Diagnosis) -> list[Tile]:
 
 def _verdict(d: Diagnosis) -> Tile:
     if d.verdict == "found":
-        return Tile("Verdict", f"{len(d.causes)} cause{'s' * (len(d.causes) != 1)} found", ", ".join(c.effect for c in d.causes))
+        return Tile(
+            "Verdict", f"{len(d.causes)} cause{'s' * (len(d.causes) != 1)} found", ", ".join(c.effect for c in d.causes)
+        )
     if d.verdict == "unknown":
         return Tile("Verdict", "Unknown cause", what_it_is(d.unknown) if d.unknown else "the reasons are below")
-    return Tile("Verdict", "No cause found", "the warnings below give the reason" if d.warnings else "only ordinary differences between ships")
+    return Tile(
+        "Verdict",
+        "No cause found",
+        "the warnings below give the reason" if d.warnings else "only ordinary differences between ships",
+    )
 
 
 def _error(d: Diagnosis) -> Tile:
     """Held-out error of the plain and of the extended model, or that it was not measured."""
     if d.gain is not None:
         return Tile(
-            "Held-out position error", f"{figure(d.gain.before)} m to {figure(d.gain.after)} m", f"plain to extended model: {gain_share(d.gain)}"
+            "Held-out position error",
+            f"{figure(d.gain.before)} m to {figure(d.gain.after)} m",
+            f"plain to extended model: {gain_share(d.gain)}",
         )
     if d.trace is None:
         return Tile("Held-out position error", "not measured")
     errors = [position_errors(d.trace, p) for p in rollouts(d.trace, changed(d))]
     means = [f"{figure(float(np.nanmean(e)))} m" for e in errors if np.isfinite(e).any()]
     return Tile(
-        "Held-out position error", "not measured", "on the runs of the fit: " + " to ".join(means) + (", plain to extended model" * (len(means) > 1))
+        "Held-out position error",
+        "not measured",
+        "on the runs of the fit: " + " to ".join(means) + (", plain to extended model" * (len(means) > 1)),
     )
 
 
@@ -87,24 +118,34 @@ def _sureness(d: Diagnosis) -> Tile:
             return Tile("Evidence", "Certain", "an error of the record itself")
         least = min(known, key=lambda c: c.score)
         note = f"log Bayes factor {0.5 * least.score:.0f}" + (f", {least.support}" if least.support else "")
-        return Tile("Evidence", _capital(grade(least.score)), note + (f" (least: {least.effect})" if len(d.causes) > 1 else ""))
+        return Tile(
+            "Evidence", _capital(grade(least.score)), note + (f" (least: {least.effect})" if len(d.causes) > 1 else "")
+        )
     if d.unknown:
         return Tile("Evidence", _capital(grade(d.unknown["score"])), f"log Bayes factor {0.5 * d.unknown['score']:.0f}")
     scores = [c for c in d.candidates if math.isfinite(c.score)]
     if not scores:
         return Tile("Evidence", "Not sufficient", "no candidate could be compared")
     best = max(scores, key=lambda c: c.score)
-    return Tile("Evidence", "Not sufficient", f"best candidate: {best.effect}, log Bayes factor {0.5 * best.score:.0f}; {best.rejected_because}")
+    return Tile(
+        "Evidence",
+        "Not sufficient",
+        f"best candidate: {best.effect}, log Bayes factor {0.5 * best.score:.0f}; {best.rejected_because}",
+    )
 
 
 def _cause(c: Cause, d: Diagnosis) -> dict[str, Any]:
-    """A cause as the template shows it: texts, its gain where it is the only one, its look-alikes with the trial that separates them."""
+    """A cause as the template shows it: texts, its gain where it is the only one, its look-alikes with the trial that
+    separates them."""
     force = force_words(c.force)
     return {
-        "title": f"{c.rank}. {_capital(in_words(c))}", "sizes": [estimate(c.effect, name, e) for name, e in c.parameters.items()],
-        "force": _capital(force) + "." if force else "", "strength": _capital(strength(c)) + ".", "evidence": c.evidence,
+        "title": f"{c.rank}. {_capital(in_words(c))}",
+        "sizes": [estimate(c.effect, name, e) for name, e in c.parameters.items()],
+        "force": _capital(force) + "." if force else "", "strength": _capital(strength(c)) + ".",
+        "evidence": c.evidence,
         "gain": gain_words(d.gain) if len(d.causes) == 1 and d.gain is not None else "", "line": _lines(c.correction),
-        "rivals": c.confused_with, "trial": _capital(c.separating_manoeuvre.rstrip(".")) + "." if c.separating_manoeuvre else "",
+        "rivals": c.confused_with,
+        "trial": _capital(c.separating_manoeuvre.rstrip(".")) + "." if c.separating_manoeuvre else "",
     }  # fmt: skip
 
 
@@ -152,16 +193,21 @@ def _evidence(d: Diagnosis) -> dict[str, Any]:
         "growth": svg.error_growth(trace, extended), "slices": svg.error_slices(trace, extended), "missing": missing,
         "by_chance": tables.independent(found), "channels": table_cells(tables.channels(trace, found, extended)),
         "dependences": table_cells(tables.dependences(found)),
-        "worst": _worst(found.worst_runs), "white": table_cells(tables.whiteness(found)), "inputs": table_cells(tables.against_inputs(found)),
+        "worst": _worst(found.worst_runs), "white": table_cells(tables.whiteness(found)),
+        "inputs": table_cells(tables.against_inputs(found)),
         "correlations": [*svg.autocorrelations(trace), *svg.cross_correlations(trace, found)],
     }  # fmt: skip
 
 
 def _which(drawn: int, total: int, held_out: bool) -> str:
     some = (
-        f"{drawn} of {total} predictions are drawn (at most {RUNS} on a page), evenly spread" if drawn < total else f"{total} predictions are drawn"
+        f"{drawn} of {total} predictions are drawn (at most {RUNS} on a page), evenly spread"
+        if drawn < total
+        else f"{total} predictions are drawn"
     )
-    fitted = "No model was fitted to the runs that it predicts." if held_out else "Here the models are fitted to all runs."
+    fitted = (
+        "No model was fitted to the runs that it predicts." if held_out else "Here the models are fitted to all runs."
+    )
     return f"{some}, from the greatest error of the plain model to the least. {fitted}"
 
 

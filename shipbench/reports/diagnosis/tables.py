@@ -21,12 +21,17 @@ _SIGNAL = {"heading": PSI, "surge": U, "sway": V, "yaw rate": R}
 
 
 def channels(trace: Trace, tables: ErrorTables, extended: bool) -> Table:
-    """Error of each channel of the open-loop predictions: root mean square, share, fit; of the plain and of the extended model."""
+    """Error of each channel of the open-loop predictions: root mean square, share, fit; of the plain and of the
+    extended model."""
     models = ("plain", "extended")[: 2 if extended else 1]
     three, zero = significant(3), number(0)
     columns = [TableColumn("channel", "channel"), *(TableColumn(f"RMS error, {m}", f"rms_{m}", three) for m in models)]
-    columns += [TableColumn(f"fit, {m} [%]", f"fit_{m}", zero) for m in models] + [TableColumn("share of the error [%]", "share", zero)]
-    rows: list[dict[str, object]] = [{"channel": f"{c} [{CHANNEL_UNITS[c][0]}]", "share": 100.0 * tables.share[c]} for c in CHANNELS]
+    columns += [TableColumn(f"fit, {m} [%]", f"fit_{m}", zero) for m in models] + [
+        TableColumn("share of the error [%]", "share", zero)
+    ]
+    rows: list[dict[str, object]] = [
+        {"channel": f"{c} [{CHANNEL_UNITS[c][0]}]", "share": 100.0 * tables.share[c]} for c in CHANNELS
+    ]
     for model, predicted in zip(models, rollouts(trace, extended), strict=True):
         squares = squared_error(trace, predicted)[0].reshape(-1, len(CHANNELS))
         known = np.isfinite(squares)
@@ -37,7 +42,8 @@ def channels(trace: Trace, tables: ErrorTables, extended: bool) -> Table:
             if channel in _SIGNAL and np.isfinite(fitted[:, _SIGNAL[channel]]).any():
                 rows[i][f"fit_{model}"] = float(np.nanmedian(fitted[:, _SIGNAL[channel]]))
     notes = (
-        "RMS error: root mean square over all time steps of all runs. Fit: NRMSE as in MATLAB's `compare`, median of the runs; 100 % is exact, "
+        "RMS error: root mean square over all time steps of all runs. Fit: NRMSE as in MATLAB's `compare`, median "
+        "of the runs; 100 % is exact, "
         "0 % is no better than the mean.",
         "Share: of the squared errors of the plain model, each divided by the variance of its channel within the runs.",
     )
@@ -59,7 +65,8 @@ def dependences(tables: ErrorTables) -> Table:
                 row |= {axis: 100.0 * found[axis][name].share, f"p_{axis}": found[axis][name].p}
         rows.append(row)
     notes = (
-        f"Share of the variance, less what chance explains. p: probability that the best of all variables reaches this by chance; up to {LEVEL:g} it "
+        "Share of the variance, less what chance explains. p: probability that the best of all variables reaches "
+        f"this by chance; up to {LEVEL:g} it "
         "counts as a dependence.",
     )
     return Table("Variance of the missing force explained by each variable", columns, rows, notes)
@@ -74,7 +81,8 @@ def gains(d: Diagnosis) -> Table:
     """Held-out position error of every run before and after."""
     three = significant(3)
     columns = [
-        TableColumn("run", "run"), TableColumn("plain [m]", "before", three), TableColumn("extended [m]", "after", three),
+        TableColumn("run", "run"), TableColumn("plain [m]", "before", three),
+        TableColumn("extended [m]", "after", three),
         TableColumn("less error [%]", "less", number(0)),
     ]  # fmt: skip
     rows = [
@@ -87,7 +95,8 @@ def gains(d: Diagnosis) -> Table:
 def candidates(d: Diagnosis) -> Table:
     """Every effect that was considered, with its score and the reason why it was named or not."""
     columns = [
-        TableColumn("effect", "effect"), TableColumn("family", "family"), TableColumn("log Bayes factor", "factor", number(1)),
+        TableColumn("effect", "effect"), TableColumn("family", "family"),
+        TableColumn("log Bayes factor", "factor", number(1)),
         TableColumn("p", "p", significant(2)), TableColumn("result", "result"),
     ]  # fmt: skip
     rows = [
@@ -104,26 +113,48 @@ def candidates(d: Diagnosis) -> Table:
 
 def detection_limits(d: Diagnosis) -> Table:
     """The smallest size of each effect that these runs could have shown."""
-    columns = [TableColumn("effect", "effect"), TableColumn("family", "family"), TableColumn("detection limit", "limit")]
+    columns = [
+        TableColumn("effect", "effect"),
+        TableColumn("family", "family"),
+        TableColumn("detection limit", "limit"),
+    ]
     known = [(c, detectable(c)) for c in sorted(d.candidates, key=lambda c: (c.family, c.effect)) if c.detectable]
     rows = [{"effect": c.effect, "family": c.family, "limit": limit} for c, limit in known if limit != "-"]
     never = [c.effect for c, limit in known if limit == "-"]
     notes = (
-        "The smallest effect that these runs could have shown. A larger one would probably have been named. A smaller one may be present.",
-        *([f"These runs cannot show {', '.join(never)}."] if never else []), "Effects that are not listed are looked for in another way.",
+        "The smallest effect that these runs could have shown. A larger one would probably have been named. A "
+        "smaller one may be present.",
+        *([f"These runs cannot show {', '.join(never)}."] if never else []),
+        "Effects that are not listed are "
+        "looked for in another way.",
     )  # fmt: skip
     return Table("Detection limits", columns, rows, notes)
 
 
 def whiteness(tables: ErrorTables) -> Table:
     """Ljung-Box statistic of each residual over its 95 % limit."""
-    columns = [TableColumn("residual", "residual"), TableColumn("Ljung-Box / 95 % limit", "ratio", number(2)), TableColumn("result", "result")]
-    rows = [{"residual": name, "ratio": v, "result": "white" if v <= 1.0 else "not white"} for name, v in tables.white.items()]
+    columns = [
+        TableColumn("residual", "residual"),
+        TableColumn("Ljung-Box / 95 % limit", "ratio", number(2)),
+        TableColumn("result", "result"),
+    ]
+    rows = [
+        {"residual": name, "ratio": v, "result": "white" if v <= 1.0 else "not white"}
+        for name, v in tables.white.items()
+    ]
     return Table("Are the residuals white?", columns, rows)
 
 
 def against_inputs(tables: ErrorTables) -> Table:
     """Pairs of residual and earlier input whose greatest correlation is beyond its 95 % bound."""
-    columns = [TableColumn("residual", "residual"), TableColumn("input", "input"), TableColumn("correlation / 95 % bound", "ratio", number(2))]
+    columns = [
+        TableColumn("residual", "residual"),
+        TableColumn("input", "input"),
+        TableColumn("correlation / 95 % bound", "ratio", number(2)),
+    ]
     beyond = sorted(((v, *pair) for pair, v in tables.inputs.items() if v > 1.0), reverse=True)
-    return Table("Residuals correlated with earlier inputs", columns, [{"residual": n, "input": label, "ratio": v} for v, n, label in beyond])
+    return Table(
+        "Residuals correlated with earlier inputs",
+        columns,
+        [{"residual": n, "input": label, "ratio": v} for v, n, label in beyond],
+    )

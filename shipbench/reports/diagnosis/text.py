@@ -40,17 +40,22 @@ def interval(e: Estimate) -> str:
     known = all(v is not None and math.isfinite(v) for v in e.ci95)
     if not known and e.unit == "1" and e.value is not None and e.value == round(e.value):
         return f"{e.value:.0f}"  # a choice: the number of a run, a side
-    return quantity(e.value, e.unit) + (f" (95 %: {figure(factor * e.ci95[0])} to {figure(factor * e.ci95[1])})" if known else "")
+    return quantity(e.value, e.unit) + (
+        f" (95 %: {figure(factor * e.ci95[0])} to {figure(factor * e.ci95[1])})" if known else ""
+    )
 
 
 def estimate(effect: str, name: str, e: Estimate) -> str:
-    """A parameter of an effect in words: a direction as three digits, a relative change or a share in percent, else its value with unit."""
+    """A parameter of an effect in words: a direction as three digits, a relative change or a share in percent, else its
+    value with unit."""
     part = _effect(effect)
     if e.value is None or not math.isfinite(e.value) or part is None:
         return f"{name} {interval(e)}"
     known = all(v is not None and math.isfinite(v) for v in e.ci95)
     if part.vector is not None and name == part.vector[1]:
-        return f"{name} {_bearing(e.value)}" + (f" (95 %: {_bearing(e.ci95[0])} to {_bearing(e.ci95[1])})" if known else "")
+        return f"{name} {_bearing(e.value)}" + (
+            f" (95 %: {_bearing(e.ci95[0])} to {_bearing(e.ci95[1])})" if known else ""
+        )
     parameter = _parameter(part, name)
     label = f"{parameter.title} {name}" if parameter is not None and parameter.title else name
     if parameter is not None and parameter.relative:
@@ -62,7 +67,8 @@ def estimate(effect: str, name: str, e: Estimate) -> str:
 
 
 def in_words(c: Cause) -> str:
-    """A cause as a noun phrase with its size, such as `a current of 0.36 m/s towards 059°`; the typed name stands beside it where it is not in it."""
+    """A cause as a noun phrase with its size, such as `a current of 0.36 m/s towards 059°`; the typed name stands
+    beside it where it is not in it."""
     part = _effect(c.effect)
     if part is None:
         return c.effect
@@ -126,7 +132,8 @@ def gain_words(g: Gain | None, named: int = 1) -> str:
     all_of_them = "it" if named == 1 else "both" if named == 2 else f"all {named}"
     doubt = "" if low > 0 else " This may be no gain at all." if high > 0 else " The extended model is worse."
     return (
-        f"With {all_of_them}, the {_METRICS.get(g.metric, g.metric)} on held-out runs {'falls' if g.relative >= 0 else 'rises'} from "
+        f"With {all_of_them}, the {_METRICS.get(g.metric, g.metric)} on held-out runs "
+        f"{'falls' if g.relative >= 0 else 'rises'} from "
         f"{figure(g.before)} m to {figure(g.after)} m: {gain_share(g)}.{doubt}"
     )
 
@@ -134,7 +141,11 @@ def gain_words(g: Gain | None, named: int = 1) -> str:
 def gain_share(g: Gain) -> str:
     """The relative gain with its interval and the runs that are better."""
     low, high = g.ci95
-    between = _between(-high, -low, "less", "more") if low <= 0 <= high else "{:.0f} to {:.0f} %".format(*sorted((100 * abs(low), 100 * abs(high))))
+    between = (
+        _between(-high, -low, "less", "more")
+        if low <= 0 <= high
+        else "{:.0f} to {:.0f} %".format(*sorted((100 * abs(low), 100 * abs(high))))
+    )
     share = f"{100 * abs(g.relative):.0f} % {'less' if g.relative >= 0 else 'more'}"
     return f"{share} (95 %: {between}), better in {g.runs_better.replace('/', ' of ')} runs"
 
@@ -151,9 +162,13 @@ def headline(d: Diagnosis) -> str:
             f"The log Bayes factor is {0.5 * d.unknown['score']:.0f}. No effect of the library explains as much."
         )
     if d.warnings:
-        return "No cause is identified. The warnings below give the reason. The detection limits state what these runs could have shown."
+        return (
+            "No cause is identified. The warnings below give the reason. The detection limits state what these "
+            "runs could have shown."
+        )
     return (
-        "Nothing found beyond ordinary differences between ships: no effect of the library and no unexplained dependence. "
+        "Nothing found beyond ordinary differences between ships: no effect of the library and no unexplained "
+        "dependence. "
         "The detection limits state what these runs could have shown."
     )
 
@@ -162,7 +177,11 @@ def next_command(d: Diagnosis) -> str:
     """The command that compares the plain model with the extended one."""
     inside = [c.effect for c in d.causes if not (c.effect in EFFECTS and EFFECTS.get(c.effect).traits.describes_data)]
     model = "+".join(["physics", *inside])
-    return f"shipbench run --model physics --model {shlex.quote(model)} --dataset {shlex.quote(d.spec or d.dataset)}" if inside else ""
+    return (
+        f"shipbench run --model physics --model {shlex.quote(model)} --dataset {shlex.quote(d.spec or d.dataset)}"
+        if inside
+        else ""
+    )
 
 
 def detectable(c: Candidate) -> str:
@@ -183,24 +202,31 @@ def _unit(c: Candidate, name: str) -> str:
 
 
 def grade(score: float) -> str:
-    """Evidence of a score (twice the log Bayes factor) in the words of Kass and Raftery (1995), Bayes factors, section 3.2."""
+    """Evidence of a score (twice the log Bayes factor) in the words of Kass and Raftery (1995), Bayes factors, section
+    3.2."""
     factor = 0.5 * score
-    return f"{'very strong' if factor > 5.0 else 'strong' if factor > 3.0 else 'positive' if factor > 1.0 else 'weak'} evidence"
+    word = "very strong" if factor > 5.0 else "strong" if factor > 3.0 else "positive" if factor > 1.0 else "weak"
+    return f"{word} evidence"
 
 
 def strength(c: Cause) -> str:
     """Evidence in words with the log Bayes factor."""
     if not math.isfinite(c.score):
         return "an error of the record itself"
-    return f"{grade(c.score)} (log Bayes factor {0.5 * c.score:.0f})" + (f", supported by {c.support}" if c.support else "")
+    return f"{grade(c.score)} (log Bayes factor {0.5 * c.score:.0f})" + (
+        f", supported by {c.support}" if c.support else ""
+    )
 
 
 def force_words(force: dict[str, float]) -> str:
-    """Greatest forces, such as `up to 38.0 kN sideways and 1.20 MN m in yaw on these runs`; empty where there are none."""
+    """Greatest forces, such as `up to 38.0 kN sideways and 1.20 MN m in yaw on these runs`; empty where there are
+    none."""
     places = (("surge", "N", "lengthwise"), ("sway", "N", "sideways"), ("yaw", "N m", "in yaw"))
     parts = [f"{_newtons(force[axis], unit)} {place}" for axis, unit, place in places if axis in force]
     *first, last = parts or [""]
-    return f"up to {', '.join(first)} and {last} on these runs" if first else f"up to {last} on these runs" if last else ""
+    return (
+        f"up to {', '.join(first)} and {last} on these runs" if first else f"up to {last} on these runs" if last else ""
+    )
 
 
 def _newtons(value: float, unit: str) -> str:
@@ -211,13 +237,17 @@ def _newtons(value: float, unit: str) -> str:
 
 
 def cause_texts(c: Cause, alone: Gain | None = None) -> list[str]:
-    """What is known of a cause besides its sizes, a text each: force, evidence, gain where it is the only cause, look-alikes, correction."""
+    """What is known of a cause besides its sizes, a text each: force, evidence, gain where it is the only cause,
+    look-alikes, correction."""
     force = force_words(c.force)
     texts = [f"Its force is {force}."] if force else []
     texts.append(f"{strength(c)[0].upper()}{strength(c)[1:]}.")
     texts += [c.evidence.rstrip(".") + "."] if c.evidence else []
     if alone is not None and alone.ci95[0] > 0.0:
-        removed = f"{figure(alone.before - alone.after)} m of {figure(alone.before)} m {_METRICS.get(alone.metric, alone.metric)}"
+        removed = (
+            f"{figure(alone.before - alone.after)} m of {figure(alone.before)} m "
+            f"{_METRICS.get(alone.metric, alone.metric)}"
+        )
         texts.append(f"Naming it removes {removed} on held-out runs.")
     if c.confused_with:
         texts.append(f"These data cannot separate it from {', '.join(c.confused_with)}.")
@@ -251,7 +281,9 @@ def _candidate_lines(d: Diagnosis, width: int) -> list[str]:
 def _detectable_lines(d: Diagnosis, width: int) -> list[str]:
     """Everything where nothing was found; else the best candidates that were not named."""
     kept = (
-        sorted(d.candidates, key=lambda c: c.effect) if d.verdict == "none" else [c for c in d.candidates[:_SHOWN] if c.rejected_because != "named"]
+        sorted(d.candidates, key=lambda c: c.effect)
+        if d.verdict == "none"
+        else [c for c in d.candidates[:_SHOWN] if c.rejected_because != "named"]
     )
     kept = [c for c in kept if c.detectable]
     if not kept:
@@ -283,7 +315,8 @@ def summary_lines(d: Diagnosis, width: int = WIDTH, full: bool = True) -> list[s
     """A diagnosis as plain lines of at most `width` columns.
 
     Args:
-        full: with what the plain model gets wrong, the candidates and the detection limits; else the verdict, its causes and the next command.
+        full: with what the plain model gets wrong, the candidates and the detection limits; else the verdict, its
+        causes and the next command.
     """
     lines = [*paragraph(f"Diagnosis of {d.dataset} ({d.seconds:.0f} s)", width), "", *paragraph(headline(d), width), ""]
     for warning in d.warnings:

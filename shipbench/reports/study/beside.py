@@ -24,7 +24,8 @@ _LONGEST = 20_000
 
 @dataclass(frozen=True)
 class Fits:
-    """Fitted models of one spec: their descriptions by fold and seed, and the numbers in them (name, median, least, greatest, what it is)."""
+    """Fitted models of one spec: their descriptions by fold and seed, and the numbers in them (name, median, least,
+    greatest, what it is)."""
 
     model: str
     texts: list[tuple[str, str]]
@@ -32,7 +33,8 @@ class Fits:
 
 
 def fitted(results: Results, dataset: str, models: Sequence[str]) -> list[Fits]:
-    """What the models of `dataset` say of themselves (`equations.txt` beside their predictions); models that say nothing are left out."""
+    """What the models of `dataset` say of themselves (`equations.txt` beside their predictions); models that say
+    nothing are left out."""
     found: dict[str, list[tuple[str, str]]] = {}
     for summary, source in zip(results.summaries, results.sources, strict=True):
         if summary["dataset"] != dataset:
@@ -42,13 +44,20 @@ def fitted(results: Results, dataset: str, models: Sequence[str]) -> list[Fits]:
             text = read_bytes(path).decode("utf-8", errors="replace")
         except InputError:
             continue  # most models have no equations
-        cut = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}\n... cut here; the whole text is in {path.name} of the result folder"
+        cut = (
+            text
+            if len(text) <= _LONGEST
+            else f"{text[:_LONGEST]}\n... cut here; the whole text is in {path.name} of the result folder"
+        )
         found.setdefault(summary["model"], []).append((f"fold {summary['fold']}, seed {summary['seed']}", cut))
-    return [Fits(model, found[model], _numbers([text for _, text in found[model]])) for model in models if model in found]
+    return [
+        Fits(model, found[model], _numbers([text for _, text in found[model]])) for model in models if model in found
+    ]
 
 
 def _numbers(texts: Sequence[str]) -> list[tuple[str, float, float, float, str]]:
-    """Lines `name = number what`, compared over the texts; a name that stands in several lines is told apart by its place."""
+    """Lines `name = number what`, compared over the texts; a name that stands in several lines is told apart by its
+    place."""
     values: dict[tuple[str, int], list[float]] = {}
     what: dict[tuple[str, int], str] = {}
     for text in texts:
@@ -64,7 +73,8 @@ def _numbers(texts: Sequence[str]) -> list[tuple[str, float, float, float, str]]
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """A diagnosis: its verdict in words, the causes (effect, sizes, gain), the model it proposes, the link to its page ("" if there is none)."""
+    """A diagnosis: its verdict in words, the causes (effect, sizes, gain), the model it proposes, the link to its page
+    ("" if there is none)."""
 
     dataset: str
     verdict: str
@@ -75,7 +85,8 @@ class Diagnosed:
 
 
 def diagnoses(results: Results, dataset: str, given: Sequence[Path], page: Path) -> list[Diagnosed]:
-    """Diagnoses of `dataset`: in the folders `given`, and in the usual places beside the result folders; links are relative to `page`.
+    """Diagnoses of `dataset`: in the folders `given`, and in the usual places beside the result folders; links are
+    relative to `page`.
 
     Raises:
         InputError: a given folder holds no diagnosis.
@@ -84,12 +95,18 @@ def diagnoses(results: Results, dataset: str, given: Sequence[Path], page: Path)
     found = {}
     for folder in dict.fromkeys(results.sources):
         up = folder.resolve().parent
-        for near in (folder, folder / "diagnosis", *(root / "diagnoses" / file_name(Path(dataset).name) for root in (up, up.parent))):
+        for near in (
+            folder,
+            folder / "diagnosis",
+            *(root / "diagnoses" / file_name(Path(dataset).name) for root in (up, up.parent)),
+        ):
             if (near / "diagnosis.json").exists():
                 try:
                     found[near.resolve()] = _told(near, _read(near), fingerprint, page)
                 except InputError as error:  # it was not asked for: said on the page, and no reason to write none
-                    found[near.resolve()] = Diagnosed(dataset, "A diagnosis lies beside the results.", [], "", "", str(error))
+                    found[near.resolve()] = Diagnosed(
+                        dataset, "A diagnosis lies beside the results.", [], "", "", str(error)
+                    )
     for folder in given:
         found[folder.resolve()] = _told(folder, _read(folder), fingerprint, page)
     return [d for d in found.values() if d.dataset == dataset]
@@ -103,7 +120,10 @@ def check_given(given: Sequence[Path], datasets: Sequence[str]) -> None:
     """
     for folder in given:
         if (name := _read(folder).dataset) not in datasets:
-            raise InputError(f"--diagnosis {folder} is of data set '{shown(name)[:80]}'; these results are of {', '.join(datasets)}. Leave it out.")
+            raise InputError(
+                f"--diagnosis {folder} is of data set '{shown(name)[:80]}'; these results are of "
+                f"{', '.join(datasets)}. Leave it out."
+            )
 
 
 class _Part(BaseModel):
@@ -160,14 +180,22 @@ def _told(place: Path, document: _Document, fingerprint: str, page: Path) -> Dia
     pages = [name for name in ("report.html", "diagnosis.html") if (place / name).is_file()]
     link = quote(Path(os.path.relpath(place / pages[0], page.resolve().parent)).as_posix()) if pages else ""
     same = document.fingerprint == fingerprint
-    warning = "" if same else f"It is of other data than these scores (fingerprint {document.fingerprint}, here {fingerprint})."
+    warning = (
+        ""
+        if same
+        else f"It is of other data than these scores (fingerprint {document.fingerprint}, here {fingerprint})."
+    )
     causes = [(c.effect, _sizes(c.parameters or {}), _gain(c.gain)) for c in document.causes]
     verdict = _VERDICTS.get(document.verdict, document.verdict)
-    return Diagnosed(document.dataset, verdict, causes, document.extended_model or "", f"./{link}" if link else "", warning)
+    return Diagnosed(
+        document.dataset, verdict, causes, document.extended_model or "", f"./{link}" if link else "", warning
+    )
 
 
 def _sizes(parameters: dict[str, _Size]) -> str:
-    return "; ".join(f"{name} {_figure(p.value)} {p.unit} {_interval(p.ci95)}".strip() for name, p in parameters.items())
+    return "; ".join(
+        f"{name} {_figure(p.value)} {p.unit} {_interval(p.ci95)}".strip() for name, p in parameters.items()
+    )
 
 
 def _interval(ends: list[float | None] | None) -> str:
@@ -175,7 +203,11 @@ def _interval(ends: list[float | None] | None) -> str:
 
 
 def _gain(gain: _Gain | None) -> str:
-    return "not measured" if gain is None or gain.relative is None else f"{gain.metric} {-100 * gain.relative:+.0f} % on held-out runs"
+    return (
+        "not measured"
+        if gain is None or gain.relative is None
+        else f"{gain.metric} {-100 * gain.relative:+.0f} % on held-out runs"
+    )
 
 
 def _figure(value: float | None) -> str:

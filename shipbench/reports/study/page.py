@@ -1,4 +1,5 @@
-"""The page of `shipbench report`: one HTML file that needs no network, rendered from results and what lies beside them."""
+"""The page of `shipbench report`: one HTML file that needs no network, rendered from results and what lies beside
+them."""
 
 from __future__ import annotations
 
@@ -33,11 +34,15 @@ class Written:
     left_out: dict[str, list[str]]
 
 
-def write_report(results: Results, out: Path, command: str, *, given: Sequence[Path] = (), points: int = POINTS) -> Written:
-    """Write the page of `results` to `out`, in one step; `given` are folders of diagnoses; at most `points` time steps are drawn.
+def write_report(
+    results: Results, out: Path, command: str, *, given: Sequence[Path] = (), points: int = POINTS
+) -> Written:
+    """Write the page of `results` to `out`, in one step; `given` are folders of diagnoses; at most `points` time steps
+    are drawn.
 
     Raises:
-        InputError: the rows cannot be ranked together (as `build_board`), a folder of `given` holds no diagnosis of these data, or `out` cannot be
+        InputError: the rows cannot be ranked together (as `build_board`), a folder of `given` holds no diagnosis of
+        these data, or `out` cannot be
             written. Nothing is written then.
     """
     names = list(dict.fromkeys(s["dataset"] for s in results.summaries))
@@ -48,7 +53,9 @@ def write_report(results: Results, out: Path, command: str, *, given: Sequence[P
     try:
         write_text(out, text)
     except OSError as error:
-        raise InputError(f"cannot write the page to {out}: {error.strerror}. Give a file that can be written with --out.") from None
+        raise InputError(
+            f"cannot write the page to {out}: {error.strerror}. Give a file that can be written with --out."
+        ) from None
     return Written(out, out.stat().st_size, {s["name"]: s["left_out"] for s in sections if s["left_out"]})
 
 
@@ -56,7 +63,8 @@ def render(sections: Sequence[dict[str, Any]], results: Results, command: str) -
     """The HTML. Everything but the pictures and our own style and script is escaped by the template."""
     names = ", ".join(s["name"] for s in sections)
     return render_page(
-        "report.html.j2", title="Study of ship-motion prediction", dataset=names, command=command, tiles=_tiles(sections, results),
+        "report.html.j2", title="Study of ship-motion prediction", dataset=names, command=command,
+        tiles=_tiles(sections, results),
         plots=any(s["tracks"]["runs"] for s in sections), sections=sections, code=code_version(),
     )  # fmt: skip
 
@@ -69,17 +77,26 @@ def _tiles(sections: Sequence[dict[str, Any]], results: Results) -> list[Tile]:
             name = section["models"][0]["name"]
             scored = results.rows[(results.rows["dataset"] == section["name"]) & (results.rows["status"] == "ok")]
             mean = float(scored.loc[scored["model"] == name, "ed"].mean())
-            best.append(Tile(f"Best on {section['name']}", short_name(name), f"mean position error ED {mean:.3g} m over {section['horizon']:g} s"))
+            best.append(
+                Tile(
+                    f"Best on {section['name']}",
+                    short_name(name),
+                    f"mean position error ED {mean:.3g} m over {section['horizon']:g} s",
+                )
+            )
     bad = sum(s["status"] != "ok" for s in results.summaries)
     models, windows = results.rows["model"].nunique(), len(results.rows[["dataset", "run"]].drop_duplicates())
     status = "the reasons are under Status" if bad else "every prediction was scored"
     return [
-        *best, Tile("Windows", str(windows), f"{models} models"), Tile("Fits", str(len(results.summaries)), "data set, model, fold, seed"),
+        *best, Tile("Windows", str(windows), f"{models} models"),
+        Tile("Fits", str(len(results.summaries)), "data set, model, fold, seed"),
         Tile("Failed, diverged or skipped", str(bad), status),
     ]  # fmt: skip
 
 
-def _section(number: int, results: Results, board: Board, given: Sequence[Path], out: Path, points: int) -> dict[str, Any]:
+def _section(
+    number: int, results: Results, board: Board, given: Sequence[Path], out: Path, points: int
+) -> dict[str, Any]:
     rows = results.rows[results.rows["dataset"] == board.dataset]
     scored = set(rows.loc[rows["status"] == "ok", "model"])
     models = [m for m in board.ranking if m in scored]
@@ -101,5 +118,14 @@ def _failures(rows: Frame) -> dict[str, Any]:
         cells = part.drop_duplicates(["fold", "seed"])
         where = ", ".join(f"fold {f} seed {s}" for f, s in list(zip(cells["fold"], cells["seed"], strict=True))[:6])
         more = f" and {len(cells) - 6} more" if len(cells) > 6 else ""
-        lines.append({"model": model, "status": status, "reason": reason, "windows": len(part), "first": part["run"].iloc[0], "where": where + more})
+        lines.append(
+            {
+                "model": model,
+                "status": status,
+                "reason": reason,
+                "windows": len(part),
+                "first": part["run"].iloc[0],
+                "where": where + more,
+            }
+        )
     return {"lines": lines[:_FAILURES], "more": max(0, len(lines) - _FAILURES)}

@@ -1,4 +1,5 @@
-"""Clean data sets for `shipbench suite check`, from simulators that differ in structure: into some faults are planted, others must be silent."""
+"""Clean data sets for `shipbench suite check`, from simulators that differ in structure: into some faults are planted,
+others must be silent."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ from ...simulate.trials import Trials, sea_trials
 SHIPS = ("container130", "kcs", "kvlcc2_l7")
 EQUATION, HARBOUR = "eq. (2)", "harbour90_noisy"
 SOURCES = (*SHIPS, EQUATION, HARBOUR)
-"""Sea trials of three MMG ships of 130, 230 and 7 m; sea trials of drawn hulls of the fitted model, on container130; port manoeuvres."""
+"""Sea trials of three MMG ships of 130, 230 and 7 m; sea trials of drawn hulls of the fitted model, on container130;
+port manoeuvres."""
 _WINDY = Trials(gusts=2.0, wind=(-8.0, 9.0))
 _CALM = Trials(noise=0.0, gusts=0.0)
 _CALM_SETS = 3
@@ -49,7 +51,8 @@ def sources_of(wind: bool) -> tuple[str, ...]:
 
 
 def _windy(name: str, seed: int) -> Dataset:
-    """Trials in a recorded gale, of a ship that has its area above water (the published KCS and KVLCC2 models have none)."""
+    """Trials in a recorded gale, of a ship that has its area above water (the published KCS and KVLCC2 models have
+    none)."""
     ship = load_mmg_ship(name)
     areas = complete(ship.particulars)
     return sea_trials(replace(ship, A_F=areas.A_F, A_L=areas.A_L), seed, (), _WINDY, wind_recorded=True)
@@ -58,8 +61,9 @@ def _windy(name: str, seed: int) -> Dataset:
 def clean_sets(seeds: Sequence[int]) -> Iterator[tuple[str, Callable[[], Dataset]]]:
     """(kind, maker) of sets in which nothing is to be found.
 
-    Trials of MMG ships in gusts, the same with strong wind recorded, without any noise, and under every effect that is no sensor's; trials of the
-    fitted model; port manoeuvres with and without noise; some of these with their last digits as instruments and displays have them.
+    Trials of MMG ships in gusts, the same with strong wind recorded, without any noise, and under every effect that is
+    no sensor's; trials of the fitted model; port manoeuvres with and without noise; some of these with their last
+    digits as instruments and displays have them.
     """
     for name in SHIPS:
         ship = load_mmg_ship(name)
@@ -69,7 +73,9 @@ def clean_sets(seeds: Sequence[int]) -> Iterator[tuple[str, Callable[[], Dataset
             yield "fitted model, noise and gusts", partial(fitted_trials, ship, seed)
         for seed in seeds[:_CALM_SETS]:
             yield "MMG ships, no noise, calm", partial(sea_trials, ship, seed, (), _CALM)
-        for i, effect in enumerate(name for name in EFFECTS.built_in() if name not in _NOT_HIDDEN):  # nor may a plug-in renumber the published cases
+        for i, effect in enumerate(
+            name for name in EFFECTS.built_in() if name not in _NOT_HIDDEN
+        ):  # nor may a plug-in renumber the published cases
             part = EFFECTS.get(effect)
             if part.family not in ("sensor", "time"):
                 yield "MMG ships under real effects", partial(_with_effect, ship, seeds[i % len(seeds)], part)
@@ -80,7 +86,10 @@ def clean_sets(seeds: Sequence[int]) -> Iterator[tuple[str, Callable[[], Dataset
         for steps in _STEPS.values():
             for name in SHIPS:
                 for trials in (Trials(), _CALM):
-                    yield "MMG ships, rounded", partial(_rounded, partial(sea_trials, load_mmg_ship(name), seed, (), trials), steps)
+                    yield (
+                        "MMG ships, rounded",
+                        partial(_rounded, partial(sea_trials, load_mmg_ship(name), seed, (), trials), steps),
+                    )
             for make in (harbour90.make, harbour90_noisy.make):
                 yield "port manoeuvres, rounded", partial(_rounded, partial(make, seed), steps)
 
@@ -101,7 +110,9 @@ def _with_effect(ship: MMGShip, seed: int, effect: Effect) -> Dataset:
     """Trials under an effect of its typical size."""
     parameters = [p.for_length(ship.L) for p in effect.parameters]
     shaped = any(p.shape for p in parameters)
-    settings = effect.settings(sea_trials(ship, seed).runs[0].states[:, :2], complete(ship.particulars)) if shaped else [()]
+    settings = (
+        effect.settings(sea_trials(ship, seed).runs[0].states[:, :2], complete(ship.particulars)) if shaped else [()]
+    )
     shapes = iter(settings[0])
     q = tuple(next(shapes) if p.shape else p.typical for p in parameters)
     return sea_trials(ship, seed, (Hidden(effect, q),), name=f"{ship.name} {effect.name}")

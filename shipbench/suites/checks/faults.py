@@ -14,8 +14,8 @@ from .planting import DEG, KNOT, Planting
 
 @dataclass(frozen=True)
 class Fault:
-    """plant changes the planting; kinds: findings that count as right, as (kind, channels or None for any); also: kinds that come of the fault and
-    are neither right nor false; wind: needs recorded wind."""
+    """plant changes the planting; kinds: findings that count as right, as (kind, channels or None for any); also: kinds
+    that come of the fault and are neither right nor false; wind: needs recorded wind."""
 
     name: str
     plant: Callable[[Planting], None]
@@ -26,7 +26,10 @@ class Fault:
 
     def expects(self, kind: str, channels: Sequence[str]) -> bool:
         """Whether a finding is one that this fault calls for."""
-        return any(kind == k and (wanted is None or bool(wanted & {c.removesuffix("_c") for c in channels})) for k, wanted in self.kinds)
+        return any(
+            kind == k and (wanted is None or bool(wanted & {c.removesuffix("_c") for c in channels}))
+            for k, wanted in self.kinds
+        )
 
 
 def _any(*kinds: str) -> list[tuple[str, frozenset[str] | None]]:
@@ -51,7 +54,11 @@ FAULTS: tuple[Fault, ...] = (
     Fault("heading sign", plant.times(psi=-1.0), _of("sign", "psi")),
     Fault("yaw rate sign", plant.times(r=-1.0), _of("sign", "r")),
     Fault("sway sign", plant.times(v=-1.0), _of("sign", "v")),
-    Fault("rudder in degrees, other sign", plant.times(delta=-DEG), _of("sign and unit", "delta") + _of("unit and sign", "delta")),
+    Fault(
+        "rudder in degrees, other sign",
+        plant.times(delta=-DEG),
+        _of("sign and unit", "delta") + _of("unit and sign", "delta"),
+    ),
     Fault("west positive", plant.times(y=-1.0), _of("sign", "y")),
     Fault("x east, y north", plant.swapped, _any("ENU")),
     Fault("ENU, v and r ours", plant.enu(1.0, 1.0), _any("ENU")),
@@ -76,7 +83,12 @@ FAULTS: tuple[Fault, ...] = (
     Fault("engine order late", plant.late("n_c", seconds=4.0), _of("lag", "n"), size="4 s"),
     Fault("motion late", plant.late("x", "y", "psi", "u", "v", "r", seconds=5.0), _of("lag", "r"), size="5 s"),
     Fault("yaw rate bias", plant.plus(r=np.deg2rad(0.05)), _any("yaw rate bias"), size="0.05 deg/s"),
-    Fault("yaw rate bias, some runs", plant.plus(0.2, r=np.deg2rad(0.1)), _any("yaw rate bias"), size="0.1 deg/s in a fifth"),
+    Fault(
+        "yaw rate bias, some runs",
+        plant.plus(0.2, r=np.deg2rad(0.1)),
+        _any("yaw rate bias"),
+        size="0.1 deg/s in a fifth",
+    ),
     Fault("yaw rate 10 % high", plant.times(r=1.1), _of("scale", "r")),
     Fault("repeated positions", plant.repeated, _any("repeated samples"), size="5 % of samples"),
     Fault("held fixes", logging.held_fixes, _of("held fixes", "x", "y"), size="one in five samples"),
@@ -130,8 +142,26 @@ FAULTS: tuple[Fault, ...] = (
     Fault("commands for actuators", plant.commands_only, _any("commands"), also=("quantised",)),
     Fault("wind to", plant.wind_to, _any("wind to"), wind=True, size="12 m/s with gusts of 2 m/s"),
     Fault("wind in degrees", plant.times(wind_from=DEG), _of("unit", "wind_from"), wind=True),
-    Fault("wind as felt", plant.felt_wind("apparent"), _any("wind not true"), wind=True, size="off the bow, ship's motion in it"),
-    Fault("wind as felt, in knots and degrees", plant.felt_wind("apparent", KNOT, DEG), _any("wind not true"), wind=True, size="off the bow"),
-    Fault("wind as felt, from north", plant.felt_wind("apparent-north"), _any("wind not true"), wind=True, size="ship's motion in it"),
+    Fault(
+        "wind as felt",
+        plant.felt_wind("apparent"),
+        _any("wind not true"),
+        wind=True,
+        size="off the bow, ship's motion in it",
+    ),
+    Fault(
+        "wind as felt, in knots and degrees",
+        plant.felt_wind("apparent", KNOT, DEG),
+        _any("wind not true"),
+        wind=True,
+        size="off the bow",
+    ),
+    Fault(
+        "wind as felt, from north",
+        plant.felt_wind("apparent-north"),
+        _any("wind not true"),
+        wind=True,
+        size="ship's motion in it",
+    ),
     Fault("true wind off the bow", plant.felt_wind("true-bow"), _any("wind not true"), wind=True),
 )

@@ -12,8 +12,9 @@ OFFSET = 7000
 
 @dataclass(frozen=True)
 class Outcome:
-    """found: a finding that the fault calls for. others: kinds of findings that it does not. healed: whether its lines, laid into dataset.toml, make
-    a set that loads and in which a second check finds nothing (`after`: what it found); None where it has no line."""
+    """found: a finding that the fault calls for. others: kinds of findings that it does not. healed: whether its lines,
+    laid into dataset.toml, make a set that loads and in which a second check finds nothing (`after`: what it found);
+    None where it has no line."""
 
     fault: str
     source: str

@@ -1,4 +1,5 @@
-"""The page of `shipbench suite check`: fault by fault what was found and healed, and the false findings on clean sets."""
+"""The page of `shipbench suite check`: fault by fault what was found and healed, and the false findings on clean
+sets."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ def _figures(mine: Sequence[Outcome]) -> dict[str, Any]:
     hits, healed = sum(o.found for o in mine), [o.healed for o in mine if o.healed is not None]
     low, high = _interval(hits, len(mine))
     return {
-        "found": f"{hits} of {len(mine)}", "low": low, "high": high, "healed": f"{sum(healed)} of {len(healed)}" if healed else "no line",
+        "found": f"{hits} of {len(mine)}", "low": low, "high": high,
+        "healed": f"{sum(healed)} of {len(healed)}" if healed else "no line",
         "others": _counts(kind for o in mine for kind in o.others),
     }  # fmt: skip
 
@@ -57,11 +59,16 @@ def _by_fault(outcomes: Sequence[Outcome]) -> Table:
         f"Sets with a finding that the fault does not call for: {extra} ({extra / len(outcomes):.1%}). "
         "Healed: with its lines in dataset.toml the set loads and a second check is silent."
     ]
-    return Table("Planted faults", [TableColumn("fault", "fault"), TableColumn("size at 130 m", "size"), *_FIGURES], rows, notes)
+    return Table(
+        "Planted faults", [TableColumn("fault", "fault"), TableColumn("size at 130 m", "size"), *_FIGURES], rows, notes
+    )
 
 
 def _by_source(outcomes: Sequence[Outcome]) -> Table:
-    rows = [{"source": source, **_figures([o for o in outcomes if o.source == source])} for source in dict.fromkeys(o.source for o in outcomes)]
+    rows = [
+        {"source": source, **_figures([o for o in outcomes if o.source == source])}
+        for source in dict.fromkeys(o.source for o in outcomes)
+    ]
     return Table("The same by data set", [TableColumn("clean set", "source"), *_FIGURES], rows)
 
 
@@ -72,10 +79,22 @@ def _false(clean: Sequence[tuple[str, tuple[str, ...]]]) -> Table:
         wrong = sum(bool(found) for found in mine)
         low, high = _interval(wrong, len(mine))
         which = _counts(c for found in mine for c in found)
-        rows.append({"kind": kind, "sets": len(mine), "wrong": wrong, "share": 100.0 * wrong / len(mine), "low": low, "high": high, "which": which})
+        rows.append(
+            {
+                "kind": kind,
+                "sets": len(mine),
+                "wrong": wrong,
+                "share": 100.0 * wrong / len(mine),
+                "low": low,
+                "high": high,
+                "which": which,
+            }
+        )
     columns = [
-        TableColumn("clean sets", "kind"), TableColumn("sets", "sets", number(0)), TableColumn("with a finding", "wrong", number(0)),
-        TableColumn("%", "share", number(1)), TableColumn("share: 95 % from", "low", number(3)), TableColumn("to", "high", number(3)),
+        TableColumn("clean sets", "kind"), TableColumn("sets", "sets", number(0)),
+        TableColumn("with a finding", "wrong", number(0)),
+        TableColumn("%", "share", number(1)), TableColumn("share: 95 % from", "low", number(3)),
+        TableColumn("to", "high", number(3)),
         TableColumn("findings", "which"),
     ]  # fmt: skip
     return Table("False findings", columns, rows)
@@ -86,10 +105,14 @@ def write_page(path: Path, tables: Sequence[Table], command: str, seeds: str) ->
     code = code_version()
     head = [
         "# Data check: planted faults, found or not", "",
-        "Faults are planted into clean sets, in the files as a user would hand them in: sea trials of three MMG ships of 130, 230 and 7 m",
-        "(24 runs of 120 samples, sensor noise, gusts), sea trials of drawn hulls of the fitted model (eq. (2), another structure), and 90 port",
-        "manoeuvres. `shipbench data check` must find each and propose a line of dataset.toml that heals it. Clean sets must give no finding at all,",
-        "notes included. Thresholds were set on the seeds of `--development` (from 7500); what 500 to 560 taught is in the code.", "",
+        ("Faults are planted into clean sets, in the files as a user would hand them in: sea trials of three MMG "
+         "ships of 130, 230 and 7 m"),
+        ("(24 runs of 120 samples, sensor noise, gusts), sea trials of drawn hulls of the fitted model (eq. (2), "
+         "another structure), and 90 port"),
+        ("manoeuvres. `shipbench data check` must find each and propose a line of dataset.toml that heals it. Clean "
+         "sets must give no finding at all,"),
+        ("notes included. Thresholds were set on the seeds of `--development` (from 7500); what 500 to 560 taught is "
+         "in the code."), "",
         f"- Command: `{command}`, {seeds}",
         f"- Code: shipbench {code['shipbench']}, source {code['source']}", "",
     ]  # fmt: skip

@@ -21,7 +21,8 @@ DEG, KNOT = 180.0 / np.pi, 3600.0 / 1852.0
 
 @dataclass
 class Planting:
-    """A clean set as it is handed in, to be spoilt: table, keys of dataset.toml, scales of length and time against 130 m, dt [s], random numbers."""
+    """A clean set as it is handed in, to be spoilt: table, keys of dataset.toml, scales of length and time against 130
+    m, dt [s], random numbers."""
 
     table: pd.DataFrame
     toml: dict[str, Any]
@@ -63,7 +64,14 @@ def planting(dataset: Dataset, seed: int) -> Planting:
         frames.append(frame)
     toml = {"name": dataset.name, "dt": dataset.dt, "actuators": dataset.actuators}
     length = dataset.ship.L / 130.0
-    return Planting(pd.concat(frames, ignore_index=True), toml, length, float(length**0.5), dataset.dt, np.random.default_rng([seed, 7]))
+    return Planting(
+        pd.concat(frames, ignore_index=True),
+        toml,
+        length,
+        float(length**0.5),
+        dataset.dt,
+        np.random.default_rng([seed, 7]),
+    )
 
 
 def times(**factors: float) -> Callable[[Planting], None]:
@@ -79,7 +87,8 @@ def times(**factors: float) -> Callable[[Planting], None]:
 
 
 def silent_log(share: float) -> Callable[[Planting], None]:
-    """Surge and sway recorded as a hundredth of themselves, a sensor's noise about nothing, in the slowest `share` of the samples."""
+    """Surge and sway recorded as a hundredth of themselves, a sensor's noise about nothing, in the slowest `share` of
+    the samples."""
 
     def plant(p: Planting) -> None:
         slow = np.abs(p.table["u"]) < np.quantile(np.abs(p.table["u"]), share)
@@ -89,7 +98,8 @@ def silent_log(share: float) -> Callable[[Planting], None]:
 
 
 def late(*channels: str, seconds: float) -> Callable[[Planting], None]:
-    """Channels recorded `seconds` (at 130 m) late; the first samples of every run, which would need the time before it, are left out."""
+    """Channels recorded `seconds` (at 130 m) late; the first samples of every run, which would need the time before it,
+    are left out."""
 
     def plant(p: Planting) -> None:
         lag, keep = seconds * p.time, []
@@ -239,7 +249,9 @@ def time(kind: str) -> Callable[[Planting], None]:
         elif kind == "late":
             p.table.loc[p.rows(p.pick(1)[0]), "t"] += 1000.0 * p.dt
         elif kind == "twice":
-            p.table = p.table.loc[np.sort(np.append(p.table.index.to_numpy(), p.rows(p.ids[1])[20]))].reset_index(drop=True)
+            p.table = p.table.loc[np.sort(np.append(p.table.index.to_numpy(), p.rows(p.ids[1])[20]))].reset_index(
+                drop=True
+            )
         else:
             p.table["t"] += p.rng.uniform(-0.1, 0.1, len(p.table)) * p.dt
 

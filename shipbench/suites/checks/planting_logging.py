@@ -1,4 +1,5 @@
-"""Plants the faults of loggers and exports into clean data sets: held fixes, placeholders, interpolation across north, clocks that are set."""
+"""Plants the faults of loggers and exports into clean data sets: held fixes, placeholders, interpolation across north,
+clocks that are set."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ def placeholder(channel: str, value: float, seconds: float = 8.0) -> Callable[[P
 
 
 def interpolated_north(p: Planting) -> None:
-    """A heading of 0 to 360 that was logged at every third sample and interpolated as it stands; in the set that `wrapped` makes."""
+    """A heading of 0 to 360 that was logged at every third sample and interpolated as it stands; in the set that
+    `wrapped` makes."""
     wrapped(p)
     for run in p.ids:
         at = p.rows(run)
@@ -39,8 +41,8 @@ def interpolated_north(p: Planting) -> None:
 
 
 def clock_set(seconds: float) -> Callable[[Planting], None]:
-    """Stamps that go on as if nothing had happened where the clock was set back by `seconds` (at 130 m) in the hardest turn of a run: the rows that
-    would stand twice are left out."""
+    """Stamps that go on as if nothing had happened where the clock was set back by `seconds` (at 130 m) in the hardest
+    turn of a run: the rows that would stand twice are left out."""
 
     def plant(p: Planting) -> None:
         gone = max(2, round(seconds * p.time / p.dt))
@@ -56,7 +58,8 @@ def clock_set(seconds: float) -> Callable[[Planting], None]:
 
 
 def clock_ahead(seconds: float) -> Callable[[Planting], None]:
-    """A gap of 10 s (at 130 m) in two runs, `seconds` of which are the clock's, which was set ahead: only the rest of the rows is missing."""
+    """A gap of 10 s (at 130 m) in two runs, `seconds` of which are the clock's, which was set ahead: only the rest of
+    the rows is missing."""
 
     def plant(p: Planting) -> None:
         ahead, gone = (max(1, round(s * p.time / p.dt)) for s in (seconds, 10.0 - seconds))

@@ -1,4 +1,5 @@
-"""`shipbench suite check`: plant faults into clean simulated sets, check them, apply the proposed lines; count false findings on clean sets."""
+"""`shipbench suite check`: plant faults into clean simulated sets, check them, apply the proposed lines; count false
+findings on clean sets."""
 
 from __future__ import annotations
 
@@ -64,7 +65,8 @@ def run_case(fault: Fault, source: str, seed: int, folder: Path) -> Outcome:
 
 
 def suite_command(
-    *, seeds: int = 1, first: int = 580, development: bool = False, out: Path = Path("leaderboards"), progress: Progress | None = None,
+    *, seeds: int = 1, first: int = 580, development: bool = False, out: Path = Path("leaderboards"),
+    progress: Progress | None = None,
     command: str = "shipbench suite check",
 ) -> tuple[Path, list[Table]]:  # fmt: skip
     """Run everything and write check.md; development draws other seeds and writes check-development.md.
@@ -92,5 +94,7 @@ def suite_command(
         progress.done(f"clean: {kind}, {dataset.source or dataset.name}", ", ".join(found) or "ok: nothing")
     progress.finish()
     tables = result_tables(outcomes, false)
-    seeds_text = f"seeds {start} to {start + seeds - 1} (planted), {start + 100} to {start + 99 + CLEAN_SEEDS * seeds} (clean)"
+    seeds_text = (
+        f"seeds {start} to {start + seeds - 1} (planted), {start + 100} to {start + 99 + CLEAN_SEEDS * seeds} (clean)"
+    )
     return write_page(out / f"check{'-development' * development}.md", tables, command, seeds_text), tables

@@ -1,6 +1,8 @@
-"""What the diagnosis is compared with: two usual ways of naming a missing cause, on the same data, candidates and linearised model.
+"""What the diagnosis is compared with: two usual ways of naming a missing cause, on the same data, candidates and
+linearised model.
 
-Both take what the model leaves unexplained for white noise. It never is, so both find something in nearly every data set.
+Both take what the model leaves unexplained for white noise. It never is, so both find something in nearly every data
+set.
 """
 
 from __future__ import annotations
@@ -31,8 +33,8 @@ _MOST_NAMED = 4
 
 @dataclass(frozen=True)
 class Ranking:
-    """Effects with their scores (information gained: test statistic less the price of its freedoms), best first; `named`: those above zero that the
-    method would report, at most one (white residuals) or four (regression)."""
+    """Effects with their scores (information gained: test statistic less the price of its freedoms), best first;
+    `named`: those above zero that the method would report, at most one (white residuals) or four (regression)."""
 
     ranking: tuple[tuple[str, float], ...]
     named: tuple[str, ...]
@@ -43,7 +45,8 @@ class Ranking:
 
 
 def candidate_terms(plant: Plant, names: Sequence[str] | None = None) -> list[Term]:
-    """Terms of the effects that can act on this ship, one per setting of their shape parameters, in the forms that the suite draws."""
+    """Terms of the effects that can act on this ship, one per setting of their shape parameters, in the forms that the
+    suite draws."""
     terms = []
     for name in names or singles():
         effect = EFFECTS.get(name)
@@ -51,17 +54,20 @@ def candidate_terms(plant: Plant, names: Sequence[str] | None = None) -> list[Te
             continue
         others = [p.other for p in effect.parameters if p.shape]
         settings = [
-            s for s in effect.settings(plant.seg.states[..., :2], plant.ship) if not any(v for v, other in zip(s, others, strict=True) if other)
+            s
+            for s in effect.settings(plant.seg.states[..., :2], plant.ship)
+            if not any(v for v, other in zip(s, others, strict=True) if other)
         ]
         terms += [Term(effect, tuple(s), effect.per_run) for s in settings]
     return terms
 
 
 def white_residual_test(dataset: Dataset, names: Sequence[str] | None = None) -> Ranking:
-    """Output-error fit (base parameters and initial states, no latent force), then the score test of every candidate on its residuals.
+    """Output-error fit (base parameters and initial states, no latent force), then the score test of every candidate on
+    its residuals.
 
-    The residuals count as white with one variance per channel; the price is that of BIC. Effects with one set of values per run have as many
-    freedoms as runs.
+    The residuals count as white with one variance per channel; the price is that of BIC. Effects with one set of values
+    per run have as many freedoms as runs.
     """
     plant = Plant.of(dataset)
     scales, terms = Scales(plant), candidate_terms(plant, names)
@@ -83,11 +89,12 @@ def white_residual_test(dataset: Dataset, names: Sequence[str] | None = None) ->
 
 
 def derivative_regression(dataset: Dataset, names: Sequence[str] | None = None) -> Ranking:
-    """Sparse regression of smoothed derivatives as in SINDy (Brunton et al. 2016; for a known model's discrepancy: Kaheman et al. 2019).
+    """Sparse regression of smoothed derivatives as in SINDy (Brunton et al. 2016; for a known model's discrepancy:
+    Kaheman et al. 2019).
 
-    du, dv, dr by a local parabola over nine samples are regressed on the base model's terms plus every candidate's column, by forward selection
-    with BIC. It cannot see the sensors' faults, which are no forces: with columns for them it names `speed_scale` in every set, since smoothing
-    makes all derivatives too small.
+    du, dv, dr by a local parabola over nine samples are regressed on the base model's terms plus every candidate's
+    column, by forward selection with BIC. It cannot see the sensors' faults, which are no forces: with columns for them
+    it names `speed_scale` in every set, since smoothing makes all derivatives too small.
     """
     plant = Plant.of(dataset)
     scales, terms = Scales(plant), [t for t in candidate_terms(plant, names) if t.effect.enters != "sensor"]
@@ -95,7 +102,8 @@ def derivative_regression(dataset: Dataset, names: Sequence[str] | None = None) 
     target = rows.defect((), np.zeros(NUM_BASE))
     used = np.isfinite(target)
     step = 1e-2
-    # of what differs between ships only resistance, rudder and hull: with all of it free, without priors, nothing is left to be named
+    # of what differs between ships only resistance, rudder and hull: with all of it free, without priors, nothing is
+    # left to be named
     base = [(target - rows.defect((), step * unit)) / step for unit in np.eye(NUM_BASE)[: len(FREE) + NUM_HULL]]
     weight = 1.0 / np.std(target[used.all(axis=-1)], axis=0)
     y, X = (weight * target)[used], np.stack([(weight * column)[used] for column in base], axis=-1)
@@ -115,7 +123,9 @@ def _whitened(plant: Plant, values: np.ndarray, noise: np.ndarray) -> np.ndarray
     return np.nan_to_num(values, posinf=0.0, neginf=0.0) * scale[..., None]
 
 
-def _newton(plant: Plant, columns: Columns, error: np.ndarray, noise: np.ndarray, point: Point) -> tuple[np.ndarray, np.ndarray]:
+def _newton(
+    plant: Plant, columns: Columns, error: np.ndarray, noise: np.ndarray, point: Point
+) -> tuple[np.ndarray, np.ndarray]:
     """Gauss-Newton step of initial states (B, 6) and base parameters, with their priors."""
     e = _whitened(plant, error.reshape(len(error), -1, 1), noise)
     eta, base = _whitened(plant, columns.eta, noise), _whitened(plant, columns.base, noise)
@@ -128,11 +138,15 @@ def _newton(plant: Plant, columns: Columns, error: np.ndarray, noise: np.ndarray
 
 
 def _line_search(plant: Plant, scales: Scales, point: Point, target: Point, noise: np.ndarray) -> Point | None:
-    """The first of the full, half ... sixteenth step that lowers the cost by more than one thousandth; None if none does."""
+    """The first of the full, half ... sixteenth step that lowers the cost by more than one thousandth; None if none
+    does."""
 
     def cost(at: Point) -> float:
         with np.errstate(over="ignore", invalid="ignore"):  # a step that sends the ship away costs infinitely much
-            value = float(np.sum(((plant.seg.states[..., :6] - predict(plant, scales, at)) / noise)[plant.seg.mask] ** 2) + np.sum(at.base**2))
+            value = float(
+                np.sum(((plant.seg.states[..., :6] - predict(plant, scales, at)) / noise)[plant.seg.mask] ** 2)
+                + np.sum(at.base**2)
+            )
         return value if np.isfinite(value) else np.inf
 
     now = cost(point)
@@ -143,8 +157,11 @@ def _line_search(plant: Plant, scales: Scales, point: Point, target: Point, nois
     return None
 
 
-def _score_test(plant: Plant, columns: Columns, noise: np.ndarray, terms: Sequence[Term]) -> tuple[tuple[str, float], ...]:
-    """Rao's statistic of every term with initial states and base parameters projected out, less its freedoms times log(values)."""
+def _score_test(
+    plant: Plant, columns: Columns, noise: np.ndarray, terms: Sequence[Term]
+) -> tuple[tuple[str, float], ...]:
+    """Rao's statistic of every term with initial states and base parameters projected out, less its freedoms times
+    log(values)."""
     e = _whitened(plant, _error(plant, columns.predicted).reshape(len(columns.predicted), -1, 1), noise)
     eta, base = _whitened(plant, columns.eta, noise), _whitened(plant, columns.base, noise)
     back = np.linalg.inv(np.swapaxes(eta, 1, 2) @ eta + 1e-4 * np.eye(6)) @ np.swapaxes(eta, 1, 2)
@@ -164,7 +181,9 @@ def _score_test(plant: Plant, columns: Columns, noise: np.ndarray, terms: Sequen
         else:
             X = X - base @ (A @ np.einsum("bti,btj->ij", base, X))
             runs = [np.ones(len(X), dtype=bool)]
-        statistic = sum(_quadratic(np.einsum("bti,btj->ij", X[r], X[r]), np.einsum("bti,btk->i", X[r], e[r])) for r in runs)
+        statistic = sum(
+            _quadratic(np.einsum("bti,btj->ij", X[r], X[r]), np.einsum("bti,btk->i", X[r], e[r])) for r in runs
+        )
         score = statistic - price * term.size * len(runs)
         best[term.label] = max(score, best.get(term.label, -np.inf))
     return tuple(sorted(best.items(), key=lambda item: -item[1]))
@@ -205,20 +224,33 @@ class _Derivatives:
         t = seg.start[:, None] + seg.dt * np.arange(plant.steps + 1)
         for a in (*flow_first(active), *hull):
             a.effect.force(e, Flow(x, y, t, psi, u, v, r, n, delta, F_b, F_s), a.q, plant.ship)
-        air: tuple[Array, Array] = (u, v) if seg.wind is None else apparent_wind(psi, u, v, seg.wind[..., 0], seg.wind[..., 1])
-        found = np.stack(np.broadcast_arrays(*eq2.accelerations(u, v, r, n, delta, F_b, F_s, air, plant.c, p, e)), axis=-1)
+        air: tuple[Array, Array] = (
+            (u, v) if seg.wind is None else apparent_wind(psi, u, v, seg.wind[..., 0], seg.wind[..., 1])
+        )
+        found = np.stack(
+            np.broadcast_arrays(*eq2.accelerations(u, v, r, n, delta, F_b, F_s, air, plant.c, p, e)), axis=-1
+        )
         return np.where(seg.mask[..., None], self.derivative - found, np.nan)
 
 
 def _term_columns(
-    rows: _Derivatives, plant: Plant, scales: Scales, term: Term, target: np.ndarray, weight: np.ndarray, used: np.ndarray, run: np.ndarray
+    rows: _Derivatives,
+    plant: Plant,
+    scales: Scales,
+    term: Term,
+    target: np.ndarray,
+    weight: np.ndarray,
+    used: np.ndarray,
+    run: np.ndarray,
 ) -> np.ndarray:
     """Columns (values, size) of a term at half its typical size; (values, size * runs) where every run has its own."""
     found = []
     unit = 0.5 * scales.amplitudes(term, plant.c.L)
     for a in range(term.size):
         q = (*(float(unit[a]) if k == a else 0.0 for k in range(term.size)), *term.setting)
-        change = np.nan_to_num(weight * (target - rows.defect([Active(term.effect, q)], np.zeros(NUM_BASE))), posinf=0.0, neginf=0.0)[used]
+        change = np.nan_to_num(
+            weight * (target - rows.defect([Active(term.effect, q)], np.zeros(NUM_BASE))), posinf=0.0, neginf=0.0
+        )[used]
         found += [change * (run == k) for k in range(plant.seg.runs)] if term.per_run else [change]
     return np.stack(found, axis=-1)
 

@@ -1,7 +1,8 @@
-"""The hidden sets that the diagnosis is judged on: effect, size, sign, ship and seed are drawn; any case is rebuilt from (seed, kind, index).
+"""The hidden sets that the diagnosis is judged on: effect, size, sign, ship and seed are drawn; any case is rebuilt
+from (seed, kind, index).
 
-Data come from the MMG simulator or from ships of the literature in their own equations (kinds with `published`), never from the fitted model;
-`none-same` alone is made by the fitted model, to count false alarms on it.
+Data come from the MMG simulator or from ships of the literature in their own equations (kinds with `published`), never
+from the fitted model; `none-same` alone is made by the fitted model, to count false alarms on it.
 """
 
 from __future__ import annotations
@@ -34,28 +35,35 @@ SIZES = (1.0, 0.3)
 OWN_KINDS = frozenset({"change_point", "going_astern", "unit_or_sign_error", "wind_coefficients", "wind_drift"})
 ONE_SIDED = frozenset(
     {
-        "added_resistance", "bank_suction", "cross_flow_drag", "position_delay", "rudder_delay", "shallow_water", "thruster_speed_loss",
+        "added_resistance", "bank_suction", "cross_flow_drag", "position_delay", "rudder_delay", "shallow_water",
+        "thruster_speed_loss",
         "velocity_delay",
     }
 )  # fmt: skip
 """Effects that nature makes in one direction only, beyond those whose lower bound is zero."""
 
 _NOT_CHANGING = frozenset({"hull_derivatives", "bank_suction", "propeller_walk_astern"})
-"""No change is made of these, nor of gears, thrusters and per-run effects: they act in few runs, and the first changed one might show nothing."""
+"""No change is made of these, nor of gears, thrusters and per-run effects: they act in few runs, and the first changed
+one might show nothing."""
 
 ON_PUBLISHED = (
-    "current", "wind", "rudder_offset", "propeller_walk", "thrust_gain", "rudder_rate_limit", "rudder_delay", "shaft_lag", "antenna_offset",
-    "heading_bias", "speed_scale", "yaw_rate_bias", "position_delay", "velocity_delay", "current_per_run", "wind_per_run",
+    "current", "wind", "rudder_offset", "propeller_walk", "thrust_gain", "rudder_rate_limit", "rudder_delay",
+    "shaft_lag", "antenna_offset",
+    "heading_bias", "speed_scale", "yaw_rate_bias", "position_delay", "velocity_delay", "current_per_run",
+    "wind_per_run",
 )  # fmt: skip
 """What is hidden in published ships: causes that mean something whatever a ship's equations are."""
 
 _RATES = {"rudder_rate_limit": ("delta", "rate_delta", 1.0), "shaft_rate_limit": ("n", "rate_n", 60.0)}
 _LIMITED = 0.65
-"""Of the least ordinary rate of a gear: a limit above it is none (SOLAS asks no faster rudder of a short ship, whatever Froude's law says)."""
+"""Of the least ordinary rate of a gear: a limit above it is none (SOLAS asks no faster rudder of a short ship, whatever
+Froude's law says)."""
 
 UNITS: tuple[tuple[str, tuple[int, ...], float], ...] = (
-    ("speeds in knots", (U, V), 1.0 / 0.514444), ("sway velocity to port", (V,), -1.0), ("yaw rate to port", (R,), -1.0),
-    ("yaw rate in deg/s", (R,), 180.0 / np.pi), ("rudder to port", (DELTA,), -1.0), ("revolutions in rev/s", (N,), 1.0 / 60.0),
+    ("speeds in knots", (U, V), 1.0 / 0.514444), ("sway velocity to port", (V,), -1.0),
+    ("yaw rate to port", (R,), -1.0),
+    ("yaw rate in deg/s", (R,), 180.0 / np.pi), ("rudder to port", (DELTA,), -1.0),
+    ("revolutions in rev/s", (N,), 1.0 / 60.0),
     ("heading anticlockwise", (PSI,), -1.0), ("revolutions astern", (N,), -1.0),
 )  # fmt: skip
 """Errors of unit or sign: name, channels of the state (commands of the same actuator follow), factor."""
@@ -65,8 +73,9 @@ UNITS: tuple[tuple[str, tuple[int, ...], float], ...] = (
 class Case:
     """One hidden set.
 
-    effects: what was hidden, with values. truth: names that the diagnosis should give, in any order. size: of typical, per effect. variables: that
-    count as right (outside). detail: what else is drawn (run of a change, channel of a unit error).
+    effects: what was hidden, with values. truth: names that the diagnosis should give, in any order. size: of typical,
+    per effect. variables: that count as right (outside). detail: what else is drawn (run of a change, channel of a unit
+    error).
     """
 
     kind: str
@@ -103,7 +112,8 @@ class Case:
         return replace(data, source="hidden set of the suite")
 
     def values(self) -> list[dict[str, float]]:
-        """Sizes under their reported names, per effect; of per-run effects the root mean square over runs, of a change what it is after it."""
+        """Sizes under their reported names, per effect; of per-run effects the root mean square over runs, of a change
+        what it is after it."""
         found = []
         for item in self.effects:
             if self.kind == "change":
@@ -151,32 +161,53 @@ def draw_case(kind: str, index: int, seed: int, which: str = "test", plan: Trial
     rng, plan = _generator(seed, kind, index, which, 0), plan or Trials()
     names, sizes = _names(kind, index, rng)
     thrusters = any(EFFECTS.get(name).family == "thruster" for name in names)
-    ship: MMGShip | Published = list(PUBLISHED.values())[index % len(PUBLISHED)] if "published" in kind else draw_ship(rng, which, thrusters)
+    ship: MMGShip | Published = (
+        list(PUBLISHED.values())[index % len(PUBLISHED)] if "published" in kind else draw_ship(rng, which, thrusters)
+    )
     case = Case(kind, index, seed, which, ship, plan=plan)
     if kind == "outside":
         return _outside(case, rng)
     if kind == "unit":
         error = index % len(UNITS)
-        return replace(case, truth=("unit_or_sign_error",), size=(1.0,), detail={"error": error, "name": UNITS[error][0]})
-    hidden = tuple(draw_hidden(rng, EFFECTS.get(name), ship, size, case) for name, size in zip(names, sizes, strict=True))
+        return replace(
+            case, truth=("unit_or_sign_error",), size=(1.0,), detail={"error": error, "name": UNITS[error][0]}
+        )
+    hidden = tuple(
+        draw_hidden(rng, EFFECTS.get(name), ship, size, case) for name, size in zip(names, sizes, strict=True)
+    )
     if kind == "change":
         first = int(rng.integers(round(0.3 * plan.runs), round(0.7 * plan.runs) + 1))
         after = np.arange(plan.runs) >= first
         hidden = tuple(Hidden(h.effect, tuple(np.where(after, v, 0.0) for v in h.q)) for h in hidden)
-        return replace(case, effects=hidden, truth=("change_point",), size=tuple(sizes), detail={"changed": names[0], "from_run": first})
+        return replace(
+            case,
+            effects=hidden,
+            truth=("change_point",),
+            size=tuple(sizes),
+            detail={"changed": names[0], "from_run": first},
+        )
     return replace(case, effects=hidden, truth=tuple(names), size=tuple(sizes))
 
 
 def draw_hidden(rng: np.random.Generator, effect: Effect, ship: MMGShip | Published, size: float, case: Case) -> Hidden:
-    """Values of an effect at `size` times its typical size: random sign where both have a meaning, random direction, per run N(0, typical)."""
+    """Values of an effect at `size` times its typical size: random sign where both have a meaning, random direction,
+    per run N(0, typical)."""
     parameters, runs = effect.sized(ship.L), case.plan.runs
     if effect.per_run:
         return Hidden(effect, tuple(size * abs(p.typical) * rng.standard_normal(runs) for p in parameters))
     if effect.vector is not None:
         towards = rng.uniform(0.0, 2.0 * np.pi)
-        return Hidden(effect, tuple(size * abs(p.typical) * part for p, part in zip(parameters, (np.cos(towards), np.sin(towards)), strict=True)))
+        return Hidden(
+            effect,
+            tuple(
+                size * abs(p.typical) * part
+                for p, part in zip(parameters, (np.cos(towards), np.sin(towards)), strict=True)
+            ),
+        )
     if effect.name == "hull_derivatives":
-        return Hidden(effect, tuple(float(np.clip(size * p.typical * rng.standard_normal(), -0.6, 1.0)) for p in parameters))
+        return Hidden(
+            effect, tuple(float(np.clip(size * p.typical * rng.standard_normal(), -0.6, 1.0)) for p in parameters)
+        )
     if effect.name in _RATES:
         actuator, field, unit = _RATES[effect.name]
         own = getattr(ship.actuators, field) * unit
@@ -210,7 +241,9 @@ def misread(data: Dataset, channels: Sequence[int], factor: float) -> Dataset:
 
 
 def _generator(seed: int, kind: str, index: int, which: str, use: int) -> np.random.Generator:
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(WHICH.index(which), KINDS.index(kind), index, use)))
+    return np.random.default_rng(
+        np.random.SeedSequence(seed, spawn_key=(WHICH.index(which), KINDS.index(kind), index, use))
+    )
 
 
 def _names(kind: str, index: int, rng: np.random.Generator) -> tuple[list[str], list[float]]:
@@ -226,7 +259,11 @@ def _names(kind: str, index: int, rng: np.random.Generator) -> tuple[list[str], 
         second = str(rng.choice([name for name in able if EFFECTS.get(name).family != EFFECTS.get(first).family]))
         return [first, second], [float(s) for s in rng.uniform(0.5, 1.0, 2)]
     if kind == "change":
-        able = [n for n in names if EFFECTS.get(n).enters != "gear" and not EFFECTS.get(n).per_run and n not in _NOT_CHANGING]
+        able = [
+            n
+            for n in names
+            if EFFECTS.get(n).enters != "gear" and not EFFECTS.get(n).per_run and n not in _NOT_CHANGING
+        ]
         able = [n for n in able if EFFECTS.get(n).family != "thruster"]
         return [str(rng.choice(able))], [1.0]
     return [], []
@@ -242,7 +279,10 @@ def _bank(rng: np.random.Generator, effect: Effect, ship: MMGShip, size: float, 
     calm = sea_trials(ship, case.data_seed, (), case.plan)
     places = np.concatenate([run.states[:, :2] for run in calm.runs])
     bearing = rng.uniform(0.0, 2.0 * np.pi)
-    line = float(np.max(places @ np.array([np.cos(bearing), np.sin(bearing)]))) + rng.uniform(1.0, 3.0) * complete(ship.particulars).B
+    line = (
+        float(np.max(places @ np.array([np.cos(bearing), np.sin(bearing)])))
+        + rng.uniform(1.0, 3.0) * complete(ship.particulars).B
+    )
     return Hidden(effect, (size * effect.sized(ship.L)[0].typical, 0.0, float(bearing), line, 0.0))
 
 
@@ -251,8 +291,14 @@ def _outside(case: Case, rng: np.random.Generator) -> Case:
     cause = OUTSIDE[case.index % len(OUTSIDE)]
     scale = (case.ship.L / 130.0) ** 0.5
     products = len(cause.variables) == 2
-    second = self_propulsion_rpm(Simulator(case.ship), CRUISE * scale) if products else float(rng.uniform(0.0, 2.0 * np.pi))
+    second = (
+        self_propulsion_rpm(Simulator(case.ship), CRUISE * scale) if products else float(rng.uniform(0.0, 2.0 * np.pi))
+    )
     amplitude = float(rng.uniform(0.7, 1.3)) * (1.0 if products else float(rng.choice([-1.0, 1.0])))
     return replace(
-        case, effects=(Hidden(cause, (amplitude, second)),), size=(abs(amplitude),), variables=cause.variables, detail={"name": cause.name}
+        case,
+        effects=(Hidden(cause, (amplitude, second)),),
+        size=(abs(amplitude),),
+        variables=cause.variables,
+        detail={"name": cause.name},
     )

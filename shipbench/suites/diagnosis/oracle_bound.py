@@ -1,4 +1,5 @@
-"""What a likelihood-ratio test could find that knew which effect is hidden, its size and direction, the noise and the background."""
+"""What a likelihood-ratio test could find that knew which effect is hidden, its size and direction, the noise and the
+background."""
 
 from __future__ import annotations
 
@@ -19,24 +20,39 @@ LEVEL = 0.05
 
 
 def expected_ratio(null: Fit, effect: Effect, values: Sequence[np.ndarray]) -> float:
-    """Expected log likelihood ratio, doubled, of the plain model against the one that holds `effect` with `values` (per parameter one number or one
-    per run): the non-centrality lambda = c' V c of the test, with the ship's ordinary differences projected out.
+    """Expected log likelihood ratio, doubled, of the plain model against the one that holds `effect` with `values` (per
+    parameter one number or one per run): the non-centrality lambda = c' V c of the test, with the ship's ordinary
+    differences projected out.
 
-    Source: docs/theory.md#evidence-of-a-cause; for gears, whose effects are seen in the record of the actuator, what their own test found.
+    Source: docs/theory.md#evidence-of-a-cause; for gears, whose effects are seen in the record of the actuator, what
+    their own test found.
     """
     plant = null.plant
     if effect.enters == "gear" and not plant.seg.commanded:
         return max([g.score for g in find_in_gears(plant)[0] if g.effect == effect.name], default=0.0)
-    amplitudes = [np.broadcast_to(v, (plant.seg.runs,)) for v, p in zip(values, effect.parameters, strict=False) if not p.shape]
-    setting = tuple(float(np.ravel(v)[0]) for v, p in zip(values, effect.parameters, strict=False) if p.shape)  # a shape may be left out
+    amplitudes = [
+        np.broadcast_to(v, (plant.seg.runs,)) for v, p in zip(values, effect.parameters, strict=False) if not p.shape
+    ]
+    setting = tuple(
+        float(np.ravel(v)[0]) for v, p in zip(values, effect.parameters, strict=False) if p.shape
+    )  # a shape may be left out
     term = Term(effect, setting)
     c = np.stack(amplitudes, axis=-1) / null.scales.amplitudes(term, plant.c.L)
-    fit = settle(Linearisation(plant, null.scales, null.point, null.motion), null.model, null.hyper, null.log_tau2, [term], cycles=0)
+    fit = settle(
+        Linearisation(plant, null.scales, null.point, null.motion),
+        null.model,
+        null.hyper,
+        null.log_tau2,
+        [term],
+        cycles=0,
+    )
     own, base = np.arange(fit.reduced.S.shape[1] - 1)[-term.size :], fit.prior.shared
     S = fit.reduced.S[:, :-1, :-1]
     direct = float(np.einsum("ni,nij,nj->", c, S[:, own][:, :, own], c))
     shared = np.einsum("nbi,ni->b", S[:, base][:, :, own], c)
-    return direct - float(shared @ np.linalg.solve(S[:, base][:, :, base].sum(axis=0) + np.diag(fit.prior.precision), shared))
+    return direct - float(
+        shared @ np.linalg.solve(S[:, base][:, :, base].sum(axis=0) + np.diag(fit.prior.precision), shared)
+    )
 
 
 def power(expected: float, level: float = LEVEL) -> float:

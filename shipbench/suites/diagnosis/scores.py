@@ -1,4 +1,5 @@
-"""Figures of the diagnosis suite from its rows: rates with Wilson intervals beside the targets, and what was named in place of what."""
+"""Figures of the diagnosis suite from its rows: rates with Wilson intervals beside the targets, and what was named in
+place of what."""
 
 from __future__ import annotations
 
@@ -16,20 +17,28 @@ Row = dict[str, Any]
 HULL = "hull_derivatives"
 
 CLASSES = (
-    {"current", "current_per_run"}, {"wind", "wind_per_run"}, {"rudder_delay", "rudder_lag"}, {"rudder_lag", "rudder_rate_limit"},
-    {"rudder_deadband", "rudder_backlash"}, {"shaft_lag", "shaft_rate_limit"}, {"propeller_walk", "list"}, {"propeller_walk", "rudder_offset"},
+    {"current", "current_per_run"}, {"wind", "wind_per_run"}, {"rudder_delay", "rudder_lag"},
+    {"rudder_lag", "rudder_rate_limit"},
+    {"rudder_deadband", "rudder_backlash"}, {"shaft_lag", "shaft_rate_limit"}, {"propeller_walk", "list"},
+    {"propeller_walk", "rudder_offset"},
     {"cross_flow_drag", "hull_derivatives"}, {"shallow_water", "hull_derivatives"}, {"rudder_gain", "race_gain"},
 )  # fmt: skip
-"""Pairs declared equal before any result: one is a special case of the other, or their forces have one form in ordinary manoeuvres."""
+"""Pairs declared equal before any result: one is a special case of the other, or their forces have one form in ordinary
+manoeuvres."""
 
-NOT_COMPARABLE = frozenset({"hull_derivatives", "race_gain", "wake_variation", "thruster_speed_loss", "cross_flow_drag", "rudder_gain"})
-"""The fitted model's own hull, race, wake, thrusters and rudder lift differ from the simulator's, so that the size hidden is not the size missing."""
+NOT_COMPARABLE = frozenset(
+    {"hull_derivatives", "race_gain", "wake_variation", "thruster_speed_loss", "cross_flow_drag", "rudder_gain"}
+)
+"""The fitted model's own hull, race, wake, thrusters and rudder lift differ from the simulator's, so that the size
+hidden is not the size missing."""
 
 TARGETS = {
     "first-named cause right, 1x": (0.90, 1), "first-named cause right, 0.3x": (0.65, 1), "right class, 1x": (0.95, 1),
     "right class, 0.3x": (0.75, 1),
-    "two effects, exact pair": (0.75, 1), "false alarms, same structure": (0.05, -1), "false alarms, other structure": (0.10, -1),
-    "outside: unknown and right variable": (0.75, 1), "size: median relative error": (0.15, -1), "size: coverage of the 95 % intervals": (0.90, 1),
+    "two effects, exact pair": (0.75, 1), "false alarms, same structure": (0.05, -1),
+    "false alarms, other structure": (0.10, -1),
+    "outside: unknown and right variable": (0.75, 1), "size: median relative error": (0.15, -1),
+    "size: coverage of the 95 % intervals": (0.90, 1),
     "share of the oracle's gain": (0.90, 1), "seconds: share within 60 s": (1.0, 1),
 }  # fmt: skip
 """Value that must be reached and its sense: 1 at least, -1 at most. Coverage must also stay below 0.97."""
@@ -57,7 +66,9 @@ def named(row: Row, skip_hull: bool = False) -> list[str]:
 def first(row: Row, skip_hull: bool = False) -> str:
     """First-named cause, else the verdict."""
     causes = named(row, skip_hull)
-    return causes[0] if causes else ("failed" if not ok(row) else "none" if row["verdict"] == "found" else row["verdict"])
+    return (
+        causes[0] if causes else ("failed" if not ok(row) else "none" if row["verdict"] == "found" else row["verdict"])
+    )
 
 
 def right(row: Row, skip_hull: bool = False) -> bool:
@@ -106,7 +117,8 @@ def right_change(row: Row) -> bool:
 
 
 def size_errors(rows: Iterable[Row], comparable: bool = True) -> tuple[list[float], list[bool]]:
-    """Relative errors and coverages of the sizes of all hidden effects that were named; no directions, no shape parameters."""
+    """Relative errors and coverages of the sizes of all hidden effects that were named; no directions, no shape
+    parameters."""
     errors, covered = [], []
     for row in rows:
         for effect, values in zip(row.get("truth", ()), row.get("values", ()), strict=False):
@@ -135,8 +147,22 @@ def _line(figure: str, value: float, low: float, high: float, total: int, note: 
     met = "" if not sense or math.isnan(value) else "yes" if sense * (value - target) >= 0 else "no"
     if figure.startswith("size: coverage") and met == "yes" and value > 0.97:
         met = "no"
-    text = "" if not sense else f"{'>=' if sense > 0 else '<='} {target:g}" + (" and <= 0.97" if figure.startswith("size: coverage") else "")
-    return {"figure": figure, "value": value, "low": low, "high": high, "n": total, "target": text, "met": met, "note": note}
+    text = (
+        ""
+        if not sense
+        else f"{'>=' if sense > 0 else '<='} {target:g}"
+        + (" and <= 0.97" if figure.startswith("size: coverage") else "")
+    )
+    return {
+        "figure": figure,
+        "value": value,
+        "low": low,
+        "high": high,
+        "n": total,
+        "target": text,
+        "met": met,
+        "note": note,
+    }
 
 
 def figures(rows: Sequence[Row]) -> list[Row]:
@@ -146,7 +172,9 @@ def figures(rows: Sequence[Row]) -> list[Row]:
     same, other, pairs = (kinds.get(k, []) for k in ("none-same", "none-other", "pair"))
     lines = []
     for label, part in (("1x", by_size[1.0]), ("0.3x", by_size[0.3])):
-        lines.append(rate(f"first-named cause right, {label}", part, lambda r: right(r, True), "hull_derivatives skipped"))
+        lines.append(
+            rate(f"first-named cause right, {label}", part, lambda r: right(r, True), "hull_derivatives skipped")
+        )
         lines.append(rate(f"right class, {label}", part, lambda r: right_class(r, True), "hull_derivatives skipped"))
     lines.append(rate("two effects, exact pair", pairs, exact_pair, "hull_derivatives skipped"))
     lines.append(rate("false alarms, same structure", same, lambda r: alarm(r, True), "hull_derivatives not counted"))
@@ -154,30 +182,84 @@ def figures(rows: Sequence[Row]) -> list[Row]:
     lines.append(rate("outside: unknown and right variable", kinds.get("outside", []), right_variable))
     hit = [r for r in kinds.get("single", []) if right(r, True)]
     errors, covered = size_errors(hit)
-    lines.append(_line("size: median relative error", float(np.median(errors)) if errors else math.nan, math.nan, math.nan, len(errors)))
-    lines.append(rate("size: coverage of the 95 % intervals", [{"covered": c} for c in covered], lambda r: r["covered"]))
+    lines.append(
+        _line(
+            "size: median relative error",
+            float(np.median(errors)) if errors else math.nan,
+            math.nan,
+            math.nan,
+            len(errors),
+        )
+    )
+    lines.append(
+        rate("size: coverage of the 95 % intervals", [{"covered": c} for c in covered], lambda r: r["covered"])
+    )
     lines.append(oracle_share([*kinds.get("single", []), *pairs]))
     done = [r for r in rows if ok(r)]
     seconds = [r["seconds"] for r in done]
-    lines.append(rate("seconds: share within 60 s", done, lambda r: r["seconds"] <= 60.0, f"median {np.median(seconds):.0f} s" if seconds else ""))
+    lines.append(
+        rate(
+            "seconds: share within 60 s",
+            done,
+            lambda r: r["seconds"] <= 60.0,
+            f"median {np.median(seconds):.0f} s" if seconds else "",
+        )
+    )
     for label, part in (("1x", by_size[1.0]), ("0.3x", by_size[0.3])):
         lines.append(rate(f"first of all causes right, {label}", part, right, "hull_derivatives counted"))
         lines.append(rate(f"right class of all causes, {label}", part, right_class, "hull_derivatives counted"))
-        lines.append(rate(f"anything found beside the hull, {label}", part, lambda r: ok(r) and alarm(r, True), "detection power"))
-        lines.append(rate(f"true cause among those named, {label}", part, lambda r: bool(set(named(r)) & set(r.get("truth", ())))))
+        lines.append(
+            rate(
+                f"anything found beside the hull, {label}", part, lambda r: ok(r) and alarm(r, True), "detection power"
+            )
+        )
+        lines.append(
+            rate(
+                f"true cause among those named, {label}", part, lambda r: bool(set(named(r)) & set(r.get("truth", ())))
+            )
+        )
         lines.append(oracle_power(f"oracle test detects it, {label}", part))
-    lines.append(rate("two effects, exact pair, hull counted", pairs, lambda r: exact_pair(r, False), "hull_derivatives counted"))
-    lines.append(rate("two effects, both among those named", pairs, lambda r: set(r.get("truth", ("?",))) <= set(named(r))))
+    lines.append(
+        rate("two effects, exact pair, hull counted", pairs, lambda r: exact_pair(r, False), "hull_derivatives counted")
+    )
+    lines.append(
+        rate("two effects, both among those named", pairs, lambda r: set(r.get("truth", ("?",))) <= set(named(r)))
+    )
     lines.append(oracle_power("oracle test detects both of two", pairs))
     lines.append(rate("two effects, one at least", pairs, lambda r: bool(set(r.get("truth", ())) & set(named(r)))))
-    lines.append(rate("false alarms with the hull, same structure", same, alarm, "its hull differs by N(0, 0.2): naming it is right"))
-    lines.append(rate("false alarms with the hull, other structure", other, alarm, "its hull truly differs: naming it is right"))
-    published, calm = kinds.get("published", []), kinds.get("none-published", [])
-    lines.append(rate("first-named cause right, ships of the literature", published, lambda r: right(r, True), "typical size"))
-    lines.append(rate("right class, ships of the literature", published, lambda r: right_class(r, True), "typical size"))
-    lines.append(rate("nothing hidden, a wrong name, ships of the literature", calm, lambda r: bool(named(r, True)), "hull_derivatives skipped"))
     lines.append(
-        rate("nothing hidden, unknown, ships of the literature", calm, says_unknown, "the fit leaves what is ordinary, or a force is missing")
+        rate(
+            "false alarms with the hull, same structure",
+            same,
+            alarm,
+            "its hull differs by N(0, 0.2): naming it is right",
+        )
+    )
+    lines.append(
+        rate("false alarms with the hull, other structure", other, alarm, "its hull truly differs: naming it is right")
+    )
+    published, calm = kinds.get("published", []), kinds.get("none-published", [])
+    lines.append(
+        rate("first-named cause right, ships of the literature", published, lambda r: right(r, True), "typical size")
+    )
+    lines.append(
+        rate("right class, ships of the literature", published, lambda r: right_class(r, True), "typical size")
+    )
+    lines.append(
+        rate(
+            "nothing hidden, a wrong name, ships of the literature",
+            calm,
+            lambda r: bool(named(r, True)),
+            "hull_derivatives skipped",
+        )
+    )
+    lines.append(
+        rate(
+            "nothing hidden, unknown, ships of the literature",
+            calm,
+            says_unknown,
+            "the fit leaves what is ordinary, or a force is missing",
+        )
     )
     lines.append(rate("outside: says unknown", kinds.get("outside", []), says_unknown))
     lines.append(rate("outside: a wrong name", kinds.get("outside", []), lambda r: bool(named(r, True))))
@@ -191,14 +273,19 @@ def oracle_share(rows: Sequence[Row]) -> Row:
     """Mean gain over the mean gain of the model that was told the names, where that gains 2 % or more."""
     both = [(r.get("gain") or 0.0, r["oracle_gain"]) for r in rows if ok(r) and (r.get("oracle_gain") or 0.0) >= 0.02]
     value = sum(g for g, _ in both) / sum(o for _, o in both) if both else math.nan
-    return _line("share of the oracle's gain", value, math.nan, math.nan, len(both), "where the oracle gains 2 % or more")
+    return _line(
+        "share of the oracle's gain", value, math.nan, math.nan, len(both), "where the oracle gains 2 % or more"
+    )
 
 
 def oracle_power(figure: str, rows: Sequence[Row]) -> Row:
-    """Mean power of the likelihood-ratio test that knows effect, size, noise and background, at 5 % false alarms of its own."""
+    """Mean power of the likelihood-ratio test that knows effect, size, noise and background, at 5 % false alarms of its
+    own."""
     powers = [r["bound"] for r in rows if ok(r) and r.get("bound") is not None]
     value = float(np.mean(powers)) if powers else math.nan
-    return _line(figure, value, math.nan, math.nan, len(powers), "likelihood ratio, 5 % false alarms for this effect alone")
+    return _line(
+        figure, value, math.nan, math.nan, len(powers), "likelihood ratio, 5 % false alarms for this effect alone"
+    )
 
 
 def per_effect(rows: Sequence[Row]) -> list[Row]:
@@ -214,7 +301,9 @@ def per_effect(rows: Sequence[Row]) -> list[Row]:
             line[f"class_{label}"] = f"{sum(right_class(r, True) for r in part)}/{len(part)}"
         wrong = Counter(first(r, True) for r in own if not right(r, True))
         errors, covered = size_errors([r for r in own if right(r, True)], comparable=False)
-        line["oracle"] = " / ".join(f"{oracle_power('', [r for r in own if r['size'] == [size]])['value']:.2f}" for size in (1.0, 0.3))
+        line["oracle"] = " / ".join(
+            f"{oracle_power('', [r for r in own if r['size'] == [size]])['value']:.2f}" for size in (1.0, 0.3)
+        )
         line["instead"] = ", ".join(f"{name} {n}" for name, n in wrong.most_common(4))
         line["error"] = float(np.median(errors)) if errors else math.nan
         line["covered"] = f"{sum(covered)}/{len(covered)}" if covered else "-"
@@ -231,7 +320,10 @@ def confusion(rows: Sequence[Row]) -> list[Row]:
             detail = row.get("detail", {})
             hidden = detail.get("name") or detail.get("changed") or "".join(row.get("truth", ())) or "nothing"
             counts[row["kind"], hidden, first(row, True)] += 1
-    return [{"kind": k, "hidden": h, "named": n, "count": c} for (k, h, n), c in sorted(counts.items(), key=lambda i: (i[0][:2], -i[1], i[0][2]))]
+    return [
+        {"kind": k, "hidden": h, "named": n, "count": c}
+        for (k, h, n), c in sorted(counts.items(), key=lambda i: (i[0][:2], -i[1], i[0][2]))
+    ]
 
 
 def baseline_lines(rows: Sequence[Row]) -> list[Row]:

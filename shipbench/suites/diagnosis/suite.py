@@ -1,4 +1,5 @@
-"""`shipbench suite diagnosis`: hide effects in simulated trials, diagnose them, keep one row per case; a crash loses nothing that is done."""
+"""`shipbench suite diagnosis`: hide effects in simulated trials, diagnose them, keep one row per case; a crash loses
+nothing that is done."""
 
 from __future__ import annotations
 
@@ -27,12 +28,22 @@ from .cases import KINDS, Case, count, draw_case
 
 Diagnose = Callable[..., Diagnosis]
 SCHEMA = 1
-_FAILURES = (ShipbenchError, ArithmeticError, AttributeError, LookupError, MemoryError, RuntimeError, TypeError, ValueError)
+_FAILURES = (
+    ShipbenchError,
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
 
 
 @dataclass(frozen=True)
 class Job:
-    """One case and what is done with it. oracle: diagnose once more with the true effects as the only candidates; baselines: run both of them."""
+    """One case and what is done with it. oracle: diagnose once more with the true effects as the only candidates;
+    baselines: run both of them."""
 
     kind: str
     index: int
@@ -51,14 +62,27 @@ class Job:
     def signature(self) -> dict[str, Any]:
         """What a finished row must agree with to be kept on resuming."""
         named = f"{self.diagnose.__module__}.{self.diagnose.__qualname__}"
-        options = {"diagnose": named, "gain": self.gain, "oracle": self.oracle, "baselines": self.baselines, "plan": repr(self.plan)}
+        options = {
+            "diagnose": named,
+            "gain": self.gain,
+            "oracle": self.oracle,
+            "baselines": self.baselines,
+            "plan": repr(self.plan),
+        }
         return {"schema": SCHEMA, "source": code_version()["source"], **options}
 
 
 @threadpool_limits.wrap(limits=1)  # workers share the cores, and sums in another number of threads round differently
 def run_case(job: Job) -> dict[str, Any]:
     """The row of one case; whatever fails in it is its row's reason."""
-    row: dict[str, Any] = {"key": job.key, "kind": job.kind, "index": job.index, "seed": job.seed, "which": job.which, "signature": job.signature()}
+    row: dict[str, Any] = {
+        "key": job.key,
+        "kind": job.kind,
+        "index": job.index,
+        "seed": job.seed,
+        "which": job.which,
+        "signature": job.signature(),
+    }
     try:
         case = draw_case(job.kind, job.index, job.seed, job.which, job.plan)
         row |= _case_row(case)
@@ -73,13 +97,17 @@ def run_case(job: Job) -> dict[str, Any]:
             row["baselines"] = _baselines(dataset)
     except _FAILURES as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
-        row |= {"status": "failed", "reason": f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"}
+        row |= {
+            "status": "failed",
+            "reason": f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})",
+        }
     return row
 
 
 def _case_row(case: Case) -> dict[str, Any]:
     return {
-        "ship": case.ship.name, "truth": list(case.truth), "size": [round(s, 4) for s in case.size], "values": case.values(),
+        "ship": case.ship.name, "truth": list(case.truth), "size": [round(s, 4) for s in case.size],
+        "values": case.values(),
         "variables": sorted(case.variables), "detail": case.detail,
     }  # fmt: skip
 
@@ -88,15 +116,18 @@ def _found_row(found: Diagnosis) -> dict[str, Any]:
     causes = found.document()["causes"]  # without NaN
     estimates = {c["effect"]: {k: [e["value"], *e["ci95"]] for k, e in c["parameters"].items()} for c in causes}
     return {
-        "verdict": found.verdict, "named": [c.effect for c in found.causes], "confused": {c.effect: list(c.confused_with) for c in found.causes},
+        "verdict": found.verdict, "named": [c.effect for c in found.causes],
+        "confused": {c.effect: list(c.confused_with) for c in found.causes},
         "scores": {c.effect: c.score for c in found.causes}, "p_values": {c.effect: c.p_value for c in found.causes},
         "evidence": {c.effect: c.evidence for c in found.causes}, "estimates": estimates, "unknown": found.unknown,
-        "gain": None if found.gain is None else found.gain.relative, "warnings": list(found.warnings), "seconds": round(found.seconds, 2),
+        "gain": None if found.gain is None else found.gain.relative, "warnings": list(found.warnings),
+        "seconds": round(found.seconds, 2),
     }  # fmt: skip
 
 
 def _oracle_gain(job: Job, dataset: Dataset, truth: tuple[str, ...]) -> float | None:
-    """Gain of the model that is told the names: the most that a diagnosis can reach. None where the diagnosing function cannot be told."""
+    """Gain of the model that is told the names: the most that a diagnosis can reach. None where the diagnosing function
+    cannot be told."""
     if "only" not in inspect.signature(job.diagnose).parameters:
         return None
     found = job.diagnose(dataset, gain=True, seed=job.seed, only=truth)
@@ -115,14 +146,20 @@ def _baselines(dataset: Dataset) -> dict[str, Any]:
 
     methods = {"white residuals": white_residual_test, "derivative regression": derivative_regression}
     found = {name: method(dataset) for name, method in methods.items()}
-    return {name: {"named": list(r.named), "best": [[n, round(s, 2)] for n, s in r.ranking[:3]]} for name, r in found.items()}
+    return {
+        name: {"named": list(r.named), "best": [[n, round(s, 2)] for n, s in r.ranking[:3]]}
+        for name, r in found.items()
+    }
 
 
 def run_suite(
-    out: Path, *, diagnose: Diagnose, seed: int = 0, seeds_per_effect: int = 3, which: str = "test", kinds: Sequence[str] = KINDS, workers: int = 2,
-    resume: bool = True, gain: bool = True, oracle: bool = True, baselines: bool = True, plan: Trials | None = None, progress: Progress | None = None,
+    out: Path, *, diagnose: Diagnose, seed: int = 0, seeds_per_effect: int = 3, which: str = "test",
+    kinds: Sequence[str] = KINDS, workers: int = 2,
+    resume: bool = True, gain: bool = True, oracle: bool = True, baselines: bool = True, plan: Trials | None = None,
+    progress: Progress | None = None,
 ) -> list[dict[str, Any]]:  # fmt: skip
-    """Run all cases in processes of one thread each (in this process with `workers` of 1) and keep every row in `out/rows` as it is made.
+    """Run all cases in processes of one thread each (in this process with `workers` of 1) and keep every row in
+    `out/rows` as it is made.
 
     Returns:
         Rows in the order of the cases. With `resume`, rows of the same code and options are taken from `out`.
@@ -170,7 +207,8 @@ def _in_processes(jobs: Sequence[Job], workers: int, keep: Callable[[Job, dict[s
                 raise
     except BrokenProcessPool:
         raise WorkError(
-            "a worker process of the suite ended by itself (out of memory?). Finished cases are kept: start again with --resume."
+            "a worker process of the suite ended by itself (out of memory?). Finished cases are kept: start again "
+            "with --resume."
         ) from None
 
 
@@ -204,8 +242,10 @@ def outcome(row: dict[str, Any]) -> str:
 
 
 def suite_command(
-    *, diagnose: Diagnose, seed: int = 0, per_effect: int = 3, kinds: str | None = None, development: bool = False, out: Path | None = None,
-    resume: bool = False, workers: int = 2, page: Path | None = None, baselines: bool = True, plan: Trials | None = None,
+    *, diagnose: Diagnose, seed: int = 0, per_effect: int = 3, kinds: str | None = None, development: bool = False,
+    out: Path | None = None,
+    resume: bool = False, workers: int = 2, page: Path | None = None, baselines: bool = True,
+    plan: Trials | None = None,
     progress: Progress | None = None, command: str = "shipbench suite diagnosis", gain: bool = True,
 ) -> tuple[Path, list[dict[str, Any]]]:  # fmt: skip
     """What `shipbench suite diagnosis` does: run, save rows and page.
@@ -214,7 +254,8 @@ def suite_command(
         kinds: names separated by commas (default all).
         gain: with the cross-validated gain of every diagnosis and of the oracle (four times the time).
         out: folder of the rows (default runs/suite_diagnosis, with -development for that).
-        page: folder of `diagnosis.md` and `diagnosis.json`; default `leaderboards` for the whole suite on test ships, else `out`.
+        page: folder of `diagnosis.md` and `diagnosis.json`; default `leaderboards` for the whole suite on test ships,
+        else `out`.
 
     Returns:
         Path of the page, and the rows.
@@ -241,7 +282,8 @@ def suite_command(
         progress=progress,
     )
     about = {
-        "runs": plan.runs, "samples": plan.samples, "command": command, "seed": seed, "per_effect": per_effect, "which": which, "workers": workers,
+        "runs": plan.runs, "samples": plan.samples, "command": command, "seed": seed, "per_effect": per_effect,
+        "which": which, "workers": workers,
         "code": code_version(), "machine": machine(),
     }  # fmt: skip
     return write_page(folder, rows, about), rows

@@ -1,7 +1,7 @@
 """Causes that are in no library: what a diagnosis must answer `unknown` to, with the variable that the force follows.
 
-They are not registered and no candidate has their form. q: amplitude as a factor of `STRENGTH`, or of a fault of 2 deg or 10 %, then a phase or a
-reference value.
+They are not registered and no candidate has their form. q: amplitude as a factor of `STRENGTH`, or of a fault of 2 deg
+or 10 %, then a phase or a reference value.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from ...ship import Particulars
 from ...signals import PSI, R, U, V
 
 STRENGTH = {"X": 4e-3, "Y": 6e-3, "N": 6e-5}
-"""Accelerations [m/s^2, m/s^2, rad/s^2 at 130 m] of amplitude 1: two to three times what a wind of 7 m/s gives a container ship."""
+"""Accelerations [m/s^2, m/s^2, rad/s^2 at 130 m] of amplitude 1: two to three times what a wind of 7 m/s gives a
+container ship."""
 
 Formula = Callable[[Modifiers, Flow, Sequence[Array], Particulars], None]
 Misreading = Callable[[np.ndarray, Sequence[Array]], None]
@@ -118,8 +119,10 @@ OUTSIDE = (
 """A product has two right variables: the force does follow both."""
 
 _ALIASES = {
-    "heading": "heading psi course", "time": "time t clock", "rudder": "rudder delta helm", "revolutions": "revolutions n rpm shaft propeller thrust",
-    "yaw rate": "yaw_rate yawrate r yaw turning", "sway": "sway v drift beta", "speed": "speed u surge forward", "position": "position place x y",
+    "heading": "heading psi course", "time": "time t clock", "rudder": "rudder delta helm",
+    "revolutions": "revolutions n rpm shaft propeller thrust",
+    "yaw rate": "yaw_rate yawrate r yaw turning", "sway": "sway v drift beta", "speed": "speed u surge forward",
+    "position": "position place x y",
 }  # fmt: skip
 
 
@@ -130,6 +133,11 @@ def get(name: str) -> Outside:
 
 def canonical(variable: str) -> frozenset[str]:
     """The names used here of the variables that a text such as "psi", "|delta|", "n*r" or "yaw rate" speaks of."""
-    text = variable.lower().replace("yaw rate", "yaw_rate").replace("sway velocity", "sway").replace("forward speed", "speed")
+    text = (
+        variable.lower()
+        .replace("yaw rate", "yaw_rate")
+        .replace("sway velocity", "sway")
+        .replace("forward speed", "speed")
+    )
     words = "".join(c if c.isalpha() or c == "_" else " " for c in text).split()
     return frozenset(name for name, words_of in _ALIASES.items() if set(words) & set(words_of.split()))

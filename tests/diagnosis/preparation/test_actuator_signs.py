@@ -66,7 +66,8 @@ def test_thrusters_to_port_are_told(channels: tuple[int, ...]):
 @pytest.mark.long
 @pytest.mark.parametrize("as_recorded", [0.0, 54.0])
 def test_thrusters_are_not_turned_for_another_rest_of_the_fit(monkeypatch, as_recorded: float):
-    """Of four runs a fit took swell for noise of the sway velocity; read to the other side, for forces, 54 better; as recorded with those, too."""
+    """Of four runs a fit took swell for noise of the sway velocity; read to the other side, for forces, 54 better; as
+    recorded with those, too."""
     data = port_trials(4)
     null = plain_model(Plant.of(data))
     pushed = float(np.sum(null.plant.seg.states[..., [F_B, F_S]] * [1.0, 0.3]))
@@ -87,7 +88,9 @@ def test_weak_or_strong_thrusters_are_not_to_port(size: float):
 @pytest.mark.long
 def test_an_order_that_was_blamed_for_its_actuator_is_cleared():
     data = port_trials(4)
-    alone = data.with_runs(replace(run, states=np.where(np.arange(10) == F_B, -run.states, run.states)) for run in data.runs)
+    alone = data.with_runs(
+        replace(run, states=np.where(np.arange(10) == F_B, -run.states, run.states)) for run in data.runs
+    )
     blamed = check_units(alone)
     assert [(f.channel, f.factor) for f in blamed] == [("F_b_c", -1.0)]
     data = corrected(alone, blamed)

@@ -1,4 +1,5 @@
-"""Wind channels as instruments on board show them are read as the true wind before anything is fitted; a true wind stays as it is."""
+"""Wind channels as instruments on board show them are read as the true wind before anything is fitted; a true wind
+stays as it is."""
 
 from __future__ import annotations
 
@@ -57,7 +58,9 @@ def test_a_wind_that_is_where_it_blows_to_is_turned(windy):
 @pytest.mark.parametrize("kept", [-2, -1])
 def test_half_a_wind_is_none_and_said(windy, kept: int):
     names = windy.inputs
-    half = windy.with_runs([replace(r, inputs=r.inputs[:, [0, 1, 2, 3, kept]], inputs_names=(*names[:4], names[kept])) for r in windy.runs])
+    half = windy.with_runs(
+        [replace(r, inputs=r.inputs[:, [0, 1, 2, 3, kept]], inputs_names=(*names[:4], names[kept])) for r in windy.runs]
+    )
     ready = true_wind(Prepared(half))
     found, (line,) = ready.dataset, ready.notes
     assert found is half

@@ -27,7 +27,11 @@ def with_derived_speeds(data: Dataset) -> Dataset:
     def run(given: Run) -> Run:
         track, turn = (derivative(given.t, given.states[:, at], given.t, data.dt, scale).rate for at in ([X, Y], [PSI]))
         states, c, s = given.states.copy(), np.cos(given.states[:, PSI]), np.sin(given.states[:, PSI])
-        states[:, U], states[:, V], states[:, R] = c * track[:, 0] + s * track[:, 1], c * track[:, 1] - s * track[:, 0], turn[:, 0]
+        states[:, U], states[:, V], states[:, R] = (
+            c * track[:, 0] + s * track[:, 1],
+            c * track[:, 1] - s * track[:, 0],
+            turn[:, 0],
+        )
         return replace(given, states=states)
 
     return data.with_runs([run(r) for r in data.runs])
@@ -38,20 +42,32 @@ def with_derived_speeds(data: Dataset) -> Dataset:
 def test_sensors_are_told_from_derivatives(ship):
     def sail(**plan: float) -> Dataset:
         trials = Trials(runs=6, **plan)
-        return published_trials(PUBLISHED[ship], 1, (), trials) if ship in PUBLISHED else sea_trials(load_mmg_ship(ship), 1, (), trials)
+        return (
+            published_trials(PUBLISHED[ship], 1, (), trials)
+            if ship in PUBLISHED
+            else sea_trials(load_mmg_ship(ship), 1, (), trials)
+        )
 
     for noise, waves in ((1.0, 0.0), (0.3, 1.0), (0.0, 0.0), (0.0, 1.0)):
         assert marked(sail(noise=noise, waves=waves)).derived == (), (noise, waves)
     measured = sail()
     derived = with_derived_speeds(measured)
     assert marked(derived).derived == ("u", "v", "r")
-    gyro = [replace(d, states=np.where(np.arange(10) == R, m.states, d.states)) for d, m in zip(derived.runs, measured.runs, strict=True)]
+    gyro = [
+        replace(d, states=np.where(np.arange(10) == R, m.states, d.states))
+        for d, m in zip(derived.runs, measured.runs, strict=True)
+    ]
     assert marked(derived.with_runs(gyro)).derived == ("u", "v")
 
 
 def test_a_perfect_log_of_the_speed_beside_a_poor_position_is_a_sensor():
-    data, rng = sea_trials(load_mmg_ship("kcs"), 1, (), Trials(runs=12, samples=60, noise=0.0)), np.random.default_rng(0)
-    noisy = data.with_runs([replace(r, states=r.states + np.pad(rng.standard_normal((len(r), 2)), ((0, 0), (0, 8)))) for r in data.runs])
+    data, rng = (
+        sea_trials(load_mmg_ship("kcs"), 1, (), Trials(runs=12, samples=60, noise=0.0)),
+        np.random.default_rng(0),
+    )
+    noisy = data.with_runs(
+        [replace(r, states=r.states + np.pad(rng.standard_normal((len(r), 2)), ((0, 0), (0, 8)))) for r in data.runs]
+    )
     assert marked(noisy).derived == ()
 
 

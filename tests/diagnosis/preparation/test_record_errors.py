@@ -90,7 +90,11 @@ def test_a_log_that_reads_too_little_is_left_to_the_fit():
 
 
 CONTRADICTIONS = {
-    "positions in km": (read_as, {X: 1e-3, Y: 1e-3}, r"positions move by 0\.\d+ m where heading and speeds say \d{3} m"),
+    "positions in km": (
+        read_as,
+        {X: 1e-3, Y: 1e-3},
+        r"positions move by 0\.\d+ m where heading and speeds say \d{3} m",
+    ),
     "positions in degrees": (read_as, {X: 1.0 / 60.0 / NAUTICAL, Y: 1.6 / 60.0 / NAUTICAL}, "positions move by"),
     "time in minutes": (in_time, 1.0 / 60.0, r"positions move by \d{3,} m where heading and speeds say \d\.\d+ m"),
     "yaw rate not recorded": (read_as, {R: 0.0}, "the heading turns by .* deg where the yaw rate says 0 deg"),
@@ -112,7 +116,10 @@ def test_samples_rarer_than_a_turn_are_refused():
 
 def test_noise_of_a_ship_at_rest_and_a_gyro_s_constant_error_are_no_contradiction():
     rng = np.random.default_rng(0)
-    still = [replace(run, states=run.states * 0.0 + 0.5 * rng.standard_normal(run.states.shape) * (np.arange(10) < 2)) for run in trials().runs]
+    still = [
+        replace(run, states=run.states * 0.0 + 0.5 * rng.standard_normal(run.states.shape) * (np.arange(10) < 2))
+        for run in trials().runs
+    ]
     prepared = Prepared(trials().with_runs(still))
     assert refuse_contradictions(prepared) is prepared
     drifting = [replace(run, states=run.states + 0.002 * (np.arange(10) == R)) for run in trials().runs]

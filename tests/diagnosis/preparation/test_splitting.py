@@ -36,7 +36,9 @@ def test_a_few_long_runs_are_cut_into_parts_of_equal_length(runs: int, seconds: 
     assert lengths.min() >= 120
     for run in data.runs:
         own = [part for part in cut.runs if part.group == run.id]
-        np.testing.assert_array_equal(np.concatenate([own[0].states, *(part.states[1:] for part in own[1:])]), run.states)
+        np.testing.assert_array_equal(
+            np.concatenate([own[0].states, *(part.states[1:] for part in own[1:])]), run.states
+        )
 
 
 @pytest.mark.parametrize(("runs", "seconds"), [(1, 900), (4, 230), (LEAST_RUNS, 400)])
