@@ -4,9 +4,8 @@
 
 Starts a scheduler and workers of one thread on this machine (needs `shipbench[dask]`), runs CELLS cells (5 folds, CELLS
 / 5 seeds) of a cheap seeded model on them, kills one worker (`kill -9`) when a third is done and starts another in its
-place, then runs the same cells locally.
-Prints the number of cells, how many were lost or differ, the seconds of both and the machine. Exit code 1: a cell was
-lost or differs.
+place, then runs the same cells locally. Prints the number of cells, how many were lost or differ, the seconds of both
+and the machine. Exit code 1: a cell was lost or differs.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ evidence and causes.
 
 Both sides start from the fitted plain model and add causes until none gains more than the threshold. Ours is the whole
 `select` of a diagnosis: the sensitivities of all candidates at once, the score of each on the one Gram matrix, refits
-of the few that are worth one, given up where they promise
-far less than the best, beginnings at single runs, and the backward pass. Peer: in every round the same refit for each
-candidate in turn, as one would do without the Gram matrix; nothing else is looked for. The target is 20 times.
+of the few that are worth one, given up where they promise far less than the best, beginnings at single runs, and the
+backward pass. Peer: in every round the same refit for each candidate in turn, as one would do without the Gram matrix;
+nothing else is looked for. The target is 20 times.
 """
 
 from __future__ import annotations

@@ -4,8 +4,7 @@ processor seconds, most memory.
     python benchmarks/many_runs.py [--only csv|parquet]
 
 The data set: 10,000 runs of 61 to 121 samples, 2 s apart, so that the horizon of 120 s fits once or twice. Each side
-runs in a process of its own;
-both must find all runs. Target: 30 s and 1 GB, on one idle core.
+runs in a process of its own; both must find all runs. Target: 30 s and 1 GB, on one idle core.
 """
 
 from __future__ import annotations

@@ -5,9 +5,8 @@
 The peer is what Lightning's documentation shows: a LightningModule, `DataLoader(TensorDataset(x, y), batch_size=32,
 shuffle=True)` and a Trainer, here without logging, checkpoints, progress bar, model summary and sanity check. A second
 peer yields its shuffled batches from tensors in memory. All sides have the same samples, standardised alike, the same
-layers, Adam 1e-3, batches of 32, the same number of epochs without early stopping, and keep
-the weights of the lowest validation loss. Ours trains all five folds in every run, a peer one fold, another in each:
-times are seconds a fold.
+layers, Adam 1e-3, batches of 32, the same number of epochs without early stopping, and keep the weights of the lowest
+validation loss. Ours trains all five folds in every run, a peer one fold, another in each: times are seconds a fold.
 """
 
 from __future__ import annotations

@@ -3,15 +3,14 @@
     python benchmarks/rollouts_shipmmg.py [--runs N] [--quick] [--json FILE]
 
 Needs `pip install --no-deps shipmmg==0.0.9`: it asks for numpy below 2 and Pillow below 10, but runs with newer ones.
-Both sides sail the same ship
-from the same start under the same rudder and revolutions: turns, shipmmg's own example and its cheapest manoeuvre (a
-rudder that moves costs it up to twice as many evaluations).
+Both sides sail the same ship from the same start under the same rudder and revolutions: turns, shipmmg's own example
+and its cheapest manoeuvre (a rudder that moves costs it up to twice as many evaluations).
 
 - shipmmg: as its documentation has it, `simulate_mmg_3dof` with the default RK45 and `sol.sol(time)` for the states at
   1 s; one run a call, it has no batches. Its result holds u, v, r; x, y, psi would cost it more.
 - shipbench, same equations: `Simulator.fast_rollout`, the MMG formula with 1 s steps, all ten states at 1 s.
 - shipbench, fitted equations: `physics.predict`, eq. (2) to (8) fitted to 12 such turns, 1/3 s steps, all ten states at
-  1 s.
+1 s.
 
 Checked first: each side's integration error against itself with finer steps, ours not above theirs; and the speeds of
 both sides after 120 s, within a tenth of the ship's (the two MMG writings differ in the wake of a drifting ship and in

@@ -4,11 +4,10 @@ grow with the models.
     python benchmarks/study_memory.py [--dt 1.0] [--models 1 3 6] [--quick] [--json FILE]
 
 Makes the data set (the simulator's harbour runs, 1 s apart; a smaller --dt interpolates them), writes it as Parquet,
-and runs `shipbench run` on
-it in a process of its own for each number of models: five folds, windows of 120 s, every network for one epoch, since
-epochs take time and no memory. The figure is the greatest sum of the resident memory of that process and all that it
-started, looked at every 50 ms, or the most that the system saw
-one of them hold, if that is more: the fit of the physics needs its memory for a moment only.
+and runs `shipbench run` on it in a process of its own for each number of models: five folds, windows of 120 s, every
+network for one epoch, since epochs take time and no memory. The figure is the greatest sum of the resident memory of
+that process and all that it started, looked at every 50 ms, or the most that the system saw one of them hold, if that
+is more: the fit of the physics needs its memory for a moment only.
 """
 
 from __future__ import annotations

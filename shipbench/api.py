@@ -56,8 +56,7 @@ def benchmark(
 
     Args:
         models: one or several: "physics+current", "my_model.py:MyNet", a folder of a saved model, a class or an object
-        with `fit` and `predict`.
-            A mapping names them: {"my net": MyNet(), "physics": "physics"}.
+            with `fit` and `predict`. A mapping names them: {"my net": MyNet(), "physics": "physics"}.
         data: one or several data sets: objects, registered names or folders.
         horizon: time to predict [s].
         folds: number of folds by run, from 2.
@@ -72,7 +71,7 @@ def benchmark(
 
     Raises:
         InputError: a model, data set or option cannot be used, or `out` holds another study; nothing has been fitted
-        then.
+            then.
         WorkError: the study had to stop.
     """
     from .bench.executors import Execution

@@ -2,9 +2,8 @@
 
 A step x' = f(x, w, p) comes as a CasADi function, traced from the one formula. Where a C compiler is at hand its
 instructions are written as C in which every number is a vector over runs (CasADi's own C code treats one run at a time
-and calls scalar sine and cosine), compiled once, and kept in
-the cache folder under the digest of source, compiler and processor. Elsewhere CasADi interprets the same instructions:
-slower, the same numbers to rounding.
+and calls scalar sine and cosine), compiled once, and kept in the cache folder under the digest of source, compiler and
+processor. Elsewhere CasADi interprets the same instructions: slower, the same numbers to rounding.
 """
 
 from __future__ import annotations

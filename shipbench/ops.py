@@ -1,8 +1,8 @@
 """Elementwise maths on numpy arrays, torch tensors and casadi expressions.
 
 Physics is written once with these functions; the argument's type picks the back end. Only operations that all three
-have are
-here. torch and casadi are never imported by this module: a value of theirs can only arrive once they are loaded.
+have are here. torch and casadi are never imported by this module: a value of theirs can only arrive once they are
+loaded.
 """
 
 from __future__ import annotations

@@ -242,8 +242,7 @@ class Dataset:
 
         Args:
             frame: columns trajectory, t [s], the ten states, the four commands, then wind_speed, wind_from, depth where
-            they are measured; others
-                are ignored. Missing actuators are filled in as for a file; `notes` say how.
+                they are measured; others are ignored. Missing actuators are filled in as for a file; `notes` say how.
             ship: the vessel's particulars, or the path of a ship.toml.
             dt: sample time [s]; None: that of t.
             name, actuators: as of a data set.
@@ -252,7 +251,7 @@ class Dataset:
 
         Raises:
             InputError: a column is missing, a value is no number, time is not uniform, or the ship's file cannot be
-            read.
+                read.
         """
         from .frames import samples_of
 

@@ -2,8 +2,7 @@
 
 Outside packages add parts through the entry-point group of the registry (for example `shipbench.predictors`). A plug-in
 that cannot be used is told of in one line of the log and left out; asked for by its name, it raises an `InputError`
-with the reason. A name that two
-parts claim is given to neither: shipbench cannot know which one is meant.
+with the reason. A name that two parts claim is given to neither: shipbench cannot know which one is meant.
 """
 
 from __future__ import annotations
@@ -31,8 +30,8 @@ _OFFERS = {
     "datasets": ("make", "summary", "licence", "cached"),
     "metrics": ("function", "columns", "per_run"),
 }
-"""What the object behind an entry point of each group must have; without it other commands would stumble over it later.
-"""
+"""What the object behind an entry point of each group must have; without it other commands would stumble over it
+later."""
 
 _problems: dict[tuple[str, str, str], str] = {}
 """Why a plug-in (group, name, value) could not be used: a failed import is not tried again."""
@@ -89,8 +88,7 @@ class Registry:
         helpers: modules of the folder that are not parts.
         group: entry-point group `shipbench.<group>` for outside packages; the folder's name unless given.
         lazy: a plug-in is imported only when it is asked for by name. Else listing imports the plug-ins (never
-        shipbench's own parts), so
-            that commands which go through all parts meet only those that work.
+            shipbench's own parts), so that commands which go through all parts meet only those that work.
     """
 
     kind: str
@@ -140,7 +138,7 @@ class Registry:
 
         Raises:
             InputError: the name is not registered, claimed twice, needs a package that is not installed, or its plug-in
-            cannot be used.
+                cannot be used.
         """
         files, plugins = self._files(), self.plugins()
         if name not in files and name not in plugins:

@@ -1,10 +1,9 @@
 """Files of strangers, opened safely: regular files only, and their size known before memory is taken.
 
 A named pipe would wait for ever, a device such as /dev/zero never ends, and opening a device may set it in motion.
-Every reader of shipbench opens
-its files here: `open_regular` for readers that take an open file, `check_regular` for those that insist on a path,
-`read_text`, `read_json` and `read_npz` for files that are read whole. `check_output` keeps what is written from what is
-read.
+Every reader of shipbench opens its files here: `open_regular` for readers that take an open file, `check_regular` for
+those that insist on a path, `read_text`, `read_json` and `read_npz` for files that are read whole. `check_output` keeps
+what is written from what is read.
 """
 
 from __future__ import annotations
@@ -132,7 +131,7 @@ def read_npz(path: str | Path, what: str = "file of arrays (.npz)", most: int = 
 
     Raises:
         InputError: as `open_regular`, the file is damaged or holds other things than arrays of numbers or text, or more
-        than `most` bytes.
+            than `most` bytes.
     """
     import numpy as np
 

@@ -65,8 +65,7 @@ class Scores:
 
         Args:
             metrics: columns of `results.rows`, such as "ed", "final_displacement" or "rmse_r", or their labels, such as
-            "ED"; those by default that
-                the study has.
+                "ED"; those by default that the study has.
 
         Returns:
             Columns dataset (of several), model, scored, then `ED`, `ED low`, `ED high` and so on; their units are in

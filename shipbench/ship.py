@@ -102,7 +102,7 @@ class Ship(_Part):
 
         Raises:
             InputError: a required key is missing, a key is unknown, a value is out of range, or together they are of no
-            ship (see `complete`).
+                ship (see `complete`).
         """
         try:
             ship = cls.model_validate(data)
@@ -183,8 +183,7 @@ def complete(ship: Ship) -> Particulars:
 
     Raises:
         InputError: mass, displacement and Cb contradict one another by more than 10 %, no hull is so full or so
-        slender, or something is too large
-            for the ship or outside of her.
+            slender, or something is too large for the ship or outside of her.
     """
     notes: list[str] = []
 

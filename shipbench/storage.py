@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 Frame = Any
-"""A pandas DataFrame. pandas' own annotations are unions of all that a method can return, which no checker can follow.
-"""
+"""A pandas DataFrame. pandas' own annotations are unions of all that a method can return, which no checker can
+follow."""
 
 
 @contextmanager

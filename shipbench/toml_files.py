@@ -30,7 +30,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
     Raises:
         InputError: the file is missing, not a regular file, too large, not TOML, nested too deeply, or holds an integer
-        beyond 64 bits.
+            beyond 64 bits.
     """
     text = read_text(path, "TOML file", MOST_TOML)
     try:
@@ -95,8 +95,8 @@ def _switch(value: Any) -> Any:
 
 
 Number = Annotated[float, BeforeValidator(_number)]
-"""A number that was written as one; infinite and not-a-number are the model's choice (`allow_inf_nan` of its config).
-"""
+"""A number that was written as one; infinite and not-a-number are the model's choice (`allow_inf_nan` of its
+config)."""
 Whole = Annotated[int, BeforeValidator(_number)]
 """A whole number (2 or 2.0)."""
 Switch = Annotated[bool, BeforeValidator(_switch)]

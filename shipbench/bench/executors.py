@@ -39,20 +39,19 @@ class Execution:
 
     Args:
         executor: "local" (one after another in this process; in a child process if there are limits, or if the code of
-        the model is not
-            shipbench's), "processes" (`workers` child processes at a time) or "dask" (the workers of the Dask cluster
-            at `scheduler`).
+            the model is not shipbench's), "processes" (`workers` child processes at a time) or "dask" (the workers of
+            the Dask cluster at `scheduler`).
         workers: number of processes; None: one for each CPU.
         scheduler: address, such as "tcp://host:8786".
         limits: of each cell.
         device: where networks train and predict ("cpu", "cuda", "cuda:1"); None: where their specs say, else on the
-        CPU.
+            CPU.
 
         wait_s: give up when the Dask cluster has had no workers for so long [s]; None: wait for them.
 
     Raises:
         InputError: an unknown executor, an option that it lacks or does not take, or a device that is not here (with
-        Dask, each worker looks itself).
+            Dask, each worker looks itself).
     """
 
     executor: str = "local"

@@ -228,7 +228,7 @@ def make_folds(dataset: Dataset, task: Task) -> list[Fold]:
 
     Raises:
         InputError: more folds than groups, too many training or validation runs, or no published split, or no kinds to
-        tell apart.
+            tell apart.
     """
     steps, history, stride = task.steps(dataset.dt), task.history(dataset.dt), task.stride(dataset.dt)
     cut = cache(lambda run, every: run.windows(history + steps + 1, every))  # the folds share the windows of a run

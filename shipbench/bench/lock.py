@@ -34,7 +34,7 @@ def claimed(out: Path) -> Iterator[None]:
 
     Raises:
         InputError: the folder cannot be made or written, or holds links in the place of its folders, or another study
-        is at work in it.
+            is at work in it.
         WorkError: writing failed later (disk full, a folder that has gone).
     """
     try:

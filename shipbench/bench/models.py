@@ -23,7 +23,7 @@ class ModelFacts:
 
     Args:
         foreign: it runs code that is not shipbench's (a model file, a plug-in), which is loaded in processes of its own
-        only.
+            only.
         seeded: it draws random numbers.
         together: its class fits several folds at once.
         files: content by relative name of the user's code, or of the saved folder.

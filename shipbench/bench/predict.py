@@ -29,8 +29,7 @@ def predict_runs(
 
     Raises:
         InputError: the folder is no saved model, its inputs or sample time are not those of the data set, a run is
-        shorter than the
-            horizon, or the device is not here.
+            shorter than the horizon, or the device is not here.
     """
     spec = parse_spec(model)
     if spec.path is None or spec.class_name is not None:

@@ -2,8 +2,8 @@
 manoeuvres.
 
 These are properties of the data, the same for every model. A study keeps them in `windows.parquet`, so that slices can
-be rendered from rows alone.
-Whole windows are sorted, not knots: in a rollout the error at a knot is the sum of all that came before.
+be rendered from rows alone. Whole windows are sorted, not knots: in a rollout the error at a knot is the sum of all
+that came before.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ all.
 - `rows.parquet`: one row per (dataset, model, fold, seed, run) of the study.
 - `summary.json`: one entry per cell that alone identifies its experiment.
 - `windows.parquet`: one row per scored window: what the true ship does there (see `regimes`). These three files are a
-  submission.
+submission.
 - `truth/<dataset>/fold0.npz`: ids, s0, U and truth of the scored windows (the same for all models).
 - `cells/<dataset>/<model>/fold0-seed0/`: rows.parquet, summary.json, predictions.npz (S), equations.txt, model/.
 """

@@ -89,8 +89,7 @@ def run_tasks(
         tasks: one per data set.
         out: folder of the study; run again, the same tasks replace what they made there.
         resume: keep the scored cells that the same code, data and task made; failed and skipped ones are tried again.
-        The results of another study
-            in `out` are replaced only then.
+            The results of another study in `out` are replaced only then.
         execution: where the cells run and what each may use; it changes no number (a GPU rounds otherwise than a CPU).
         progress: told of every cell.
         command: the command line, kept in the results.
@@ -98,7 +97,7 @@ def run_tasks(
 
     Raises:
         InputError: a task, data set, model, folder or executor cannot be used, or `out` holds another study. Nothing
-        has been fitted then.
+            has been fitted then.
         WorkError: the study had to stop (disk full, workers lost). What is finished is kept.
     """
     out, progress, execution = Path(out), progress or Silent(), execution or Execution()

@@ -40,8 +40,7 @@ def check_submission(folder: Path, rows: Frame, summaries: Any) -> Frame:
 
     Raises:
         InputError: a column or key is missing or of another type, a row stands twice, the protocol or the task is not
-        known here, rows and summaries
-            do not belong together, a status is unknown, or a score is none.
+            known here, rows and summaries do not belong together, a status is unknown, or a score is none.
     """
 
     def refuse(what: str, help_: str = _GIVE) -> InputError:
@@ -247,8 +246,7 @@ def read_results(folders: str | Path | Sequence[str | Path]) -> Results:
 
     Raises:
         InputError: a folder holds no results, they contradict themselves or one another (see `submissions`), or the
-        same cell stands in two of
-            them.
+            same cell stands in two of them.
     """
     import pandas as pd
 

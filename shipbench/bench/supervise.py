@@ -16,8 +16,8 @@ import time
 from contextlib import suppress
 
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
-"""Linux, prctl(2): a process ends with its parent; orphans below a process become its children, not those of process 1.
-"""
+"""Linux, prctl(2): a process ends with its parent; orphans below a process become its children, not those of process
+1."""
 
 _PASSES = 50
 """Most rounds of ending processes that start others meanwhile; 20 ms each."""

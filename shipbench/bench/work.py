@@ -2,9 +2,8 @@
 it.
 
 A job holds the cells that are fitted together: all folds of one model, data set and seed where the model's class offers
-`fit_group`, else one
-cell. Stacked training rounds differently with other members beside it, so a job is the unit that is sent, killed and
-resumed: its numbers then do not depend on where and in which order jobs run.
+`fit_group`, else one cell. Stacked training rounds differently with other members beside it, so a job is the unit that
+is sent, killed and resumed: its numbers then do not depend on where and in which order jobs run.
 """
 
 from __future__ import annotations
@@ -81,8 +80,7 @@ class Answer:
         notes: why the model could not be saved or described, and how it follows its own training runs (`fit_report`).
         machine: where it was computed.
         code: digests by relative name of the user's code that was loaded in the end, and of the files that the model
-        read; empty for other
-            models.
+            read; empty for other models.
     """
 
     status: str = ""

@@ -32,8 +32,7 @@ def _checks() -> tuple[Callable[[Recording], list[Finding]], ...]:
 
 def check_recording(recording: Recording) -> list[Finding]:
     """Findings of the gross checks, then those of every other on the data with the gross errors taken out; errors
-    first. None is about a channel
-    that import made of others: it is as good as these."""
+    first. None is about a channel that import made of others: it is as good as these."""
     mended, found = recording, []
     mends = (mend_placeholders, mend_north, mend_held, mend_gross)
     checks = _checks()

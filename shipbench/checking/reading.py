@@ -30,7 +30,7 @@ def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
 
     Raises:
         InputError: neither a known name nor a folder; its TOML files or its table cannot be read, or nothing usable is
-        left of it.
+            left of it.
     """
     folder = Path(spec)
     if not (folder / "dataset.toml").is_file():

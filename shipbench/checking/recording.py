@@ -18,13 +18,11 @@ class Recording:
     """A data set to check.
 
     dataset: runs without missing values, uniform in time (pieces of one run share the group `parent`). given:
-    dataset.toml as written, {} for a
-    registered set. recorded: columns that stand in the table (states that were filled in do not). wrapped: runs whose
-    heading was wrapped.
+    dataset.toml as written, {} for a registered set. recorded: columns that stand in the table (states that were filled
+    in do not). wrapped: runs whose heading was wrapped.
     parent: id of a piece -> id of the run that it is a piece of. turned: u, v were velocities over ground, turned into
-    the ship's axes by psi: the
-    track says nothing of psi. turn: a whole turn in the unit of psi (degrees that nobody declared are read as they
-    are).
+    the ship's axes by psi: the track says nothing of psi. turn: a whole turn in the unit of psi (degrees that nobody
+    declared are read as they are).
     """
 
     dataset: Dataset

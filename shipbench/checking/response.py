@@ -33,8 +33,8 @@ class _Pair:
 
     late, early: smallest lag of the cause, or lead, that is reported [s at 130 m], and the log likelihood that it must
     gain. agreed: what a lag must gain where the actuator waits for its order, too. Noise in the motion and forces that
-    are not recorded make the rudder seem late, never early;
-    early None: a lead is not told from the dead time of a gear.
+    are not recorded make the rudder seem late, never early; early None: a lead is not told from the dead time of a
+    gear.
     of: the state of the effect. order: the cause is an order, which is held until the next sample, and windows that it
     does not explain count; else these are left out.
     """

@@ -17,9 +17,8 @@ class Chosen:
     that models leave.
 
     left: "plain", every explanation alone, and "all chosen" -> root of squares left over root of the squares of
-    `whole`. held: explanation -> squares
-    that all chosen ones leave in runs held out of the fit, over those that the others leave there without it. out: mean
-    square that all leave there.
+    `whole`. held: explanation -> squares that all chosen ones leave in runs held out of the fit, over those that the
+    others leave there without it. out: mean square that all leave there.
     """
 
     names: tuple[str, ...]

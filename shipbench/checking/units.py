@@ -1,12 +1,11 @@
 """Gross errors of unit and sign, found before any model is fitted, by kinematics between the channels.
 
 Increments over windows of some seconds are compared with integrals, never with differences of neighbours. Track against
-heading and
-speeds, heading against yaw rate: every combination of units and signs is tried with the ordinary faults of sensors left
-free (a scale of 15 %, a compass error, an antenna away from midship, a delay, a drift), and one is believed if it
-leaves a quarter or less of the plain reading's squares; of the small sway alone, three quarters, if that is beyond
-chance and better than no sway at all. Of combinations that explain the same (a mirrored track with mirrored sway is a
-mirrored heading), that with the fewest errors is taken, the rudder's side included.
+heading and speeds, heading against yaw rate: every combination of units and signs is tried with the ordinary faults of
+sensors left free (a scale of 15 %, a compass error, an antenna away from midship, a delay, a drift), and one is
+believed if it leaves a quarter or less of the plain reading's squares; of the small sway alone, three quarters, if that
+is beyond chance and better than no sway at all. Of combinations that explain the same (a mirrored track with mirrored
+sway is a mirrored heading), that with the fewest errors is taken, the rudder's side included.
 """
 
 from __future__ import annotations
@@ -140,8 +139,7 @@ class _Motion:
 
     def choose(self, side: Side, astern: Sequence[float]) -> _Reading:
         """The reading with the fewest errors among those that explain the data as well as any; the plain one unless it
-        fails by far.
-        astern: signs of u with which the shaft would turn the wrong way."""
+        fails by far. astern: signs of u with which the shaft would turn the wrong way."""
         plain = _Reading()
         suits = self._tracks(plain) if self.track else [replace(plain, psi=psi) for psi in self._headings()]
         options = [(replace(k, r=r), self.track.get(k, 0.0)) for k in suits for r in self._rates(k.psi)]

@@ -18,9 +18,9 @@ class Rule:
         name: short and stable; what `--json` reports.
         says: the rule, in one sentence.
         tries: returns the evidence that it is kept, or raises `Broken` or `NotApplicable`; anything else that it raises
-        is the model's failure.
+            is the model's failure.
         after: rules without which this one means nothing: where one of them is broken, this one is not put to the
-        model.
+            model.
     """
 
     name: str

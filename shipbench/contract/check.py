@@ -58,8 +58,7 @@ def check_model(model: Any, data: Dataset | None = None, device: str | None = No
 
     Raises:
         InputError: the spec cannot be made into a model, the model refuses the data (`skip`), its inputs are not those
-        of the data, or no such
-            device is here.
+            of the data, or no such device is here.
     """
     began = time.perf_counter()
     spec = spec_of(model)

@@ -44,8 +44,8 @@ class RunCorrections(BaseModel):
     """Keys of `[runs.<id>]` that change the samples; all others are metadata.
 
     cut: [from, to] in s, both included: these samples are left out and the run is split there. fill: signal -> such
-    intervals, bridged by straight
-    lines. bias: signal -> recorded less true. current: [north, east] m/s for velocities through water.
+    intervals, bridged by straight lines. bias: signal -> recorded less true. current: [north, east] m/s for velocities
+    through water.
     """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -64,10 +64,10 @@ class Corrections(BaseModel):
     wind_from: "true" (ours), "apparent" (as felt on board, its direction from the bow), "apparent-north" (as felt on
     board, from north), "true-bow" (the true wind, its direction from the bow). antenna: [forward, starboard] m from
     midship of the point whose position is recorded. gaps: "refuse", or "split" runs at gaps in time and at rows that
-    lack values. scale: recorded
-    over true. bias: recorded less true. delay: s by which the record of a signal is late; "velocity" is the vector of u
-    and v in earth axes (late or filtered there, then turned by the heading of the moment). held: x, y or psi whose
-    values a faster record repeats until the next one; straight lines from value to value take their place.
+    lack values. scale: recorded over true. bias: recorded less true. delay: s by which the record of a signal is late;
+    "velocity" is the vector of u and v in earth axes (late or filtered there, then turned by the heading of the
+    moment). held: x, y or psi whose values a faster record repeats until the next one; straight lines from value to
+    value take their place.
     """
 
     frame: Literal["NED", "ENU", "east-north"] = "NED"
@@ -155,7 +155,7 @@ def correct_run(
 
     Raises:
         InputError: a fill has no samples to stand on, velocities through water lack their current, or a kind of wind
-        its columns.
+            its columns.
     """
     frame = frame.reset_index(drop=True).copy()
     t = frame["t"].to_numpy()

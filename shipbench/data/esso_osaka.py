@@ -34,8 +34,8 @@ _RPS, _RUDDER = "n_prop [rps]", "delta_rudder [rad]"
 _WIND_SPEED, _WIND_FROM = "wind_velo_true [m/s]", "wind_dir_true [rad]"
 _SAMPLE = 0.1
 _CUT_COPIES = ("turn_cut_14-Sep-2020_15_58_08",)
-"""Files that are the beginning of another file here: left out, so that no sample stands in training and test at once.
-"""
+"""Files that are the beginning of another file here: left out, so that no sample stands in training and test at
+once."""
 
 _PUBLISHED_TEST = (
     "berthing_12-Nov-2020_11_38_50", "berthing_12-Nov-2020_11_49_21", "berthing_12-Nov-2020_13_21_03",
@@ -146,13 +146,12 @@ def make(path: str | None = None, dt: float = 0.5, wind: bool = True) -> Dataset
     Args:
         path: folder of the copy.
         dt: sample time [s], a multiple of the files' 0.1 s. States are the samples at t_k; commands and wind are means
-        over [t_k, t_k+1), which keeps
-            their impulse.
+            over [t_k, t_k+1), which keeps their impulse.
         wind: give the measured true wind as inputs, or withhold it.
 
     Raises:
         InputError: no copy, an unknown layout, a dt that is no multiple of 0.1 s, or a `wind` that is neither true nor
-        false.
+            false.
     """
     if not isinstance(wind, bool):  # the text "False" would count as yes
         raise InputError(f"esso_osaka: wind = {wind!r}; accepted: true or false, as in 'esso_osaka[wind=false]'.")

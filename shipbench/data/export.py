@@ -19,8 +19,7 @@ def check_format(format: str | None, out: Path, source: str) -> Format:
 
     Raises:
         InputError: no format or an unknown one, a file's name that contradicts it, or `out` is the folder that is to be
-        exported (its table would be
-            replaced).
+            exported (its table would be replaced).
     """
     is_mat_file = out.suffix == ".mat"
     chosen = "mat" if format is None and is_mat_file else format

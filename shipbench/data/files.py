@@ -70,7 +70,7 @@ def read_dataset(folder: str | Path) -> Dataset:
 
     Raises:
         InputError: a file or column is missing, a value is not a finite number, time is not uniform, or a key, unit or
-        sign is unknown.
+            sign is unknown.
     """
     folder = Path(folder)
     description = read_description(folder / "dataset.toml")
@@ -146,7 +146,7 @@ def read_table(folder: Path, description: Description) -> tuple[pd.DataFrame, Pa
 
     Raises:
         InputError: no table or several, a required column is missing, two columns are one signal, or as
-        `read_trajectories`.
+            `read_trajectories`.
     """
     found = [folder / name for name in TABLES if os.path.lexists(folder / name)]
     if not found:

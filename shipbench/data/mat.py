@@ -3,7 +3,7 @@
 The file holds two variables:
 
 - `dataset`: struct with name, dt [s], actuators, source, licence, simulation, notes (cell), fingerprint and ship
-  (struct, SI);
+(struct, SI);
 - `runs`: struct array, one element per run, with id, t (samples x 1) [s], states (samples x 10), commands (samples x
   4), environment (samples x channels), names and units (structs with one cell of text per array) and meta (text, JSON).
 

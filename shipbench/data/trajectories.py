@@ -49,7 +49,7 @@ def read_trajectories(path: Path, ids: str, needed: Callable[[Sequence[str]], li
 
     Raises:
         InputError: no regular file, damaged, not UTF-8, a row with more fields than the header, or too large for
-        memory.
+            memory.
     """
     read = _read_parquet if path.suffix == ".parquet" else _read_csv
     try:

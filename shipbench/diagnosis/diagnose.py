@@ -57,20 +57,19 @@ def diagnose(
 
     Args:
         gain: cross-validate (everything is repeated on every training part); without, gains are None, and the hull is
-        not named: that it lies off
-            the regressions is named only where fitting it pays on runs that were not fitted.
+            not named: that it lies off the regressions is named only where fitting it pays on runs that were not
+            fitted.
         seed: of the bootstrap and of the folds.
         only: effects to consider (an oracle that knows what is hidden); default all.
         workers: processes for the folds; 1: everything runs in this one.
         thorough: use up to twice as much of a long record (the folds use a quarter); 90 runs of 120 s are used whole
-        either way.
+            either way.
         budget: how much work and memory the whole may take; default that of `Budget`. A warning says where it has
-        acted.
+            acted.
 
     Raises:
         InputError: the ship never moves, there are too few samples for any fit, the record contradicts itself,
-        `workers` is less than one, or it
-            would take too much memory.
+            `workers` is less than one, or it would take too much memory.
     """
     if workers < 1:
         raise InputError(f"workers: {workers}; accepted: whole numbers from 1.")

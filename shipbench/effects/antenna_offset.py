@@ -1,7 +1,7 @@
 """The recorded position is that of an antenna, ahead and to starboard of midship: p + R(psi) (forward, starboard). Its
 velocity is midship's (a log, or an inertial unit that reckons with the lever), or the antenna's own, from the same
-receiver: u - r starboard, v + r forward. Its own agree with the
-track, so that only the forces tell where on the ship they belong: what is ahead or astern may pass for another hull.
+receiver: u - r starboard, v + r forward. Its own agree with the track, so that only the forces tell where on the ship
+they belong: what is ahead or astern may pass for another hull.
 
 It stands on the ship or near her: within three quarters of the length from midship, and within a breadth of the
 centreline."""

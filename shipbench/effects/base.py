@@ -2,10 +2,9 @@
 model.
 
 A part is one file of this folder whose instance is bound to `EFFECT`; the file's name is the effect's name. It
-overrides one of three methods,
-which say where the cause enters: `force` (anything that acts on the hull), `gear` (between command and actuator) or
-`measure` (the sensors). Its values `q` are zero when nothing is missing, and may be numbers, one per run, or symbols
-(force only).
+overrides one of three methods, which say where the cause enters: `force` (anything that acts on the hull), `gear`
+(between command and actuator) or `measure` (the sensors). Its values `q` are zero when nothing is missing, and may be
+numbers, one per run, or symbols (force only).
 """
 
 from __future__ import annotations
@@ -39,11 +38,10 @@ class Parameter:
     typical, low, high are for a ship of 130 m; `scaling` says how they go with the length (Froude's law): a key of
     `_FROUDE`. A fit is held between low and high; a size beyond them is not named (`Effect.plausible`).
     A `shape` parameter is not an amplitude: it is chosen from `Effect.settings`, and means nothing while the amplitudes
-    are zero. An `other` one
-    is the amplitude, or chooses, another form of the same cause, which a ship may have in its place: fitted, but not
-    drawn for the suite. `title` is the name in words, such as "sway damping"; a `relative` one is a change of a
-    coefficient as a share, reported in percent; one with `share_of` is a share of that quantity, reported in percent
-    too.
+    are zero. An `other` one is the amplitude, or chooses, another form of the same cause, which a ship may have in its
+    place: fitted, but not drawn for the suite. `title` is the name in words, such as "sway damping"; a `relative` one
+    is a change of a coefficient as a share, reported in percent; one with `share_of` is a share of that quantity,
+    reported in percent too.
     """
 
     name: str
@@ -73,10 +71,9 @@ class Effect:
     earth-fixed components are reported as), `separate` (the manoeuvre that tells it from its look-alikes), `channels`
     (measured inputs without which it means nothing), `known_with` (measured inputs with which the model has it
     already), `scales` (channels that it records (1 + q) times too large), `breaks_symmetry` (a force that knows port
-    from
-    starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that are
-    wrong), `late` (tells of another time, and as much of the motion as a sensor in time, but where a record begins or
-    ends), `unrecorded` (of a gear's: it may also act behind the record of the actuator, where the motion alone shows
+    from starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that
+    are wrong), `late` (tells of another time, and as much of the motion as a sensor in time, but where a record begins
+    or ends), `unrecorded` (of a gear's: it may also act behind the record of the actuator, where the motion alone shows
     it), `traits` (facts about ships and about its look-alikes). `way`: how one of those that `fitted` gives acts, where
     the user should be told.
     """

@@ -1,7 +1,6 @@
 """The centre of gravity lies elsewhere than the ship file says: x_G + shift, forward positive; mass and inertia about
-it stay.
-A shift of 0.06 L trims the ship by as much, over a longitudinal metacentric height of one length: by more than her
-draught."""
+it stay. A shift of 0.06 L trims the ship by as much, over a longitudinal metacentric height of one length: by more than
+her draught."""
 
 from __future__ import annotations
 

@@ -49,11 +49,11 @@ class ChangePoint(Effect):
 
         Args:
             rows: number of the run of each row (simulated run, segment) where rows are not the runs in order; values
-            and flow have rows last.
+                and flow have rows last.
 
         Raises:
             InputError: not just one of `from_run`, `from_time` is given, a cause that is no force shall begin within
-            runs, or `effect` is a change.
+                runs, or `effect` is a change.
         """
         if (from_run is None) == (from_time is None):
             raise InputError(

@@ -1,7 +1,7 @@
 """The compass reads too much by a constant: psi recorded = psi + bias. Surge and sway are of a sensor in the ship's own
 axes (a log), or velocities over ground from satellites that the same compass turned into the ship's axes: u cos + v
-sin, v cos - u sin of the bias. Those agree with the track
-and the heading, so that only the forces tell: they act along the ship."""
+sin, v cos - u sin of the bias. Those agree with the track and the heading, so that only the forces tell: they act along
+the ship."""
 
 from __future__ import annotations
 

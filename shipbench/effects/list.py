@@ -1,9 +1,8 @@
 """A list: the heeled hull is unsymmetrical and turns away from its low side.
 
 N = -0.008 phi rho/2 L^2 T u|u|, Y = -0.5 N/L + s rho/2 L T u|u|; heel phi positive to starboard. At rest there is no
-force. s is what the side force
-of another hull differs by: of it little is known. No ship sails with a list of more than 10 degrees: passengers or a
-turn may heel an intact ship by no more (2008 IS Code, part A, 3.1)."""
+force. s is what the side force of another hull differs by: of it little is known. No ship sails with a list of more
+than 10 degrees: passengers or a turn may heel an intact ship by no more (2008 IS Code, part A, 3.1)."""
 
 from __future__ import annotations
 

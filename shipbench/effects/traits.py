@@ -26,29 +26,29 @@ class Traits:
 
     Attributes:
         search: how the diagnosis looks for it, a key of `SEARCHES`. A limit has no slope where it does not act: the
-        record shows it alone.
+            record shows it alone.
         describes_data: it is a fault of the data, or of their order, and no part of a predictor: the data are
-        corrected, or split.
+            corrected, or split.
         wraps: it takes another effect (`Effect.of`), whose values are its own.
         local: it depends on the place or on the time within a run, which a model of accelerations is not given.
         between_ships: ordinary ships differ in it, so that what the form of a hull lacks passes for it: it must be
-        worth more.
+            worth more.
         absorbs_misfit: such forms were mistaken for it most often: it must be worth more again.
         persistent: hull, rudder and propeller keep their shape during trials, a bank its place: it does not begin with
-        a run.
+            a run.
         least_size: size from which it is practically significant, in typical sizes.
         least_unrecorded: the same behind the record of an actuator, where the motion alone shows it.
         aliases: effects that it is told as confused with, however far apart their scores are.
         group: effects of one group come together and push alike: beside one of them the others are not named.
         imitates: effects whose own law leaves what looks like this one along their normal (`Effect.normal`): there it
-        is not believed.
+            is not believed.
         by_coefficients: a force that breaks a symmetry, but shows by the ship's coefficients alone.
         relies_on: coefficients of the ship (`between_ships`) that it is judged by: beyond those of all ships it is not
-        believed.
+            believed.
         faults_of: channels of whose sensors it is a fault.
         gear_field: value of the gear that it changes: T, rate, delay, deadband or backlash.
         in_place_of: parameters p of eq. (2) to (8), by number, that stay zero where it is fitted: data cannot tell the
-        two apart.
+            two apart.
         in_place_beside_hull: the same where the hull's derivatives are free, too.
     """
 

@@ -40,10 +40,9 @@ class Wind(Effect):
 
     def fitted(self, L: float) -> tuple[Self, ...]:
         """Components a = W (W + W_0)/(W_t + W_0) of a wind W, W_t the typical one, W_0 a ship's ordinary speed: its
-        forces grow with them, while the
-        square of a weak wind has no slope that a fit could follow. Once for each of three moments: that of an unknown
-        superstructure may be a fraction of the formula's or twice as large (the spread between types of ship:
-        Blendermann 1994)."""
+        forces grow with them, while the square of a weak wind has no slope that a fit could follow. Once for each of
+        three moments: that of an unknown superstructure may be a fraction of the formula's or twice as large (the
+        spread between types of ship: Blendermann 1994)."""
         found = []
         for moment in (0.3, 1.0, 2.0):
             effect = copy(self)

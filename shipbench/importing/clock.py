@@ -70,7 +70,7 @@ def to_seconds(
 
     Raises:
         InputError: unknown format, unreadable stamps, stamps of which only some have a zone, or moments outside 1900 to
-        2199.
+            2199.
     """
     seconds = _read(clock, columns, numbers, where, [] if told is None else told)
     if is_absolute(clock):

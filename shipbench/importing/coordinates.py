@@ -29,7 +29,7 @@ def coordinates(cells: Cells, name: str, channel: Channel, missing: Sequence[str
 
     Raises:
         InputError: a cell is no number, its letters belong to the other axis or contradict its sign, or its minutes are
-        above 60.
+            above 60.
     """
     (column,) = channel.columns
     if not cells.is_text(column):

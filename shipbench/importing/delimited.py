@@ -35,7 +35,7 @@ def open_text(path: Path, layout: Layout) -> Table:
 
     Raises:
         InputError: no text, or no header where it should stand; while it is streamed: rows with more or fewer fields
-        than the header.
+            than the header.
     """
     with uncompressed(path) as file:
         head = file.read(TEXT_BLOCK)

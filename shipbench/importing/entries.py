@@ -58,11 +58,10 @@ class Channel(Part):
     """One column, or one expression of columns: ours = sign x unit x factor x (reading + offset).
 
     `gap` [s] replaces the mapping's for this channel (inf: logged on change); `missing` lists readings that are none,
-    beside the source's (an empty
-    list: every number is a reading, also those that stand for "not available" by convention).
-    `unit = "%"` and `unit = "pwm"` need `full`, the value in `full_unit` at 100 % or at 2000 us.
-    `hemisphere` is the column with N or S, E or W; `part` is the place (1 or 2) in a cell that holds latitude and
-    longitude.
+    beside the source's (an empty list: every number is a reading, also those that stand for "not available" by
+    convention).
+    `unit = "%"` and `unit = "pwm"` need `full`, the value in `full_unit` at 100 % or at 2000 us. `hemisphere` is the
+    column with N or S, E or W; `part` is the place (1 or 2) in a cell that holds latitude and longitude.
     """
 
     column: str | None = None

@@ -27,8 +27,7 @@ def open_excel(path: Path, layout: Layout) -> Table:
 
     Raises:
         InputError: openpyxl is not installed, or the file is no workbook, holds more than 1 GB (100 MB of texts), or
-        has several sheets and none
-            is named.
+            has several sheets and none is named.
     """
     _check_book(path)
     header = next(itertools.islice(_rows(path, layout), (layout.header or layout.skip + 1) - 1, None), None)

@@ -12,8 +12,8 @@ from .cells import Counts
 from .track import usual
 
 _LEAST = 8
-"""Changes of a position in a block that are needed to tell how long a fix is held; of fewer, the block before decides.
-"""
+"""Changes of a position in a block that are needed to tell how long a fix is held; of fewer, the block before
+decides."""
 _WITH_THE_FIX = ("psi", "u", "v", "r", "sog", "cog")
 """Channels that may come from the same receiver."""
 

@@ -88,9 +88,8 @@ class Source(Part):
 
 class Split(Part):
     """How logs become runs; all in s and m/s. `gap`: longer pauses split; `window`: runs of that length; `shortest`:
-    shorter ones are left out;
-    `longest`: longer ones are cut in parts of one group; `still_speed`: stretches slower than that for `still_time` are
-    left out."""
+    shorter ones are left out; `longest`: longer ones are cut in parts of one group; `still_speed`: stretches slower
+    than that for `still_time` are left out."""
 
     gap: float = Field(3.0, gt=0)
     window: float | None = Field(None, gt=0, allow_inf_nan=False)
@@ -133,7 +132,7 @@ def load_mapping(path: str | Path, **overrides: Any) -> Mapping:
 
     Raises:
         InputError: not TOML; a missing or unknown key (with the nearest accepted one), channel, unit or sign; channels
-        that make no data set.
+            that make no data set.
     """
     data = read_toml(path)
     for key, value in overrides.items():

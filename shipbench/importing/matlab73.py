@@ -43,7 +43,7 @@ def open_matlab73(path: Path) -> Table:
 
     Raises:
         InputError: h5py is not installed, or the file is damaged, declares more than it holds, or has no numeric
-        vectors.
+            vectors.
     """
     vectors: dict[str, _Vector] = {}
     objects: list[str] = []

@@ -27,8 +27,7 @@ def in_order(blocks: Iterable[Block], source: Source, where: str, met: Counts) -
 
     Raises:
         InputError: time goes back and [time] backwards does not say what to do; so many rows repeat a time that the
-        stamps are coarser than the
-            samples; or there are too many rows to sort.
+            stamps are coarser than the samples; or there are too many rows to sort.
     """
     if is_daily(source.time):
         blocks = _over_midnight(blocks)

@@ -19,9 +19,8 @@ def to_plane(
     """North and east [m] in the plane that touches the WGS84 ellipsoid at `origin`.
 
     Exact geographic/topocentric conversion, IOGP Guidance Note 7-2, section 4.1.2 (EPSG method 9837). Its two formulas
-    serve the few kilometres of a
-    run as well as a projection library would: distances are off by less than d^3 / (6 R^2), 4 mm at 10 km and 0.5 m at
-    50 km.
+    serve the few kilometres of a run as well as a projection library would: distances are off by less than d^3 / (6
+    R^2), 4 mm at 10 km and 0.5 m at 50 km.
 
     Args:
         lat, lon: geodetic [rad].

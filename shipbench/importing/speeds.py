@@ -38,9 +38,8 @@ def derivative(t: np.ndarray, values: np.ndarray, grid: np.ndarray, dt: float, s
         grid: (count,) times of the result [s].
         dt: step of the grid [s]; samples that are much faster are first averaged in bins of a quarter of it.
         scale: shortest time constant [s]. Froude's time sqrt(L / g) serves: waves are faster, manoeuvres slower. On
-        simulated manoeuvres of 130 m at
-            1 Hz the error is then 0.002 m/s without noise and 0.009 m/s with 0.2 m of it; in the first and last 5 s
-            0.012 and 0.027 m/s.
+            simulated manoeuvres of 130 m at 1 Hz the error is then 0.002 m/s without noise and 0.009 m/s with 0.2 m of
+            it; in the first and last 5 s 0.012 and 0.027 m/s.
     """
     from scipy.interpolate import make_smoothing_spline
 

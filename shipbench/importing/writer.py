@@ -31,7 +31,7 @@ class FolderWriter:
 
     Raises:
         InputError: the folder is there already and `force` is not set, or holds other files than a data set's, or
-        cannot be written.
+            cannot be written.
     """
 
     def __init__(self, out: Path, force: bool = False) -> None:

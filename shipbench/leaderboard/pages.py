@@ -37,7 +37,7 @@ def build_board(results: Results, dataset: str, baseline: str | None = None) -> 
 
     Raises:
         InputError: the rows are of different protocols, data (fingerprints) or tasks, which are never ranked together;
-        or there is no such baseline.
+            or there is no such baseline.
     """
     return _board(scores_of(results, dataset, baseline), [s for s in results.summaries if s["dataset"] == dataset])
 

@@ -44,8 +44,7 @@ class Track:
 @dataclass(frozen=True, eq=False)
 class Series:
     """Of one data set: `t` (knots,) [s]; tracks by window; errors of each model by window, position [m] and heading
-    [deg], (windows, knots);
-    `left_out`: lines on what is not drawn."""
+    [deg], (windows, knots); `left_out`: lines on what is not drawn."""
 
     t: np.ndarray
     tracks: list[Track]

@@ -1,11 +1,9 @@
 """Honest uncertainty: intervals, paired tests and win rates by a bootstrap over runs.
 
 The unit that is drawn is the run (the cluster): windows of one run are drawn together, since they share a ship, a day
-and a manoeuvre.
-Folds are no unit: five of them can never reach p < 0.0625. The same draws serve every model and every table, so that
-differences are paired.
-Several seeds of a model stand inside the run and are averaged there: intervals are over runs, for the seeds that were
-run; the spread over seeds has its own column.
+and a manoeuvre. Folds are no unit: five of them can never reach p < 0.0625. The same draws serve every model and every
+table, so that differences are paired. Several seeds of a model stand inside the run and are averaged there: intervals
+are over runs, for the seeds that were run; the spread over seeds has its own column.
 """
 
 from __future__ import annotations

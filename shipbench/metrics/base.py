@@ -6,7 +6,7 @@ keyword-only arguments, and only those of these that it needs:
 - `true`, `pred`: (batch, K, 10), states at the K predicted knots, order and units of `signals.STATES`;
 - `s0`: (batch, 10), the state that the predictor was given. It is known, so it is never scored;
 - `U`: (batch, K, inputs), the recorded orders and what else was measured, `U[:, k]` held on the step that ends at knot
-  k;
+k;
 - `L`: the ship's length [m]; `dt`: sample time [s].
 """
 
@@ -40,7 +40,7 @@ class Metric:
 
     Args:
         function: keyword-only; returns (batch, K) if `per_knot`, else (batch,); with several columns they are a
-        further, last axis.
+            further, last axis.
         columns: what the function returns, in that order.
         per_knot: the per-run value is the mean over the K knots.
         smaller_is_better: direction of ranking.

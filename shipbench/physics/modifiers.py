@@ -38,9 +38,8 @@ class Modifiers:
 
     u_c, v_c: velocity of the water in body axes [m/s]; drift: share of the wind's velocity that the water has besides.
     air_u, air_v: velocity of the air beyond the measured wind, body axes [m/s]; wind_X, wind_Y, wind_N: factors of the
-    wind's forces and moment; wind_lever: of its side force, to
-    add [m]. delta: rudder angle to add [rad]; rudder: factor of the rudder's lift; rudder_asymmetry a: factor 1 + a to
-    starboard and 1 - a to port;
+    wind's forces and moment; wind_lever: of its side force, to add [m]. delta: rudder angle to add [rad]; rudder:
+    factor of the rudder's lift; rudder_asymmetry a: factor 1 + a to starboard and 1 - a to port;
     stall: share of the lift lost beyond `stall_angle` [rad]; late_stall: the same from 26 to 37 deg, as any rudder may.
     race, thrust: factors of the race's excess speed and of the thrust; off_design: thrust [N] beside that of K_T, to
     add before the factor; straightening: factor of the sideways flow at the rudder, 1 + its asymmetry where it comes
@@ -49,8 +48,8 @@ class Modifiers:
     flow comes from astern (1/2: nothing, 1: the other way); wake: added to the wake fraction. bow, stern: factors of
     the thrusters; lever: shift of the bow thruster [m]; loss: share of side force and moment lost at speed. mass, m_x,
     m_y, J_z: factors of the ship's mass (with its inertia), of added mass in surge and sway and of added inertia in
-    yaw; coupling: added mass between sway and yaw, to add [kg m]; x_G: shift of the centre of gravity
-    [m]. hull: factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship [N m] to add.
+    yaw; coupling: added mass between sway and yaw, to add [kg m]; x_G: shift of the centre of gravity [m]. hull:
+    factors of the hull's derivatives. X, Y, N: forces [N] and moment about midship [N m] to add.
     """
 
     u_c: Array = 0.0

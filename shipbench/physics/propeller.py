@@ -95,8 +95,7 @@ def side_force_astern(n: Array, u: Array, D: float, L: float, T: float, rho: flo
     """Side force Y_P [N] and moment N_P [N m] about midship of a right-handed screw turning astern.
 
     Y_P = rho/2 L T (nD)^2 {A1 + A2 J, J in [-0.35, -0.06]; A3 + A4 J below; A5 above}, J = u / (nD); N_P likewise with
-    L^2 and B. The stern goes to
-    port: Y_P < 0, N_P > 0. Zero for n >= 0.
+    L^2 and B. The stern goes to port: Y_P < 0, N_P > 0. Zero for n >= 0.
 
     Source: form of Hachii with the values of the Esso Osaka, as in Miyauchi et al. (2022), doi
     10.1007/s00773-022-00889-3.

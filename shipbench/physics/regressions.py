@@ -25,10 +25,9 @@ def clarke_1983(L: float, B: float, T: float, Cb: float) -> Clarke:
     """Added masses in sway and yaw (prime-I).
 
     Source: Clarke, Gedling & Hine (1983), regression equations; N'_rd with 0.33 B/L as in the original. B/L is held at
-    0.2, that of the beamiest
-    merchant ships: up to there N'_rd/Y'_vd is that of an integral over sections (1/12 of a prism; KCS and KVLCC2,
-    measured: 0.05), beyond it falls to nothing at 0.3, and a tug would turn without added inertia, about an added mass
-    0.4 L before midship.
+    0.2, that of the beamiest merchant ships: up to there N'_rd/Y'_vd is that of an integral over sections (1/12 of a
+    prism; KCS and KVLCC2, measured: 0.05), beyond it falls to nothing at 0.3, and a tug would turn without added
+    inertia, about an added mass 0.4 L before midship.
     """
     k, b = -math.pi * (T / L) ** 2, min(B / L, 0.2)
     return Clarke(

@@ -17,8 +17,8 @@ def apparent_wind(psi: Array, u: Array, v: Array, wind_speed: Array, wind_from: 
 
 
 KINDS = {"true": (0.0, 0.0), "true-bow": (1.0, 0.0), "apparent-north": (0.0, 1.0), "apparent": (1.0, 1.0)}
-"""How a wind may be recorded -> whether its direction counts from the bow, and whether the ship's own motion is in it.
-"""
+"""How a wind may be recorded -> whether its direction counts from the bow, and whether the ship's own motion is in
+it."""
 
 
 def true_wind(psi: Array, u: Array, v: Array, speed: Array, come_from: Array, kind: str) -> tuple[Array, Array]:
@@ -63,8 +63,7 @@ def harmonic(u_rw: Array, v_rw: Array, A_F: float, A_L: float, L: float) -> tupl
     velocities: nothing is undefined in still air.
 
     Source: simplified form in github.com/nikpau/mmgdynamics, but for C_N: that has 0.2, twice the second harmonic of
-    Blendermann's
-    0.18 (pi/2 - gamma) C_Y (0.09), whose slope 0.18 holds for all his types of ship.
+    Blendermann's 0.18 (pi/2 - gamma) C_Y (0.09), whose slope 0.18 holds for all his types of ship.
     """
     q = 0.5 * RHO_AIR
     speed = (u_rw * u_rw + v_rw * v_rw + 1e-12) ** 0.5

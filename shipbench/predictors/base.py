@@ -236,7 +236,7 @@ def make_predictor(model: Any, device: str | None = None) -> Any:
 
     Args:
         model: "physics+current", "mlp[hidden=64]", "my_model.py:MyNet", the folder of a saved model, a `Spec`, a class,
-        or an object (then a copy).
+            or an object (then a copy).
         device: "cpu", "cuda" or "cuda:1".
 
     Raises:

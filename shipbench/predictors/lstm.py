@@ -193,7 +193,7 @@ class LSTM(PredictorBase):
         lr: Adam's first step size; a cosine takes it down to a hundredth.
         epochs: number of validations, each after 10 minibatches.
         pose_weight: weight of the pose error (in units of the error of kept velocities) against the error of
-        standardised y.
+            standardised y.
         device: where to train and to predict: "cpu", "cuda" or "cuda:1".
     """
 

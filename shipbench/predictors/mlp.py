@@ -95,7 +95,7 @@ class MLP(PredictorBase):
         hidden, layers: width and number of the hidden layers.
         epochs, batch, lr, patience, min_delta: training, as in the paper.
         target: "state" predicts y at k + 1 as the paper does; "increment" predicts y_k+1 - y_k, an honest stronger
-        variant.
+            variant.
         device: where to train and to predict: "cpu", "cuda" or "cuda:1".
     """
 

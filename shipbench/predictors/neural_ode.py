@@ -2,9 +2,8 @@
 grow in length.
 
 The residual is a small network of (u, v, r, n, delta, F_b, F_s), and of the velocity through the air where wind is
-measured, whose output starts
-at exactly zero: training starts at the fitted physics and the weights of the best validation rollout are kept, the
-untouched physics among them.
+measured, whose output starts at exactly zero: training starts at the fitted physics and the weights of the best
+validation rollout are kept, the untouched physics among them.
 
 Source: Chen et al. (2018), Neural ordinary differential equations, NeurIPS 31.
 """
@@ -157,7 +156,7 @@ class NeuralODE(PredictorBase):
 
         Raises:
             InputError: an effect is unknown, acts on the sensors, or depends on place or time, which the training
-            windows do not know.
+                windows do not know.
         """
         self.physics = Physics().extend(effects)
         for effect in effects:

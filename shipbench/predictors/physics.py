@@ -60,8 +60,8 @@ class Physics(PredictorBase):
         iterations: most Gauss-Newton steps of the fit.
         tolerance: relative decrease of the cost below which the fit stops.
         piece: longest rollout in the fit [s], 0 for whole runs: runs are cut into pieces that each start from the
-        measured state. Where gusts push
-            a ship, the end of a long rollout is their work and says little of the parameters.
+            measured state. Where gusts push a ship, the end of a long rollout is their work and says little of the
+            parameters.
     """
 
     iterations: int = 30

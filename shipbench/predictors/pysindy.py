@@ -41,7 +41,7 @@ class PySINDy(PredictorBase):
         threshold: terms whose coefficient (of scaled variables) stays below it are dropped.
         alpha: ridge penalty of the least squares.
         derivative: "finite_difference" (second order) or "smoothed" (of velocities smoothed by a Savitzky-Golay filter,
-        for noisy data).
+            for noisy data).
     """
 
     name: ClassVar[str] = "pysindy"

@@ -27,8 +27,8 @@ from .base import History, PredictorFamily
 
 _OWN = ("target",)
 _TOO_LARGE = 1e30
-"""A standardised value beyond this is a rollout that has diverged; regressors refuse what float32 cannot hold (3.4e38).
-"""
+"""A standardised value beyond this is a rollout that has diverged; regressors refuse what float32 cannot hold
+(3.4e38)."""
 
 
 def _regressors() -> dict[str, Any]:
@@ -83,7 +83,7 @@ class SklearnOneStep(PredictorFamily):
 
         Raises:
             InputError: scikit-learn has no regressor of that name, or it has no such parameter, or cannot be made
-            without a further one.
+                without a further one.
         """
         known = _regressors()
         if self.regressor not in known:

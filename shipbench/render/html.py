@@ -146,7 +146,7 @@ def content_policy(
         images: whether it holds pictures (`data:`).
         style_attributes: whether its drawings have attributes `style`, which cannot fetch anything.
         plots: whether it draws with Plotly, which adds an empty style element, fills it by script and sets attributes
-        `style`.
+            `style`.
     """
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'"]
     if style_attributes or plots:

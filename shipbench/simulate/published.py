@@ -4,8 +4,8 @@ shares with them.
 What is told from trials of these ships is told of hulls, propellers and rudders that the fit does not know: cubic hull
 forces with products of rudder and drift (Mariner), thrust and rudder flow as quadratics of speed and revolutions
 (tanker), a hull that heels in turns (S175), a small fast one that heels, with absolute values in its hull forces and
-rudders beside the races (navy). Side forces of the propeller and of zero helm and a rudder's stall
-are left out: they are causes with names.
+rudders beside the races (navy). Side forces of the propeller and of zero helm and a rudder's stall are left out: they
+are causes with names.
 """
 
 from __future__ import annotations
@@ -43,8 +43,7 @@ class Published:
         actuators: of an ordinary ship of this size; the sources leave them open or limit angles to what autopilots use.
         cruise: speed [m/s] about which the equations hold; trials begin at `ratios` of it.
         rates: (motion, n [rpm], delta [rad], factor of the thrust, (X, Y, N) [N, N, N m] to add) -> accelerations;
-        motion is u, v, r through the
-            water and, beyond the plane, further states, whose rates follow.
+            motion is u, v, r through the water and, beyond the plane, further states, whose rates follow.
         more: number of those: roll rate [rad/s] and heel [rad], or none.
         rpm: of the shaft where the equations have none.
     """
@@ -165,8 +164,8 @@ _NAVY: dict[str, dict[str, float]] = {
 def _navy(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, push: Push) -> Motion:
     """Blanke & Christensen (1993), 10th Ship Control Systems Symposium, Ottawa: a multipurpose navy ship at 8 m/s, SI,
     about midship; in capitals the absolute values. Two rudders of 1.5 m^2 whose lift grows by 0.054 a degree; stall at
-    23 degrees is left out. The propellers are not in the
-    source: two of 1.6 m with K_T = 0.45 - 0.40 J, bilinear in revolutions and speed, as are linear propeller models."""
+    23 degrees is left out. The propellers are not in the source: two of 1.6 m with K_T = 0.45 - 0.40 J, bilinear in
+    revolutions and speed, as are linear propeller models."""
     rho, volume, x_G, z_G, x_R, z_R, D = 1014.0, 357.0, -3.38, -1.06, -23.79, 1.5, 1.6
     m, (u, v, r, p, f), rps = rho * volume, motion, np.maximum(n, 0.0) / 60.0
     values = {"u": u, "v": v, "r": r, "p": p, "f": f, "U": np.abs(u), "V": np.abs(v), "R": np.abs(r), "P": np.abs(p)}

@@ -2,10 +2,9 @@
 simulation.
 
 Model of a segment: e = S_eta eta + S_w w + S_g g + noise, with w ~ N(0, sigma_j^2 K) per axis (stationary,
-Ornstein-Uhlenbeck), a weak prior of the
-initial state eta, and shared coefficients g: base parameters and effects, each with a zero-mean prior; or one set per
-run (random effects).
-Source: model discrepancy of Kennedy & O'Hagan (2001) put on the force side as in Hooker (2009).
+Ornstein-Uhlenbeck), a weak prior of the initial state eta, and shared coefficients g: base parameters and effects, each
+with a zero-mean prior; or one set per run (random effects). Source: model discrepancy of Kennedy & O'Hagan (2001) put
+on the force side as in Hooker (2009).
 """
 
 from __future__ import annotations

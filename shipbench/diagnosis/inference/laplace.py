@@ -76,8 +76,7 @@ def base_precision(model: Model) -> np.ndarray:
 @dataclass(frozen=True)
 class Fit:
     """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate: of
-    [eta, w] per segment;
-    early: what the fit promised at its second linearisation."""
+    [eta, w] per segment; early: what the fit promised at its second linearisation."""
 
     plant: Plant
     scales: Scales

@@ -1,12 +1,11 @@
 """Dependence of the latent force's log determinant on the parameters.
 
 The evidence of parameters is the posterior with the force integrated out: besides the squares it holds the log
-determinant of the force's precision,
-and a ship that is more damped answers the force less. Squares alone take the ship for one that is less damped and moves
-with little force: by a few standard errors in simulated trials, by ten where noise is small and runs are long (Esso
-Osaka).
-Sources: Laplace's approximation with states eliminated, Thygesen & Kristensen, arXiv:2503.21358 (2025); the like term
-of the Onsager-Machlup functional, which minimum energy estimates lack, Dutra, arXiv:1704.01847 (2017).
+determinant of the force's precision, and a ship that is more damped answers the force less. Squares alone take the ship
+for one that is less damped and moves with little force: by a few standard errors in simulated trials, by ten where
+noise is small and runs are long (Esso Osaka). Sources: Laplace's approximation with states eliminated, Thygesen &
+Kristensen, arXiv:2503.21358 (2025); the like term of the Onsager-Machlup functional, which minimum energy estimates
+lack, Dutra, arXiv:1704.01847 (2017).
 """
 
 from __future__ import annotations

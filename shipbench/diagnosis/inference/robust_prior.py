@@ -41,8 +41,7 @@ def widths_of(found: Fit, reduced: Reduced | None = None) -> np.ndarray:
 
 def needed(found: Fit, least: float = NOTICEABLE) -> np.ndarray:
     """(NUM_BASE,) parameters in units of what ships differ by (`STRUCTURE.wider`), as they would be beside a latent
-    force of at least the size
-    `least`: what so small a force could stand for need not be the ship's."""
+    force of at least the size `least`: what so small a force could stand for need not be the ship's."""
     reduced = found.gram.reduce(np.maximum(found.hyper.log_force, 2.0 * np.log(least)))
     z = _base(found, reduced, widths_of(found, reduced))
     for name, factor in STRUCTURE.wider(found.plant.ship).items():

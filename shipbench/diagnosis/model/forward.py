@@ -292,9 +292,8 @@ class Plant:
 
     def _stages(self, i: int, gear: Gear) -> np.ndarray:
         """One actuator behind a gear, (B, steps * substeps, 3). A negative delay means that the record is late.
-        Recorded actuators are read at the
-        time that a delay points to: a gear that follows them at once moves from stage to stage, and would leave a delay
-        without a slope."""
+        Recorded actuators are read at the time that a delay points to: a gear that follows them at once moves from
+        stage to stage, and would leave a delay without a slope."""
         seg, n, before = self.seg, 2 * self.substeps, self.seg.earlier.shape[1]
         fine = np.arange(-before * n, self.steps * n + 1) / n
         if seg.commanded:

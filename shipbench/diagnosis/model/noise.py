@@ -1,14 +1,13 @@
 """Sensor noise whose samples go together: a compass or a receiver that filters errs for seconds, and samples taken as
-independent would say too much.
-A ship in waves moves at their frequency besides: samples taken as independent would say too little of her slow motion.
+independent would say too much. A ship in waves moves at their frequency besides: samples taken as independent would say
+too little of her slow motion.
 
 Noise of a channel: white, and `share` times as much variance that forgets itself like exp(-|t - s| / time), or moves to
 and fro with a `period`, as the output of a damped oscillator that has nothing at frequency zero (T. I. Fossen, Handbook
-of Marine Craft Hydrodynamics and Motion Control, Wiley,
-2011, 8.2.6: linear wave response), or is smooth, as in a record that was filtered: Matern's correlation of order 5/2
-(C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press, 2006, eq. 4.17). Both sides
-of the linear model are multiplied by the inverse of its Cholesky factor; what is left is white again, also in a piece
-that ends early, as the factor is triangular.
+of Marine Craft Hydrodynamics and Motion Control, Wiley, 2011, 8.2.6: linear wave response), or is smooth, as in a
+record that was filtered: Matern's correlation of order 5/2 (C. E. Rasmussen and C. K. I. Williams, Gaussian Processes
+for Machine Learning, MIT Press, 2006, eq. 4.17). Both sides of the linear model are multiplied by the inverse of its
+Cholesky factor; what is left is white again, also in a piece that ends early, as the factor is triangular.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ def refuse_contradictions(prepared: Prepared) -> Prepared:
 
     Raises:
         InputError: in most pieces in which the ship moves, and in three at least, more than half of the squared way, or
-        turn, is unexplained.
+            turn, is unexplained.
     """
     dataset = prepared.dataset
     length = max(1, round(SEGMENT * (dataset.ship.L / 130.0) ** 0.5 / dataset.dt))

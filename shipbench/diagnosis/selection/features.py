@@ -47,9 +47,8 @@ Forms = Mapping[str, Mapping[str, Form]]
 
 class Feature(NamedTuple):
     """The features (F, K, B) of one form in the middle of every step, and beside the trajectory
-    (`Linearisation.aside`); or (F, K + 1, B) at the
-    samples. Of order one. odd: whether it changes its sign with the ship's mirror image; ways: number of forms of which
-    it was chosen."""
+    (`Linearisation.aside`); or (F, K + 1, B) at the samples. Of order one. odd: whether it changes its sign with the
+    ship's mirror image; ways: number of forms of which it was chosen."""
 
     form: str
     on: np.ndarray

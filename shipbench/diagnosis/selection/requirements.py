@@ -35,8 +35,7 @@ class Standard:
         null: the plain model.
         threshold: least gain of a named cause, 2 log evidence.
         off_form: gain asked besides of what the form of this hull could pass for: a hull that lies off the regressions
-        is not of the fitted form
-            either.
+            is not of the fitted form either.
         careful: False where the causes are given: whoever is told the names asks for no evidence.
     """
 

@@ -1,9 +1,8 @@
 """What the columns say about each other: the track's direction and speed against heading, yaw rate and speeds.
 
 Heads often name no unit, or one word for heading and course. A ship moves about where she points, at the speed that the
-log has, and her heading
-changes by the yaw rate: whatever unit, axis or clock contradicts that is told, and where the head leaves it open the
-one that agrees is taken.
+log has, and her heading changes by the yaw rate: whatever unit, axis or clock contradicts that is told, and where the
+head leaves it open the one that agrees is taken.
 """
 
 from __future__ import annotations

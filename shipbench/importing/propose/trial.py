@@ -20,8 +20,8 @@ _ROWS, _READ = 3000, 200_000
 _MOST_CORRECTIONS = 20
 _NEEDED = ("psi", "x", "y", "lat", "lon")
 _ANY_SHIP = Ship(name="any", L=50.0, B=8.0, T=3.0, mass=9e5)
-"""A ship of middling size: her length sets how smooth speeds are taken from a track, which no answer here depends on.
-"""
+"""A ship of middling size: her length sets how smooth speeds are taken from a track, which no answer here depends
+on."""
 
 
 def try_draft(

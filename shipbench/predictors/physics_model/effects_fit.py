@@ -39,7 +39,7 @@ def fit_extension(
 
     Args:
         repath: the actuators' path under an extension's gears; asked again at every step where only commands are
-        recorded.
+            recorded.
     """
     model = _Extended(data, extension, ship, repath, commanded)
     start = np.concatenate([base.p / model.p_scale, model.first])

@@ -151,8 +151,7 @@ def subproblem(num: int, scale: np.ndarray) -> ca.Function:
 @dataclass(frozen=True)
 class Data:
     """What is fitted. path: actuators at the stages of every substep (batch, K * substeps, 3, 4); wind: (batch, K, 2)
-    speed and direction, or None;
-    dt: sample time [s]."""
+    speed and direction, or None; dt: sample time [s]."""
 
     c: eq2.Coefficients
     batch: Batch

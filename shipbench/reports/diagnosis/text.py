@@ -316,7 +316,7 @@ def summary_lines(d: Diagnosis, width: int = WIDTH, full: bool = True) -> list[s
 
     Args:
         full: with what the plain model gets wrong, the candidates and the detection limits; else the verdict, its
-        causes and the next command.
+            causes and the next command.
     """
     lines = [*paragraph(f"Diagnosis of {d.dataset} ({d.seconds:.0f} s)", width), "", *paragraph(headline(d), width), ""]
     for warning in d.warnings:

@@ -42,8 +42,7 @@ def write_report(
 
     Raises:
         InputError: the rows cannot be ranked together (as `build_board`), a folder of `given` holds no diagnosis of
-        these data, or `out` cannot be
-            written. Nothing is written then.
+            these data, or `out` cannot be written. Nothing is written then.
     """
     names = list(dict.fromkeys(s["dataset"] for s in results.summaries))
     check_given(given, names)

@@ -255,7 +255,7 @@ def suite_command(
         gain: with the cross-validated gain of every diagnosis and of the oracle (four times the time).
         out: folder of the rows (default runs/suite_diagnosis, with -development for that).
         page: folder of `diagnosis.md` and `diagnosis.json`; default `leaderboards` for the whole suite on test ships,
-        else `out`.
+            else `out`.
 
     Returns:
         Path of the page, and the rows.
