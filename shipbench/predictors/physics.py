@@ -78,12 +78,12 @@ class Physics(PredictorBase):
         self.report: FitReport | None = None
 
     def extend(self, effects: Sequence[EffectSpec]) -> Self:
-        """Add effects to what is fitted (`physics+current`): their formulas are those of `shipbench.effects`.
+        """Add effects to the fitted model (`physics+current`): their formulas are those of `shipbench.effects`.
 
-        Values that the spec sets are held; the others are fitted with p0..p10, or from command and actuator for effects
-        of a gear where both are recorded. p4 stays zero beside a fitted rudder offset or asymmetry, p0 beside a fitted
-        propeller walk (and beside a rudder offset where hull derivatives are fitted too): data cannot tell them apart.
-        Runs begin at t = 0 s, the time of s0.
+        Values that the spec sets are held. The others are fitted with p0..p10; those of actuator effects from commands
+        and recorded positions, where both are recorded. p4 stays zero beside a fitted rudder offset or asymmetry, p0
+        beside a fitted propeller walk (and beside a rudder offset where hull derivatives are fitted too): they are
+        confounded. Runs begin at t = 0 s, the time of s0.
 
         Raises:
             InputError: an effect or a parameter is unknown, or cannot be part of a predictor.
@@ -92,7 +92,7 @@ class Physics(PredictorBase):
         return self
 
     def skip(self, dataset: Dataset) -> str | None:
-        """Why this model cannot take `dataset`: an effect needs a channel that was not measured."""
+        """Reason why this model cannot take `dataset`: an effect needs a channel that was not measured; or None."""
         for term in self.extension.terms if self.extension is not None else ():
             if missing := [c for c in term.effect.channels if c not in dataset.inputs]:
                 return f"effect '{term.name}' needs {' and '.join(missing)}, which data set '{dataset.name}' lacks"
@@ -135,7 +135,7 @@ class Physics(PredictorBase):
         return self
 
     def _report(self, batch: Batch) -> FitReport:
-        """How the fit follows its own runs."""
+        """Report of the fit on its own runs."""
         from .physics_model.fit import bounds, fit_parameters, parameter_scale
 
         low, high = bounds(parameter_scale(self.c))
@@ -157,13 +157,13 @@ class Physics(PredictorBase):
         )
 
     def _pieces(self, data: Dataset) -> Dataset:
-        """The runs, cut into pieces of `piece` seconds, or of the shortest run where that is shorter."""
+        """Runs cut into pieces of `piece` seconds, or of the shortest run where that is shorter."""
         steps = min(max(1, round(self.piece / data.dt)), min(len(r) for r in data.runs) - 1)
         return data.windows(steps) if self.piece else data
 
     def _fit_effects(self, batch: Batch, base: Fit, asked: Extension) -> Fit:
-        """Gears first where they are recorded, then everything else together, once for every setting of open shape
-        parameters; the best is kept."""
+        """Fit the actuator effects first where actuators are recorded, then all other values together, once for every
+        choice of open shape parameters; the best fit is kept."""
         from .physics_model.effects_fit import fit_extension
         from .physics_model.fit import Data
 
@@ -203,15 +203,16 @@ class Physics(PredictorBase):
         self.substeps = max(1, int(np.ceil(dt / (0.15 * np.sqrt(self.c.L)) - 1e-9)))
 
     def actuators_after(self, actuators: np.ndarray, commands: np.ndarray, dt: float) -> np.ndarray:
-        """Actuator states (..., 4) after `dt` seconds of held commands (..., 4); they are the commands themselves where
-        none were measured."""
+        """Actuator states (..., 4) after `dt` seconds of held commands (..., 4); the commands themselves where no
+        actuators were measured."""
         if self.commanded:
             return commands.copy()
         now, wanted = (list(np.moveaxis(a, -1, 0)) for a in (actuators, commands))
         return np.stack(actuators_after(now, wanted, dt, list(self.actuator_params)), axis=-1)
 
     def actuator_path(self, s0: np.ndarray, U: np.ndarray) -> np.ndarray:
-        """n, delta, F_b, F_s at the beginning, middle and end of every substep, (batch, K * substeps, 3, 4)."""
+        """Actuators n, delta, F_b, F_s at the beginning, middle and end of every substep, (batch, K * substeps, 3,
+        4)."""
         h = self.dt / self.substeps
         path = np.empty((len(s0), U.shape[1] * self.substeps, 3, 4))
         now = s0[:, ACTUATORS]
@@ -264,8 +265,8 @@ class Physics(PredictorBase):
         return measured(S, sensors, self.dt)[:, 1:]
 
     def describe(self) -> str:
-        """The fitted equations with units and 95 % confidence intervals (clustered over runs), and what was estimated
-        of the ship."""
+        """Text of the fitted equations with units and 95 % confidence intervals (clustered over runs), and of the
+        quantities estimated from the particulars."""
         lines = [
             (
                 f"physics of {self.ship.name}: eq. (2) to (8), left side from Inoue (1981), Clarke (1983) and Soeding "

@@ -1,4 +1,4 @@
-"""The plain model fitted to all runs, beside which causes are looked for."""
+"""Baseline model fitted to all runs: the null hypothesis of every candidate cause."""
 
 from __future__ import annotations
 
@@ -21,15 +21,18 @@ from .outliers import strange_pieces
 from .robust_prior import widened
 
 _GEAR_FACTORS = ((2.0, 4.0, 8.0), (0.5, 0.25, 0.125))
-"""Factors of an ordinary time constant or rate that are tried first, slower and faster."""
+"""Factors of a default time constant or rate that are tried first, slower and faster."""
 REFIT_ITERATIONS = 16
-"""Iterations of a fit that begins beside another one."""
+"""Most iterations of a fit that starts from another one."""
 
 
 def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> Fit:
-    """The plain model, fitted from the regressions; where only commands are recorded, with the ordinary gears that suit
-    the motion; where sensors err for longer than a sample, with such noise; without the few pieces that no ship's
-    motion explains. Once the budget is spent, that of some pieces alone, where it stands."""
+    """Baseline model, fitted from the regressions.
+
+    Where only commands are recorded, it has the actuator dynamics that fit the motion. Where sensor errors last longer
+    than a sample, it has autocorrelated noise. Outlying segments are left out. Once the time budget is spent, the
+    current fit of some segments is returned.
+    """
     few = plant.thinned(FEW_PIECES)
     found, share = _begun(few, scales), len(few.seg.run) / len(plant.seg.run)
     if plant.seg.commanded:
@@ -52,9 +55,11 @@ def null_fit(plant: Plant, scales: Scales, candidates: Sequence[Term] = ()) -> F
 
 
 def beside_noise_of(named: Fit, null: Fit) -> Fit | None:
-    """The plain model `null` fitted again beside the noise that suits the causes of `named`; None where its own does
-    about as well, or is white. What a late or a turned sensor errs by lasts, as noise may, and beside such noise it is
-    worth less, or is taken for something else."""
+    """Baseline model `null` fitted again with the noise model that fits the causes of `named`.
+
+    None where its own noise model fits about as well, or is white. The error of a late sensor or of a reversed sign
+    lasts, as noise may: under autocorrelated noise its evidence is lower, or another cause takes its place.
+    """
     if is_spent() or not null.scales.colour.share.any():
         return None
     colour = colour_of(named)
@@ -79,19 +84,22 @@ def first_evidence(plant: Plant, null: Fit) -> float:
 
 
 def first_fit(plant: Plant, null: Fit, like: Fit | None = None) -> Fit:
-    """The plain model of another reading, or some pieces, of what `null` was fitted to: from the beginning, with the
-    same units; with the forces and the noise of the fit `like`."""
+    """Baseline model of another reading, or of some segments, of the data of `null`.
+
+    It starts from the regressions, with the same units; with the forces and the noise model of the fit `like`.
+    """
     return _first(
         plant, Scales(plant).alike(null.scales), iterations=REFIT_ITERATIONS, hyper=like.hyper if like else None
     )
 
 
 def _begun(plant: Plant, scales: Scales) -> Fit:
-    """The first fit, of which the others take the background.
+    """First fit. Its nuisance parameters serve all others.
 
-    On a ship far from the regressions the force that tracks her is so large that it may go on doing what the parameters
-    should. A push may drag a fit so far that nothing is an outlier where it ends. A fit that has not converged is made
-    again: from a force of ordinary size, then without the outliers where it began. It is kept if it converges then.
+    On a ship far from the regressions the latent force that tracks her is large, and may stand in for the parameters.
+    An external push may pull a fit so far that no segment is an outlier at its optimum. A fit that has not converged is
+    repeated: from a latent force of typical size, then without the outliers of its start. The repeated fit is kept if
+    it converges.
     """
     found, most = _without_strange(_first(plant, scales)), THRESHOLDS.value("unconverged_excess")
     if found.excess > most and not is_spent():
@@ -104,9 +112,11 @@ def _begun(plant: Plant, scales: Scales) -> Fit:
 
 
 def _beside_waves(found: Fit, scales: Scales, share: float, waves_alone: bool = False) -> tuple[Fit, Scales, Colour]:
-    """A first fit, its units, and the noise that suits it (`colour_of`); made again beside the waves, where the ship
-    moves with them: a force that follows them is large, hides what is slow, and leaves residuals that swing too
-    fast."""
+    """First fit, its units, and the noise model that fits it (`colour_of`).
+
+    Where the ship moves with the waves, the fit is repeated with wave noise. A latent force that follows the waves is
+    large, hides slow motion, and leaves residuals that oscillate too fast.
+    """
     colour = colour_of(found, share, waves_alone)
     waves = swinging_force(found, colour)
     if np.isfinite(waves.period).any() and not is_spent():
@@ -117,7 +127,8 @@ def _beside_waves(found: Fit, scales: Scales, share: float, waves_alone: bool = 
 
 
 def _first(plant: Plant, scales: Scales, iterations: int = 8, weak: bool = False, hyper: Hyper | None = None) -> Fit:
-    """Fit from the regressions, briefly: until there is a background, lower variances are rewarded without end."""
+    """Fit from the regressions with few iterations. Without fixed nuisance variances, lower variances would be rewarded
+    without end."""
     origin = Origin.of(plant, scales)
     hyper = hyper or (
         replace(origin.hyper, log_force=np.minimum(origin.hyper.log_force, 0.0)) if weak else origin.hyper
@@ -126,7 +137,7 @@ def _first(plant: Plant, scales: Scales, iterations: int = 8, weak: bool = False
 
 
 def _without_strange(found: Fit) -> Fit:
-    """Fit again without the largest outliers, which hide the next ones."""
+    """Fit again without the largest outliers, which mask the next ones."""
     for _ in range(3):
         pieces = strange_pieces(found)
         if not len(pieces) or is_spent():
@@ -139,10 +150,10 @@ def _without_strange(found: Fit) -> Fit:
 
 
 def _with_gear(found: Fit, name: str, field: str) -> Fit:
-    """Fit behind a gear whose time constant or rate is an ordinary one times the factor that suits the motion.
+    """Fit with actuator dynamics whose time constant or rate is the default times the factor that fits the motion.
 
-    Servos of models are quicker than Froude's law makes an ordinary gear. What remains of a gear that is a little off
-    passes for a delay.
+    Servos of models are quicker than Froude's law makes the default. A small remaining error of a time constant would
+    be confounded with a delay.
     """
     first = found
     if is_spent():

@@ -1,5 +1,5 @@
-"""The joint fit: base parameters, effects, initial states and the latent force, with the variances of force and noise
-(an iterated smoother)."""
+"""Joint fit of base parameters, effects, initial states and latent force, with the variances of force and noise (an
+iterated smoother)."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from .gram import Hyper
 from .laplace import Fit, Model, at_point, by_segment, leaning, objective, point_from, settle, suiting
 
 _FREE_STEPS = 5
-"""First steps, which may raise the cost a little; later ones must lower it."""
+"""Number of first steps, which may raise the cost a little; later ones must lower it."""
 _LEAST_SHARE, _MAY_FOLLOW = 0.05, 100.0
-"""Share to which a step is halved before it is given up; factor of the cost beyond which no force could follow it."""
+"""Least share of a step before it is given up; factor of the cost above which no latent force could compensate it."""
 _AT_REST, _AT_REST_EVIDENCE = 0.5, 0.1
-"""Excess of the cost over what the linear model predicts, and change of the evidence, at which a fit has converged."""
+"""Excess of the cost over the linear model's prediction, and change of the evidence, at which a fit has converged."""
 
 
 def fit(
@@ -30,14 +30,15 @@ def fit(
     candidates: Sequence[Term] = (), guess: np.ndarray | None = None, hope: float = -np.inf, far: bool = False,
     begun: tuple[Linearisation, Fit] | None = None, free_steps: int = _FREE_STEPS,
 ) -> Fit:  # fmt: skip
-    """Gauss-Newton with EM for the variances, from `point` (which may lack the last terms of `model`: they start at
-    zero), until it rests or promises less log evidence than `hope`, when it is not worth its time; or, once the budget
-    is spent, where it stands.
+    """Gauss-Newton with EM for the variances, from `point` to convergence.
 
-    A step is at first halved only where the cost explodes: the cost of a step that is right for the parameters rises
-    until the latent force has followed, and the path would else end where parameters compensate each other. The best
-    point of the path is kept, by its evidence once the force has followed; there it does. If that led astray, each step
-    must lower the cost from the first on. `candidates` get columns there. far: `point` is that of an `Origin`; begun:
+    `point` may lack the last terms of `model`: they start at zero. The fit stops early when its predicted log evidence
+    is below `hope`, or when the time budget is spent.
+
+    A step is at first halved only where the cost diverges. The cost of a step that is right for the parameters rises
+    until the latent force has followed; otherwise the path would end where parameters compensate each other. The best
+    point of the path is kept, by its evidence once the force has followed. If that point is worse, each step must lower
+    the cost from the first on. `candidates` get columns at the best point. far: `point` is that of an `Origin`; begun:
     its linearisation, and a fit there whose products hold.
     """
     log_tau2, began = dict(log_tau2 or {}), (hyper, dict(log_tau2 or {}))
@@ -91,8 +92,8 @@ def fit(
 
 
 def looking_at(found: Fit, candidates: Sequence[Term]) -> Fit:
-    """`found` with columns of `candidates`, fitted on if it does not rest on the linearisation with which fits
-    begin."""
+    """Fit `found` with columns of `candidates`; iterated further if it has not converged on the linearisation with
+    which fits begin."""
     plant, scales, model, hyper, log_tau2 = found.plant, found.scales, found.model, found.hyper, found.log_tau2
     again = settle(
         Linearisation(plant, scales, found.point, found.motion), model, hyper, log_tau2, candidates, leap=0.0
@@ -103,11 +104,11 @@ def looking_at(found: Fit, candidates: Sequence[Term]) -> Fit:
 
 
 def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Linearisation | None, Fit | None]:
-    """Towards the point that the linear model thinks best, and the fit there if one was made; None where no part of the
-    way, from `share` on, is any better (the first steps are `free`).
+    """Step towards the optimum of the linear model, and the fit there if one was made.
 
-    A point is better if its cost is lower, or would be once the latent force has followed: on exact sensors the
-    trajectory of a new point is nearly always dearer than that of the old one, whose force has been fitted.
+    None where no share of the step, from `share` down, is better (the first steps are `free`). A point is better if its
+    cost is lower, or would be once the latent force has followed. With exact sensors the trajectory of a new point
+    nearly always costs more than the old one, whose latent force has been fitted.
     """
     plant, scales, model, may_rise = lin.plant, lin.scales, found.model, 1.1 if free else 1.0
     target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
@@ -134,8 +135,8 @@ def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Lin
 
 
 def _followed(found: Fit, lin: Linearisation) -> tuple[Fit, Linearisation]:
-    """Initial states and latent force where they suit the parameters of the point best; the step of a segment is halved
-    while its cost rises."""
+    """Fit with the initial states and latent force that fit the parameters of the point best; the step of a segment is
+    halved while its cost rises."""
     for _ in range(6):
         if found.excess < _AT_REST or is_spent():
             break
@@ -163,7 +164,7 @@ def _followed(found: Fit, lin: Linearisation) -> tuple[Fit, Linearisation]:
 
 
 def between(a: Point, b: Point, share: float) -> Point:
-    """a + share (b - a); terms that `a` lacks start from zero."""
+    """Point a + share (b - a); terms that `a` lacks start from zero."""
 
     def mix(p: np.ndarray, q: np.ndarray) -> np.ndarray:
         return p + share * (q - p)
@@ -179,8 +180,8 @@ def between(a: Point, b: Point, share: float) -> Point:
 
 
 def within_bounds(plant: Plant, scales: Scales, point: Point) -> Point:
-    """Amplitudes held inside the bounds of their effects; those of single runs are held by what the runs have in
-    common."""
+    """Point with amplitudes clipped to the bounds of their effects. Amplitudes of single runs are limited by the values
+    common to all runs."""
     values = []
     for term, value in zip(point.terms, point.values, strict=True):
         if term.per_run:
@@ -199,7 +200,7 @@ def within_bounds(plant: Plant, scales: Scales, point: Point) -> Point:
 
 
 def start(plant: Plant) -> tuple[Point, Hyper]:
-    """Regressions, no effect, no latent force."""
+    """Point at the regressions, without effects and latent force."""
     B = len(plant.seg.run)
     hyper = Hyper(np.zeros(3), np.zeros(6), 12.0 * plant.froude)
     return Point(np.zeros(NUM_BASE), np.zeros((B, 6)), np.zeros((B, plant.knots, 3))), hyper
@@ -207,7 +208,7 @@ def start(plant: Plant) -> tuple[Point, Hyper]:
 
 @dataclass(frozen=True)
 class Origin:
-    """Start of fits: the regressions, with trajectories kept on the measured ones by the latent force alone.
+    """Starting point of fits: the regressions, with trajectories kept on the measured ones by the latent force alone.
 
     Gauss-Newton is nearly linear from there. From another fit it may end where parameters compensate each other.
     """

@@ -1,10 +1,11 @@
-"""Linear Gaussian algebra on the sensitivities: evidence, estimates and variances of the background, without another
-simulation.
+"""Linear Gaussian algebra on the sensitivities: evidence, estimates and variances of the nuisance parameters, without
+another simulation.
 
 Model of a segment: e = S_eta eta + S_w w + S_g g + noise, with w ~ N(0, sigma_j^2 K) per axis (stationary,
 Ornstein-Uhlenbeck), a weak prior of the initial state eta, and shared coefficients g: base parameters and effects, each
-with a zero-mean prior; or one set per run (random effects). Source: model discrepancy of Kennedy & O'Hagan (2001) put
-on the force side as in Hooker (2009).
+with a zero-mean prior; or one set per run (random effects).
+
+Source: model discrepancy of Kennedy & O'Hagan (2001) put on the force side as in Hooker (2009).
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ ETA_PRECISION = THRESHOLDS.value("initial_state_precision")
 
 @dataclass(frozen=True)
 class Hyper:
-    """Variances: log_force (3,) of the latent acceleration in units of its scales; log_noise (6,) of the samples,
-    likewise; tau [s] of the force."""
+    """Log variances: log_force (3,) of the latent acceleration and log_noise (6,) of the samples, in units of the
+    scales; correlation time tau [s] of the force."""
 
     log_force: np.ndarray
     log_noise: np.ndarray
@@ -33,10 +34,10 @@ class Hyper:
 
 @dataclass(frozen=True)
 class Products:
-    """Products of columns [eta, w, shared, e] per channel and segment, (6, B, Z + G + 1, Z + G + 1), before the noise
-    is known.
+    """Products of columns [eta, w, shared, e] per channel and segment, (6, B, Z + G + 1, Z + G + 1), before noise
+    variances apply.
 
-    run (B,): the segment's run; samples (B,): of real samples; colour (B,): log determinant of the noise's
+    run (B,): the segment's run; samples (B,): number of real samples; colour (B,): log determinant of the noise's
     correlations; initial (B,), slope (B, G + 1): as in `sloped`.
     """
 
@@ -61,7 +62,7 @@ class Products:
         runs: int,
         colour: np.ndarray | None = None,
     ) -> Products:
-        """From columns Z (6, B, K + 1, Z + G + 1), zero where `mask` (B, K + 1) has no real sample."""
+        """Products of columns Z (6, B, K + 1, Z + G + 1), zero where `mask` (B, K + 1) has no real sample."""
         B, P = len(mask), np.swapaxes(Z, 2, 3) @ Z
         slope = np.zeros((B, P.shape[-1] - 6 - 3 * knots))
         return cls(
@@ -85,7 +86,7 @@ class Products:
         return self.P.shape[-1] - self.latent - 1
 
     def take(self, rows: np.ndarray, runs: np.ndarray) -> Products:
-        """Some segments; `runs` are the numbers of the runs that are kept, which are numbered anew."""
+        """Products of some segments; `runs` are the indices of the runs that are kept, which are renumbered."""
         new = np.searchsorted(runs, self.run[rows])
         return replace(
             self, P=self.P[:, rows], run=new, runs=len(runs), samples=self.samples[rows], colour=self.colour[rows],
@@ -94,7 +95,7 @@ class Products:
         )  # fmt: skip
 
     def without(self, num: int) -> Products:
-        """Without the last `num` shared columns."""
+        """Products without the last `num` shared columns."""
         if not num:
             return self
         end = self.P.shape[-1] - 1 - num
@@ -104,25 +105,25 @@ class Products:
         return replace(self, P=P, slope=np.delete(self.slope, np.s_[-1 - num : -1], axis=1))
 
     def only(self, columns: np.ndarray) -> Products:
-        """With some shared columns alone (and the residual)."""
+        """Products of some shared columns alone (and the residual)."""
         keep = np.concatenate([np.arange(self.latent), self.latent + columns, [self.P.shape[-1] - 1]])
         return replace(
             self, P=self.P.take(keep, axis=2).take(keep, axis=3), slope=self.slope[:, keep[self.latent :] - self.latent]
         )
 
     def sloped(self, slopes: np.ndarray, at: np.ndarray, initial: np.ndarray) -> Products:
-        """With the part (B,) of initial states in the segments' log determinants taken off, and derivatives (B, G) of
-        what is left by the shared columns, which stand at coefficients `at` (B, G).
+        """Products without the part (B,) of the log determinants that belongs to initial states, and with derivatives
+        (B, G) of the rest by the shared columns, which stand at coefficients `at` (B, G).
 
-        Nothing is known of initial states, and integrated out so they would favour parameters by which a ship forgets
-        hers: such a likelihood depends on the parameters by more than the data (Francke, Koopman & de Vos, J. Time Ser.
-        Anal. 31 (2010) 407). Without that part they are fixed but unknown (Durbin & Koopman, Time Series Analysis by
-        State Space Methods, 2nd ed., 2012, 7.2.4).
+        Initial states have no informative prior. Integrated out, they would favour parameters under which a ship
+        forgets her initial state: such a likelihood depends on the parameters by more than the data (Francke, Koopman &
+        de Vos, J. Time Ser. Anal. 31 (2010) 407). Without that part they are fixed but unknown (Durbin & Koopman, Time
+        Series Analysis by State Space Methods, 2nd ed., 2012, 7.2.4).
         """
         return replace(self, initial=initial, slope=beside_products(slopes, at))
 
     def weigh(self, hyper: Hyper) -> Gram:
-        """The Gram under given noise."""
+        """Gram matrices under the noise variances of `hyper`."""
         G = (np.exp(-hyper.log_noise) @ self.P.reshape(6, -1)).reshape(
             self.P.shape[1:]
         )  # BLAS, which einsum does without
@@ -143,8 +144,8 @@ def ornstein_uhlenbeck(knots: int, spacing: float, tau: float) -> tuple[np.ndarr
 
 
 def by_run(values: np.ndarray, run: np.ndarray) -> np.ndarray:
-    """Sums (N, ...) over the segments of every run, which stand in the order of their runs (`np.add.reduceat`, but
-    quick for matrices)."""
+    """Sums (N, ...) over the segments of every run, in the order of the runs (`np.add.reduceat`, but quick for
+    matrices)."""
     first = np.flatnonzero(np.diff(run, prepend=-1))
     counts, total = np.diff(first, append=len(run)), values[first]
     for j in range(1, counts.max()):
@@ -172,7 +173,7 @@ class Gram:
         return 6 + 3 * self.knots
 
     def only(self, columns: np.ndarray) -> Gram:
-        """The Gram of some shared columns (the residual is kept)."""
+        """Gram of some shared columns (the residual is kept)."""
         keep = np.concatenate([np.arange(self.latent), self.latent + columns, [self.G.shape[-1] - 1]])
         return replace(
             self,
@@ -206,8 +207,8 @@ class Gram:
 
 @dataclass(frozen=True)
 class Reduced:
-    """Per run, with eta and w integrated out: S (N, G + 1, G + 1) of [shared, e] and logdet (N,); inverse, solved per
-    segment for going back."""
+    """Sums per run with eta and w integrated out: S (N, G + 1, G + 1) of [shared, e] and logdet (N,); inverse and
+    solved per segment, for back substitution."""
 
     S: np.ndarray
     logdet: np.ndarray
@@ -225,16 +226,19 @@ class Prior:
     log_tau2: np.ndarray
 
     def and_shared(self, more: int) -> Prior:
-        """With so many columns behind its own, each with a prior of unit spread."""
+        """Prior with `more` further shared columns behind its own, each with unit variance."""
         at = len(self.shared) + len(self.random) + np.arange(more)
         return replace(self, shared=np.append(self.shared, at), precision=np.append(self.precision, np.ones(more)))
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Posterior of the coefficients. log_evidence without constants; squares: twice the negative log posterior at its
-    mode, as the linear model expects it; mean, cov of `prior.shared`; means (N, R), covs (N, R, R) of `prior.random`;
-    per_run (N,): share of each run in the log evidence given the mean."""
+    """Posterior of the coefficients.
+
+    log_evidence: without constants. squares: twice the negative log posterior at its mode, as the linear model expects
+    it. mean, cov: of `prior.shared`. means (N, R), covs (N, R, R): of `prior.random`. per_run (N,): share of each run
+    in the log evidence given the mean.
+    """
 
     log_evidence: float
     squares: float
@@ -246,9 +250,8 @@ class Solution:
 
 
 def shared_alone(reduced: Reduced, prior: Prior) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """S (N, P + 1, P + 1) of [prior.shared, e] and logdet (N,) with the values of single runs integrated out, and for
-    going back to these: covs (N, R, R) given the shared coefficients, and covs times their products with [shared,
-    e]."""
+    """Sums S (N, P + 1, P + 1) of [prior.shared, e] and logdet (N,) with the values of single runs integrated out; for
+    back substitution, covs (N, R, R) given the shared coefficients, and covs times their products with [shared, e]."""
     keep, random = np.append(prior.shared, reduced.S.shape[1] - 1), prior.random
     S = reduced.S[:, keep][:, :, keep]
     if not len(random):
@@ -276,7 +279,7 @@ def solve(reduced: Reduced, prior: Prior) -> Solution:
 
 
 def background(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -> np.ndarray:
-    """Estimates (B, Z) of [eta, w]."""
+    """Estimates (B, Z) of the nuisance parameters [eta, w]."""
     B, G = len(reduced.solved), reduced.S.shape[1] - 1
     coefficients = np.zeros((B, G))
     coefficients[:, prior.shared] = solution.mean
@@ -285,7 +288,7 @@ def background(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -
 
 
 def background_cov(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution) -> np.ndarray:
-    """Covariances (B, Z, Z) of [eta, w], with the uncertainty of the shared coefficients."""
+    """Covariances (B, Z, Z) of the nuisance parameters [eta, w], with the uncertainty of the shared coefficients."""
     J, R = reduced.solved[:, :, prior.shared], reduced.solved[:, :, prior.random]
     return (
         reduced.inverse + J @ solution.cov @ np.swapaxes(J, 1, 2) + R @ solution.covs[gram.run] @ np.swapaxes(R, 1, 2)
@@ -293,10 +296,10 @@ def background_cov(gram: Gram, reduced: Reduced, prior: Prior, solution: Solutio
 
 
 def update_force(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution, estimate: np.ndarray) -> np.ndarray:
-    """One EM step for the variances of the latent force, log (3,).
+    """Log variances (3,) of the latent force after one EM step.
 
-    Of the force's covariance (`background_cov`) it takes the trace with K^-1 alone, for which no matrix of a segment is
-    made.
+    Of the force's covariance (`background_cov`) it needs only the trace with K^-1, for which no matrix of a segment is
+    built.
     """
     B, covs, log_force = len(estimate), solution.covs[gram.run], np.empty(3)
     for j in range(3):
@@ -316,7 +319,8 @@ def update_force(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution,
 
 
 def coefficients_of(gram: Gram, prior: Prior, solution: Solution, estimate: np.ndarray, size: int) -> np.ndarray:
-    """All columns' coefficients per segment, (B, size), with -1 for e: what the products are to be contracted with."""
+    """Coefficients (B, size) of all columns per segment, with -1 for e: the vectors with which products are
+    contracted."""
     theta = np.zeros((len(estimate), size))
     theta[:, : gram.latent] = estimate
     theta[:, gram.latent + prior.shared] = solution.mean
@@ -334,10 +338,10 @@ def update_noise(
     estimate: np.ndarray,
     floor: float,
 ) -> np.ndarray:
-    """One EM step for the variances of the noise, log (6,); of a channel that is not seen, 0.
+    """Log variances (6,) of the noise after one EM step; 0 for a channel that was not measured.
 
-    Given the shared coefficients: theirs are few beside the samples, and their errors are cancelled by those of the
-    force that they cause.
+    They are conditional on the shared coefficients. Those are few beside the samples, and the errors of the latent
+    force cancel the errors that they cause.
     """
     theta = coefficients_of(gram, prior, solution, estimate, products.P.shape[-1])
     second = theta[:, :, None] * theta[:, None, :]
@@ -348,10 +352,11 @@ def update_noise(
 
 
 def accelerated(step: Callable[[np.ndarray], tuple[float, np.ndarray]], theta: np.ndarray, cycles: int) -> np.ndarray:
-    """Logarithms of variances after EM steps, extrapolated: plain EM creeps where the data say little of the force.
+    """Logarithms of variances after EM steps, extrapolated: plain EM converges slowly where the data hold little
+    information on the latent force.
 
-    `step` takes theta to (log evidence at theta, next theta). Three steps a cycle, fewer once it rests; a leap that
-    loses evidence is not taken.
+    `step` takes theta to (log evidence at theta, next theta). There are three steps a cycle, fewer once converged; an
+    extrapolation that lowers the evidence is rejected.
 
     Source: Varadhan & Roland, Scand. J. Stat. 35 (2008) 335, scheme S3 (SQUAREM).
     """

@@ -1,5 +1,4 @@
-"""One linearisation of the joint fit: the variances of force, noise and random effects, the posterior, and what points
-cost."""
+"""Laplace approximation of the joint fit on one linearisation: variances, posterior, and cost of points."""
 
 from __future__ import annotations
 
@@ -40,9 +39,8 @@ _EM_CYCLES = 3
 
 @dataclass(frozen=True)
 class Model:
-    """Structure: terms, and how far the hull may lie from the regressions and the other parameters from their centres
-    (factors of the prior standard deviations), and each base parameter besides (`widths`: such a factor for each, none
-    for 1)."""
+    """Terms of a model, and factors of the prior standard deviations of the hull and of the other parameters; `widths`:
+    such a factor for each base parameter besides, None for 1."""
 
     terms: tuple[Term, ...] = ()
     hull: float = 1.0
@@ -75,8 +73,8 @@ def base_precision(model: Model) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate: of
-    [eta, w] per segment; early: what the fit promised at its second linearisation."""
+    """Fitted model and its linearisation about `motion` (B, K + 1, 6). solution: of `prior` on `gram`; estimate: of
+    [eta, w] per segment; early: predicted evidence at the second linearisation."""
 
     plant: Plant
     scales: Scales
@@ -98,16 +96,13 @@ class Fit:
 
     @property
     def evidence(self) -> float:
-        """Log evidence, without constants, less the costs of the terms.
-
-        Laplace's: with the cost that the point has, not the lower one that the linear model promises. Where the fit
-        rests they are the same.
-        """
+        """Log evidence (Laplace approximation), without constants, less the costs of the terms. It uses the cost at the
+        point, not the lower one that the linear model predicts; once converged they are the same."""
         return self.promise - 0.5 * self.excess
 
     @property
     def promise(self) -> float:
-        """Log evidence where the linear model expects its optimum."""
+        """Predicted log evidence, at the optimum of the linear model."""
         return self.solution.log_evidence - 0.5 * sum(t.cost(self.plant.seg.runs) for t in self.model.terms)
 
     @property
@@ -128,7 +123,7 @@ class Fit:
         return point_from(self.model, self.point, self.solution, self.prior, self.estimate).values
 
     def solution_without(self, index: int) -> Solution:
-        """The posterior on the same linearisation with the model's index-th term left out."""
+        """Posterior on the same linearisation without the model's index-th term."""
         columns, prior = self.columns_of(index), self.prior
         keep, random = ~np.isin(prior.shared, columns), ~np.isin(prior.random, columns)
         return solve(
@@ -136,7 +131,7 @@ class Fit:
         )
 
     def worth(self, index: int) -> float:
-        """Twice the log evidence that the index-th term adds on this linearisation, its cost taken off."""
+        """Twice the log Bayes factor of the index-th term on this linearisation, less its cost."""
         gain = 2.0 * (self.solution.log_evidence - self.solution_without(index).log_evidence)
         return gain - self.model.terms[index].cost(self.plant.seg.runs)
 
@@ -165,8 +160,8 @@ def products_of(
 def whitened(
     plant: Plant, scales: Scales, point: Point, columns: Columns, channels: Sequence[int] = range(6)
 ) -> np.ndarray:
-    """[eta, w, base, own, candidates, e] (channels, B, K + 1, ...) in units of the scales, as if the noise were white;
-    e is the residual with everything linear added back, so that all of it competes anew."""
+    """Whitened columns [eta, w, base, own, candidates, e] (channels, B, K + 1, ...) in units of the scales; e is the
+    residual with all linear contributions added back, so that all terms compete anew."""
     seg, B = plant.seg, len(point.eta)
     e = (seg.states[..., :6] - columns.predicted).reshape(B, -1)
     e = (
@@ -195,12 +190,12 @@ def whitened(
 
 
 def _times(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """(B, T) from columns (B, T, C) and coefficients (B, C)."""
+    """Products (B, T) of columns (B, T, C) and coefficients (B, C)."""
     return (columns @ values[:, :, None])[..., 0]
 
 
 def point_from(model: Model, point: Point, solution: Solution, prior: Prior, estimate: np.ndarray) -> Point:
-    """The point that a solution describes."""
+    """Point that a solution describes."""
     knots = point.w.shape[1]
     values, at, at_random = [], NUM_BASE, 0
     for term in model.terms:
@@ -220,8 +215,7 @@ def objective(lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int
 
 
 def by_segment(lin: Linearisation, hyper: Hyper, gram: Gram) -> np.ndarray:
-    """Twice the negative log posterior of every segment (B,) given the parameters: errors, initial state, latent force;
-    infinite if it diverges."""
+    """Twice the negative log posterior of every segment (B,) given the parameters; infinite if it diverges."""
     plant, point = lin.plant, lin.point
     w = np.moveaxis(point.w, -1, 1)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -233,16 +227,16 @@ def by_segment(lin: Linearisation, hyper: Hyper, gram: Gram) -> np.ndarray:
 
 
 def suiting(found: Fit, point: Point) -> tuple[np.ndarray, np.ndarray]:
-    """Initial states (B, 6) and latent force (B, knots, 3) that suit the parameters and values of a point best, on the
-    linearisation of `found`."""
+    """Initial states (B, 6) and latent force (B, knots, 3) of highest posterior given the parameters and values of a
+    point, on the linearisation of `found`."""
     theta = _coefficients(found, point)[found.plant.seg.run]
     estimate = -(found.reduced.solved @ theta[:, :, None])[..., 0]
     return estimate[:, :6], np.moveaxis(estimate[:, 6:].reshape(len(estimate), 3, -1), 1, 2)
 
 
 def at_point(found: Fit, point: Point) -> float:
-    """Twice the negative log posterior at the parameters and values of a point, with the initial states and the latent
-    force that suit them best on the linearisation of `found`."""
+    """Twice the negative log posterior at the parameters and values of a point, with the initial states and latent
+    force that maximise it on the linearisation of `found`."""
     theta = _coefficients(found, point)
     return float(np.einsum("ni,nij,nj", theta, found.reduced.S, theta)) + prior_squares(
         found.model, point, found.log_tau2
@@ -250,13 +244,14 @@ def at_point(found: Fit, point: Point) -> float:
 
 
 def leaning(found: Fit, point: Point) -> float:
-    """Rise of the log determinant of the force at a point, as the linearisation of `found` predicts it."""
+    """Curvature term: rise of the log determinant of the latent force at a point, as the linearisation of `found`
+    predicts it."""
     slope = by_run(found.gram.slope, found.gram.run)
     return -2.0 * float(np.sum(_coefficients(found, point)[:, :-1] * slope[:, :-1])) + float(np.sum(slope[:, -1]))
 
 
 def _coefficients(found: Fit, point: Point) -> np.ndarray:
-    """(N, G + 1): parameters and values of a point by run, -1 for the residual."""
+    """Parameters and values (N, G + 1) of a point by run, -1 for the residual."""
     runs = found.plant.seg.runs
     own = [
         v if t.per_run else np.broadcast_to(v, (runs, t.size)) for t, v in zip(point.terms, point.values, strict=True)
@@ -277,8 +272,8 @@ def settle(
     cycles: int = _EM_CYCLES,
     leap: float = np.inf, seen: Fit | None = None, far: bool = False,
 ) -> Fit:  # fmt: skip
-    """Variances, whose logarithms move by `leap` at most, and posterior on one linearisation; seen: an earlier fit on
-    it, whose products hold; far: see `sloped`."""
+    """Converged variances and posterior on one linearisation. leap: limit of the change of each log variance; seen: an
+    earlier fit on it, whose products hold; far: see `sloped`."""
     plant, scales, point = lin.plant, lin.scales, lin.point
     columns = lin.columns(candidates) if seen is None else seen.columns
     products = products_of(plant, scales, point, columns) if seen is None else seen.products
@@ -303,11 +298,11 @@ def settle(
 def sloped(
     lin: Linearisation, columns: Columns, products: Products, hyper: Hyper, far: bool = False, known: bool = False
 ) -> Products:
-    """Products that know how the log determinants depend on what is shared.
+    """Products with the derivatives of the log determinants by the shared columns; known: the products are of an
+    earlier fit on this linearisation.
 
-    What initial states take off is seen at the same variances in all fits of a diagnosis: it would else reward lower
-    ones. Where the force does what the parameters should (`far`), the slopes mean nothing: followed from there, they
-    made the yaw inertia of a navy ship negative. known: the products are of an earlier fit on this linearisation.
+    The part of the initial states is evaluated at the same variances in all fits of a diagnosis; otherwise it would
+    reward lower variances. The derivatives are zero where the latent force stands in for the parameters (`far`).
     """
     alone = products.without(products.shared)
 
@@ -322,7 +317,7 @@ def sloped(
 
 
 def evidence_with(found: Fit, colour: Colour) -> float:
-    """Log evidence of the same linearisation with noise of another correlation, whose variances are fitted anew."""
+    """Log evidence of the same linearisation under another noise model, with its variances fitted anew."""
     other = colour.differs(found.scales.colour)
     part = products_of(found.plant, found.scales.coloured(colour), found.point, found.columns, other)
     P = found.products.P.copy()
@@ -333,7 +328,8 @@ def evidence_with(found: Fit, colour: Colour) -> float:
 
 
 def hull_evidence(found: Fit) -> float:
-    """Return 2 log evidence for a hull that differs from the regressions as usual, against one that follows them."""
+    """Return 2 log evidence for a hull that differs from the regressions as ships usually do, against one that follows
+    them."""
     products = found.products.without(sum(t.size for t in found.candidates))
 
     def with_hull(width: float) -> float:
@@ -385,7 +381,7 @@ def _variances(
 
 
 def _random_variances(model: Model, solution: Solution) -> list[float]:
-    """One EM step for the log variance of each random effect."""
+    """Log variance of each random effect after one EM step."""
     at, found = 0, []
     for term in model.terms:
         if term.per_run:

@@ -1,5 +1,4 @@
-"""Inverses and determinants of many small positive definite matrices: most of the time of the algebra, as machine code
-where a compiler is."""
+"""Inverses and determinants of many small positive definite matrices, as machine code where a compiler is available."""
 
 from __future__ import annotations
 
@@ -46,13 +45,16 @@ void inverses(num count, num size, const double *A, double *inverse, double *log
   free(a);
 }
 """
-"""The sweep operator (Goodnight, The American Statistician 33 (1979) 149) at every pivot in turn; each number is a
-vector over matrices. LAPACK takes one matrix at a time, and at these sizes its blocks and pivots cost most of it."""
+"""Sweep operator (Goodnight, The American Statistician 33 (1979) 149) at every pivot in turn; each number is a vector
+over matrices.
+
+LAPACK takes one matrix at a time, and at these sizes its blocks and pivots take most of the time.
+"""
 
 
 def inverses(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Inverses (B, n, n) and log determinants (B,) of positive definite matrices; of those that are only nearly so
-    (sensitivities of a trajectory that blows up) with pivoting."""
+    """Inverses (B, n, n) and log determinants (B,) of positive definite matrices. Nearly definite ones (sensitivities
+    of a diverging trajectory) are inverted with pivoting."""
     code = _code()
     if code is not None:
         A, out, logdet = np.ascontiguousarray(A), np.empty(A.shape), np.empty(len(A))
@@ -65,7 +67,7 @@ def inverses(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def log_determinant(A: np.ndarray) -> np.ndarray:
     """Log determinants of positive definite matrices (..., n, n).
 
-    It is half the work of a decomposition with pivoting, which is left for matrices that are nearly singular.
+    A Cholesky factorisation takes half the work of one with pivoting, which serves nearly singular matrices.
     """
     try:
         return 2.0 * np.log(np.diagonal(np.linalg.cholesky(A), axis1=-2, axis2=-1)).sum(axis=-1)

@@ -1,11 +1,11 @@
 """Dependence of the latent force's log determinant on the parameters.
 
-The evidence of parameters is the posterior with the force integrated out: besides the squares it holds the log
-determinant of the force's precision, and a ship that is more damped answers the force less. Squares alone take the ship
-for one that is less damped and moves with little force: by a few standard errors in simulated trials, by ten where
-noise is small and runs are long (Esso Osaka). Sources: Laplace's approximation with states eliminated, Thygesen &
-Kristensen, arXiv:2503.21358 (2025); the like term of the Onsager-Machlup functional, which minimum energy estimates
-lack, Dutra, arXiv:1704.01847 (2017).
+The evidence of parameters is the posterior with the latent force integrated out. Besides the squares it holds the log
+determinant of the force's precision: a ship with more damping responds less to the force. Squares alone bias the fit
+towards less damping and a small force, by several standard errors where noise is small and runs are long.
+
+Sources: Laplace's approximation with states eliminated, Thygesen & Kristensen, arXiv:2503.21358 (2025); the equivalent
+term of the Onsager-Machlup functional, which minimum energy estimates lack, Dutra, arXiv:1704.01847 (2017).
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from ..model.rollout import Active
 from .gram import Hyper
 
 _MOVE = 1e-4
-"""Share of the sensitivities by which the motion is moved to see what sensors make of them."""
+"""Share of the sensitivities by which the motion is moved for the derivatives of the sensors."""
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyper) -> np.ndarray:
-    """Derivatives (B, G) of the log determinants of the segments by base, own terms and candidates, for trajectories
-    that stay where they are.
+    """Derivatives (B, G) of the log determinants of the segments by base, own terms and candidates, at fixed
+    trajectories.
 
     With Phi the sensitivities to w, R the noise and A = Phi' R^-1 Phi + P: d log det A = 2 tr(A^-1 Phi' R^-1 d Phi).
     `inverse` (B, Z, Z) is that of [eta, w], which holds A^-1 once eta is known. Phi is a chain of single steps, so that
-    the derivative by the Jacobian of each comes from an adjoint one. A trial that blows up has none.
+    the derivative by the Jacobian of each comes from an adjoint one. A trial that diverges has none.
     """
     phi = _finite(np.concatenate([columns.eta, columns.w], axis=-1))
     B, _, Z = phi.shape
@@ -60,7 +60,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 
 def _by_noise(lin: Linearisation, hyper: Hyper, phi: np.ndarray) -> np.ndarray:
-    """R^-1 Phi, (B, K + 1, 6, Z)."""
+    """Product R^-1 Phi, (B, K + 1, 6, Z)."""
     colour, precision = lin.scales.colour, np.exp(-hyper.log_noise) / lin.scales.noise**2
     return colour.unwhitened(
         colour.whitened(phi) * (lin.plant.seg.mask[..., None] * lin.plant.seg.seen * precision)[..., None]
@@ -68,7 +68,7 @@ def _by_noise(lin: Linearisation, hyper: Hyper, phi: np.ndarray) -> np.ndarray:
 
 
 def _by_rate(lin: Linearisation, phi: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Half the derivatives (K, B, 3, 6) by those of the acceleration by the motion, at every step."""
+    """Half the derivatives (K, B, 3, 6) of the log determinant by the Jacobian of the acceleration, at every step."""
     half, step = 0.5 * (np.eye(6) + lin.jacobian), 0.5 * lin.plant.seg.dt
     middle = 0.5 * (lin.plant.hat[:-1] + lin.plant.hat[1:])
     K, B = half.shape[:2]
@@ -82,7 +82,7 @@ def _by_rate(lin: Linearisation, phi: np.ndarray, weight: np.ndarray) -> np.ndar
 
 
 def _of_sensors(lin: Linearisation, bend: Bend, phi: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Half the derivatives (B, size) by what sensors do to the sensitivities."""
+    """Half the derivatives (B, size) of the log determinant by the sensors' effect on the sensitivities."""
     moves = _MOVE * np.moveaxis(phi, -1, 0)
 
     def seen(active: Sequence[Active]) -> np.ndarray:

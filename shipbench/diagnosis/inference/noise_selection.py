@@ -1,4 +1,4 @@
-"""Selection of the correlation of the sensors' noise, and its description for the reader."""
+"""Selection of the noise model of each channel, and its description for the reader."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..thresholds import THRESHOLDS
 from .laplace import Fit, evidence_with
 
 _LASTING, _SMOOTH = ((1.0, 4.0, 16.0, 64.0), (2.0, 6.0, 20.0)), ((16.0, 64.0), (0.5, 1.0, 2.0, 4.0))
-"""Grids of errors that last and of filtered noise: variance over that of the white part, and time [samples]."""
+"""Grids of autocorrelated errors and of filtered noise: variance over that of the white part, and time [samples]."""
 _FIRST = ((1.0, 2.0), (4.0, 6.0))
 """Pairs of share and time that are tried before a grid."""
 _WAVES = (_LASTING[0], (1.7, 2.0, 2.3), (0.1, 0.25))
@@ -23,9 +23,11 @@ _WAVES = (_LASTING[0], (1.7, 2.0, 2.3), (0.1, 0.25))
 
 
 def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colour:
-    """Correlation of the noise of each channel that suits the residuals by far better than none; found: of this share
-    of the pieces. waves_alone: look for motion with the waves, and for nothing that lasts. Channels that are not
-    reached before the budget is spent keep white noise."""
+    """Noise model of each channel that fits the residuals far better than white noise.
+
+    found: a fit of this share of the segments. waves_alone: look for wave motion only, not for errors that last.
+    Channels that are not reached before the time budget is spent keep white noise.
+    """
     worth = THRESHOLDS.value("coloured_noise") * share
     colour = Colour.white(found.plant.steps + 1)
     best = evidence_with(found, colour)
@@ -42,8 +44,8 @@ def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colo
 
 
 def _climbed(found: Fit, grid: np.ndarray) -> tuple[float, Colour]:
-    """Log evidence and noise of a grid's summit, from its second entry along the first two axes on, as far as a
-    neighbour is better."""
+    """Log evidence and noise model at a maximum of the grid, by hill climbing along the first two axes from its second
+    entry."""
     at = (1, 1, *[0] * (grid.ndim - 2))
     known = {at: evidence_with(found, grid[at])}
     while True:
@@ -61,8 +63,11 @@ def _climbed(found: Fit, grid: np.ndarray) -> tuple[float, Colour]:
 
 
 def _tuned(found: Fit, colour: Colour, channel: int, best: float) -> tuple[float, Colour]:
-    """Log evidence and noise of `colour`, which has the evidence `best`, with a longer or a shorter period in a
-    channel, as far as that is better and a piece holds one, a sample no more than half of one."""
+    """Log evidence and noise model of `colour`, which has the evidence `best`, with a longer or a shorter period in a
+    channel.
+
+    The period changes as long as the evidence rises, a segment holds one period, and a sample is at most half a period.
+    """
     share, time, period = (float(x[channel]) for x in (colour.share, colour.time, colour.period))
     for factor in (1.15, 1.0 / 1.15):
         stretch = factor
@@ -76,8 +81,8 @@ def _tuned(found: Fit, colour: Colour, channel: int, best: float) -> tuple[float
 
 
 def _lasting(found: Fit, colour: Colour, channel: int, least: float) -> list[np.ndarray]:
-    """Errors that last for seconds, or were filtered, where such noise reaches the `least` evidence: grids of share and
-    time."""
+    """Grids of share and time of errors that last for seconds, or were filtered, where such noise reaches the `least`
+    evidence."""
     if max(evidence_with(found, colour.with_channel(channel, share, time)) for share, time in _FIRST) < least:
         return []
     return [
@@ -94,7 +99,7 @@ def _grid(axes: tuple[tuple[float, ...], ...], way: Callable[..., Colour]) -> np
 
 
 def _swinging(found: Fit, colour: Colour, channel: int) -> list[np.ndarray]:
-    """Motion with the waves, where the residuals swing: a grid of share, period and damping."""
+    """Grid of share, period and damping of wave motion, where the residuals oscillate."""
     seg = found.plant.seg
     e = np.where(seg.mask, seg.states[..., channel] - found.columns.predicted[..., channel], 0.0)
     lags = range(1, min(THRESHOLDS.count("wave_lag"), e.shape[1] - 1) + 1)
@@ -111,8 +116,11 @@ def _swinging(found: Fit, colour: Colour, channel: int) -> list[np.ndarray]:
 
 
 def swinging_force(found: Fit, colour: Colour) -> Colour:
-    """`colour` with noise that swings in the velocities of the axes in which the latent force does: it follows waves
-    that are long to its knots, and no residual shows them."""
+    """Noise model `colour` with wave noise in the velocities along whose axes the latent force oscillates.
+
+    Where the wave period is long beside the knots of the latent force, the force follows the waves, and no residual
+    shows them.
+    """
     for axis, channel in enumerate((U, V, R)):
         w = np.where(found.plant.seg.mask, found.point.w[..., axis] @ found.plant.hat.T, 0.0)
         lags = range(1, min(THRESHOLDS.count("swell_lag"), w.shape[1] - 1) + 1)
@@ -127,9 +135,9 @@ def swinging_force(found: Fit, colour: Colour) -> Colour:
 
 
 def noise_in_words(found: Fit) -> dict[str, str]:
-    """Describe the noise of each channel that is not white: motion with the waves, or errors of the sensor that last.
+    """Describe the noise of each channel that is not white: wave motion, or errors of the sensor that last.
 
-    It is no cause, but a reader has to know of it.
+    It is no cause, but the reader has to know of it.
     """
     colour, dt = found.scales.colour, found.plant.seg.dt
     size = np.exp(0.5 * found.hyper.log_noise) * found.scales.noise * np.sqrt(colour.share)

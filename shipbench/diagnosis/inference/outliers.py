@@ -1,7 +1,7 @@
-"""Parts of a record that are not fitted: the surplus of a long one, and outliers.
+"""Segments of a record that are not fitted: the surplus of a long one, and outliers.
 
-Outliers are pieces that no ship's motion explains: a ship that is held, pushed or aground, or a record that jumps.
-One such piece of ten seconds can weigh more for a cause than all others together.
+Outliers are segments that no ship's motion explains: a ship that is held, pushed or aground, or a record that jumps.
+One such segment of ten seconds can have more influence on a cause than all others together.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .laplace import Fit
 
 
 def strange_pieces(found: Fit) -> np.ndarray:
-    """Pieces whose latent force, in any axis, is far beyond that of the others; the largest first."""
+    """Outlying segments: their latent force, in any axis, is far above that of the others; the largest first."""
     gram, knots, z = found.gram, found.plant.knots, found.estimate
     left = len(z) // THRESHOLDS.count("segments_per_outlier") - int(np.sum(~found.plant.seg.mask.any(axis=1)))
     if left <= 0:
@@ -35,7 +35,7 @@ def strange_pieces(found: Fit) -> np.ndarray:
 
 
 def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
-    """Say what was left out of the fit: the share of a long record, and outliers, in the times of their runs."""
+    """State the parts left out of the fit: the share of a long record, and outliers, in the times of their runs."""
     seg = plant.seg
     fitted, whole = (
         seg.dt * float(np.maximum(seg.mask.sum(axis=1) - 1, 0).sum()),

@@ -1,6 +1,6 @@
-"""Prior between ships with room for single parameters that lie far off.
+"""Robust prior between ships: single parameters may be outliers.
 
-A normal spread has no such room, and what it holds back passes for a cause.
+A normal prior leaves no room for them, and the part of a parameter that it holds back would be reported as a cause.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ _SAME = 0.05
 
 
 def widths_of(found: Fit, reduced: Reduced | None = None) -> np.ndarray:
-    """(NUM_BASE,) factors of the spreads, 1 for what is ordinary: Huber's weights, at the optimum of this linearisation
-    (iteratively reweighted)."""
+    """Factors (NUM_BASE,) of the prior standard deviations, 1 within the prior: Huber's weights, at the optimum of this
+    linearisation (iteratively reweighted)."""
     widths, knee = np.ones(NUM_BASE), THRESHOLDS.value("huber_knee")
     for _ in range(20):
         new = np.sqrt(np.maximum(np.abs(_base(found, reduced or found.reduced, widths)) / knee, 1.0))
@@ -40,8 +40,9 @@ def widths_of(found: Fit, reduced: Reduced | None = None) -> np.ndarray:
 
 
 def needed(found: Fit, least: float = NOTICEABLE) -> np.ndarray:
-    """(NUM_BASE,) parameters in units of what ships differ by (`STRUCTURE.wider`), as they would be beside a latent
-    force of at least the size `least`: what so small a force could stand for need not be the ship's."""
+    """Parameters (NUM_BASE,) in units of the prior standard deviation between ships (`STRUCTURE.wider`), as estimated
+    beside a latent force of at least the size `least`. Differences that so small a force could explain need not belong
+    to the ship."""
     reduced = found.gram.reduce(np.maximum(found.hyper.log_force, 2.0 * np.log(least)))
     z = _base(found, reduced, widths_of(found, reduced))
     for name, factor in STRUCTURE.wider(found.plant.ship).items():
@@ -59,10 +60,10 @@ def _base(found: Fit, reduced: Reduced, widths: np.ndarray) -> np.ndarray:
 
 
 def widened(found: Fit) -> Fit:
-    """Fit the same model with as wide a spread for each parameter as it needs.
+    """Fit the same model with as wide a prior for each parameter as it needs.
 
-    The fit is kept as it is where the wider one has less evidence: winds of single runs and wind coefficients can
-    compensate each other.
+    The old fit is kept where the wider one has less evidence: winds of single runs and wind coefficients can compensate
+    each other.
     """
     for _ in range(3):
         widths = widths_of(found)

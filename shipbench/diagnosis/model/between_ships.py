@@ -1,4 +1,5 @@
-"""Differences between ordinary ships, beside hull and fitted parameters: part of every fit, never a cause."""
+"""Structural differences between ordinary ships, beside hull and fitted parameters. They are nuisance parameters of
+every fit, never a cause."""
 
 from __future__ import annotations
 
@@ -83,14 +84,14 @@ class Structure(Effect):
     parts = ((RACE, -0.45), (WAKE, 0.2), (LOSS, 0.25), (THRUSTERS, 0.0), (CROSS_FLOW, 0.2), (ASTERN, 0.3))
 
     def spreads(self, ship: Particulars, measured_wind: bool) -> np.ndarray:
-        """Standard deviations of the values. The side force of a wind that is not measured cannot be told from the wind
+        """Prior standard deviations of the values. The side force of an unmeasured wind is confounded with the wind
         itself."""
         thrust = np.hypot(0.8 * ship.lacks("propeller"), 0.2 * ship.lacks("propeller.kt"))
         own = {"wind_Y": float(measured_wind), "log_thrust": float(thrust)}
         return np.array([p.typical * own.get(p.name, 1.0) for p in self.parameters])
 
     def wider(self, ship: Particulars) -> dict[str, float]:
-        """Factors of the spreads of parameters whose spread is narrower in the fit than between ships.
+        """Factors of the standard deviations of parameters whose prior is narrower in the fit than between ships.
 
         A full hull makes waves at a lower Froude number: C_b = 1.12 - 1.68 Fn.
 
@@ -107,7 +108,7 @@ class Structure(Effect):
         return np.array([*first, *(own.get(p.name, 0.0) for p in self.parameters[len(first) :])])
 
     def plain(self) -> np.ndarray:
-        """Values, in units of their spreads, at which it adds nothing to eq. (2)."""
+        """Values, in units of their standard deviations, at which the structure adds no force to eq. (2)."""
         return np.array([-c / p.typical for c, p in zip(self.centres(), self.parameters, strict=True)])
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
@@ -143,7 +144,7 @@ class Structure(Effect):
         e.wake = e.wake - (1.0 - ship.w_P0) * in_turns
 
     def _off_design(self, e: Modifiers, s: Flow, q: Sequence[Array], headway: Array, ship: Particulars) -> None:
-        """Add the quadrants that K_T does not know: a propeller that does not drive or is turned against the flow."""
+        """Add the quadrants that K_T does not cover: a propeller that does not drive or is turned against the flow."""
         n, D, u = s.n / 60.0, ship.D_P, s.u - e.u_c
         ahead, V_A = maximum(n, 0.0), u - ship.w_P0 * maximum(u, 0.0)
         share = V_A * V_A / (V_A * V_A + (0.7 * math.pi * n * D) ** 2 + 1e-4)

@@ -1,4 +1,4 @@
-"""Sensitivities of what the sensors record, and how the motion's own sensitivities change with the same causes."""
+"""Sensitivities of the predicted record, and the change of the motion's sensitivities with the same causes."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ ASIDE, AWAY = (2, 3, 4, 5), 0.01
 
 @dataclass(frozen=True)
 class Columns:
-    """Sensitivities about a point, T = 6 (K + 1) with the channel last: eta (B, T, 6), w (B, T, 3 knots), base (B, T,
-    NUM_BASE), one (B, T, size) per term of the point (`own`) and per candidate; predicted (B, K + 1, 6)."""
+    """Sensitivities about a point, T = 6 (K + 1) rows with the channel last.
+
+    Shapes: eta (B, T, 6); w (B, T, 3 knots); base (B, T, NUM_BASE); one (B, T, size) per term of the point (`own`) and
+    one per candidate; predicted (B, K + 1, 6).
+    """
 
     predicted: np.ndarray
     eta: np.ndarray
@@ -28,10 +31,12 @@ class Columns:
 
 @dataclass(frozen=True)
 class Bend:
-    """Change of the motion's own sensitivities with columns of base, own terms or candidates: through forces, by
-    `rates` (size, K, B, 3), the change of the acceleration in the middle of every step beside the trajectory
-    (`Linearisation.aside`) less that on it; through sensors, by `sensors`, what they are when each is moved by `unit`,
-    or None where that changes nothing."""
+    """Change of the motion's sensitivities with columns of base, own terms or candidates.
+
+    Through forces: `rates` (size, K, B, 3), the change of the acceleration in the middle of every step beside the
+    trajectory (`Linearisation.aside`) less that on it. Through sensors: `sensors`, their readings when each state is
+    moved by `unit`, or None where that changes nothing.
+    """
 
     rates: np.ndarray | None
     sensors: tuple[tuple[Active, ...] | None, ...] = ()

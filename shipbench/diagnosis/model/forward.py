@@ -1,5 +1,5 @@
-"""The fitted model as the diagnosis sees it: batches of segments, rolled out with a latent force, for many changed
-directions at once."""
+"""Forward model of the diagnosis: batches of segments, rolled out with a latent force, for many changed directions at
+once."""
 
 from __future__ import annotations
 
@@ -36,8 +36,11 @@ FEW_PIECES = THRESHOLDS.count("segments_for_noise")
 
 
 def ordinary_gears(L: float) -> dict[str, Gear]:
-    """Shaft [rpm], steering gear [rad] and thrusters [N] of an ordinary ship of length L, where no actuator is
-    recorded: time constants and rates of `actuator_fit.DEFAULT_ACTUATORS`, Froude-scaled."""
+    """Default dynamics of shaft [rpm], steering gear [rad] and thrusters [N] of a ship of length L [m].
+
+    They serve where no actuator is recorded: time constants and rates of `actuator_fit.DEFAULT_ACTUATORS`,
+    Froude-scaled.
+    """
     T_n, rate_n, T_delta, rate_delta, T_F, _ = (float(v) for v in DEFAULT_ACTUATORS)
     scale = (L / 130.0) ** 0.5
     return {
@@ -49,13 +52,15 @@ def ordinary_gears(L: float) -> dict[str, Gear]:
 
 @dataclass(frozen=True)
 class Segments:
-    """Pieces of runs of at most `steps` transitions, padded to equal length.
+    """Segments of runs, of at most `steps` transitions, padded to equal length.
 
-    Shapes: states (B, K + 1, 10), commands (B, K + 1, 4), wind (B, K + 1, 2) or None, mask (B, K + 1) of real samples,
-    run (B,) index of the run, start (B,) time since the run began [s]; earlier (B, P, 4): the commands before the piece
-    (the first, before the run), without any where actuators are recorded; kinds: of manoeuvre, by run, "" where not
-    given; seen (6,): what of the motion was measured; depth (B,): mean of the recorded one [m], None where none is, or
-    deep water, or less than the draught; working: names of the actuators that work in any run.
+    Shapes: states (B, K + 1, 10); commands (B, K + 1, 4); wind (B, K + 1, 2) or None; mask (B, K + 1) of real samples;
+    run (B,), index of the run; start (B,), time since the run began [s].
+
+    earlier (B, P, 4): commands before the segment (the first one, before the run); empty where actuators are recorded.
+    kinds: manoeuvre by run, "" where not given. seen (6,): which motion channels were measured. depth (B,): mean
+    recorded depth [m]; None where none is recorded, in deep water, or where it is less than the draught. working: names
+    of the actuators that work in any run.
     """
 
     dt: float
@@ -96,20 +101,20 @@ class Segments:
         )  # fmt: skip
 
     def without(self, pieces: np.ndarray) -> Segments:
-        """Return them with nothing to be seen in some pieces."""
+        """Return them with all samples of some segments masked."""
         mask = self.mask.copy()
         mask[pieces] = False
         return replace(self, mask=mask)
 
     def turned(self, actuators: Sequence[int]) -> Segments:
-        """Return them with some actuators (of n, delta, F_b, F_s) read to the other side."""
+        """Return them with the sign of some actuators (of n, delta, F_b, F_s) reversed."""
         sign = np.where(np.isin(np.arange(4), actuators), -1.0, 1.0)
         states = np.concatenate([self.states[..., :6], self.states[..., 6:] * sign], axis=-1)
         return replace(self, states=states, commands=self.commands * sign, earlier=self.earlier * sign)
 
 
 def cut(dataset: Dataset, steps: int) -> Segments:
-    """Cut every run into equal pieces of at most `steps` transitions; neighbours share the sample between them."""
+    """Cut every run into equal segments of at most `steps` transitions; neighbours share the sample between them."""
     pieces = []
     for index, run in enumerate(dataset.runs):
         num = max(1, int(np.ceil((len(run) - 1) / steps)))
@@ -144,7 +149,7 @@ def cut(dataset: Dataset, steps: int) -> Segments:
 
 
 def working(dataset: Dataset) -> frozenset[str]:
-    """Actuators that are not zero throughout, nor stand still while the ship does what they alone can do."""
+    """Names of actuators that are not zero throughout, nor constant while the ship does what they alone can do."""
     ever = np.any([np.any(run.states[:, ACTUATORS], axis=0) for run in dataset.runs], axis=0)
     return frozenset(np.array(STATES[ACTUATORS])[ever].tolist()) - set(standing(dataset))
 
@@ -161,7 +166,7 @@ def _substeps(dt: float, L: float) -> int:
 
 
 def _known(inputs: Mapping[str, np.ndarray], ship: Particulars) -> list[Active]:
-    """Effects whose values the measured `inputs` give."""
+    """Effects whose values follow from the measured `inputs`."""
     return [
         Active(e, e.known(inputs, ship))
         for e in map(EFFECTS.get, EFFECTS.names())
@@ -170,11 +175,10 @@ def _known(inputs: Mapping[str, np.ndarray], ship: Particulars) -> list[Active]:
 
 
 class Plant:
-    """Rollouts of eq. (2) over all segments.
+    """Forward model: rollouts of eq. (2) over all segments.
 
-    The motion is driven by the recorded actuators (interpolated), so that
-    what happens between command and actuator cannot be mistaken for a force; where only commands are recorded, by the
-    held commands.
+    The recorded actuators (interpolated) drive the motion, so that actuator dynamics cannot be mistaken for a force.
+    Where only commands are recorded, the held commands drive it.
     """
 
     def __init__(
@@ -183,26 +187,27 @@ class Plant:
         froude: float | None = None, recorded: bool = False,
     ) -> None:  # fmt: skip
         self.recorded = recorded
-        """Whether the actuators that `gears` bring about are recorded ones, though orders drive them here."""
+        """Whether the outputs of `gears` are recorded actuators, though commands drive them here."""
         self.ship, self.seg, self.long = dataset_ship, segments, segments if long is None else long
         self.c = eq2.coefficients(dataset_ship)
         self.froude = (self.c.L / 130.0) ** 0.5 if froude is None else froude
-        """Factor of times and speeds against those of a ship of 130 m."""
+        """Factor of times and speeds relative to those of a ship of 130 m."""
         self.substeps = _substeps(segments.dt, self.c.L)
         self.steps = segments.states.shape[1] - 1
         self.knot_time = 5.0 * self.froude
         self.knots = int(np.ceil(self.steps * segments.dt / self.knot_time)) + 1
         at = np.minimum(np.arange(self.steps + 1) * segments.dt / self.knot_time, self.knots - 1 - 1e-9)
         self.hat = np.maximum(1.0 - np.abs(at[:, None] - np.arange(self.knots)), 0.0)
-        """(K + 1, knots): the latent acceleration at the samples from its knots, linear between them."""
+        """(K + 1, knots): interpolation matrix of the latent acceleration from its knots to the samples, piecewise
+        linear."""
         self.parts = (np.arange(self.substeps)[:, None] + 0.5 * np.arange(3)) / self.substeps
-        """(substeps, 3): where the stages of the integration steps lie within a sample."""
+        """(substeps, 3): times of the integration stages within a sample, as shares of the sample time."""
         k = np.arange(self.steps)[:, None, None]
         t = segments.start[:, None, None] + np.minimum(k + self.parts, k + 1.0 - 1e-9)[:, None] * segments.dt
         wind = None if segments.wind is None else np.swapaxes(segments.wind[:, :-1], 0, 1)
         self.course = Course(Vessel(dataset_ship, self.c), segments.dt / self.substeps, t, wind)
         self.water = _known({} if segments.depth is None else {"depth": segments.depth}, dataset_ship)
-        """Effects whose values a measured input gives."""
+        """Effects whose values follow from a measured input."""
         self.inputs = frozenset(("wind_speed", "wind_from") * (wind is not None) + ("depth",) * bool(self.water))
         """Measured inputs that the model takes into account."""
         self.ordinary: dict[str, Gear] = {}
@@ -212,24 +217,24 @@ class Plant:
         )
 
     def drive(self, gears: dict[str, Gear]) -> None:
-        """Take these gears for the ordinary ones between the commands and the actuators."""
+        """Use these actuator dynamics as the default between commands and actuators."""
         self.ordinary = gears
         self.path = np.stack([self._stages(i, gears[k]) for i, k in enumerate(("n", "delta", "F", "F"))], axis=-1)
 
     def driven(self, gears: dict[str, Gear]) -> Plant:
-        """Return the same runs with some other ordinary gears."""
+        """Return the same runs with some other default actuator dynamics."""
         plant = copy(self)
         plant.drive(self.ordinary | gears)
         return plant
 
     def without(self, pieces: np.ndarray) -> Plant:
-        """Return the same runs with nothing to be seen in some pieces."""
+        """Return the same runs with all samples of some segments masked."""
         plant = copy(self)
         plant.seg = self.seg.without(pieces)
         return plant
 
     def less(self, error: np.ndarray) -> Plant:
-        """Return the same runs with an error (B, K + 1, 6) taken out of the recorded motion."""
+        """Return the same runs with an error (B, K + 1, 6) subtracted from the recorded motion."""
         plant, states = copy(self), self.seg.states.copy()
         states[..., :6] -= error
         plant.seg = replace(self.seg, states=states)
@@ -244,11 +249,12 @@ class Plant:
         return Plant(self.ship, self.seg.where(wanted), self.long, self.ordinary, self.froude)
 
     def resized(self, factor: float) -> Plant:
-        """Return the same runs of a similar ship; pieces, latent force and units stay, so that evidence compares."""
+        """Return the same runs of a geometrically similar ship. Segments, latent force and units stay, so that evidence
+        compares."""
         return Plant(self.ship.resized(factor), self.seg, self.long, froude=self.froude)
 
     def turned(self, actuators: Sequence[int]) -> Plant:
-        """Return the same runs with some actuators (of n, delta, F_b, F_s) read to the other side."""
+        """Return the same runs with the sign of some actuators (of n, delta, F_b, F_s) reversed."""
         return Plant(self.ship, self.seg.turned(actuators), self.long.turned(actuators), self.ordinary, self.froude)
 
     def with_actuators(self, actuators: np.ndarray) -> Plant:
@@ -258,10 +264,12 @@ class Plant:
 
     @classmethod
     def of(cls, dataset: Dataset, most_steps: int = MOST_STEPS) -> Plant:
-        """The plant of a data set, cut into segments of about 60 s at 130 m (Froude-scaled): over longer ones the
-        motion is far from linear in its parameters, and little is learnt from the place where the next one begins. Fast
-        records are averaged, long ones thinned to `most_steps` integration steps. `long` are longer pieces, with every
-        sample, for what has no such limit: the gears."""
+        """Forward model of a data set, cut into segments of about 60 s at 130 m (Froude-scaled).
+
+        Over longer segments the motion is far from linear in its parameters, and the initial state of the next segment
+        adds little. Fast records are averaged; long ones are thinned to `most_steps` integration steps. `long` holds
+        longer segments with every sample, for the actuator dynamics, which have no such limit.
+        """
         ship, motion, longer = complete(dataset.ship), averaged(dataset), THRESHOLDS.count("long_segment")
         length = SEGMENT * (ship.L / 130.0) ** 0.5
         segments = cut(motion, max(20, round(length / motion.dt)))
@@ -273,8 +281,8 @@ class Plant:
     def path_of(self, active: Sequence[Active]) -> np.ndarray:
         """Actuators at the three stages of every integration step, (B, steps * substeps, 3, 4): n, delta, F_b, F_s.
 
-        Recorded actuators are interpolated and pass through what gear effects add; where only commands are recorded,
-        these pass through ordinary gears as well.
+        Recorded actuators are interpolated and pass through the added actuator dynamics. Where only commands are
+        recorded, these pass through the default actuator dynamics as well.
         """
         gears = dict(self.ordinary)
         for a in active:
@@ -291,9 +299,11 @@ class Plant:
         return path
 
     def _stages(self, i: int, gear: Gear) -> np.ndarray:
-        """One actuator behind a gear, (B, steps * substeps, 3). A negative delay means that the record is late.
-        Recorded actuators are read at the time that a delay points to: a gear that follows them at once moves from
-        stage to stage, and would leave a delay without a slope."""
+        """Output of one actuator's dynamics, (B, steps * substeps, 3). A negative delay means that the record is late.
+
+        Recorded actuators are read at the time to which a delay points: dynamics without lag move from stage to stage,
+        and would give a delay no gradient.
+        """
         seg, n, before = self.seg, 2 * self.substeps, self.seg.earlier.shape[1]
         fine = np.arange(-before * n, self.steps * n + 1) / n
         if seg.commanded:
@@ -339,7 +349,7 @@ class Plant:
         push: np.ndarray,
         path: np.ndarray | None = None,
     ) -> np.ndarray:
-        """One sample ahead of every state at once: (D, K, B, 6) from states (D or 1, K, B, 6) and `pushes`.
+        """States one sample ahead of every state at once: (D, K, B, 6) from states (D or 1, K, B, 6) and `pushes`.
 
         Along a known trajectory this replaces the loop over time: the sensitivities of the single steps are chained
         afterwards.
@@ -354,8 +364,8 @@ class Plant:
         path: np.ndarray | None = None,
         often: bool = True,
     ) -> np.ndarray:
-        """Accelerations (D, K, B, 3) that forces give in the middle of every step, from the states there (1, K, B, 6);
-        `often` as in `Course.rates`."""
+        """Accelerations (D, K, B, 3) by forces in the middle of every step, from the states there (1, K, B, 6); `often`
+        as in `Course.rates`."""
         return self.course.rates(middle, p, [*active, *self.water], self._by_sample(path), often)
 
     def midway(self, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

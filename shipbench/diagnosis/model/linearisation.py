@@ -1,4 +1,4 @@
-"""One point of the model (parameters, effects, initial states, latent force) and its linearisation about that point."""
+"""Linearisation of the model about a point: parameters, effects, initial states, latent force."""
 
 from __future__ import annotations
 
@@ -53,9 +53,11 @@ class Point:
 
 
 class Scales:
-    """Units of everything that is free, for one ship: chosen so that one unit is a typical size. background: the
-    variances at which all fits that are compared see what initial states take off the evidence; none before there is a
-    first fit."""
+    """Units of all free values, for one ship: one unit is a typical size.
+
+    background: variances of the nuisance parameters. With them, all fits that are compared use the same part of the log
+    determinant that belongs to initial states. None before the first fit.
+    """
 
     background: Hyper | None = None
 
@@ -69,19 +71,19 @@ class Scales:
         self.colour = Colour.white(plant.steps + 1)
 
     def coloured(self, colour: Colour) -> Scales:
-        """Return them with another correlation of the noise."""
+        """Return them with another noise model."""
         new = copy(self)
         new.colour = colour
         return new
 
     def with_background(self, background: Hyper) -> Scales:
-        """Return them for fits that are compared."""
+        """Return them with the variances of the nuisance parameters, for fits that are compared."""
         new = copy(self)
         new.background = background
         return new
 
     def alike(self, other: Scales) -> Scales:
-        """Return them with the noise and the background of a fit that is compared."""
+        """Return them with the noise model and the variances of the nuisance parameters of a fit that is compared."""
         new = self.coloured(other.colour)
         new.background = other.background
         return new
@@ -92,7 +94,7 @@ class Scales:
 
 
 def hull_changes(base: np.ndarray) -> np.ndarray:
-    """Relative changes (..., NUM_HULL) of the hull's derivatives and added masses from their values in `base`."""
+    """Relative changes (..., NUM_HULL) of the hull's derivatives and added masses, from their values in `base`."""
     change, linear = THRESHOLDS.value("hull_spread") * base, THRESHOLDS.value("hull_change_linear")
     least = 1.0 - linear
     bounded = np.maximum(change, least * np.exp(np.minimum(change + linear, 0.0) / least) - 1.0)
@@ -100,8 +102,10 @@ def hull_changes(base: np.ndarray) -> np.ndarray:
 
 
 def parameters(scales: Scales, base: np.ndarray) -> tuple[list[np.ndarray | float], list[Active]]:
-    """p0..p10, and the changes of the hull and of the structure, from `base` (..., 15); leading axes are kept, so that
-    (D, 1) spreads over segments."""
+    """Parameters p0..p10, and the changes of the hull and of the structure, from `base` (..., 15).
+
+    Leading axes are kept, so that (D, 1) spreads over segments.
+    """
     p: list[np.ndarray | float] = [0.0] * 11
     for i, index in enumerate(FREE):
         p[index] = (CENTRE[i] + SPREAD[i] * base[..., i]) * scales.p[index]
@@ -118,7 +122,7 @@ def predict(plant: Plant, scales: Scales, point: Point) -> np.ndarray:
 
 
 def actives(plant: Plant, scales: Scales, point: Point) -> list[Active]:
-    """The effects of a point with their values, one per segment where they differ between runs."""
+    """Effects of a point with their values, one per segment where they differ between runs."""
     found = []
     for term, value in zip(point.terms, point.values, strict=True):
         amplitude = scales.amplitudes(term, plant.c.L) * value
@@ -136,17 +140,18 @@ def _since(plant: Plant, term: Term, value: Array) -> Array:
 _STEP = 1e-4
 """Finite difference in units of the scales."""
 _quiet = np.errstate(over="ignore", invalid="ignore")
-"""A trial whose trajectory blows up is judged by its cost, which is not finite."""
+"""Silence overflow: a trial whose trajectory diverges is judged by its cost, which is not finite."""
 
 
 class Linearisation:
-    """A trajectory and its sensitivities: forward differences of all single steps at once, chained by the steps'
+    """Trajectory and its sensitivities: forward differences of all single steps at once, chained by the steps'
     Jacobians.
 
-    The trajectory may be a guess whose steps do not quite meet (lifted Newton, multiple shooting): the gaps are chained
-    into `predicted`, and close as the iterations converge. Without a guess the model is rolled out. `coarse`: vectors
-    in the model are moved by half their typical size; finely a fit comes to rest where it is best, but does not leave
-    the place where a vector is zero.
+    The trajectory may be a guess with gaps between its steps (lifted Newton, multiple shooting). The gaps are chained
+    into `predicted`, and close as the iterations converge. Without a guess the model is rolled out.
+
+    `coarse`: vectors in the model are moved by half their typical size. A fine step converges to the optimum, but does
+    not leave the place where a vector is zero.
     """
 
     @_quiet
@@ -204,13 +209,14 @@ class Linearisation:
 
     def pushed(self, axis: int, on: np.ndarray, aside: np.ndarray) -> tuple[np.ndarray, Bend]:
         """Columns (B, T, F) of accelerations (F, K, B) along one axis in the middle of every step, in units of the
-        latent force's scales, and how they bend the motion, where they are others beside it. After `columns`."""
+        latent force's scales, and their change of the motion's sensitivities. `aside`: the same accelerations beside
+        the trajectory. Call it after `columns`."""
         along = self.scales.w * (np.arange(3) == axis)
         return self._chained(self._ends(on[..., None] * along)), Bend((aside - on)[..., None] * along)
 
     def towards(self, target: Point) -> np.ndarray:
-        """The trajectory that the linear model expects at another point, gaps closed: the guess for the next iteration.
-        After `columns`."""
+        """Trajectory that the linear model expects at another point, gaps closed: the guess for the next iteration.
+        Call it after `columns`."""
         here = self.point
         w = np.moveaxis(target.w - here.w, -1, 1).reshape(len(here.w), -1)
         sources = self.gaps + self.base_sources @ (target.base - here.base) + (self.pulses @ w[..., None])[..., 0]
@@ -243,8 +249,8 @@ class Linearisation:
         return self.plant.rates_from(at, self.p if p is None else p, active, way, often)
 
     def _look_aside(self) -> None:
-        """A point beside the middle of every step, in one direction after the other, for what the forces' derivatives
-        by the motion change with."""
+        """Set points beside the middle of every step, in one direction after the other, for second derivatives of the
+        forces."""
         K, B = self.middle.shape[1:3]
         self.turn = np.take(ASIDE, np.add.outer(np.arange(K), np.arange(B)) % len(ASIDE))
         self.away = AWAY * self.scales.eta[self.turn]
@@ -253,14 +259,14 @@ class Linearisation:
 
     def _changed(self, unit: float, **change: Any) -> tuple[np.ndarray, np.ndarray]:
         """Changes (D, K, B, 3) of the accelerations by a change of something, per unit: on the trajectory, and beside
-        it less those (none where the derivatives of the log determinant are not asked for)."""
+        it less those on it. The second is empty where the derivatives of the log determinant are not needed."""
         on = self._rates(**change) - self.rates
         aside = on if self.aside is None else self._rates(**change, states=self.aside) - self.rates_aside
         return on / unit, (aside - on) / unit
 
     def _ends(self, rates: np.ndarray) -> np.ndarray:
-        """Changes of the steps' ends (K, B, 6, D) by changes of the acceleration (D, K, B, 3): one evaluation of the
-        forces instead of the four of a step."""
+        """Changes (K, B, 6, D) of the steps' ends by changes of the acceleration (D, K, B, 3). It takes one evaluation
+        of the forces instead of the four of a step."""
         return np.asarray(self.reach @ np.moveaxis(rates, 0, -1))
 
     def _pulses(self) -> np.ndarray:
@@ -283,7 +289,7 @@ class Linearisation:
         return S
 
     def _chained(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
-        """Columns (B, T, D) of the measurement, of the same changes."""
+        """Columns (B, T, D) of the measurement, by the same changes."""
         S = self._chain(sources, first)
         if any(a.effect.enters == "sensor" for a in self.now):
             moved = self.plant.measured(self.motion + _STEP * np.moveaxis(S, -1, 0), self.now)
@@ -291,7 +297,7 @@ class Linearisation:
         return S.reshape(len(S), -1, S.shape[-1])
 
     def _of_term(self, index: int, term: Term) -> np.ndarray:
-        """Columns of a term that is in the model."""
+        """Columns of a term of the model."""
         # a vector near zero, where its force has no slope, would else stay there
         step = 0.5 if term.effect.vector and self.coarse else 0.02
         steps = step * self.scales.amplitudes(term, self.plant.c.L)
@@ -309,7 +315,7 @@ class Linearisation:
 
     @_quiet
     def _of_candidates(self, candidates: Sequence[Term]) -> list[np.ndarray]:
-        """Columns (B, T, size) of terms that are not in the model; those that act as forces share one batch."""
+        """Columns (B, T, size) of terms outside the model; those that act as forces share one batch."""
         found: dict[int, np.ndarray] = {}
         self.candidate_sources: list[np.ndarray | None] = []
         for i, term in enumerate(candidates):
@@ -340,7 +346,7 @@ class Linearisation:
         return [found[i] for i in range(len(candidates))]
 
     def holding(self, index: int, term: Term) -> Linearisation:
-        """Return it with the index-th candidate of `columns` in the model, without a size yet."""
+        """Return it with the index-th candidate of `columns` as a term of the model, of size zero."""
         new, runs = copy(self), self.plant.seg.runs
         value = np.zeros((runs, term.size)) if term.per_run else np.zeros(term.size)
         new.point = replace(self.point, terms=(*self.point.terms, term), values=(*self.point.values, value))
@@ -348,15 +354,15 @@ class Linearisation:
         return new
 
     def _beside(self, term: Term, q: Sequence[np.ndarray], side: float) -> list[Active]:
-        """The model's forces and one that is not in it."""
+        """Forces of the model and of one term outside it."""
         return [*self.forces, Active(term.effect, (*(side * v for v in q), *term.setting))]
 
     @_quiet
     def _moved(
         self, index: int | None, term: Term, steps: np.ndarray, unit: float
     ) -> tuple[np.ndarray, np.ndarray | None, Bend]:
-        """Columns (B, T, size) of one term, the index-th of the model or one that is not in it, and its sources where
-        it touches the motion."""
+        """Columns (B, T, size) of one term, the index-th of the model or one outside it, and its sources where it acts
+        on the motion."""
         columns, sources, bends, sensors = [], [], [], []
         seen = self.plant.measured(self.motion, self.now)
         for a in range(term.size):

@@ -1,13 +1,17 @@
-"""Sensor noise whose samples go together: a compass or a receiver that filters errs for seconds, and samples taken as
-independent would say too much. A ship in waves moves at their frequency besides: samples taken as independent would say
-too little of her slow motion.
+"""Autocorrelated sensor noise.
 
-Noise of a channel: white, and `share` times as much variance that forgets itself like exp(-|t - s| / time), or moves to
-and fro with a `period`, as the output of a damped oscillator that has nothing at frequency zero (T. I. Fossen, Handbook
-of Marine Craft Hydrodynamics and Motion Control, Wiley, 2011, 8.2.6: linear wave response), or is smooth, as in a
-record that was filtered: Matern's correlation of order 5/2 (C. E. Rasmussen and C. K. I. Williams, Gaussian Processes
-for Machine Learning, MIT Press, 2006, eq. 4.17). Both sides of the linear model are multiplied by the inverse of its
-Cholesky factor; what is left is white again, also in a piece that ends early, as the factor is triangular.
+A compass or a receiver that filters has errors that last for seconds: samples taken as independent would count for too
+much. A ship in waves also moves at their frequency: samples taken as independent would count for too little in her slow
+motion.
+
+Noise of a channel: white noise, and a second part of `share` times its variance. The second part has one of three
+forms. It decays like exp(-|t - s| / time). Or it oscillates with a `period`, as the output of a damped oscillator
+without energy at frequency zero (T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, Wiley, 2011,
+8.2.6: linear wave response). Or it is smooth, as in a filtered record: Matern's correlation of order 5/2 (C. E.
+Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press, 2006, eq. 4.17).
+
+Both sides of the linear model are multiplied by the inverse of its Cholesky factor. The residual noise is white, also
+in a segment that ends early, as the factor is triangular.
 """
 
 from __future__ import annotations
@@ -20,9 +24,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Colour:
-    """share (6,), variance of the part that lasts over that of the white part; time, period (6,) in samples, no period
-    is infinity; smooth (6,), whether it was filtered; factor (6, K + 1, K + 1) that whitens; logdet (6, K + 2) of the
-    covariance of the first k samples."""
+    """Noise model of the six channels.
+
+    share (6,): variance of the correlated part over that of the white part. time, period (6,): in samples; no period is
+    infinity. smooth (6,): whether the record was filtered. factor (6, K + 1, K + 1): whitening matrix. logdet (6, K +
+    2): log determinant of the covariance of the first k samples.
+    """
 
     share: np.ndarray
     time: np.ndarray
@@ -33,7 +40,7 @@ class Colour:
 
     @classmethod
     def white(cls, samples: int) -> Colour:
-        """Independent samples, in pieces of `samples`."""
+        """White noise: independent samples, in segments of `samples`."""
         nothing, never = np.zeros(6), np.full(6, np.inf)
         return cls(
             nothing, np.ones(6), never, nothing > 0.0, np.tile(np.eye(samples), (6, 1, 1)), np.zeros((6, samples + 1))
@@ -53,7 +60,7 @@ class Colour:
         return new
 
     def whitened(self, values: np.ndarray) -> np.ndarray:
-        """(B, K + 1, 6, ...) as if their noise were white; themselves where it is."""
+        """Values (B, K + 1, 6, ...) multiplied by the whitening matrix; themselves where the noise is white."""
         if not self.share.any():
             return values
         out = values.copy()
@@ -61,14 +68,14 @@ class Colour:
         return out
 
     def whiten(self, values: np.ndarray, channels: Sequence[int]) -> None:
-        """Whiten in place some channels, which come first: (channels, B, K + 1, ...)."""
+        """Whiten some channels in place; values (channels, B, K + 1, ...) have the channel first."""
         for at, channel in enumerate(channels):
             if self.share[channel] > 0.0:
                 values[at] = np.einsum("kl,bl...->bk...", self.factor[channel], values[at], optimize=True)
 
     def unwhitened(self, values: np.ndarray) -> np.ndarray:
-        """(B, K + 1, 6, ...), multiplied by the transposes of the factors that whiten; themselves where there is
-        nothing to whiten."""
+        """Values (B, K + 1, 6, ...) multiplied by the transposed whitening matrix; themselves where the noise is
+        white."""
         if not self.share.any():
             return values
         out = values.copy()
@@ -79,17 +86,17 @@ class Colour:
         return out
 
     def differs(self, other: Colour) -> list[int]:
-        """Channels whose noise is another one."""
+        """Channels with another noise model."""
         ours, theirs = (np.stack([c.share, c.time, c.period, c.smooth]) for c in (self, other))
         return [int(c) for c in np.flatnonzero(np.any(ours != theirs, axis=0))]
 
     def log_determinant(self, lengths: np.ndarray) -> np.ndarray:
-        """(B,) of the covariance of all channels, for pieces of `lengths` samples."""
+        """Log determinant (B,) of the covariance of all channels, for segments of `lengths` samples."""
         return np.asarray(self.logdet[:, lengths].sum(axis=0))
 
 
 def _correlation(lag: np.ndarray, time: float, period: float, smooth: bool) -> np.ndarray:
-    """Correlation of the part that lasts, at lags in samples."""
+    """Correlation of the correlated part of the noise, at lags in samples."""
     decay = np.exp(-lag / time)
     if smooth:
         return (1.0 + lag / time + (lag / time) ** 2 / 3.0) * decay

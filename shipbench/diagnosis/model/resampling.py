@@ -1,7 +1,7 @@
-"""Averaging of fast records to what a ship's motion needs.
+"""Averaging of fast records to the time resolution that a ship's motion needs.
 
-A record at 10 Hz says as much in a tenth of the arithmetic. The errors of its sensors, which last for seconds, become
-those of neighbouring samples.
+A record at 10 Hz has the same information in a tenth of the arithmetic. Sensor errors that last for seconds become
+errors of neighbouring samples.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from ..thresholds import THRESHOLDS
 
 
 def averaged(dataset: Dataset) -> Dataset:
-    """The mean of every 3, 5, 7, ... samples, at the time of the middle one; of what is held (commands, wind, depth),
-    that until the next such time.
+    """Data set with the mean of every 3, 5, 7, ... samples, at the time of the middle one. Held channels (commands,
+    wind, depth) keep the value that holds until the next such time.
 
-    As many as fit into a second at 130 m (Froude-scaled) and leave the shortest run with two samples; the data set
-    itself where that is one.
+    The number of samples is the largest that fits into a second at 130 m (Froude-scaled) and leaves the shortest run
+    with two samples. The data set itself is returned where that is one.
     """
     every = THRESHOLDS.value("sample_interval")
     most = min(every * (complete(dataset.ship).L / 130.0) ** 0.5 / dataset.dt + 1e-6, min(map(len, dataset.runs)) / 2)

@@ -1,9 +1,8 @@
-"""Steps of eq. (2) with effects over many lanes at once: the formula, and machine code of it for every set of effects
-that is met.
+"""Steps of eq. (2) with effects over many lanes at once: the formula, and machine code of it for each set of effects.
 
-Lanes are (D, K, B): changed directions, samples, segments. What the ship and the effects' values are, the code takes as
-numbers: one compilation serves all ships and all fits with the same effects, in whichever way these are fitted. Without
-a compiler numpy goes through the formula.
+Lanes are (D, K, B): changed directions, samples, segments. The code takes the ship's numbers and the effects' values as
+inputs: one compilation serves all ships and all fits with the same effects. Without a compiler numpy evaluates the
+formula.
 """
 
 from __future__ import annotations
@@ -34,19 +33,19 @@ _built: dict[tuple[Any, ...], Lanes | None] = {}
 
 @dataclass(frozen=True)
 class Active:
-    """An effect in the model and its values: arrays that spread over (directions, segments)."""
+    """Effect in the model and its values: arrays that broadcast over (directions, segments)."""
 
     effect: Effect
     q: tuple[Array, ...]
 
     @property
     def own(self) -> tuple[float, ...]:
-        """The effect's own numbers, which differ between the ways in which it is fitted (`Effect.fitted`)."""
+        """Numbers of the effect itself, which differ between the forms in which it is fitted (`Effect.fitted`)."""
         numbers = numbers_of(tuple(vars(self.effect).values()))
         return tuple(numbers) if all(isinstance(number, float) for number in numbers) else ()
 
     def with_own(self, numbers: Iterator[Array]) -> Effect:
-        """The effect with others in their place."""
+        """The effect with other numbers in their place."""
         effect, attributes = copy(self.effect), vars(self.effect)
         vars(effect).update(zip(attributes, with_numbers(tuple(attributes.values()), numbers), strict=True))
         return effect
@@ -54,7 +53,7 @@ class Active:
 
 @dataclass(frozen=True)
 class Vessel:
-    """The ship as its particulars, for the effects, and as the coefficients of eq. (2)."""
+    """Ship as its particulars, for the effects, and as the coefficients of eq. (2)."""
 
     ship: Particulars
     c: eq2.Coefficients
@@ -103,7 +102,7 @@ class Course:
     def ends(
         self, states: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, push: np.ndarray
     ) -> np.ndarray:
-        """One sample ahead of every state at once, (D, K, B, 6), from states (D or 1, K, B, 6)."""
+        """States one sample ahead of every state at once, (D, K, B, 6), from states (D or 1, K, B, 6)."""
         code = self._code(active, steps=True)
         if code is None:
             with np.errstate(all="ignore"):
@@ -115,8 +114,10 @@ class Course:
     def rates(
         self, middle: np.ndarray, p: Sequence[Array], active: Sequence[Active], act: np.ndarray, often: bool = True
     ) -> np.ndarray:
-        """Accelerations (D, K, B, 3) that forces give in the middle of every sample, from the states there (1, K, B,
-        6). often: whether these effects come up again and again, so that code of their own pays."""
+        """Accelerations (D, K, B, 3) by forces in the middle of every sample, from the states there (1, K, B, 6).
+
+        often: whether these effects are evaluated so often that compiled code pays.
+        """
         at, code = self.midway, self._code(active, steps=False) if often else None
         if code is not None:
             return self._evaluated(
@@ -143,7 +144,7 @@ class Course:
         t: np.ndarray,
         wind: np.ndarray | None,
     ) -> tuple[Array, ...]:  # fmt: skip
-        """One sample from x; act (.., S, 3, 4), push (.., S, 3, 3), t (.., S, 3)."""
+        """State one sample after x; act (.., S, 3, 4), push (.., S, 3, 3), t (.., S, 3)."""
         air = None if wind is None else np.moveaxis(wind, -1, 0)
         for s in range(t.shape[-2]):
             stages = [
@@ -162,7 +163,7 @@ class Course:
         t: np.ndarray,
         *push: np.ndarray,
     ) -> list[Any]:
-        """Arguments of the machine code, each spread over (D, K, B, S, its numbers)."""
+        """Arguments of the machine code, each broadcast over (D, K, B, S, its numbers)."""
         values = np.stack(np.broadcast_arrays(*p, *(v for a in active for v in a.q)), axis=-1)[..., None, :]
         stages = [a.reshape(*self.t.shape[:2], a.shape[2], -1) for a in (act, t, *push)]
         return [
@@ -174,7 +175,7 @@ class Course:
         ]
 
     def _evaluated(self, code: Lanes, num: int, bundles: Sequence[np.ndarray]) -> np.ndarray:
-        """(D, K, B, num); D is that of the states or of the values."""
+        """Values (D, K, B, num) of the machine code; D is that of the states or of the values."""
         D = max(a.shape[0] for a in bundles[:2] if a.ndim == 5)
         out = np.moveaxis(
             np.empty((*self.t.shape[:2], num, D)), -1, 0
@@ -211,8 +212,10 @@ def accelerations(
     active: Sequence[Active],
     vessel: Vessel,
 ) -> tuple[Array, ...]:
-    """(du, dv, dr) [m/s^2, m/s^2, rad/s^2] of forces at one instant; act: n, delta, F_b, F_s; wind: speed and
-    direction, or None."""
+    """Accelerations (du, dv, dr) [m/s^2, m/s^2, rad/s^2] by forces at one instant.
+
+    act: n, delta, F_b, F_s; wind: speed and direction, or None.
+    """
     px, py, psi, u, v, r = state
     n, delta, F_b, F_s = act
     air = (u, v) if wind is None else apparent_wind(psi, u, v, wind[0], wind[1])
@@ -230,8 +233,8 @@ def step(
     active: Sequence[Active],
     vessel: Vessel, h: Array,
 ) -> tuple[Array, ...]:  # fmt: skip
-    """One integration step of h [s]; stages: actuators, pushes (accelerations to add) and time at its beginning, middle
-    and end."""
+    """State after one integration step of h [s]; stages: actuators, pushes (accelerations to add) and time at its
+    beginning, middle and end."""
 
     def rhs(state: tuple[Array, ...], stage: int) -> tuple[Array, ...]:
         act, push, t = stages[stage]
@@ -252,7 +255,7 @@ def _fields(vessel: Vessel) -> tuple[Any, ...]:
 
 
 def _numbers(active: Sequence[Active], vessel: Vessel) -> list[float]:
-    """Numbers that the code takes besides the step: the ship's, and the effects' own."""
+    """Inputs of the code besides the step: numbers of the ship and of the effects themselves."""
     return [*numbers_of(_fields(vessel)), *(number for a in active for number in a.own)]
 
 
@@ -271,7 +274,7 @@ def _compiled(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool,
 
 
 def _traced(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool, any_ship: bool) -> casadi.Function:
-    """The step, or the accelerations, of symbols: state, values of p and effects, h and `_numbers`, actuators, times[,
+    """Symbolic step, or accelerations. Inputs: state, values of p and effects, h and `_numbers`, actuators, times[,
     pushes][, wind].
 
     Raises:

@@ -1,4 +1,4 @@
-"""An effect as a part of the model, or as a candidate for it."""
+"""Term of the model: an effect that is part of it, or a candidate."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ..thresholds import THRESHOLDS
 
 @dataclass(frozen=True)
 class Term:
-    """An effect in the model: shape parameters fixed, one of `choices`; amplitudes free, one set or one per run;
-    `since`: absent before that run."""
+    """Effect in the model: shape parameters fixed, one of `choices`; amplitudes free, one set or one per run; `since`:
+    absent before that run."""
 
     effect: Effect
     setting: tuple[float, ...] = ()
@@ -31,7 +31,8 @@ class Term:
         return self.effect.name
 
     def cost(self, runs: int) -> float:
-        """Twice the prior log odds against it: choice of beginning or shape parameters, variances of values per run."""
+        """Twice the prior log odds against the term: choice of beginning or shape parameters, variances of values per
+        run."""
         if self.since is not None:
             return 2.0 * float(np.log(runs))
         own = THRESHOLDS.value("values_per_run") + float(np.log(runs)) if self.per_run else 0.0

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from ...compiled import Rollout
 
 DEFAULT_ACTUATORS = np.array([6.0, 10.0, 1.0, np.deg2rad(2.5), 2.0, 3e4])
-"""T_n [s], rate_n [rpm/s], T_delta [s], rate_delta [rad/s], T_F [s], rate_F [N/s]: kept for an actuator that the data
-never move."""
+"""T_n [s], rate_n [rpm/s], T_delta [s], rate_delta [rad/s], T_F [s], rate_F [N/s]: used for an actuator that never
+moves in the data."""
 
 _NO_LIMIT = 1e3
-"""A rate limit this many times the mean command step per second is no limit."""
+"""Factor of the mean command step per second above which a rate limit counts as none."""
 
 
 def fit_actuators(batch: Batch, dt: float) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""Effects in the fitted physics: what a spec adds (`physics+current`), which of its values are fitted, and where each
-effect enters.
+"""Effects in the fitted physics model: parts that a spec adds (`physics+current`), their fitted values, and the place
+where each effect enters.
 
-The formulas are those of `shipbench.effects`. Forces act in the rollout, gears between command and actuator; faults of
-sensors are taken off s0 and put on the prediction again, since both are what the sensors say.
+The formulas are those of `shipbench.effects`. Forces act in the rollout, actuator dynamics between command and
+actuator. Sensor errors are removed from s0 and added to the prediction again, since both are sensor readings.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ _INVERSE_STEPS = 30
 
 @dataclass(frozen=True)
 class Term:
-    """One effect of a spec; `given` holds the values (of `Effect.parameters`) that the spec sets, None where they are
-    found from the data."""
+    """Effect of a spec; `given` holds the values (of `Effect.parameters`) that the spec sets, None where they are
+    fitted."""
 
     spec: EffectSpec
     effect: Effect
@@ -55,7 +55,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Slot:
-    """A value that is fitted: the `at`-th of the `term`-th effect."""
+    """Fitted value: the `at`-th of the `term`-th effect."""
 
     term: int
     at: int
@@ -68,11 +68,11 @@ class Slot:
 
 @dataclass
 class Extension:
-    """The effects of one model, their values and 95 % intervals (one row per value; NaN where it was given, chosen or
-    sits at a bound).
+    """Effects of one model, their values and 95 % intervals (one row per value; NaN where it was given, chosen or sits
+    at a bound).
 
-    A predictor knows no runs: an effect that differs from run to run takes part with one value, that which serves all
-    training runs best, and a run that was not seen gets the same.
+    A predictor does not distinguish runs: an effect that differs between runs has one value, the one that fits all
+    training runs best. A new run gets the same value.
     """
 
     terms: tuple[Term, ...]
@@ -88,7 +88,7 @@ class Extension:
         return [Active(t.effect, q) for t, q in zip(self.terms, self.values, strict=True) if t.effect.enters == enters]
 
     def slots(self, L: float, *enters: str) -> list[Slot]:
-        """What is fitted of the effects that enter there, for a ship of length L [m]."""
+        """Fitted values of the effects that enter there, for a ship of length L [m]."""
         return [
             Slot(i, j, parameter)
             for i, t in enumerate(self.terms)
@@ -97,7 +97,7 @@ class Extension:
         ]
 
     def check(self, L: float) -> None:
-        """That the values which the spec gives are ones a ship of length L [m] may have.
+        """Check that a ship of length L [m] may have the values that the spec gives.
 
         Raises:
             InputError: a value lies outside the bounds of its parameter.
@@ -124,10 +124,10 @@ class Extension:
             )  # no width: the data say nothing of it
 
     def held(self) -> dict[int, str]:
-        """Indices of p that stay at zero, and the fitted effect that does their work: data cannot tell the two apart.
+        """Indices of p that stay at zero, and the fitted effect with which each is confounded.
 
-        With the hull's derivatives free, p0 and a rudder offset push the stern alike wherever the revolutions follow
-        the speed; p0 stays zero then.
+        With the hull's derivatives free, p0 and a rudder offset push the stern alike wherever the shaft speed follows
+        the ship's speed; p0 stays zero then.
         """
         fitted = [t for t in self.terms if None in t.given]
         held = {p: t.name for t in fitted for p in t.effect.traits.in_place_of}
@@ -138,9 +138,12 @@ class Extension:
         return held
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[Extension]:
-        """One copy per choice of the shape parameters that the spec leaves open, given the places (.., 2) that the ship
-        visited. Beside a given one, what is absent as a rule (the other bank of a channel) stays so: it was placed for
-        another value."""
+        """Copies of the extension, one per choice of the shape parameters that the spec leaves open, given the
+        positions (.., 2) that the ship visited.
+
+        Beside a given one, an effect that is absent by default (the other bank of a channel) stays absent: it was
+        placed for another value.
+        """
         choices: list[list[tuple[float, ...]]] = []
         for t, now in zip(self.terms, self.values, strict=True):
             shapes = [j for j, p in enumerate(t.effect.parameters) if p.shape]
@@ -158,7 +161,7 @@ class Extension:
         return [replace(self, values=list(values), ci95=self.ci95.copy()) for values in product(*choices)]
 
     def describe(self) -> list[str]:
-        """The values with units and intervals, for the printed equations."""
+        """Lines with the values, units and intervals, for the printed equations."""
         lines, row = ["  effects beside eq. (2) to (8):"], 0
         for t, q in zip(self.terms, self.values, strict=True):
             lines.append(f"  {t.name}: {t.effect.summary}" + (" (one value for all runs)" if t.effect.per_run else ""))
@@ -175,7 +178,7 @@ class Extension:
 
 
 def extension_of(specs: Sequence[EffectSpec]) -> Extension:
-    """The effects that a spec names, before they are fitted.
+    """Extension that a spec names, before it is fitted.
 
     Raises:
         InputError: an effect or a parameter is unknown, named twice, no number, or cannot be part of a predictor.
@@ -238,8 +241,8 @@ def accelerations(
     p: Sequence[Array],
     ship: Particulars,
 ) -> tuple[Array, Array, Array]:
-    """(du, dv, dr) of eq. (2) with the force effects `active`; `wind` is the measured wind (speed, from) or None.
-    Numbers or symbols."""
+    """Accelerations (du, dv, dr) of eq. (2) with the force effects `active`; `wind` is the measured wind (speed, from)
+    or None. Numbers or symbols."""
     e = Modifiers()
     for effect, q in flow_first(active):
         effect.force(e, flow, q, ship)
@@ -279,16 +282,16 @@ def roll(
 
 
 def measured(S: np.ndarray, sensors: Sequence[Active], dt: float) -> np.ndarray:
-    """What the sensors say of the true states S (batch, samples, 10)."""
+    """Sensor readings of the true states S (batch, samples, 10)."""
     for effect, q in sensors:
         S = effect.measure(S, q, dt)
     return S
 
 
 def true_start(s0: np.ndarray, sensors: Sequence[Active], dt: float) -> np.ndarray:
-    """The state (batch, 10) of which the sensors say s0: a fixed point of `measured`.
+    """True state (batch, 10) whose sensor readings are s0: a fixed point of `measured`.
 
-    For a delay the ship is taken to have come at s0's velocities.
+    For a delay the ship is taken to have arrived at s0's velocities.
     """
     if not sensors:
         return s0
@@ -302,10 +305,9 @@ def true_start(s0: np.ndarray, sensors: Sequence[Active], dt: float) -> np.ndarr
 
 
 def no_gear(h: float) -> Gear:
-    """What lies between command and actuator where only commands are recorded: next to nothing, a lag of a quarter of
-    the integration step `h` [s].
+    """Actuator dynamics where only commands are recorded: a lag of a quarter of the integration step `h` [s].
 
-    Without it the actuator would jump, and no small change of a delay would show.
+    Without a lag the actuator would jump, and a small change of a delay would have no effect.
     """
     return Gear(0.25 * h, 1e12)
 
@@ -319,8 +321,8 @@ def geared(
     dt: float,
     substeps: int,
 ) -> np.ndarray:
-    """`path` (batch, K * substeps, 3, 4) with the actuators whose gears the effects `active` change taken along these
-    gears, from s0 (batch, 10)."""
+    """Path (batch, K * substeps, 3, 4) with the actuators whose dynamics the effects `active` change, from s0 (batch,
+    10)."""
     gears = dict(base)
     for effect, q in active:
         effect.gear(gears, q)

@@ -18,12 +18,12 @@ _DIFFERENCE = 1e-3
 """Step of the differences, in typical sizes."""
 
 _PRIOR = 10.0
-"""Standard deviation of the prior of an effect's value, in typical sizes: only directions that the data leave open feel
-it."""
+"""Standard deviation of the prior of an effect's value, in typical sizes: it acts only in directions that the data do
+not identify."""
 
 _FIRST, _FIRST_GEAR = 0.1, 1.0
-"""Where the values start, in typical sizes: some forces have no slope at zero, a gear's rate limit acts only where it
-binds."""
+"""Starting values, in typical sizes: some forces have no slope at zero, and a rate limit acts only where it is
+reached."""
 
 
 def fit_extension(
@@ -31,14 +31,14 @@ def fit_extension(
     commanded: bool, iterations: int,
     tolerance: float,
 ) -> tuple[Fit, Extension]:  # fmt: skip
-    """p0..p10 and the effects' values together, from the plain fit `base` on; effects' shape parameters stay as they
-    are in `extension`.
+    """Fit p0..p10 and the effects' values together, starting from the plain fit `base`; effects' shape parameters stay
+    as they are in `extension`.
 
     A value has a zero-mean prior of ten typical sizes, whose weight against the rollouts counts every run as one
-    observation. What `Extension.held` names stays zero.
+    observation. The parameters in `Extension.held` stay zero.
 
     Args:
-        repath: the actuators' path under an extension's gears; asked again at every step where only commands are
+        repath: the actuators' path under an extension's dynamics; evaluated again at every step where only commands are
             recorded.
     """
     model = _Extended(data, extension, ship, repath, commanded)
@@ -101,7 +101,7 @@ class _Extended:
         return true_start(self.data.batch.s0, at.active("sensor"), self.data.dt), self.data.inputs(path, self.timed)
 
     def _measured(self, start: np.ndarray, X: np.ndarray, at: Extension) -> np.ndarray:
-        """What the sensors say of the motion X (batch, K, 6)."""
+        """Sensor readings of the motion X (batch, K, 6)."""
         sensors = at.active("sensor")
         if not sensors:
             return X

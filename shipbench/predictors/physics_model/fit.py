@@ -35,13 +35,13 @@ Forces = tuple[tuple[Effect, tuple[float | None, ...]], ...]
 """Force effects and their values; None where the value is a symbol."""
 
 _WORTH_COMPILING = 5000
-"""Integration steps of all runs; a fit interprets each of them some 15 times at about 40 microseconds."""
+"""Least integration steps of all runs for which compiling takes less time than it saves."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Parameters (11,), their 95 % intervals (11, 2; NaN where a parameter sits at a bound), cost per run and knot,
-    steps taken."""
+    """Parameters (11,), their 95 % intervals (11, 2; NaN where a parameter sits at a bound), cost per run and time
+    step, steps taken."""
 
     p: np.ndarray
     ci95: np.ndarray
@@ -62,9 +62,8 @@ def rollout_function(
     in `Data.inputs`.
 
     p holds p0..p10 and then the values of `forces` that are None; the last column of w is the time at the beginning of
-    the step, if there are forces. `ship` (Particulars) is what effects know of the ship. The code is of this ship and
-    these effects alone: it is compiled where `run_steps`, the integration steps of all runs, are so many that a fit
-    gains more than the 3 s that this takes.
+    the step, if there are forces. `ship` (Particulars) serves the effects. The code is for this ship and these effects
+    alone: it is compiled where `run_steps`, the integration steps of all runs, are many enough.
     """
     return _rollout_function(c, h, wind, sensitivities, forces, ship, run_steps >= _WORTH_COMPILING)
 
@@ -95,8 +94,8 @@ def _rollout_function(
 
 
 def parameter_scale(c: eq2.Coefficients) -> np.ndarray:
-    """Typical sizes of p0..p10 for this ship; resistance terms follow rho L T and the speed sqrt(g L)/10 (130 m: 3.6
-    m/s)."""
+    """Typical sizes of p0..p10 for this ship; resistance terms scale with rho L T and the speed sqrt(g L)/10 (130 m:
+    3.6 m/s)."""
     area = 0.5 * c.rho * c.L * c.T
     speed = 0.1 * np.sqrt(9.81 * c.L)
     return np.array(
@@ -112,8 +111,8 @@ def bounds(scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _constraints(p: ca.SX) -> ca.SX:
-    """g(p) <= 0: lift rises for |a| <= 20 deg, |c_L| <= 2 for |a| <= 35 deg, drag never negative, at most 3 deg of
-    built-in helm."""
+    """Constraints g(p) <= 0: lift rises for |a| <= 20 deg, |c_L| <= 2 for |a| <= 35 deg, drag never negative, at most 3
+    deg of neutral rudder angle."""
     a, b = np.deg2rad(20.0), np.deg2rad(35.0)
     lift = [p[4] + s * b * (p[5] + s * b * (p[6] + s * b * p[7])) for s in (1, -1)]
     return ca.vertcat(
@@ -150,8 +149,11 @@ def subproblem(num: int, scale: np.ndarray) -> ca.Function:
 
 @dataclass(frozen=True)
 class Data:
-    """What is fitted. path: actuators at the stages of every substep (batch, K * substeps, 3, 4); wind: (batch, K, 2)
-    speed and direction, or None; dt: sample time [s]."""
+    """Data of a fit.
+
+    path: actuators at the stages of every substep (batch, K * substeps, 3, 4); wind: (batch, K, 2) speed and direction,
+    or None; dt: sample time [s].
+    """
 
     c: eq2.Coefficients
     batch: Batch
@@ -259,8 +261,7 @@ def descend(
 
 
 def inverse_size(batch: Batch, dt: float) -> np.ndarray:
-    """Per signal, the inverse root mean square of how far holding s0's velocities errs: the size of what there is to
-    predict."""
+    """Inverse root mean square error (6,) of constant velocities, per signal: the size of the changes to predict."""
     runs, samples = batch.truth.shape[:2]
     return 1.0 / (_hold_error(batch, dt) * np.sqrt(runs * samples * 6.0))
 

@@ -1,5 +1,4 @@
-"""How well fitted physics follows the runs that it was fitted on, beside the floor that keeps the initial velocities
-(`hold`)."""
+"""Error of fitted physics on its own training runs, beside the baseline of constant velocities (`hold`)."""
 
 from __future__ import annotations
 
@@ -21,7 +20,7 @@ _RESISTANCE = frozenset({"p1", "p2", "p3"})
 
 @dataclass(frozen=True)
 class FitReport:
-    """What came of a fit.
+    """Result of a fit.
 
     Args:
         at_bounds: symbols of the parameters that ended at their bounds.
@@ -39,8 +38,8 @@ class FitReport:
 
     @property
     def fits(self) -> bool:
-        """Whether it follows its own runs: it is better than `hold`, and where it still keeps more than a third of that
-        error, no coefficient of the propeller or the rudder, nor the whole resistance, is at a bound."""
+        """Whether it fits its own runs: it is better than `hold`, and where its error is more than a third of that of
+        `hold`, no coefficient of the propeller or the rudder, nor the whole resistance, is at a bound."""
         telling = set(self.at_bounds) - _RESISTANCE or set(self.at_bounds) >= _RESISTANCE
         if self.error < _NOTHING:  # the ship keeps its velocities: there is nothing to be better at
             return True
@@ -56,7 +55,7 @@ class FitReport:
 
     @property
     def note(self) -> str:
-        """What a reader must know, "" where the physics fits."""
+        """Warning for the reader, "" where the physics fits."""
         if self.fits:
             return ""
         hint = "`shipbench data check` looks at signs and units, `shipbench diagnose` at what the physics lacks."
@@ -68,7 +67,7 @@ class FitReport:
         return f"physics does not fit these runs: {self.summary}. {hint}"
 
     def as_dict(self) -> dict[str, Any]:
-        """For a summary; an error that is not finite is None there."""
+        """Values for a summary; an error that is not finite is None there."""
         kept = asdict(self) | {"at_bounds": list(self.at_bounds)}
         return {
             key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in kept.items()
@@ -76,7 +75,7 @@ class FitReport:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> FitReport:
-        """What `as_dict` returned."""
+        """Report from the values that `as_dict` returned."""
         error, hold = (np.inf if data[key] is None else float(data[key]) for key in ("error", "hold"))
         again = data.get("reversed_error")
         return cls(
@@ -92,8 +91,7 @@ def position_error(S: np.ndarray, batch: Batch) -> float:
 
 
 def with_reversed_shaft(report: FitReport, batch: Batch, error_on: Callable[[Batch], float]) -> FitReport:
-    """The report with the error of a fit to the same runs with the opposite sign of n, where the physics does not
-    fit."""
+    """Report with the error of a fit to the same runs with the opposite sign of n, where the physics does not fit."""
     if report.fits:
         return report
     s0, truth, U = batch.s0.copy(), batch.truth.copy(), batch.U.copy()

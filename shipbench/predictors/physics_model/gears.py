@@ -1,5 +1,5 @@
-"""Effects between command and actuator, fitted where both are recorded: every actuator alone, without the ship's
-motion."""
+"""Effects on actuator dynamics, fitted where command and actuator are both recorded: every actuator alone, without the
+ship's motion."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _NO_LIMIT = 1e3
 
 
 def gears_of(actuators: np.ndarray) -> dict[str, Gear]:
-    """Gears of shaft, rudder and thrusters from the six values of `DEFAULT_ACTUATORS`."""
+    """Dynamics of shaft, rudder and thrusters from the six values of `DEFAULT_ACTUATORS`."""
     T_n, rate_n, T_delta, rate_delta, T_F, rate_F = (float(v) for v in actuators)
     return {"n": Gear(T_n, rate_n), "delta": Gear(T_delta, rate_delta), "F": Gear(T_F, rate_F)}
 
@@ -29,18 +29,18 @@ def gears_of(actuators: np.ndarray) -> dict[str, Gear]:
 def fit_gears(
     batch: Batch, dt: float, substeps: int, extension: Extension, actuators: np.ndarray, ship: Particulars
 ) -> tuple[np.ndarray, Extension]:
-    """Fit the values of the gear effects, with time constant and rate limit of the actuators that they change.
+    """Fit the values of the actuator effects, with time constant and rate limit of the actuators that they change.
 
-    The data show T + lag, and the smaller of two rate limits: beside a fitted lag the time constant is held at an
-    ordinary one (`DEFAULT_ACTUATORS`, by Froude's law; or the one found without the effect, where that is smaller),
-    beside a fitted rate limit there is no other.
+    The data identify T + lag, and the smaller of two rate limits. Beside a fitted lag the time constant is held at the
+    default (`DEFAULT_ACTUATORS`, Froude-scaled; or the one found without the effect, where that is smaller). Beside a
+    fitted rate limit there is no other.
 
     Args:
         actuators: (6,) as `fit_actuators` found them without the effects.
 
     Returns:
-        The six values and the extension with values and intervals. An actuator that never moves keeps what it had, its
-        effects zero (or their bound).
+        The six values and the extension with values and intervals. An actuator that never moves keeps its values, with
+        its effects at zero (or their bound).
     """
     actuators = actuators.copy()
     for g, (name, channels) in enumerate(CHANNELS.items()):
@@ -75,7 +75,7 @@ def _changes(extension: Extension, term: int, name: str) -> bool:
 
 
 class _Actuator:
-    """One actuator's records and its gear as a function of z = (log T, log rate, values of the effects)."""
+    """Records of one actuator, and its dynamics as a function of z = (log T, log rate, values of the effects)."""
 
     def __init__(
         self,
@@ -96,7 +96,7 @@ class _Actuator:
         self.moves = self.scale >= 1e-9 * (1.0 + float(np.max(np.abs(self.command))))
 
     def gear(self, z: np.ndarray) -> Gear:
-        """z (values,) or (values, rows)."""
+        """Dynamics for z (values,) or (values, rows)."""
         gears = {name: Gear(np.exp(z[0]), np.exp(z[1])) for name in CHANNELS}
         at = {(s.term, s.at): z[2 + i] for i, s in enumerate(self.slots)}
         for i, (t, q) in enumerate(zip(self.extension.terms, self.extension.values, strict=True)):
@@ -110,7 +110,7 @@ class _Actuator:
         return (path - self.truth) / self.scale
 
     def fit(self, before: np.ndarray, ordinary_T: float) -> tuple[np.ndarray, Extension]:
-        """(T, rate) and the extension with the values found, from the pair `before` that serves without the effects."""
+        """Fit (T, rate) and the extension, from the pair `before` that serves without the effects."""
         from scipy.optimize import least_squares
 
         from .fit import intervals

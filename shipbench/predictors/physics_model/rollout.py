@@ -42,7 +42,7 @@ def actuators_after(
 
 @dataclass(frozen=True)
 class Rolling:
-    """What a rollout needs beside p0..p10.
+    """Inputs of a rollout beside p0..p10.
 
     Attributes:
         c: left side and geometry.
@@ -92,14 +92,14 @@ def _numbers(c: eq2.Coefficients) -> np.ndarray:
 
 
 def numbers_of(value: Any) -> list[float]:
-    """The numbers in a dataclass, in order."""
+    """Numbers in a dataclass, in order."""
     if is_dataclass(value):
         return [number for f in fields(value) for number in numbers_of(getattr(value, f.name))]
     return [number for item in value for number in numbers_of(item)] if isinstance(value, tuple) else [value]
 
 
 def with_numbers(like: Any, numbers: Iterator[Array]) -> Any:
-    """The dataclass `like` with other numbers in the same places."""
+    """Copy of the dataclass `like` with other numbers in the same places."""
     if is_dataclass(like):
         values = {f.name: with_numbers(getattr(like, f.name), numbers) for f in fields(like)}
         return replace(like, **values)  # type: ignore[type-var]
@@ -107,7 +107,7 @@ def with_numbers(like: Any, numbers: Iterator[Array]) -> Any:
 
 
 def _step(like: eq2.Coefficients, commanded: bool, wind: bool, sensitivities: bool) -> casadi.Function:
-    """One integration step (x, w, p) -> x': x the ten states, then, with `sensitivities`, d(motion)/d(p0..p10) row by
+    """Integration step (x, w, p) -> x': x the ten states, then, with `sensitivities`, d(motion)/d(p0..p10) row by
     row."""
     import casadi as ca
 
