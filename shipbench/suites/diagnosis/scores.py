@@ -182,15 +182,8 @@ def figures(rows: Sequence[Row]) -> list[Row]:
     lines.append(rate("outside: unknown and right variable", kinds.get("outside", []), right_variable))
     hit = [r for r in kinds.get("single", []) if right(r, True)]
     errors, covered = size_errors(hit)
-    lines.append(
-        _line(
-            "size: median relative error",
-            float(np.median(errors)) if errors else math.nan,
-            math.nan,
-            math.nan,
-            len(errors),
-        )
-    )
+    median = float(np.median(errors)) if errors else math.nan
+    lines.append(_line("size: median relative error", median, math.nan, math.nan, len(errors)))
     lines.append(
         rate("size: coverage of the 95 % intervals", [{"covered": c} for c in covered], lambda r: r["covered"])
     )
