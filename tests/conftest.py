@@ -7,9 +7,12 @@ import os
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy and torch load: pytest's workers share the cores
 
 import pytest
+from toy_ship import toy, toy_folder
 
 from shipbench.contract.small import small_harbour
 from shipbench.records import Dataset
+
+__all__ = ["toy", "toy_folder"]
 
 
 @pytest.fixture(scope="session")

@@ -10,13 +10,10 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from toy_ship import toy
 
 from shipbench.data.files import write_dataset
 from shipbench.extras import EXTRAS
 from shipbench.predictors.base import PREDICTORS
-
-__all__ = ["toy"]  # a fixture
 
 ROOT = Path(__file__).parent.parent
 NETWORKS = ("lightning", "torch", "torchdiffeq")

@@ -9,7 +9,6 @@ import sys
 from importlib.metadata import EntryPoint
 
 import pytest
-from toy_ship import toy
 from typer.testing import CliRunner
 
 from shipbench import registry
@@ -23,8 +22,6 @@ from shipbench.errors import InputError
 from shipbench.metrics.base import METRICS
 from shipbench.predictors.base import PREDICTORS, make_predictor, parse_spec
 from shipbench.reports.listing import describe_parts
-
-__all__ = ["toy"]  # a fixture
 
 GOOD = """
 import numpy as np

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from nonlinear_benchmarks import Input_output_data
 from nonlinear_benchmarks.error_metrics import RMSE
-from toy_ship import toy
 
 from shipbench.adapters.nonlinear_benchmarks import InputOutputModel, from_records, ship_benchmark, to_records
 from shipbench.bench.runner import run_tasks
@@ -16,8 +15,6 @@ from shipbench.bench.task import make_task
 from shipbench.data.base import load_dataset
 from shipbench.data.files import write_dataset
 from shipbench.errors import InputError
-
-__all__ = ["toy"]  # a fixture
 
 
 @pytest.mark.parametrize("history_s", [0.0, 5.0])

@@ -9,14 +9,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from toy_ship import toy_folder
 
 from shipbench.data.files import read_dataset, write_dataset
 from shipbench.errors import InputError
 from shipbench.records import Dataset
 from shipbench.signals import COMMANDS, DELTA, PSI, R, U, V
-
-__all__ = ["toy_folder"]  # a fixture
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import loadmat, savemat
-from toy_ship import sail, toy_folder
+from toy_ship import sail
 from typer.testing import CliRunner
 
 from shipbench.cli.app import app
@@ -18,8 +18,6 @@ from shipbench.data.mat import read_mat, write_mat
 from shipbench.records import Dataset, Run
 from shipbench.ship import Propeller, Rudder, Ship, Thrusters
 from shipbench.signals import COMMANDS, STATES
-
-__all__ = ["toy_folder"]  # a fixture
 
 ODD_IDS = ("1-2 (port)", "日本/é", "001", "NA", " spaced ", "a,b\"c'", "x" * 80)
 

@@ -7,15 +7,12 @@ import sys
 
 import numpy as np
 import pytest
-from toy_ship import toy
 
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
 from shipbench.data.files import write_dataset
 from shipbench.errors import InputError
 from shipbench.predictors.base import make_predictor, parse_spec
-
-__all__ = ["toy"]  # a fixture
 
 
 def fitted(spec, harbour, seed=0):

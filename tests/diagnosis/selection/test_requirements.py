@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_robust import RUNS, fit_of
+from made_fits import RUNS, fit_of
 
 from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection import requirements
@@ -25,7 +25,7 @@ from shipbench.diagnosis.selection.screening import Score
 from shipbench.effects.base import EFFECTS, Effect
 from shipbench.effects.traits import Traits
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "shipbench-example"
+EXAMPLE = Path(__file__).parents[3] / "examples" / "shipbench-example"
 
 
 class Never(Requirement):

@@ -6,45 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_diagnosis import make_trace
 
 from shipbench.diagnosis.evaluation import residuals as wrong
 from shipbench.diagnosis.evaluation.dependence import Follows, curve, follows, with_speed
 from shipbench.diagnosis.evaluation.residuals import _whiteness, error_tables, force_words, what_is_wrong
-from shipbench.diagnosis.result import Trace
-
-
-def make_trace(runs: int = 12, samples: int = 61, seed: int = 0) -> Trace:
-    """Runs on courses all round, with white residuals, no missing force, and a sway error that grows with time."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(float(samples))
-    measured = np.zeros((runs, samples, 6))
-    measured[..., 2] = np.linspace(0.0, 2.0 * np.pi, runs, endpoint=False)[:, None] + 0.3 * np.sin(t / 20.0)
-    measured[..., 3] = rng.uniform(2.0, 6.0, (runs, 1)) + 0.2 * np.sin(t / 9.0)
-    measured[..., 4], measured[..., 5] = 0.3 * np.sin(t / 7.0 + rng.uniform(0, 6, (runs, 1))), 0.01 * np.cos(t / 11.0)
-    measured[..., 0] = np.cumsum(measured[..., 3], axis=1)
-    before = measured.copy()
-    before[..., 4] += 0.01 * t * rng.choice([-1.0, 1.0], (runs, 1))
-    inputs = np.zeros((runs, samples, 4))
-    inputs[..., 0], inputs[..., 1] = 50.0, 0.2 * np.sin(t / 7.0 + rng.uniform(0, 6, (runs, 1)))
-    knots = t[::5]
-    force = 1e-4 * rng.standard_normal((runs, len(knots), 3))
-    white = rng.standard_normal((runs, samples, 6))
-    names = tuple(f"r{i}" for i in range(runs))
-    return Trace(
-        np.arange(runs),
-        names,
-        np.zeros(runs),
-        t,
-        measured,
-        before,
-        before,
-        inputs,
-        knots,
-        force,
-        0.1 + 0 * force,
-        force,
-        white,
-    )
 
 
 def test_a_force_that_follows_the_heading_is_said_to():

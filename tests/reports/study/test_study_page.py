@@ -6,16 +6,14 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile import HOSTILE, Elements, drawings, page_of
 from typer.testing import CliRunner
 
-from shipbench.bench.runner import run_tasks
 from shipbench.bench.submissions import read_results
-from shipbench.bench.task import make_task
 from shipbench.cli.app import app
 from shipbench.errors import InputError
 from shipbench.leaderboard.histories import near
@@ -26,70 +24,6 @@ from shipbench.render.svg import Axes, limits, path, ticks
 from shipbench.render.table import Table, TableColumn, number, table_cells
 from shipbench.reports.study.beside import _numbers, check_given, diagnoses
 from shipbench.reports.study.page import write_report
-
-HOSTILE = "<img src=x onerror=alert(1)>&\"'</script><script>alert(2)</script>"
-MODELS = """
-import numpy as np
-class Still:
-    def fit(self, train, valid=None, *, seed=0): return self
-    def predict(self, s0, U, history=None): return np.repeat(s0[:, None], U.shape[1], axis=1)
-    def describe(self): return "still\\n  k = 2.5 1/s [1, 3] some <b>gain</b>"
-class Fails(Still):
-    def predict(self, s0, U, history=None): raise ValueError("</script><script>alert(3)</script> no")
-class Blows(Still):
-    def predict(self, s0, U, history=None):
-        S = np.repeat(s0[:, None], U.shape[1], axis=1)
-        S[0, 5:] = np.inf
-        return S
-"""
-
-
-@pytest.fixture(scope="session")
-def study(tmp_path_factory):
-    """Results of four models, one of which fails and one diverges, on runs with hostile names."""
-    from toy_ship import TOY_SHIP, sail
-
-    from shipbench.records import Dataset, Run
-
-    runs = []
-    for i in range(9):
-        S, C = sail(30, i)
-        S[:, 6], C[:, 0], C[:, 2] = (-40.0, -40.0, 5e3) if i == 4 else (90.0, 90.0, 0.0)
-        runs.append(Run(f"r{i} {HOSTILE}", np.arange(31.0), S, C, meta={"manoeuvre": "turn" if i % 2 else HOSTILE}))
-    folder = tmp_path_factory.mktemp("report")
-    (folder / "m.py").write_text(MODELS)
-    models = ["hold", f"{folder}/m.py:Still", f"{folder}/m.py:Fails", f"{folder}/m.py:Blows"]
-    patch = pytest.MonkeyPatch()
-    patch.setattr(
-        "shipbench.bench.runner.load_dataset", lambda name: Dataset("toy", TOY_SHIP, 1.0, tuple(runs), source=HOSTILE)
-    )
-    run_tasks(
-        [make_task({"dataset": "toy", "models": models, "horizon_s": 30, "folds": 3})],
-        folder / "out",
-        command=f"shipbench run {HOSTILE}",
-    )
-    patch.undo()
-    return folder / "out"
-
-
-class Elements(HTMLParser):
-    """Start tags with their attributes, and the data of scripts."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict]] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-
-
-def page_of(study, tmp_path, **options):
-    return write_report(read_results([study]), tmp_path / "page.html", f"shipbench report {HOSTILE}", **options)
-
-
-def drawings(text):
-    return json.loads(re.search(r'<script type="application/json">(.*?)</script>', text, re.DOTALL)[1])
 
 
 def test_the_page_holds_all_parts_and_fetches_nothing(study, tmp_path):

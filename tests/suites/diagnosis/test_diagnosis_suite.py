@@ -21,7 +21,7 @@ from shipbench.suites.diagnosis.page import read_rows, render, tables, write_pag
 from shipbench.suites.diagnosis.suite import Job, run_case, run_suite, suite_command
 
 TINY = Trials(runs=4, samples=40)
-PAGE = Path(__file__).parents[2] / "leaderboards" / "diagnosis.md"
+PAGE = Path(__file__).parents[3] / "leaderboards" / "diagnosis.md"
 QUICK = {"plan": TINY, "oracle": False, "baselines": False, "workers": 1}
 CALLS: list[str] = []
 

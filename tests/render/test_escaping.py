@@ -7,8 +7,8 @@ import hashlib
 import re
 
 import pytest
-from test_diagnosis_report import make_diagnosis
-from test_leaderboard import results
+from made_diagnosis import make_diagnosis
+from made_results import results
 
 from shipbench.bench.predict import write_csv
 from shipbench.bench.progress import Bar

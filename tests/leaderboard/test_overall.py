@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
-from test_leaderboard import many, results
+from made_results import many, results
 
 from shipbench.bench.submissions import Results
 from shipbench.leaderboard.overall import NAME, data_sets_needed, over_data_sets

@@ -12,12 +12,9 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from toy_ship import toy_folder
 from typer.testing import CliRunner
 
 from shipbench.cli.app import app
-
-__all__ = ["toy_folder"]  # a fixture
 
 QUICK = ("--horizon", "20", "--folds", "2")
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from made_results import many, results
 
 from shipbench.bench.regimes import COLUMNS as REGIME_COLUMNS
 from shipbench.bench.results import PROTOCOL
@@ -20,49 +21,6 @@ from shipbench.metrics.trial_indices import NAMES as TRIAL_NAMES
 from shipbench.render.table import Table, TableColumn, number, significant
 
 REGIMES = REGIME_COLUMNS[:5]
-
-COLUMNS = [
-    {"name": "ed", "label": "ED", "unit": "m"},
-    {"name": "edh", "label": "EDH", "unit": "m"},
-    {"name": "cvdm", "label": "cVDM", "unit": "%"},
-    {"name": "heading_error", "label": "heading error", "unit": "rad"},
-    {"name": "rmse_F_b", "label": "RMSE F_b", "unit": "N"},
-    {"name": "ed_at_10s", "label": "ED at 10 s", "unit": "m"},
-]
-
-
-def results(models, dataset="toy", *, fingerprint="f1", protocol=PROTOCOL, task="t1", kinds=("",)):
-    """Rows from `models`: name -> list over folds of the runs' ED; None is a diverged run. The other columns are
-    multiples of ED."""
-    rows, summaries = [], []
-    for model, folds in models.items():
-        for fold, errors in enumerate(folds):
-            for i, error in enumerate(errors):
-                value = np.nan if error is None else float(error)
-                rows.append(
-                    {
-                        "protocol": protocol, "dataset": dataset, "fingerprint": fingerprint, "task": task,
-                        "model": model, "fold": fold,
-                        "seed": 0, "run": f"r{fold}{i}", "parent": f"r{fold}{i}", "kind": kinds[i % len(kinds)],
-                        "status": "diverged" if error is None else "ok",
-                        "reason": "u is nan at t = 3 s" if error is None else "",
-                        "ed": value, "edh": 2 * value, "cvdm": 3 * value, "heading_error": value / 100,
-                        "rmse_F_b": 1000 * value,
-                        "ed_at_10s": value / 2, "fit_s": 1.5, "fit_shared_by": 1, "predict_s": 0.002,
-                    }
-                )  # fmt: skip
-            summaries.append(
-                {
-                    "dataset": dataset, "fingerprint": fingerprint, "protocol": protocol, "task_key": task,
-                    "model": model, "fold": fold,
-                    "seed": 0, "columns": COLUMNS, "task": {"split": "folds", "horizon_s": 20, "history_s": 0},
-                    "ship": "toy", "ship_L": 50.0,
-                    "dt": 1.0, "source": "", "licence": "", "notes": ["depth unknown"], "command": "shipbench run -m x",
-                    "finished": "2026-01-02T03:04:05", "code": {"shipbench": "0", "source": "abc", "git": ""},
-                    "machine": {"cpus": 2, "python": "3", "torch": "2"},
-                }
-            )  # fmt: skip
-    return Results(pd.DataFrame(rows), summaries, [Path()] * len(summaries))
 
 
 def first_table(board):
@@ -140,12 +98,6 @@ def test_harbour90_stands_beside_the_papers_table():
 
 def by_title(board, words):
     return next(t for t in board.tables if words in t.title)
-
-
-def many(seed, runs=30, offset=0.0):
-    """ED of two folds of runs."""
-    rng = np.random.default_rng(seed)
-    return [(rng.lognormal(size=runs // 2) + offset).tolist() for _ in range(2)]
 
 
 def test_every_figure_of_table_iii_has_an_interval_around_it():

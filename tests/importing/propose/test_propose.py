@@ -186,7 +186,7 @@ def test_names_with_quotes_and_escapes_stay_valid_toml(propose, tmp_path):
 
 def test_the_mapping_in_the_docs_imports_a_log(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    page = (Path(__file__).parents[2] / "docs/import-a-log.md").read_text()
+    page = (Path(__file__).parents[3] / "docs/import-a-log.md").read_text()
     (plan,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     write(tmp_path, "mapping.toml", plan)
     write(tmp_path, "ship.toml", SHIP)

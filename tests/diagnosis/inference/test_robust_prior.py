@@ -105,7 +105,7 @@ def test_a_ship_of_the_literature_with_an_odd_rudder_is_neither_doubted_nor_expl
 
 def test_the_page_of_the_calibration_has_the_prior_of_the_code():
     """Centre and spread of every parameter, as they stand in the table of docs/calibration.md."""
-    page = (Path(__file__).parents[2] / "docs" / "calibration.md").read_text("utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "calibration.md").read_text("utf-8")
     cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in page.splitlines() if line.startswith("| `")]
     rows = {row[0].strip("`"): row[-4:-2] for row in cells if len(row) in (5, 6)}
     prior = {p.name: (c, p.typical) for p, c in zip(STRUCTURE.parameters, STRUCTURE.centres(), strict=True)}

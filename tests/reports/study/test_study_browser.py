@@ -6,9 +6,7 @@ import re
 
 import pytest
 from chromium import CONTRAST, browse
-from test_report_page import HOSTILE, page_of, study
-
-__all__ = ["study"]
+from hostile import HOSTILE, page_of
 
 BOARD = "#d0-board ~ .scroll"
 ORDER = f"[...document.querySelector('{BOARD} tbody').rows].map(r => r.cells[1].textContent)"

@@ -11,62 +11,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_diagnosis import CANDIDATES, CAUSE, GAIN, extended, make_diagnosis, make_trace
 from typer.testing import CliRunner
 
 from shipbench.cli.app import app
-from shipbench.diagnosis.result import Candidate, Cause, Diagnosis, Estimate, Gain, Wrong
+from shipbench.diagnosis.result import Candidate, Diagnosis, Estimate, Gain
 from shipbench.reports.diagnosis.files import write_diagnosis, write_report
 from shipbench.reports.diagnosis.linked import changed, chosen_segments, fits
 from shipbench.reports.diagnosis.page import diagnosis_page as page
 from shipbench.reports.diagnosis.text import WIDTH, gain_words, headline, summary_lines
-from tests.diagnosis.test_wrong import make_trace
-
-GAIN = Gain("ED", 21.3, 9.8, 0.54, (0.4, 0.66), "24/24")
-CAUSE = Cause(
-    "current", 1, 120.0, 0.001, {"speed": Estimate(0.31, "m/s", (0.28, 0.34)), "to": Estimate(2.5, "rad", (2.4, 2.6))},
-    ("wind",),
-    "reciprocal courses", GAIN, "", "24 of 24 runs", {"sway": 38123.0, "yaw": 1.2e6},
-)  # fmt: skip
-CANDIDATES = (
-    Candidate(
-        "current",
-        120.0,
-        0.001,
-        "named",
-        {"north": 0.2},
-        {"north": 0.05, "east": float("nan")},
-        {"speed": "m/s", "to": "rad"},
-        "environment",
-    ),
-    Candidate(
-        "heading_bias",
-        float("nan"),
-        float("nan"),
-        "score below the threshold",
-        {},
-        {"bias": 0.002},
-        {"bias": "rad"},
-        "sensor",
-    ),
-)
-
-
-def make_diagnosis(verdict: str = "found", name: str = "trial") -> Diagnosis:
-    found = verdict == "found"
-    unknown = (
-        {"axis": "yaw", "variable": "heading", "form": "cos(3 psi + phase)", "score": 44.0, "share": 0.5}
-        if verdict == "unknown"
-        else None
-    )
-    return Diagnosis(
-        dataset=name, verdict=verdict, causes=(CAUSE,) if found else (), candidates=CANDIDATES,
-        what_is_wrong=(Wrong("sway", 0.6, "heading", "worst at 90 to 135 deg"),),
-        unexplained_after={"force_sd": {"surge": 0.001}},
-        extended_model="physics+current" if found else "physics", fingerprint="abc", seconds=12.0,
-        warnings=("few runs",),
-        gain=GAIN if found else None, unknown=unknown,
-        gain_per_run=(("a", 20.0, 9.0), ("b", 22.0, 10.6)) if found else (), trace=make_trace(4),
-    )  # fmt: skip
 
 
 def in_words(d: Diagnosis) -> Diagnosis:
@@ -222,11 +175,6 @@ def test_infinite_scores_do_not_reach_the_json(tmp_path):
     d = in_words(make_diagnosis())
     write_diagnosis(replace(d, causes=(replace(CAUSE, score=np.inf),)), tmp_path)
     assert json.loads((tmp_path / "diagnosis.json").read_text())["causes"][0]["score"] is None
-
-
-def extended(d: Diagnosis) -> Diagnosis:
-    """With rollouts of an extended model that is right."""
-    return replace(d, trace=replace(d.trace, after=d.trace.measured + 0.01))
 
 
 def test_the_page_tells_why_each_candidate_was_rejected_and_what_would_have_been_seen(written):

@@ -6,13 +6,10 @@ import re
 
 import pytest
 from chromium import CONTRAST, browse
-from test_data_card import card_of
-from test_report_page import HOSTILE, study
+from hostile import HOSTILE, card_of
 
 from shipbench.bench.submissions import read_results
 from shipbench.leaderboard.pages import write_boards
-
-__all__ = ["study"]  # a fixture
 
 TRACK, HISTORIES = "document.querySelector('[data-track]')", "document.querySelector('[data-histories]')"
 FITS = "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 from chromium import CONTRAST, browse
-from test_diagnosis_report import CAUSE, extended, make_diagnosis
+from made_diagnosis import CAUSE, extended, make_diagnosis
 
 from shipbench.reports.diagnosis.page import diagnosis_page
 

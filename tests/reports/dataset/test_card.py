@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_report_page import HOSTILE, Elements, drawings
-from toy_ship import TOY_SHIP, sail, toy, toy_folder
+from hostile import HOSTILE, Elements, card_of, drawings
 from typer.testing import CliRunner
 
 from shipbench.cli.app import app
@@ -22,9 +21,7 @@ from shipbench.reports.dataset.card_page import write_card
 from shipbench.reports.dataset.coverage import coverage
 from shipbench.reports.dataset.coverage_svg import svg
 
-__all__ = ["toy", "toy_folder"]  # fixtures
-
-SHARED = Path(__file__).parents[3] / "shared" / "data" / "esso-osaka-frt"
+SHARED = Path(__file__).parents[4] / "shared" / "data" / "esso-osaka-frt"
 
 
 @pytest.fixture
@@ -58,16 +55,6 @@ def test_a_card_is_written_printed_and_given_as_json(cli, toy_folder, tmp_path):
     assert {row["channel"] for row in document["noise"]["rows"]} >= {"x", "psi", "u", "r", "n"}
     assert document["durations"]["rows"][0]["median"] == 40.0
     assert text == (tmp_path / "card/card.md").read_text(), "the same data give the same page"
-
-
-def card_of(folder):
-    """The page of runs whose names and kinds of manoeuvre are hostile."""
-    runs = []
-    for i in range(30):
-        S, C = sail(30, i)
-        runs.append(Run(f"r{i} {HOSTILE}", np.arange(31.0), S, C, meta={"manoeuvre": HOSTILE if i == 29 else "turn"}))
-    data = Dataset("toy", TOY_SHIP, 1.0, tuple(runs), source=HOSTILE)
-    return write_card(make_card(data), data, folder, f"shipbench data describe {HOSTILE}")[1]
 
 
 def test_the_page_fetches_nothing_and_text_from_the_data_stays_text(tmp_path):

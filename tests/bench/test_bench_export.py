@@ -10,14 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import loadmat
-from toy_ship import toy_folder
 from typer.testing import CliRunner
 
 from shipbench.bench.results import Cell, read_predictions, read_truth
 from shipbench.cli.app import app
 from shipbench.signals import STATES
-
-__all__ = ["toy_folder"]  # a fixture
 
 BROKEN = """
 import numpy as np
