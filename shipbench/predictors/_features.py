@@ -1,4 +1,4 @@
-"""What models learn from and how poses follow from velocities, on numpy arrays and on torch tensors alike."""
+"""Input features of the models, and poses from velocities; for numpy arrays and torch tensors alike."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CHANNELS = slice(U, None)
 
 
 def joined(parts: Sequence[Array], axis: int = -1) -> Array:
-    """Arrays, or tensors, one after another along `axis`."""
+    """Arrays, or tensors, concatenated along `axis`."""
     return (
         np.concatenate(parts, axis)
         if isinstance(parts[0], np.ndarray)
@@ -24,8 +24,8 @@ def joined(parts: Sequence[Array], axis: int = -1) -> Array:
 
 
 class InputFeatures:
-    """Inputs as a network sees them: wind as its components from ahead and from starboard, so that a turned frame
-    changes nothing.
+    """Input features of a network: wind as its components from ahead and from starboard, invariant to a rotation of the
+    axes.
 
     Args:
         names: columns of U.

@@ -1,4 +1,4 @@
-"""Bounds of the numbers that a model spec sets: beyond them a model takes all memory, or never ends."""
+"""Bounds of the numbers that a model spec sets: beyond them a model takes all memory, or does not finish."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ RATE, WEIGHT = (0.0, 100.0), (0.0, 1e6)
 
 
 def check_numbers(model: Any, bounds: dict[str, tuple[float, float]]) -> None:
-    """Raises ValueError where a field of `model` is no number within its bounds; whole numbers where both bounds are
+    """Raise ValueError where a field of `model` is no number within its bounds; whole numbers where both bounds are
     whole."""
     for key, (low, high) in bounds.items():
         value, whole = getattr(model, key), isinstance(low, int)

@@ -1,5 +1,4 @@
-"""What one-step models share, whatever learns the step: samples to learn from, and the rollout that feeds predictions
-back.
+"""Common parts of one-step models: training samples, and the rollout that feeds predictions back.
 
 y = [u, v, r, n, delta, F_b, F_s]; a step maps (y_k, input features at k) to y_k+1 or to y_k+1 - y_k; the pose follows
 by eq. (10) to (14). Arrays are of numpy or of torch, as the model's step takes them.
@@ -18,7 +17,7 @@ TARGETS = ("state", "increment")
 
 
 def check_target(target: str) -> None:
-    """Raises ValueError where `target` is none of `TARGETS`."""
+    """Raise ValueError where `target` is none of `TARGETS`."""
     if target not in TARGETS:
         raise ValueError(f"target = '{target}'; accepted: 'state' or 'increment'")
 
@@ -37,8 +36,8 @@ def transitions(S: Array, U: Array, features: InputFeatures) -> tuple[Array, Arr
 def one_step_rollout(
     step: Callable[[Array], Array], s0: Array, U: Array, features: InputFeatures, dt: float, *, increment: bool
 ) -> Array:
-    """Roll a one-step model out in float64, so that what is predicted for a run does not depend, to far below 1 mm, on
-    the runs beside it.
+    """Roll a one-step model out in float64. The prediction of a run then depends on the other runs of the batch by far
+    less than 1 mm.
 
     Args:
         step: (batch, 7 + features) to the next y (batch, 7), or to its change if `increment`; both in physical units.

@@ -1,4 +1,4 @@
-"""Saved models: what they were made for, their two files, and whether these are whole."""
+"""Saved models: their training data, their two files, and checks that these are complete."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from ..storage import in_one_step, write_text
 
 _log = logging.getLogger(__name__)
 _LARGEST_JSON = 16_000_000
-"""Bytes of a model.json; what a fit finds stands in arrays.npz."""
+"""Most bytes of a model.json; fitted arrays are stored in arrays.npz."""
 _SHIP_DIFFERS = 0.01
 """Relative difference of a main dimension that is more than rounding in a ship file."""
 
 
 @dataclass(frozen=True)
 class Origin:
-    """What a model was fitted on: sample time [s], inputs, actuators ("measured" or "commanded"), the ship's name, L,
-    B, T [m] and displacement [m^3] (empty where an older saved model does not tell)."""
+    """Training data of a model: sample time [s], inputs, actuators ("measured" or "commanded"), the ship's name, L, B,
+    T [m] and displacement [m^3] (empty where an older saved model does not state them)."""
 
     dt: float
     inputs: tuple[str, ...]
@@ -45,7 +45,7 @@ class Origin:
 
 
 def remembers_origin(fit: Callable[..., Any]) -> Callable[..., Any]:
-    """`fit`, after which the model's `origin` is that of its training data."""
+    """Decorate `fit` so that the model's `origin` is that of its training data."""
 
     @functools.wraps(fit)
     def fitted(self: Any, train: Dataset, *args: Any, **options: Any) -> Any:
@@ -57,7 +57,7 @@ def remembers_origin(fit: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def remembers_origins(fit_group: Callable[..., Any]) -> Callable[..., Any]:
-    """The same for the class method that fits many."""
+    """Decorate the class method that fits many models in the same way."""
 
     @functools.wraps(fit_group)
     def fitted(cls: Any, models: Any, trains: Any, *args: Any, **options: Any) -> Any:
@@ -70,8 +70,8 @@ def remembers_origins(fit_group: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def check_origin(name: str, origin: Origin | None, data: Dataset) -> list[str]:
-    """What a reader must know where the saved model `name` is used on `data`: another ship, or other actuators. Each is
-    told in one line of the log.
+    """Warnings for a saved model `name` that is used on `data`: another ship, or other actuators. Each is one line of
+    the log.
 
     Raises:
         InputError: the data have another sample time or other channels than the model was made for.
@@ -112,7 +112,8 @@ def check_origin(name: str, origin: Origin | None, data: Dataset) -> list[str]:
 
 
 def write_saved(folder: Path, meta: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
-    """`meta` as model.json and `arrays` as arrays.npz, each in one step, with a digest by which damage is found."""
+    """Write `meta` as model.json and `arrays` as arrays.npz, each atomically, with a digest by which damage is
+    found."""
     with in_one_step(folder / "arrays.npz", suffix=".npz") as part:
         np.savez(part, allow_pickle=False, **arrays)
         digest = _digest(meta, part.read_bytes())
@@ -120,10 +121,10 @@ def write_saved(folder: Path, meta: Mapping[str, Any], arrays: Mapping[str, np.n
 
 
 def read_meta(folder: Path) -> dict[str, Any]:
-    """The content of model.json.
+    """Read the content of model.json.
 
     Raises:
-        InputError: it is missing, damaged, or not what `write_saved` writes.
+        InputError: it is missing, damaged, or not a file of `write_saved`.
     """
     try:
         meta = read_json(folder / "model.json", most=_LARGEST_JSON)
@@ -138,7 +139,7 @@ def read_meta(folder: Path) -> dict[str, Any]:
 
 
 def read_arrays(folder: Path, meta: dict[str, Any]) -> dict[str, np.ndarray]:
-    """The arrays that belong to `meta`, whole.
+    """Read the arrays that belong to `meta`, complete.
 
     Raises:
         InputError: they are missing, damaged, or of another model.
@@ -162,7 +163,7 @@ def read_arrays(folder: Path, meta: dict[str, Any]) -> dict[str, np.ndarray]:
 
 
 def damaged(folder: Path, error: Exception) -> InputError:
-    """The message on a folder that holds no saved model, or a damaged one."""
+    """Error for a folder that holds no saved model, or a damaged one."""
     why = (str(error) or type(error).__name__).rstrip(".")
     return InputError(
         f"{folder} is not a saved model, or it is damaged: {why}. Give a folder that save() wrote, whole, or fit "
@@ -171,7 +172,7 @@ def damaged(folder: Path, error: Exception) -> InputError:
 
 
 def check_shapes(arrays: Mapping[str, np.ndarray], shapes: Mapping[str, tuple[int, ...]]) -> None:
-    """Raises ValueError where an array is missing or has another shape."""
+    """Raise ValueError where an array is missing or has another shape."""
     for name, shape in shapes.items():
         found = arrays[name].shape if name in arrays else "none"
         if found != shape:
@@ -179,7 +180,7 @@ def check_shapes(arrays: Mapping[str, np.ndarray], shapes: Mapping[str, tuple[in
 
 
 def sample_time(meta: Mapping[str, Any]) -> float:
-    """The dt [s] of a saved model. Raises ValueError where it is none."""
+    """Sample time dt [s] of a saved model. Raises ValueError where it is none."""
     dt = float(meta["dt"])
     if not 0.0 < dt < np.inf:
         raise ValueError(f"dt = {dt}; accepted: a positive number of seconds")
@@ -187,8 +188,8 @@ def sample_time(meta: Mapping[str, Any]) -> float:
 
 
 def origin_of(meta: dict[str, Any]) -> Origin | None:
-    """What a saved model was made for; of one from before this was kept, its dt and inputs. None where it does not
-    tell."""
+    """Training data of a saved model; of one saved by an older version, its dt and inputs only. None where it does not
+    state them."""
     if isinstance(made := meta.get("made_for"), dict):
         return Origin(
             sample_time(made),
@@ -207,5 +208,5 @@ def _digest(meta: Mapping[str, Any], arrays: bytes) -> str:
 
 
 def described(origin: Origin | None) -> dict[str, Any]:
-    """For model.json."""
+    """Training data as values of model.json."""
     return {} if origin is None else {"made_for": asdict(origin)}

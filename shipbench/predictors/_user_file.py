@@ -1,4 +1,4 @@
-"""A user's model file: imported with its folder on the import path, and which files of code it is made of."""
+"""A user's model file: import with its folder on the import path, and the list of files of code that belong to it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _brought: set[str] = set()
 
 
 def class_from_file(path: Path, class_name: str) -> Any:
-    """The class `class_name` of the Python file `path`.
+    """Class `class_name` of the Python file `path`.
 
     Raises:
         InputError: there is no such file or class, or it needs an extra of shipbench that is not installed.
@@ -74,8 +74,8 @@ def models_in(path: Path) -> list[str]:
 
 
 def spec_in_file(name: str) -> str:
-    """The spec that was meant by the name of a file without its class, or of a class without its file; "" where there
-    is no such file here."""
+    """Spec suggested for the name of a file without its class, or of a class without its file; "" where there is no
+    such file here."""
     if name.endswith(".py"):
         return " or ".join(f"{name}:{model}" for model in models_in(Path(name)))
     files = islice(Path().glob("*.py"), _MOST_FILES) if name.isidentifier() else ()
@@ -84,7 +84,7 @@ def spec_in_file(name: str) -> str:
 
 @contextmanager
 def on_import_path(file: Path) -> Iterator[None]:
-    """Modules beside the model file are found, as where Python runs the file itself."""
+    """Make modules beside the model file importable, as where Python runs the file itself."""
     folder = str(file.resolve().parent)
     sys.path.insert(0, folder)
     importlib.invalidate_caches()
@@ -96,7 +96,7 @@ def on_import_path(file: Path) -> Iterator[None]:
 
 
 _watched: list[set[str]] = []
-"""Where the paths of files that are opened for reading go, while `files_read` listens."""
+"""Sets that collect the paths of files that are opened for reading, while `files_read` is active."""
 
 
 def _watch(event: str, args: tuple[Any, ...]) -> None:
@@ -115,8 +115,8 @@ def files_read(*below: Path) -> Iterator[dict[str, Path]]:
     """Files that are opened in Python while the context lasts, by name relative to the first folder of `below` that
     holds them, filled at its end.
 
-    Code is left out (`code_of`), and so is what was written meanwhile. A library that opens files in machine code of
-    its own is not seen.
+    Code is left out (`code_of`), and so are files written meanwhile. Files that a library opens in its own machine code
+    are not detected.
     """
     if not _listens:
         sys.addaudithook(_watch)  # there is no way to take it away again
@@ -140,11 +140,10 @@ def files_read(*below: Path) -> Iterator[dict[str, Path]]:
 
 
 def code_of(path: Path) -> dict[str, bytes]:
-    """Content of the model file and of all code of the user's that it imports, by name relative to where it is imported
-    from.
+    """Content of the model file and of all user code that it imports, by name relative to its import folder.
 
-    To be asked after `class_from_file`, in a process that imported no other user's code. Of a package all its Python
-    files belong to it. Modules that functions import by name later are found in the source.
+    Call it after `class_from_file`, in a process that imported no other user's code. A package counts with all its
+    Python files. Modules that functions import by name later are found in the source.
     """
     files = {path.name: path}
     for name, module in list(sys.modules.items()):
@@ -162,7 +161,7 @@ def code_of(path: Path) -> dict[str, bytes]:
 
 
 def _whole(file: Path, name: list[str]) -> dict[str, Path]:
-    """The files of the top-level module or package behind the module `name` at `file`, by name relative to its root."""
+    """Files of the top-level module or package behind the module `name` at `file`, by name relative to its root."""
     depth = len(name) - (file.stem != "__init__")
     if depth == 0 or file.parts[-depth - 1 : -1] != tuple(
         name[:depth]
@@ -173,7 +172,7 @@ def _whole(file: Path, name: list[str]) -> dict[str, Path]:
 
 
 def _beside(name: str, roots: list[Path]) -> Path | None:
-    """The user's file that `import name` finds below `roots`, or None."""
+    """User's file that `import name` finds below `roots`, or None."""
     for root in roots:
         for file in (root / name / "__init__.py", root / f"{name}.py"):
             if file.is_file() and _outside(file):
@@ -193,7 +192,7 @@ def _imported_in(file: Path) -> set[str]:
 
 
 def _own_file(module: ModuleType) -> Path | None:
-    """The file of a module that is neither Python's, nor an installed package's, nor shipbench's own; else None."""
+    """File of a module that is neither Python's, nor an installed package's, nor shipbench's own; else None."""
     file = getattr(module, "__file__", None)
     return Path(file) if isinstance(file, str) and Path(file).is_file() and _outside(Path(file)) else None
 

@@ -1,7 +1,7 @@
-"""Base of all predictors: fit, predict, save, load; and the way from a model spec to a predictor.
+"""Base of all predictors: fit, predict, save, load; and the construction of a predictor from a model spec.
 
 A part is one file of this folder whose class is bound to `PREDICTOR`. Its dataclass fields are the parameters that a
-spec sets (`mlp[hidden=64,seed=3]`); arrays that `fit` finds are returned by `_arrays` and taken back by `_restore`.
+spec sets (`mlp[hidden=64,seed=3]`); `_arrays` returns the fitted arrays and `_restore` takes them back.
 """
 
 from __future__ import annotations
@@ -40,13 +40,18 @@ __all__ = ["PREDICTORS", "History", "Predictor", "PredictorBase", "Spec", "make_
 
 @runtime_checkable
 class Predictor(Protocol):
-    """The seam of the benchmark; foreign classes conform without inheriting.
+    """Interface of a model in the benchmark; foreign classes conform without inheriting.
 
-    `predict(s0, U, history)`: s0 (batch, 10), U (batch, K, inputs) -> S (batch, K, 10), S[:, k] at t_k+1. A class may
-    also offer the class method `fit_group(models, trains, valids, seeds)`, which fits many at once (folds and seeds) in
-    place; `skip(dataset)`, which says why it cannot take a data set, or None; `num_parameters`, how many numbers a fit
-    sets; `seeded = False` where nothing is drawn; `earth_fixed = True` where it knows a place on earth; `device`, which
-    `--device` sets ("cpu", "cuda", "cuda:1") before it fits or predicts.
+    `predict(s0, U, history)`: s0 (batch, 10), U (batch, K, inputs) -> S (batch, K, 10), S[:, k] at t_k+1.
+
+    A class may also offer:
+        fit_group: class method `fit_group(models, trains, valids, seeds)`, which fits many at once (folds and seeds) in
+            place.
+        skip: `skip(dataset)`, the reason why it cannot take a data set, or None.
+        num_parameters: count of fitted numbers.
+        seeded: False where nothing is drawn at random.
+        earth_fixed: True where the model knows a place on earth.
+        device: set by `--device` ("cpu", "cuda", "cuda:1") before it fits or predicts.
     """
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Any: ...
@@ -64,10 +69,10 @@ class PredictorBase(ABC):
     inputs: tuple[str, ...] = COMMANDS
     """Names of the columns of U, known after `fit`."""
     origin: Origin | None = None
-    """What it was fitted on, known after `fit`."""
+    """Training data, known after `fit`."""
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Every `fit` and `fit_group` remembers what it was given: a saved model can then refuse other data."""
+        """Wrap every `fit` and `fit_group` to record the training data: a saved model can then refuse other data."""
         super().__init_subclass__(**options)
         if "__repr__" not in cls.__dict__:
             # A dataclass would write one that does not say whether it is fitted.
@@ -89,7 +94,7 @@ class PredictorBase(ABC):
 
     @property
     def fitted(self) -> bool:
-        """True once it can predict."""
+        """Whether it can predict."""
         return True
 
     def _refuse_unfitted(self, what: str) -> None:
@@ -97,8 +102,8 @@ class PredictorBase(ABC):
             raise InputError(f"{self.name}: {what} was called before fit; fit or load the model first.")
 
     def skip(self, dataset: Dataset) -> str | None:
-        """Why this model cannot take `dataset`, or None; a study then has rows with the status `skipped` and this
-        reason."""
+        """Reason why this model cannot take `dataset`, or None; a study then has rows with the status `skipped` and
+        this reason."""
         return None
 
     @abstractmethod
@@ -107,17 +112,17 @@ class PredictorBase(ABC):
 
     @abstractmethod
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
-        """`predict` on checked arrays with a batch axis."""
+        """Prediction on checked arrays with a batch axis."""
 
     def _arrays(self) -> dict[str, np.ndarray]:
-        """What `fit` found."""
+        """Fitted arrays, by name."""
         return {}
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:  # noqa: B027
-        """Take back what `_arrays` and `_meta` returned; a model without memory has nothing to take."""
+        """Take back the values that `_arrays` and `_meta` returned; a model without state does nothing."""
 
     def _meta(self) -> dict[str, Any]:
-        """Anything else to save, as JSON."""
+        """Further values to save, as JSON."""
         return {}
 
     def predict(self, s0: np.ndarray, U: np.ndarray, history: History | None = None) -> np.ndarray:
@@ -209,12 +214,12 @@ class PredictorBase(ABC):
 
 
 class PredictorFamily(PredictorBase):
-    """A predictor that stands for many: `sklearn:Ridge[alpha=0.1]` is the member "Ridge" of the family "sklearn"."""
+    """Family of predictors: `sklearn:Ridge[alpha=0.1]` is the member "Ridge" of the family "sklearn"."""
 
     @classmethod
     @abstractmethod
     def member(cls, member: str, params: dict[str, Any]) -> Self:
-        """The unfitted model of a spec; `member` is what stands behind the colon ("" where there is none), `params` are
+        """Unfitted model of a spec; `member` is the text behind the colon ("" where there is none), `params` are
         unchecked.
 
         Raises:
@@ -231,8 +236,8 @@ def _no_effects(spec: Spec) -> InputError:
 
 
 def make_predictor(model: Any, device: str | None = None) -> Any:
-    """The unfitted predictor of a spec (or the fitted one, for a saved folder), to compute on `device` if it has one
-    and the spec names none.
+    """Unfitted predictor of a spec (or the fitted one, for a saved folder), to compute on `device` if it has one and
+    the spec names none.
 
     Args:
         model: "physics+current", "mlp[hidden=64]", "my_model.py:MyNet", the folder of a saved model, a `Spec`, a class,
@@ -250,7 +255,7 @@ def make_predictor(model: Any, device: str | None = None) -> Any:
 
 
 def _given(spec: Spec) -> Any:
-    """A new object of a class in memory, or a copy of an object."""
+    """New object of a class in memory, or a copy of an object."""
     try:
         return spec.given() if isinstance(spec.given, type) else copy.deepcopy(spec.given)
     except (TypeError, ValueError) as error:

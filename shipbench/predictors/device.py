@@ -1,4 +1,4 @@
-"""Where networks train and predict: the one place that reads the name of a device and says whether it is there."""
+"""Device on which networks train and predict: the one place that reads its name and checks that it exists."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _NAME = re.compile(r"cpu|cuda(:\d+)?")
 
 
 def check_device(name: str, *, here: bool = True) -> str:
-    """`name`, if it is a device: "cpu", "cuda" (the first GPU) or "cuda:1" (the second).
+    """Check that `name` is a device, and return it: "cpu", "cuda" (the first GPU) or "cuda:1" (the second).
 
     Args:
         name: of the device.

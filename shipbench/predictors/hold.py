@@ -28,7 +28,7 @@ class Hold(PredictorBase):
 
     @classmethod
     def at(cls, dt: float) -> Self:
-        """Of runs sampled at `dt` [s]."""
+        """Predictor for runs sampled at `dt` [s]."""
         model = cls()
         model.dt = dt
         return model
@@ -39,7 +39,7 @@ class Hold(PredictorBase):
         return not np.isnan(self.dt)
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
-        """Nothing is learned but the sample time and the list of inputs."""
+        """Store the sample time and the list of inputs; nothing else is learned."""
         self.dt, self.inputs = train.dt, train.inputs
         return self
 

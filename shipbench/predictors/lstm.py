@@ -120,7 +120,7 @@ class _Rollouts(StackedTask):
     windows [m]."""
 
     MINIBATCHES = 10
-    """Per epoch."""
+    """Number per epoch."""
 
     def __init__(self, net: _Network, training: StackedRuns, validation: StackedRuns, stages: Sequence[Stage],
         draw: Sequence[torch.Generator],
@@ -133,7 +133,7 @@ class _Rollouts(StackedTask):
 
     @property
     def num_chunks(self) -> int:
-        """How often it is validated."""
+        """Number of validations."""
         return sum(s.epochs for s in self.stages)
 
     def _windows(self, stage: Stage, history: int) -> tuple[Tensor, Tensor]:
@@ -179,20 +179,20 @@ class _Rollouts(StackedTask):
 
 
 def thinned(runs: StackedRuns, stride: int) -> StackedRuns:
-    """Every `stride`-th sample; inputs as they stand at the beginning of each longer step."""
+    """Runs with every `stride`-th sample; inputs as they stand at the beginning of each longer step."""
     steps = runs.steps // stride
     return StackedRuns(runs.S[:, : steps * stride + 1 : stride], runs.U[:, : steps * stride : stride], runs.counts)
 
 
 @dataclass
 class LSTM(PredictorBase):
-    """The recurrent network.
+    """Recurrent network.
 
     Args:
         hidden: width of the memory and of the head.
-        lr: Adam's first step size; a cosine takes it down to a hundredth.
+        lr: Adam's first step size; a cosine reduces it to a hundredth.
         epochs: number of validations, each after 10 minibatches.
-        pose_weight: weight of the pose error (in units of the error of kept velocities) against the error of
+        pose_weight: weight of the pose error (in units of the error of constant velocities) against the error of
             standardised y.
         device: where to train and to predict: "cpu", "cuda" or "cuda:1".
     """
@@ -222,7 +222,7 @@ class LSTM(PredictorBase):
         return self
 
     def _stages(self, steps: int) -> list[Stage]:
-        """Short windows first: they are cheap and their gradients tame."""
+        """Stages of training, short windows first: they take less time, and their gradients stay small."""
         plan = ((10, 24, 0.5), (30, 24, 0.25), (80, 24, 0.25))
         epochs = shares_of(self.epochs, [share for _, _, share in plan])
         stages = []
@@ -235,8 +235,8 @@ class LSTM(PredictorBase):
     def fit_group(
         cls, models: Sequence[LSTM], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]
     ) -> None:
-        """Train several (folds, seeds) of the same parameters as one stacked batch; each comes out as it would
-        alone."""
+        """Train several (folds, seeds) of the same parameters as one stacked batch, each with the result of a separate
+        fit."""
         lead, dt, names = models[0], trains[0].dt, trains[0].inputs
         pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
         training, validation = StackedRuns.of([t for t, _ in pairs]), StackedRuns.of([v for _, v in pairs])
@@ -261,7 +261,7 @@ class LSTM(PredictorBase):
             model._weights = {k: v[m : m + 1].copy() for k, v in state.items()}
 
     def _network(self) -> _Network:
-        """The fitted network of this one member in float64."""
+        """Fitted network of this one member in float64."""
         w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
         y, u, dy = (Scaler(w[f"scale_{k}.mean"], w[f"scale_{k}.std"]) for k in ("y", "u", "dy"))
         net = _Network(InputFeatures(self.inputs), self.hidden, (y, u, dy), generators([0]), self._commanded).double()

@@ -52,7 +52,7 @@ class _OneStep(StackedTask):
         return after - y if self.increment else after
 
     def _standardised(self, parts: list[Any]) -> tuple[Tensor, Tensor]:
-        """x and z of all members, one member after another."""
+        """Standardised x and z of all members, one member after another."""
         counts = [len(y) for y, _, _ in parts]
         x, z = (torch.empty(sum(counts), scale.mean.shape[-1]) for scale in (self.scale_x, self.scale_z))
         for m, ((y, inputs, after), x_m, z_m) in enumerate(zip(parts, x.split(counts), z.split(counts), strict=True)):
@@ -69,7 +69,7 @@ class _OneStep(StackedTask):
 
     @staticmethod
     def _gathered(x: Tensor, z: Tensor, rows: Tensor) -> Iterator[tuple[Tensor, Tensor]]:
-        """The minibatches of `rows` (steps, members, batch), gathered many at a time: a step then costs no indexing, an
+        """Minibatches of `rows` (steps, members, batch), gathered many at a time. A step then needs no indexing, an
         epoch no second copy."""
         for some in rows.split(_GATHERED):
             flat, shape = some.flatten(), (*some.shape, -1)
@@ -89,13 +89,12 @@ class _OneStep(StackedTask):
 
 @dataclass
 class MLP(PredictorBase):
-    """The paper's network.
+    """Multilayer perceptron of the source paper.
 
     Args:
         hidden, layers: width and number of the hidden layers.
         epochs, batch, lr, patience, min_delta: training, as in the paper.
-        target: "state" predicts y at k + 1 as the paper does; "increment" predicts y_k+1 - y_k, an honest stronger
-            variant.
+        target: "state" predicts y at k + 1 as the paper does; "increment" predicts y_k+1 - y_k, a stronger variant.
         device: where to train and to predict: "cpu", "cuda" or "cuda:1".
     """
 
@@ -144,8 +143,8 @@ class MLP(PredictorBase):
     def fit_group(
         cls, models: Sequence[MLP], trains: Sequence[Dataset], valids: Sequence[Dataset | None], seeds: Sequence[int]
     ) -> None:
-        """Train several (folds, seeds) of the same parameters as one stacked batch; each comes out as it would
-        alone."""
+        """Train several (folds, seeds) of the same parameters as one stacked batch, each with the result of a separate
+        fit."""
         lead = models[0]
         pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
         names = trains[0].inputs
@@ -209,7 +208,7 @@ class MLP(PredictorBase):
 
 
 def _samples(datasets: Sequence[Dataset], features: InputFeatures) -> list[tuple[Tensor, Tensor, Tensor]]:
-    """The `transitions` of every member."""
+    """Transitions of every member, by `transitions`."""
     return [transitions(S, U, features) for S, U in StackedRuns.of(datasets).members()]
 
 

@@ -46,7 +46,7 @@ from .physics_model.fit_report import FitReport
 
 
 class Stage(NamedTuple):
-    """Part of the training: window length [knots], windows per minibatch, number of epochs."""
+    """Part of the training: window length [model steps], windows per minibatch, number of epochs."""
 
     steps: int
     batch: int
@@ -58,7 +58,7 @@ class _Windows(StackedTask):
     length [m]."""
 
     MINIBATCHES = 20
-    """Per epoch."""
+    """Number per epoch."""
 
     def __init__(self, model: Residual, training: Drive, validation: Drive, grid: Grid, stages: Sequence[Stage],
         draw: Sequence[torch.Generator],
@@ -77,7 +77,7 @@ class _Windows(StackedTask):
 
     @property
     def num_chunks(self) -> int:
-        """How often it is validated."""
+        """Number of validations."""
         return 1 + sum(s.epochs for s in self.stages)
 
     def chunks(self) -> Iterator[Chunk]:
@@ -97,7 +97,7 @@ class _Windows(StackedTask):
         self, drive: Drive, runs: Tensor, starts: Tensor, steps: int
     ) -> tuple[Tensor, Tensor, Tensor, Tensor | None]:
         """Predicted u, v, r (members, batch, steps, 3) and pose, measured states and wind at the end, of windows at
-        `starts` [knots]."""
+        `starts` [model steps]."""
         device, fine = self.model.p.device, self.grid.per_knot
         S = drive.S[runs[..., None], starts[..., None] + torch.arange(steps + 1)].to(device)
         at = (runs[..., None], starts[..., None] * fine + torch.arange(steps * fine))
@@ -126,9 +126,9 @@ class NeuralODE(PredictorBase):
 
     Args:
         hidden: width of the two hidden layers.
-        lr: Adam's first step size (a cosine takes it to a fiftieth).
+        lr: Adam's first step size (a cosine reduces it to a fiftieth).
         epochs: number of validations, each after 20 minibatches.
-        penalty: weight of the squared residual, in units of the accelerations that occur.
+        penalty: weight of the squared residual, in units of the typical accelerations.
         weight_decay: of AdamW.
         device: where to train and to predict: "cpu", "cuda" or "cuda:1".
     """
@@ -149,10 +149,11 @@ class NeuralODE(PredictorBase):
         self.effects: tuple[EffectSpec, ...] = ()
         self._weights: dict[str, np.ndarray] = {}
         self.improved = False
-        """Whether validation preferred the trained residual; without it the predictions are the physics' own."""
+        """Whether validation preferred the trained residual; otherwise the predictions are those of the physics
+        alone."""
 
     def extend(self, effects: Sequence[EffectSpec]) -> Self:
-        """Add effects to the physics beneath (`neural_ode+race_gain`), as in `Physics.extend`.
+        """Add effects to the physics (`neural_ode+race_gain`), as in `Physics.extend`.
 
         Raises:
             InputError: an effect is unknown, acts on the sensors, or depends on place or time, which the training
@@ -172,11 +173,11 @@ class NeuralODE(PredictorBase):
 
     @property
     def report(self) -> FitReport | None:
-        """How the physics beneath follows its own runs."""
+        """Report of the physics' fit on its own runs."""
         return self.physics.report
 
     def skip(self, dataset: Dataset) -> str | None:
-        """Why this model cannot take `dataset`: the physics beneath cannot."""
+        """Reason why the physics, and so this model, cannot take `dataset`; or None."""
         return self.physics.skip(dataset)
 
     @property
@@ -185,12 +186,13 @@ class NeuralODE(PredictorBase):
         return bool(self._weights)
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
-        """Fit the physics on `train` and `valid`, train the residual on `train`; `valid` decides what is kept."""
+        """Fit the physics on `train` and `valid`, train the residual on `train`; `valid` selects the weights."""
         type(self).fit_group([self], [train], [valid], [seed])
         return self
 
     def _stages(self, knots: int) -> list[Stage]:
-        """Short windows first, in large batches: cheap, and their gradients are tame; long ones decide."""
+        """Stages of training: short windows first, in large batches, which take less time and keep gradients small;
+        then long ones."""
         plan = ((1, 1024, 0.4), (10, 384, 0.25), (30, 192, 0.3), (100, 64, 0.05))
         epochs = shares_of(self.epochs, [share for _, _, share in plan])
         return [Stage(min(steps, knots), batch, n) for (steps, batch, _), n in zip(plan, epochs, strict=True) if n]
@@ -203,7 +205,8 @@ class NeuralODE(PredictorBase):
         valids: Sequence[Dataset | None],
         seeds: Sequence[int],
     ) -> None:
-        """Fit the physics of each, then train all residuals as one stacked batch; each comes out as it would alone."""
+        """Fit the physics of each, then train all residuals as one stacked batch, each with the result of a separate
+        fit."""
         lead = models[0]
         pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
         for model, (training, validation), seed in zip(models, pairs, seeds, strict=True):
@@ -239,7 +242,7 @@ class NeuralODE(PredictorBase):
             model.improved = bool(np.any(model._weights["net.layers.2.weight"]))
 
     def _residual(self) -> Residual:
-        """The fitted accelerations of this one member in float64."""
+        """Fitted accelerations of this one member in float64."""
         w = {k: torch.as_tensor(v, dtype=torch.float64) for k, v in self._weights.items()}
         scale_in = Scaler(w["scale_in.mean"], w["scale_in.std"])
         model = Residual([self.physics], self.hidden, scale_in, w["scale_out"], generators([0])).double()

@@ -29,7 +29,7 @@ class Oracle(PredictorBase):
     seeded: ClassVar[bool] = False
 
     def skip(self, dataset: Dataset) -> str | None:
-        """Why this model cannot take `dataset`, or None."""
+        """Reason why this model cannot take `dataset`, or None."""
         return None if dataset.simulation else f"data set '{dataset.name}' was not made by this simulator"
 
     @property
@@ -38,7 +38,7 @@ class Oracle(PredictorBase):
         return hasattr(self, "_simulator")
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
-        """Nothing is learned but which ship made the data.
+        """Read from the data which simulated ship made them; nothing else is learned.
 
         Raises:
             InputError: the data were not simulated.

@@ -28,8 +28,7 @@ from .base import History, PredictorBase
 from .physics_model.actuator_fit import fit_actuators
 
 _BEYOND = 10.0
-"""A run whose velocity exceeds this many times the largest of the training data has diverged: polynomials leave the
-data fast."""
+"""Factor of the largest training velocity above which a run has diverged: polynomials grow fast outside the data."""
 
 
 @dataclass
@@ -65,8 +64,7 @@ class PySINDy(PredictorBase):
         return bool(self._found)
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
-        """Find the equations from all runs of `train` and `valid` (nothing here stops early); the seed has no part in
-        it."""
+        """Find the equations from all runs of `train` and `valid` (no early stopping); `seed` has no effect."""
         data = train.merged(valid)
         self.inputs, self._dt = data.inputs, data.dt
         methods = {"finite_difference": pysindy.FiniteDifference, "smoothed": pysindy.SmoothedFiniteDifference}
@@ -99,11 +97,12 @@ class PySINDy(PredictorBase):
         return self
 
     def _environment(self, held: np.ndarray, psi: np.ndarray) -> np.ndarray:
-        """What U holds beyond the four commands (..., extras), wind as components from ahead and from starboard."""
+        """Columns of U beyond the four commands (..., extras), wind as components from ahead and from starboard."""
         return InputFeatures(self.inputs)(held, psi)[..., len(COMMANDS) :]
 
     def _accelerations(self, nu: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """(batch, 3) [m/s2, m/s2, rad/s2] at velocities (batch, 3), actuators and environment (batch, 4 + extras)."""
+        """Accelerations (batch, 3) [m/s2, m/s2, rad/s2] at velocities (batch, 3), actuators and environment (batch, 4 +
+        extras)."""
         f = self._found
         variables = np.concatenate([nu / f["scale_x"], (others / f["scale_w"])[:, f["moving"]]], axis=1)
         terms = np.prod(variables[:, None, :] ** f["powers"], axis=2)
@@ -136,7 +135,7 @@ class PySINDy(PredictorBase):
         return rk4_step(motion_rhs(accelerations), state, self._dt)
 
     def describe(self) -> str:
-        """The equations, one per acceleration, in variables divided by their root mean square (given below them)."""
+        """Equations, one per acceleration, in variables divided by their root mean square (given below them)."""
         f = self._found
         extras = [f"environment {i + 1}" for i in range(len(f["moving"]) - 4)]
         controls = [name for name, used in zip([*STATES[ACTUATORS], *extras], f["moving"], strict=True) if used]
@@ -157,7 +156,7 @@ class PySINDy(PredictorBase):
         )
 
     def num_parameters(self) -> int:
-        """Coefficients that are not zero, and the lags and rates of the actuators."""
+        """Number of coefficients that are not zero, and of lags and rates of the actuators."""
         return int(np.count_nonzero(self._found["coefficients"]) + np.size(self._found["actuators"]))
 
     def _arrays(self) -> dict[str, np.ndarray]:
@@ -184,7 +183,7 @@ class PySINDy(PredictorBase):
 
 
 def _root_mean_square(a: np.ndarray) -> np.ndarray:
-    """Of the columns; 1 for a column that is zero throughout."""
+    """Root mean square of the columns; 1 for a column that is zero throughout."""
     size = np.sqrt(np.mean(a**2, axis=0))
     return np.where(size > 0.0, size, 1.0)
 

@@ -1,4 +1,4 @@
-"""The predictors by name, without numpy: `shipbench models` loads nothing that computes."""
+"""Predictors by name, without numpy: `shipbench models` loads nothing that computes."""
 
 from __future__ import annotations
 

@@ -27,12 +27,11 @@ from .base import History, PredictorFamily
 
 _OWN = ("target",)
 _TOO_LARGE = 1e30
-"""A standardised value beyond this is a rollout that has diverged; regressors refuse what float32 cannot hold
-(3.4e38)."""
+"""Largest standardised value of a rollout that has not diverged; regressors refuse values beyond float32 (3.4e38)."""
 
 
 def _regressors() -> dict[str, Any]:
-    """Every regressor that scikit-learn itself knows, by class name."""
+    """Regressors of scikit-learn itself, by class name."""
     return dict(all_estimators(type_filter="regressor"))
 
 
@@ -66,7 +65,8 @@ class SklearnOneStep(PredictorFamily):
 
     @classmethod
     def member(cls, member: str, params: dict[str, Any]) -> Self:
-        """`sklearn:Ridge[alpha=0.1,target=state]`: `target` is ours, all other parameters are the regressor's."""
+        """Member of a spec, as `sklearn:Ridge[alpha=0.1,target=state]`: `target` is of this class, all other parameters
+        are the regressor's."""
         if not member:
             raise InputError(
                 "model spec 'sklearn' names no regressor; write sklearn:HistGradientBoostingRegressor, or another "
@@ -79,7 +79,7 @@ class SklearnOneStep(PredictorFamily):
             raise InputError(f"model spec 'sklearn:{member}': {error}.") from None
 
     def _new(self, seed: int) -> Any:
-        """The unfitted regressor.
+        """Unfitted regressor.
 
         Raises:
             InputError: scikit-learn has no regressor of that name, or it has no such parameter, or cannot be made
@@ -110,7 +110,7 @@ class SklearnOneStep(PredictorFamily):
         return self._fitted is not None
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
-        """Fit on the transitions of `train` and, since nothing here stops early by it, of `valid`.
+        """Fit on the transitions of `train` and, without early stopping, of `valid`.
 
         Raises:
             InputError: scikit-learn refuses a parameter's value.
@@ -152,15 +152,14 @@ class SklearnOneStep(PredictorFamily):
         )
 
     def num_parameters(self) -> int | None:
-        """Coefficients and intercepts of a linear regressor; None for any other, which keeps its numbers in ways of its
-        own."""
+        """Number of coefficients and intercepts of a linear regressor; None for any other."""
         found = getattr(self._fitted, "estimators_", [self._fitted])  # one for each channel, or one for all
         if not all(hasattr(linear, "coef_") for linear in found):
             return None
         return sum(np.size(linear.coef_) + np.size(linear.intercept_) for linear in found)
 
     def _probe(self) -> np.ndarray:
-        """What the fitted regressor says of a few training samples."""
+        """Predictions of the fitted regressor for a few training samples."""
         return self._step(self._x[:: max(1, len(self._x) // 20)])
 
     def _arrays(self) -> dict[str, np.ndarray]:

@@ -66,7 +66,7 @@ class Residual(nn.Module):
     def forward(
         self, psi: Tensor | None, u: Tensor, v: Tensor, r: Tensor, actuators: Sequence[Tensor], air: Air | None
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """(du, dv, dr), each (members, batch); `air` is true wind speed and direction."""
+        """Accelerations (du, dv, dr), each (members, batch); `air` is true wind speed and direction."""
         apparent = None if air is None or psi is None else apparent_wind(psi, u, v, *air)
         n, delta, F_b, F_s = actuators
         if self.effects and psi is not None:
@@ -82,13 +82,13 @@ class Residual(nn.Module):
 
 
 def _forces(physics: Physics) -> list[Active]:
-    """The effects of a fitted model that act as forces."""
+    """Effects of a fitted model that act as forces."""
     return [] if physics.extension is None else list(physics.extension.active("force"))
 
 
 def features(S: Tensor, air: Tensor | None) -> Tensor:
-    """What the network sees of states (..., 10): u, v, r, n, delta, F_b, F_s, and the speed through the air where true
-    wind (..., 2) is given."""
+    """Network inputs for states (..., 10): u, v, r, n, delta, F_b, F_s, and the speed through the air where true wind
+    (..., 2) is given."""
     seen = S[..., CHANNELS]
     if air is None:
         return seen
@@ -98,8 +98,8 @@ def features(S: Tensor, air: Tensor | None) -> Tensor:
 
 
 class Grid(NamedTuple):
-    """How the training integrates: a knot every `stride` samples, `per_knot` midpoint steps of `step` seconds between
-    knots."""
+    """Integration grid of the training: a model step every `stride` samples, `per_knot` midpoint steps of `step`
+    seconds in each."""
 
     stride: int
     per_knot: int
@@ -107,8 +107,8 @@ class Grid(NamedTuple):
 
     @classmethod
     def of(cls, physics: Physics) -> Grid:
-        """Steps of about a second for 100 m (the time scale of a ship goes with sqrt(L)), never across a change of the
-        inputs that it misses."""
+        """Grid with steps of about a second for 100 m (the time scale of a ship goes with sqrt(L)). No step misses a
+        change of the inputs."""
         if physics.substeps > 1:
             return cls(1, physics.substeps, physics.dt / physics.substeps)
         stride = max(1, int(0.1 * np.sqrt(physics.c.L) / physics.dt))
@@ -116,7 +116,7 @@ class Grid(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What is known ahead of the rollouts of all members' runs.
+    """Known inputs of the rollouts of all members' runs.
 
     Args:
         S: (runs, knots + 1, 10) measured states.
@@ -132,7 +132,8 @@ class Drive(NamedTuple):
 
     @classmethod
     def of(cls, physics: Sequence[Physics], datasets: Sequence[Dataset], grid: Grid) -> Drive:
-        """Actuators do not depend on the hull's motion, so that their path is known before the rollout."""
+        """Inputs of the rollouts. Actuators do not depend on the hull's motion: their path is computed before the
+        rollout."""
         parts, counts, d = [], [], grid.stride
         for model, data in zip(physics, datasets, strict=True):
             batch = data.batch()
@@ -156,7 +157,7 @@ class Drive(NamedTuple):
 
 
 def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step: float) -> Tensor:
-    """u, v, r at the ends of the steps by torchdiffeq's midpoint rule (members, batch, steps, 3).
+    """Velocities u, v, r at the ends of the steps by torchdiffeq's midpoint rule (members, batch, steps, 3).
 
     Args:
         start: (members, batch, 10).

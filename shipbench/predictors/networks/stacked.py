@@ -1,7 +1,7 @@
 """Building blocks of stacked networks: data, scalers and layers with a leading member axis (folds and seeds of one
 network).
 
-Every layer is one batched matrix product, since small networks on a CPU are all overhead.
+Every layer is one batched matrix product: the run time of small networks on a CPU is mostly overhead.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from ...signals import PSI, R, U, X, Y
 
 
 def generators(seeds: Sequence[int]) -> list[torch.Generator]:
-    """One generator per member: what is drawn for a member does not depend on the others."""
+    """Random generators, one per member: draws of a member do not depend on the others."""
     return [torch.Generator().manual_seed(int(seed)) for seed in seeds]
 
 
 def with_valid(train: Dataset, valid: Dataset | None, seed: int) -> tuple[Dataset, Dataset]:
-    """`train` and `valid`; without `valid`, a tenth of the training runs (at least one) is set aside, drawn from
-    `seed`.
+    """Training and validation data; without `valid`, a tenth of the training runs (at least one) is set aside, drawn
+    from `seed`.
 
     A single training run serves as both, since nothing can be set aside.
     """
@@ -64,7 +64,7 @@ class StackedRuns:
         return cls(torch.cat(states), torch.cat(held), tuple(len(s) for s in states))
 
     def members(self) -> list[tuple[Tensor, Tensor]]:
-        """S and U of every member."""
+        """States S and inputs U of every member."""
         return list(zip(self.S.split(self.counts), self.U.split(self.counts), strict=True))
 
     @property
@@ -86,7 +86,7 @@ def padded(counts: Sequence[int]) -> tuple[Tensor, Tensor]:
 
 
 class Scaler(nn.Module):
-    """Per-member mean and standard deviation (members, 1, features); a constant feature keeps scale 1."""
+    """Mean and standard deviation per member (members, 1, features); a constant feature keeps scale 1."""
 
     mean: Tensor
     std: Tensor
@@ -98,7 +98,8 @@ class Scaler(nn.Module):
 
     @classmethod
     def fit(cls, samples: Iterable[Tensor], centred: bool = True) -> Scaler:
-        """From each member's training samples (..., features); `centred=False` keeps zero at zero (for increments)."""
+        """Scaler from each member's training samples (..., features); `centred=False` keeps zero at zero (for
+        increments)."""
         found = []
         for part in samples:
             flat = part.reshape(-1, part.shape[-1]).double()
@@ -115,13 +116,13 @@ class Scaler(nn.Module):
         return (x - self.mean) / self.std
 
     def inverse(self, z: Tensor) -> Tensor:
-        """`z` in the units of the samples."""
+        """Values `z` in the units of the samples."""
         return z * self.std + self.mean
 
 
 class StackedLinear(nn.Module):
-    """`torch.nn.Linear` for every member: weight (members, inputs, outputs), bias (members, 1, outputs), same initial
-    values per seed."""
+    """Linear layer (`torch.nn.Linear`) for every member: weight (members, inputs, outputs), bias (members, 1, outputs),
+    same initial values per seed."""
 
     def __init__(self, inputs: int, outputs: int, draw: Sequence[torch.Generator], zero: bool = False) -> None:
         super().__init__()
@@ -135,7 +136,7 @@ class StackedLinear(nn.Module):
         self.bias = nn.Parameter(scale * torch.stack(biases))
 
     def forward(self, x: Tensor) -> Tensor:
-        """(members, batch, inputs) -> (members, batch, outputs)."""
+        """Outputs (members, batch, outputs) of inputs (members, batch, inputs)."""
         return torch.baddbmm(self.bias, x, self.weight)
 
 
@@ -158,7 +159,7 @@ class StackedMLP(nn.Module):
         self.activation = activation
 
     def forward(self, x: Tensor) -> Tensor:
-        """(members, batch, sizes[0]) -> (members, batch, sizes[-1])."""
+        """Outputs (members, batch, sizes[-1]) of inputs (members, batch, sizes[0])."""
         for layer in self.layers[:-1]:
             x = self.activation(layer(x))
         return self.layers[-1](x)
@@ -177,10 +178,11 @@ def trapezoid_pose(s0: Tensor, y: Tensor, dt: float) -> Tensor:
 
 
 def hold_error(S: Tensor, counts: Sequence[int], dt: float, steps: int) -> Tensor:
-    """Root mean square error (members, 5) of u, v, r, position [m] and heading [rad] over `steps` steps when the
-    initial velocities are kept.
+    """Root mean square error (members, 5) of u, v, r, position [m] and heading [rad] over `steps` steps of constant
+    velocities.
 
-    S: (runs, samples, 10) of all members; dt: time between samples [s]. It is the size of what there is to predict.
+    S: (runs, samples, 10) of all members; dt: time between samples [s]. The error is the size of the changes to
+    predict.
     """
     start, truth = S[:, 0], S[:, 1 : steps + 1]
     kept = start[:, None, U : R + 1].expand(-1, steps, -1)
@@ -195,8 +197,8 @@ def hold_error(S: Tensor, counts: Sequence[int], dt: float, steps: int) -> Tenso
 def random_windows(
     counts: Sequence[int], starts: int, batch: int, draw: Sequence[torch.Generator]
 ) -> tuple[Tensor, Tensor]:
-    """A random run of the member's own and one of `starts` first samples for each window: both (members, batch), runs
-    counted over all members."""
+    """Random run of the member and one of `starts` first samples for each window: both (members, batch), runs counted
+    over all members."""
     first = np.concatenate([[0], np.cumsum(counts)[:-1]]).tolist()
     runs = [f + torch.randint(c, (batch,), generator=g) for f, c, g in zip(first, counts, draw, strict=True)]
     return torch.stack(runs), torch.stack([torch.randint(starts, (batch,), generator=g) for g in draw])
@@ -209,6 +211,6 @@ def position_score(pose: Tensor, truth: Tensor, weight: Tensor) -> Tensor:
 
 
 def shares_of(total: int, shares: Sequence[float]) -> list[int]:
-    """`total` cut into whole numbers in the proportion of `shares` (which sum to 1)."""
+    """Whole numbers that sum to `total`, in the proportion of `shares` (which sum to 1)."""
     edges = [round(total * share) for share in np.cumsum(shares)]
     return [int(b - a) for a, b in pairwise([0, *edges])]

@@ -1,11 +1,11 @@
 """Stacked training with Lightning: the folds and seeds of one network train together.
 
 The loss is the sum over members of each member's own loss and Adam works element by element, so that a member's result
-is the one it would reach alone; what is drawn for a member comes from its own generator. Early stopping is per member:
-the best weights of each are kept, and training goes on until the last member stops.
+is that of a separate training. Each member draws from its own generator. Early stopping is per member: the best weights
+of each are kept, and training continues until the last member stops.
 
-One Lightning batch is a chunk: all minibatches up to the next validation, stepped through with manual optimisation.
-What Lightning does around a batch is then paid once per validation, not once per minibatch of a small network.
+One Lightning batch is a chunk: all minibatches up to the next validation, stepped through with manual optimisation. The
+overhead of a Lightning batch then occurs once per validation, not once per minibatch of a small network.
 """
 
 from __future__ import annotations
@@ -29,25 +29,25 @@ from ...steps import within
 
 @dataclass(frozen=True)
 class Chunk:
-    """Minibatches up to the next validation, gone through once; `ended` (members,) says whose epoch ends there."""
+    """Minibatches up to the next validation, used once; `ended` (members,) marks the members whose epoch ends there."""
 
     minibatches: Iterable[Any]
     ended: Tensor
 
 
 class StackedTask(nn.Module, ABC):
-    """What is trained: parameters with a leading member axis, the losses of a minibatch and the validation scores."""
+    """Training task: parameters with a leading member axis, the losses of a minibatch and the validation scores."""
 
     members: int
 
     @property
     def device(self) -> torch.device:
-        """Where the parameters are."""
+        """Device of the parameters."""
         return next(self.parameters()).device
 
     @abstractmethod
     def chunks(self) -> Iterator[Chunk]:
-        """The training, cut at the validations."""
+        """Training, cut at the validations."""
 
     @abstractmethod
     def losses(self, minibatch: Any) -> Tensor:
@@ -60,7 +60,7 @@ class StackedTask(nn.Module, ABC):
 
 @dataclass(frozen=True)
 class Recipe:
-    """How to train.
+    """Settings of the training.
 
     Args:
         lr: Adam's step size, or a cosine from it to `lr * lr_end` over `chunks` chunks if that is set.
@@ -85,7 +85,7 @@ class Recipe:
 
 
 class BestWeights:
-    """Per-member early stopping: the weights of the lowest score seen until the member stops."""
+    """Per-member early stopping: the weights of the lowest score until the member stops."""
 
     def __init__(self, task: StackedTask, patience: int | None, min_delta: float) -> None:
         self.patience, self.min_delta = patience, min_delta
@@ -97,13 +97,13 @@ class BestWeights:
 
     @property
     def stopped(self) -> Tensor:
-        """(members,) who has stopped."""
+        """Whether each member has stopped (members,)."""
         return (
             torch.zeros_like(self.waited, dtype=torch.bool) if self.patience is None else self.waited >= self.patience
         )
 
     def update(self, task: StackedTask, scores: Tensor, ended: Tensor) -> None:
-        """Take in the `scores` of the members whose epoch `ended` (both (members,))."""
+        """Update the best weights with the `scores` of the members whose epoch `ended` (both (members,))."""
         scores = scores.detach().double().cpu()
         counts = ended & ~self.stopped
         better = counts & (scores < self.score)
@@ -193,7 +193,7 @@ def clip_members(parameters: Iterator[nn.Parameter], limit: float) -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Lightning's banners and hints off, only while it runs."""
+    """Silence Lightning's banners and hints, only while it runs."""
     loggers = [
         logging.getLogger(name)
         for name in ("lightning.pytorch", "lightning.fabric", "lightning.pytorch.utilities.rank_zero")
@@ -224,8 +224,8 @@ def _threads(number: int | None) -> Iterator[None]:
 
 
 def train(task: StackedTask, recipe: Recipe) -> BestWeights:
-    """Train `task` in place and leave each member with its best weights, on the CPU. Writes no files, draws no global
-    random number.
+    """Train `task` in place and leave each member with its best weights, on the CPU. It writes no files and draws no
+    global random number.
 
     Raises:
         WorkError: a member never had a finite validation score.
@@ -254,7 +254,7 @@ def train(task: StackedTask, recipe: Recipe) -> BestWeights:
 
 
 class _Chunks:
-    """The chunks as something that Lightning can iterate over."""
+    """Chunks as an iterable for Lightning."""
 
     def __init__(self, task: StackedTask) -> None:
         self.task = task
@@ -268,11 +268,11 @@ def epochs_of_samples(
 ) -> Iterator[tuple[Tensor, Tensor]]:
     """Shuffled minibatches of every member's samples, cut wherever a member ends an epoch.
 
-    Each member goes through its own samples in its own order and its own time, so that others with more or fewer
-    samples do not matter. The last minibatch of an epoch is filled up from the beginning of the epoch's order.
+    Each member's order and timing depend on its own samples only, not on those of other members. The last minibatch of
+    an epoch is filled up from the beginning of the epoch's order.
 
     Yields:
-        Indices (steps, members, batch) into each member's samples, and who ends an epoch (members,).
+        Indices (steps, members, batch) into each member's samples, and a mask of members whose epoch ends (members,).
     """
     steps = [math.ceil(c / batch) for c in counts]
     left: list[Tensor] = [torch.empty(0, batch, dtype=torch.long)] * len(counts)
