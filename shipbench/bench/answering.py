@@ -1,4 +1,4 @@
-"""The worker's side of `isolate`: it takes one question from a pipe and sends its answer back."""
+"""Worker's side of `isolate`: it reads one question from a pipe and writes its answer back."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import sys
 
 
 def _tell_unraisable(what: sys.UnraisableHookArgs) -> None:
-    """One line instead of a traceback on what a model raises in `__del__`, where no row can say it."""
+    """Print one line instead of a traceback for an exception in `__del__` of a model, which no row can report."""
     print(f"note: the model raised {what.exc_type.__name__} while it was removed", file=sys.stderr)
 
 
 def answer() -> None:
-    """The worker: a question from stdin, its answer to stdout; what the model prints goes to stderr."""
+    """Read a question from stdin and write its answer to stdout; the model's own prints go to stderr."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     sys.unraisablehook = _tell_unraisable

@@ -1,4 +1,4 @@
-"""What a model costs beside its seconds: how many numbers a fit sets."""
+"""Cost of a model beside its run time: number of fitted parameters."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ _NO_PARAMETERS = ("ci95", "scale_")
 
 
 def count_parameters(model: Any) -> int | None:
-    """Numbers that `fit` set in `model`; None where that cannot be told.
+    """Count of the numbers that `fit` set in `model`; None where it is unknown.
 
-    A model may say it itself: `num_parameters`, a number or a method (None: it cannot tell). Of others of ours the
-    saved arrays are counted, without intervals, scales of inputs and outputs, and a hybrid's copy of its physics. Torch
-    modules held as attributes are counted for any other model.
+    A model may state it: `num_parameters`, a number or a method (None: unknown). For other models of shipbench the
+    saved arrays are counted, without intervals, scales of inputs and outputs, and a hybrid's copy of its physics. For
+    any other model torch modules held as attributes are counted.
     """
     try:
         return _count(model)
@@ -36,7 +36,7 @@ def _count(model: Any) -> int | None:
 
 
 def parameters_by_model(summaries: list[dict[str, Any]]) -> dict[str, float]:
-    """Mean number of parameters over the cells of each model, of those that tell it."""
+    """Mean number of parameters over the cells of each model, of those that state it."""
     counts: dict[str, list[int]] = {}
     for summary in summaries:
         if summary.get("parameters") is not None:

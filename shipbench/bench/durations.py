@@ -1,4 +1,4 @@
-"""Durations in words, and the time that is left of a study."""
+"""Durations in words, and the remaining time of a study."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 
 def duration(seconds: float) -> str:
-    """Seconds as people say them: 42 s, 3 min 05 s, 1 h 12 min."""
+    """Text of a duration: 42 s, 3 min 05 s, 1 h 12 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"
@@ -17,11 +17,10 @@ def duration(seconds: float) -> str:
 
 
 class Remaining:
-    """Time that is left of pieces of work of several kinds.
+    """Remaining time of pieces of work of several kinds.
 
-    A piece costs what the finished ones of its kind cost on average; of a kind without one, what all finished pieces
-    cost on average. Several at a time, and the work between them, count by the ratio of the elapsed time to the
-    finished cost.
+    A piece costs the mean cost of the finished ones of its kind; without one, that of all finished pieces. Parallel
+    pieces, and the work between them, count by the ratio of the elapsed time to the finished cost.
 
     Args:
         todo: number of pieces of each kind.
@@ -32,13 +31,13 @@ class Remaining:
         self.costs: dict[str, list[float]] = defaultdict(list)
 
     def done(self, kind: str, cost: float) -> None:
-        """Count a finished piece; `cost` [s] is 0 for one that was there already."""
+        """Count a finished piece; `cost` [s] is 0 for one that was finished before."""
         self.todo[kind] -= 1
         if cost > 0.0:
             self.costs[kind].append(cost)
 
     def seconds(self, elapsed: float) -> float | None:
-        """Seconds that are left after `elapsed` seconds; None before anything that costs is finished."""
+        """Remaining time [s] after `elapsed` seconds; None before any piece with a cost is finished."""
         known = [cost for costs in self.costs.values() for cost in costs]
         if not known:
             return None

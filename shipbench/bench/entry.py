@@ -1,5 +1,4 @@
-"""One entry of summary.json and the columns of rows.parquet and windows.parquet as pages read them: types and values,
-checked in one place."""
+"""Schema of one entry of summary.json and of the columns of rows.parquet and windows.parquet: types and values."""
 
 from __future__ import annotations
 
@@ -21,10 +20,10 @@ from .scoring import DIVERGED_DISTANCE, HORIZONS_S, columns
 from .task import make_task
 
 Refuse = Callable[[str], InputError]
-"""Makes the error from what is wrong; it adds the folder."""
+"""Function that makes the error from its message; it adds the folder."""
 Status = Literal["ok", "diverged", "failed", "skipped"]
 LARGEST = 1e100
-"""Of any number: the squares of larger ones, and their sums, are not finite any more."""
+"""Largest size of any number: squares of larger ones, and their sums, are not finite."""
 Seconds = Annotated[float, Field(ge=0, le=LARGEST)]
 Size = Annotated[float, Field(gt=0, le=LARGEST)]
 
@@ -36,7 +35,7 @@ _SIGNED = frozenset(c.name for c in TRIAL_COLUMNS)
 """Metrics that may be negative. They and cVDM are undefined in some windows."""
 _UNDEFINED = _SIGNED | {"cvdm"}
 _MOST_STEPS = 10**8
-"""Time steps of a window; far beyond it dt is no sample time."""
+"""Most time steps of a window; with more, dt is no sample time."""
 
 
 class _Part(BaseModel):
@@ -68,7 +67,7 @@ class _Runs(_Part):
 
 
 class Entry(_Part):
-    """One cell of summary.json: the keys that pages and checks read. Other keys are kept and shown nowhere."""
+    """Cell of summary.json: the keys that pages and checks read. Other keys are kept but not shown."""
 
     protocol: int
     dataset: str
@@ -102,10 +101,10 @@ class Entry(_Part):
 
 
 def check_entry(summary: Any, refuse: Refuse) -> None:
-    """Refuse an entry with a missing key, a value of another type, or one that no study has.
+    """Check an entry: no key is missing, every value has its type and lies in its range.
 
     Raises:
-        InputError: see above.
+        InputError: it does not.
     """
     try:
         entry = Entry.model_validate(summary)
@@ -132,15 +131,15 @@ def check_entry(summary: Any, refuse: Refuse) -> None:
 
 
 def _accepted(message: str) -> str:
-    """pydantic's "Input should be a valid string" as what is accepted: "a valid string"."""
+    """Accepted value in pydantic's "Input should be a valid string": "a valid string"."""
     return message.removeprefix("Input should be ")
 
 
 def check_task_of(summary: dict[str, Any], refuse: Refuse) -> None:
-    """Refuse a task with a missing key, and columns that are not those of its metrics.
+    """Check the task of an entry: no key is missing, and the columns are those of its metrics.
 
     Raises:
-        InputError: see above.
+        InputError: it does not pass.
     """
     if missing := [key for key in _TASK_KEYS if key not in summary["task"]]:
         raise refuse(f"summary.json: task lacks {', '.join(missing)}")
@@ -158,10 +157,10 @@ def check_task_of(summary: dict[str, Any], refuse: Refuse) -> None:
 def check_columns(
     rows: Frame, refuse: Refuse, texts: Iterable[str], whole: Iterable[str], numbers: Iterable[str]
 ) -> None:
-    """Refuse a table that lacks one of these columns, has one twice, or has one of another type.
+    """Check that a table has each of these columns once, with its type.
 
     Raises:
-        InputError: see above.
+        InputError: it has not.
     """
     from pandas.api import types
 
@@ -183,10 +182,10 @@ def check_columns(
 
 
 def check_labels(rows: Frame, refuse: Refuse) -> None:
-    """Refuse names that cannot stand in a table (see `names`).
+    """Check that names may stand in a table (see `names`).
 
     Raises:
-        InputError: see above.
+        InputError: one may not.
     """
     try:
         for name in ("run", "parent", "kind", *(["group"] if "group" in rows else [])):
@@ -197,15 +196,14 @@ def check_labels(rows: Frame, refuse: Refuse) -> None:
 
 
 def check_scores(rows: Frame, metrics: Iterable[str], scores: Iterable[str], refuse: Refuse) -> None:
-    """Refuse scores that no prediction gives: not finite, negative, missing in a scored row, or there in a row that was
-    not scored.
+    """Check scores: finite, not negative, present in every scored row and in no other.
 
     Args:
         rows: of one folder.
         metrics: the names of the metrics behind the columns `scores`.
 
     Raises:
-        InputError: see above.
+        InputError: a score does not pass.
     """
     unknown = sorted(set(rows["status"]) - set(STATUSES))
     if unknown:
@@ -240,10 +238,10 @@ def check_scores(rows: Frame, metrics: Iterable[str], scores: Iterable[str], ref
 
 
 def check_windows(windows: Frame, refuse: Refuse) -> None:
-    """Refuse a table of windows whose columns or values are not those of windows.
+    """Check the columns and values of a table of windows.
 
     Raises:
-        InputError: see above.
+        InputError: it does not pass.
     """
     check_columns(windows, refuse, ("dataset", "fingerprint", "task", "run"), ("fold",), FEATURES)
     values = windows[list(FEATURES)].to_numpy(float, na_value=np.nan)

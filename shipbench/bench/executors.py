@@ -1,4 +1,4 @@
-"""Where the jobs of a study run: in this process, in processes of this machine, or on a Dask cluster; all behind
+"""Executors of a study's jobs: in this process, in processes of this machine, or on a Dask cluster; all behind
 `concurrent.futures`."""
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .work import Answer, FoldData, Job, one_line, work
 
 NAMES = ("local", "processes", "dask")
 CONNECT_S = 5.0
-"""A scheduler that does not answer within this time [s] is not there."""
+"""Longest time [s] to wait for a scheduler's answer."""
 
 _MOST_WORKERS = 4096
 _GO_ON = "What is finished is kept; run the same command again with --resume."
@@ -35,7 +35,7 @@ _GO_ON = "What is finished is kept; run the same command again with --resume."
 
 @dataclass(frozen=True)
 class Execution:
-    """Where the jobs run and what each may use.
+    """Place where the jobs run, and limits of each.
 
     Args:
         executor: "local" (one after another in this process; in a child process if there are limits, or if the code of
@@ -46,12 +46,11 @@ class Execution:
         limits: of each cell.
         device: where networks train and predict ("cpu", "cuda", "cuda:1"); None: where their specs say, else on the
             CPU.
-
         wait_s: give up when the Dask cluster has had no workers for so long [s]; None: wait for them.
 
     Raises:
         InputError: an unknown executor, an option that it lacks or does not take, or a device that is not here (with
-            Dask, each worker looks itself).
+            Dask, each worker checks it).
     """
 
     executor: str = "local"
@@ -93,17 +92,17 @@ class Execution:
 
 
 class Workers(ABC):
-    """Takes jobs. `room`: how many at once at most (None: all, the cluster queues them); `about`: who they are, for the
-    progress.
+    """Workers that accept jobs. `room`: most jobs at once (None: no limit, the cluster queues them); `about`:
+    description for the progress.
 
-    `sends_files`: the workers may not see this machine's files, so that a job must bring those of the model.
+    `sends_files`: the workers may not see this machine's files, so that a job must carry those of the model.
     """
 
     def __init__(self, executor: Executor, room: int | None, about: str = "") -> None:
         self.executor, self.room, self.about, self.sends_files = executor, room, about, False
 
     def missing(self) -> str:
-        """What must come before a job can go on, "" where nothing is missing."""
+        """Condition that must be met before a job can continue, "" where none is missing."""
         return ""
 
     @abstractmethod
@@ -112,7 +111,7 @@ class Workers(ABC):
 
 
 class _Here(Executor):
-    """Runs what is submitted at once, in this thread, so that Ctrl-C reaches it."""
+    """Executor that runs a job at once, in this thread, so that Ctrl-C reaches it."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
@@ -139,7 +138,7 @@ class _Local(Workers):
 
 
 class _Processes(Workers):
-    """One child process for each job; the threads only wait for them."""
+    """Workers with one child process for each job; the threads only wait for them."""
 
     def __init__(self, workers: int, limits: Limits) -> None:
         super().__init__(ThreadPoolExecutor(workers), room=workers)
@@ -150,8 +149,8 @@ class _Processes(Workers):
 
 
 class _Dask(Workers):
-    """Jobs go to the cluster by value: neither files nor caches are shared. A fold's data go once to each worker that
-    needs them."""
+    """Workers of a Dask cluster. Jobs go to it by value: neither files nor caches are shared. A fold's data go once to
+    each worker that needs them."""
 
     def __init__(self, client: Any, limits: Limits) -> None:
         about = f"{client.scheduler.address}, {len(client.scheduler_info(n_workers=-1)['workers'])} workers now"
@@ -164,15 +163,15 @@ class _Dask(Workers):
         return self.executor.submit(_on_dask, job, self.limits, thread_settings(), *data)
 
     def missing(self) -> str:
-        """Workers, where the cluster has none."""
+        """Text "workers", where the cluster has none."""
         if self.client.scheduler_info(n_workers=-1)["workers"]:
             return ""
         address = self.client.scheduler.address
         return f"no workers at {address}; start one with `dask worker {address}`"
 
     def _shared(self, fold: FoldData) -> Any:
-        """As a task of the cluster, not as data scattered to it: the scheduler gives it to another worker where one is
-        lost."""
+        """Data of a fold as a task of the cluster, not as scattered data: where a worker is lost, the scheduler gives
+        it to another one."""
         if id(fold) not in self.shared:
             self.shared[id(fold)] = fold, self.client.submit(_itself, fold, pure=False)
         return self.shared[id(fold)][1]
@@ -183,11 +182,12 @@ def _itself(fold: FoldData) -> FoldData:
 
 
 _digest_here = cache(package_digest)
-"""Of a worker that answers many jobs; one with new code is started anew."""
+"""Digest of a package, cached for a worker that serves many jobs; one with new code is started anew."""
 
 
 def _on_dask(job: Job, limits: Limits, threads: Mapping[str, str], *folds: FoldData) -> list[Answer]:
-    """In a child process of the worker: killable, and alone (a worker may have many threads)."""
+    """Run a job in a child process of the worker: it can be killed, and it is alone (a worker may have many
+    threads)."""
     for package, digest in job.code.items():
         if (here := _digest_here(package)) != digest:
             found = f"other code of {package} (source {here}; of the study: {digest})" if here else f"no {package}"
@@ -199,7 +199,7 @@ def _on_dask(job: Job, limits: Limits, threads: Mapping[str, str], *folds: FoldD
 
 @contextmanager
 def open_workers(how: Execution) -> Iterator[Workers]:
-    """The workers of `how`; where the study ends early, what still runs is stopped.
+    """Open the workers of `how`; where the study ends early, running jobs are stopped.
 
     Raises:
         InputError: Dask is not installed, or no scheduler answers.
@@ -253,7 +253,7 @@ def _client(scheduler: str) -> Any:
 
 
 def answers_of(future: Future[list[Answer]], cells: int) -> list[Answer]:
-    """What the workers answered; a job that was lost with every worker that took it is the model's failure.
+    """Answers of the workers; a job that was lost with every worker that took it counts as the model's failure.
 
     Raises:
         InputError: the workers' code is another.

@@ -1,4 +1,4 @@
-"""The predictions of a study as tables or as one MATLAB file, so that every score can be computed again elsewhere."""
+"""Predictions of a study as tables or as one MATLAB file, so that every score can be computed again elsewhere."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from .submissions import read_results
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """One cell: its summary, the windows that it was scored on, and S (batch, K, 10), not-a-number where nothing was
-    predicted; ed (batch,) [m] is ED as it stands in the rows, not-a-number where it was not scored."""
+    """Cell with its summary, its scored windows, and S (batch, K, 10), NaN where nothing was predicted; ed (batch,) [m]
+    is the ED of the rows, NaN where it was not scored."""
 
     summary: dict[str, Any]
     batch: Batch
@@ -32,7 +32,7 @@ class Predicted:
 
     @property
     def t(self) -> np.ndarray:
-        """Seconds after the start of the window, (K,)."""
+        """Time after the start of the window, (K,) [s]."""
         return float(self.summary["dt"]) * np.arange(1, self.S.shape[1] + 1)
 
 
@@ -42,7 +42,7 @@ def is_results(path: Path) -> bool:
 
 
 def predictions(folder: Path) -> Iterator[Predicted]:
-    """Every cell of a study.
+    """Cells of a study, one after another.
 
     Raises:
         InputError: the folder holds no results, or the saved predictions are missing or damaged.
@@ -69,10 +69,10 @@ def predictions(folder: Path) -> Iterator[Predicted]:
 
 
 def export_predictions(folder: Path, out: Path, format: str) -> list[Path]:
-    """Write every prediction of the study in `folder`; returns what was written.
+    """Write every prediction of the study in `folder`; returns the paths written.
 
-    csv, parquet: into the folder `out`: `predictions`, one row per cell, window and knot with the prediction (`x` ..
-    `F_s`), the truth (`true_x` ..) and the inputs held on the step that ends there; `starts`, the state s0 of every
+    csv, parquet: into the folder `out`: `predictions`, one row per cell, window and time step with the prediction (`x`
+    .. `F_s`), the truth (`true_x` ..) and the inputs held on the step that ends there; `starts`, the state s0 of every
     window; `summary.json`, which identifies every cell.
     mat: one file with the struct array `predictions`, one element per cell.
 
@@ -141,7 +141,7 @@ def _starts(found: list[Predicted]) -> Frame:
 
 
 def _struct(p: Predicted) -> dict[str, Any]:
-    """One element of the MATLAB struct array."""
+    """Element of the MATLAB struct array."""
     inputs = p.summary["inputs"]
     return {
         **{key: p.summary[key] for key in ("dataset", "model", "fold", "seed", "dt", "status", "reason")},

@@ -26,7 +26,7 @@ class Fold:
 
 
 def select_runs(dataset: Dataset, task: Task) -> tuple[Dataset, tuple[str, ...]]:
-    """The runs that can be used (long enough; at most `max_runs`, evenly spread), and a note on each reduction.
+    """Runs that can be used (long enough; at most `max_runs`, evenly spread), and a note on each reduction.
 
     Raises:
         InputError: no run is as long as the horizon.
@@ -62,7 +62,7 @@ def _groups(runs: Sequence[Run], rng: np.random.Generator) -> list[list[Run]]:
 
 
 def _deal(groups: list[list[Run]], folds: int) -> list[list[Run]]:
-    """Whole groups into `folds` parts of nearly equal numbers of runs: the greatest first, each to the smallest
+    """Groups dealt whole into `folds` parts of nearly equal numbers of runs: the greatest first, each to the smallest
     part."""
     parts: list[list[Run]] = [[] for _ in range(folds)]
     for group in sorted(groups, key=len, reverse=True):
@@ -71,7 +71,8 @@ def _deal(groups: list[list[Run]], folds: int) -> list[list[Run]]:
 
 
 def _carve_valid(runs: Sequence[Run], count: int | None, rng: np.random.Generator) -> tuple[list[Run], list[Run]]:
-    """(train, valid) from the training runs: whole groups, until `count` runs (default: one ninth) are set aside."""
+    """Training and validation runs (train, valid): whole groups, until `count` runs (default: one ninth) are set
+    aside."""
     wanted = max(1, round(len(runs) / 9)) if count is None else count
     valid: list[Run] = []
     groups = _groups(runs, rng)
@@ -118,12 +119,12 @@ def _by_folds(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]
 
 
 def kinds_of(dataset: Dataset) -> list[str]:
-    """The kinds of manoeuvre of a data set, in the order of the folds of split = "kind"."""
+    """Kinds of manoeuvre of a data set, in the order of the folds of split = "kind"."""
     return sorted({r.kind for r in dataset.runs})
 
 
 def _parted(dataset: Dataset, test: list[Run]) -> tuple[list[Run], list[Run]]:
-    """(rest, test): runs of a group that is scored train nothing."""
+    """Remaining and scored runs (rest, test): runs of a group that is scored train nothing."""
     scored = {r.group for r in test}
     return [r for r in dataset.runs if r.group not in scored], test
 
@@ -152,7 +153,7 @@ def mean_speed(run: Run) -> float:
 
 
 def _by_speed(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]:
-    """Whole groups by their mean speed: the fastest are scored, until they are one `folds`-th of the runs."""
+    """Folds by mean speed, whole groups: the fastest are scored, until they are one `folds`-th of the runs."""
     groups: dict[str, list[Run]] = {}
     for run in dataset.runs:
         groups.setdefault(run.group, []).append(run)

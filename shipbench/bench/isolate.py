@@ -1,5 +1,5 @@
-"""A job in a process of its own, which can be killed: where a model hangs, eats memory or crashes, only the cells of
-its job fail.
+"""Job in a process of its own, which can be killed. Where a model hangs, exhausts the memory or crashes, only the cells
+of its job fail.
 
 The process is a plain `python -c`, not one of `multiprocessing`: workers of Dask are daemons, which may not have such
 children, and a user's script needs no `if __name__ == "__main__"`.
@@ -25,11 +25,12 @@ from . import supervise
 from .work import Answer, FoldData, Job, work
 
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-"""Sums in another number of threads round differently: the study's settings go with its jobs."""
+"""Environment variables of thread counts. Sums in another number of threads round differently: the study's settings go
+with its jobs."""
 
 _LOOK_EVERY = 0.1
-"""Seconds between two looks at the memory: what is filled meanwhile (about 0.2 GB) is what a model may exceed its limit
-by."""
+"""Time between two readings of the memory [s]. A model may exceed its limit by the memory it fills meanwhile, about 0.2
+GB."""
 
 _running: set[subprocess.Popen[bytes]] = set()
 
@@ -47,12 +48,12 @@ class Limits:
 
 
 def thread_settings() -> dict[str, str]:
-    """Those of `THREADS` that are set here."""
+    """Settings of `THREADS` in this environment."""
     return {name: os.environ[name] for name in THREADS if name in os.environ}
 
 
 def work_isolated(job: Job, folds: Sequence[FoldData], limits: Limits, threads: Mapping[str, str]) -> list[Answer]:
-    """`work` in a process of its own; where it does not answer, each of its cells fails with the reason."""
+    """Run `work` in a process of its own; where it does not answer, each of its cells fails with the reason."""
     answers, reason = call_isolated(_work_on, (job, *folds), limits, threads, cells=len(folds))
     return [Answer("failed", f"fit or prediction: {reason}") for _ in folds] if reason else answers
 
@@ -71,9 +72,9 @@ def call_isolated(
     threads: Mapping[str, str] | None = None,
     cells: int = 1,
 ) -> tuple[Any, str]:
-    """What `function(*parts)` returns in a process of its own, or None and why it did not answer.
+    """Result of `function(*parts)` in a process of its own, or None and the reason why there is none.
 
-    All that it started ends with it. The parts are sent apart: what is shared by two of them here is not shared there.
+    All processes that it started end with it. The parts are sent separately: objects shared by two of them are copied.
     """
     limits, threads = limits or Limits(), thread_settings() if threads is None else threads
     alive, held = os.pipe()
@@ -109,7 +110,7 @@ def stop_all() -> None:
 
 
 def _attend(process: subprocess.Popen[bytes], question: bytes, limits: Limits, cells: int) -> tuple[bytes, str]:
-    """What the process answers, or why it does not: it is left alone until it ends or exceeds a limit."""
+    """Answer of the process, or the reason why there is none: wait until it ends or exceeds a limit."""
     ended, exceeded = threading.Event(), list[str]()
     watch = threading.Thread(target=_watch, args=(process, limits, cells, ended, exceeded))
     watch.start()
@@ -124,7 +125,7 @@ def _attend(process: subprocess.Popen[bytes], question: bytes, limits: Limits, c
 def _watch(
     process: subprocess.Popen[bytes], limits: Limits, cells: int, ended: threading.Event, exceeded: list[str]
 ) -> None:
-    """Kill the process when it exceeds a limit, and say which."""
+    """Kill the process when it exceeds a limit, and record which."""
     end = math.inf if limits.seconds is None else time.monotonic() + limits.seconds * cells
     look_every = math.inf if limits.memory_gb is None else _LOOK_EVERY
     while not ended.wait(min(end - time.monotonic(), look_every, threading.TIMEOUT_MAX)):
@@ -160,7 +161,7 @@ def _ending(code: int) -> str:
 
 
 def _end_group(process: subprocess.Popen[bytes]) -> None:
-    """Have the process end all that it started, and itself; kill it where it does not within two seconds."""
+    """Ask the process to end all that it started, and itself; kill it where it does not within two seconds."""
     with suppress(ProcessLookupError):
         process.terminate()
     try:
@@ -170,7 +171,7 @@ def _end_group(process: subprocess.Popen[bytes]) -> None:
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
-    """The same, and clean up after it."""
+    """Kill the process and all that it started."""
     _end_group(process)
     process.wait()
     for pipe in (process.stdin, process.stdout):

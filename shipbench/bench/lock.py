@@ -1,4 +1,4 @@
-"""The folder of a study while it runs: one study at a time, no leftovers of killed ones, and one clear message where it
+"""Folder of a study while it runs: one study at a time, no leftovers of killed ones, and one clear message where it
 cannot be written."""
 
 from __future__ import annotations
@@ -19,8 +19,7 @@ _LEFTOVERS = {
     "": r"(writable|study\.json|rows\.parquet|summary\.json|windows\.parquet)", "truth/*": r"fold\d+\.npz",
     "cells/*/*": r"fold\d+-seed\d+",
 }  # fmt: skip
-"""What a killed study leaves half-written, by folder: `.NAME.PID.tmp` of these names. Everything else is not ours to
-remove."""
+"""Half-written files of a killed study, by folder: `.NAME.PID.tmp` of these names. No other file is removed."""
 
 
 def _elsewhere() -> str:
@@ -29,8 +28,8 @@ def _elsewhere() -> str:
 
 @contextmanager
 def claimed(out: Path) -> Iterator[None]:
-    """Make `out`, see that it can be written and that no other study writes there now, and take away what killed
-    studies left half-written.
+    """Make `out`, check that it can be written and that no other study writes there now, and remove the half-written
+    files of killed studies.
 
     Raises:
         InputError: the folder cannot be made or written, or holds links in the place of its folders, or another study
@@ -74,7 +73,7 @@ def refuse_other_study(out: Path, tasks: Sequence[Task]) -> None:
     """Keep the results of another study from being replaced: a folder holds the tables of one.
 
     Raises:
-        InputError: `out` holds results of other tasks, or results that do not tell of which.
+        InputError: `out` holds results of other tasks, or results that do not state their task.
     """
     there = _tasks_of(out)
     if there is not None and there != list(tasks):
@@ -87,7 +86,7 @@ def refuse_other_study(out: Path, tasks: Sequence[Task]) -> None:
 
 
 def _tasks_of(out: Path) -> list[Task] | None:
-    """Tasks of the study in `out`; none of results that do not tell; None where there are no results."""
+    """Tasks of the study in `out`; empty for results that do not state them; None where there are no results."""
     if not any((out / name).exists() for name in ("study.json", "rows.parquet", "summary.json")):
         return None
     try:
@@ -97,7 +96,7 @@ def _tasks_of(out: Path) -> list[Task] | None:
 
 
 def _refuse_links(out: Path) -> None:
-    """A folder of another's may hold links: what is written through one lands outside `out`."""
+    """Refuse links in a folder: a file written through a link lies outside `out`."""
     for pattern in ("cells", "truth", "cells/*", "cells/*/*"):
         if link := next((path for path in out.glob(pattern) if path.is_symlink()), None):
             raise InputError(

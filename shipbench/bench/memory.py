@@ -1,4 +1,4 @@
-"""Memory that was freed, given back to the system."""
+"""Return of freed memory to the system."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import sys
 
 
 def give_back_memory() -> None:
-    """What is freed goes back to the system, where the C library can do that: what comes next would else need its
-    memory on top of it."""
+    """Return freed memory to the system, where the C library can: the next work would otherwise need its memory in
+    addition."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
     if trim is not None:
         trim(0)

@@ -1,5 +1,4 @@
-"""What a study knows of a model before it fits it: whose code it is, which files it is made of, and how it wants to be
-fitted."""
+"""Facts on a model before it is fitted: whose code it is, its files, and how it is fitted."""
 
 from __future__ import annotations
 
@@ -19,7 +18,7 @@ from .provenance import source_digest
 
 @dataclass(frozen=True)
 class ModelFacts:
-    """What is known of the model of a spec.
+    """Facts on the model of a spec.
 
     Args:
         foreign: it runs code that is not shipbench's (a model file, a plug-in), which is loaded in processes of its own
@@ -28,8 +27,8 @@ class ModelFacts:
         together: its class fits several folds at once.
         files: content by relative name of the user's code, or of the saved folder.
         plugins: versions of the model's and its effects' plug-ins ("" for shipbench's own).
-        code: digests of the packages that it takes, by which a worker knows its own (`package_digest`).
-        origin: what a saved model was fitted on.
+        code: digests of the packages that it takes, which a worker compares with its own (`package_digest`).
+        origin: training data of a saved model.
     """
 
     foreign: bool
@@ -42,7 +41,8 @@ class ModelFacts:
 
 
 def facts_of(spec: Spec) -> ModelFacts:
-    """The facts of a model; making it once tells of an unknown name or parameter before anything is loaded or fitted.
+    """Facts on a model. It is made once, so that an unknown name or parameter is reported before anything is loaded or
+    fitted.
 
     Raises:
         InputError: the model cannot be made.
@@ -66,7 +66,7 @@ def facts_of(spec: Spec) -> ModelFacts:
 
 
 def _kind(spec: Spec) -> str:
-    """The registered predictor behind a spec, "" for a model file and for a model in memory."""
+    """Name of the registered predictor behind a spec, "" for a model file and for a model in memory."""
     if spec.class_name is not None or spec.given is not None:
         return ""
     if spec.path is None:
@@ -75,7 +75,7 @@ def _kind(spec: Spec) -> str:
 
 
 def _made_alone(spec: Spec) -> tuple[bool, bool, dict[str, bytes], Origin | None] | ShipbenchError:
-    """`_made` in a process of its own, where nobody presses Ctrl-C: whatever is raised is the model's."""
+    """Result of `_made` in a process of its own, without Ctrl-C: any exception is the model's."""
     try:
         return _made(spec)
     except BaseException as error:
@@ -83,7 +83,7 @@ def _made_alone(spec: Spec) -> tuple[bool, bool, dict[str, bytes], Origin | None
 
 
 def _made(spec: Spec) -> tuple[bool, bool, dict[str, bytes], Origin | None] | ShipbenchError:
-    """seeded, together, files and origin; or why the model cannot be made."""
+    """Facts (seeded, together, files, origin), or the reason why the model cannot be made."""
     try:
         model: Any = make_predictor(spec)
         return (

@@ -1,4 +1,4 @@
-"""Progress in a notebook: one bar that is redrawn in its place. Jupyter brings all that it needs, without widgets."""
+"""Progress in a notebook: one bar that is redrawn in place, without widgets."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _EVERY_S = 0.2
 
 
 class _Place:
-    """A place of the page that is drawn anew."""
+    """Output area of the page that is redrawn."""
 
     def __init__(self) -> None:
         from IPython.display import HTML, display
@@ -36,14 +36,14 @@ class _Place:
         return time.monotonic() - self.drawn >= _EVERY_S
 
     def draw(self, part: float, whole: float, text: str, below: Sequence[str] = ()) -> None:
-        """A bar with text behind it and lines below."""
+        """Draw a bar with text behind it and lines below."""
         bar = f'<progress value="{part:g}" max="{whole:g}"></progress> {escape(shown(text))}'
         self.handle.update(self.html(f"<div>{bar}{''.join(f'<br>{escape(shown(line))}' for line in below)}</div>"))
         self.drawn = time.monotonic()
 
 
 class NotebookSteps:
-    """A bar for the steps of one piece of work, with the time that is left at the mean pace so far."""
+    """Progress bar for the steps of one piece of work, with the remaining time at the mean pace so far."""
 
     def __init__(self) -> None:
         self.place, self.began = _Place(), time.monotonic()
@@ -59,7 +59,7 @@ class NotebookSteps:
 
 
 class NotebookBar:
-    """A bar with the finished part, the remaining time and the work at hand; lines below it on what did not go well."""
+    """Progress bar with the finished part, the remaining time and the current work; lines below it report problems."""
 
     def __init__(self) -> None:
         self.place = _Place()

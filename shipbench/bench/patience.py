@@ -1,5 +1,5 @@
-"""Waiting for workers: what is missing is told after some seconds and then every minute, and there may be an end to
-it."""
+"""Waiting for workers: a missing condition is reported after some seconds and then every minute, with an optional time
+limit."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .executors import Workers
 from .progress import Progress
 
 LOOK_S, FIRST_S, AGAIN_S = 1.0, 5.0, 60.0
-"""Seconds between two looks, until the first word and until the next."""
+"""Time [s] between two checks, until the first report and until the next."""
 
 
 class Patience:
-    """Waits for the answers of `workers`, and tells `progress` where they have been unable to work for some seconds;
-    gives up after `wait_s`."""
+    """Wait for the answers of `workers`, and report to `progress` where they have been unable to work for some seconds;
+    give up after `wait_s`."""
 
     def __init__(self, workers: Workers, progress: Progress, wait_s: float | None = None) -> None:
         self.workers, self.progress, self.limit = workers, progress, math.inf if wait_s is None else wait_s
@@ -28,7 +28,7 @@ class Patience:
         self.next_word = 0.0
 
     def first_done(self, running: Collection[Future[Any]]) -> set[Future[Any]]:
-        """The futures that are done, one at least.
+        """Futures that are done, one at least.
 
         Raises:
             WorkError: nothing can go on for `wait_s` seconds.

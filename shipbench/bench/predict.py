@@ -1,4 +1,4 @@
-"""Rolls a saved model out over whole runs and writes the states as CSV, for use outside the benchmark."""
+"""Rollouts of a saved model over whole runs, as CSV for use outside the benchmark."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def predict_runs(
 
 
 def write_csv(rollouts: list[Rollout], path: str | Path) -> None:
-    """Columns trajectory, t and the ten states (SI, `n` in rpm), written in one step; of run names see `csv_text`."""
+    """Write columns trajectory, t and the ten states (SI, `n` in rpm), atomically; run names as in `csv_text`."""
     path = Path(path)
     with in_one_step(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

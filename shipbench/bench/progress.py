@@ -15,8 +15,8 @@ from .durations import Remaining, duration
 
 
 class Progress(Protocol):
-    """What the runner tells: how many cells there are, which model is worked on, at which step its fit is, each cell as
-    it ends, and what is wrong.
+    """Receiver of a study's progress: number of cells, current model, step of its fit, each finished cell, and
+    warnings.
 
     `kinds`: number of cells of each kind; cells of one kind cost about the same. `cost` of a cell [s]: 0 where it was
     kept.
@@ -36,7 +36,7 @@ class Progress(Protocol):
 
 
 class Silent:
-    """Says nothing but warnings."""
+    """Reporter that prints warnings only."""
 
     def start(self, total: int, kinds: Mapping[str, int] | None = None) -> None: ...
 
@@ -57,7 +57,8 @@ EVERY_S = 10.0
 
 
 class StepLines:
-    """A plain line on the steps of one piece of work each 10 s, with the time that is left at the mean pace so far."""
+    """Reporter that prints a plain line on the steps of one piece of work every 10 s, with the remaining time at the
+    mean pace so far."""
 
     def __init__(self, stream: TextIO | None = None, before: str = "") -> None:
         self.stream, self.before = stream or sys.stderr, before
@@ -72,11 +73,11 @@ class StepLines:
         print(shown(f"        {self.before}{what}, {100.0 * share:.0f} %{left}"), file=self.stream, flush=True)
 
     def finish(self) -> None:
-        """Nothing: what was printed stays."""
+        """Do nothing: printed lines stay."""
 
 
 class StepBar:
-    """A rich bar for the steps of one piece of work: share done, elapsed and remaining time, the step."""
+    """Bar (rich) for the steps of one piece of work: share done, elapsed and remaining time, the step."""
 
     def __init__(self) -> None:
         from rich.console import Console
@@ -103,7 +104,7 @@ class StepBar:
         self.progress.update(self.bar, description=shown(what), completed=share)
 
     def finish(self) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         self.progress.stop()
 
 
@@ -124,7 +125,7 @@ def steps_shown(quiet: bool) -> Iterator[None]:
 
 
 class Lines:
-    """One line per finished cell, with the time that is left."""
+    """Reporter that prints one line per finished cell, with the remaining time."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self.stream = stream or sys.stderr
@@ -160,7 +161,7 @@ class Lines:
 
 
 class Bar:
-    """A rich bar: cells done, elapsed and remaining time, the model being worked on."""
+    """Bar (rich) of cells done, elapsed and remaining time, and the current model."""
 
     def __init__(self) -> None:
         from rich.console import Console
@@ -202,7 +203,7 @@ class Bar:
 
 
 def make_progress(quiet: bool = False) -> Progress:
-    """The reporter that fits the place: silent, bar or lines."""
+    """Reporter that fits the output: silent, bar or lines."""
     if quiet:
         return Silent()
     from .notebook_bar import NotebookBar, in_notebook

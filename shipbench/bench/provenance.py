@@ -1,4 +1,4 @@
-"""Which code on which machine made a result."""
+"""Code and machine behind a result."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LIBRARIES = ("numpy", "scipy", "pandas", "casadi", "torch", "lightning", "torch
 
 @cache
 def source_digest() -> str:
-    """That of shipbench itself: tells edited code from the released one."""
+    """Digest of shipbench's own source: it distinguishes edited code from the released one."""
     return package_digest("shipbench")
 
 

@@ -1,9 +1,9 @@
-"""What the true ship does in each scored window: speed, drift, rudder, astern, thrusters, and the indices of standard
+"""Motion of the true ship in each scored window: speed, drift, rudder, astern, thrusters, and the indices of standard
 manoeuvres.
 
 These are properties of the data, the same for every model. A study keeps them in `windows.parquet`, so that slices can
-be rendered from rows alone. Whole windows are sorted, not knots: in a rollout the error at a knot is the sum of all
-that came before.
+be rendered from rows alone. Whole windows are sorted, not time steps: in a rollout the error at a time step is the sum
+of all earlier ones.
 """
 
 from __future__ import annotations
@@ -21,17 +21,16 @@ from ..signals import DELTA, U, V
 
 Frame = Any
 RPM_C, THRUSTERS_C = 0, slice(2, 4)
-"""Columns of the orders in U."""
+"""Columns of the commands in U."""
 
 
 def window_features(batch: Batch, L: float) -> dict[str, np.ndarray]:
-    """By name, one value per window (batch,).
+    """Features by name, one value per window (batch,).
 
-    speed: mean resultant speed [m/s]. drift: mean drift angle atan2(|v|, |u|) [rad], weighted with the speed, for at
-    rest it means nothing.
-    rudder: mean |delta| [rad]. astern, thrusters: share of the samples with orders of astern revolutions, of a
-    thruster. Then the true ship's `trial_indices`, in ship lengths and rad, not-a-number where the window is no such
-    manoeuvre.
+    speed: mean resultant speed [m/s]. drift: mean drift angle atan2(|v|, |u|) [rad], weighted with the speed, since it
+    is undefined at rest. rudder: mean |delta| [rad]. astern, thrusters: share of the samples with astern shaft speed
+    commands, or with thruster commands. Then the true ship's `trial_indices`, in ship lengths and rad, NaN where the
+    window is no such manoeuvre.
     """
     u, v = batch.truth[..., U], batch.truth[..., V]
     speed = np.hypot(u, v)
@@ -52,8 +51,8 @@ _UNITS = {"speed": "m/s", "drift": "rad", "rudder": "rad"}
 
 @dataclass(frozen=True, eq=False)
 class Slice:
-    """Windows of one regime: what it is of ("speed"), its label with bounds and units, and which windows (windows,) are
-    in it."""
+    """Windows of one regime: its feature ("speed"), its label with bounds and units, and its mask of windows
+    (windows,)."""
 
     regime: str
     label: str
@@ -61,8 +60,8 @@ class Slice:
 
 
 def slices(windows: Frame) -> Iterator[Slice]:
-    """Thirds of the windows by speed, drift and rudder; with and without astern orders and thrusters. Regimes without a
-    difference are left out."""
+    """Thirds of the windows by speed, drift and rudder; with and without astern and thruster commands. Regimes without
+    a difference are left out."""
     for regime, unit in _UNITS.items():
         name, factor = display_unit(unit)
         values = windows[regime].to_numpy(float) * factor

@@ -32,18 +32,18 @@ from .regimes import window_features
 from .scoring import measure
 
 PROTOCOL = 1
-"""Version of what a score means. A change that moves a published score raises it; rows of different protocols are never
-ranked together."""
+"""Version of the definition of the scores. A change that alters a published score raises it; rows of different
+protocols are never ranked together."""
 
 STATUSES = ("ok", "diverged", "failed", "skipped")
 _MOST_ROWS = 10_000_000
-"""Rows of a table of results; 200 models on 10,000 runs have 2 million."""
+"""Most rows of a table of results; 200 models on 10,000 runs have 2 million."""
 _WHOLE = "Give the folder that `shipbench run` wrote, whole."
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One unit of work."""
+    """Unit of work: data set, model, fold and seed."""
 
     dataset: str
     model: str
@@ -52,17 +52,17 @@ class Cell:
 
     @property
     def label(self) -> str:
-        """For messages."""
+        """Label for messages."""
         return f"{self.dataset} {self.model} fold {self.fold} seed {self.seed}"
 
     @property
     def folder(self) -> Path:
-        """Relative to the study's folder."""
+        """Folder relative to the study's."""
         return Path("cells", file_name(self.dataset), file_name(self.model), f"fold{self.fold}-seed{self.seed}")
 
 
 def write_truth(out: Path, dataset: str, fold: int, batch: Batch) -> None:
-    """Save what every model of this fold is scored against."""
+    """Save the truth against which every model of this fold is scored."""
     path = truth_path(out, dataset, fold)
     if path.parent.is_symlink():
         raise InputError(
@@ -127,7 +127,7 @@ def read_predictions(out: Path, cell: Cell) -> np.ndarray | None:
 
 
 def _arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """The arrays of these names in a .npz file."""
+    """Arrays of these names in a .npz file."""
     found = read_npz(path)
     if missing := [name for name in names if name not in found]:
         raise InputError(f"{path} lacks {', '.join(missing)}. {_WHOLE}")
@@ -135,13 +135,13 @@ def _arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
 
 
 _CELL_FILES = ("rows.parquet", "summary.json", "predictions.npz", "equations.txt", "model")
-"""What a study writes into the folder of a cell."""
+"""Files and folders that a study writes into the folder of a cell."""
 
 
 def write_cell(
     out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, files: Mapping[str, bytes]
 ) -> None:
-    """Write a finished cell in one step (an older one is replaced); `files` are further ones, by relative name (saved
+    """Write a finished cell atomically (an older one is replaced); `files` are further ones, by relative name (saved
     model, equations)."""
     final = out / cell.folder
     old = final.with_name(f".{final.name}.{os.getpid()}.old.tmp")
@@ -163,20 +163,20 @@ def write_cell(
 
 
 def _digests(folder: Path) -> dict[str, str]:
-    """SHA-256 (first 16 digits) of what a cell's rows and scores are read from."""
+    """SHA-256 (first 16 digits) of the files from which a cell's rows and scores are read."""
     found = (folder / name for name in ("rows.parquet", "predictions.npz"))
     return {p.name: hashlib.sha256(p.read_bytes()).hexdigest()[:16] for p in found if p.is_file()}
 
 
 def read_summary(out: Path, cell: Cell) -> dict[str, Any] | None:
-    """The summary of a finished cell, or None if it is not there."""
+    """Summary of a finished cell, or None if it is not there."""
     path = out / cell.folder / "summary.json"
     return read_json(path) if path.exists() else None
 
 
 def scored_before(out: Path, cell: Cell, key: str) -> str:
-    """The status of a cell that need not be run again ("ok", "diverged"), or "": it is not there, damaged, of another
-    key, failed or skipped."""
+    """Status of a cell that need not be run again ("ok", "diverged"), or "": it is not there, damaged, of another key,
+    failed or skipped."""
     try:
         summary = read_summary(out, cell) or {}
         whole = summary.get("key") == key and summary["files"] == _digests(out / cell.folder)
@@ -221,7 +221,7 @@ def window_table(out: Path, summaries: Sequence[dict[str, Any]]) -> Frame:
 
 
 def read_frame(path: Path) -> Frame:
-    """A parquet table. What pandas wrote of itself into the file is not read: it can be damaged, and decides types.
+    """Read a parquet table. The metadata of pandas in the file are ignored: they can be damaged, and decide types.
 
     Raises:
         InputError: it is no regular file, is damaged, or declares more rows than a study has.
@@ -241,7 +241,7 @@ def read_frame(path: Path) -> Frame:
 
 
 def rescore(out: Path, summary: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Every metric of a cell computed again from its saved predictions and truth (NaN where nothing was predicted)."""
+    """Compute every metric of a cell again from its saved predictions and truth (NaN where nothing was predicted)."""
     cell = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"])
     batch, S = read_truth(out, cell.dataset, cell.fold), read_predictions(out, cell)
     ok = np.array([status == "ok" for status in summary["run_status"]])

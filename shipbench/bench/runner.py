@@ -1,4 +1,4 @@
-"""Runs a study: for every data set, model, fold and seed fit, roll out, score and save; one failure never stops the
+"""Run of a study: for every data set, model, fold and seed fit, roll out, score and save; one failure never stops the
 others."""
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from .work import Answer, digests
 
 @dataclass(frozen=True)
 class Memory:
-    """Data sets and models in memory, by the names that tasks give them."""
+    """Data sets and models in memory, by their names in tasks."""
 
     data: Mapping[str, Dataset] = field(default_factory=dict)
     models: Mapping[str, Spec] = field(default_factory=dict)
@@ -59,7 +59,7 @@ class Outcome:
 
     @property
     def equations(self) -> dict[tuple[str, str], Path]:
-        """By data set and model of this study the first file of fitted equations."""
+        """First file of fitted equations by data set and model of this study."""
         found: dict[tuple[str, str], Path] = {}
         for s in self.summaries:
             path = self.out / Cell(s["dataset"], s["model"], s["fold"], s["seed"]).folder / "equations.txt"
@@ -69,7 +69,7 @@ class Outcome:
 
     @property
     def results(self) -> Results:
-        """As `read_results` would read them back."""
+        """Results as `read_results` would read them back."""
         return Results(self.rows, self.summaries, [self.out] * len(self.summaries))
 
 
@@ -144,7 +144,7 @@ def run_tasks(
 
 
 def check_task(task: Task) -> None:
-    """Raise what `run_tasks` would raise before it fits anything."""
+    """Raise the errors that `run_tasks` would raise before it fits anything."""
     _prepare(task, Memory())
 
 
@@ -164,7 +164,7 @@ def _prepare(task: Task, memory: Memory) -> Study:
 
 
 def _refuse_elsewhere(studies: Sequence[Study], execution: Execution) -> None:
-    """Models in memory are here and nowhere else."""
+    """Refuse models in memory where the jobs run in other processes."""
     here = [spec.text for study in studies for spec in study.specs if spec.given is not None]
     if here and (execution.executor != "local" or execution.limits):
         how = f"executor '{execution.executor}'" if execution.executor != "local" else "a limit of time or memory"
@@ -195,14 +195,14 @@ def _kept(part: Part, out: Path, progress: Progress, finished: set[Cell]) -> boo
 
 
 def _kind(cell: Cell) -> str:
-    """Cells that cost about the same: those of one model on one data set."""
+    """Kind of a cell: cells of one model on one data set cost about the same."""
     return f"{cell.dataset} {cell.model}"
 
 
 def _answers(
     parts: Sequence[Part], workers: Workers, progress: Progress, how: Execution
 ) -> Iterator[tuple[Part, list[Answer]]]:
-    """Each part with the answers for its cells, as they come."""
+    """Parts with the answers for their cells, as they come."""
     if workers.room is None and parts:
         progress.working(f"{len(parts)} jobs sent to {workers.about}")
     waiting, running, patience = (
@@ -223,8 +223,8 @@ def _answers(
 
 
 def _identity(part: Part, key: str, answer: Answer) -> dict[str, Any]:
-    """The cell's key and the digests of the user's code behind it; no key where the model loaded code or read files
-    that the key does not cover."""
+    """Key of the cell and digests of the user's code behind it; no key where the model loaded code or read files that
+    the key does not cover."""
     identity: dict[str, Any] = {
         "key": key,
         "model_code": {name: digest[:16] for name, digest in digests(part.facts.files).items()},
@@ -247,7 +247,7 @@ class _Record:
 
 
 def _score(study: Study, spec: Spec, cell: Cell, answer: Answer) -> _Record:
-    """One row per scored window of the fold, from what the model predicted or why it did not."""
+    """Rows of the fold, one per scored window, from the prediction of the model or the reason why there is none."""
     batch, data, task, S = study.batches[cell.fold], study.data, study.task, answer.S
     status, reason = answer.status, answer.reason
     if S is None:
@@ -295,7 +295,7 @@ def _rows(
 
 
 def _summary(study: Study, spec: Spec, cell: Cell, answer: Answer, times: dict[str, float]) -> dict[str, Any]:
-    """What alone identifies the cell's experiment."""
+    """Summary that identifies the cell's experiment on its own."""
     data, fold = study.data, study.folds[cell.fold]
     return {
         "protocol": PROTOCOL, "dataset": data.name, "fingerprint": data.fingerprint,
@@ -314,7 +314,7 @@ def _summary(study: Study, spec: Spec, cell: Cell, answer: Answer, times: dict[s
 
 
 def _outcome_text(summary: dict[str, Any]) -> str:
-    """One line on a finished cell, for the progress."""
+    """Line on a finished cell, for the progress."""
     statuses = summary["run_status"]
     shared = f" (its share of {summary['fit_shared_by']} fits together)" if summary["fit_shared_by"] > 1 else ""
     if summary["status"] == "ok":

@@ -1,4 +1,4 @@
-"""From predictions to one row per run: status, reason, every metric, the position error at fixed horizons."""
+"""Scores from predictions, one row per run: status, reason, every metric, the position error at fixed horizons."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ..signals import STATES
 
 HORIZONS_S = (10.0, 30.0, 60.0, 120.0)
 DIVERGED_DISTANCE = 1e5
-"""A position error beyond this [m] is no prediction any more: the run counts as diverged."""
+"""Largest position error [m] of a prediction that has not diverged."""
 
 
 def horizons(horizon_s: float, dt: float) -> dict[str, int]:
-    """Column name -> index of the knot, for those of `HORIZONS_S` that the task reaches and the sampling hits."""
+    """Time step index by column name, for those of `HORIZONS_S` that the task reaches and the sampling hits."""
     return {
         f"ed_at_{h:g}s": round(h / dt) - 1
         for h in HORIZONS_S
@@ -26,13 +26,14 @@ def horizons(horizon_s: float, dt: float) -> dict[str, int]:
 
 
 def columns(metrics: Sequence[str], horizon_s: float, dt: float) -> list[Column]:
-    """The numeric columns of a row, in order."""
+    """Numeric columns of a row, in order."""
     found = [column for name in metrics for column in METRICS.get(name).columns]
     return found + [Column(name, f"ED at {name[6:-1]} s", "m") for name in horizons(horizon_s, dt)]
 
 
 def divergence(truth: np.ndarray, S: np.ndarray, dt: float) -> list[str]:
-    """For each run "" or why it counts as diverged: the first knot that is not finite or too far from the truth."""
+    """Reason for each run why it counts as diverged, or "": the first time step that is not finite or too far from the
+    truth."""
     with np.errstate(all="ignore"):
         distance = np.hypot(S[..., 0] - truth[..., 0], S[..., 1] - truth[..., 1])
     finite = np.isfinite(S)
@@ -55,7 +56,7 @@ def divergence(truth: np.ndarray, S: np.ndarray, dt: float) -> list[str]:
 def measure(
     metrics: Sequence[str], batch: Batch, S: np.ndarray, *, L: float, dt: float, ok: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Every column (batch,); NaN for the runs that are not `ok` (batch,), which must not be scored."""
+    """Score columns (batch,) by name; NaN for the runs that are not `ok` (batch,), which must not be scored."""
     steps = S.shape[1]
     values: dict[str, np.ndarray] = {}
 

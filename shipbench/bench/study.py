@@ -1,5 +1,4 @@
-"""What a study has to do: its cells, in parts that run together, each cell under the key by which `--resume` knows
-it."""
+"""Work of a study: its cells, in parts that run together, each cell under the key by which `--resume` identifies it."""
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ from .work import Answer, FoldData, Job, digests
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A task with its data, folds and parsed models."""
+    """Task with its data, folds and parsed models."""
 
     task: Task
     data: Dataset
@@ -36,7 +35,7 @@ class Study:
 
     @cached_property
     def fold_data(self) -> list[FoldData]:
-        """What models may see of each fold; a window that several folds train on is kept once."""
+        """Data of each fold that models may see; a window that several folds train on is kept once."""
         kept: dict[str, Run] = {}
         return [
             FoldData(
@@ -55,8 +54,8 @@ class Study:
         return [METRICS.digest(name) for name in self.task.metrics]
 
     def parts(self) -> list[Part]:
-        """All cells: the folds of a model and seed as one part where its class fits them together, else each cell as
-        its own."""
+        """Cells of the study: the folds of a model and seed as one part where its class fits them together, else each
+        cell as its own."""
         parts = []
         for spec, facts in zip(self.specs, self.facts, strict=True):
             seeds = spec.seeds or list(self.task.seeds)
@@ -82,7 +81,7 @@ class Part:
 
     @property
     def label(self) -> str:
-        """For messages."""
+        """Label for messages."""
         first = self.cells[0]
         return (
             first.label
@@ -92,7 +91,7 @@ class Part:
 
     @cached_property
     def keys(self) -> list[str]:
-        """For each cell the digest of everything that decides its content; `--resume` keeps a cell only where it
+        """Digest, for each cell, of everything that decides its content; `--resume` keeps a cell only where it
         agrees."""
         task, data = self.study.task, self.study.data
         files, facts = digests(self.facts.files), self.facts
@@ -112,19 +111,19 @@ class Part:
 
     @property
     def fold_data(self) -> list[FoldData]:
-        """Of each cell."""
+        """Fold data of each cell."""
         return [self.study.fold_data[cell.fold] for cell in self.cells]
 
     def job(self, send_files: bool, device: str | None) -> Job:
-        """What a worker is given beside `fold_data`."""
+        """Job for a worker, without `fold_data`."""
         facts = self.facts
         return Job(
             self.spec, self.cells[0].seed, facts.code, facts.files if send_files else None, device, facts.foreign
         )
 
     def uncovered(self, answer: Answer) -> list[str]:
-        """Code that the model loaded, and files that it read, while it was fitted or asked, and that the keys do not
-        cover.
+        """Names of code that the model loaded, and of files that it read, during fit and prediction, that the keys do
+        not cover.
 
         Raises:
             WorkError: a file of its code is no longer the one that the keys were made of.

@@ -1,5 +1,5 @@
-"""What a result folder must be before it is ranked beside others: types and values (see `entry`), and rows and
-summaries that belong together."""
+"""Validation of a result folder before it is ranked beside others: types and values (see `entry`), and agreement of
+rows and summaries."""
 
 from __future__ import annotations
 
@@ -35,8 +35,7 @@ _GIVE = "Give the folder as `shipbench run` wrote it."
 
 
 def check_submission(folder: Path, rows: Frame, summaries: Any) -> Frame:
-    """Refuse rows and summaries that contradict themselves or cannot be ranked here; the rows without columns that no
-    entry speaks of.
+    """Check rows and summaries for contradictions; return the rows without columns that no entry names.
 
     Raises:
         InputError: a column or key is missing or of another type, a row stands twice, the protocol or the task is not
@@ -99,7 +98,7 @@ def _check_task(summary: dict[str, Any], keys: dict[str, str], refuse: Any) -> N
 
 
 def _cells(rows: Frame, summaries: Sequence[dict[str, Any]], refuse: Any) -> list[tuple[dict[str, Any], Frame]]:
-    """Each entry with its rows, in the order of its scored runs."""
+    """Entries with their rows, in the order of their scored runs."""
     cells = {(s["dataset"], s["model"], s["fold"], s["seed"]): s for s in summaries}
     if len(cells) < len(summaries):
         raise refuse("two entries of summary.json are of the same data set, model, fold and seed")
@@ -128,7 +127,7 @@ def _cells(rows: Frame, summaries: Sequence[dict[str, Any]], refuse: Any) -> lis
 
 
 def _check_cell(summary: dict[str, Any], part: Frame, scores: Iterable[str], refuse: Any) -> None:
-    """What stands in the rows and in the entry is the same, and no column is filled that the entry does not name."""
+    """Check that rows and entry agree, and that no column is filled that the entry does not name."""
     label = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"]).label
     statuses = part["status"].tolist()
     if statuses != summary["run_status"]:
@@ -146,11 +145,10 @@ def _check_cell(summary: dict[str, Any], part: Frame, scores: Iterable[str], ref
 
 
 def check_together(rows: Frame, summaries: Sequence[dict[str, Any]], sources: Sequence[Path]) -> None:
-    """Refuse studies that say different things of the same data: of the ship, of the runs of a fold, or of where a
-    window was cut from.
+    """Check that studies agree on the same data: on the ship, the runs of a fold, and the origin of a window.
 
     Raises:
-        InputError: see above, or the same cell stands twice.
+        InputError: they do not, or the same cell stands twice.
     """
     seen: dict[tuple[Any, ...], Path] = {}
     facts: dict[tuple[Any, ...], tuple[Any, Path]] = {}
@@ -190,10 +188,10 @@ def _agree(facts: dict[tuple[Any, ...], tuple[Any, Path]], key: tuple[Any, ...],
 
 
 def check_windows_of(folder: Path, windows: Frame, summaries: Sequence[dict[str, Any]]) -> None:
-    """Refuse a windows.parquet that is damaged or speaks of windows that were not scored: slices would be cut by them.
+    """Check that windows.parquet is whole and has scored windows only: slices are cut by them.
 
     Raises:
-        InputError: see above.
+        InputError: it is not, or has others.
     """
 
     def refuse(what: str) -> InputError:
@@ -287,8 +285,8 @@ def check_target(results: Results, folder: Path) -> None:
 
 
 def write_submission(results: Results, folder: Path) -> None:
-    """Write `rows.parquet`, `summary.json` and, where the windows are known, `windows.parquet`: all that a leaderboard
-    is rendered from.
+    """Write `rows.parquet`, `summary.json` and, where the windows are known, `windows.parquet`: the files from which a
+    leaderboard is rendered.
 
     Raises:
         InputError: the folder cannot be written.
@@ -305,7 +303,8 @@ def write_submission(results: Results, folder: Path) -> None:
 
 
 def _read_windows(folder: Path, summaries: list[dict[str, Any]]) -> Frame | None:
-    """`windows.parquet` of a study, made from the saved truth where it is missing; None without both."""
+    """Windows table of a study (`windows.parquet`), made from the saved truth where it is missing; None without
+    both."""
     path = folder / "windows.parquet"
     if path.exists():
         windows = read_frame(path)

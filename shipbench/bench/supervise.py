@@ -1,5 +1,5 @@
-"""The process that a job's worker is a child of: whatever the worker starts ends with it, also what left its session or
-was orphaned.
+"""Parent process of a job's worker: all processes that the worker starts end with it, also those that left its session
+or were orphaned.
 
 It loads nothing but Python's library before it forks, so that it costs little and has no threads.
 """
@@ -24,7 +24,8 @@ _PASSES = 50
 
 
 def main(alive: int) -> None:
-    """Answer one question (`answering.answer`) in a child process, end all that it left, and end as it did.
+    """Answer one question (`answering.answer`) in a child process, end all processes that it left, and exit with its
+    exit code.
 
     Args:
         alive: reading end of a pipe that the study holds: it ends with the study, also by `kill -9`.
@@ -58,7 +59,7 @@ def _prctl(option: int, value: int) -> None:
 
 
 def end_descendants() -> None:
-    """Kill everything below this process, until nothing is left."""
+    """Kill all descendants of this process, until none is left."""
     import psutil
 
     for _ in range(_PASSES):
@@ -77,6 +78,6 @@ def _stop(*_: object) -> None:
 
 
 def _end_with_study(alive: int) -> None:
-    """The study never writes to this pipe."""
+    """Wait for the end of the study: it never writes to this pipe."""
     os.read(alive, 1)
     _stop()

@@ -1,4 +1,4 @@
-"""The task: data that fully identifies an experiment, read from a TOML file and from the command line."""
+"""Task: data that fully identifies an experiment, read from a TOML file and from the command line."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class Task(BaseModel):
         return brief(super().__repr__())
 
     def steps(self, dt: float) -> int:
-        """Knots of the horizon at sample time `dt` [s]."""
+        """Number of time steps of the horizon at sample time `dt` [s]."""
         return samples(self.horizon_s, dt, "horizon_s")
 
     def history(self, dt: float) -> int:
@@ -104,7 +104,7 @@ class Task(BaseModel):
         return samples(self.stride_s, dt, "stride_s") if self.stride_s else None
 
     def key(self, fingerprint: str) -> str:
-        """Digest of all that decides what is scored on which data; rows are ranked together only where it agrees."""
+        """Digest of all settings that decide the scored data; rows are ranked together only where it agrees."""
         data = self.model_dump(mode="json", exclude=_NOT_IDENTITY)
         if self.train_runs is None:
             del data["train_runs"]  # tasks from before this key keep theirs
@@ -124,7 +124,7 @@ def samples(seconds: float, dt: float, name: str) -> int:
 
 
 def make_task(data: dict[str, Any], where: str = "task") -> Task:
-    """A validated task.
+    """Validated task.
 
     Raises:
         InputError: a key is missing or unknown, or a value is not accepted; `where` names the source in the message.
@@ -151,7 +151,7 @@ def configs_folder() -> Path:
 
 
 def read_config(path: str | Path) -> dict[str, Any]:
-    """The table of a task file; a bare name ("paper", "smoke") means a shipped one.
+    """Read the table of a task file; a bare name ("paper", "smoke") means a shipped one.
 
     Raises:
         InputError: the file is missing, unreadable or not TOML.
@@ -161,10 +161,10 @@ def read_config(path: str | Path) -> dict[str, Any]:
 
 
 def load_tasks(config: str | Path | None = None, overrides: dict[str, Any] | None = None) -> list[Task]:
-    """The tasks of a config, one per data set; entries of `overrides` that are not None replace those of the file.
+    """Tasks of a config, one per data set; entries of `overrides` that are not None replace those of the file.
 
-    A config names one `dataset` or several `datasets`; all other keys are those of `Task`. Without either, harbour90 is
-    meant.
+    A config names one `dataset` or several `datasets`; all other keys are those of `Task`. Without either, the data set
+    is harbour90.
 
     Raises:
         InputError: as `read_config` and `make_task`.

@@ -1,5 +1,4 @@
-"""What a worker does: fit the cells of one job and predict. It scores nothing and writes no result; no truth reaches
-it.
+"""Work of a worker: fit the cells of one job and predict. It scores nothing and writes no result; no truth reaches it.
 
 A job holds the cells that are fitted together: all folds of one model, data set and seed where the model's class offers
 `fit_group`, else one cell. Stacked training rounds differently with other members beside it, so a job is the unit that
@@ -32,14 +31,14 @@ from .cost import count_parameters
 from .provenance import machine
 
 _RAISED = BaseException
-"""What a model may raise, and only its own rows say so (after `_let_stop_through`): also asyncio's CancelledError and
-an exit."""
+"""Exceptions that a model may raise and that fail its own rows only (after `_let_stop_through`): also asyncio's
+CancelledError and an exit."""
 
 
 @dataclass(frozen=True, eq=False)
 class FoldData:
-    """What a model may see of a fold: windows for fitting and for early stopping, and start, inputs and history of the
-    scored windows."""
+    """Data of a fold that a model may see: windows for fitting and for early stopping, and start, inputs and history of
+    the scored windows."""
 
     train: Dataset
     valid: Dataset | None
@@ -50,7 +49,7 @@ class FoldData:
 
 @dataclass(frozen=True)
 class Job:
-    """A model and a seed, to be fitted on one or several folds.
+    """Model and seed, to be fitted on one or several folds.
 
     `code`: digests of the packages that it takes (`package_digest`). `files`: content by relative name of the user's
     code or saved folder, where the worker may not have it; None: it is read in place. `device`: where it computes,
@@ -67,7 +66,7 @@ class Job:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What came of a cell.
+    """Result of a cell.
 
     Args:
         status: "" (predicted, to be scored), "failed" or "skipped", with the `reason`.
@@ -75,9 +74,10 @@ class Answer:
         fit_s: time of the fit [s], shared equally by the `shared_by` cells that were fitted together.
         predict_s: time of one rollout [s].
         params: the model's settings, or None if it does not state them.
-        parameters: how many numbers the fit set (see `cost`), or None if that cannot be told.
+        parameters: count of the fitted numbers (see `cost`), or None if it is unknown.
         files: saved model and fitted equations, content by relative name.
-        notes: why the model could not be saved or described, and how it follows its own training runs (`fit_report`).
+        notes: reason why the model could not be saved or described, and its error on its own training runs
+            (`fit_report`).
         machine: where it was computed.
         code: digests by relative name of the user's code that was loaded in the end, and of the files that the model
             read; empty for other models.
@@ -98,7 +98,7 @@ class Answer:
 
 
 def work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
-    """Fit and predict; whatever the model raises becomes the answer of its cells (one for each of `folds`)."""
+    """Fit and predict; an exception of the model becomes the answer of its cells (one for each of `folds`)."""
     try:
         with _at_hand(job) as spec:
             if spec.path is None or spec.class_name is None:
@@ -127,8 +127,8 @@ def file_digest(file: Path) -> str:
 
 
 def _let_stop_through(error: BaseException) -> None:
-    """Raise KeyboardInterrupt where that is behind the exception: Lightning makes a SystemExit of it, which would count
-    as a failed model."""
+    """Raise KeyboardInterrupt where that is behind the exception: Lightning turns it into a SystemExit, which would
+    count as a failed model."""
     behind: BaseException | None = error
     while behind is not None:
         if isinstance(behind, KeyboardInterrupt):
@@ -137,14 +137,14 @@ def _let_stop_through(error: BaseException) -> None:
 
 
 def one_line(error: BaseException) -> str:
-    """An exception as a reason for a row."""
+    """Text of an exception as a reason for a row."""
     text = str(error) if isinstance(error, ShipbenchError) else f"{type(error).__name__}: {error}".removesuffix(": ")
     return " ".join(text.split())[:400]
 
 
 @contextmanager
 def _at_hand(job: Job) -> Iterator[Spec]:
-    """The job's spec, with the files behind it in a temporary folder where they were sent along."""
+    """Provide the job's spec, with the files behind it in a temporary folder where they were sent along."""
     if job.spec.path is None:
         yield job.spec
         return
@@ -169,7 +169,7 @@ def _work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
 
 
 def _seed_global_draws(seed: int) -> None:
-    """A model that draws from a global generator then draws the same wherever and after whatever it runs."""
+    """Seed the global generators: a model that draws from them then draws the same in any order and place."""
     random.seed(seed)
     np.random.seed(seed % 2**32)  # noqa: NPY002 - for models of others; ours draw from generators of their own
     if "torch" in sys.modules:
@@ -185,8 +185,8 @@ class _Fit:
 
 
 def _fit(job: Job, folds: Sequence[FoldData]) -> list[_Fit]:
-    """The fitted models of the folds: together where the class can, else one by one; one model's failure stays its
-    own."""
+    """Fit the models of the folds: together where the class can, else one by one; a failure of one leaves the
+    others."""
     spec, seed = job.spec, job.seed
     models = [make_predictor(spec, job.device) for _ in folds]
     if spec.path is not None and spec.class_name is None:
@@ -234,8 +234,8 @@ def _predicted(fit: _Fit, fold: FoldData) -> Answer:
 
 
 def _predict(model: Any, fold: FoldData) -> np.ndarray:
-    """The model's prediction of copies of what it may see: writing into them, or looking behind them, never reaches the
-    truth."""
+    """Predict on copies of the data that the model may see: writing into them, or reading beyond their views, never
+    reaches the truth."""
     history = None if fold.history is None else (fold.history[0].copy(), fold.history[1].copy())
     S = np.array(model.predict(fold.s0.copy(), fold.U.copy(), history), dtype=float)
     expected = (*fold.U.shape[:2], fold.s0.shape[1])
@@ -245,7 +245,7 @@ def _predict(model: Any, fold: FoldData) -> np.ndarray:
 
 
 def _kept(model: Any) -> tuple[dict[str, bytes], dict[str, Any]]:
-    """The saved model and its equations as files, and a note where a foreign model fails to save or to describe
+    """Files of the saved model and its equations, and a note where a foreign model fails to save or to describe
     itself."""
     files: dict[str, bytes] = {}
     notes: dict[str, Any] = {}
