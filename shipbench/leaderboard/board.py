@@ -1,4 +1,4 @@
-"""A leaderboard as tables, with what is said about them."""
+"""Leaderboard as tables, with its head lines and summary."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ class Board:
     ranking: list[str]
     tables: list[Table]
     head: list[str]
-    """Lines on where the figures come from."""
+    """Lines on the origin of the figures."""
     heading: str = "Leaderboard"
     lead: str = ""
-    """Who is first, by how much, how sure."""
+    """Sentence on the first model, its lead, and the certainty."""
     tiles: Sequence[Tile] = ()
-    """The same in figures, for a page."""
+    """Figures of the same result, for a page."""
     short: Table | None = None
-    """What a terminal shows of the tables."""
+    """Short table for a terminal."""
 
     def __repr__(self) -> str:
         return brief(f"<Board {self.title}: {len(self.tables)} tables; {', '.join(self.ranking)}>")
@@ -39,7 +39,7 @@ class Board:
         return f"{self.heading}: {self.dataset}"
 
     def markdown(self, command: str, plots: Sequence[str] = ()) -> str:
-        """The whole page; `command` is what rendered it, `plots` are image paths relative to it."""
+        """Page as Markdown; `command` is the command that rendered it, `plots` are image paths relative to it."""
         lines = [
             f"# {markdown_text(self.title)}",
             "",
@@ -51,7 +51,7 @@ class Board:
         return "\n".join(["\n".join(lines), *tables[:1], *images, *tables[1:]])
 
     def as_json(self) -> dict[str, Any]:
-        """Everything as plain data."""
+        """Board as plain data."""
         return {
             "dataset": self.dataset,
             "ranking": self.ranking,

@@ -1,5 +1,5 @@
-"""The tables of a leaderboard that say how certain it is: skill, win rate, paired tests, seeds; slices by regime;
-indices of standard manoeuvres."""
+"""Tables on the certainty of a leaderboard: skill, win rate, paired tests, seeds; slices by regime; indices of standard
+manoeuvres."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ from .tables import FEW_RUNS, SIGMA, group_lines
 
 
 def p_text(value: Any) -> str:
-    """A p-value as people read it; a dash where there is none."""
+    """Text of a p-value; a dash where there is none."""
     if value is None or not np.isfinite(value):
         return "-"
     return "<0.001" if value < 0.001 else f"{value:.3f}"
 
 
 def comparison_table(scores: Scores) -> Table:
-    """ED, skill against the baseline, win rate, and whether each model is told apart from the next better one."""
+    """Table of ED, skill against the baseline, win rate, and significance of the difference to the next better
+    model."""
     matched, baseline = scores.matched, scores.baseline
     ranked = scores.ranked
     holm = {frozenset((p.first, p.second)): p.p_holm for p in scores.pairs}
@@ -90,7 +91,7 @@ def comparison_table(scores: Scores) -> Table:
 
 
 def pair_table(scores: Scores) -> Table:
-    """Every two ranked models on the same runs."""
+    """Table of every two ranked models on the same runs."""
     matched = scores.matched
     lines: list[dict[str, Any]] = []
     for pair in scores.pairs:
@@ -125,7 +126,7 @@ def pair_table(scores: Scores) -> Table:
 
 
 def slice_table(scores: Scores) -> Table | None:
-    """ED of every model in slices of what the true ship does, or None where the rows do not tell."""
+    """Table of every model's ED in slices of the true ship's motion, or None where the rows do not state it."""
     windows = scores.windows
     if windows is None or windows.empty:
         return None
@@ -194,7 +195,7 @@ def trial_table(scores: Scores) -> Table | None:
 
 
 def _trial_lines(scores: Scores, windows: Frame, name: str, column: Column) -> list[dict[str, Any]]:
-    """One line for each model, none where no window has the index."""
+    """Lines of the table, one for each model; none where no window has the index."""
     there = windows[windows[name].notna()]
     shown, factor = display_unit(column.unit)
     keys = set(zip(there["fold"], there["run"], strict=True))

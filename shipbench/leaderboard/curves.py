@@ -13,10 +13,10 @@ from .series import POINTS, gather
 
 
 def study_curves(results: Results, dataset: str, models: Sequence[str], points: int = POINTS) -> dict[str, Any]:
-    """What the macros of `templates/study.html.j2` draw of `models`, from saved predictions.
+    """Values that the macros of `templates/study.html.j2` draw for `models`, from saved predictions.
 
     `models` (number, name, stroke), `tracks` (linked plots; no runs where nothing is saved), `growth` (title and SVG,
-    "" where nothing is saved), `left_out` (lines on what is not drawn), `horizon` [s]. At most `points` time steps are
+    "" where nothing is saved), `left_out` (lines on omitted parts), `horizon` [s]. At most `points` time steps are
     drawn.
     """
     summary = next(s for s in results.summaries if s["dataset"] == dataset)

@@ -1,4 +1,5 @@
-"""Which fitted physics does not follow its own training runs, in words for the terminal, the tables and the page."""
+"""Notes on fitted physics that does not fit its own training runs, in words for the terminal, the tables and the
+page."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ MARK = "†"
 
 
 def fit_notes(summaries: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], str]:
-    """By data set and model a note on the worst of its fits that do not follow their runs; none where all do."""
+    """Note by data set and model on the worst of its fits that do not fit their runs; none where all do."""
     fits: dict[tuple[str, str], list[tuple[FitReport, int]]] = {}
     for summary in summaries:
         if (report := _report(summary)) is not None:
@@ -29,7 +30,7 @@ def fit_notes(summaries: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], s
 
 
 def _report(summary: Mapping[str, Any]) -> FitReport | None:
-    """The report of a summary; None where there is none, or where a stranger's summary holds something else."""
+    """Fit report in a summary; None where there is none, or where it is malformed."""
     try:
         return FitReport.from_dict(summary["fit_report"])
     except (KeyError, TypeError, ValueError, AttributeError):

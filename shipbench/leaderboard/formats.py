@@ -1,4 +1,4 @@
-"""A leaderboard as Markdown, LaTeX, CSV and one HTML page."""
+"""Leaderboard as Markdown, LaTeX, CSV and one HTML page."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from .board import Board
 from .html import board_page
 
 FORMATS = {"md": ".md", "latex": ".tex", "csv": ".csv", "html": ".html"}
-"""Name of a format -> suffix of its file."""
+"""File suffix by name of a format."""
 
 
 def check_formats(formats: Sequence[str]) -> None:
-    """Refuse a format that is not known.
+    """Check that all formats are known, and that one is given.
 
     Raises:
-        InputError: as said, or none is given.
+        InputError: they are not, or none is.
     """
     if not formats:
         raise InputError(f"--format: no format is given; accepted: {', '.join(FORMATS)}, several with commas between.")
@@ -35,9 +35,9 @@ def render(
     """Suffix and text of `board` in the format `name`.
 
     Args:
-        board, name, command: the leaderboard, a key of `FORMATS`, and what rendered it.
+        board, name, command: the leaderboard, a key of `FORMATS`, and the command that rendered it.
         images: its plots as files; `folder`: where the page will lie.
-        curves: what the HTML page draws instead of them (`report.curves.study_curves`).
+        curves: values that the HTML page draws instead of them (`report.curves.study_curves`).
     """
     if name == "md":
         text = board.markdown(command, [path.relative_to(folder).as_posix() for path in images])
@@ -51,7 +51,7 @@ def render(
 
 
 def latex(board: Board, command: str) -> str:
-    """Tables for `\\input`; they need the packages booktabs and graphicx."""
+    r"""Tables for LaTeX's `\input`; they need the packages booktabs and graphicx."""
     about = [f"{board.title}. Rendered by: {command}", *board.head]
     parts = [*[f"% {one_line(line)}" for line in about], r"% \usepackage{booktabs,graphicx}", ""]
     for table in board.tables:
@@ -81,8 +81,8 @@ def _latex_tabular(table: Table) -> str:
 
 
 def csv(board: Board) -> str:
-    """One line per figure: data set, table, row (its text cells), figure, value (not rounded), ends of the 95 %
-    interval."""
+    """Lines of CSV, one per figure: data set, table, row (its text cells), figure, value (not rounded), ends of the
+    95 % interval."""
     import pandas as pd
 
     lines = []

@@ -27,16 +27,16 @@ SIGNALS = (
     (F_B, 1e-3, Quantity("F_b", "bow thruster", "kN", 1)),
     (F_S, 1e-3, Quantity("F_s", "stern thruster", "kN", 1)),
 )
-"""Index of the state, factor to the unit that is shown, column. Decimals: finer than an engineer reads off a plot."""
+"""Index of the state, factor to the displayed unit, column. The decimals are finer than a plot can be read."""
 FITTED = (U, V, R, PSI)
-"""Signals whose fit stands beside every model."""
+"""Signals whose fit in percent is shown for every model."""
 
 
 def study_plots(series: Series, rows: Frame, models: Sequence[str], L: float, B: float) -> dict[str, Any]:
-    """The windows of `series` as linked plots; a ship without thrusters has none in the histories.
+    """Linked plots of the windows of `series`; a ship without thrusters has none in the histories.
 
     Args:
-        series: what `gather` read.
+        series: result of `gather`.
         rows: rows of the data set, for the errors beside the plots.
         models: model i of this list has colour and switch i.
         L, B: the ship's length and beam [m].
@@ -75,7 +75,7 @@ def study_plots(series: Series, rows: Frame, models: Sequence[str], L: float, B:
 
 
 def shown(S: np.ndarray, truth: np.ndarray, signals: Sequence[tuple[int, float, Quantity]]) -> dict[str, np.ndarray]:
-    """Columns of states (steps, 6 or 10) by name; the heading on the turn of the true one."""
+    """Columns of states (steps, 6 or 10) by name; the heading is unwrapped to the turn of the true one."""
     turned = S.copy()
     turned[:, PSI] = truth[:, PSI] + wrap_angle(S[:, PSI] - truth[:, PSI])
     return {"east": S[:, Y], "north": S[:, X]} | {q.name: factor * turned[:, i] for i, factor, q in signals}
@@ -94,14 +94,14 @@ def _error(mine: Frame, model: str) -> str:
 
 
 def _median_run(found: Sequence[Frame]) -> int:
-    """The window shown first: the one whose best model has the median error."""
+    """Index of the window shown first: the one whose best model has the median error."""
     sizes = [float(rows.loc[rows["status"] == "ok", "ed"].min()) for rows in found]
     return int(np.argsort(np.nan_to_num(sizes, nan=np.inf), kind="stable")[len(sizes) // 2])
 
 
 def near(predicted: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """States (steps, 6 or 10) without what follows the first position that lies farther off than twice the true track's
-    extent: a model that diverges must not hide the others. The truth may have gaps."""
+    """States (steps, 6 or 10) up to the first position that lies farther off than twice the true track's extent: a
+    model that diverges must not hide the others. The truth may have gaps."""
     known = truth[np.isfinite(truth[:, :2]).all(axis=1), :2]
     reach = 2.0 * float(np.max(np.ptp(known, axis=0), initial=1e-3)) if len(known) else np.inf
     with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""The page of a leaderboard: who is first, intervals of the errors, sortable tables, tracks and time histories."""
+"""HTML page of a leaderboard: result, intervals of the errors, sortable tables, tracks and time histories."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 def board_page(board: Board, command: str, images: Sequence[Path], curves: dict[str, Any] | None) -> str:
-    """The HTML of a leaderboard; it needs no network and no other file.
+    """HTML of a leaderboard; it needs no network and no other file.
 
     Args:
-        board: tables, ranking and lines on where the figures come from.
-        command: what rendered it.
+        board: tables, ranking and lines on the origin of the figures.
+        command: the command that rendered it.
         images: pictures as files, which the page holds where it has no `curves`.
         curves: tracks, time histories and growth of the errors (`report.curves.study_curves`), or None.
     """

@@ -1,5 +1,5 @@
-"""The result of a leaderboard in one or two sentences, in tiles, and in the short table of a terminal: who is first, by
-how much, how sure."""
+"""Result of a leaderboard in one or two sentences, in tiles, and in the short table of a terminal: best model, its
+lead, significance."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .scores import Scores
 from .statistics import Pair
 
 _CERTAIN = 0.05
-"""p (after Holm) below which two models are told apart."""
+"""p-value (after Holm) below which the difference of two models is significant."""
 
 
 def lead(scores: Scores) -> str:
-    """Who is first, by how much against the second, and how sure."""
+    """Sentences on the best model, its lead over the second, and the significance."""
     ranked = [model for model in scores.ranked if scores.shares[model][0]]
     if not ranked:
         return "No model has a score; the reasons stand in the table Status and cost, in Python in scores.results.rows."
@@ -34,7 +34,8 @@ def lead(scores: Scores) -> str:
 
 
 def lead_tiles(scores: Scores, horizon: float) -> list[Tile]:
-    """The first two models, their difference, windows, and what was not scored; `horizon` [s] is predicted."""
+    """Tiles of the first two models, their difference, windows, and windows without a score; `horizon` [s] is
+    predicted."""
     errors, found = scores.figures("ed"), []
     ranked = [model for model in scores.ranked if scores.shares[model][0]]
     for label, model in zip(("First", "Second"), ranked, strict=False):
@@ -76,7 +77,7 @@ def _certainty(scores: Scores, first: str, second: str) -> str:
 
 
 def _p(scores: Scores, pair: Pair) -> str:
-    """The p of a pair; of several pairs it is Holm's, which says more caution than the interval beside it."""
+    """Text of a pair's p-value; of several pairs it is Holm's, which is more cautious than the interval beside it."""
     value = "p < 0.001" if pair.p_holm < 0.001 else f"p = {pair.p_holm:.3f}"
     pairs = sum(np.isfinite(p.p) for p in scores.pairs)
     return f"{value} (after Holm for {pairs} pairs)" if pairs > 1 else value
@@ -96,7 +97,7 @@ def _runs(scores: Scores) -> str:
 
 
 def short_table(full: Table) -> Table:
-    """The means of the table of errors alone, without the notes on how the other figures are made."""
+    """Table of mean errors alone, without the notes on the other figures."""
     columns = [c for c in full.columns if c.format is None or c.key.endswith("_mean")]
     return replace(
         full,

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The table and page of a learning curve, and the cells that failed with their reasons."""
+    """Table and page of a learning curve, and the cells that failed with their reasons."""
 
     board: Board
     page: Path
@@ -112,14 +112,16 @@ def _board(found: dict[int, Scores], last: Board) -> Board:
 
 
 def _figures(scores: Scores, model: str) -> dict[str, float]:
-    """ED [m] and the ends of its interval; not-a-number where a run has no score, which would flatter the model."""
+    """ED [m] and the ends of its interval; NaN where a run has no score, since leaving it out would favour the
+    model."""
     scored, expected = scores.shares[model]
     figures = scores.figures("ed")[model] if scored == expected else {}
     return {end: figures.get(f"ed_mean{end}", float("nan")) for end in ("", "_low", "_high")}
 
 
 def draw(found: dict[int, Scores], dataset: str) -> Figure:
-    """ED against the number of training runs, one line with its 95 % band for each model; both axes logarithmic."""
+    """Figure of ED against the number of training runs, one line with its 95 % band for each model; both axes
+    logarithmic."""
     from .plots import new_figure, plain, short_name, style
 
     models = next(iter(found.values())).models

@@ -1,5 +1,5 @@
-"""All data sets of a study beside one another: mean rank, win rate, skill, and a critical-difference diagram where
-there are enough data sets."""
+"""Comparison over all data sets of a study: mean rank, win rate, skill, and a critical-difference diagram where there
+are enough data sets."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ ALPHA = 0.05
 
 
 def data_sets_needed(models: int) -> int:
-    """Fewest data sets with which a paired rank test can tell any two of `models` apart at 5 % after Bonferroni or
-    Holm.
+    """Fewest data sets with which a paired rank test can find a significant difference between any two of `models` at 5
+    % after Bonferroni or Holm.
 
     Wilcoxon's signed-rank test on n data sets has no two-sided p below 2 / 2^n; of k (k - 1) / 2 pairs the first must
     stay below 0.05 / pairs.
@@ -35,7 +35,7 @@ def data_sets_needed(models: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Overall:
-    """The page over all data sets, and what its diagram is drawn from: ED (data sets, models)."""
+    """Page over all data sets, and the data of its diagram: ED (data sets, models)."""
 
     board: Board
     models: list[str]
@@ -47,8 +47,8 @@ class Overall:
         return len(self.errors) >= data_sets_needed(len(self.models)) and not not_installed(["scikit_posthocs"])
 
     def draw(self, folder: Path) -> Path:
-        """The critical-difference diagram: mean ranks; a bar joins models that Wilcoxon's test does not tell apart (p
-        after Holm).
+        """Draw the critical-difference diagram: mean ranks; a bar joins models without a significant difference
+        (Wilcoxon's p after Holm).
 
         Source: Demsar (2006), J. Mach. Learn. Res. 7; pairwise tests instead of Nemenyi's: Benavoli et al. (2016), J.
         Mach. Learn. Res. 17.
@@ -62,7 +62,8 @@ class Overall:
         return save(figure, folder / "critical-difference.png")
 
     def p_values(self) -> Any:
-        """p of every two models over data sets, Wilcoxon's signed-rank test after Holm; a DataFrame by short name."""
+        """p-value of every two models over data sets, Wilcoxon's signed-rank test after Holm; a DataFrame by short
+        name."""
         import scikit_posthocs as posthocs
 
         from .plots import short_name as in_legend
@@ -93,8 +94,8 @@ def _ranks(errors: np.ndarray) -> np.ndarray:
 
 
 def over_data_sets(sets: Sequence[Scores]) -> Overall | None:
-    """The page over several data sets, for the ranked models that have every score on all of them; None for one data
-    set or one such model."""
+    """Page over several data sets, for the ranked models that have every score on all of them; None for one data set or
+    one such model."""
     if len(sets) < 2:
         return None
     models = [m for m in sets[0].ranked if all(m in s.matched.complete for s in sets)]
@@ -157,7 +158,7 @@ def _table(sets: Sequence[Scores], models: list[str], errors: np.ndarray, baseli
 
 
 def _lead(table: Table, count: int) -> str:
-    """Who has the best mean rank, and who follows."""
+    """Sentence on the model of best mean rank and the next one."""
     first, second = table.rows[:2]
     return (
         f"'{first['model']}' has the best mean rank over {count} data sets: {_rank(first)}. '{second['model']}' is "
@@ -182,7 +183,7 @@ def _rank(row: dict[str, Any]) -> str:
 
 
 def _with_diagram(table: Table, overall: Overall) -> Table:
-    """The table with a note on the diagram."""
+    """Table with a note on the diagram."""
     count, needed = len(overall.errors), data_sets_needed(len(overall.models))
     if count < needed:
         note = (

@@ -1,4 +1,4 @@
-"""The leaderboard of a data set, rendered from saved rows only."""
+"""Leaderboard of a data set, rendered from saved rows only."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ SPLITS = {
              "of manoeuvre left out of training"),
     "speed": "trained on the slower runs, scored on the fastest",
 }  # fmt: skip
-"""How a page names the split of a task."""
+"""Description of the split of a task on a page."""
 
 
 def build_board(results: Results, dataset: str, baseline: str | None = None) -> Board:
-    """The leaderboard of `dataset`; skill is counted from the model `baseline` (default: `hold`, where it is there).
+    """Leaderboard of `dataset`; skill is relative to the model `baseline` (default: `hold`, where it is there).
 
     Raises:
         InputError: the rows are of different protocols, data (fingerprints) or tasks, which are never ranked together;
@@ -43,7 +43,7 @@ def build_board(results: Results, dataset: str, baseline: str | None = None) -> 
 
 
 def scores_of(results: Results, dataset: str, baseline: str | None = None) -> Scores:
-    """The rows of `dataset` with what its tables are made from.
+    """Scores of the rows of `dataset`, from which its tables are made.
 
     Raises:
         InputError: as `build_board`.
@@ -92,7 +92,7 @@ def _board(scores: Scores, summaries: list[dict[str, Any]]) -> Board:
 
 
 def _marked(table: Table, dataset: str, summaries: list[dict[str, Any]]) -> Table:
-    """The table with a mark and a note at every model whose physics does not follow its own training runs."""
+    """Table with a mark and a note at every model whose physics does not fit its own training runs."""
     notes = {model: note for (name, model), note in fit_notes(summaries).items() if name == dataset}
     if not notes:
         return table
@@ -226,6 +226,6 @@ def _curves(results: Results, board: Board) -> dict[str, Any]:
 def _write(
     board: Board, form: str, command: str, images: Sequence[Path], out: Path, curves: dict[str, Any] | None
 ) -> Path:
-    """The page in one format, in one step."""
+    """Write the page in one format, atomically."""
     suffix, text = render(board, form, command, images, out, curves)
     return write_text(out / f"{file_name(board.dataset)}{suffix}", text)

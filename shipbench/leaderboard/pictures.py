@@ -1,8 +1,8 @@
-"""The still pictures of a page: growth of the error, errors in slices of the truth; each as the content of one SVG
+"""Static pictures of a page: growth of the error, errors in slices of the truth; each as the content of one SVG
 element.
 
-What belongs to model number i carries `data-m="i"`, by which the page shows and hides it. No name from the data enters
-a picture.
+Elements of model number i carry `data-m="i"`, by which the page shows and hides them. No name from the data enters a
+picture.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ _WIDTH, _HEIGHT = 400.0, 330.0
 
 
 def growth(series: Series, models: Sequence[str], which: int, ylabel: str) -> str:
-    """Error (0: position, 1: heading) against time: median of the windows and the band between the quartiles."""
+    """Picture of the error (0: position, 1: heading) against time: median of the windows and the band between the
+    quartiles."""
     found = {
         m: np.nanquantile(series.errors[m][which], [0.25, 0.5, 0.75], axis=0) for m in models if m in series.errors
     }
@@ -41,7 +42,7 @@ def growth(series: Series, models: Sequence[str], which: int, ylabel: str) -> st
 
 
 def slices(regime: Regime, models: Sequence[str]) -> str:
-    """Mean error of every model in the slices of one feature."""
+    """Picture of the mean error of every model in the slices of one feature."""
     values = {
         m: np.array(regime.values[m]) for m in models if m in regime.values and np.isfinite(regime.values[m]).any()
     }

@@ -42,8 +42,8 @@ _DASHES: dict[str, Any] = {
 
 @dataclass(frozen=True, eq=False)
 class _Prediction:
-    """One model's scored windows of one cell: ids, s0 (batch, 10), truth and S (batch, K, 10), which of them are
-    scored."""
+    """Scored windows of one model and cell: ids, s0 (batch, 10), truth and S (batch, K, 10), and a mask of those that
+    are scored."""
 
     ids: tuple[str, ...]
     s0: np.ndarray
@@ -53,7 +53,7 @@ class _Prediction:
 
 
 def _predictions(results: Results, dataset: str, model: str) -> Iterator[_Prediction]:
-    """The cells of a model that hold predictions; of several seeds the first."""
+    """Cells of a model that hold predictions; of several seeds the first."""
     found = [
         (s, p)
         for s, p in zip(results.summaries, results.sources, strict=True)
@@ -80,13 +80,13 @@ def _readable(results: Results, dataset: str, model: str) -> bool:
 
 
 def short_name(model: str) -> str:
-    """A spec that fits a legend: no folders, at most 28 characters."""
+    """Spec shortened for a legend: no folders, at most 28 characters."""
     name = Path(model).name if "/" in model else model
     return plain(name if len(name) <= 28 else f"{name[:25]}...")
 
 
 def plain(text: str) -> str:
-    """Text for matplotlib, which would take what stands between dollar signs for a formula."""
+    """Text with dollar signs escaped: matplotlib would read a formula between them."""
     return shown(text).replace("$", r"\$")
 
 
@@ -107,7 +107,7 @@ def style(models: Sequence[str]) -> dict[str, dict[str, Any]]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """A figure on the Agg canvas, without pyplot's global state."""
+    """Figure on the Agg canvas, without pyplot's global state."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -117,7 +117,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure in one step and return its path."""
+    """Write a figure atomically and return its path."""
     with in_one_step(path, suffix=path.suffix) as part:
         figure.savefig(part)
     return path
@@ -142,7 +142,7 @@ def draw_all(
     tell: Callable[[str], None] = lambda line: None,
 ) -> list[Path]:
     """Draw every plot of a data set into `folder`. Models without a single scored run are left out, and those without
-    saved predictions, of which `tell` gets one line."""
+    saved predictions; `tell` gets one line on the latter."""
     rows = results.rows[results.rows["dataset"] == dataset]
     models, without = drawable(results, dataset, ranking)
     if without:
@@ -163,8 +163,8 @@ def draw_all(
 
 
 def choose_runs(rows: Frame, models: Sequence[str]) -> dict[str, str]:
-    """A good, a median and a bad run: the 10, 50 and 90 % points of the models' median ED (floor and ceiling left
-    out)."""
+    """Names of a good, a median and a bad run: the 10, 50 and 90 % points of the models' median ED (baseline and oracle
+    left out)."""
     compared = [m for m in models if m not in ("hold", "oracle")] or list(models)
     scored = rows[(rows["status"] == "ok") & rows["model"].isin(compared)]
     order = scored.groupby("run")["ed"].median().sort_values().index
@@ -184,8 +184,8 @@ def outline(x: float, y: float, psi: float, L: float, B: float) -> np.ndarray:
 def tracks(
     results: Results, dataset: str, models: Sequence[str], summary: dict[str, Any], runs: Sequence[str] = ()
 ) -> Figure:
-    """Tracks of `runs`, or of a good, a median and a bad one; the true ship every quarter of the horizon, the predicted
-    ones at its end."""
+    """Figure of the tracks of `runs`, or of a good, a median and a bad one; the true ship every quarter of the horizon,
+    the predicted ones at its end."""
     rows = results.rows[results.rows["dataset"] == dataset]
     chosen = {plain(run): run for run in runs} or {
         f"{name} run: {plain(run)}": run for name, run in choose_runs(rows, models).items()
@@ -236,7 +236,7 @@ def _track(
     linestyle: Any,
     fill: bool = False,
 ) -> None:
-    """One line from s0 through the states, with ships; the true track (`fill`) is drawn once per axis."""
+    """Draw one line from s0 through the states, with ships; the true track (`fill`) is drawn once per axis."""
     if label == "true" and label in axis.get_legend_handles_labels()[1]:
         return
     path = np.concatenate([s0[None], states])
@@ -263,7 +263,7 @@ def _track(
 
 
 def _readable_limits(axis: Axes, groups: Sequence[np.ndarray]) -> None:
-    """Linear from zero, or logarithmic where the models' medians lie more than a factor of 12 apart."""
+    """Set axes linear from zero, or logarithmic where the models' medians lie more than a factor of 12 apart."""
     medians = np.array([np.median(g) for g in groups])
     positive = medians[medians > 0]
     if len(positive) and positive.max() > 12 * positive.min():
@@ -309,7 +309,7 @@ def boxes(rows: Frame, models: Sequence[str], summary: dict[str, Any]) -> Figure
 
 
 def against_horizon(results: Results, dataset: str, models: Sequence[str], dt: float) -> Figure:
-    """Position error against time: median over runs, with the band between the quartiles."""
+    """Figure of the position error against time: median over runs, with the band between the quartiles."""
     figure = new_figure(8.6, 5.4)
     axis = figure.subplots()
     styles = style(models)

@@ -1,5 +1,4 @@
-"""The scores of one data set as all tables of its leaderboard use them: statistics with intervals, ranking, matched
-errors."""
+"""Scores of one data set for all tables of its leaderboard: statistics with intervals, ranking, matched errors."""
 
 from __future__ import annotations
 
@@ -16,11 +15,11 @@ from .statistics import Bootstrap, Matched, Pair, interval
 STATISTICS = ("mean", "median", "std", "iqr")
 CEILING = "oracle"
 FLOOR = "hold"
-"""The baseline of the skill where none is named."""
+"""Baseline of the skill where none is given."""
 
 
 def cluster_of(rows: Frame) -> Frame:
-    """The unit of resampling of each row: the group of runs where rows tell it, else the run that the window was cut
+    """Unit of resampling of each row: the group of runs where rows state it, else the run that the window was cut
     from."""
     if "group" not in rows:
         return rows["parent"]
@@ -30,9 +29,11 @@ def cluster_of(rows: Frame) -> Frame:
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Rows of one data set; `columns` are the numeric columns by name; `windows` tells what the true ship does (or
-    None); `asked_baseline`: the model that skill is counted from, where one was named; `beside_paper`: the source
-    paper's figures are of such a task."""
+    """Rows of one data set.
+
+    `columns`: the numeric columns by name. `windows`: motion of the true ship (or None). `asked_baseline`: model that
+    skill is relative to, where one was given. `beside_paper`: the source paper's figures are of such a task.
+    """
 
     dataset: str
     rows: Frame
@@ -43,7 +44,7 @@ class Scores:
 
     @cached_property
     def boot(self) -> Bootstrap:
-        """Draws of runs, the same for every table."""
+        """Resamples of runs, the same for every table."""
         return Bootstrap(self.rows["cluster"].tolist())
 
     @cached_property
@@ -53,7 +54,7 @@ class Scores:
 
     @cached_property
     def shares(self) -> dict[str, tuple[int, int]]:
-        """Model -> (scored rows, expected rows): every window that any model was given, times the model's seeds."""
+        """Scored and expected rows by model: every window that any model was given, times the model's seeds."""
         windows = len(self.rows[["fold", "run"]].drop_duplicates())
         return {
             str(model): (int((part["status"] == "ok").sum()), max(len(part), windows * part["seed"].nunique()))
@@ -73,12 +74,12 @@ class Scores:
 
     @property
     def ranked(self) -> list[str]:
-        """Models that have a rank: all but the ceiling."""
+        """Models that have a rank: all but the oracle."""
         return [m for m in self.models if m != CEILING]
 
     @property
     def baseline(self) -> str | None:
-        """The model that skill is counted from, or None where the default one is not there.
+        """Model that skill is relative to, or None where the default one is not there.
 
         Raises:
             InputError: the one that was asked for is not among the models.
@@ -92,8 +93,7 @@ class Scores:
 
     @cached_property
     def _cells(self) -> dict[str, tuple[Frame, np.ndarray, np.ndarray]]:
-        """Of each model its scored rows, their runs as places in `boot`, and the number of their cell (fold and
-        seed)."""
+        """Scored rows of each model, their runs as places in `boot`, and the number of their cell (fold and seed)."""
         found = {}
         for model in self.shares:
             part = self.scored[self.scored["model"] == model]
@@ -110,8 +110,8 @@ class Scores:
         return values, codes, [np.flatnonzero(cells == cell) for cell in np.unique(cells)]
 
     def means(self, column: str) -> dict[str, dict[str, float]]:
-        """By model the statistics over the runs of a fold, then their mean over folds and seeds (sigma: n - 1; IQR:
-        linear quantiles)."""
+        """Statistics by model over the runs of a fold, then their mean over folds and seeds (sigma: n - 1; IQR: linear
+        quantiles)."""
         return {model: self._means(*self._values(column, model)) for model in self.shares}
 
     @staticmethod
@@ -130,7 +130,7 @@ class Scores:
     def figures(
         self, column: str, statistics: tuple[str, ...] = ("mean",), factor: float = 1.0
     ) -> dict[str, dict[str, float]]:
-        """By model `column_statistic`, `.._low` and `.._high` with the 95 % interval over runs, for tables."""
+        """Table values by model: `column_statistic`, `.._low` and `.._high` with the 95 % interval over runs."""
         found: dict[str, dict[str, float]] = {}
         for model in self.shares:
             values, codes, places = self._values(column, model)
@@ -154,7 +154,8 @@ class Scores:
     def _replicates(
         self, values: np.ndarray, codes: np.ndarray, places: list[np.ndarray], statistics: tuple[str, ...]
     ) -> np.ndarray:
-        """(resamples, statistics) of one model's values, with the weights of the means over folds and seeds."""
+        """Replicates (resamples, statistics) of one model's values, with the weights of the means over folds and
+        seeds."""
         weights = np.empty(len(values))
         for at in places:
             weights[at] = 1.0 / len(at)
@@ -185,10 +186,10 @@ class Scores:
 
     @cached_property
     def pairs(self) -> list[Pair]:
-        """Every two ranked models that are complete, on the same windows."""
+        """Comparisons of every two ranked models that are complete, on the same windows."""
         return self.matched.pairs(self.ranked)
 
     def values(self, column: str, model: str) -> dict[str, Any]:
-        """Mean of `column` of each seed of a model, as the ranking counts it."""
+        """Mean of `column` for each seed of a model, with the weights of the ranking."""
         part = self.scored[self.scored["model"] == model]
         return dict(part.groupby(["seed", "fold"])[column].mean().groupby("seed").mean())

@@ -1,4 +1,4 @@
-"""What the pictures of a page are drawn from, read from saved predictions and thinned so that the page stays small."""
+"""Data of the pictures of a page, read from saved predictions and thinned so that the page stays small."""
 
 from __future__ import annotations
 
@@ -18,20 +18,19 @@ from ..records import Batch
 from ..signals import PSI, wrap_angle
 
 POINTS = 80_000
-"""Time steps of all models and runs of one page together; one takes some 31 characters (11 columns), beside Plotly's
-1.2 MB: a page of 8 models and 90 runs takes 3.6 MB and its tables."""
+"""Most time steps of all models and runs of one page together; one takes about 31 characters (11 columns)."""
 _MOST, _LEAST = 121, 25
-"""Time steps of one run: no more than are seen, no fewer than a track can be followed by."""
+"""Most and fewest time steps of one run: no more than are visible, no fewer than show the track."""
 _WINDOW = 50
-"""What ships and texts of one run take, in time steps."""
+"""Size of the ships and texts of one run, in time steps."""
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One window: `t` (steps,) [s], `truth` and each model's prediction (steps, 10), order and units of
-    `signals.STATES`, the first row at s0.
+    """Window: `t` (steps,) [s], `truth` and each model's prediction (steps, 10), order and units of `signals.STATES`,
+    the first row at s0.
 
-    `fits`: of each model the fit of every signal (10,) [%], over all time steps of the window.
+    `fits`: by model the fit of every signal (10,) [%], over all time steps of the window.
     """
 
     run: str
@@ -43,8 +42,11 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Of one data set: `t` (knots,) [s]; tracks by window; errors of each model by window, position [m] and heading
-    [deg], (windows, knots); `left_out`: lines on what is not drawn."""
+    """Series of one data set.
+
+    `t` (knots,) [s]; tracks by window; errors of each model by window, position [m] and heading [deg], (windows,
+    knots); `left_out`: lines on omitted parts.
+    """
 
     t: np.ndarray
     tracks: list[Track]
@@ -93,7 +95,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 class _Reading:
-    """Gathers cell by cell, so that only thinned predictions stay in memory."""
+    """Reader that gathers cell by cell, so that only thinned predictions stay in memory."""
 
     def __init__(self, chosen: set[str], most: int) -> None:
         self.chosen, self.most, self.thinned = chosen, most, 0
@@ -165,5 +167,5 @@ class _Reading:
 
 
 def _thin(count: int, most: int) -> np.ndarray:
-    """Indices of at most `most` of `count` knots, evenly spread, with the first and the last."""
+    """Indices of at most `most` of `count` time steps, evenly spread, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))

@@ -24,8 +24,7 @@ class Regime:
 
 
 def regime_errors(rows: Frame, windows: Frame | None, models: Sequence[str]) -> list[Regime]:
-    """Of every regime in which the windows differ. rows: of one data set; windows: what `Results.windows` tells of
-    it."""
+    """Errors in every regime in which the windows differ. rows: of one data set; windows: `Results.windows` of it."""
     if windows is None:
         return []
     scored = rows[rows["status"] == "ok"]

@@ -1,9 +1,9 @@
-"""Honest uncertainty: intervals, paired tests and win rates by a bootstrap over runs.
+"""Uncertainty by a bootstrap over runs: intervals, paired tests and win rates.
 
-The unit that is drawn is the run (the cluster): windows of one run are drawn together, since they share a ship, a day
-and a manoeuvre. Folds are no unit: five of them can never reach p < 0.0625. The same draws serve every model and every
-table, so that differences are paired. Several seeds of a model stand inside the run and are averaged there: intervals
-are over runs, for the seeds that were run; the spread over seeds has its own column.
+The resampling unit is the run (the cluster): windows of one run are drawn together, since they share a ship, a day and
+a manoeuvre. Folds are no unit: five of them can never reach p < 0.0625. The same draws serve every model and every
+table, so that differences are paired. Several seeds of a model are averaged within the run: intervals are over runs,
+for the seeds that were run; the spread over seeds has its own column.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ import numpy as np
 RESAMPLES = 4999
 LEVEL = 0.95
 DRAW_SEED = 0
-"""Of the resampling alone, fixed so that a page rendered twice is the same page."""
+"""Seed of the resampling alone, fixed so that a page rendered twice is the same page."""
 _CELLS = 200_000
-"""Of a block of resamples: 1.6 MB."""
+"""Number of values in a block of resamples: 1.6 MB."""
 
 
 class Bootstrap:
-    """Resamples of the runs of one data set: `counts` (resamples, runs), how often each run is drawn."""
+    """Resamples of the runs of one data set: `counts` (resamples, runs), the number of draws of each run."""
 
     def __init__(self, clusters: Sequence[str], resamples: int = RESAMPLES, seed: int = DRAW_SEED) -> None:
         self.names = sorted(set(clusters))
@@ -35,7 +35,7 @@ class Bootstrap:
         self._index = {name: i for i, name in enumerate(self.names)}
 
     def codes(self, clusters: Sequence[str]) -> np.ndarray:
-        """Place of each name in `names`, (n,)."""
+        """Index of each name in `names`, (n,)."""
         return np.array([self._index[name] for name in clusters], dtype=int)
 
     def totals(self, codes: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -64,7 +64,8 @@ class Bootstrap:
         )
 
     def p_value(self, differences: np.ndarray, weights: np.ndarray) -> float:
-        """Two-sided p of no mean difference, by the symmetric bootstrap-t over runs; never below 1 / (resamples + 1).
+        """Two-sided p-value of no mean difference, by the symmetric bootstrap-t over runs; never below 1 / (resamples +
+        1).
 
         Args:
             differences: (runs,) weighted sums of the differences in each run.
@@ -94,20 +95,20 @@ class Bootstrap:
 
 
 def _blocks(rows: int, columns: int) -> Iterator[slice]:
-    """The rows of a table in blocks that stay in the processor's cache."""
+    """Slices of a table's rows in blocks that stay in the processor's cache."""
     step = max(8, _CELLS // max(columns, 1) // 8 * 8)
     return (slice(start, min(start + step, rows)) for start in range(0, rows, step))
 
 
 def _spread(drawn: np.ndarray, ordered: np.ndarray) -> np.ndarray:
-    """As `Bootstrap.spread`, of `ordered` (n,), each drawn as often as `drawn` (resamples, n) tells."""
+    """Spread as in `Bootstrap.spread`, of `ordered` (n,), each drawn as often as `drawn` (resamples, n) states."""
     reached = np.cumsum(drawn, axis=1)
     total = reached[:, -1]
     apart = np.arange(len(total)) * (total.max() + 1.0)  # makes of all rows one ascending list, to be searched at once
     ascending = (reached + apart[:, None]).ravel()
 
     def at(edge: np.ndarray) -> np.ndarray:
-        """The value of that rank in each resample."""
+        """Value of that rank in each resample."""
         place = np.searchsorted(ascending, edge + apart, side="right") - np.arange(len(total)) * len(ordered)
         return ordered[np.minimum(place, len(ordered) - 1)]
 
@@ -133,10 +134,10 @@ def _tail(clusters: int) -> float:
 
 
 def interval(replicates: np.ndarray, clusters: int) -> tuple[float, float]:
-    """The 95 % interval of `replicates` (resamples,) that were drawn from `clusters` runs; not-a-number for fewer than
-    two runs.
+    """95 % interval of `replicates` (resamples,) that were drawn from `clusters` runs; NaN for fewer than two runs.
 
     Percentiles, widened for few runs: the level is that of sqrt(n / (n - 1)) t(n - 1) instead of the normal quantile.
+
     Source: Hesterberg (2015), What teachers should know about the bootstrap, section 5.2 (expanded percentile
     interval).
     """
@@ -150,8 +151,8 @@ def interval(replicates: np.ndarray, clusters: int) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two models on the same windows: mean error of `first` less that of `second`, its interval, in how many windows
-    `first` is better, and p."""
+    """Two models on the same windows: mean error of `first` less that of `second`, its interval, the number of windows
+    in which `first` is better, and the p-value."""
 
     first: str
     second: str
@@ -166,11 +167,10 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """Errors of every model on the same windows, (windows, models), seeds averaged; not-a-number where a model has no
-    score.
+    """Errors of every model on the same windows, (windows, models), seeds averaged; NaN where a model has no score.
 
-    `weights` (windows,) make the weighted mean the mean over folds of the fold means. `codes` (windows,) tell which run
-    each window is of.
+    `weights` (windows,) make the weighted mean the mean over folds of the fold means. `codes` (windows,) are the runs
+    of the windows.
     """
 
     models: list[str]
@@ -206,8 +206,8 @@ class Matched:
         return len(np.unique(self.codes))
 
     def skill(self, model: str, baseline: str) -> tuple[float, float, float]:
-        """1 - error / error of `baseline` with its interval; not-a-number unless both are complete and the baseline
-        errs."""
+        """Skill 1 - error / error of `baseline` with its interval; NaN unless both are complete and the baseline has an
+        error."""
         if not {model, baseline} <= set(self.complete) or not self.mean(baseline) > 0:
             return (float("nan"),) * 3
         drawn = self.means([model, baseline])
@@ -229,8 +229,8 @@ class Matched:
         return (float(np.average(won, weights=self.weights)), *interval(drawn, self.clusters))
 
     def pairs(self, models: Sequence[str]) -> list[Pair]:
-        """Every two of `models` that are complete, in the order given; p adjusted over all of them after Holm
-        (1979)."""
+        """Comparisons of every two of `models` that are complete, in the order given; p adjusted over all of them after
+        Holm (1979)."""
         from statsmodels.stats.multitest import multipletests
 
         names = [m for m in models if m in self.complete]

@@ -31,12 +31,12 @@ STYLE = """
 img { max-width: 100%; height: auto; background: #fff; }
 """
 _EDGE = 3.0
-"""Percent of the width that are free on either side, for the numbers at the ends of the axis."""
+"""Margin on either side, in percent of the width, for the numbers at the ends of the axis."""
 
 
 @dataclass(frozen=True)
 class _Scale:
-    """Places along a strip, in percent of its width."""
+    """Positions along a strip, in percent of its width."""
 
     low: float
     high: float
@@ -49,8 +49,8 @@ class _Scale:
 
 
 def strips(table: Table) -> list[dict[str, Any]]:
-    """One drawing for each column of `TITLES` that the table has: `title`, `rows` (model, text, svg) and the svg of the
-    `axis`.
+    """Drawings, one for each column of `TITLES` that the table has: `title`, `rows` (model, text, svg) and the svg of
+    the `axis`.
 
     A row's mean is a dot, its 95 % interval a bar; a pale band is the middle half of the runs, where the row holds it.
     """

@@ -1,5 +1,5 @@
-"""The tables of scores of a leaderboard: the paper's Table III, errors against horizon, of signals and kinds of
-manoeuvre, status and cost."""
+"""Tables of scores of a leaderboard: the paper's Table III, errors against horizon, of signals and kinds of manoeuvre,
+status and cost."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ PAPER = {
 }
 PAPER_DATASET = "harbour90"
 FEW_RUNS = 10
-"""Below that a page says that intervals and p are rough; nothing else depends on it."""
+"""Number of runs below which a page says that intervals and p-values are rough; it changes nothing else."""
 
 
 def table_iii(scores: Scores) -> Table:
-    """Mean, median, spread and interquartile range of ED, EDH and cVDM."""
+    """Table of mean, median, spread and interquartile range of ED, EDH and cVDM."""
     columns, shares = scores.columns, scores.shares
     metrics = [m for m in TABLE_III if m in columns]
     figures = {m: scores.figures(m, STATISTICS) for m in metrics}
@@ -94,7 +94,7 @@ def table_iii(scores: Scores) -> Table:
 
 
 def claim(scores: Scores) -> Table:
-    """How far `physics` lies below `mlp`, beside the paper's two rows."""
+    """Table of the error of `physics` relative to `mlp`, beside the paper's two rows."""
     here: dict[str, Any] = {"where": "here"}
     there: dict[str, Any] = {"where": "paper", "_reference": True}
     for metric in (m for m in TABLE_III if m in scores.rows):
@@ -112,7 +112,7 @@ def claim(scores: Scores) -> Table:
 
 
 def _mean_table(title: str, scores: Scores, chosen: list[dict[str, str]], notes: Sequence[str] = ()) -> Table:
-    """Mean over folds of the fold means of the `chosen` columns, in units that people read."""
+    """Table of the mean over folds of the fold means of the `chosen` columns, in the units of display."""
     units = {c["name"]: display_unit(c["unit"]) for c in chosen}
     figures = {c["name"]: scores.figures(c["name"], factor=units[c["name"]][1]) for c in chosen}
     lines: list[dict[str, Any]] = []
@@ -130,7 +130,7 @@ def _mean_table(title: str, scores: Scores, chosen: list[dict[str, str]], notes:
 
 
 def horizon_table(scores: Scores) -> Table:
-    """Position error at fixed times, at the end, over the run; heading error."""
+    """Table of the position error at fixed times, at the end, over the run; heading error."""
     at_times = [c for n, c in scores.columns.items() if n.startswith("ed_at_")]
     chosen = at_times + [scores.columns[n] for n in _WHOLE_RUN if n in scores.columns]
     note = (
@@ -141,14 +141,14 @@ def horizon_table(scores: Scores) -> Table:
 
 
 def signal_table(scores: Scores) -> Table:
-    """Every other column: the error of each signal in its own unit."""
+    """Table of all other columns: the error of each signal in its own unit."""
     rest = [c for n, c in scores.columns.items() if n not in _NO_SIGNAL and not n.startswith("ed_at_")]
     note = "Mean over runs and folds of the root mean square over the run, each in its own unit."
     return _mean_table("Error of each signal", scores, rest, [note])
 
 
 def kind_table(scores: Scores) -> Table:
-    """Mean over the windows of each kind of manoeuvre."""
+    """Table of the mean over the windows of each kind of manoeuvre."""
     metric = scores.columns.get("position_rmse", scores.columns["ed"])
     counts = scores.rows.drop_duplicates(["fold", "run"])["kind"].value_counts()
     kinds = sorted(counts.index)
@@ -165,8 +165,7 @@ def kind_table(scores: Scores) -> Table:
 
 
 def group_lines(scores: Scores, column: str, members: dict[str, Any]) -> list[dict[str, Any]]:
-    """By model the mean of `column` over the rows of each group (name -> mask of the rows), with intervals over
-    runs."""
+    """Mean of `column` by model over the rows of each group (name -> mask of the rows), with intervals over runs."""
     lines = []
     models, scored = scores.rows["model"].to_numpy(), (scores.rows["status"] == "ok").to_numpy()
     values, codes = scores.rows[column].to_numpy(float), scores.boot.codes(scores.rows["cluster"].tolist())
@@ -185,8 +184,8 @@ def group_lines(scores: Scores, column: str, members: dict[str, Any]) -> list[di
 
 
 def status_table(scores: Scores, parameters: dict[str, float]) -> Table:
-    """Statuses with their reasons, and what a model costs: seconds of a fit, of a rollout, numbers that the fit found
-    (`parameters`)."""
+    """Table of statuses with their reasons, and the cost of a model: time of a fit and of a rollout [s], number of
+    fitted parameters (`parameters`)."""
     lines, notes = [], []
     for model in scores.models:
         part = scores.rows[scores.rows["model"] == model]

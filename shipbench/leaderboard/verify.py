@@ -1,5 +1,5 @@
-"""What a page shows, computed again: scores and windows from the saved predictions and truth, the rest from the data
-set where it is at hand."""
+"""Verification of a page by recomputation: scores and windows from the saved predictions and truth, the rest from the
+data set where it is available."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from ..specs import parse_spec
 from ..storage import Frame
 
 TOLERANCE = 1e-9
-"""Relative difference of a figure that another processor's rounding can make."""
+"""Relative difference of a figure that rounding on another processor can make."""
 
 
 def verify(results: Results) -> tuple[list[str], list[str]]:
-    """Compute again all that a page shows.
+    """Compute all values of a page again.
 
     Scores, statuses with their reasons and the windows come from the saved predictions and truth; the numbers of
-    parameters from the saved models of shipbench's own kinds; truth, ship, runs and what they are called from the data
-    set, where it is at hand.
+    parameters from the saved models of shipbench's own kinds; truth, ship, runs and their names from the data set,
+    where it is available.
 
     Returns:
-        One line on each figure that differs, and notes on what could not be computed again.
+        One line on each figure that differs, and notes on those that could not be computed again.
 
     Raises:
         InputError: a folder has no saved predictions or truth, or they cannot be read.
@@ -114,7 +114,7 @@ def _compare_scores(summary: dict[str, Any], cell: Cell, own: Frame, batch: Batc
 
 @dataclass(eq=False)
 class _Found:
-    """What differs and what could not be checked; every data set, truth and fold is looked at once."""
+    """Differences, and values that could not be checked; every data set, truth and fold is checked once."""
 
     differences: list[str] = field(default_factory=list)
     notes: dict[str, None] = field(default_factory=dict)
@@ -123,13 +123,13 @@ class _Found:
     _truths: dict[tuple[Path, str, int], bool] = field(default_factory=dict)
 
     def _differs(self, what: str, said: Any, is_: Any) -> None:
-        """One line where two values differ, once."""
+        """Add one line where two values differ, once."""
         if said != is_ and (what, str(said)) not in self._told:
             self._told.add((what, str(said)))
             self.differences.append(f"{what} is {shown(said)[:80]} in summary.json, {shown(is_)[:80]} in the data set.")
 
     def _set(self, summary: dict[str, Any]) -> tuple[Dataset, list[Fold]] | None:
-        """The data set of a task with its folds, or None and a note where it is not at hand or another one."""
+        """Data set of a task with its folds, or None and a note where it is not available or another one."""
         task, name = make_task(summary["task"]), summary["dataset"]
         key = (task.dataset, summary["task_key"])
         if key not in self._sets:
@@ -149,7 +149,7 @@ class _Found:
         return self._sets[key]
 
     def data_set(self, summary: dict[str, Any], cell: Cell, source: Path, own: Frame) -> None:
-        """Ship, runs of the fold, and group, parent and kind of its windows, against the data set."""
+        """Compare ship, runs of the fold, and group, parent and kind of its windows with the data set."""
         found = self._set(summary)
         if found is None:
             return
@@ -191,7 +191,7 @@ class _Found:
                     )
 
     def truth(self, summary: dict[str, Any], cell: Cell, source: Path, batch: Batch, windows: Frame | None) -> bool:
-        """Whether the saved truth is that of the data set, and windows.parquet what it gives; once for each fold of a
+        """Whether the saved truth is that of the data set, and windows.parquet agrees with it; once for each fold of a
         folder."""
         key = (source, cell.dataset, cell.fold)
         if key not in self._truths:
@@ -227,7 +227,7 @@ class _Found:
                 )
 
     def parameters(self, summary: dict[str, Any], cell: Cell, source: Path) -> None:
-        """The number of parameters against the saved model, of shipbench's own kinds: nothing of a stranger's is
+        """Compare the number of parameters with the saved model, of shipbench's own kinds: no foreign code is
         imported."""
         if summary.get("parameters") is None:
             return

@@ -1,5 +1,5 @@
-"""The common base of all HTML pages: one style, one header, one way of escaping, one content security policy, plots
-without a network.
+"""Common base of all HTML pages: one style, one header, one way of escaping, one content security policy, plots without
+a network.
 
 A page is a jinja2 template of its own that begins with `{% extends "base.html.j2" %}` and fills the blocks `nav` and
 `content`; `render_page` renders it. `macros.html.j2` holds the tables that are sorted with a click. `render/linked.py`
@@ -27,7 +27,7 @@ lies beside it."""
 
 @dataclass(frozen=True)
 class Tile:
-    """One figure at the top of a page: `value` with its unit under `label`, and a short `note`."""
+    """Figure at the top of a page: `value` with its unit under `label`, and a short `note`."""
 
     label: str
     value: str
@@ -99,8 +99,8 @@ def plotly_version() -> str:
 
 
 def embedded(data: Any) -> Any:
-    """JSON for a `<script type="application/json">`: no `</script>` and no `<!--` can stand in it, and no number that
-    JSON does not have."""
+    """JSON for a `<script type="application/json">`, without `</script>`, `<!--`, or numbers that JSON does not
+    have."""
     from markupsafe import Markup
 
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
@@ -108,7 +108,7 @@ def embedded(data: Any) -> Any:
 
 
 def short_name(model: str) -> str:
-    """The last part of a model that is named by a file: `folder/m.py:Mine` is `m.py:Mine`."""
+    """Last part of a model name that contains a file path: `folder/m.py:Mine` is `m.py:Mine`."""
     return Path(model).name if "/" in model else model
 
 
@@ -160,7 +160,7 @@ def content_policy(
 
 
 def _digests(contents: Sequence[str]) -> str:
-    """Digests by which a browser knows what it may use, whatever a name in the page may hold."""
+    """Digests of the contents, by which a browser knows what it may use."""
     return " ".join(
         f"'sha256-{base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()}'" for content in contents
     )

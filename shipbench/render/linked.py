@@ -28,7 +28,7 @@ COLOURS = 8
 `linked.js` does the same."""
 _DASHES = ("", "7 3", "2 2", "8 2 2 2")
 _LARGEST = 1e9
-"""Values beyond it are not drawn: a prediction that diverged."""
+"""Largest value that is drawn; beyond it a prediction has diverged."""
 
 
 def stroke(i: int) -> str:
@@ -38,13 +38,13 @@ def stroke(i: int) -> str:
 
 
 def switch(i: int, name: str) -> dict[str, Any]:
-    """Model number `i` for the macros `switches` and `errors` of `macros.html.j2`."""
+    """Values of model number `i` for the macros `switches` and `errors` of `macros.html.j2`."""
     return {"i": i, "name": name, "stroke": stroke(i)}
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A column: its name, what it is in words, the unit in which it is shown, and the decimals that are kept."""
+    """Column: its name, its label in words, the unit in which it is shown, and the decimals that are kept."""
 
     name: str
     label: str
@@ -54,7 +54,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Line:
-    """A series: its name and its role, "measured" or the number of a model."""
+    """Series: its name and its role, "measured" or the number of a model."""
 
     name: str
     role: str | int
@@ -84,7 +84,7 @@ def linked_run(
     outlines: Sequence[np.ndarray] = (),
     cells: Sequence[Sequence[str]] = (),
 ) -> dict[str, Any]:
-    """One run of the contract.
+    """Data of one run in the contract.
 
     Args:
         name, note: as the run selector shows them.
@@ -114,7 +114,7 @@ def linked_plots(
     track: tuple[str, str] | None = None,
     start: int = 0,
 ) -> dict[str, Any]:
-    """The whole of the contract; `runs` come from `linked_run`."""
+    """Complete data of the contract; `runs` come from `linked_run`."""
     return {
         "columns": [asdict(c) for c in columns], "series": [asdict(s) for s in lines],
         "track": list(track) if track else None,

@@ -1,4 +1,4 @@
-"""Small SVG drawings: axes with ticks, and lines. Only numbers and our own words enter, never a user's text."""
+"""Small SVG drawings: axes with ticks, and lines. They contain numbers and fixed words only, never a user's text."""
 
 from __future__ import annotations
 
@@ -21,12 +21,13 @@ class Axes:
     log: bool = False
 
     def px(self, values: np.ndarray | float) -> np.ndarray:
-        """Data to user units, to the right."""
+        """Horizontal position in user units of data values, to the right."""
         low, high = self.x
         return np.asarray(_LEFT + (np.asarray(values, float) - low) / (high - low) * (self.width - _LEFT - _RIGHT))
 
     def py(self, values: np.ndarray | float) -> np.ndarray:
-        """Data to user units, downwards; values that a logarithm cannot take lie on the lower edge."""
+        """Vertical position in user units of data values, downwards; values without a logarithm lie on the lower
+        edge."""
         low, high, values = *self.y, np.asarray(values, float)
         if self.log:
             with np.errstate(all="ignore"):
@@ -34,11 +35,11 @@ class Axes:
         return np.asarray(self.height - _BOTTOM - (values - low) / (high - low) * (self.height - _TOP - _BOTTOM))
 
     def line(self, x: np.ndarray, y: np.ndarray) -> str:
-        """The `d` of a path through the points (n,), broken where one is not finite."""
+        """Path data (attribute `d`) through the points (n,), broken where one is not finite."""
         return path(np.column_stack([self.px(x), self.py(y)]))
 
     def band(self, x: np.ndarray, low: np.ndarray, high: np.ndarray) -> str:
-        """The `d` of the area between two lines."""
+        """Path data (attribute `d`) of the area between two lines."""
         return (
             path(np.column_stack([self.px(np.concatenate([x, x[::-1]])), self.py(np.concatenate([low, high[::-1]]))]))
             + "z"
@@ -69,7 +70,7 @@ class Axes:
 
 
 def path(points: np.ndarray) -> str:
-    """The `d` of a path through `points` (n, 2) in user units, in tenths; a gap where one is not finite."""
+    """Path data (attribute `d`) through `points` (n, 2) in user units, in tenths; a gap where one is not finite."""
     points = np.round(points, 1)
     parts, pen = [], None
     for point in points:
@@ -100,7 +101,7 @@ def ticks(low: float, high: float, log: bool = False) -> list[float]:
 
 
 def label(value: float) -> str:
-    """A tick's number."""
+    """Text of a tick's number."""
     return f"{0.0 if abs(value) < 1e-12 else value:.6g}"
 
 

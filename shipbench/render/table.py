@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     pass
 
 DISPLAY = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi), "N": ("kN", 1e-3)}
-"""Units that people read, for those that rows keep: name and factor."""
+"""Unit of display for a stored unit: name and factor."""
 
 
 def display_unit(unit: str) -> tuple[str, float]:
-    """The unit that a table prints for `unit`, and the factor of the values."""
+    """Unit that a table prints for `unit`, and the factor of the values."""
     return DISPLAY.get(unit, (unit, 1.0))
 
 
@@ -51,7 +51,7 @@ def significant(digits: int) -> Callable[[Any], str]:
 
 @dataclass(frozen=True)
 class TableColumn:
-    """Header, key in the rows, and how a value becomes text (None: text, left aligned).
+    """Column of a table: header, key in the rows, and format of a value (None: text, left aligned).
 
     `interval`: the rows may hold the ends of an interval under `key_low` and `key_high`.
     """
@@ -62,12 +62,12 @@ class TableColumn:
     interval: bool = False
 
     def text(self, row: dict[str, Any]) -> str:
-        """The cell of `row`."""
+        """Cell of `row`."""
         value = row.get(self.key)
         return self.format(value) if self.format else "" if value is None else str(value)
 
     def interval_text(self, row: dict[str, Any]) -> str:
-        """The interval of the cell, "" where there is none or it has no width but rounding."""
+        """Interval of the cell, "" where there is none or its width is only rounding."""
         low, high = (row.get(f"{self.key}_{end}") for end in ("low", "high"))
         if not self.interval or self.format is None or low is None or high is None or not high - low > 1e-9:
             return ""
@@ -76,7 +76,8 @@ class TableColumn:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows are dicts by column key; a row with `_reference` true is quoted from elsewhere and printed in italics."""
+    """Table whose rows are dicts by column key; a row with `_reference` true is quoted from elsewhere and printed in
+    italics."""
 
     title: str
     columns: Sequence[TableColumn]
@@ -125,10 +126,10 @@ class Table:
 
 
 def table_cells(table: Table) -> dict[str, Any]:
-    """A table for the macro `table` of `render/templates/macros.html.j2`: cells as text, beside the value that they are
-    sorted by.
+    """Values for the macro `table` of `render/templates/macros.html.j2`: cells as text, with the value by which they
+    are sorted.
 
-    The head of a row is its model; in a table without models its first text. It stays in sight when the table is
+    The head of a row is its model; in a table without models its first text. It stays visible when the table is
     scrolled sideways.
     """
     models = any(c.key == "model" for c in table.columns)
@@ -160,7 +161,7 @@ def _between(column: TableColumn, row: dict[str, Any]) -> str:
 
 
 def _sort_key(value: Any) -> str:
-    """A number as text that a browser reads back; "" for what has none and comes last."""
+    """Number as text that a browser reads back; "" for a cell without a number, which comes last."""
     value = value.item() if isinstance(value, np.generic) else value
     if isinstance(value, bool | int | float):
         return repr(float(value)) if np.isfinite(value) else ""

@@ -1,4 +1,4 @@
-"""What a part says of itself, read from its source without importing it (so that a list never loads torch or
+"""Self-description of parts, read from their source without importing it (so that a list never loads torch or
 casadi)."""
 
 from __future__ import annotations
@@ -15,9 +15,11 @@ from ..registry import Registry
 
 
 def describe_parts(registry: Registry) -> list[dict[str, Any]]:
-    """For each registered part its name, one line on it, its parameters with their defaults as written, where it comes
-    from, and why it cannot be used here ("" where it can): an optional package is missing, or a plug-in (only these are
-    imported) fails to import."""
+    """Description of each registered part: name, one line on it, parameters with their defaults as written, origin, and
+    the reason why it cannot be used here ("" where it can).
+
+    Reasons are a missing optional package, or a plug-in (only these are imported) that fails to import.
+    """
     parts = []
     for name in registry.names():
         path, entry = _place(registry, name)
@@ -36,7 +38,7 @@ def describe_parts(registry: Registry) -> list[dict[str, Any]]:
 
 
 def _place(registry: Registry, name: str) -> tuple[Path | None, str | None]:
-    """The file of a part (None where it cannot be found), and the entry point of a plug-in."""
+    """File of a part (None where it cannot be found), and the entry point of a plug-in."""
     if name in registry.built_in():
         return Path(__file__).resolve().parent.parent / registry.folder / f"{name}.py", None
     entry = registry.plugins()[name][0].value
@@ -44,8 +46,7 @@ def _place(registry: Registry, name: str) -> tuple[Path | None, str | None]:
 
 
 def explain_part(registry: Registry, name: str) -> tuple[list[str], dict[str, str]]:
-    """Paragraphs of the docstrings of a part's module and class, without the first line; what is said of each
-    parameter."""
+    """Paragraphs of the docstrings of a part's module and class, without the first line; the text on each parameter."""
     path, entry = _place(registry, name)
     try:
         tree = ast.parse(path.read_text(encoding="utf-8")) if path else ast.parse("")
@@ -74,7 +75,7 @@ def _problem(registry: Registry, name: str) -> str:
 
 
 def describe_effects() -> list[dict[str, Any]]:
-    """For each effect its family, one line on it, its source and its parameters at 130 m."""
+    """Description of each effect: family, one line on it, source and parameters at 130 m."""
     from ..effects.base import EFFECTS
 
     parts = []
@@ -93,7 +94,7 @@ def describe_effects() -> list[dict[str, Any]]:
 
 
 def _source(entry: str) -> Path | None:
-    """The file of an entry point's module, or None where it cannot be found."""
+    """File of an entry point's module, or None where it cannot be found."""
     try:
         found = importlib.util.find_spec(entry.partition(":")[0])
     except Exception:  # finding a module imports the package around it, and a stranger's package may raise anything
@@ -120,7 +121,7 @@ def read_part(path: Path, attribute: str, entry: str | None = None) -> tuple[str
 
 
 def _needs(node: ast.ClassDef) -> tuple[str, ...]:
-    """The literal value of the class variable `needs` of a predictor."""
+    """Literal value of the class variable `needs` of a predictor."""
     values = [
         n.value for n in node.body if isinstance(n, ast.AnnAssign) and n.value and ast.unparse(n.target) == "needs"
     ]
@@ -151,6 +152,6 @@ def _fields(node: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> dict[str, s
 
 
 def _default(value: ast.expr | None) -> str:
-    """A field's default as written; `{}` for `field(default_factory=dict)`, "" where there is none."""
+    """Default of a field as written; `{}` for `field(default_factory=dict)`, "" where there is none."""
     text = ast.unparse(value) if value else ""
     return {"field(default_factory=dict)": "{}", "field(default_factory=list)": "[]"}.get(text, text)

@@ -16,7 +16,7 @@ from ..render.linked import Line, linked_plots, linked_run
 from ..signals import DELTA, F_B, F_S, PSI, STATES, N, X, Y
 
 RUNS = 24
-"""Runs of one page at most: more are not looked through one by one."""
+"""Most runs of one page."""
 _SAMPLES = 60_000
 """Time steps of all runs of one page together: some 3 MB, beside Plotly's 1.2 MB."""
 _COMMANDS = (DELTA, N, F_B, F_S)
@@ -25,12 +25,12 @@ _COMMANDS = (DELTA, N, F_B, F_S)
 def recorded_plots(
     dataset: Dataset, runs: Mapping[str, Sequence[Run]], notes: Mapping[str, str], start: str = ""
 ) -> dict[str, Any]:
-    """Tracks, states and commands as linked plots.
+    """Linked plots of tracks, states and commands.
 
     Args:
         dataset: whose ship and inputs the runs are of.
         runs: by name the pieces of a run, in the order of time; between two pieces the lines are broken.
-        notes: by name what the run selector shows beside it.
+        notes: by name the text that the run selector shows beside it.
         start: name of the run that is shown first.
     """
     everything = np.concatenate([piece.states for pieces in runs.values() for piece in pieces])
@@ -73,8 +73,8 @@ def _joined(pieces: Sequence[Run]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def thinned(columns: np.ndarray, most: int) -> np.ndarray:
-    """Indices of about `most` of the rows of `columns` (n, k), in order: evenly spread, and of each stretch between
-    them where a column is least and greatest, so that a single wrong sample stays visible."""
+    """Indices of about `most` of the rows of `columns` (n, k), in order: evenly spread, and in each stretch between
+    them the rows where a column is least and greatest, so that a single wrong sample stays visible."""
     n, k = columns.shape
     if n <= most:
         return np.arange(n)

@@ -1,5 +1,4 @@
-"""The data card: what a data set holds, how noisy it is, what it covers, and what it cannot identify; as tables,
-Markdown and one HTML page."""
+"""Data card: content, noise, coverage and identifiability of a data set; as tables, Markdown and one HTML page."""
 
 from __future__ import annotations
 
@@ -39,7 +38,7 @@ _GAPS = "cannot_identify"
 
 @dataclass(frozen=True)
 class Card:
-    """Everything on the card: facts by name, tables by key in the order of a terminal, whose end is read; a page begins
+    """Contents of the card: facts by name, tables by key in the order of a terminal, most important last; a page begins
     with the gaps."""
 
     name: str
@@ -47,7 +46,7 @@ class Card:
     tables: dict[str, Table]
 
     def lead(self) -> str:
-        """What the data set holds, and how much of it cannot be identified, in two sentences."""
+        """Summary in two sentences: content of the data set, and the share of causes that cannot be identified."""
         missing = len(self.tables[_GAPS].rows)
         what = (
             f"{missing} of the causes that are looked for cannot be identified with it."
@@ -58,18 +57,17 @@ class Card:
         return f"{self.name}: {runs} run{'s' * (runs != '1')} in {samples}. {what}"
 
     def brief(self) -> list[Table]:
-        """What a terminal shows unless all tables are asked for: durations, and the trials that would add what is
-        missing."""
+        """Short tables for a terminal: durations, and the trials that would close the gaps."""
         gaps = self.tables[_GAPS]
         kept = [column for column in gaps.columns if column.key != "because"]
         return [self.tables["durations"], *([replace(gaps, columns=kept, notes=())] if gaps.rows else [])]
 
     def page(self) -> list[Table]:
-        """The tables in the order of a page."""
+        """Tables in the order of a page."""
         return [self.tables[_GAPS], *(table for key, table in self.tables.items() if key != _GAPS)]
 
     def document(self) -> dict[str, Any]:
-        """As JSON."""
+        """Card as JSON."""
         return {
             "dataset": self.name,
             "facts": self.facts,
@@ -118,7 +116,7 @@ def _gap_table(found: Sequence[Gap], dataset: Dataset) -> Table:
 
 
 def _alike(told: Sequence[Telling]) -> list[Gap]:
-    """The causes that others imitate; two that do so for each other make one line."""
+    """Causes that are confounded with others; two that are confounded with each other make one line."""
     found, done = [], set()
     twins = {t.subject: t.alike for t in told if t.cosine**2 > IMITATED}
     for t in told:
@@ -143,7 +141,7 @@ def _alike(told: Sequence[Telling]) -> list[Gap]:
 
 
 def _durations(dataset: Dataset) -> Table:
-    """Runs, samples and times of every kind of manoeuvre."""
+    """Table of runs, samples and times of every kind of manoeuvre."""
     kinds: dict[str, list[float]] = {}
     for run in dataset.runs:
         kinds.setdefault(str(run.meta.get("manoeuvre", "not given")), []).append((len(run) - 1) * dataset.dt)

@@ -1,4 +1,4 @@
-"""A data card on disk, and its page: what cannot be identified, coverage, the runs as linked plots, all tables."""
+"""Data card on disk, and its page: identifiability gaps, coverage, the runs as linked plots, all tables."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .facts import fact_lines
 
 
 def card_page(card: Card, dataset: Dataset, covered: Sequence[Coverage], command: str) -> str:
-    """The HTML of a card; it needs no network and no other file."""
+    """HTML of a card; it needs no network and no other file."""
     drawn = [(c.title, c.caption, *svg(c, dataset.dt)) for c in covered]
     gaps, *others = card.page()
     shown = _chosen(dataset.runs)
@@ -47,7 +47,7 @@ def _kind(run: Run) -> str:
 
 
 def _chosen(runs: Sequence[Run]) -> list[Run]:
-    """RUNS of the runs at most, of each kind of manoeuvre in turn the next one; in the order of the data set."""
+    """Runs to draw, RUNS at most, of each kind of manoeuvre in turn the next one; in the order of the data set."""
     kinds: dict[str, list[int]] = {}
     for i, run in enumerate(runs):
         kinds.setdefault(_kind(run), []).append(i)
@@ -75,7 +75,7 @@ def _tiles(card: Card, dataset: Dataset) -> list[Tile]:
 def write_card(card: Card, dataset: Dataset, out: Path, command: str) -> list[Path]:
     """Write `card.md` with its pictures, and `card.html`, which holds everything in one file; returns the two pages.
 
-    `command` is what made them, as the page states it.
+    `command` is the command that made them, as the page states it.
 
     Raises:
         InputError: the folder cannot be written.
@@ -105,7 +105,7 @@ def write_card(card: Card, dataset: Dataset, out: Path, command: str) -> list[Pa
 
 
 def markdown(card: Card, covered: Sequence[Coverage]) -> str:
-    """The card as Markdown; pictures are files beside it."""
+    """Card as Markdown; pictures are files beside it."""
     parts = [
         f"# Data card: {markdown_text(card.name)}\n",
         "\n".join(f"- {key}: {markdown_text(line)}" for key, line in fact_lines(card.facts)) + "\n",

@@ -1,5 +1,5 @@
-"""What a data set covers: the time spent at each speed, drift, rudder angle, shaft speed, heading, thrust and wind; as
-PNG for Markdown."""
+"""Coverage of a data set: time spent at each speed, drift, rudder angle, shaft speed, heading, thrust and wind; as PNG
+for Markdown."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SECTORS = 24
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """A histogram of time with its file's name, title and caption.
+    """Histogram of time with its file's name, title and caption.
 
     `seconds` (nx, ny) in the cells between the edges `x` (nx + 1,) and `y` (ny + 1,) with their labels; of headings
     (nx,) in sectors, `x` in rad.
@@ -36,8 +36,8 @@ class Coverage:
 
 
 def coverage(dataset: Dataset) -> list[Coverage]:
-    """Speed against drift, rudder against shaft speed, headings, yaw rate against speed; thrusters and wind where there
-    are any."""
+    """Histograms of speed against drift, rudder against shaft speed, headings, yaw rate against speed; thrusters and
+    wind where there are any."""
     s = Samples(dataset)
     S, dt = s.states, dataset.dt
     speed, drift, delta = np.copysign(s.speed, s.froude), np.rad2deg(s.drift), np.rad2deg(S[:, DELTA])
@@ -73,19 +73,19 @@ def coverage(dataset: Dataset) -> list[Coverage]:
 
 
 def _time_in(x: np.ndarray, y: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Seconds spent in every cell, and the edges of the cells."""
+    """Time spent in every cell [s], and the edges of the cells."""
     counts, edges_x, edges_y = np.histogram2d(x, y, bins=_BINS, range=[_span(x), _span(y)])
     return dt * counts, edges_x, edges_y
 
 
 def _span(x: np.ndarray) -> tuple[float, float]:
-    """From least to greatest value, and never empty."""
+    """Range from least to greatest value, never empty."""
     low, high = (float(x.min()), float(x.max())) if len(x) else (0.0, 0.0)
     return (low, high) if high - low > 1e-9 * max(abs(low), abs(high), 1.0) else (low - 0.5, high + 0.5)
 
 
 def png(covered: Coverage, dt: float) -> bytes:
-    """A picture drawn without a display and without global state; `dt` [s] is the least time of the scale."""
+    """Picture drawn without a display and without global state; `dt` [s] is the least time of the scale."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -104,7 +104,7 @@ def png(covered: Coverage, dt: float) -> bytes:
 
 
 def _cells(axes: Any, covered: Coverage, dt: float) -> None:
-    """The time in every cell, in a logarithmic scale of colours."""
+    """Draw the time in every cell, in a logarithmic scale of colours."""
     from matplotlib.colors import LogNorm
 
     if covered.seconds.any():
@@ -119,7 +119,7 @@ def _cells(axes: Any, covered: Coverage, dt: float) -> None:
 
 
 def _rose(axes: Any, covered: Coverage) -> None:
-    """The time in every sector of heading, north up and clockwise."""
+    """Draw the time in every sector of heading, north up and clockwise."""
     axes.set_theta_zero_location("N")
     axes.set_theta_direction(-1)
     axes.bar(

@@ -1,5 +1,5 @@
-"""What a data set covers as drawings of a page: SVG in the colours of its style sheet, so that they are read in light
-and dark."""
+"""Coverage of a data set as drawings of a page: SVG in the colours of its style sheet, so that they are readable in
+light and dark."""
 
 from __future__ import annotations
 
@@ -26,8 +26,7 @@ STYLE = """
 
 
 def svg(covered: Coverage, dt: float) -> tuple[str, list[str]]:
-    """The content of an SVG element (WIDTH x HEIGHT), and the times that its levels of colour stand for (none for
-    headings).
+    """Content of an SVG element (WIDTH x HEIGHT), and the times of its colour levels (none for headings).
 
     `dt` [s] is the least time of the scale.
     """
@@ -35,7 +34,7 @@ def svg(covered: Coverage, dt: float) -> tuple[str, list[str]]:
 
 
 def _cells(covered: Coverage, dt: float) -> tuple[str, list[str]]:
-    """The time in every cell, in levels that grow by the same factor."""
+    """Drawing of the time in every cell, in levels that grow by the same factor."""
     x, y, seconds = covered.x, covered.y, covered.seconds
     axes = Axes((float(x[0]), float(x[-1])), (float(y[0]), float(y[-1])), WIDTH, HEIGHT)
     edges = np.geomspace(dt, max(float(seconds.max()), 10.0 * dt), _LEVELS + 1)
@@ -57,7 +56,7 @@ def _cells(covered: Coverage, dt: float) -> tuple[str, list[str]]:
 
 
 def _rose(covered: Coverage) -> str:
-    """The time in every sector of heading, north up and clockwise."""
+    """Drawing of the time in every sector of heading, north up and clockwise."""
     middle, below, radius = WIDTH / 2, HEIGHT / 2, HEIGHT / 2 - 32.0
     most = max(float(covered.seconds.max()), 1e-9)
     parts = [f'<circle class="ring" cx="{middle:g}" cy="{below:g}" r="{part * radius:g}"/>' for part in (0.5, 1.0)]

@@ -1,4 +1,4 @@
-"""What a data set holds: its facts in lines, its statistics in tables."""
+"""Content of a data set: its facts in lines, its statistics in tables."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...ship import complete
 
 
 def dataset_facts(dataset: Dataset) -> dict[str, Any]:
-    """What was found in a data set, for a person who checks a loader or a folder."""
+    """Facts on a data set, for a person who checks a loader or a folder."""
     samples = [len(r) for r in dataset.runs]
     lengths = " to ".join(dict.fromkeys(f"{(n - 1) * dataset.dt:g}" for n in (min(samples), max(samples))))
 
@@ -50,8 +50,8 @@ ROUNDING = "The paper prints r with two decimals: its 0.01 rad/s stands for anyt
 
 
 def describe_tables(dataset: Dataset) -> list[Table]:
-    """Statistics of every signal; for the harbour sets, which imitate the paper's data, also its Table II and the
-    differences."""
+    """Tables of the statistics of every signal; for the harbour sets, which imitate the paper's data, also its Table II
+    and the differences."""
     from ...data.describe import STATISTICS, actuator_use, compare_with_paper, statistics, table_ii
 
     def rows(frame: Any) -> list[dict[str, Any]]:

@@ -1,5 +1,5 @@
-"""Files of `data check`: one page, one document, the lines for dataset.toml, one picture for each finding that has
-evidence to look at."""
+"""Files of `data check`: one page, one document, the lines for dataset.toml, one picture for each finding with evidence
+to draw."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def check_document(recording: Recording, findings: Sequence[Finding]) -> dict[st
 def write_findings(recording: Recording, findings: Sequence[Finding], folder: Path, command: str) -> list[Path]:
     """Write check.html, findings.json, dataset_lines.toml and NN-kind.png; pictures of an earlier check are removed.
 
-    `command` is what the page names as its origin. Returns the paths, the page first.
+    `command` is the command that the page states as its origin. Returns the paths, the page first.
 
     Raises:
         InputError: the folder cannot be written.

@@ -1,5 +1,4 @@
-"""The page of `data check`: verdict, findings with the lines that correct them, and the runs concerned as linked
-plots."""
+"""Page of `data check`: verdict, findings with the lines that correct them, and the runs concerned as linked plots."""
 
 from __future__ import annotations
 
@@ -22,7 +21,7 @@ from .facts import fact_lines
 _POINTS = 1500
 """Points of one curve of a finding's evidence: more than a picture of 600 pixels shows."""
 _NAMED = 12
-"""Runs of a finding that its row names."""
+"""Most runs of a finding that its row lists."""
 _STYLE = """
 @media (min-width: 40.01rem) { .findings td { min-width: 9rem; } .findings td.what { min-width: 20rem; } }
 .findings td p { margin: 0 0 .4rem; }
@@ -32,7 +31,7 @@ _STYLE = """
 
 
 def check_page(recording: Recording, findings: Sequence[Finding], document: dict[str, Any], command: str) -> str:
-    """The HTML of a check; `document` is that of `check_report.check_document`."""
+    """HTML of a check; `document` is that of `check_report.check_document`."""
     runs: dict[str, list[Run]] = {}
     for run in recording.runs:
         runs.setdefault(recording.name_of(run), []).append(run)
@@ -53,8 +52,8 @@ def check_page(recording: Recording, findings: Sequence[Finding], document: dict
 
 
 def _chosen(findings: Sequence[Finding], names: Sequence[str]) -> list[str]:
-    """Runs to draw: of each finding in turn its next one, then the others where a finding concerns all runs or there is
-    none; RUNS at most."""
+    """Names of the runs to draw: of each finding in turn its next one, then the others where a finding concerns all
+    runs or there is none; RUNS at most."""
     known = set(names)
     turns = zip_longest(*([name for name in f.runs if name in known] for f in findings))
     chosen = [name for turn in turns for name in turn if name is not None]
@@ -134,7 +133,7 @@ def _evidence(picture: Picture) -> dict[str, Any] | None:
 
 
 def _span(values: np.ndarray) -> tuple[float, float]:
-    """From the least to the greatest value with a margin, and never empty."""
+    """Range from the least to the greatest value with a margin, never empty."""
     low, high = float(values.min()), float(values.max())
     margin = 0.04 * (high - low) if high - low > 1e-9 * max(abs(low), abs(high), 1.0) else 0.5 * max(abs(high), 1.0)
     return low - margin, high + margin

@@ -1,7 +1,7 @@
-"""The evidence of a diagnosis as drawings of a page: SVG in the colours of its style sheet, so that they are read in
+"""Evidence of a diagnosis as drawings of a page: SVG in the colours of its style sheet, so that they are readable in
 light and dark.
 
-What belongs to the plain or the extended model carries `data-m`, by which the page shows and hides it. No name from the
+Elements of the baseline or the extended model carry `data-m`, by which the page shows and hides them. No name from the
 data enters a drawing.
 """
 
@@ -51,7 +51,7 @@ svg .dots { stroke-width: 4; stroke-linecap: round; stroke-opacity: .4; }
 
 
 class Drawing(NamedTuple):
-    """A title in plain text, the content of an SVG element (WIDTH x HEIGHT), and a caption."""
+    """Title in plain text, content of an SVG element (WIDTH x HEIGHT), and caption."""
 
     title: str
     svg: str
@@ -59,8 +59,8 @@ class Drawing(NamedTuple):
 
 
 def error_growth(trace: Trace, extended: bool) -> list[Drawing]:
-    """Position and heading error against the time of prediction: the median of all segments and the middle half of
-    them."""
+    """Drawings of position and heading error against the time of prediction: the median of all segments and their
+    middle half."""
     models = [str(i) for i in range(len(rollouts(trace, extended)))]
     with np.errstate(all="ignore"):
         squares = [squared_error(trace, p)[0] for p in rollouts(trace, extended)]
@@ -76,7 +76,7 @@ def error_growth(trace: Trace, extended: bool) -> list[Drawing]:
 
 
 def error_slices(trace: Trace, extended: bool) -> list[Drawing]:
-    """Root mean square position error against each variable; those with the greatest contrast first."""
+    """Drawings of the root mean square position error against each variable; those with the greatest contrast first."""
     scale = float(squared_error(trace, trace.before)[1][0])
     found = [
         slices(trace, np.concatenate([p[..., :2], trace.measured[..., 2:]], axis=-1)) for p in rollouts(trace, extended)
@@ -111,7 +111,7 @@ def _contrast(rows: Sequence[Slice]) -> float:
 
 
 def _steps(axes: Axes, rows: Sequence[Slice], scale: float) -> str:
-    """A level line over the range of each slice, joined where one ends at the beginning of the next."""
+    """Path of level lines over the range of each slice, joined where one ends at the beginning of the next."""
     x: list[float] = []
     y: list[float] = []
     for row in rows:
@@ -126,8 +126,8 @@ def _axis(name: str) -> str:
 
 
 def gain_per_run(rows: Sequence[tuple[str, float, float]]) -> Drawing:
-    """Held-out position error of every run before (ring) and after (dot), from the greatest of the plain model to the
-    least."""
+    """Drawing of the held-out position error of every run before (ring) and after (dot), from the greatest of the
+    baseline model to the least."""
     order = sorted(((b, a) for _, b, a in rows), key=lambda row: -row[0])
     top = max((max(row) for row in order), default=1.0)
     axes = Axes((0.0, len(order) + 1.0), (0.0, 1.08 * max(top, _LEAST)), WIDTH, HEIGHT)
@@ -147,8 +147,8 @@ def gain_per_run(rows: Sequence[tuple[str, float, float]]) -> Drawing:
 
 
 def missing_forces(trace: Trace, tables: ErrorTables, extended: bool, level: float) -> list[Drawing]:
-    """The force that the plain model lacks, per unit of mass, against the variable that explains most of it; axes where
-    this may be chance (p > `level`) are left out."""
+    """Drawings of the missing force, per unit of mass, against the variable that explains most of it; axes without a
+    significant dependence (p > `level`) are left out."""
     values = at_knots(trace)
     found = []
     for j, axis in enumerate(AXES):
@@ -182,7 +182,7 @@ def missing_forces(trace: Trace, tables: ErrorTables, extended: bool, level: flo
 
 
 def _band(axes: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray) -> str:
-    """The area between two lines, in pieces where they have gaps."""
+    """Area between two lines, in pieces where they have gaps."""
     known = np.isfinite(low) & np.isfinite(high)
     cuts = np.flatnonzero(np.diff(known.astype(int))) + 1
     pieces = [p for p in np.split(np.arange(len(x)), cuts) if known[p].all()]
@@ -200,7 +200,7 @@ def _force_unit(j: int) -> tuple[str, float]:
 
 
 def over_places(trace: Trace, axes: Sequence[str]) -> list[Drawing]:
-    """For each of some axes the force that the plain model lacks, where the ship was; darker where it is greater."""
+    """Drawings of the missing force over the positions of the ship, one per axis; darker where it is greater."""
     places = trace.measured[:, samples_of(trace)]
     found = []
     for j in map(AXES.index, axes):
@@ -236,7 +236,7 @@ def over_places(trace: Trace, axes: Sequence[str]) -> list[Drawing]:
 
 
 def autocorrelations(trace: Trace) -> list[Drawing]:
-    """Residuals with themselves, at lags of one sample and more."""
+    """Drawings of the autocorrelation of the residuals, at lags of one sample and more."""
     found = []
     for i, name in enumerate(RESIDUALS):
         if np.any(np.isfinite(trace.white[..., i])):
@@ -246,7 +246,8 @@ def autocorrelations(trace: Trace) -> list[Drawing]:
 
 
 def cross_correlations(trace: Trace, tables: ErrorTables, most: int = 3) -> list[Drawing]:
-    """Residuals with earlier inputs: the pairs that come closest to their bound, or go farthest beyond it."""
+    """Drawings of the cross-correlation of residuals with earlier inputs: the pairs closest to their bound, or farthest
+    beyond it."""
     found = []
     for (name, label), _ in sorted(tables.inputs.items(), key=lambda item: -item[1])[:most]:
         rho, bound = correlogram(trace.white[..., RESIDUALS.index(name)], trace.inputs[..., INPUTS.index(label)])

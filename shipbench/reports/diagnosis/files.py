@@ -1,4 +1,4 @@
-"""A diagnosis on disk: diagnosis.json, summary.txt and a self-contained page."""
+"""Diagnosis on disk: diagnosis.json, summary.txt and a self-contained page."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def write_diagnosis(d: Diagnosis, folder: Path) -> list[Path]:
 
 
 def document(d: Diagnosis) -> dict[str, Any]:
-    """What diagnosis.json holds: `Diagnosis.document`, and every cause in words."""
+    """Content of diagnosis.json: `Diagnosis.document`, and every cause in words."""
     content = d.document()
     for c, cause in zip(d.causes, content["causes"], strict=True):
         cause["in_words"] = in_words(c)

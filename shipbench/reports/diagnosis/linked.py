@@ -1,4 +1,5 @@
-"""Measured runs and open-loop predictions of the plain and the extended model, as linked plots (`render/linked.py`)."""
+"""Measured runs and open-loop predictions of the baseline and the extended model, as linked plots
+(`render/linked.py`)."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ _SAMPLES = 25_000
 
 
 def changed(d: Diagnosis) -> bool:
-    """Whether there is an extended model to draw beside the plain one."""
+    """Whether there is an extended model to draw beside the baseline."""
     return (
         d.trace is not None
         and d.verdict == "found"
@@ -32,7 +33,7 @@ def changed(d: Diagnosis) -> bool:
 
 
 def rollouts(trace: Trace, extended: bool) -> list[np.ndarray]:
-    """Predictions (B, K + 1, 6) of the plain model and, where there is one, of the extended model."""
+    """Predictions (B, K + 1, 6) of the baseline model and, where there is one, of the extended model."""
     return [trace.before, trace.after][: 2 if extended else 1]
 
 
@@ -61,8 +62,8 @@ def fits(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
 
 
 def chosen_segments(trace: Trace, extended: bool) -> list[int]:
-    """Segments to draw, from the greatest error of the plain model to the least: all, or `RUNS` evenly spread with the
-    one that gains least."""
+    """Segments to draw, from the greatest error of the baseline model to the least: all, or `RUNS` evenly spread with
+    the one of the least gain."""
     before, after = (position_errors(trace, p) for p in (trace.before, trace.after))
     order = [int(b) for b in np.argsort(-np.nan_to_num(before, nan=-1.0), kind="stable")]
     if len(order) <= RUNS:
@@ -106,7 +107,7 @@ def rollout_plots(trace: Trace, extended: bool) -> dict[str, Any]:
 
 
 def _name(trace: Trace, b: int) -> str:
-    """The run, and where it is cut into several segments the time at which this one starts."""
+    """Name of the run, and where it is cut into several segments the time at which this one starts."""
     return trace.names[int(trace.run[b])] + (f" from {trace.start[b]:.0f} s" if trace.start[b] > 0 else "")
 
 

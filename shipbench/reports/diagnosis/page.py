@@ -1,5 +1,5 @@
-"""The page of `diagnose`: verdict, causes with the line that corrects each, measured and predicted runs as linked
-plots, the evidence."""
+"""Page of `diagnose`: verdict, causes with the line that corrects each, measured and predicted runs as linked plots,
+the evidence."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _STYLE = (
 
 
 def diagnosis_page(d: Diagnosis) -> str:
-    """The HTML of a diagnosis; it needs no network and no other file."""
+    """HTML of a diagnosis; it needs no network and no other file."""
     return render_page(
         "diagnosis.html.j2", title=f"Diagnosis: {d.dataset}", dataset=d.dataset,
         command=f"shipbench diagnose {shlex.quote(d.spec or d.dataset)}", lead=headline(d), tiles=_tiles(d),
@@ -69,7 +69,7 @@ def diagnosis_page(d: Diagnosis) -> str:
 
 
 def _tiles(d: Diagnosis) -> list[Tile]:
-    """Verdict, position error before and after, evidence, number of runs."""
+    """Tiles of the verdict, position error before and after, evidence, number of runs."""
     tiles = [_verdict(d), _error(d), _sureness(d)]
     if d.trace is not None:
         spans = f"{len(d.trace.run)} predictions of up to {d.trace.t[-1]:.0f} s"
@@ -92,7 +92,7 @@ def _verdict(d: Diagnosis) -> Tile:
 
 
 def _error(d: Diagnosis) -> Tile:
-    """Held-out error of the plain and of the extended model, or that it was not measured."""
+    """Tile of the held-out error of the baseline and of the extended model, or of its absence."""
     if d.gain is not None:
         return Tile(
             "Held-out position error",
@@ -111,7 +111,7 @@ def _error(d: Diagnosis) -> Tile:
 
 
 def _sureness(d: Diagnosis) -> Tile:
-    """Evidence of the cause with the least of it, of an unknown dependence, or of the best candidate."""
+    """Tile of the evidence of the cause with the least of it, of an unknown dependence, or of the best candidate."""
     if d.causes:
         known = [c for c in d.causes if math.isfinite(c.score)]
         if not known:
@@ -135,8 +135,8 @@ def _sureness(d: Diagnosis) -> Tile:
 
 
 def _cause(c: Cause, d: Diagnosis) -> dict[str, Any]:
-    """A cause as the template shows it: texts, its gain where it is the only one, its look-alikes with the trial that
-    separates them."""
+    """Values of a cause for the template: texts, its gain where it is the only one, the causes it is confounded with
+    and the trial that separates them."""
     force = force_words(c.force)
     return {
         "title": f"{c.rank}. {_capital(in_words(c))}",
@@ -150,17 +150,18 @@ def _cause(c: Cause, d: Diagnosis) -> dict[str, Any]:
 
 
 def _lines(correction: str) -> str:
-    """A correction such as `[delay] x = 1 and y = 1` as lines of dataset.toml."""
+    """Lines of dataset.toml for a correction such as `[delay] x = 1 and y = 1`."""
     return correction.replace("] ", "]\n").replace(" and ", "\n")
 
 
 def _gain_of_all(d: Diagnosis) -> str:
-    """The gain of several causes together, or that none was measured; that of a single cause stands beside it."""
+    """Text of the gain of several causes together, or that none was measured; that of a single cause stands beside
+    it."""
     return gain_words(d.gain, len(d.causes)) if d.causes and (d.gain is None or len(d.causes) > 1) else ""
 
 
 def _no_cause(d: Diagnosis) -> str:
-    """What stands in place of the causes where none is named."""
+    """Text in place of the causes where none is identified."""
     if d.causes:
         return ""
     if d.verdict == "unknown" and d.unknown:
@@ -178,7 +179,7 @@ def _wrong(channel: str, share: float, when: str) -> dict[str, str]:
 
 
 def _evidence(d: Diagnosis) -> dict[str, Any]:
-    """What is drawn from the trace; nothing where there is none."""
+    """Drawings from the trace; none where there is no trace."""
     trace, extended = d.trace, changed(d)
     if trace is None:
         return {"traced": False}
@@ -212,7 +213,7 @@ def _which(drawn: int, total: int, held_out: bool) -> str:
 
 
 def _worst(runs: Sequence[tuple[str, float]], listed: int = 5) -> str:
-    """The runs with the greatest error of all channels, as multiples of the median run's."""
+    """Text on the runs with the greatest error of all channels, as multiples of the median run's."""
     if len(runs) < 2:
         return ""
     typical = max(float(np.median([e for _, e in runs])), 1e-12)

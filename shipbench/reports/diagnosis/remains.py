@@ -1,4 +1,4 @@
-"""What a diagnosis leaves unexplained, and what it treats as noise, as sentences."""
+"""Sentences on the unexplained part of a diagnosis, and on its noise model."""
 
 from __future__ import annotations
 

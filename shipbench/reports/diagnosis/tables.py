@@ -1,4 +1,4 @@
-"""The tables of a diagnosis page."""
+"""Tables of a diagnosis page."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .linked import fits, rollouts
 from .text import detectable
 
 LEVEL = 0.02
-"""Greatest p of a dependence that is not taken for chance."""
+"""Greatest p-value of a significant dependence."""
 _SIGNAL = {"heading": PSI, "surge": U, "sway": V, "yaw rate": R}
-"""The motion signal of a channel, whose fit stands in the table of channels."""
+"""Motion signal of a channel, whose fit stands in the table of channels."""
 
 
 def channels(trace: Trace, tables: ErrorTables, extended: bool) -> Table:
-    """Error of each channel of the open-loop predictions: root mean square, share, fit; of the plain and of the
-    extended model."""
+    """Table of the error of each channel of the open-loop predictions: root mean square, share, fit; of the baseline
+    and of the extended model."""
     models = ("plain", "extended")[: 2 if extended else 1]
     three, zero = significant(3), number(0)
     columns = [TableColumn("channel", "channel"), *(TableColumn(f"RMS error, {m}", f"rms_{m}", three) for m in models)]
@@ -51,7 +51,7 @@ def channels(trace: Trace, tables: ErrorTables, extended: bool) -> Table:
 
 
 def dependences(tables: ErrorTables) -> Table:
-    """Share of the variance of the missing force that each variable explains, by axis."""
+    """Table of the share of the missing force's variance that each variable explains, by axis."""
     found = {axis: {f.variable: f for f in tables.follows[axis]} for axis in AXES}
     names = list(dict.fromkeys(f.variable for axis in AXES for f in tables.follows[axis]))
     columns = [TableColumn("variable", "variable")]
@@ -73,12 +73,12 @@ def dependences(tables: ErrorTables) -> Table:
 
 
 def independent(tables: ErrorTables) -> list[str]:
-    """The axes whose missing force shows no dependence beyond chance."""
+    """Axes whose missing force shows no significant dependence."""
     return [axis for axis in AXES if not any(f.p <= LEVEL for f in tables.follows[axis])]
 
 
 def gains(d: Diagnosis) -> Table:
-    """Held-out position error of every run before and after."""
+    """Table of the held-out position error of every run before and after."""
     three = significant(3)
     columns = [
         TableColumn("run", "run"), TableColumn("plain [m]", "before", three),
@@ -93,7 +93,7 @@ def gains(d: Diagnosis) -> Table:
 
 
 def candidates(d: Diagnosis) -> Table:
-    """Every effect that was considered, with its score and the reason why it was named or not."""
+    """Table of every candidate effect, with its score and the reason why it was identified or not."""
     columns = [
         TableColumn("effect", "effect"), TableColumn("family", "family"),
         TableColumn("log Bayes factor", "factor", number(1)),
@@ -112,7 +112,7 @@ def candidates(d: Diagnosis) -> Table:
 
 
 def detection_limits(d: Diagnosis) -> Table:
-    """The smallest size of each effect that these runs could have shown."""
+    """Table of detection limits: the smallest size of each effect that these runs could have shown."""
     columns = [
         TableColumn("effect", "effect"),
         TableColumn("family", "family"),
@@ -132,7 +132,7 @@ def detection_limits(d: Diagnosis) -> Table:
 
 
 def whiteness(tables: ErrorTables) -> Table:
-    """Ljung-Box statistic of each residual over its 95 % limit."""
+    """Table of the Ljung-Box statistic of each residual over its 95 % limit."""
     columns = [
         TableColumn("residual", "residual"),
         TableColumn("Ljung-Box / 95 % limit", "ratio", number(2)),
@@ -146,7 +146,7 @@ def whiteness(tables: ErrorTables) -> Table:
 
 
 def against_inputs(tables: ErrorTables) -> Table:
-    """Pairs of residual and earlier input whose greatest correlation is beyond its 95 % bound."""
+    """Table of pairs of residual and earlier input whose greatest correlation is beyond its 95 % bound."""
     columns = [
         TableColumn("residual", "residual"),
         TableColumn("input", "input"),

@@ -1,4 +1,4 @@
-"""A diagnosis in words, for the terminal and the page."""
+"""Diagnosis in words, for the terminal and the page."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _METRICS = {"ED": "position error"}
 
 
 def figure(value: float, digits: int = 3) -> str:
-    """So many significant digits, powers of ten only for what is very small or large."""
+    """Number with `digits` significant digits, powers of ten only where it is very small or large."""
     if abs(value) < 1e-12:
         return "0"
     if not 1e-3 <= abs(value) < 1e5:
@@ -27,7 +27,7 @@ def figure(value: float, digits: int = 3) -> str:
 
 
 def quantity(value: float | None, unit: str) -> str:
-    """A value with its unit as people read it: angles in degrees, forces in kN."""
+    """Value with its unit of display: angles in degrees, forces in kN."""
     if value is None or not math.isfinite(value):
         return "-"
     shown, factor = display_unit(unit)
@@ -35,7 +35,7 @@ def quantity(value: float | None, unit: str) -> str:
 
 
 def interval(e: Estimate) -> str:
-    """Such as `0.31 m/s (95 %: 0.28 to 0.34)`; without interval where there is none."""
+    """Text such as `0.31 m/s (95 %: 0.28 to 0.34)`; without interval where there is none."""
     factor = display_unit(e.unit)[1]
     known = all(v is not None and math.isfinite(v) for v in e.ci95)
     if not known and e.unit == "1" and e.value is not None and e.value == round(e.value):
@@ -46,7 +46,7 @@ def interval(e: Estimate) -> str:
 
 
 def estimate(effect: str, name: str, e: Estimate) -> str:
-    """A parameter of an effect in words: a direction as three digits, a relative change or a share in percent, else its
+    """Text of a parameter of an effect: a direction as three digits, a relative change or a share in percent, else its
     value with unit."""
     part = _effect(effect)
     if e.value is None or not math.isfinite(e.value) or part is None:
@@ -67,7 +67,7 @@ def estimate(effect: str, name: str, e: Estimate) -> str:
 
 
 def in_words(c: Cause) -> str:
-    """A cause as a noun phrase with its size, such as `a current of 0.36 m/s towards 059°`; the typed name stands
+    """Noun phrase of a cause with its size, such as `a current of 0.36 m/s towards 059°`; the effect's name stands
     beside it where it is not in it."""
     part = _effect(c.effect)
     if part is None:
@@ -81,7 +81,7 @@ def in_words(c: Cause) -> str:
 
 
 def _size(part: Effect, name: str, e: Estimate) -> str:
-    """A value alone, with two significant digits; none where its interval holds zero."""
+    """Value alone, with two significant digits; none where its interval holds zero."""
     if e.value is None or not math.isfinite(e.value):
         return "unknown size"
     if part.vector is not None and name == part.vector[1]:
@@ -107,7 +107,7 @@ def _changed(relative: float) -> str:
 
 
 def _between(low: float, high: float, less: str, more: str) -> str:
-    """Two relative changes as an interval, such as `24 to 79 % less` or `65 % less to 52 % more`."""
+    """Interval of two relative changes, such as `24 to 79 % less` or `65 % less to 52 % more`."""
     if low < 0 < high:
         return f"{100 * -low:.0f} % {less} to {100 * high:.0f} % {more}"
     near, far = sorted((100 * abs(low), 100 * abs(high)))
@@ -115,17 +115,17 @@ def _between(low: float, high: float, less: str, more: str) -> str:
 
 
 def _effect(name: str) -> Effect | None:
-    """The effect of this name; None for one that is not installed here."""
+    """Effect of this name; None for one that is not installed here."""
     return EFFECTS.get(name) if name in EFFECTS else None
 
 
 def _bearing(angle: float) -> str:
-    """An angle [rad] as a bearing of three digits."""
+    """Angle [rad] as a bearing of three digits."""
     return f"{round(math.degrees(angle)) % 360:03d}°"
 
 
 def gain_words(g: Gain | None, named: int = 1) -> str:
-    """The gain of the extension, with so many named causes, on runs that were not fitted."""
+    """Text of the gain of the extension, with the number of identified causes, on held-out runs."""
     if g is None:
         return "The gain on held-out runs was not measured."
     low, high = g.ci95
@@ -139,7 +139,7 @@ def gain_words(g: Gain | None, named: int = 1) -> str:
 
 
 def gain_share(g: Gain) -> str:
-    """The relative gain with its interval and the runs that are better."""
+    """Text of the relative gain with its interval and the number of runs that are better."""
     low, high = g.ci95
     between = (
         _between(-high, -low, "less", "more")
@@ -151,7 +151,7 @@ def gain_share(g: Gain) -> str:
 
 
 def headline(d: Diagnosis) -> str:
-    """The verdict in one or two sentences."""
+    """Verdict in one or two sentences."""
     if d.verdict == "found":
         *first, last = map(in_words, d.causes)
         found = f"{', '.join(first)}, and {last}" if first else last
@@ -174,7 +174,7 @@ def headline(d: Diagnosis) -> str:
 
 
 def next_command(d: Diagnosis) -> str:
-    """The command that compares the plain model with the extended one."""
+    """Command that compares the baseline model with the extended one."""
     inside = [c.effect for c in d.causes if not (c.effect in EFFECTS and EFFECTS.get(c.effect).traits.describes_data)]
     model = "+".join(["physics", *inside])
     return (
@@ -195,22 +195,22 @@ def detectable(c: Candidate) -> str:
 
 
 def _unit(c: Candidate, name: str) -> str:
-    """Components of a vector are in the unit of its size."""
+    """Unit of a parameter; components of a vector have the unit of its size."""
     if name in c.units:
         return c.units[name]
     return next((u for u in c.units.values() if u != "rad"), "1")
 
 
 def grade(score: float) -> str:
-    """Evidence of a score (twice the log Bayes factor) in the words of Kass and Raftery (1995), Bayes factors, section
-    3.2."""
+    """Strength of the evidence of a score (twice the log Bayes factor) in the words of Kass and Raftery (1995), Bayes
+    factors, section 3.2."""
     factor = 0.5 * score
     word = "very strong" if factor > 5.0 else "strong" if factor > 3.0 else "positive" if factor > 1.0 else "weak"
     return f"{word} evidence"
 
 
 def strength(c: Cause) -> str:
-    """Evidence in words with the log Bayes factor."""
+    """Text of the evidence in words with the log Bayes factor."""
     if not math.isfinite(c.score):
         return "an error of the record itself"
     return f"{grade(c.score)} (log Bayes factor {0.5 * c.score:.0f})" + (
@@ -219,8 +219,8 @@ def strength(c: Cause) -> str:
 
 
 def force_words(force: dict[str, float]) -> str:
-    """Greatest forces, such as `up to 38.0 kN sideways and 1.20 MN m in yaw on these runs`; empty where there are
-    none."""
+    """Text of the greatest forces, such as `up to 38.0 kN sideways and 1.20 MN m in yaw on these runs`; empty where
+    there are none."""
     places = (("surge", "N", "lengthwise"), ("sway", "N", "sideways"), ("yaw", "N m", "in yaw"))
     parts = [f"{_newtons(force[axis], unit)} {place}" for axis, unit, place in places if axis in force]
     *first, last = parts or [""]
@@ -230,15 +230,15 @@ def force_words(force: dict[str, float]) -> str:
 
 
 def _newtons(value: float, unit: str) -> str:
-    """Two significant digits with the prefix that suits the size."""
+    """Text of two significant digits with the prefix that suits the size."""
     rounded = float(f"{value:.2g}")
     factor, prefix = (1e-6, "M") if rounded >= 1e6 else (1e-3, "k") if rounded >= 1e3 else (1.0, "")
     return f"{figure(factor * rounded, 2)} {prefix}{unit}"
 
 
 def cause_texts(c: Cause, alone: Gain | None = None) -> list[str]:
-    """What is known of a cause besides its sizes, a text each: force, evidence, gain where it is the only cause,
-    look-alikes, correction."""
+    """Texts on a cause besides its sizes: force, evidence, gain where it is the only cause, causes it is confounded
+    with, correction."""
     force = force_words(c.force)
     texts = [f"Its force is {force}."] if force else []
     texts.append(f"{strength(c)[0].upper()}{strength(c)[1:]}.")
@@ -256,7 +256,8 @@ def cause_texts(c: Cause, alone: Gain | None = None) -> list[str]:
 
 
 def cause_lines(c: Cause, width: int = WIDTH, alone: Gain | None = None) -> list[str]:
-    """A cause with sizes, force, evidence and look-alikes; alone: the gain where it is the only cause."""
+    """Lines on a cause: sizes, force, evidence and the causes it is confounded with; alone: the gain where it is the
+    only cause."""
     part = _effect(c.effect)
     lines = paragraph(f"{c.rank}. {c.effect}" + (f": {part.summary}" if part else ""), width, "  ", " " * 5)
     for name, e in c.parameters.items():
@@ -279,7 +280,7 @@ def _candidate_lines(d: Diagnosis, width: int) -> list[str]:
 
 
 def _detectable_lines(d: Diagnosis, width: int) -> list[str]:
-    """Everything where nothing was found; else the best candidates that were not named."""
+    """Lines of detection limits: all where nothing was identified; else those of the best other candidates."""
     kept = (
         sorted(d.candidates, key=lambda c: c.effect)
         if d.verdict == "none"
@@ -296,7 +297,7 @@ def _detectable_lines(d: Diagnosis, width: int) -> list[str]:
 
 
 def _wrong_lines(d: Diagnosis, width: int) -> list[str]:
-    """What the plain model gets wrong in each channel, and what is taken as noise."""
+    """Lines on the error of the baseline model in each channel, and on the noise model."""
     lines = ["What the plain physics model gets wrong:"] if d.what_is_wrong else []
     for w in d.what_is_wrong:
         none = "its missing force shows no dependence on motion, actuators or time alone"
@@ -312,10 +313,10 @@ def _wrong_lines(d: Diagnosis, width: int) -> list[str]:
 
 
 def summary_lines(d: Diagnosis, width: int = WIDTH, full: bool = True) -> list[str]:
-    """A diagnosis as plain lines of at most `width` columns.
+    """Diagnosis as plain lines of at most `width` columns.
 
     Args:
-        full: with what the plain model gets wrong, the candidates and the detection limits; else the verdict, its
+        full: with the errors of the baseline model, the candidates and the detection limits; else the verdict, its
             causes and the next command.
     """
     lines = [*paragraph(f"Diagnosis of {d.dataset} ({d.seconds:.0f} s)", width), "", *paragraph(headline(d), width), ""]

@@ -1,4 +1,4 @@
-"""What lies beside the scores: fitted equations of the models, diagnoses of the same data."""
+"""Additions to the scores on a page: fitted equations of the models, diagnoses of the same data."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from ...regular_files import read_bytes, read_json
 
 _PARAMETER = re.compile(r"^\s+(\w+)\s+=\s+([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)\s+(\S.*)$", re.IGNORECASE)
 _LONGEST = 20_000
-"""Characters of one model's own description that the page takes."""
+"""Most characters of one model's own description on the page."""
 
 
 @dataclass(frozen=True)
 class Fits:
     """Fitted models of one spec: their descriptions by fold and seed, and the numbers in them (name, median, least,
-    greatest, what it is)."""
+    greatest, meaning)."""
 
     model: str
     texts: list[tuple[str, str]]
@@ -33,8 +33,8 @@ class Fits:
 
 
 def fitted(results: Results, dataset: str, models: Sequence[str]) -> list[Fits]:
-    """What the models of `dataset` say of themselves (`equations.txt` beside their predictions); models that say
-    nothing are left out."""
+    """Descriptions that the models of `dataset` give of themselves (`equations.txt` beside their predictions); models
+    without one are left out."""
     found: dict[str, list[tuple[str, str]]] = {}
     for summary, source in zip(results.summaries, results.sources, strict=True):
         if summary["dataset"] != dataset:
@@ -56,7 +56,7 @@ def fitted(results: Results, dataset: str, models: Sequence[str]) -> list[Fits]:
 
 
 def _numbers(texts: Sequence[str]) -> list[tuple[str, float, float, float, str]]:
-    """Lines `name = number what`, compared over the texts; a name that stands in several lines is told apart by its
+    """Lines `name = number what`, compared over the texts; a name that stands in several lines is distinguished by its
     place."""
     values: dict[tuple[str, int], list[float]] = {}
     what: dict[tuple[str, int], str] = {}
@@ -73,7 +73,7 @@ def _numbers(texts: Sequence[str]) -> list[tuple[str, float, float, float, str]]
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """A diagnosis: its verdict in words, the causes (effect, sizes, gain), the model it proposes, the link to its page
+    """Diagnosis: its verdict in words, the causes (effect, sizes, gain), the model it proposes, the link to its page
     ("" if there is none)."""
 
     dataset: str
@@ -116,7 +116,7 @@ def check_given(given: Sequence[Path], datasets: Sequence[str]) -> None:
     """Refuse a diagnosis of a data set that the page does not show.
 
     Raises:
-        InputError: see above, or the folder holds no diagnosis.
+        InputError: the page shows no such data set, or the folder holds no diagnosis.
     """
     for folder in given:
         if (name := _read(folder).dataset) not in datasets:
@@ -148,7 +148,7 @@ class _Cause(_Part):
 
 
 class _Document(_Part):
-    """What the page takes of diagnosis.json."""
+    """Keys of diagnosis.json that the page uses."""
 
     dataset: str
     verdict: str

@@ -1,5 +1,4 @@
-"""The page of `shipbench report`: one HTML file that needs no network, rendered from results and what lies beside
-them."""
+"""Page of `shipbench report`: one HTML file that needs no network, rendered from results and the files beside them."""
 
 from __future__ import annotations
 
@@ -27,7 +26,7 @@ _FAILURES = 200
 
 @dataclass(frozen=True)
 class Written:
-    """The page's path and size [bytes], and by data set the lines on what it leaves out."""
+    """Path and size [bytes] of the page, and by data set the lines on its omissions."""
 
     path: Path
     size: int
@@ -37,7 +36,7 @@ class Written:
 def write_report(
     results: Results, out: Path, command: str, *, given: Sequence[Path] = (), points: int = POINTS
 ) -> Written:
-    """Write the page of `results` to `out`, in one step; `given` are folders of diagnoses; at most `points` time steps
+    """Write the page of `results` to `out`, atomically; `given` are folders of diagnoses; at most `points` time steps
     are drawn.
 
     Raises:
@@ -59,7 +58,7 @@ def write_report(
 
 
 def render(sections: Sequence[dict[str, Any]], results: Results, command: str) -> str:
-    """The HTML. Everything but the pictures and our own style and script is escaped by the template."""
+    """HTML of the page. The template escapes everything but the pictures and its own style and script."""
     names = ", ".join(s["name"] for s in sections)
     return render_page(
         "report.html.j2", title="Study of ship-motion prediction", dataset=names, command=command,
@@ -69,7 +68,7 @@ def render(sections: Sequence[dict[str, Any]], results: Results, command: str) -
 
 
 def _tiles(sections: Sequence[dict[str, Any]], results: Results) -> list[Tile]:
-    """The best model of each data set, windows, fits, and what was not scored."""
+    """Tiles of the best model of each data set, windows, fits, and windows without a score."""
     best = []
     for section in sections:
         if section["models"]:
@@ -110,7 +109,7 @@ def _section(
 
 
 def _failures(rows: Frame) -> dict[str, Any]:
-    """Every status but ok with its reason: model, folds and seeds, windows."""
+    """Statuses other than ok with their reasons: model, folds and seeds, windows."""
     bad = rows[rows["status"] != "ok"]
     lines = []
     for (model, status, reason), part in bad.groupby(["model", "status", "reason"], sort=False):
