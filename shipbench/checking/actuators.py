@@ -1,5 +1,5 @@
-"""Actuators that are said to be measured but are commands: they jump through their range inside one sample, or repeat
-their command exactly."""
+"""Check for actuator columns that are commands, not measurements: they change by much of their range inside one sample,
+or repeat their command exactly."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _NAMES = ("n", "delta", "F_b", "F_s")
 
 
 def check(recording: Recording) -> list[Finding]:
-    """One finding for all actuators that look like commands; none where the data set says that they are.
+    """Find actuators that look like commands, as one finding; none where the data set says that they are commands.
 
-    Every rudder has a gear that takes its time, so its jumps alone are a sign; those of shafts and thrusters are so
-    only beside such a rudder.
+    Every rudder has a steering gear with a finite rate, so its jumps alone are a sign; those of shafts and thrusters
+    count only beside such a rudder.
     """
     if recording.dataset.actuators != "measured":
         return []
@@ -73,7 +73,7 @@ def check(recording: Recording) -> list[Finding]:
 
 
 def _held(recording: Recording) -> float:
-    """Share of the samples at which the rudder is exactly where it was."""
+    """Share of the samples at which the rudder angle is exactly that of the sample before."""
     return float(np.mean(np.concatenate([np.diff(run.states[:, DELTA]) == 0.0 for run in recording.runs])))
 
 
@@ -95,7 +95,8 @@ def _exact(recording: Recording, i: int) -> tuple[float, int]:
 
 
 def _sudden(recording: Recording, channel: int) -> tuple[int, float]:
-    """Number of steps within one sample that stay, at a pace that sweeps the range in `sudden_sweep`; the greatest."""
+    """Number of lasting steps within one sample, at a rate that sweeps the range in `sudden_sweep`; and the
+    greatest."""
     values = np.concatenate([run.states[:, channel] for run in recording.runs])
     reach = float(np.ptp(np.quantile(values, [0.001, 0.999])))
     sweep = THRESHOLDS.value("sudden_sweep") * recording.froude

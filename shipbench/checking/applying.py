@@ -1,4 +1,4 @@
-"""Lines of findings laid into dataset.toml: they add to what stands there, and those that contradict it or one another
+"""Corrections of findings written into dataset.toml: they add to its entries; those that contradict it or one another
 are left out."""
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from .finding import Finding, toml_line
 
 _Path = tuple[str, ...]
 _KEPT = ("units", "frame", "velocities", "wind")
-"""Keys by which the table was read already: another value is no correction of the first."""
+"""Keys by which the table was read: another value does not correct the first."""
 
 
 @dataclass(frozen=True)
 class Laid:
-    """description: dataset.toml with the lines in it; changed: those of its entries that are new; refused: what was
-    left out, and why."""
+    """Result of merging. description: dataset.toml with the new lines; changed: its new entries; refused: lines left
+    out, with the reason."""
 
     description: dict[str, Any]
     changed: dict[str, Any] = field(default_factory=dict)
@@ -37,8 +37,7 @@ class Laid:
 
 
 def laid(given: dict[str, Any], findings: Sequence[Finding]) -> Laid:
-    """Lay the lines of all findings into `given`, a parsed dataset.toml ({}: none). They were found in the data as
-    `given` has them read."""
+    """Merge the lines of all findings into `given`, a parsed dataset.toml ({}: none), with which the data were read."""
     entries = [(f, dict(_leaves(tomllib.loads(f.line)))) for f in findings if f.line]
     clashes: dict[int, str] = {}
     for i, (finding, mine) in enumerate(entries):
@@ -80,7 +79,7 @@ def _at(table: Any, path: _Path) -> Any:
 
 
 def _with(table: dict[str, Any], new: dict[_Path, Any]) -> dict[str, Any]:
-    """A copy of a table with these entries."""
+    """Copy of a table with these entries."""
     result = {key: _with(value, {}) if isinstance(value, dict) else value for key, value in table.items()}
     for path, value in new.items():
         here = result
@@ -99,7 +98,7 @@ def _intervals(value: Any) -> bool:
 
 
 def _alike(a: Any, b: Any) -> bool:
-    """Whether two findings say the same of one entry: intervals add up, and estimates of one number may differ by their
+    """Whether two findings agree on one entry: intervals add up, and estimates of one number may differ by their
     error."""
     if _intervals(a) and _intervals(b):
         return True
@@ -113,7 +112,7 @@ def _joined(old: list[Any], new: list[Any]) -> list[Any]:
 
 
 def _composed(given: dict[str, Any], path: _Path, value: Any) -> Any:
-    """The entry that stands for what is given and then what was found: (reading - bias) / scale twice over, delays and
+    """Entry equivalent to the given one followed by the new one: (reading - bias) / scale twice over, delays and
     vectors added."""
     old, kind = _at(given, path), path[-2] if len(path) > 1 else path[0]
     if _intervals(value):
@@ -136,13 +135,14 @@ def _round(value: float) -> float:
 
 
 def write_lines(folder: Path, findings: Sequence[Finding]) -> tuple[Laid, Path | None]:
-    """Lay the lines of findings into a folder's dataset.toml; its comments stay, and the old file is kept beside it.
+    """Write the lines of findings into a folder's dataset.toml; its comments stay, and a copy of the old file is kept
+    beside it.
 
     Returns:
-        What was laid, and the copy of the old file (None where nothing changed).
+        The merged lines, and the copy of the old file (None where nothing changed).
 
     Raises:
-        InputError: the file cannot be read or written, or would not be a description of a data set any more.
+        InputError: the file cannot be read or written, or would no longer describe a data set.
     """
     path = folder / "dataset.toml"
     found = laid(read_toml(path), findings)
@@ -160,7 +160,7 @@ def write_lines(folder: Path, findings: Sequence[Finding]) -> tuple[Laid, Path |
 
 
 def _edited(text: str, found: Laid) -> str:
-    """The file's text with the new entries in it."""
+    """Text of the file with the new entries in it."""
     try:
         document: Any = tomlkit.parse(text)
         for key, value in _leaves(found.changed):

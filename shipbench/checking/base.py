@@ -1,4 +1,4 @@
-"""All checks: one file each, found by its existence. A file's `CHECK` takes a `Recording` and returns its findings."""
+"""Registry of all checks, one file each. A file's `CHECK` takes a `Recording` and returns its findings."""
 
 from __future__ import annotations
 
@@ -31,8 +31,11 @@ def _checks() -> tuple[Callable[[Recording], list[Finding]], ...]:
 
 
 def check_recording(recording: Recording) -> list[Finding]:
-    """Findings of the gross checks, then those of every other on the data with the gross errors taken out; errors
-    first. None is about a channel that import made of others: it is as good as these."""
+    """Findings of the gross checks, then those of every other check on the data with the gross errors corrected; errors
+    first.
+
+    None concerns a channel that import derived from others: it has no error of its own.
+    """
     mended, found = recording, []
     mends = (mend_placeholders, mend_north, mend_held, mend_gross)
     checks = _checks()
@@ -52,9 +55,12 @@ def check_recording(recording: Recording) -> list[Finding]:
 
 
 def _without_consequences(found: list[Finding]) -> list[Finding]:
-    """Speeds or a yaw rate that are late against the other motion are late against rudder and shaft, too; a stuck
-    rudder seems late; of a log that falls silent the track tells nothing else, and a yaw rate that is none tells
-    nothing of the rudder. Said once."""
+    """Remove findings that follow from others, so that each fault is reported once.
+
+    Velocities or a yaw rate that are late against the other motion are also late against rudder and shaft; a stuck
+    rudder seems late. Under a speed-log dropout the track identifies nothing else; a meaningless yaw rate says nothing
+    on the rudder.
+    """
     if any(f.kind == "log reads nothing" for f in found):
         found = [f for f in found if f.check not in ("track", "spikes") or not set(f.channels) <= {"x", "y", "u", "v"}]
     if any(f.kind == "unrelated" for f in found):
@@ -87,7 +93,7 @@ def check_dataset(dataset: Dataset) -> list[Finding]:
 
 
 def check_path(spec: str) -> tuple[Recording, list[Finding]]:
-    """A registered data set or a folder, as far as it can be read, and everything that is found in it.
+    """Recording of a registered data set or a folder, as far as it can be read, and all findings on it.
 
     Raises:
         InputError: neither a known name nor a folder, or nothing in it can be read.

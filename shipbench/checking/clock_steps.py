@@ -1,7 +1,7 @@
-"""Clocks that were set while the log went on: the ship moves on by more, or by less, than the time stamps say.
+"""Check for clocks that were set during the log: the ship moves by more, or by less, than the time stamps allow.
 
-Set back (the rows that would stand twice are gone), position and heading leap ahead along the motion. Set ahead, a gap
-in time is longer than the way across it.
+After a step back (the rows with repeated times are gone), position and heading jump ahead along the motion. After a
+step ahead, a gap in time is longer than the distance across it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def _motion(before: np.ndarray, after: np.ndarray) -> tuple[complex, float, floa
 
 
 def set_back(run: Run, k: int, leap: complex, turned: float) -> float | None:
-    """Seconds by which the clock was set back between samples k and k + 1, where position and heading both leap along
+    """Time [s] by which the clock was set back between samples k and k + 1, where position and heading both jump along
     the motion; else None."""
     way, rate, _ = _motion(run.states[max(0, k - 3) : k + 1], run.states[k + 1 : k + 5])
     seconds = float(np.real(leap * np.conj(way)) / max(abs(way) ** 2, 1e-12))
@@ -37,7 +37,7 @@ def set_back(run: Run, k: int, leap: complex, turned: float) -> float | None:
 
 
 def clock_finding(recording: Recording, steps: dict[tuple[str, int], float]) -> Finding:
-    """One finding on the clocks set back: (run id, last sample before) -> seconds."""
+    """Finding on the clocks set back: (run id, last sample before) -> seconds."""
     runs = {run.id: run for run in recording.runs}
     (name, k), seconds = max(steps.items(), key=lambda step: abs(step[1]))
     cuts: dict[str, dict[str, list[list[float]]]] = {}
@@ -58,7 +58,7 @@ def clock_finding(recording: Recording, steps: dict[tuple[str, int], float]) -> 
 
 
 def check(recording: Recording) -> list[Finding]:
-    """One finding on the gaps in time that are longer than the way across them, by a second or more."""
+    """Find gaps in time that are longer than the distance across them, by a second or more; one finding."""
     pieces: dict[str, list[Run]] = {}
     for run in recording.runs:
         pieces.setdefault(recording.name_of(run), []).append(run)
@@ -93,8 +93,8 @@ def check(recording: Recording) -> list[Finding]:
 
 
 def _ahead(before: np.ndarray, after: np.ndarray, gap: float, recording: Recording) -> float | None:
-    """Seconds by which the stamps of a gap are longer than the ship's way across it; None where the motion tells no
-    such thing."""
+    """Time [s] by which the stamps of a gap are longer than the ship needs across it; None where the motion does not
+    show it."""
     if gap < 1.5 * recording.dt:
         return None
     way, rate, change = _motion(before[-4:], after[:4])

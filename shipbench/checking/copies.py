@@ -1,4 +1,4 @@
-"""Runs that hold the same samples as another (copies, pieces), and runs that go on where another ends: neither may
+"""Check for runs that hold the same samples as another (copies, parts), and runs that continue another: neither may
 straddle a fold.
 
 Windows of rounded samples of u, v, r are hashed, so that the cost grows with the number of samples and shifted
@@ -20,12 +20,12 @@ from .statistics import some, spread, stretches
 from .thresholds import THRESHOLDS
 
 _WINDOW = 8
-"""Samples of a window that is hashed, fewer than `copied_samples`."""
+"""Samples of a hashed window, fewer than `copied_samples`."""
 
 
 def _hashes(run: Run, size: np.ndarray) -> np.ndarray:
-    """(windows,) 64-bit hash of each window of samples, 0 for windows in which nothing changes (ships at rest are all
-    alike)."""
+    """Hash (windows,), 64 bits, of each window of samples; 0 for windows in which nothing changes (ships at rest are
+    all alike)."""
     rounded = np.round(run.states[:, [U, V, R]] / size).astype(np.int64).astype(np.uint64)
     with np.errstate(over="ignore"):
         sample = (
@@ -40,7 +40,7 @@ def _hashes(run: Run, size: np.ndarray) -> np.ndarray:
 
 
 def overlaps(recording: Recording) -> dict[tuple[int, int], tuple[int, int]]:
-    """(i, j) of runs, i < j -> (equal samples, start of the equal part in i less that in j)."""
+    """Pairs (i, j) of runs, i < j -> (equal samples, start of the equal part in i less that in j)."""
     runs = [(i, run) for i, run in enumerate(recording.runs) if len(run) >= _WINDOW]
     if len(runs) < 2:
         return {}
@@ -74,7 +74,7 @@ def _alike(a: Run, b: Run, offset: int, size: np.ndarray) -> int:
     """Number of samples that are equal to rounding where `a` begins `offset` samples before `b` (a hash breaks where
     rounding falls on an edge).
 
-    0 where no unbroken part of them holds enough changes: records in coarse steps agree here and there by chance.
+    0 where no unbroken part of them holds enough changes: coarsely quantised records agree here and there by chance.
     """
     i, j = max(offset, 0), max(-offset, 0)
     n = min(len(a) - i, len(b) - j)
@@ -86,8 +86,8 @@ def _alike(a: Run, b: Run, offset: int, size: np.ndarray) -> int:
 
 
 def check(recording: Recording) -> list[Finding]:
-    """Copies and pieces, then logs that were cut; what shares a group already is not reported. All runs that hang
-    together get one group."""
+    """Find copies and parts, then logs that were cut; runs that share a group already are not reported. All connected
+    runs get one group."""
     shared = {pair: part for pair, part in overlaps(recording).items() if _apart([recording.runs[i] for i in pair])}
     chains = [chain for chain in _chains(recording) if _apart(chain) and not _cut_by_import(chain)]
     families = _families(recording, [*([recording.runs[i] for i in pair] for pair in shared), *chains])
@@ -104,7 +104,7 @@ def _apart(runs: list[Run]) -> bool:
 
 
 def _cut_by_import(chain: list[Run]) -> bool:
-    """Whether the runs are windows that import cut from one recording, as its description says: their owner chose
+    """Whether the runs are windows that import cut from one recording, as its description states: their owner chose
     so."""
     files = {run.meta.get("file") for run in chain}
     return len(files) == 1 and None not in files and all({"from", "to"} <= run.meta.keys() for run in chain)
@@ -116,7 +116,7 @@ def _cluster(
     shared: dict[tuple[int, int], tuple[int, int]],
     families: dict[str, tuple[str, ...]],
 ) -> Finding:
-    """One finding on runs that share samples with one another, with the pair that shares most."""
+    """Finding on runs that share samples with one another, with the pair that shares most."""
     i, j = max(pairs, key=lambda pair: shared[pair][0])
     finding = _copy(recording, (i, j), shared[i, j], families)
     names = recording.names(recording.runs[k] for k in sorted({k for pair in pairs for k in pair}))
@@ -128,8 +128,8 @@ def _cluster(
 
 
 def _families(recording: Recording, sets: list[list[Run]]) -> dict[str, tuple[str, ...]]:
-    """Name of a run -> names of all runs that hang together with it by these sets and by the groups that are given, in
-    the order of the data set."""
+    """Names of all runs that are connected with a run by these sets and by the given groups, in the order of the data
+    set, by name."""
     family: dict[str, set[str]] = {}
     given: dict[str, list[Run]] = {}
     for run in recording.runs:
@@ -185,7 +185,7 @@ def _copy(
 
 
 def _chains(recording: Recording) -> list[list[Run]]:
-    """Chains of runs each of which goes on where the one before ends."""
+    """Chains of runs, each of which continues the one before."""
     runs = [run for run in recording.runs if len(run) >= 4]
     after = {i: j for i in range(len(runs)) if (j := _next(recording, runs, i)) is not None}
     starts = set(after) - set(after.values())
@@ -199,8 +199,8 @@ def _chains(recording: Recording) -> list[list[Run]]:
 
 
 def _next(recording: Recording, runs: list[Run], i: int) -> int | None:
-    """The run that begins where run i ends, within a few samples: state carried on by its rates, to within noise and a
-    sample's change."""
+    """Index of the run that begins where run i ends, within a few samples: state extrapolated by its rates, to within
+    noise and a sample's change."""
     end, dt = runs[i].states[-1], recording.dt
     rates = end[[U, V]] @ np.array([[np.cos(end[PSI]), np.sin(end[PSI])], [-np.sin(end[PSI]), np.cos(end[PSI])]])
     noise = _noise(recording)
@@ -223,8 +223,8 @@ def _next(recording: Recording, runs: list[Run], i: int) -> int | None:
 
 
 def _noise(recording: Recording) -> np.ndarray:
-    """(5,) tolerances of position, heading, u, v, r: six deviations of the change of slope within runs; of the rates a
-    tenth of what is usual."""
+    """Tolerances (5,) of position, heading, u, v, r: six standard deviations of the change of slope within runs; of the
+    rates a tenth of the typical value."""
     second = np.concatenate(
         [run.states[2:] - 2.0 * run.states[1:-1] + run.states[:-2] for run in recording.runs if len(run) >= 4]
     )

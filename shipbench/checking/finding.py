@@ -17,13 +17,13 @@ SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note")
 
 
 def labelled(*channels: str) -> str:
-    """Channels of one unit as the label of an axis: "x, y [m]"."""
+    """Axis label of channels with one unit: "x, y [m]"."""
     return f"{', '.join(channels)} [{UNITS[channels[0].removesuffix('_c')]}]"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Curve:
-    """One line or cloud of a picture: x, y of equal length; style is matplotlib's ("-", ".")."""
+    """Line or point cloud of a picture: x, y of equal length; style is matplotlib's ("-", ".")."""
 
     label: str
     x: np.ndarray
@@ -33,7 +33,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Evidence to look at; axis labels carry units."""
+    """Evidence as a picture; axis labels carry units."""
 
     title: str
     xlabel: str
@@ -43,16 +43,16 @@ class Picture:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """One fault or peculiarity of a data set.
+    """Fault or peculiarity of a data set.
 
     Args:
         check: name of the check that found it.
         severity: "error" (fits are wrong or the loader refuses it), "warning" (fits suffer), "note" (good to know).
         kind: the fault in a few words, the same for every data set.
-        text: what is wrong, with the figures.
-        line: TOML for dataset.toml that heals it, or "".
-        todo: what to do instead, or beside.
-        channels, runs: what is concerned; runs empty: all.
+        text: the fault, with the figures.
+        line: TOML for dataset.toml that corrects it, or "".
+        todo: action in place of the line, or in addition.
+        channels, runs: those concerned; runs empty: all.
         evidence: figures by name.
     """
 
@@ -71,7 +71,7 @@ class Finding:
         return brief(f"<{self.severity}, {self.kind}: {self.text}>")
 
     def as_json(self) -> dict[str, Any]:
-        """Everything but the picture, with plain numbers."""
+        """Fields without the picture, with plain numbers."""
         figures = {k: v.item() if hasattr(v, "item") else v for k, v in self.evidence.items()}
         return {
             "check": self.check, "severity": self.severity, "kind": self.kind, "text": self.text, "line": self.line,
@@ -81,7 +81,7 @@ class Finding:
 
 
 def toml_line(data: dict[str, Any]) -> str:
-    """Compact TOML: values first, then tables; numbers to six digits, lists on one line."""
+    """TOML in compact form: values first, then tables; numbers to six digits, lists on one line."""
     return "\n".join(_toml(data, ()))
 
 
@@ -100,7 +100,7 @@ def _key(key: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Lists, text, whole numbers and floats as JSON and TOML both write them."""
+    """Value as JSON and TOML both write it: list, text, whole number or float."""
     if isinstance(value, list | tuple):
         return [_plain(v) for v in value]
     value = value.item() if hasattr(value, "item") else value

@@ -1,9 +1,9 @@
-"""Errors that touch every figure: frames (ENU, heading from east), earth-fixed velocities, units, signs. They are taken
-out before finer checks.
+"""Gross errors that change every figure: frames (ENU, heading from east), earth-fixed velocities, units, signs. They
+are corrected before finer checks.
 
 Readings of frame and velocities are compared by the share of the track, and of the heading's change, that they leave
-unexplained; a reading other than ours is believed only if it leaves a quarter or less of the squares. Units and signs
-are `units`, those of the wind `wind_reading`.
+unexplained. Another reading than the standard one is accepted only if it leaves a quarter or less of the sum of
+squares. Units and signs are in `units`, those of the wind in `wind_reading`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _UNITS = {
 
 @dataclass(frozen=True)
 class _Reading:
-    """A way to read frame and velocities: what it is called, the change of the states (a copy) that makes them ours,
+    """Interpretation of frame and velocities: its name, the change of the states (a copy) that gives standard states,
     and its lines."""
 
     kind: str
@@ -102,8 +102,8 @@ def _mended(dataset: Dataset, mend: Callable[[np.ndarray], None]) -> Dataset:
 
 @dataclass(frozen=True)
 class _Misfit:
-    """track: root share of the track's squares that heading and speeds leave; scale: of the speeds to the track; pairs:
-    way said and made (W,)."""
+    """Misfit of a reading. track: root share of the track's squares that heading and speeds leave; scale: of the speeds
+    to the track; pairs: displacement by the speeds and by the position (W,)."""
 
     track: float
     scale: float
@@ -112,7 +112,7 @@ class _Misfit:
 
 
 def _misfit(recording: Recording, dataset: Dataset) -> _Misfit | None:
-    """Misfit of the track to heading and speeds, with a scale left free; None where the ship hardly moves."""
+    """Misfit of the track to heading and speeds, with a free scale; None where the ship hardly moves."""
     dt = recording.dt
     width = max(3, round(THRESHOLDS.value("track_window") * recording.froude / dt))
     pieces = [run.states[a : a + width + 1] for run in dataset.runs for a in range(0, len(run) - width, width)]
@@ -131,7 +131,7 @@ def _misfit(recording: Recording, dataset: Dataset) -> _Misfit | None:
 
 
 def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
-    """Recording with gross errors taken out, and the findings on them."""
+    """Recording with gross errors corrected, and the findings on them."""
     findings: list[Finding] = []
     plain = _misfit(recording, recording.dataset)
     units = _units(recording)
@@ -147,7 +147,7 @@ def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
 
 
 def _units(recording: Recording) -> list[UnitFinding]:
-    """Errors of unit and sign; of two speeds that come from one velocity over ground none has a unit of its own."""
+    """Errors of unit and sign; of two speeds derived from one velocity over ground none has a unit of its own."""
     found = check_units(recording.dataset)
     factors = {f.channel: f.factor for f in found}
     return [
@@ -158,7 +158,7 @@ def _units(recording: Recording) -> list[UnitFinding]:
 def _best_reading(
     recording: Recording, plain: _Misfit, units: list[UnitFinding]
 ) -> tuple[_Reading, Dataset, _Misfit] | None:
-    """A reading of the frame that explains the track, unless units and signs explain it with as few errors."""
+    """Interpretation of the frame that explains the track, unless units and signs explain it with as few errors."""
     options = []
     for reading in READINGS:
         dataset = _mended(recording.dataset, reading.mend)
@@ -178,12 +178,13 @@ def _best_reading(
 
 
 def _errors(units: list[UnitFinding]) -> list[UnitFinding]:
-    """Separate mistakes: commands share that of their actuator, u and v one unit."""
+    """Separate errors: commands share that of their actuator, u and v one unit."""
     return [f for f in units if not _follows(f, units)]
 
 
 def _follows(f: UnitFinding, units: list[UnitFinding]) -> bool:
-    """A command with its actuator's error, and y where both axes of the position are reversed."""
+    """Whether an error follows from another: a command with its actuator's error, or y where both axes of the position
+    are reversed."""
     if f.channel == "y":
         return _reversed(units)
     return f.channel.endswith("_c") and any(
@@ -192,7 +193,7 @@ def _follows(f: UnitFinding, units: list[UnitFinding]) -> bool:
 
 
 def _reversed(units: list[UnitFinding]) -> bool:
-    """Whether both axes of the position have the other sign."""
+    """Whether both axes of the position have the opposite sign."""
     return {("x", "sign"), ("y", "sign")} <= {(f.channel, f.kind) for f in units}
 
 
@@ -222,7 +223,7 @@ def _frame_finding(reading: _Reading, plain: _Misfit, left: _Misfit) -> Finding:
 
 
 def _side(recording: Recording, channel: str) -> str:
-    """The word of `[signs]` that turns a channel round; a sign that the file declares already is taken back."""
+    """Word of `[signs]` that reverses a channel; a sign that the file declares already is removed."""
     flipped, kept = _FLIPPED[channel.removesuffix("_c")]
     return kept if recording.given.get("signs", {}).get(channel) == flipped else flipped
 
@@ -276,7 +277,7 @@ def _unit_finding(recording: Recording, f: UnitFinding, units: list[UnitFinding]
 
 
 def _channel(recording: Recording, channel: str) -> Picture:
-    """Picture of the channel in the longest run, beside the channels that it would have to agree with."""
+    """Picture of the channel in the longest run, beside the channels with which it should agree."""
     run = max(recording.runs, key=len)
     t, S = run.t - run.t[0], run.states
     names = dict(zip(("x", "y", "psi", "u", "v", "r", "n", "delta", "F_b", "F_s"), S.T, strict=True)) | dict(

@@ -1,7 +1,8 @@
-"""Fixes that are held: a receiver or compass gives a value now and then, and a faster record repeats it until the next.
+"""Check for held fixes: a receiver or compass gives a value now and then, and a faster record repeats it until the
+next.
 
-Each value is right when it comes and late until the next. It is a held one if the ship moves on, by the other channels,
-further than the record's last digit hides, and if that is so of most values.
+Each value is correct when it arrives and late until the next. It counts as held if the ship moves on, by the other
+channels, further than the resolution of the record, and if that holds for most values.
 """
 
 from __future__ import annotations
@@ -20,22 +21,22 @@ from .thresholds import THRESHOLDS
 
 
 def _digit(changes: np.ndarray) -> float:
-    """Last digit of a record: the least of its changes and of their differences (of numbers in full precision nearly
-    nothing)."""
+    """Resolution of a record: the least of its changes and of their differences (close to zero for numbers in full
+    precision)."""
     size = np.unique(np.abs(changes[changes != 0.0]))
     size = size[np.concatenate([[True], np.diff(size) > 1e-6 * size[-1]])]
     return float(np.min(np.concatenate([size[:1], np.diff(size)])))
 
 
 def _moved(run: Run, dt: float) -> dict[int, np.ndarray]:
-    """Way and turn by the rates (samples,)."""
+    """Displacement and turn by the rates (samples,)."""
     S = run.states
     way = np.cumsum((S[:, U] + 1j * S[:, V]) * np.exp(1j * S[:, PSI])) * dt
     return {X: way.real, Y: way.imag, PSI: np.cumsum(S[:, R]) * dt}
 
 
 def _held(recording: Recording, channel: int) -> int:
-    """Samples for which most values are held; 0 where they are not."""
+    """Number of samples for which most values are held; 0 where they are not."""
     changes = np.concatenate([np.diff(run.states[:, channel]) for run in recording.runs])
     if np.sum(changes != 0.0) < THRESHOLDS.count("occurrences"):
         return 0
@@ -49,7 +50,7 @@ def _held(recording: Recording, channel: int) -> int:
 
 
 def mend_held(recording: Recording) -> tuple[Recording, list[Finding]]:
-    """The recording with straight lines from fix to fix, and one finding."""
+    """Recording with linear interpolation from fix to fix, and one finding."""
     made = (
         {PSI} if "r" in recording.dataset.derived else {X, Y} if {"u", "v"} & set(recording.dataset.derived) else set()
     )

@@ -1,5 +1,5 @@
-"""A heading that was interpolated linearly across 360/0 or 180/-180: named as that, and not as the jumps or the
-yaw-rate scale that it makes."""
+"""Check for a heading that was interpolated linearly across 360/0 or 180/-180, reported as such and not as the jumps or
+the yaw-rate scale that it causes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .statistics import times
 
 
 def mend_north(recording: Recording) -> tuple[Recording, list[Finding]]:
-    """The recording with straight lines in place of such samples, and one finding."""
+    """Recording with linear interpolation in place of such samples, and one finding."""
     found = {run.id: places for run in recording.runs if (places := interpolated(run.states[:, PSI], recording.turn))}
     if not found:
         return recording, []

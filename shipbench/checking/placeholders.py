@@ -1,8 +1,8 @@
-"""Values that stand for "not available" (a heading of 511, a position of 0, 0): a channel leaps to one, holds it
-exactly, and leaps back.
+"""Check for placeholder values of "not available" (a heading of 511, a position of 0, 0): a channel jumps to one, holds
+it exactly, and jumps back.
 
-No motion does that: a sensor that freezes stays where it was, and a ship that stops comes to rest. These samples are
-cut before anything else.
+No motion does that: a sensor that freezes keeps its value, and a ship that stops comes to rest. These samples are cut
+before other checks.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .thresholds import THRESHOLDS
 
 
 def _blocks(z: np.ndarray, limit: float) -> list[tuple[int, int]]:
-    """First and last samples of the blocks in z (samples,): equal values between two leaps, out and back, with the
+    """First and last samples of the blocks in z (samples,): equal values between two jumps, out and back, with the
     samples between on the slopes."""
     steps, found = np.abs(np.diff(z)), []
     for a, b in stretches(steps == 0.0):
@@ -39,7 +39,7 @@ def _blocks(z: np.ndarray, limit: float) -> list[tuple[int, int]]:
 
 
 def _channel(recording: Recording, channels: Sequence[int]) -> dict[str, list[tuple[int, int]]]:
-    """Run id -> blocks."""
+    """Blocks by run id."""
     z = {
         run.id: run.states[:, channels[0]] + (1j * run.states[:, channels[1]] if len(channels) > 1 else 0.0)
         for run in recording.runs
@@ -53,7 +53,7 @@ def _channel(recording: Recording, channels: Sequence[int]) -> dict[str, list[tu
 
 
 def _impossible(recording: Recording, found: dict[str, list[tuple[int, int]]]) -> dict[str, list[tuple[int, int]]]:
-    """Those blocks of rudder angles that no rudder reaches, unless it goes there otherwise too: then the unit is
+    """Blocks of rudder angles that no rudder reaches, unless the record has such angles elsewhere too: then the unit is
     another one."""
     kept = {}
     for run in recording.runs:
@@ -69,7 +69,7 @@ def _impossible(recording: Recording, found: dict[str, list[tuple[int, int]]]) -
 
 
 def mend_placeholders(recording: Recording) -> tuple[Recording, list[Finding]]:
-    """The recording without such samples, and one finding for each channel."""
+    """Recording without such samples, and one finding for each channel."""
     findings, bad = [], {run.id: np.zeros(len(run), dtype=bool) for run in recording.runs}
     for channels in ((X, Y), (PSI,), (U,), (V,), (R,), (DELTA,)):
         found = (

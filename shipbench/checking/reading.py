@@ -1,5 +1,4 @@
-"""Read a data set's folder as far as it goes: what the loader refuses at its first sight becomes findings here, all at
-once."""
+"""Tolerant reading of a data set's folder: errors at which the loader stops become findings here, all at once."""
 
 from __future__ import annotations
 
@@ -26,7 +25,7 @@ _SPLIT = toml_line({"gaps": "split"})
 
 
 def read_recording(spec: str) -> tuple[Recording, list[Finding]]:
-    """A registered data set, or a folder read tolerantly, with what is wrong in its table.
+    """Recording of a registered data set, or of a folder read tolerantly, with the errors of its table.
 
     Raises:
         InputError: neither a known name nor a folder; its TOML files or its table cannot be read, or nothing usable is
@@ -86,7 +85,7 @@ def _error(
 
 
 def _clean(table: pd.DataFrame, description: Description, found: list[Finding]) -> pd.DataFrame:
-    """Rows with a name, numbers or NaN in every signal."""
+    """Rows with a name, and numbers or NaN in every signal."""
     nameless = (table["trajectory"].isna() | (table["trajectory"].astype(str).str.strip() == "")).to_numpy()
     if nameless.any():
         row = int(np.argmax(nameless)) + 2
@@ -145,7 +144,7 @@ def _clean(table: pd.DataFrame, description: Description, found: list[Finding]) 
 
 
 def _possible(table: pd.DataFrame, where: str) -> None:
-    """Refuse numbers that no sensor reads, at which arithmetic ends."""
+    """Refuse numbers that no sensor reads, at which arithmetic overflows."""
     accepted = THRESHOLDS.value("greatest_value")
     for column in ("t", *(c for c in SIGNALS if c in table)):
         values = table[column].to_numpy()
@@ -206,7 +205,7 @@ def _sample_time(frames: dict[str, pd.DataFrame], description: Description, foun
 def _missing_values(
     frames: dict[str, pd.DataFrame], description: Description, recorded: frozenset[str], found: list[Finding]
 ) -> None:
-    """Rows without all values: at the end of a run (a tail), or elsewhere."""
+    """Report rows without all values: at the end of a run (a tail), or elsewhere."""
     if description.gaps == "split":
         return
     columns = ["t", *(c for c in SIGNALS if c in recorded)]
@@ -241,7 +240,7 @@ def _missing_values(
 
 
 def _time_steps(frames: dict[str, pd.DataFrame], description: Description, dt: float, found: list[Finding]) -> None:
-    """Gaps, uneven steps, and runs whose time does not begin at 0."""
+    """Report gaps, uneven steps, and runs whose time does not begin at 0."""
     late = {}
     for name, rows in frames.items():
         t = rows["t"].to_numpy()
@@ -312,8 +311,8 @@ def _time_steps(frames: dict[str, pd.DataFrame], description: Description, dt: f
 
 
 def _turn(frames: dict[str, pd.DataFrame]) -> float:
-    """A whole turn of the headings as they stand: 2 pi, or 360 where they jump by more than two turns (degrees that
-    nobody declared)."""
+    """Full turn in the unit of the recorded headings: 2 pi, or 360 where they jump by more than two turns (undeclared
+    degrees)."""
     most = max((np.max(np.abs(_heading_steps(rows)), initial=0.0) for rows in frames.values()), default=0.0)
     return 360.0 if most > 4.0 * np.pi else 2.0 * np.pi
 
@@ -327,7 +326,7 @@ def _runs(
     dt: float, turn: float, where: str,
     found: list[Finding],
 ) -> tuple[list[Run], dict[str, str]]:  # fmt: skip
-    """Whole pieces of every run, and which run each is a piece of; owner: name of a frame -> the run's."""
+    """Whole pieces of every run, and the run of each piece; owner: name of a frame -> the run's."""
     runs, parent = [], {}
     tolerant = description.model_copy(update={"gaps": "split"})
     for name, rows in frames.items():

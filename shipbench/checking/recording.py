@@ -1,4 +1,4 @@
-"""Recording that is checked: the data set as far as it can be read, its raw table, and the time scale of its ship."""
+"""Recording to check: the data set as far as it can be read, its raw table, and the time scale of its ship."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .statistics import stretches
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A data set to check.
+    """Data set to check.
 
     dataset: runs without missing values, uniform in time (pieces of one run share the group `parent`). given:
-    dataset.toml as written, {} for a registered set. recorded: columns that stand in the table (states that were filled
-    in do not). wrapped: runs whose heading was wrapped.
-    parent: id of a piece -> id of the run that it is a piece of. turned: u, v were velocities over ground, turned into
-    the ship's axes by psi: the track says nothing of psi. turn: a whole turn in the unit of psi (degrees that nobody
-    declared are read as they are).
+    dataset.toml as written, {} for a registered set. recorded: columns of the table (without states that were filled
+    in). wrapped: runs whose heading was wrapped.
+    parent: id of a piece -> id of the run that it is a piece of. turned: u, v were velocities over ground, rotated into
+    the ship's axes by psi; the track then does not depend on psi. turn: full turn in the unit of psi (undeclared
+    degrees are read as they are).
     """
 
     dataset: Dataset
@@ -43,7 +43,7 @@ class Recording:
 
     @property
     def froude(self) -> float:
-        """Time scale against a ship of 130 m, sqrt(L/130)."""
+        """Time scale relative to a ship of 130 m, sqrt(L/130)."""
         return float((self.dataset.ship.L / 130.0) ** 0.5)
 
     @cached_property
@@ -59,26 +59,26 @@ class Recording:
 
     @cached_property
     def steps(self) -> np.ndarray:
-        """(10,) step in which each state is recorded, or less: of the changes between neighbours one in a hundred is
-        smaller; 0: none."""
+        """Resolution (10,) of each state, or less: one in a hundred of the changes between neighbours is smaller; 0:
+        none."""
         changes = np.abs(np.concatenate([np.diff(run.states, axis=0) for run in self.runs]))
         return np.array([np.quantile(c[c > 0.0], 0.01) if np.any(c > 0.0) else 0.0 for c in changes.T])
 
     def rounded(self, channel: int) -> bool:
-        """Whether a state is recorded in steps of the size of its changes, so that it may well repeat itself (1 % of
-        the changes in noise are smaller than a fiftieth of the median)."""
+        """Whether the resolution of a state is as coarse as its changes, so that values may repeat (1 % of the changes
+        in noise are smaller than a fiftieth of the median)."""
         changes = np.abs(np.concatenate([np.diff(run.states[:, channel]) for run in self.runs]))
         return bool(np.any(changes > 0.0) and self.steps[channel] > 0.1 * np.median(changes[changes > 0.0]))
 
     def name_of(self, run: Run) -> str:
-        """The id under which the user knows a run."""
+        """Id under which the user knows a run."""
         return self.parent.get(run.id, run.id)
 
     def names(self, runs: Any) -> tuple[str, ...]:
         return tuple(dict.fromkeys(self.name_of(run) for run in runs))
 
     def without(self, bad: dict[str, np.ndarray]) -> Recording:
-        """The recording without samples, bad[run id] (samples,), split there as a cut would."""
+        """Recording without the samples bad[run id] (samples,), split there as a cut would."""
         runs, parent = [], dict(self.parent)
         for run in self.runs:
             pieces = stretches(~bad[run.id]) if run.id in bad else [(0, len(run))]

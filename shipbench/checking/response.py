@@ -1,9 +1,8 @@
-"""Actuators against what they do: a rudder or shaft whose record is late against the motion, a motion late against
-them, late orders.
+"""Time lags between actuators and motion: a rudder or shaft record that is late against the motion, a motion late
+against them, late commands.
 
-Changes of yaw rate, surge, rudder and shaft over some seconds are regressed on the integrals of what causes them, with
-the record of the cause moved in time. A cause acts at once, so the move that leaves the least squares is the lag of the
-record.
+Changes of yaw rate, surge, rudder and shaft over some seconds are regressed on the integrals of their causes, with the
+record of the cause shifted in time. A cause acts at once, so the shift of least squares is the lag of the record.
 """
 
 from __future__ import annotations
@@ -28,14 +27,13 @@ _Columns = Callable[[np.ndarray, np.ndarray, _Shift], tuple[np.ndarray, list[np.
 
 @dataclass(frozen=True)
 class _Pair:
-    """A cause and its effect. columns: (states (T, 10), inputs, shift) -> effect (T,) and causes [(T,), ...], where
-    shift moves a channel in time.
+    """Cause and effect. columns: (states (T, 10), inputs, shift) -> effect (T,) and causes [(T,), ...], where shift
+    moves a channel in time.
 
     late, early: smallest lag of the cause, or lead, that is reported [s at 130 m], and the log likelihood that it must
-    gain. agreed: what a lag must gain where the actuator waits for its order, too. Noise in the motion and forces that
-    are not recorded make the rudder seem late, never early; early None: a lead is not told from the dead time of a
-    gear.
-    of: the state of the effect. order: the cause is an order, which is held until the next sample, and windows that it
+    gain. agreed: the gain that a lag needs where the actuator also lags its command. Noise in the motion and unrecorded
+    forces make the rudder seem late, never early; early None: a lead is confounded with the dead time of the actuator.
+    of: the state of the effect. order: the cause is a command, which is held until the next sample, and windows that it
     does not explain count; else these are left out.
     """
 
@@ -71,7 +69,7 @@ def _surge(S: np.ndarray, orders: np.ndarray, shift: _Shift) -> tuple[np.ndarray
 
 
 def _gear(actuator: int) -> _Columns:
-    """Pace of an actuator by what is left to its order, with limits of the pace at several shares of its range."""
+    """Rate of an actuator from its distance to the command, with rate limits at several shares of its range."""
 
     shares = (0.005, 0.02, 0.05, 0.1, 0.2, 0.5)
 
@@ -98,7 +96,7 @@ _PAIRS = (
 
 @dataclass(frozen=True)
 class _Search:
-    """lags (G,) [s], mean squares that remain with each (G,), number of windows."""
+    """Search over lags: lags (G,) [s], residual mean squares with each (G,), number of windows."""
 
     lags: np.ndarray
     squares: np.ndarray
@@ -121,7 +119,7 @@ class _Search:
 
 
 def _search(recording: Recording, pair: _Pair) -> _Search | None:
-    """None where there are too few windows."""
+    """Search over lags of one pair; None where there are too few windows."""
     times = THRESHOLDS.value("lag_interval"), THRESHOLDS.value("lag_mean")
     ahead, edge = (max(1, round(seconds * recording.froude / recording.dt)) for seconds in times)
     half = round(THRESHOLDS.value("longest_lag") / THRESHOLDS.value("lag_step"))
@@ -162,18 +160,17 @@ def _search(recording: Recording, pair: _Pair) -> _Search | None:
 
 
 def _changes(values: np.ndarray, windows: np.ndarray, ahead: int, edge: int) -> np.ndarray:
-    """(windows, P): mean of values (T, P) over an edge less the mean over the edge `ahead` samples before; windows:
-    their first samples."""
+    """Changes (windows, P): mean of values (T, P) over an edge less the mean over the edge `ahead` samples before;
+    windows: their first samples."""
     samples = windows[:, None] + np.arange(edge)
     return np.asarray((values[samples + ahead] - values[samples]).mean(axis=1))
 
 
 def check(recording: Recording) -> list[Finding]:
-    """At most one finding for each pair; none where actuators are commands: the lag is that of the gear then. A motion
-    that import made of another is not asked.
+    """Find lags, at most one for each pair; none where actuators are commands: the lag is then that of the actuator
+    dynamics. A motion that import derived from another is not tested.
 
-    Where rudder or revolutions are missing from the record, what they do is laid on the other's lag: the motion is not
-    asked.
+    Where rudder or shaft speed is missing from the record, its effect biases the other's lag: the motion is not tested.
     """
     if recording.dataset.actuators != "measured" or command_like(recording):
         return []
@@ -193,9 +190,9 @@ def check(recording: Recording) -> list[Finding]:
 
 
 def _judge(recording: Recording, pair: _Pair, found: _Search, waits: float) -> Finding | None:
-    """The finding of a pair; waits: s by which the actuator answers its order late, 0.0 where that is not known.
+    """Finding of a pair; waits: delay [s] of the actuator behind its command, 0.0 where it is unknown.
 
-    None where the best lag is the last one searched: forces that are not recorded do that.
+    None where the best lag is the last one searched: unrecorded forces do that.
     """
     lag, late_gain = float(found.lags[found.best]), pair.late[1]
     at_130 = lag / recording.froude

@@ -1,5 +1,4 @@
-"""The side to which the recorded rudder turns the recorded yaw rate: a reversed rudder, and a mirrored heading, are
-told by it."""
+"""Sign of the turn under the recorded rudder: it shows a reversed rudder, and a mirrored heading."""
 
 from __future__ import annotations
 
@@ -16,8 +15,8 @@ from .thresholds import THRESHOLDS
 
 @dataclass(frozen=True)
 class Side:
-    """sign: +1 where the recorded rudder turns the recorded yaw rate to its own side, -1 to the other, 0 where it is
-    not clear."""
+    """Sign of the turn: +1 where the recorded rudder turns the recorded yaw rate to its own side, -1 to the other, 0
+    where it is not clear."""
 
     sign: float = 0.0
     evidence: str = ""
@@ -26,9 +25,9 @@ class Side:
 def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
     """Side to which the ship turns under a rudder, ahead and without thrusters.
 
-    It must show in turns by a visible angle, which no gust makes against the rudder, and just after the rudder:
-    r(t + 6 s) - r(t) against delta(t), given r(t). On a straight course the rudder answers the motion, which alone
-    would mislead. unit: of the recorded yaw rate, over rad/s.
+    It must show in turns by a clear angle, which no gust makes against the rudder, and just after the rudder: r(t +
+    6 s) - r(t) against delta(t), given r(t). On a straight course the rudder responds to the motion, which alone would
+    mislead. unit: of the recorded yaw rate, over rad/s.
     """
     froude = (dataset.ship.L / 130.0) ** 0.5
     times = THRESHOLDS.value("rudder_answer"), THRESHOLDS.value("side_turn_time"), THRESHOLDS.value("side_turn_delay")
@@ -70,7 +69,7 @@ def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
 
 
 def _slopes(block: np.ndarray) -> tuple[np.ndarray, float]:
-    """(slope of column 0 on column 2, on column 1) and the first one's standard error."""
+    """Slopes of column 0 on column 2, on column 1, as (slope, the first one's standard error)."""
     A, y = block[:, [2, 1]], block[:, 0]
     G = A.T @ A + 1e-12 * np.trace(A.T @ A) * np.eye(2)
     slope = np.linalg.solve(G, A.T @ y)

@@ -1,4 +1,4 @@
-"""Repeated, frozen and quantised samples: values that are exactly equal to the one before while the ship moves on."""
+"""Check for repeated, frozen and quantised samples: values exactly equal to the one before while the ship moves."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _CHANNELS = {"x, y": (X, Y), "psi": (PSI,), "u": (U,), "v": (V,), "r": (R,)}
 
 
 def _equal(run: Run, channels: Sequence[int]) -> np.ndarray:
-    """(samples - 1,): the sample repeats the one before in all channels."""
+    """Mask (samples - 1,) of samples that repeat the one before in all channels."""
     return np.all(np.diff(run.states[:, list(channels)], axis=0) == 0.0, axis=1)
 
 
 def _moving(recording: Recording, run: Run, channels: Sequence[int]) -> np.ndarray:
-    """(samples - 1,): steps in which the channel ought to change: the ship makes way, and for psi, v and r turns (by r,
-    or by psi)."""
+    """Mask (samples - 1,) of steps in which the channel should change: the ship makes way, and for psi, v and r turns
+    (by r, or by psi)."""
     S = run.states
     way = (
         np.hypot(np.diff(S[:, X]), np.diff(S[:, Y])) / recording.dt
@@ -47,7 +47,7 @@ def _averaged(values: np.ndarray, wide: int) -> np.ndarray:
 
 
 def check(recording: Recording) -> list[Finding]:
-    """Findings on single samples and standstills of motion channels, stuck actuators and coarse rudders."""
+    """Find single repeats and standstills of motion channels, stuck actuators and coarse rudders."""
     found = []
     for name, channels in _CHANNELS.items():
         found += _channel(recording, name, channels)
@@ -98,17 +98,17 @@ def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[F
 
 
 def _needed(recording: Recording, seconds: float) -> int:
-    """Least number of repeats of a standstill of so many seconds at 130 m."""
+    """Least number of repeats of a standstill of `seconds` at 130 m."""
     return max(THRESHOLDS.count("occurrences"), round(seconds * recording.froude / recording.dt))
 
 
 def _standstills(repeated: np.ndarray, moving: np.ndarray, needed: int) -> list[tuple[int, int]]:
-    """Stretches of at least `needed` repeats, most of them while the ship moves."""
+    """Standstills of at least `needed` repeats, most of them while the ship moves."""
     return [(a, b) for a, b in stretches(repeated) if b - a >= needed and np.mean(moving[a:b]) > 0.7]
 
 
 def _visible(recording: Recording, run: Run, channels: Sequence[int], a: int, b: int) -> bool:
-    """Whether more happened from sample a to b than a record in such steps hides, as the other channels have it."""
+    """Whether the motion from sample a to b, by the other channels, exceeds the resolution of the record."""
     S, dt, step = run.states, recording.dt, float(np.max(recording.steps[list(channels)]))
     hides, sure = THRESHOLDS.value("hidden_steps"), THRESHOLDS.value("hidden_noise")
     if X in channels:
@@ -132,7 +132,7 @@ def _visible(recording: Recording, run: Run, channels: Sequence[int], a: int, b:
 def _frozen(
     recording: Recording, name: str, channels: Sequence[int], stops: dict[str, list[tuple[int, int]]]
 ) -> list[Finding]:
-    """One finding on the standstills (run id -> first and last sample) of a channel in all runs."""
+    """Finding on the standstills (run id -> first and last sample) of a channel in all runs."""
     runs = [run for run in recording.runs if stops.get(run.id)]
     if not runs:
         return []
@@ -159,7 +159,7 @@ def _frozen(
 
 
 def _repeats_picture(recording: Recording, channels: Sequence[int], repeats: list[np.ndarray]) -> Picture:
-    """Steps of the channel around the first repeats of the run that has most."""
+    """Picture of the channel's steps around the first repeats of the run that has most."""
     i = max(range(len(repeats)), key=lambda k: repeats[k].sum())
     run = recording.runs[i]
     first = int(np.argmax(repeats[i]))
@@ -174,7 +174,7 @@ def _repeats_picture(recording: Recording, channels: Sequence[int], repeats: lis
 
 
 def _stuck(recording: Recording, channel: int) -> list[Finding]:
-    """An actuator that stays at one value while its command is far from it, or while noise would move its record."""
+    """Find an actuator that keeps one value while its command is far from it, or while noise would move its record."""
     values = np.concatenate([run.states[:, channel] for run in recording.runs])
     reach = float(np.ptp(values))
     needed = _needed(recording, THRESHOLDS.value("stuck_time"))
@@ -196,7 +196,7 @@ def _noisy(recording: Recording, channel: int) -> bool:
 
 
 def _quantised(recording: Recording) -> list[Finding]:
-    """A rudder that is recorded in coarse steps."""
+    """Find a rudder that is recorded in coarse steps."""
     if "delta" not in recording.recorded:
         return []
     values = np.concatenate([run.states[:, DELTA] for run in recording.runs])

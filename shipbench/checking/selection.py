@@ -1,4 +1,4 @@
-"""Choice among explanations of the data: forward selection of groups of columns by likelihood and clustered t."""
+"""Forward selection among explanations of the data: groups of columns by likelihood and clustered t."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .thresholds import THRESHOLDS
 
 @dataclass(frozen=True)
 class Chosen:
-    """Explanations in the order of choice, coefficients and standard errors of each, and the share of the plain squares
-    that models leave.
+    """Explanations in the order of choice, coefficients and standard errors of each, and the share of the squares that
+    models leave.
 
-    left: "plain", every explanation alone, and "all chosen" -> root of squares left over root of the squares of
-    `whole`. held: explanation -> squares that all chosen ones leave in runs held out of the fit, over those that the
-    others leave there without it. out: mean square that all leave there.
+    left: "plain", every explanation alone, and "all chosen" -> root of residual squares over root of the squares of
+    `whole`. held: explanation -> residual squares of all chosen ones in held-out runs, over those of the others without
+    it. out: residual mean square of all in held-out runs.
     """
 
     names: tuple[str, ...]
@@ -53,7 +53,7 @@ def select(
         return float(np.sqrt(squares / len(y))) / whole
 
     def held_out(names: Sequence[str]) -> float:
-        """Squares that a fit to every other cluster leaves in those between, and the other way round."""
+        """Residual squares in every other cluster of a fit to those between, and the other way round."""
         X = np.column_stack([nuisance, *(groups[n] for n in names)])
         odd = np.unique(cluster, return_inverse=True)[1] % 2 == 1
         return sum(
@@ -63,7 +63,7 @@ def select(
     least = THRESHOLDS.value("explanation_gain")
 
     def significant(name: str, fitted: Fit) -> bool:
-        """Whether one or two columns differ from zero beyond chance; more columns are judged by their gain alone."""
+        """Whether one or two columns differ significantly from zero; more columns are judged by their gain alone."""
         width = groups[name].shape[1]
         return width > 2 or bool(fitted.p[-width:].min() < THRESHOLDS.value("chance"))
 
@@ -101,8 +101,8 @@ def _gain(old: Fit, new: Fit, more: int) -> float:
 
 
 def _trimmed(y: np.ndarray, X: np.ndarray, parts: int) -> np.ndarray:
-    """Rows that the richest model does not leave far out: jumps and spikes are found by other checks and must not
-    decide here."""
+    """Rows within the bulk of the richest model's residuals: other checks find jumps and spikes, which must not decide
+    here."""
     keep = np.ones(len(y), dtype=bool)
     for _ in range(4):
         value, *_ = np.linalg.lstsq(X[keep], y[keep], rcond=None)

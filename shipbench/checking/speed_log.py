@@ -1,8 +1,8 @@
-"""A speed log that reads nothing where the ship makes way: below some speed (a Doppler log, a receiver that holds
-still), or now and then.
+"""Check for a speed-log dropout: the log reads zero while the ship makes way, below some speed (a Doppler log, a held
+receiver), or now and then.
 
-What makes no way through the water drifts with it, steadily for a minute or two. Where a log reads nothing, and the
-track departs from the nearest steady drift by what the log explains nothing of, the log is wrong.
+A ship without way through the water drifts with it, steadily for a minute or two. Where the log reads zero, and the
+track departs from the nearest steady drift by more than the log explains, the log is wrong.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from .thresholds import THRESHOLDS
 
 @dataclass(frozen=True)
 class Silence:
-    """level: speed [m/s] up to which the log says nothing; pieces that show it, and their share of the samples;
-    departure: the greatest of the track from a steady drift [m], and its seconds; worst: the run with that."""
+    """Speed-log dropout. level: speed [m/s] up to which the log reads zero; pieces that show it, and their share of the
+    samples; departure: the greatest of the track from a steady drift [m], and its seconds; worst: the run with that."""
 
     level: float
     pieces: int
@@ -75,7 +75,7 @@ def in_words(found: Silence) -> str:
 
 
 def _departures(S: np.ndarray, dt: float) -> tuple[float, float]:
-    """Greatest distance [m] of the track from the steady drift that is nearest, as recorded and less the way by u and
+    """Greatest distance [m] of the track from the nearest steady drift, as recorded and less the displacement by u and
     v."""
     track = S[:, X] + 1j * S[:, Y]
     way = cumulative_trapezoid((S[:, U] + 1j * S[:, V]) * np.exp(1j * S[:, PSI]), dx=dt, initial=0.0)
@@ -86,7 +86,7 @@ def _departures(S: np.ndarray, dt: float) -> tuple[float, float]:
 
 
 def check(recording: Recording) -> list[Finding]:
-    """One finding, if the log falls silent."""
+    """Find a speed-log dropout; one finding at most."""
     found = silence(recording.dataset)
     if found is None:
         return []

@@ -1,8 +1,8 @@
-"""Outliers (single samples away from their neighbours) and jumps (of position or heading, that stay).
+"""Check for outliers (single samples away from their neighbours) and jumps (lasting steps of position or heading).
 
-A spike stands far off the mean of its neighbours while these agree among themselves; far is eight robust deviations of
-all such differences of the channel. Positions and heading are looked at after their integrals (of the speeds, of the
-yaw rate) are taken off. A jump is a step of that difference that stays, when spikes are filled.
+An outlier differs from the mean of its neighbours by eight robust standard deviations of all such differences of the
+channel, while the neighbours agree among themselves. Position and heading are examined after their integrals (of the
+speeds, of the yaw rate) are subtracted. A jump is a step of that difference that lasts, when outliers are filled.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _PLACES = ((X, Y), (PSI,))
 
 
 def _levels(recording: Recording, run: Run, actuators: bool = False) -> dict[int, np.ndarray]:
-    """The channels to look at (samples,), slow parts of position and heading taken off."""
+    """Channels to examine (samples,), slow parts of position and heading subtracted."""
     S, dt = run.states, recording.dt
     velocity = (S[:, U] + 1j * S[:, V]) * np.exp(1j * S[:, PSI])
     way = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * dt)])
@@ -37,7 +37,8 @@ def _levels(recording: Recording, run: Run, actuators: bool = False) -> dict[int
 
 
 def _least(recording: Recording, channel: int, values: list[np.ndarray]) -> float:
-    """Smallest spike: above one step of a record in steps, which may go to and fro between two of them."""
+    """Size of the smallest outlier: more than one step of a quantised record, which may alternate between two of
+    them."""
     if channel in (X, Y):
         own = THRESHOLDS.value("outlier_position") * recording.dataset.ship.L
     elif channel == PSI:
@@ -49,12 +50,12 @@ def _least(recording: Recording, channel: int, values: list[np.ndarray]) -> floa
 
 
 def _off(values: np.ndarray) -> np.ndarray:
-    """(samples - 4,): samples 2 .. -3 less the mean of their neighbours."""
+    """Differences (samples - 4,) of samples 2 .. -3 from the mean of their neighbours."""
     return values[2:-2] - 0.5 * (values[1:-3] + values[3:-1])
 
 
 def find_spikes(recording: Recording) -> dict[int, dict[str, np.ndarray]]:
-    """channel -> run id -> indices of the samples."""
+    """Indices of the outliers: channel -> run id -> samples."""
     measured = recording.dataset.actuators == "measured" and not command_like(
         recording
     )  # commands may well come for one sample only
@@ -81,7 +82,7 @@ def find_spikes(recording: Recording) -> dict[int, dict[str, np.ndarray]]:
 
 
 def _held(S: np.ndarray, channel: int) -> np.ndarray:
-    """(samples,): the sample or a neighbour is a repeated one, which `samples` reports."""
+    """Mask (samples,) where the sample or a neighbour is a repeated one, which `samples` reports."""
     same = S[1:, channel] == S[:-1, channel]
     near = np.zeros(len(S), dtype=bool)
     near[1:] |= same
@@ -90,7 +91,7 @@ def _held(S: np.ndarray, channel: int) -> np.ndarray:
 
 
 def _without(recording: Recording, found: dict[int, dict[str, np.ndarray]]) -> Recording:
-    """Spikes replaced by the mean of their neighbours."""
+    """Recording with outliers replaced by the mean of their neighbours."""
     runs = []
     for run in recording.runs:
         states = run.states.copy()
@@ -102,7 +103,7 @@ def _without(recording: Recording, found: dict[int, dict[str, np.ndarray]]) -> R
 
 
 def check(recording: Recording) -> list[Finding]:
-    """Spikes of every channel, then jumps of position and heading."""
+    """Find outliers of every channel, then jumps of position and heading."""
     spikes = find_spikes(recording)
     return [_spikes(recording, channel, by_run) for channel, by_run in spikes.items()] + _jumps(
         _without(recording, spikes)
@@ -147,8 +148,8 @@ def _spikes(recording: Recording, channel: int, by_run: dict[str, np.ndarray]) -
 
 
 def _jumps(recording: Recording) -> list[Finding]:
-    """Steps of position less integrated speeds, and of heading less integrated yaw rate, that stay; both at once along
-    the motion: the clock's."""
+    """Findings on lasting steps of position less integrated speeds, and of heading less integrated yaw rate; both at
+    once along the motion are the clock's."""
     levels = {run.id: _levels(recording, run) for run in recording.runs if len(run) >= 9}
     combined = {channels: {k: _combined(each, channels) for k, each in levels.items()} for channels in _PLACES}
     at = {channels: _places(recording, channels, combined[channels]) for channels in _PLACES if levels}
@@ -170,7 +171,7 @@ def _combined(each: dict[int, np.ndarray], channels: tuple[int, ...]) -> np.ndar
 
 
 def _places(recording: Recording, channels: tuple[int, ...], levels: dict[str, np.ndarray]) -> dict[str, list[int]]:
-    """Run id -> last samples before the jumps of position or heading."""
+    """Last samples before the jumps of position or heading, by run id."""
     steps = np.concatenate([np.diff(v) for v in levels.values()])
     noise = float(np.hypot(spread(steps.real), spread(steps.imag)))
     limit = max(THRESHOLDS.value("jump_size") * noise, 2.0 * _least(recording, channels[0], []))
@@ -191,15 +192,14 @@ def _places(recording: Recording, channels: tuple[int, ...], levels: dict[str, n
 
 
 def _beside(S: np.ndarray, channels: tuple[int, ...]) -> np.ndarray:
-    """(samples - 1,): by how much each step of the record differs from the nearer of the steps beside it; 0 at the
-    ends."""
+    """Difference (samples - 1,) of each step of the record from the nearer of its neighbouring steps; 0 at the ends."""
     d = np.diff(S[:, list(channels)], axis=0)
     off = np.minimum(*(np.linalg.norm(d[1:-1] - other, axis=1) for other in (d[:-2], d[2:])))
     return np.concatenate([[0.0], off, [0.0]])
 
 
 def _steps(v: np.ndarray, S: np.ndarray, channel: int) -> np.ndarray:
-    """(samples - 1,): sizes of the steps; 0 after a repeated sample, where a sensor that stood still catches up."""
+    """Sizes (samples - 1,) of the steps; 0 after a repeated sample, where a sensor that stood still catches up."""
     held = np.concatenate([[False], S[1:-1, channel] == S[:-2, channel]])
     return np.where(held | (S[1:, channel] == S[:-1, channel]), 0.0, np.abs(np.diff(v)))
 
@@ -214,7 +214,7 @@ def _level_change(v: np.ndarray, k: int) -> complex:
 def _jump(
     recording: Recording, channels: tuple[int, ...], at: dict[str, list[int]], levels: dict[str, np.ndarray]
 ) -> Finding:
-    """One finding on the jumps (run id -> last sample before each) of position or heading in all runs."""
+    """Finding on the jumps (run id -> last sample before each) of position or heading in all runs."""
     runs = {run.id: run for run in recording.runs}
     sizes = {
         (name, k): float(abs(levels[name][k + 1] - levels[name][k])) for name, places in at.items() for k in places

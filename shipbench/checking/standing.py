@@ -1,7 +1,6 @@
-"""A rudder or screw that never moves in the record, though the ship does what only they can do: turn, or keep her way.
+"""Check for a rudder or propeller that never moves in the record, though the ship turns or keeps her speed.
 
-A column that is missing is taken as zero, and a sensor that died gives one value. No model can predict such turns or
-such a way.
+A missing column is taken as zero, and a failed sensor gives one value. No model can predict such turns or such headway.
 """
 
 from __future__ import annotations
@@ -65,7 +64,7 @@ def _driven(dataset: Dataset) -> _Shown | None:
 
 
 def _fewest(windows: int) -> float:
-    """Least number of windows that show it."""
+    """Least number of windows that show the fault."""
     return max(THRESHOLDS.count("occurrences"), THRESHOLDS.value("still_share") * windows)
 
 
@@ -74,7 +73,7 @@ def _seconds(dataset: Dataset) -> float:
 
 
 def _windows(dataset: Dataset) -> Iterator[np.ndarray]:
-    """States of windows in which the ship has way on ahead and the thrusters rest."""
+    """States of windows in which the ship has headway and the thrusters are at rest."""
     width = max(2, round(_seconds(dataset) / dataset.dt))
     slowest = THRESHOLDS.value("still_way") * (9.81 * dataset.ship.L) ** 0.5
     for S in (run.states for run in dataset.runs):
@@ -84,7 +83,7 @@ def _windows(dataset: Dataset) -> Iterator[np.ndarray]:
 
 
 def check(recording: Recording) -> list[Finding]:
-    """One finding per actuator that never moves."""
+    """Find actuators that never move; one finding each."""
     todo = {
         "delta": "Give the rudder, or its command as delta_c; without it these turns cannot be predicted.",
         "n": (

@@ -1,5 +1,4 @@
-"""Least squares whose errors hold when samples of one run go together, and scales of noise that outliers do not
-move."""
+"""Least squares with standard errors for dependent samples within a run, and robust scales of noise."""
 
 from __future__ import annotations
 
@@ -11,8 +10,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Fit:
-    """value, sd (P,): coefficients and their standard errors; p (P,): two-sided probabilities; squares: what is left;
-    rows: number of equations."""
+    """Coefficients value and their standard errors sd (P,); p (P,): two-sided p-values; squares: residual sum; rows:
+    number of equations."""
 
     value: np.ndarray
     sd: np.ndarray
@@ -61,25 +60,25 @@ def spread(values: np.ndarray) -> float:
 
 
 def stretches(flags: np.ndarray) -> list[tuple[int, int]]:
-    """(start, stop) of every unbroken stretch of True, stop excluded."""
+    """Intervals (start, stop) of every unbroken stretch of True, stop excluded."""
     edges = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
     return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
 
 
 def inliers(residual: np.ndarray, groups: int = 1, limit: float = 6.0) -> np.ndarray:
-    """Rows (T,) whose residual lies within `limit` robust deviations; with `groups` of 2, equations (2 T/2) of one
-    window go together."""
+    """Mask of rows (T,) whose residual lies within `limit` robust standard deviations; with `groups` of 2, equations (2
+    T/2) of one window go together."""
     size = np.sqrt(np.sum(residual.reshape(groups, -1) ** 2, axis=0))
     typical = float(np.median(size))
     return np.tile(size <= limit * max(typical, 1e-12), groups)
 
 
 def times(number: int, runs: int) -> str:
-    """ "once in one run", "3 times in 2 runs"."""
+    """Text such as "once in one run", "3 times in 2 runs"."""
     return f"{'once' if number == 1 else f'{number} times'} in {'one run' if runs == 1 else f'{runs} runs'}"
 
 
 def some(names: Sequence[str], most: int = 4) -> str:
-    """A list of names cut short: "a, b, c and 5 more"."""
+    """Text of a list of names cut short: "a, b, c and 5 more"."""
     names = list(names)
     return ", ".join(names) if len(names) <= most else f"{', '.join(names[:most])} and {len(names) - most} more"

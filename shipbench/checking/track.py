@@ -1,7 +1,8 @@
-"""Position against integrated speed: what explains their difference. The findings are in `track_findings`.
+"""Comparison of position with integrated speed, and explanations of their difference. The findings are in
+`track_findings`.
 
-Over windows of `track_window` the way made good is compared with the integral of surge and sway along the heading.
-Explanations are chosen one after another by how much of the difference each takes away.
+Over windows of `track_window` the displacement is compared with the integral of surge and sway along the heading.
+Explanations are chosen one after another by the share of the difference that each explains.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ LAGS = {"lag of u, v": (U, V), "lag of position": (X, Y), "lag of heading": (PSI
 _SCALES = frozenset({"scale of u and v", "scale of u", "scale of v"})
 _LATE = frozenset({"lag of u, v", "lag of position"})
 _OVER_GROUND = ("scale of u and v", "lag of position", "off midship")
-"""Errors that velocities over ground can have. Once psi turned them, neither psi nor one axis shows in the track."""
+"""Errors that velocities over ground can have. Once psi rotated them, neither psi nor one axis shows in the track."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,7 @@ class Windows:
 
 
 def shifted(recording: Recording, late: dict[int, float]) -> list[tuple[int, np.ndarray]]:
-    """(index, states) of every run with the channels in `late` put back by so many seconds; the ends that this leaves
-    open are cut off.
+    """Runs as (index, states) with the channels in `late` shifted back by so many seconds; the open ends are cut off.
 
     The pieces of one run share the index of the first.
     """
@@ -61,7 +61,7 @@ def shifted(recording: Recording, late: dict[int, float]) -> list[tuple[int, np.
 
 
 def windows(recording: Recording, late: dict[int, float]) -> Windows | None:
-    """All windows of the data set, each half over the next, or None where there are fewer than 12."""
+    """Windows of the data set, each half over the next, or None where there are fewer than 12."""
     width = max(3, round(THRESHOLDS.value("track_window") * recording.froude / recording.dt))
     pieces = [
         (i, S[a : a + width + 1]) for i, S in shifted(recording, late) for a in range(0, len(S) - width, width // 2)
@@ -87,7 +87,7 @@ def _real(*columns: np.ndarray) -> np.ndarray:
 
 
 def explain_windows(w: Windows, turned: bool, only: Collection[str] | None = None) -> Chosen:
-    """only: names of the explanations that are tried (None: all)."""
+    """Choose explanations of the windows; only: names of those that are tried (None: all)."""
     way, one = w.surge + w.sway, np.full(len(w.run), w.span, dtype=complex)
     groups = {
         "scale of u and v": _real(way), "scale of u": _real(w.surge), "scale of v": _real(w.sway),
@@ -108,8 +108,8 @@ def explain_windows(w: Windows, turned: bool, only: Collection[str] | None = Non
 
 @dataclass(frozen=True)
 class Explained:
-    """The windows as recorded (`plain`) and with the lags put back (`mended`), what was chosen on each, and seconds of
-    lag by channel."""
+    """Windows as recorded (`plain`) and with the lags corrected (`mended`), the explanations chosen on each, and lag
+    [s] by channel."""
 
     plain: Windows
     mended: Windows
@@ -145,8 +145,8 @@ def explain(recording: Recording) -> Explained | None:
 
 
 def late_velocities(recording: Recording) -> tuple[float, float] | None:
-    """Seconds by which the velocities, as a vector in the earth's axes, are late against the position, with their
-    standard error; None if not."""
+    """Time [s] by which the velocities, as a vector in the earth's axes, lag the position, with its standard error;
+    None if they do not."""
     found = explain(recording)
     if found is None or "lag of position" not in found.first.sd:
         return None
@@ -155,9 +155,12 @@ def late_velocities(recording: Recording) -> tuple[float, float] | None:
 
 
 def lags(recording: Recording) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """Seconds by which the velocities in the ship's axes, and the position, are late against the other, each with its
-    standard error over the runs, whatever the speed's scale, the heading's reference and the antenna's place; None
-    where there are too few windows."""
+    """Time [s] by which the velocities in the ship's axes, and the position, lag the other, each with its standard
+    error over the runs.
+
+    Scale of the speed, reference of the heading and place of the antenna are free. None where there are too few
+    windows.
+    """
     w = windows(recording, {})
     if w is None:
         return None
@@ -170,19 +173,19 @@ def lags(recording: Recording) -> tuple[tuple[float, float], tuple[float, float]
 
 
 def keeps_time(recording: Recording) -> bool:
-    """Whether the track shows that neither the velocities nor the position are late against the other."""
+    """Whether the track shows that neither the velocities nor the position lag the other."""
     found, least = lags(recording), THRESHOLDS.value("no_lag") * recording.froude
     return found is not None and all(may_be_none(f) and abs(f[0]) + 2.0 * f[1] < least for f in found)
 
 
 def may_be_none(lag: tuple[float, float]) -> bool:
-    """Whether a lag and its standard error are no lag."""
+    """Whether a lag is zero within its standard error."""
     return abs(lag[0]) < THRESHOLDS.value("lag_doubt") * lag[1]
 
 
 def through_water(recording: Recording) -> tuple[float, float] | None:
-    """Velocity [m/s] north and east of the water that the velocities are through, the same in all runs; None if they
-    are over ground."""
+    """Velocity [m/s] north and east of the water, where the recorded velocities are through water, the same in all
+    runs; None if they are over ground."""
     found = explain(recording)
     if found is None or "through water" not in found.chosen.names:
         return None
@@ -193,10 +196,10 @@ def through_water(recording: Recording) -> tuple[float, float] | None:
 
 
 def least_lag(recording: Recording) -> float:
-    """Seconds below which a lag of a channel is not told."""
+    """Smallest lag [s] of a channel that is reported."""
     return max(0.25 * recording.dt, THRESHOLDS.value("least_lag") * recording.froude)
 
 
 def possible_scale(factor: float) -> bool:
-    """Whether a sensor may read so many times the truth: beyond twice and half it is another unit, sign or channel."""
+    """Whether a sensor may have this scale factor: beyond twice and half it is another unit, sign or channel."""
     return 0.5 < factor < 2.0

@@ -1,5 +1,5 @@
-"""Position against integrated speed: scale, lag, heading's reference, antenna, velocities through water, as `track`
-explains them."""
+"""Findings from position against integrated speed: scale, lag, heading reference, antenna, velocities through water, as
+`track` explains them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def check(recording: Recording) -> list[Finding]:
 
 
 def _possible_lag(recording: Recording, x: Explained, name: str) -> bool:
-    """Whether a lag is long enough to matter, short enough to be seen in the windows, and explains what nothing else
+    """Whether a lag is practically significant, short enough for the windows, and explains a part that nothing else
     does."""
     lag = x.late.get(LAGS[name][0], 0.0)
     if not least_lag(recording) <= abs(lag) <= 0.5 * x.plain.span or name not in x.first.sd:
@@ -39,8 +39,8 @@ def _possible_lag(recording: Recording, x: Explained, name: str) -> bool:
 
 
 def _lag_findings(recording: Recording, x: Explained) -> list[Finding]:
-    """Sensors are late, not early: a position ahead of heading and speeds together is a velocity vector that is late in
-    earth axes."""
+    """Findings on lags. Sensors are late, not early: a position ahead of heading and speeds together is a velocity
+    vector that is late in earth axes."""
     w, chosen, first = x.plain, x.chosen, x.first
     vector = "the position, as a vector in earth axes (a filter there, before the turn into the ship's axes),"
     words = {
@@ -210,7 +210,7 @@ def _picture(w: Windows, title: str, column: np.ndarray, label: str) -> Picture:
 
 
 def _sway_picture(w: Windows) -> Picture:
-    """Picture of the way across the ship: by position less surge, against sway."""
+    """Picture of the displacement across the ship: by position less surge, against sway."""
     turn = np.where(np.abs(w.sway) > 0.0, w.sway / np.maximum(np.abs(w.sway), 1e-300), 1.0)
     made = np.real((w.moved - w.surge) * np.conj(turn))
     top = float(np.max(np.abs(w.sway)))

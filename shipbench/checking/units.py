@@ -1,11 +1,12 @@
 """Gross errors of unit and sign, found before any model is fitted, by kinematics between the channels.
 
-Increments over windows of some seconds are compared with integrals, never with differences of neighbours. Track against
-heading and speeds, heading against yaw rate: every combination of units and signs is tried with the ordinary faults of
-sensors left free (a scale of 15 %, a compass error, an antenna away from midship, a delay, a drift), and one is
-believed if it leaves a quarter or less of the plain reading's squares; of the small sway alone, three quarters, if that
-is beyond chance and better than no sway at all. Of combinations that explain the same (a mirrored track with mirrored
-sway is a mirrored heading), that with the fewest errors is taken, the rudder's side included.
+Increments over windows of some seconds are compared with integrals, never with differences of neighbours: track against
+heading and speeds, heading against yaw rate. Every combination of units and signs is tried with the usual errors of
+sensors as free parameters (a scale of 15 %, a compass error, an antenna away from midship, a delay, a drift).
+
+A combination is accepted if it leaves a quarter or less of the plain reading's squares; for the small sway alone three
+quarters, if that is significant and better than no sway at all. Of combinations that explain the same (a mirrored track
+with mirrored sway is a mirrored heading), that with the fewest errors is taken, the rudder's side included.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ _REVERSED = "x and y reversed"
 
 @dataclass(frozen=True)
 class UnitFinding:
-    """A channel (state or command) that is not in our unit or sign.
+    """Channel (state or command) with another unit or sign than the standard one.
 
     kind: "degrees", "knots", "sign", "degrees, sign", or "exchanged with y" (of x). factor: recorded over true (1:
     exchanged). evidence: in words.
@@ -41,10 +42,10 @@ class UnitFinding:
 
 
 def check_units(dataset: Dataset) -> list[UnitFinding]:
-    """Gross unit and sign errors of a data set; empty when nothing is beyond doubt.
+    """Find gross unit and sign errors of a data set; empty when none is certain.
 
-    Seen are: units and sign of psi, r, u, v; x, y or both reversed, or exchanged; unit and side of delta; unit and sign
-    of n; units of the thrusters; commands beside their actuators. Not seen is a mirror image of everything.
+    Detected are: units and sign of psi, r, u, v; x, y or both reversed, or exchanged; unit and side of delta; unit and
+    sign of n; units of the thrusters; commands beside their actuators. A mirror image of everything is not detected.
     """
     runs = [run for run in dataset.runs if len(run) >= 3]
     if not runs:
@@ -62,7 +63,7 @@ def check_units(dataset: Dataset) -> list[UnitFinding]:
 
 
 def corrected(dataset: Dataset, findings: Sequence[UnitFinding]) -> Dataset:
-    """The data set with the findings taken out: channels divided by their factors, x and y exchanged back."""
+    """Data set with the findings corrected: channels divided by their factors, x and y exchanged back."""
     if not findings:
         return dataset
     notes = tuple(f"{f.channel} was recorded otherwise ({f.kind}) and is corrected. {f.evidence}" for f in findings)
@@ -87,7 +88,7 @@ def _finding(channel: str, factor: float, evidence: str) -> UnitFinding:
 
 
 def merged(findings: Sequence[UnitFinding]) -> list[UnitFinding]:
-    """One finding per channel: unit and sign of delta are found apart. Two that cancel are none."""
+    """Findings with one per channel: unit and sign of delta are found apart. Two that cancel are none."""
     found: dict[str, UnitFinding] = {}
     for f in findings:
         old = found.get(f.channel)
@@ -111,7 +112,7 @@ class _Reading:
 
     @property
     def errors(self) -> int:
-        """Number of separate mistakes; one wrong unit of both speeds counts once."""
+        """Number of separate errors; one wrong unit of both speeds counts once."""
         units = {abs(self.u), abs(self.v)} - {1.0}
         signs = sum(f < 0.0 for f in (self.psi, self.u, self.v, self.r))
         return (self.frame != "plain") + (abs(self.psi) != 1.0) + (abs(self.r) != 1.0) + len(units) + signs
@@ -129,8 +130,8 @@ _FRAMES = {
 
 @dataclass(frozen=True)
 class _Motion:
-    """Squares that readings leave: track[reading] of (frame, psi, u, v) over that of no motion, yaw[(psi, r)] likewise;
-    empty where there is none."""
+    """Residual squares of readings: track[reading] of (frame, psi, u, v) over that of no motion, yaw[(psi, r)] in the
+    same way; empty where there is none."""
 
     track: dict[_Reading, float]
     yaw: dict[tuple[float, float], float]
@@ -138,8 +139,8 @@ class _Motion:
     windows: int
 
     def choose(self, side: Side, astern: Sequence[float]) -> _Reading:
-        """The reading with the fewest errors among those that explain the data as well as any; the plain one unless it
-        fails by far. astern: signs of u with which the shaft would turn the wrong way."""
+        """Choose the reading with the fewest errors among those that explain the data as well as any; the plain one
+        unless it fails by far. astern: signs of u with which the shaft would turn the wrong way."""
         plain = _Reading()
         suits = self._tracks(plain) if self.track else [replace(plain, psi=psi) for psi in self._headings()]
         options = [(replace(k, r=r), self.track.get(k, 0.0)) for k in suits for r in self._rates(k.psi)]
@@ -148,7 +149,7 @@ class _Motion:
         )[0]
 
     def _tracks(self, plain: _Reading) -> list[_Reading]:
-        """Readings of the track that suit."""
+        """Readings of the track that fit."""
         gain, poor = THRESHOLDS.value("sway_gain"), THRESHOLDS.value("reading_misfit")
         sane = {k: s for k, s in self.track.items() if k.v in (1.0, k.u) or gain * s < self.track[replace(k, v=np.inf)]}
         best, as_read = min(sane.values()), self.track[plain]
@@ -160,14 +161,14 @@ class _Motion:
         return [sway] if sure and sane[sway] < poor else [plain]
 
     def _headings(self) -> list[float]:
-        """Readings of psi that suit, without a track."""
+        """Readings of psi that fit, without a track."""
         best, gain = min(self.yaw.values(), default=np.inf), THRESHOLDS.value("reading_gain")
         if best > THRESHOLDS.value("reading_misfit") or self.yaw[1.0, 1.0] <= gain * best:
             return [1.0]
         return sorted({psi for (psi, _), s in self.yaw.items() if s <= gain * best})
 
     def _rates(self, psi: float) -> list[float]:
-        """Readings of r that suit a reading of psi."""
+        """Readings of r that fit a reading of psi."""
         if not self.yaw:
             return [1.0]
         here = {r: s for (p, r), s in self.yaw.items() if p == psi}
@@ -251,7 +252,8 @@ def _limits(L: float, froude: float) -> np.ndarray:
 
 
 def _track_parts(S: np.ndarray, psi: float, dt: float) -> dict[str, np.ndarray]:
-    """Parts of the way by surge, sway, faults, (W, 2) each, in windows S (W, samples, 10); psi: heading's factor."""
+    """Parts of the displacement by surge, sway, sensor errors, (W, 2) each, in windows S (W, samples, 10); psi:
+    heading's factor."""
     c, s = np.cos(S[..., PSI] / psi), np.sin(S[..., PSI] / psi)
     ahead, abeam = np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)
     surge, sway = S[..., U, None] * ahead, S[..., V, None] * abeam
@@ -270,7 +272,7 @@ def _track_parts(S: np.ndarray, psi: float, dt: float) -> dict[str, np.ndarray]:
 def _track_squares(
     moved: np.ndarray, parts: dict[str, np.ndarray], span: float, limits: np.ndarray
 ) -> dict[tuple[float, float], float]:
-    """Squares left of the ways `moved` (W, 2) for every reading of u and v."""
+    """Residual squares of the displacements `moved` (W, 2) for every reading of u and v."""
     pairs = list(itertools.product(_signed("u"), [*_signed("v"), np.inf]))
     u, v = (np.array(values)[:, None, None] for values in zip(*pairs, strict=True))
     way, change, own_change = (parts[f"{of}u"] / u + parts[f"{of}v"] / v for of in ("", "d", "own d"))
@@ -297,7 +299,7 @@ def _bounded_squares(target: np.ndarray, columns: np.ndarray, limits: np.ndarray
 
 
 def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
-    """Units of rudder, shaft and thrusters from what is possible at all."""
+    """Units of rudder, shaft and thrusters from their physical limits."""
     S, ship = np.concatenate([run.states for run in runs]), dataset.ship
     found = []
     rudder = float(np.quantile(np.abs(S[:, DELTA]), 0.99))
@@ -332,7 +334,7 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
 
 
 def _lagged(runs: Sequence[Run], i: int, lag: int) -> tuple[float, np.ndarray, np.ndarray]:
-    """Likeness (cosine) of a command and its actuator `lag` samples later, and both."""
+    """Cosine similarity of a command and its actuator `lag` samples later, and both."""
     wanted = np.concatenate([r.inputs[: max(len(r) - lag, 0), i] for r in runs])
     is_ = np.concatenate([r.states[lag:, N + i] for r in runs])
     size = float(np.sqrt(np.sum(wanted**2) * np.sum(is_**2)))
@@ -340,8 +342,8 @@ def _lagged(runs: Sequence[Run], i: int, lag: int) -> tuple[float, np.ndarray, n
 
 
 def _shaft_sign(runs: Sequence[Run], dt: float, froude: float, ahead: float) -> list[UnitFinding]:
-    """Revolutions of the other sign: the ship keeps her speed against what is recorded, and hardly ever with it. ahead:
-    sign of the recorded u."""
+    """Find a reversed sign of the shaft speed: the ship keeps her speed against the record, and hardly ever with it.
+    ahead: sign of the recorded u."""
     width = max(1, round(THRESHOLDS.value("keeping_time") * froude / dt))
     pieces = [run.states[a : a + width + 1] for run in runs for a in range(0, len(run) - width, width)]
     if not pieces:
@@ -361,7 +363,7 @@ def _shaft_sign(runs: Sequence[Run], dt: float, froude: float, ahead: float) -> 
 
 
 def check_commands(runs: Sequence[Run], dt: float, findings: Sequence[UnitFinding]) -> list[UnitFinding]:
-    """Commands that share their actuator's error, or have one of their own."""
+    """Find commands that share their actuator's error, or have one of their own."""
     own = {f.channel: f.factor for f in merged(findings)}
     found, lags = [], (0.0, 2.0, 5.0, 10.0)  # s by which an actuator may follow its command
     for i, command in enumerate(COMMANDS):

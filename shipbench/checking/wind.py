@@ -1,8 +1,8 @@
-"""Wind that is written as the direction it blows to: it would have to push the ship against the wind.
+"""Check for a wind direction that is recorded as where the wind blows to: it would push the ship against the wind.
 
 Changes of surge and sway over 10 s (at 130 m, Froude-scaled) are regressed on state, actuators and the wind's force
-along and across the ship, once with the wind coming from the recorded direction and once going to it. The side whose
-force pushes to leeward is believed.
+along and across the ship, once with the wind coming from the recorded direction and once going to it. The direction
+whose force pushes to leeward is accepted.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from .thresholds import THRESHOLDS
 
 
 def _rows(recording: Recording, turn: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """run (W,), change of (u, v) (W, 2), other columns of u's and of v's equation, wind's (along, across) (W, 2), with
-    the direction turned."""
+    """Rows of the regressions: run (W,), change of (u, v) (W, 2), other columns of u's and of v's equation, wind's
+    (along, across) (W, 2), with the direction turned."""
     ahead = max(1, round(THRESHOLDS.value("wind_push_time") * recording.froude / recording.dt))
     speed, direction = (recording.dataset.inputs.index(name) for name in ("wind_speed", "wind_from"))
     edge = max(1, round(THRESHOLDS.value("wind_push_mean") * recording.froude / recording.dt))
@@ -65,7 +65,7 @@ def _fits(recording: Recording, turn: float) -> tuple[list[Fit], np.ndarray, np.
 
 @dataclass(frozen=True)
 class _Turned:
-    """t of the wind's push on surge and sway, as recorded and turned; push and change across the ship (W,)."""
+    """Values t of the wind's push on surge and sway, as recorded and turned; push and change across the ship (W,)."""
 
     t_from: np.ndarray
     t_to: np.ndarray
@@ -75,7 +75,7 @@ class _Turned:
 
 def blows_to(recording: Recording) -> _Turned | None:
     """Evidence that wind_from is where the wind blows to; None if it is not, without wind channels or where the wind
-    does too little."""
+    has too little effect."""
     if not {"wind_speed", "wind_from"} <= set(recording.dataset.inputs):
         return None
     if len(_rows(recording, 0.0)[0]) < THRESHOLDS.count("wind_push_windows"):
@@ -91,7 +91,7 @@ def blows_to(recording: Recording) -> _Turned | None:
 
 
 def check(recording: Recording) -> list[Finding]:
-    """At most one finding."""
+    """Find a reversed wind direction; one finding at most."""
     found = blows_to(recording)
     if found is None:
         return []

@@ -1,10 +1,10 @@
-"""Wind as an instrument on board shows it, in place of the true wind: the true wind does not change because the ship
-turns or speeds up.
+"""Check for apparent wind, as an instrument on board shows it, in place of the true wind: the true wind does not change
+because the ship turns or speeds up.
 
 Every way to record a wind (off the bow or from north, with the ship's own motion in it or without, clockwise or not,
-where it comes from or blows to, m/s, knots, km/h) is turned back into a true wind. One is believed if it changes less
-than the wind as recorded, within `wind_window` and from run to run, by what heading and motion of the ship would have
-put in, and beyond doubt. A ship on one steady course tells nothing.
+where it comes from or blows to, m/s, knots, km/h) is converted to a true wind. A reading is accepted if its wind
+changes less than the wind as recorded, within `wind_window` and from run to run, by the part that heading and motion of
+the ship add, and significantly. A ship on one steady course identifies nothing.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class WindReading:
-    """A way to read the wind channels: kind of `KINDS`; sign: of `[signs]`, "clockwise" for ours; angle, speed:
-    units."""
+    """Interpretation of the wind channels: kind of `KINDS`; sign: of `[signs]`, "clockwise" for the standard one;
+    angle, speed: units."""
 
     kind: str = "true"
     sign: str = "clockwise"
@@ -44,7 +44,7 @@ class WindReading:
 
     @property
     def errors(self) -> int:
-        """Number of separate departures from ours."""
+        """Number of separate departures from the standard."""
         ours = WindReading()
         return sum(
             a != b
@@ -67,7 +67,7 @@ class WindReading:
         return np.asarray(north) + 1j * np.asarray(east)
 
     def applied(self, dataset: Dataset) -> Dataset:
-        """The data set with the true wind in its channels."""
+        """Data set with the true wind in its channels."""
         runs = []
         for run in dataset.runs:
             wind, inputs = self.wind(*_recorded(run)), run.inputs.copy()
@@ -77,7 +77,7 @@ class WindReading:
         return replace(dataset, runs=tuple(runs))
 
     def lines(self) -> dict[str, Any]:
-        """For dataset.toml."""
+        """Lines for dataset.toml."""
         units = {
             c: u for c, u, ours in (("wind_from", self.angle, "rad"), ("wind_speed", self.speed, "m/s")) if u != ours
         }
@@ -88,13 +88,13 @@ class WindReading:
 
 
 def _recorded(run: Run) -> np.ndarray:
-    """psi, u, v, wind_speed and wind_from, (5, T)."""
+    """Recorded psi, u, v, wind_speed and wind_from, (5, T)."""
     return np.vstack([run.states[:, [PSI, U, V]].T, *(run.inputs[:, run.inputs_names.index(c)] for c in CHANNELS)])
 
 
 def _readings(angle: str) -> list[WindReading]:
-    """All that changes of the wind can tell apart: sense and unit of speed show only where heading or motion of the
-    ship are in it."""
+    """Readings that changes of the wind can distinguish: sense and unit of speed show only where heading or motion of
+    the ship are in it."""
     found = []
     for kind in KINDS:
         signs = {"true": ("clockwise",), "true-bow": ("clockwise", "counterclockwise")}.get(
@@ -120,7 +120,7 @@ class _Windows:
 
     @property
     def departures(self) -> np.ndarray:
-        """From the mean of all runs."""
+        """Differences from the mean of all runs."""
         return self.begin - self.begin.mean()
 
 
@@ -138,8 +138,8 @@ def _ends(recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _evidence(plain: _Windows, reading: WindReading, read: _Windows) -> tuple[float, float]:
-    """Sum of the logs of the ratios of squares, and joint t, of changes and departures: by how much they are smaller
-    `read` so than `plain`."""
+    """Sum of the logs of the ratios of squares, and joint t, of changes and departures: by how much they are smaller in
+    the windows `read` than in `plain`."""
     size = unit_factor("wind_speed", reading.speed)  # a smaller unit alone makes every change smaller
     before, bow = size * plain.changes, KINDS[reading.kind][0]
     seen = before if reading.sign == "clockwise" else -before if reading.sign == "to" else np.conj(before)
@@ -164,7 +164,8 @@ def _squares(change: np.ndarray) -> float:
 
 
 def wind_reading(recording: Recording) -> tuple[WindReading, _Windows, _Windows] | None:
-    """Reading of the wind channels, their windows as recorded and read so; None where they are true wind in SI."""
+    """Reading of the wind channels, their windows as recorded and with this reading; None where they are true wind in
+    SI."""
     if not set(CHANNELS) <= set(recording.dataset.inputs):
         return None
     first = [
@@ -234,7 +235,7 @@ def _declared(recording: Recording, reading: WindReading) -> list[str]:
 
 
 def said(reading: WindReading) -> str:
-    """Words for a reading, with the units that are not ours."""
+    """Words for a reading, with non-standard units."""
     units = [u for u, ours in ((reading.angle, "rad"), (reading.speed, "m/s")) if u != ours]
     sense = {"counterclockwise": " counterclockwise", "to": ", where it blows to"}.get(reading.sign, "")
     return _WORDS[reading.kind] + sense + (f", in {' and '.join(units)}" if units else "")

@@ -1,4 +1,4 @@
-"""Yaw rate against heading rate: bias (of all runs, or of single ones), scale, lag.
+"""Comparison of yaw rate with heading rate: bias (of all runs, or of single ones), scale, lag.
 
 Over windows of `track_window` the change of the heading is compared with the integral of the yaw rate.
 """
@@ -19,8 +19,8 @@ from .track import least_lag, possible_scale, shifted
 
 
 def _windows(recording: Recording, lag: float) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """(run (W,), columns (W, 3): heading's change, integral of r, change of r; span [s]), r put back by `lag` s.
-    Windows overlap by half: whatever is chosen is judged by runs, which are independent."""
+    """Windows (run (W,), columns (W, 3): heading's change, integral of r, change of r; span [s]), r shifted back by
+    `lag` s. Windows overlap by half: they are judged by runs, which are independent."""
     width = max(3, round(THRESHOLDS.value("track_window") * recording.froude / recording.dt))
     pieces = [
         (i, S[a : a + width + 1])
@@ -42,7 +42,7 @@ def _explain(run: np.ndarray, rows: np.ndarray, span: float, lag: bool = True) -
 
 
 class _Settled(NamedTuple):
-    """Windows as `_windows` makes them with the lag taken out, what was chosen in the record as it is and then, the lag
+    """Windows of `_windows` with the lag corrected, the explanations chosen in the record as it is and then, the lag
     and its standard error."""
 
     made: tuple[np.ndarray, np.ndarray, float]
@@ -53,7 +53,7 @@ class _Settled(NamedTuple):
 
 
 def _settled(recording: Recording) -> _Settled | None:
-    """None where the ship hardly turns."""
+    """Windows with the lag corrected; None where the ship hardly turns."""
     lag, made = 0.0, _windows(recording, 0.0)
     if made is None or np.sqrt(np.mean(made[1][:, 0] ** 2)) < 0.01:
         return None
@@ -72,13 +72,14 @@ def _settled(recording: Recording) -> _Settled | None:
 
 
 def late_yaw_rate(recording: Recording) -> tuple[float, float] | None:
-    """Seconds by which the yaw rate is late against the heading, with their standard error; None if it is not."""
+    """Time [s] by which the yaw rate lags the heading, with its standard error; None if it does not."""
     found = _settled(recording)
     return None if found is None or found.lag < least_lag(recording) else (found.lag, found.lag_sd)
 
 
 def check(recording: Recording) -> list[Finding]:
-    """Findings of the yaw rate; none where the ship hardly turns, or where the yaw rate was made from the heading."""
+    """Find errors of the yaw rate; none where the ship hardly turns, or where the yaw rate was derived from the
+    heading."""
     found = None if "r" in recording.dataset.derived else _settled(recording)
     if found is None:
         return []
@@ -93,7 +94,7 @@ def check(recording: Recording) -> list[Finding]:
 
 
 def _picture(made: tuple[np.ndarray, np.ndarray, float], what: str) -> Picture:
-    """Rate of the heading against the mean yaw rate, or their difference against the change of r."""
+    """Picture of the rate of the heading against the mean yaw rate, or of their difference against the change of r."""
     _, rows, span = made
     deg = 180.0 / np.pi
     if what == "lag":
@@ -186,7 +187,7 @@ def _scale(made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Ch
 def _biases(
     recording: Recording, made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Chosen
 ) -> list[Finding]:
-    """One bias for all runs where they agree, else those of the runs that stand out."""
+    """Findings on one bias for all runs where they agree, else on those of outlying runs."""
     run, rows, span = made[0][::2], made[1][::2], made[2]  # drifts add up over windows that do not overlap
     known = sum(
         (rows[:, 1 + i] * float(chosen.value[n][0]) for i, n in enumerate(("scale", "lag")) if n in chosen.names),
