@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .metrics.base import METRICS
     from .predictors.base import PREDICTORS, Predictor, PredictorBase, make_predictor
     from .records import Batch, Dataset, Run
+    from .run_meta import RunMeta
     from .scores import Scores
     from .ship import Ship
     from .specs import parse_spec
@@ -33,12 +34,12 @@ _HOME = {
     "InputError": "errors", "ShipbenchError": "errors", "WorkError": "errors", "METRICS": "metrics.base",
     "PREDICTORS": "predictors.base", "Predictor": "predictors.base", "PredictorBase": "predictors.base",
     "make_predictor": "predictors.base", "parse_spec": "specs",
-    "Batch": "records", "Dataset": "records", "Run": "records", "Ship": "ship",
+    "Batch": "records", "Dataset": "records", "Run": "records", "RunMeta": "run_meta", "Ship": "ship",
 }  # fmt: skip
 
 __all__ = [
     "DATASETS", "METRICS", "PREDICTORS", "Batch", "Dataset", "InputError", "Predictor", "PredictorBase", "Run",
-    "Scores", "Ship",
+    "RunMeta", "Scores", "Ship",
     "ShipbenchError", "Task", "WorkError", "__version__", "benchmark", "build_board", "check_data", "check_model",
     "diagnose", "import_log",
     "load_dataset", "load_tasks", "make_predictor", "parse_spec", "propose_mapping", "read_results", "report",

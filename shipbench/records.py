@@ -17,6 +17,7 @@ from .arrays import numbers
 from .errors import InputError, unknown_name
 from .names import brief, check_name, check_run
 from .notebook import Runs, dataset_html, dataset_text, run_text
+from .run_meta import RunMeta
 from .ship import Ship
 from .signals import COMMANDS, STATES
 
@@ -41,7 +42,8 @@ class Run:
         states: (samples, 10), order and units of `signals.STATES`; heading unwrapped.
         inputs: (samples, inputs), the four commands, then the environment channels; row k is held on [t_k, t_k+1).
         inputs_names: names of the columns of `inputs`.
-        meta: anything known of the run (manoeuvre, group, split, parent, from: date and time at which it began).
+        meta: what is known of the run, `run.meta.manoeuvre` and so on (see `RunMeta`); a dict with the keys of
+            dataset.toml becomes one.
     """
 
     id: str
@@ -49,12 +51,11 @@ class Run:
     states: np.ndarray
     inputs: np.ndarray
     inputs_names: tuple[str, ...] = COMMANDS
-    meta: dict[str, Any] = field(default_factory=dict)
+    meta: RunMeta = field(default_factory=RunMeta)
 
     def __post_init__(self) -> None:
         check_run(self.id, "run")
-        for key, label in (("group", self.group), ("manoeuvre", self.kind)):
-            check_run(label, f"run '{self.id}': {key}")
+        object.__setattr__(self, "meta", RunMeta.of(self.meta, f"run '{self.id}'"))
         for part in ("t", "states", "inputs"):
             object.__setattr__(self, part, numbers(getattr(self, part), f"run '{self.id}': {part}"))
         object.__setattr__(self, "inputs_names", tuple(self.inputs_names))
@@ -120,28 +121,32 @@ class Run:
     def group(self) -> str:
         """Runs of one group (pieces of one log, copies of one manoeuvre, windows of one run) must not be split; a run
         without one is its own."""
-        return str(self.meta.get("group", self.meta.get("parent", self.id)))
+        return str(self.parent if self.meta.group is None else self.meta.group)
+
+    @property
+    def parent(self) -> str:
+        """Id of the run of which it is a window; of a run that is none, its own."""
+        return self.id if self.meta.parent is None else self.meta.parent
 
     @property
     def kind(self) -> str:
         """Kind of manoeuvre, "" where it is not given."""
-        return str(self.meta.get("manoeuvre", ""))
+        return self.meta.manoeuvre or ""
 
     @property
     def began(self) -> datetime | None:
         """Date and time at which it began (UTC where no zone is given); None where they are not given."""
-        given = self.meta.get("from")
-        try:
-            began = given if isinstance(given, datetime) else datetime.fromisoformat(str(given))
-        except ValueError:
+        given = self.meta.from_
+        if given is None or isinstance(given, Real):
             return None
+        began = given if isinstance(given, datetime) else datetime.fromisoformat(str(given))
         return began if began.tzinfo else began.replace(tzinfo=UTC)
 
     def slice(self, start: int, stop: int, suffix: str = "") -> Run:
         """Samples [start, stop) as a run that keeps the metadata and names its parent."""
         return Run(
             self.id + suffix, self.t[start:stop], self.states[start:stop], self.inputs[start:stop], self.inputs_names,
-            {"parent": self.meta.get("parent", self.id), **self.meta},
+            replace(self.meta, parent=self.parent),
         )  # fmt: skip
 
     def windows(self, samples: int, stride: int) -> list[Run]:
@@ -236,7 +241,7 @@ class Dataset:
     def from_frame(
         cls, frame: pd.DataFrame, ship: Ship | str | Path, dt: float | None = None, *, name: str = "trial",
         actuators: str = "measured",
-        meta: Mapping[str, dict[str, Any]] | None = None, **about: Any,
+        meta: Mapping[str, RunMeta | Mapping[str, Any]] | None = None, **about: Any,
     ) -> Dataset:  # fmt: skip
         """The data set of a long table, one row per sample, in SI units and our signs.
 
@@ -246,7 +251,7 @@ class Dataset:
             ship: the vessel's particulars, or the path of a ship.toml.
             dt: sample time [s]; None: that of t.
             name, actuators: as of a data set.
-            meta: what is known of each run, by its name.
+            meta: what is known of each run, by its id: a RunMeta, or a dict with the keys of dataset.toml.
             about: source, licence, simulation, notes or derived of the data set.
 
         Raises:
@@ -259,7 +264,9 @@ class Dataset:
         known = dict(meta or {})
         if unknown := [run for run in known if run not in found]:
             raise unknown_name("run in meta", str(unknown[0]), [*found][:_SHOWN_NAMES])
-        runs = tuple(Run(run, *arrays, inputs, dict(known.get(run, {}))) for run, arrays in found.items())
+        runs = tuple(
+            Run(run, *arrays, inputs, RunMeta.of(known.get(run, {}), f"run '{run}'")) for run, arrays in found.items()
+        )
         longest = max(runs, key=len)
         step = dt if dt is not None else float(f"{longest.dt:.9g}") if len(longest) > 1 else 1.0
         about["notes"] = tuple(dict.fromkeys((*about.get("notes", ()), *filled)))

@@ -31,7 +31,7 @@ HOUSE: dict[float, dict[str, str]] = {
         "registry": "parts by name, plug-ins", "specs": "`mlp[hidden=64]`", "integrate": "Runge-Kutta",
         "compiled": "formulas as machine code",
         "ship": "the ship file", "arrays": "checks of arrays", "frames": "tables in memory",
-        "notebook": "reprs in notebooks",
+        "notebook": "reprs in notebooks", "run_meta": "what is known of a run beside its samples",
         "processes": "pools of processes", "render": "tables, terminal, SVG, HTML pages: one style sheet, one escaping",
     },
     2: {"records": "Run, Dataset, Batch", "physics": "pure formulas"},

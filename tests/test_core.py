@@ -45,7 +45,7 @@ def test_the_number_of_windows_at_the_boundary(steps, windows):
 
 def test_windows_keep_their_metadata_and_name_their_parent():
     windows = Dataset("d", SHIP, 1.0, (_run(group="log1", split="test"),)).windows(5)
-    assert [w.meta for w in windows.runs] == [{"group": "log1", "split": "test", "parent": "a"}] * 2
+    assert [w.meta.as_dict() for w in windows.runs] == [{"group": "log1", "split": "test", "parent": "a"}] * 2
     assert windows.runs[1].t[0] == 5.0
 
 

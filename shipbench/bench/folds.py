@@ -45,7 +45,7 @@ def select_runs(dataset: Dataset, task: Task) -> tuple[Dataset, tuple[str, ...]]
         notes.append(f"max_runs = {task.max_runs}: {task.max_runs} of {len(usable)} runs are used, evenly spread")
         usable = [usable[i] for i in np.linspace(0, len(usable) - 1, task.max_runs).round().astype(int)]
     if task.split == "published":
-        sides = {side: {r.group for r in usable if r.meta.get("split") == side} for side in ("train", "test")}
+        sides = {side: {r.group for r in usable if r.meta.split == side} for side in ("train", "test")}
         for group in sorted(sides["train"] & sides["test"]):
             notes.append(f"the published split has pieces of '{group}' both in training and in test")
     selected = dataset.with_runs(usable)
@@ -88,7 +88,7 @@ def _carve_valid(runs: Sequence[Run], count: int | None, rng: np.random.Generato
 
 
 def _published(dataset: Dataset) -> list[tuple[list[Run], list[Run]]]:
-    sides = {side: [r for r in dataset.runs if r.meta.get("split") == side] for side in ("train", "test")}
+    sides = {side: [r for r in dataset.runs if r.meta.split == side] for side in ("train", "test")}
     for side, runs in sides.items():
         if not runs:
             raise InputError(

@@ -282,7 +282,7 @@ def _rows(
     }  # fmt: skip
     per_run = {
         "run": [r.id for r in runs],
-        "parent": [str(r.meta.get("parent", r.id)) for r in runs],
+        "parent": [r.parent for r in runs],
         "group": [r.group for r in runs],
         "kind": [r.kind for r in runs],
         "status": statuses,

@@ -99,7 +99,7 @@ class Part:
         for cell in self.cells:
             fold = self.study.folds[cell.fold]
             runs = [
-                [(run.id, run.meta) for run in side.runs] if side else []
+                [(run.id, run.meta.as_dict()) for run in side.runs] if side else []
                 for side in (fold.train, fold.valid, fold.test)
             ]
             parts = [

@@ -106,8 +106,8 @@ def _apart(runs: list[Run]) -> bool:
 def _cut_by_import(chain: list[Run]) -> bool:
     """Whether the runs are windows that import cut from one recording, as its description states: their owner chose
     so."""
-    files = {run.meta.get("file") for run in chain}
-    return len(files) == 1 and None not in files and all({"from", "to"} <= run.meta.keys() for run in chain)
+    files = {run.meta.file for run in chain}
+    return len(files) == 1 and None not in files and all(None not in (run.meta.from_, run.meta.to) for run in chain)
 
 
 def _cluster(

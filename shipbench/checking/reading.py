@@ -13,6 +13,7 @@ from ..data.files import Description, convert_table, read_description, read_tabl
 from ..errors import InputError
 from ..frames import complete_columns
 from ..records import Dataset, Run
+from ..run_meta import RunMeta
 from ..ship import Ship
 from ..signals import STATES
 from ..toml_files import read_toml
@@ -337,7 +338,6 @@ def _runs(
             found.append(_error("empty run", message, todo="Remove the run from the table.", runs=(name,)))
         for i, part in enumerate(pieces, 1):
             run = name if len(pieces) == 1 else f"{name}#{i}"
-            meta = {"group": owner[name], **meta}
             runs.append(
                 Run(
                     run,
@@ -345,7 +345,7 @@ def _runs(
                     part[list(STATES)].to_numpy(),
                     part[list(inputs)].to_numpy(),
                     inputs,
-                    meta,
+                    RunMeta.of(meta, f"run '{run}'").in_group(owner[name]),
                 )
             )
             parent[run] = owner[name]

@@ -94,7 +94,7 @@ class Recording:
                             run.states[a:b],
                             run.inputs[a:b],
                             run.inputs_names,
-                            {"group": name, **run.meta},
+                            run.meta.in_group(name),
                         )
                     )
                     parent[piece] = name

@@ -53,7 +53,8 @@ def few_windows(data: Dataset) -> Dataset:
 def copied(data: Dataset) -> Dataset:
     """The same data in arrays of their own, so that nobody can write into the originals."""
     return data.with_runs(
-        replace(r, t=r.t.copy(), states=r.states.copy(), inputs=r.inputs.copy(), meta=dict(r.meta)) for r in data.runs
+        replace(r, t=r.t.copy(), states=r.states.copy(), inputs=r.inputs.copy(), meta=replace(r.meta))
+        for r in data.runs
     )
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import InputError
 from ..records import Dataset, Run
 from ..regular_files import open_regular
+from ..run_meta import RunMeta
 from ..ship import Propeller, Rudder, Ship, Wind
 from ..signals import COMMANDS, DELTA, PSI, N, R, U, V, X, Y
 from .base import DatasetPart, public_folder
@@ -248,7 +249,7 @@ def _read_run(file: Path, stem: str, every: int, wind: bool, kind: str, test: bo
         states,
         inputs,
         names,
-        {"manoeuvre": kind, "group": group, "split": "test" if test else "train", "from": began},
+        RunMeta(manoeuvre=kind, group=group, split="test" if test else "train", from_=began),
     )
 
 

@@ -27,6 +27,7 @@ from ..frames import (
 )
 from ..names import check_name
 from ..records import Dataset, Run
+from ..run_meta import RunMeta
 from ..ship import Ship
 from ..signals import COMMANDS, STATES, wrap_angle
 from ..storage import in_one_step, write_text
@@ -224,14 +225,15 @@ def _runs(name: str, rows: Columns, inputs: tuple[str, ...], description: Descri
         parts = [rows | {"psi": continuous(rows["psi"])}]
     if not parts:
         raise InputError(f"{where}: run '{name}': its cuts, gaps and delays leave no two samples. Remove the run.")
+    known = RunMeta.of(meta, f"{where.with_name('dataset.toml')}: [runs.{name}]")
     if len(parts) == 1:
-        return [_run(name, parts[0], inputs, description, where, meta)]
-    shared = {"group": name, **meta}
+        return [_run(name, parts[0], inputs, description, where, known)]
+    shared = known.in_group(name)
     return [_run(f"{name}#{i}", part, inputs, description, where, shared) for i, part in enumerate(parts, 1)]
 
 
 def _run(
-    name: str, rows: Columns, inputs: tuple[str, ...], description: Description, where: Path, meta: dict[str, Any]
+    name: str, rows: Columns, inputs: tuple[str, ...], description: Description, where: Path, meta: RunMeta
 ) -> Run:
     t = rows["t"]
     steps = np.diff(t)
@@ -244,7 +246,7 @@ def _run(
             'Time must be uniform inside a run and its rows in order: resample, or write gaps = "split" into '
             "dataset.toml."
         )
-    return Run(name, t.copy(), samples(rows, STATES), samples(rows, inputs), inputs, dict(meta))
+    return Run(name, t.copy(), samples(rows, STATES), samples(rows, inputs), inputs, meta)
 
 
 def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz", "csv", "parquet"] = "csv.gz") -> None:
@@ -263,7 +265,7 @@ def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz"
         "licence": dataset.licence, **({"simulation": dataset.simulation} if dataset.simulation else {}),
         "notes": list(dataset.notes),
         **({"derived": list(dataset.derived)} if dataset.derived else {}),
-        "runs": {run.id: run.meta for run in dataset.runs if run.meta},
+        "runs": {run.id: known for run in dataset.runs if (known := run.meta.as_dict())},
     }  # fmt: skip
     try:
         texts = {"dataset.toml": tomli_w.dumps(description), "ship.toml": dataset.ship.to_toml()}

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..physics.mmg import load_mmg_ship
 from ..records import Dataset, Run
+from ..run_meta import RunMeta
 from ..signals import COMMANDS
 from ..simulate.harbour import Gusts, draw_plan, fly
 from .base import DatasetPart
@@ -30,7 +31,7 @@ def simulate(name: str, seed: int, gusts: Gusts | None = None, noise: np.ndarray
         S = S + scale * noise_rng.standard_normal(S.shape)
     t = np.arange(HORIZON + 1, dtype=float)
     kinds = np.where(plan.stopping, "stop", np.where(plan.thrusters, "thruster_assist", "transit"))
-    runs = tuple(Run(f"run{i:02d}", t, S[i], C[i], COMMANDS, {"manoeuvre": str(kinds[i])}) for i in range(NUM_RUNS))
+    runs = tuple(Run(f"run{i:02d}", t, S[i], C[i], COMMANDS, RunMeta(manoeuvre=str(kinds[i]))) for i in range(NUM_RUNS))
     return Dataset(
         name=name, ship=ship.particulars, dt=1.0, runs=runs, actuators="measured", simulation=SHIP, licence="MIT",
         source=f"shipbench simulator, MMG ship '{SHIP}', seed {seed}",

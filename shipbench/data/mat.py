@@ -22,6 +22,7 @@ from ..errors import InputError
 from ..matlab_files import check_matlab
 from ..records import Dataset, Run
 from ..regular_files import open_regular
+from ..run_meta import RunMeta
 from ..ship import Ship
 from ..signals import COMMANDS, ENVIRONMENT, STATES, UNITS
 from ..storage import in_one_step
@@ -77,7 +78,7 @@ def write_mat(dataset: Dataset, path: str | Path) -> None:
         {
             "id": run.id, "t": run.t, "states": run.states, "commands": run.inputs[:, : len(COMMANDS)],
             "environment": run.inputs[:, len(COMMANDS) :], "names": names, "units": units,
-            "meta": json.dumps(run.meta, default=str),
+            "meta": json.dumps(run.meta.as_dict(), default=str),
         }
         for run in dataset.runs
     ]  # fmt: skip
@@ -166,8 +167,9 @@ def _run(element: Any, where: str) -> Run:
     arrays = [
         np.asarray(element[part], dtype=float).reshape(len(t), -1) for part in ("states", "commands", "environment")
     ]
-    meta = json.loads(_plain(element["meta"]) or "{}")
-    return Run(_plain(element["id"]), t, arrays[0], np.hstack(arrays[1:]), (*COMMANDS, *environment), meta)
+    name = _plain(element["id"])
+    meta = RunMeta.of(json.loads(_plain(element["meta"]) or "{}"), f"run '{name}'")
+    return Run(name, t, arrays[0], np.hstack(arrays[1:]), (*COMMANDS, *environment), meta)
 
 
 def _plain(value: Any) -> Any:

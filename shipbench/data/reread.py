@@ -8,6 +8,7 @@ from typing import Any
 import pandas as pd
 
 from ..records import Dataset, Run
+from ..run_meta import RunMeta
 from ..signals import STATES
 from .corrections import correct_run, split_meta
 from .files import Description, convert_table
@@ -37,7 +38,8 @@ def reread(dataset: Dataset, entries: dict[str, Any]) -> Dataset:
         convert_table(frame, description)
         own, meta = split_meta(run.id, description.runs.get(run.id, {}), where)
         parts = correct_run(frame, description, own, dataset.dt, f"{where}: run '{run.id}'")
-        shared = run.meta | ({"group": run.group} if len(parts) > 1 else {}) | meta
+        known = run.meta.as_dict() | ({"group": run.group} if len(parts) > 1 else {}) | meta
+        shared = RunMeta.of(known, f"run '{run.id}'")
         names = [run.id] if len(parts) == 1 else [f"{run.id}#{i}" for i in range(1, len(parts) + 1)]
         runs += [
             Run(

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, option
+from ..names import shown
 from ..ship import Ship
 from ..signals import COMMANDS
 from ..steps import step
@@ -154,7 +155,10 @@ def _recordings(logs: Sequence[Path], mapping: Mapping, met: Counts) -> Iterator
             for name, blocks in read_recordings(path, source, met):
                 for place, part in enumerate(parts(_clean(blocks, source, mapping, str(path), met))):
                     yield _Log(
-                        run_name(name if name is not None else _stem(path)), path.name, {source_name: part}, place > 0
+                        run_name(name if name is not None else _stem(path)),
+                        shown(path.name),
+                        {source_name: part},
+                        place > 0,
                     )
         return
     kinds = {is_absolute(s.time) for s in mapping.sources.values()}
@@ -169,7 +173,7 @@ def _recordings(logs: Sequence[Path], mapping: Mapping, met: Counts) -> Iterator
     for name, source in mapping.sources.items():
         where = ", ".join(map(str, files[name]))
         feeds[name] = onward(_clean(_chained(files[name], source, met), source, mapping, where, met), met)
-    yield _Log(run_name(mapping.name), ", ".join(p.name for p in logs), feeds)
+    yield _Log(run_name(mapping.name), ", ".join(shown(p.name) for p in logs), feeds)
 
 
 def _clean(blocks: Iterable[Block], source: Source, mapping: Mapping, where: str, met: Counts) -> Iterator[Block]:

@@ -178,7 +178,7 @@ class _Found:
             if run.id not in own.index:
                 continue  # said above
             for name, value in (
-                ("parent", str(run.meta.get("parent", run.id))),
+                ("parent", run.parent),
                 ("kind", run.kind),
                 ("group", run.group),
             ):

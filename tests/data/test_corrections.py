@@ -108,7 +108,7 @@ def test_a_late_command_moves_by_whole_samples(load):
 def test_fill_bridges_and_cut_splits_into_pieces_of_one_group(load):
     spoilt = load("runs.r00.fill.delta = [[5.0, 6.0]]\nruns.r01.cut = [[10.0, 12.0]]")
     np.testing.assert_allclose(np.diff(spoilt.runs[0].states[4:8, DELTA], n=2), 0.0, atol=1e-12)
-    assert [(run.id, len(run), run.meta.get("group")) for run in spoilt.runs] == [
+    assert [(run.id, len(run), run.meta.group) for run in spoilt.runs] == [
         ("r00", 41, None),
         ("r01#1", 10, "r01"),
         ("r01#2", 28, "r01"),

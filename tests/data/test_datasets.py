@@ -141,10 +141,10 @@ def esso():
 
 def test_esso_osaka_is_read_in_our_units_and_signs(esso):
     assert len(esso) == 33
-    assert sum(r.meta["split"] == "test" for r in esso.runs) == 6
+    assert sum(r.meta.split == "test" for r in esso.runs) == 6
     stacked = np.concatenate([r.states for r in esso.runs])
     assert np.abs(stacked[:, 6]).max() == pytest.approx(1200.0)
-    turns = [r for r in esso.runs if r.meta["manoeuvre"] == "turn"]
+    turns = [r for r in esso.runs if r.meta.manoeuvre == "turn"]
     assert len(turns) == 12
     for run in turns:
         end = run.states[len(run) // 2 : -40]
@@ -163,7 +163,7 @@ def test_esso_osaka_velocities_agree_with_its_positions(esso):
 def test_pieces_of_one_log_share_a_group_and_the_cut_copy_is_left_out(esso):
     pieces = [r for r in esso.runs if r.id.startswith("random_06-Aug-2020_16_24_25")]
     assert len(pieces) == 5
-    assert {r.meta["group"] for r in pieces} == {"random_06-Aug-2020_16_24_25"}
+    assert {r.meta.group for r in pieces} == {"random_06-Aug-2020_16_24_25"}
     assert "turn_cut_14-Sep-2020_15_58_08" not in [r.id for r in esso.runs]
 
 
@@ -175,7 +175,7 @@ def test_commanded_actuators_repeat_the_command_before(esso):
 def test_the_hold_figure_of_the_datas_readme_is_met(esso):
     from shipbench.predictors.hold import Hold
 
-    test = esso.with_runs(r for r in esso.runs if r.meta["split"] == "test").windows(200)
+    test = esso.with_runs(r for r in esso.runs if r.meta.split == "test").windows(200)
     batch = test.batch()
     assert len(batch.ids) == 15
     S = Hold().fit(test).predict(batch.s0, batch.U)

@@ -97,9 +97,9 @@ def test_wind_is_the_mean_vector_and_comes_from_the_side_that_the_file_says(copy
 def test_the_copy_of_another_run_is_left_out_and_pieces_of_one_log_share_a_group(copy):
     meta = {r.id: r.meta for r in make(str(copy())).runs}
     assert "turn_cut_14-Sep-2020_15_58_08" not in meta
-    assert meta["random_06-Aug-2020_16_24_25_1"]["group"] == meta["random_06-Aug-2020_16_24_25_3"]["group"]
-    assert meta["random_31-Jul-2020_12_29_58"]["group"] != meta["random_06-Aug-2020_16_24_25_1"]["group"]
-    assert [m["split"] for m in meta.values()] == ["train", "train", "test", "train"]
+    assert meta["random_06-Aug-2020_16_24_25_1"].group == meta["random_06-Aug-2020_16_24_25_3"].group
+    assert meta["random_31-Jul-2020_12_29_58"].group != meta["random_06-Aug-2020_16_24_25_1"].group
+    assert [m.split for m in meta.values()] == ["train", "train", "test", "train"]
 
 
 @pytest.mark.parametrize(("dt", "samples"), [(0.1, 63), (0.3, 21), (0.5, 13), (1.0, 7), (1, 7)])

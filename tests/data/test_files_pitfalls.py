@@ -18,6 +18,7 @@ from shipbench.data.files import read_dataset, write_dataset
 from shipbench.data.units import unit_factor
 from shipbench.errors import InputError
 from shipbench.records import Dataset, Run
+from shipbench.run_meta import RunMeta
 from shipbench.signals import COMMANDS
 
 Edit = Callable[[pd.DataFrame], pd.DataFrame]
@@ -52,7 +53,7 @@ def test_what_is_written_comes_back_bit_for_bit(tmp_path, format):
     assert back.fingerprint == awkward.fingerprint
     assert [r.id for r in back.runs] == ["001", "NA", "nan", "b c"]
     assert (back.source, back.licence, back.simulation, back.notes) == ("formula", "MIT", "toy", ("a note",))
-    assert back.runs[1].meta == {"manoeuvre": "weave"}
+    assert back.runs[1].meta == RunMeta(manoeuvre="weave")
 
 
 def test_environment_channels_and_noise_come_back_bit_for_bit(tmp_path):

@@ -92,10 +92,10 @@ def test_a_download_after_the_licence_is_accepted_loads_and_is_not_repeated(publ
     for word in ("NON-COMMERCIAL", "Wakita et al. (2022)", "10.1007/s00773-022-00889-3", public.url):
         assert word in result.stderr
     data = load_dataset("esso_osaka")
-    assert {r.id: r.meta["split"] for r in data.runs} == {
+    assert {r.id: r.meta.split for r in data.runs} == {
         Path(n).stem: "test" if "zigzag" in n else "train" for n in NAMES
     }
-    assert [r.meta["manoeuvre"] for r in data.runs] == ["turn", "zigzag", "random"]
+    assert [r.meta.manoeuvre for r in data.runs] == ["turn", "zigzag", "random"]
     again = get()
     assert again.exit_code == 0
     assert "already" in again.stdout

@@ -240,5 +240,5 @@ channels = { n = { column = "rpm", unit = "rpm" }, delta = { column = "rudder", 
     result = trial_import([gps, bridge], plan)
     assert result.exit_code == 0, result.output
     run = load_dataset("out").runs[0]
-    assert (run.meta["from"], run.meta["to"]) == ("2025-01-15T09:00:00.000Z", "2025-01-15T09:01:00.000Z")
+    assert (run.meta.from_, run.meta.to) == ("2025-01-15T09:00:00.000Z", "2025-01-15T09:01:00.000Z")
     np.testing.assert_allclose(run.states[:, 7], 0.2 * np.sin(run.t / 20.0), atol=0.003)

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from shipbench.cli.app import app
 from shipbench.data.base import load_dataset
+from shipbench.run_meta import RunMeta
 
 T = np.arange(0.0, 120.05, 0.1)
 DAY_FIRST = "%d/%m/%Y %H:%M:%S.%f"
@@ -39,7 +40,7 @@ def test_a_log_with_its_own_names_and_units_becomes_a_data_set(trial_import):
     check_motion(run)
     # Commands are means over [t_k, t_k+1): here they change at whole seconds.
     np.testing.assert_allclose(run.inputs[:-1, 1], motion(run.t)["delta_c"][:-1], atol=1e-12)
-    assert run.meta == {"file": "log.csv", "from": 0.0, "to": 120.0}
+    assert run.meta == RunMeta(file="log.csv", from_=0.0, to=120.0)
 
 
 def test_what_it_writes_runs_through_the_benchmark(trial_import, tmp_path):
@@ -124,7 +125,7 @@ def test_time_stamps_are_kept_in_the_metadata(trial_import):
     table = logged(T[::5])
     table["time"] = pd.Timestamp("2024-07-01 12:00:00") + pd.to_timedelta(table["time"], "s")
     trial_import(table, mapping(time='column = "time"\nformat = "iso"\nzone = "Europe/Amsterdam"'))
-    assert load_dataset("out").runs[0].meta["from"] == "2024-07-01T10:00:00.000Z"
+    assert load_dataset("out").runs[0].meta.from_ == "2024-07-01T10:00:00.000Z"
 
 
 def test_date_and_time_in_two_columns_and_two_decimals_of_a_second(trial_import):
@@ -162,7 +163,7 @@ def test_typed_time_stamps_of_parquet(trial_import, tmp_path):
     result = trial_import([tmp_path / "log.parquet"], mapping(time='column = "time"\nformat = "iso"'))
     assert result.exit_code == 0, result.output
     run = load_dataset("out").runs[0]
-    assert run.meta["from"] == "2024-07-01T10:00:00.000Z"
+    assert run.meta.from_ == "2024-07-01T10:00:00.000Z"
     check_motion(run)
 
 
@@ -213,7 +214,7 @@ def test_a_run_longer_than_the_longest_comes_in_parts_of_one_group(trial_import)
     trial_import(logged(T), mapping(tables="[split]\nlongest = 40.0"))
     data = load_dataset("out")
     assert [(r.t[0], r.t[-1]) for r in data.runs] == [(0.0, 40.0), (41.0, 81.0), (82.0, 120.0)]
-    assert {r.meta["group"] for r in data.runs} == {"log_stretch_001"}
+    assert {r.meta.group for r in data.runs} == {"log_stretch_001"}
     for run in data.runs:
         check_motion(run)  # also at the cuts: the filter sees beyond them
 
@@ -258,7 +259,7 @@ def test_times_of_day_count_on_over_midnight_and_rows_may_end_with_a_delimiter(t
     )
     assert result.exit_code == 0, result.output
     run = load_dataset("out").runs[0]
-    assert run.meta["from"] == 86_340.0
+    assert run.meta.from_ == 86_340.0
     check_motion(run, run.t - 86_340.0)
 
 
@@ -354,7 +355,7 @@ def test_gps_gyro_and_rudder_at_their_own_rates_are_merged_on_time(trial_import,
     np.testing.assert_allclose(run.states[:, 3], truth["u"], atol=0.02)
     np.testing.assert_allclose(run.states[:, 4], truth["v"], atol=0.02)
     np.testing.assert_allclose(run.inputs[:-1, 1], truth["delta_c"][:-1], atol=1e-6)
-    assert run.meta["origin"]["lat"] == pytest.approx(52.0, abs=0.01)
+    assert run.meta.origin.lat == pytest.approx(52.0, abs=0.01)
     for told in ("u, v from sog, cog and psi (over ground)", "x, y from lat, lon", "antenna at x = 12 m, y = -1.5 m"):
         assert told in result.stdout
         assert any(told in note for note in data.notes)

@@ -72,7 +72,7 @@ def test_time_stamps_as_rows_of_letters(trial_import, tmp_path):
     write_mat(tmp_path / "log.mat", logged(T), stamps)
     result = trial_import([tmp_path / "log.mat"], PLAN.replace('column = "time"', 'column = "stamp"\nformat = "iso"'))
     assert result.exit_code == 0, result.output
-    assert load_dataset("out").runs[0].meta["from"] == "2024-03-05T13:59:00.000Z"
+    assert load_dataset("out").runs[0].meta.from_ == "2024-03-05T13:59:00.000Z"
 
 
 def test_what_is_no_vector_and_what_lies_elsewhere_is_passed_over(tmp_path):

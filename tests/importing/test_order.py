@@ -49,7 +49,7 @@ def test_a_clock_that_was_set_back_is_joined_nowhere(trial_import, how, step, ra
     data = load_dataset("out")
     assert [r.id for r in data.runs] == ["log", "log_2"]
     assert greatest_leap(data) < 4.7
-    assert len({r.meta["group"] for r in data.runs}) == 1  # the ship went on: never in two folds
+    assert len({r.meta.group for r in data.runs}) == 1  # the ship went on: never in two folds
     assert "the clock was set back" in result.stdout
     for run, zero in zip(data.runs, (0.0, step), strict=True):
         np.testing.assert_allclose(run.states[:, 0], motion(run.t + zero)["x"], atol=0.05)
@@ -134,7 +134,7 @@ def test_a_clock_that_steps_ahead_in_a_pause_is_joined_nowhere(trial_import, ahe
     assert result.exit_code == 0, result.output
     data = load_dataset("out")
     assert len(data.runs) == 2, result.stdout
-    assert len({r.meta["group"] for r in data.runs}) == 1
+    assert len({r.meta.group for r in data.runs}) == 1
     (found,) = re.findall(r"stepped ahead by about ([\d.]+) s", result.stdout)
     assert float(found) == pytest.approx(ahead, abs=0.05 + noise)
 

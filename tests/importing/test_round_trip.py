@@ -148,7 +148,7 @@ def errors(run, states: np.ndarray, commands: np.ndarray) -> dict[str, np.ndarra
     Motion by the spline that the instruments saw, the actuators by their samples at 1 Hz, commands held from second to
     second.
     """
-    k, first = divmod((pd.Timestamp(run.meta["from"]) - START).total_seconds(), PAUSE)
+    k, first = divmod((pd.Timestamp(run.meta.from_) - START).total_seconds(), PAUSE)
     assert k in (0, 1)
     at, seconds = first + run.t - run.t[0], np.arange(LENGTH + 1.0)
     motion = CubicSpline(seconds, states[int(k)])(at)[:, :6]

@@ -4,7 +4,7 @@ with it."""
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def changed(**meta: object) -> Dataset:
         load_mmg_ship("kcs"), 3, (Hidden(EFFECTS.get("heading_bias"), (values,)),), Trials(runs=RUNS, samples=90)
     )
     return data.with_runs(
-        [replace(r, meta={**r.meta, **{k: v[i] for k, v in meta.items()}}) for i, r in enumerate(data.runs)]
+        [replace(r, meta={**r.meta.as_dict(), **{k: v[i] for k, v in meta.items()}}) for i, r in enumerate(data.runs)]
     )
 
 
@@ -82,7 +82,8 @@ def test_kinds_that_come_in_random_order_leave_places_for_a_change():
     [
         ("2026-05-01T10:30:00Z", datetime(2026, 5, 1, 10, 30, tzinfo=UTC)),
         ("2026-05-01 10:30", datetime(2026, 5, 1, 10, 30, tzinfo=UTC)),
-        (datetime(2026, 5, 1), datetime(2026, 5, 1, tzinfo=UTC)), (12.5, None), ("soon", None), (None, None),
+        (datetime(2026, 5, 1), datetime(2026, 5, 1, tzinfo=UTC)),
+        (date(2026, 5, 1), datetime(2026, 5, 1, tzinfo=UTC)), (12.5, None), (None, None),
     ],
 )  # fmt: skip
 def test_when_a_run_began_is_read_from_its_metadata(given: object, began: datetime | None):

@@ -194,13 +194,13 @@ def test_healed_lags_are_the_planted_ones(name: str, channel: int, seconds: floa
 
 
 def test_runs_that_share_samples_get_one_group_so_that_no_fold_parts_them(case):
-    groups = {run.id: run.meta.get("group", run.id) for run in read_dataset(case("piece of a run")[1]).runs}
+    groups = {run.id: run.group for run in read_dataset(case("piece of a run")[1]).runs}
     assert groups["copy"] == groups["run03"]
     assert len(set(groups.values())) == len(groups) - 1
 
 
 def test_a_copy_of_parts_of_two_runs_binds_all_three(case):
-    groups = {run.id.split("#")[0]: run.meta.get("group") for run in read_dataset(case("overlapping runs")[1]).runs}
+    groups = {run.id.split("#")[0]: run.meta.group for run in read_dataset(case("overlapping runs")[1]).runs}
     assert groups["copy"] == groups["run03"] == groups["run04"] is not None
 
 

@@ -144,7 +144,7 @@ def _durations(dataset: Dataset) -> Table:
     """Table of runs, samples and times of every kind of manoeuvre."""
     kinds: dict[str, list[float]] = {}
     for run in dataset.runs:
-        kinds.setdefault(str(run.meta.get("manoeuvre", "not given")), []).append((len(run) - 1) * dataset.dt)
+        kinds.setdefault(run.kind or "not given", []).append((len(run) - 1) * dataset.dt)
     groups = [*kinds.items(), *([("all", [x for times in kinds.values() for x in times])] if len(kinds) > 1 else [])]
     rows = [
         {

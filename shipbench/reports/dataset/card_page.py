@@ -27,7 +27,7 @@ def card_page(card: Card, dataset: Dataset, covered: Sequence[Coverage], command
     gaps, *others = card.page()
     shown = _chosen(dataset.runs)
     plots = recorded_plots(
-        dataset, {run.id: [run] for run in shown}, {run.id: kind for run in shown if (kind := _kind(run))}
+        dataset, {run.id: [run] for run in shown}, {run.id: kind for run in shown if (kind := run.kind)}
     )
     which = (
         f"{len(shown)} of {len(dataset)} runs"
@@ -42,22 +42,18 @@ def card_page(card: Card, dataset: Dataset, covered: Sequence[Coverage], command
     )  # fmt: skip
 
 
-def _kind(run: Run) -> str:
-    return str(run.meta.get("manoeuvre", ""))
-
-
 def _chosen(runs: Sequence[Run]) -> list[Run]:
     """Runs to draw, RUNS at most, of each kind of manoeuvre in turn the next one; in the order of the data set."""
     kinds: dict[str, list[int]] = {}
     for i, run in enumerate(runs):
-        kinds.setdefault(_kind(run), []).append(i)
+        kinds.setdefault(run.kind, []).append(i)
     turns = [i for turn in zip_longest(*kinds.values()) for i in turn if i is not None]
     return [runs[i] for i in sorted(turns[:RUNS])]
 
 
 def _tiles(card: Card, dataset: Dataset) -> list[Tile]:
     missing, ship = len(card.tables["cannot_identify"].rows), dataset.ship
-    samples, kinds = sum(len(run) for run in dataset.runs), len({_kind(run) for run in dataset.runs if _kind(run)})
+    samples, kinds = sum(len(run) for run in dataset.runs), len({run.kind for run in dataset.runs if run.kind})
     times = sorted((len(run) - 1) * dataset.dt for run in dataset.runs)
     length = f"{times[0]:g} s" if times[0] == times[-1] else f"{times[0]:g} to {times[-1]:g} s"
     return [

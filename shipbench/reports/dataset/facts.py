@@ -16,7 +16,8 @@ def dataset_facts(dataset: Dataset) -> dict[str, Any]:
     lengths = " to ".join(dict.fromkeys(f"{(n - 1) * dataset.dt:g}" for n in (min(samples), max(samples))))
 
     def counts(key: str) -> str:
-        values = [str(r.meta[key]) for r in dataset.runs if key in r.meta]
+        known = [getattr(r.meta, key) for r in dataset.runs]
+        values = [value for value in known if value is not None]
         return ", ".join(f"{v} {values.count(v)}" for v in dict.fromkeys(values)) or "not given"
 
     groups = {r.group for r in dataset.runs}

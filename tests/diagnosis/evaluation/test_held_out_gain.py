@@ -23,7 +23,7 @@ def grouped(groups: str, samples: int = 5, *hidden: Hidden) -> Dataset:
     """Runs whose groups are the letters; "-" is a run without one."""
     data = sea_trials(load_mmg_ship("kcs"), 3, hidden, Trials(runs=len(groups), samples=samples))
     return data.with_runs(
-        [r if g == "-" else replace(r, meta={**r.meta, "group": g}) for r, g in zip(data.runs, groups, strict=True)]
+        [r if g == "-" else replace(r, meta=replace(r.meta, group=g)) for r, g in zip(data.runs, groups, strict=True)]
     )
 
 

@@ -132,5 +132,5 @@ def test_a_data_set_is_read_again_as_its_folder_would_be():
     cut = reread(data, {"scale": {"u": 2.0}, "runs": {data.runs[0].id: {"cut": [[30.0, 40.0]], "load": "ballast"}}})
     assert [run.id for run in cut.runs[:3]] == [f"{data.runs[0].id}#1", f"{data.runs[0].id}#2", data.runs[1].id]
     assert cut.runs[0].group == cut.runs[1].group == data.runs[0].group
-    assert cut.runs[0].meta["load"] == "ballast"
+    assert cut.runs[0].meta.other["load"] == "ballast"
     np.testing.assert_allclose(cut.runs[2].states[:, U], 0.5 * data.runs[1].states[:, U])

@@ -11,6 +11,7 @@ from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
 from shipbench.physics.hull import polynomial, unified
 from shipbench.physics.mmg import load_mmg_ship
+from shipbench.run_meta import RunMeta
 from shipbench.signals import PSI
 from shipbench.simulate.fitted_ship import fitted_trials, is_sane
 from shipbench.simulate.manoeuvres import turning_circle
@@ -132,7 +133,7 @@ def test_nothing_in_the_data_says_what_was_hidden():
     for kind in ("single", "outside", "none-same", "none-other"):
         data = draw_case(kind, 1, 3, plan=TINY).dataset()
         assert (data.name, data.source, data.simulation, data.notes) == ("trials", "hidden set of the suite", None, ())
-        assert all(not run.meta for run in data.runs)
+        assert all(run.meta == RunMeta() for run in data.runs)
 
 
 def test_a_hull_as_polynomial_is_the_same_where_it_was_fitted_and_another_beyond():
