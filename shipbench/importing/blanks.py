@@ -1,4 +1,4 @@
-"""Tables whose columns stand apart by runs of blanks, as Fortran and MATLAB write them."""
+"""Tables with columns separated by runs of blanks, as Fortran and MATLAB write them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _BLOCK = 1 << 20
 
 
 class Collapsed(io.RawIOBase):
-    """A binary stream in which runs of blanks and tabs are one blank, and lines neither begin nor end with one."""
+    """Binary stream in which runs of blanks and tabs are one blank, and lines neither begin nor end with one."""
 
     def __init__(self, raw: Any) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Rows of a log as arrays, and streams of them in which every row has some rows before and after it at hand."""
+"""Rows of a log as arrays, and streams of them with some rows of context before and after each row."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Block:
-    """Some rows of a log: times (n,) [s], values (n, channels) in our units with NaN where there is none.
+    """Rows of a log: times (n,) [s], values (n, channels) in standard units with NaN where there is none.
 
     `new` (n,) is true where the clock was set: nothing may join that row to the one before.
     """
@@ -28,15 +28,15 @@ class Block:
 
 
 def joined(blocks: list[Block]) -> Block:
-    """The rows of all blocks as one."""
+    """Rows of all blocks as one block."""
     if len(blocks) == 1:
         return blocks[0]
     return Block(*(np.concatenate([getattr(b, name) for b in blocks]) for name in ("t", "values", "new")))
 
 
 def with_context(blocks: Iterable[Block], rows: int) -> Iterator[tuple[Block, int, int]]:
-    """(block, begin, end): every row stands once in [begin, end), with up to `rows` rows before and after it in the
-    block."""
+    """Triples (block, begin, end): every row stands once in [begin, end), with up to `rows` rows before and after it in
+    the block."""
     held: Block | None = None
     begin = 0
     for block in blocks:

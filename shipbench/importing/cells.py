@@ -1,4 +1,4 @@
-"""The cells of a log as numbers, texts or names; what was met while reading them."""
+"""Cells of a log as numbers, texts or names, with counts of irregular cells."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _NUMBERS = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.t
 
 @dataclass
 class Counts:
-    """What was met while reading, for the summary: `what` was left out, `doubtful` was kept, `notes` says how files
-    were read, `clock` what was found of their clocks."""
+    """Counts of irregularities while reading, for the summary: `what` was left out, `doubtful` was kept, `notes` on the
+    reading of files, `clock` on their clocks."""
 
     rows: int = 0
     what: Counter[str] = field(default_factory=Counter)
@@ -37,8 +37,8 @@ class Counts:
 
 
 class Cells:
-    """The cells of one batch of a log; `first_row` is the number of its first row in the file, `top` that of the first
-    data row."""
+    """Cells of one batch of a log; `first_row` is the number of its first row in the file, `top` that of the first data
+    row."""
 
     def __init__(
         self, path: Path, batch: pa.RecordBatch, source: Source, first_row: int, top: int, met: Counts
@@ -53,7 +53,7 @@ class Cells:
         )
 
     def numbers(self, column: str, missing: Sequence[str | float] | None = None) -> np.ndarray:
-        """(n,) floats; NaN where the cell is empty or one of `missing` (default: the source's).
+        """Numbers (n,); NaN where the cell is empty or one of `missing` (default: the source's).
 
         Raises:
             InputError: a cell is no number.
@@ -67,14 +67,14 @@ class Cells:
         return self.finite(array, missing)
 
     def finite(self, array: pa.Array, missing: Sequence[str | float]) -> np.ndarray:
-        """(n,) floats of an array of numbers, NaN where there is no quantity."""
+        """Numbers (n,) of an array, NaN where there is no quantity."""
         values = pc.fill_null(array.cast(pa.float64(), safe=False), np.nan).to_numpy(zero_copy_only=False).astype(float)
         absurd = np.abs(values) > _GREATEST
         self.met.what[f"infinite values (above {_GREATEST:g}), taken as missing"] += int(absurd.sum())
         return np.where(absurd | np.isin(values, [m for m in missing if not isinstance(m, str)]), np.nan, values)
 
     def parsed(self, column: str, text: pa.Array) -> pa.Array:
-        """(n,) numbers of texts that stand in `column`, null where there is none.
+        """Numbers (n,) of texts that stand in `column`, null where there is none.
 
         Raises:
             InputError: a cell is no number, or can be read in two ways.
@@ -85,7 +85,7 @@ class Cells:
             raise self.unread(column, error.row, error.hint) from None
 
     def unread(self, column: str, row: int, hint: str = "", what: str = "not a number") -> InputError:
-        """The error for a cell (rows of the batch from 0) that is no number, or in words what else it is not."""
+        """Error for a cell (rows of the batch from 0) that is no number, or another text on the fault."""
         cell = str(self._array(column)[row].as_py()).strip()
         if not hint and self.first_row == self.top and row == 0 and not any(c.isdigit() for c in cell):
             hint = " If the rows under the header are units or remarks, set [file] skip."
@@ -96,13 +96,13 @@ class Cells:
         return is_text(self._array(column))
 
     def texts(self, column: str, missing: Sequence[str | float] = ()) -> pa.Array:
-        """(n,) trimmed text, null where the cell is empty or one of `missing`."""
+        """Trimmed text (n,), null where the cell is empty or one of `missing`."""
         text = pc.utf8_trim_whitespace(self._array(column).cast(pa.large_string()))
         marks = [*EMPTY, *(m for m in missing if isinstance(m, str))]
         return pc.if_else(pc.is_in(text, pa.array(marks, text.type)), None, text)
 
     def names(self, column: str) -> np.ndarray:
-        """(n,) text, None where empty."""
+        """Text (n,), None where empty."""
         array = self.batch.column(column)
         text = pc.utf8_trim_whitespace(array.cast(pa.string()))
         return pc.if_else(pc.equal(pc.utf8_length(text), 0), None, text).to_numpy(zero_copy_only=False)

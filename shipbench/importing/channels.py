@@ -1,4 +1,4 @@
-"""Blocks of a log in our units and signs, with their times in order: the first step of every import."""
+"""Blocks of a log in standard units and signs, with their times in order: the first step of every import."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .values import channel_values
 
 
 def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str | None, Block]]:
-    """(name in the run column or None, block) of a log, rows of one run after another.
+    """Blocks of a log, as (name in the run column or None, block), rows of one run after another.
 
     Raises:
         InputError: a column is missing, or a cell is not a number or not a time.
@@ -37,8 +37,8 @@ def read_blocks(path: Path, source: Source, met: Counts) -> Iterator[tuple[str |
 
 
 def read_named(path: Path, source: Source, met: Counts) -> Iterator[tuple[np.ndarray, Block]]:
-    """(names (n,) in the run column, if any, and block) of a log, as the file has them; rows without a time or a name
-    are left out.
+    """Blocks of a log, as (names (n,) in the run column, if any, and block), in the order of the file; rows without a
+    time or a name are left out.
 
     Raises:
         InputError: a column is missing, or a cell is not a number or not a time.
@@ -75,7 +75,7 @@ def read_named(path: Path, source: Source, met: Counts) -> Iterator[tuple[np.nda
 
 
 def _without_footer(table: Table, columns: Sequence[str], source: Source) -> Iterator[pa.RecordBatch]:
-    """The batches of a log, the last without a footer; what is left out is noted in the table."""
+    """Batches of a log, the last without a footer; rows left out are noted in the table."""
     batches = table.batches(columns)
     batch = next(batches, None)
     while batch is not None:
@@ -91,8 +91,8 @@ def _without_footer(table: Table, columns: Sequence[str], source: Source) -> Ite
 
 
 def _footer(batch: pa.RecordBatch, source: Source) -> int:
-    """The row where a footer begins, such as "Total" or "End of log": a word for the time, empty cells beside it, and
-    no time after it."""
+    """Row where a footer begins, such as "Total" or "End of log": a word for the time, empty cells beside it, and no
+    time after it."""
     clock = batch.column(source.time.names[0])
     if not is_text(clock):
         return len(batch)
@@ -107,5 +107,5 @@ def _footer(batch: pa.RecordBatch, source: Source) -> int:
 
 
 def all_channels(mapping: Mapping) -> dict[str, Channel]:
-    """Every mapped channel, over all sources."""
+    """Mapped channels of all sources."""
     return {name: channel for source in mapping.sources.values() for name, channel in source.channels.items()}

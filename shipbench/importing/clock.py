@@ -1,4 +1,5 @@
-"""Time stamps of any kind to seconds: as they are counted in the log, or since 1970 (UTC) where they name a moment."""
+"""Conversion of time stamps of any kind to seconds: relative to the log's zero, or since 1970 (UTC) for absolute
+times."""
 
 from __future__ import annotations
 
@@ -18,8 +19,7 @@ from .stamps import parsed, text_durations
 RELATIVE = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 _ABSOLUTE = {"unix": (1.0, 0.0), "unix_ms": (1e-3, 0.0), "unix_us": (1e-6, 0.0), "unix_ns": (1e-9, 0.0),
              "excel": (86400.0, 25569.0), "matlab": (86400.0, 719529.0)}  # fmt: skip
-"""Factor to s, and the reading that stands for 1970-01-01: Excel counts days from 1899-12-30, MATLAB's datenum from the
-year 0."""
+"""Factor to s, and the reading of 1970-01-01: Excel counts days from 1899-12-30, MATLAB's datenum from the year 0."""
 FORMATS = (*RELATIVE, *_ABSOLUTE, "unix+ns (columns = [seconds, nanoseconds])",
     "timedelta (such as '0 days "
     "00:00:01.5' or '0:00:01.5')",
@@ -27,11 +27,11 @@ FORMATS = (*RELATIVE, *_ABSOLUTE, "unix+ns (columns = [seconds, nanoseconds])",
            "%H:%M:%S (time of day, counted on over midnight)")  # fmt: skip
 _DATE = re.compile("%[-#]?[aAbBcdDFgGjmsuUVwWxyY]")
 _1900, _2200 = -2208988800.0, 7258118400.0
-"""Where strptime puts a time of day that has no date, and the end of what a log may name; s since 1970."""
+"""Time that strptime gives to a time of day without a date, and the latest time of a log; s since 1970."""
 
 
 def is_absolute(clock: Clock) -> bool:
-    """Whether the times name moments (so that logs of different instruments can be merged by them)."""
+    """Whether the times are absolute (so that logs of different instruments can be merged by them)."""
     return clock.rate is None and clock.format not in (*RELATIVE, "timedelta") and not is_daily(clock)
 
 
@@ -44,12 +44,12 @@ def is_daily(clock: Clock) -> bool:
 
 
 def shown(clock: Clock, seconds: float) -> str:
-    """A time as the log's reader knows it, for messages."""
+    """Time in the log's own form, for messages."""
     return moment(seconds) if is_absolute(clock) else f"{seconds:.10g} s"
 
 
 def moment(seconds: float) -> str:
-    """Seconds since 1970 as an ISO time stamp in UTC, to the millisecond."""
+    """ISO time stamp in UTC of seconds since 1970, to the millisecond."""
     return datetime.fromtimestamp(round(seconds, 3), UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
@@ -66,7 +66,7 @@ def to_seconds(
         columns: the one or two columns of the clock.
         numbers: reads a column as numbers (n,), where the format counts.
         where: file and rows, for messages.
-        told: takes what is worth a word.
+        told: receives notes for the summary.
 
     Raises:
         InputError: unknown format, unreadable stamps, stamps of which only some have a zone, or moments outside 1900 to
@@ -97,7 +97,7 @@ def counts(clock: Clock) -> bool:
 
 
 def check_format(clock: Clock, where: str) -> None:
-    """The format is one of ours, 'iso', or a strptime pattern, and fits the number of columns and the zone.
+    """Check that the format is a known one, 'iso', or a strptime pattern, and fits the number of columns and the zone.
 
     Raises:
         InputError: it is none of them.
@@ -223,7 +223,7 @@ def _is_date(kind: pa.DataType) -> bool:
 
 
 def _joined(columns: list[pa.Array]) -> pa.Array:
-    """The columns as text with a blank between them; null where all are empty."""
+    """Texts of the columns with a blank between them; null where all are empty."""
     texts = [
         pc.utf8_trim_whitespace(c.cast(pa.string()) if not pa.types.is_null(c.type) else pa.nulls(len(c), pa.string()))
         for c in columns
@@ -237,7 +237,7 @@ def _joined(columns: list[pa.Array]) -> pa.Array:
 
 
 def _durations(column: pa.Array) -> np.ndarray:
-    """Durations or times of day as seconds."""
+    """Seconds of durations or times of day."""
     if pa.types.is_time(column.type):
         column = (
             column.cast(pa.int32() if pa.types.is_time32(column.type) else pa.int64())
@@ -253,7 +253,7 @@ def _stamps(column: pa.Array) -> pd.Series:
 
 
 def _date_and_time(columns: list[pa.Array], clock: Clock, where: str) -> np.ndarray:
-    """A column of dates (typed as dates or time stamps) and one of times of day, in either order."""
+    """Stamps of a column of dates (typed as dates or time stamps) and one of times of day, in either order."""
     whole = [
         _is_date(c.type) and bool((_stamps(c).dt.normalize() == _stamps(c))[_stamps(c).notna()].all()) for c in columns
     ]
@@ -276,8 +276,7 @@ def _date_and_time(columns: list[pa.Array], clock: Clock, where: str) -> np.ndar
 
 
 def _twice_or_never(error: str) -> str:
-    """The stamp in the message of pandas, and what is wrong with it; that message goes on with advice on its own
-    options."""
+    """Stamp in the message of pandas, and its fault, without that message's advice on pandas options."""
     found = re.search(r"\d{4}-\d\d-\d\d \d\d:\d\d:[\d.]*\d", error)
     return (
         f"{found[0] if found else 'one'} {'does not occur' if 'nonexistent' in error else 'occurs twice'}, as "
@@ -286,7 +285,7 @@ def _twice_or_never(error: str) -> str:
 
 
 def _seconds(stamps: pd.Series, clock: Clock, where: str) -> np.ndarray:
-    """Stamps without a zone are taken in `clock.zone`, or UTC."""
+    """Seconds of stamps; those without a zone are taken in `clock.zone`, or UTC."""
     try:
         aware = (
             stamps.dt.tz_convert("UTC")

@@ -1,4 +1,4 @@
-"""Latitude and longitude as logs write them: letters of the hemisphere, degrees with minutes, both in one cell."""
+"""Latitude and longitude as written in logs: letters of the hemisphere, degrees with minutes, both in one cell."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SEXAGESIMAL = (
 
 
 def coordinates(cells: Cells, name: str, channel: Channel, missing: Sequence[str | float]) -> np.ndarray:
-    """(n,) readings of a lat or lon, north and east positive, in the channel's unit; of `ddmm.mmmm` in degrees.
+    """Readings (n,) of a lat or lon, north and east positive, in the channel's unit; of `ddmm.mmmm` in degrees.
 
     Raises:
         InputError: a cell is no number, its letters belong to the other axis or contradict its sign, or its minutes are
@@ -115,7 +115,7 @@ def _without_sign(array: pa.Array) -> int:
 
 
 def _part(cells: Cells, column: str, text: pa.Array, part: int) -> pa.Array:
-    """The first or second of the two numbers in each cell."""
+    """First or second of the two numbers in each cell."""
     text = pc.utf8_trim(
         pc.replace_substring_regex(text, r"(?i)^\s*POINT\b", ""), "()[]{} "
     )  # as in WKT, where the longitude is first
@@ -136,7 +136,7 @@ def _part(cells: Cells, column: str, text: pa.Array, part: int) -> pa.Array:
 
 
 def _letters(text: pa.Array) -> tuple[pa.Array, np.ndarray | None]:
-    """The cells without their letters, and the letter of each (n,) or None where no cell has one."""
+    """Cells without their letters, and the letter of each (n,) or None where no cell has one."""
     found = pc.extract_regex(text, _LETTERED)
     before, number, after = (pc.struct_field(found, k) for k in range(3))
     letter = pc.if_else(pc.equal(before, ""), after, before)
@@ -197,7 +197,7 @@ def _sides_of(cells: Cells, column: str) -> np.ndarray:
 
 
 def _signed(cells: Cells, name: str, channel: Channel, values: np.ndarray, sides: np.ndarray) -> np.ndarray:
-    """North and east positive; a minus is accepted where it says the same as the letter."""
+    """Values with north and east positive; a minus is accepted where it agrees with the letter."""
     there = np.isfinite(values) & np.array([s is not None for s in sides])
     accepted = SIDES[name]
     strange = there & ~np.isin(sides.astype(str), list(accepted))

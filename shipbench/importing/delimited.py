@@ -1,4 +1,4 @@
-"""Logs as text: CSV and its kin, in any encoding, streamed; rows that do not fit the header are refused, but for a cut
+"""Logs as text: CSV and similar, in any encoding, streamed; rows that do not fit the header are refused, except a cut
 last line or a footer."""
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .mapping import Layout
 from .table import BLANKS, DELIMITERS, KINDS, TEXT_BLOCK, Table, check_number, uncompressed
 
 _NO_TEXT = ("idna", "punycode", "undefined", "unicode_escape", "raw_unicode_escape")
-"""Codecs of Python that make text of text, not of a file's bytes."""
+"""Codecs of Python that convert text to text, not a file's bytes."""
 _WIDE = ("utf-16", "utf-32")
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
@@ -31,7 +31,7 @@ _BEGINS_DATA = re.compile(r"\s*[\"']?[-+\u2212]?[.,]?\d")
 
 
 def open_text(path: Path, layout: Layout) -> Table:
-    """The columns of the header, or their numbers where [file] header = 0.
+    """Open a text log with the columns of the header, or their numbers where [file] header = 0.
 
     Raises:
         InputError: no text, or no header where it should stand; while it is streamed: rows with more or fewer fields
@@ -109,8 +109,8 @@ class _OddRows:
         self._blank_before: list[int] = []
 
     def met(self, row: pa.csv.InvalidRow) -> str:
-        """Take a row out, for now; one of delimiters alone is an empty line. Reading ends at too many: an exception
-        would be lost in pyarrow."""
+        """Set a row aside; one of delimiters alone is an empty line. Reading ends at too many: an exception would be
+        lost in pyarrow."""
         if not row.text.strip(" \t,;|"):
             self.blank += 1
             return "skip"
@@ -119,7 +119,7 @@ class _OddRows:
         return "error" if len(self.rows) > _MOST_ODD else "skip"
 
     def refuse(self) -> None:
-        """The message for a file whose reading ended early.
+        """Raise the error for a file whose reading ended early.
 
         Raises:
             InputError: reading ended since too many rows do not fit.
@@ -139,10 +139,10 @@ class _OddRows:
                 raise self._refused(row)
 
     def left_out(self) -> list[str]:
-        """What was left out at the end of the file, in words.
+        """Text on the rows left out at the end of the file.
 
         Raises:
-            InputError: it is more than a cut last line or a footer.
+            InputError: they are more than a cut last line or a footer.
         """
         for k, row in enumerate(self.rows):
             cut = k == len(self.rows) - 1
@@ -172,7 +172,7 @@ class _OddRows:
 
 
 def find_encoding(path: Path, head: bytes, layout: Layout) -> tuple[str, list[str]]:
-    """The encoding of a text by its mark, by the mapping, or by trial; with a note where it was tried out.
+    """Encoding of a text by its byte order mark, by the mapping, or by trial; with a note in the last case.
 
     Raises:
         InputError: the text is binary, or the mapping names no encoding of text.
@@ -199,7 +199,7 @@ def check_encoding(name: str) -> str:
     """Python's name of a text encoding.
 
     Raises:
-        InputError: it is none, or a codec that makes something else than text of a file's bytes.
+        InputError: it is none, or a codec that does not convert a file's bytes to text.
     """
     try:
         found = codecs.lookup(name)
@@ -223,8 +223,7 @@ def _decodes(head: bytes, encoding: str) -> bool:
 
 
 def _first_lines(path: Path, head: bytes, encoding: str, layout: Layout) -> tuple[str, str]:
-    """The header and the first row of data (empty where there is none); of a table without a header, the first row
-    twice."""
+    """Header and first row of data (empty where there is none); of a table without a header, the first row twice."""
     number = layout.header or layout.skip + 1
     text = codecs.getincrementaldecoder(encoding)
     try:

@@ -1,4 +1,4 @@
-"""A channel's entry in mapping.toml: which columns it is made of, in which unit and sign."""
+"""Entry of a channel in mapping.toml: its columns, unit and sign."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ EXTRA_UNITS = {
     "apparent_wind_speed": "m/s",
     "apparent_wind_from": "rad",
 }
-"""What a log may hold beside our signals: WGS84 position, speed and course over ground (course clockwise from north),
-and the wind felt on board, its direction where it comes from, clockwise from the bow."""
+"""Units of channels that a log may hold beside the standard signals: WGS84 position, speed and course over ground
+(course clockwise from north), and the apparent wind, its direction where it comes from, clockwise from the bow."""
 CHANNELS = (*STATES, *COMMANDS, *ENVIRONMENT, *EXTRA_UNITS)
 ANGLES = ("psi", "cog", "wind_from", "apparent_wind_from")
-"""Angles that wrap around; lon is made a position before anything else."""
+"""Angles that wrap around; lon is converted to a position before anything else."""
 EXPRESSIONS = ("column", "mean", "sum", "diff", "atan2", "quaternion")
-"""How a channel is made: from one column; as mean or sum of several; as the first less the second; as the angle of [y,
-x]; as the heading of the body-to-earth quaternion [x, y, z, w]."""
+"""Expressions for a channel: one column; mean or sum of several; the first less the second; the angle of [y, x]; the
+heading of the body-to-earth quaternion [x, y, z, w]."""
 ARCS = ("atan2", "quaternion")
 MINUTES = ("ddmm.mmmm", "ddmm.mmmmN")
-"""Latitude and longitude as NMEA 0183 has them, degrees and minutes in one number; with the letter of the hemisphere in
-the cell."""
+"""Formats of latitude and longitude in NMEA 0183, degrees and minutes in one number; with the letter of the hemisphere
+in the cell."""
 _OF_FULL = {"%": 100.0, "pwm": 500.0}
 _SIGN_WORDS = {"lat": ("north", "south"), "lon": ("east", "west"), "cog": ("clockwise", "counterclockwise"),
                "apparent_wind_from": ("clockwise", "counterclockwise")}  # fmt: skip
@@ -45,23 +45,23 @@ _UNITS_LIKE = {
 
 
 MOST = 1e12
-"""Largest factor and offset; no unit of a log is further from ours."""
+"""Largest factor and offset of a unit."""
 
 
 class Part(BaseModel):
-    """An unknown key is an error, never ignored."""
+    """Table of mapping.toml. An unknown key is an error, never ignored."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=True)
 
 
 class Channel(Part):
-    """One column, or one expression of columns: ours = sign x unit x factor x (reading + offset).
+    """Column, or expression of columns: standard value = sign x unit x factor x (reading + offset).
 
     `gap` [s] replaces the mapping's for this channel (inf: logged on change); `missing` lists readings that are none,
     beside the source's (an empty list: every number is a reading, also those that stand for "not available" by
-    convention).
-    `unit = "%"` and `unit = "pwm"` need `full`, the value in `full_unit` at 100 % or at 2000 us. `hemisphere` is the
-    column with N or S, E or W; `part` is the place (1 or 2) in a cell that holds latitude and longitude.
+    convention). `unit = "%"` and `unit = "pwm"` need `full`, the value in `full_unit` at 100 % or at 2000 us.
+    `hemisphere` is the column with N or S, E or W; `part` is the place (1 or 2) in a cell that holds latitude and
+    longitude.
     """
 
     column: str | None = None
@@ -84,12 +84,12 @@ class Channel(Part):
     @model_validator(mode="before")
     @classmethod
     def _angle_in_radians(cls, data: Any) -> Any:
-        """An arc tangent and the heading of a quaternion are in radians; nobody has to say so."""
+        """Set the unit of an arc tangent and of a quaternion's heading to radians."""
         return {"unit": "rad", **data} if isinstance(data, dict) and set(data) & set(ARCS) else data
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Which of `column` and the expressions are given; a checked mapping has one."""
+        """Keys given among `column` and the expressions; a checked mapping has one."""
         return tuple(kind for kind in EXPRESSIONS if getattr(self, kind) is not None)
 
     @property
@@ -100,12 +100,12 @@ class Channel(Part):
 
     @property
     def every_column(self) -> tuple[str, ...]:
-        """All columns that are read for it."""
+        """Names of all columns that are read for it."""
         return (*self.columns, *([self.hemisphere] if self.hemisphere else []))
 
     @property
     def neutral(self) -> float:
-        """Reading that stands for zero."""
+        """Reading that corresponds to zero."""
         return 1500.0 if self.unit == "pwm" else 0.0
 
     def __str__(self) -> str:
@@ -115,12 +115,12 @@ class Channel(Part):
 
 
 def unit_of(channel: str) -> str:
-    """Our unit of a channel."""
+    """Standard unit of a channel."""
     return EXTRA_UNITS.get(channel) or UNITS[channel]
 
 
 def channel_factor(name: str, channel: Channel) -> float:
-    """Factor from (reading + offset) to our unit and sign.
+    """Factor from (reading + offset) to the standard unit and sign.
 
     Raises:
         InputError: unknown unit or sign.
@@ -144,7 +144,7 @@ def channel_factor(name: str, channel: Channel) -> float:
 
 
 def _full_of(name: str) -> str:
-    """An example of what 100 % means."""
+    """Example of the meaning of 100 %."""
     value, unit = {"rad": (35.0, "deg"), "rpm": (120.0, "rpm"), "N": (100.0, "kN")}.get(
         unit_of(name), (1.0, unit_of(name))
     )
@@ -155,7 +155,7 @@ def _full_of(name: str) -> str:
 
 
 def check_channel(name: str, channel: Channel, path: str | Path) -> None:
-    """The entry names one channel, one expression, a unit and a sign, and its keys fit each other.
+    """Check that the entry names one channel, one expression, a unit and a sign, and that its keys fit each other.
 
     Raises:
         InputError: it does not; `path` is the mapping.

@@ -18,12 +18,12 @@ from .table import MOST_COLUMNS, Table, as_batch
 
 _LARGEST, _LARGEST_WHOLE = 1_000_000_000, 100_000_000
 _DENSEST = 200
-"""Unpacked over packed size of a workbook; those of logs are below 50."""
+"""Largest accepted ratio of unpacked to packed size of a workbook; those of logs are below 50."""
 _ROWS = 20_000
 
 
 def open_excel(path: Path, layout: Layout) -> Table:
-    """The sheet named in the mapping, else the only one.
+    """Open the sheet named in the mapping, else the only one.
 
     Raises:
         InputError: openpyxl is not installed, or the file is no workbook, holds more than 1 GB (100 MB of texts), or
@@ -61,13 +61,13 @@ def open_excel(path: Path, layout: Layout) -> Table:
 
 
 def first_rows(path: Path, layout: Layout, count: int) -> list[list[Any]]:
-    """The cells of the first rows of a sheet, whatever they hold: for one that looks for the header."""
+    """Cells of the first rows of a sheet, of any type, for the search of the header."""
     _check_book(path)
     return [[_cell(cell) for cell in row] for row in itertools.islice(_rows(path, layout), count)]
 
 
 def _check_book(path: Path) -> None:
-    """The library is there, and the file is a workbook of a size that can be read."""
+    """Check that the library is installed, and that the file is a workbook of a size that can be read."""
     with needed_by(f"{path}: reading .xlsx", "Save the sheet as CSV"):
         import openpyxl  # noqa: F401
     if not zipfile.is_zipfile(path):
@@ -89,7 +89,7 @@ def _check_book(path: Path) -> None:
 
 
 def _rows(path: Path, layout: Layout) -> Iterator[tuple[Any, ...]]:
-    """The rows of the sheet from the top, its cells as values."""
+    """Rows of the sheet from the top, its cells as values."""
     import openpyxl
     from openpyxl.utils.exceptions import InvalidFileException
 
@@ -118,8 +118,8 @@ def _rows(path: Path, layout: Layout) -> Iterator[tuple[Any, ...]]:
 
 
 def _cell(value: Any) -> Any:
-    """Dates and times as ISO text; a date without a time of day as a date alone, so that a time column can follow
-    it."""
+    """Cell with dates and times as ISO text; a date without a time of day as a date alone, so that a time column can
+    follow it."""
     if isinstance(value, datetime.datetime):
         whole_day = value.time() == datetime.time() and value.tzinfo is None
         return value.date().isoformat() if whole_day else value.isoformat(sep=" ")

@@ -1,5 +1,5 @@
 """Positions that a faster log repeats between two fixes of the receiver: only the rows where the fix changes are
-taken."""
+used."""
 
 from __future__ import annotations
 
@@ -12,14 +12,13 @@ from .cells import Counts
 from .track import usual
 
 _LEAST = 8
-"""Changes of a position in a block that are needed to tell how long a fix is held; of fewer, the block before
-decides."""
+"""Fewest changes of a position in a block to estimate the time between fixes; with fewer, the block before decides."""
 _WITH_THE_FIX = ("psi", "u", "v", "r", "sog", "cog")
 """Channels that may come from the same receiver."""
 
 
 class _Held:
-    """How long the receiver's fixes are held [rows], for one pair of channels; carried from block to block."""
+    """Time between the receiver's fixes [rows], for one pair of channels; carried from block to block."""
 
     def __init__(self) -> None:
         self.last = np.full(2, np.nan)
@@ -29,11 +28,11 @@ class _Held:
 
 
 def fixes_only(blocks: Iterable[Block], channels: tuple[str, ...], met: Counts) -> Iterator[Block]:
-    """The blocks with NaN in place of a position that was only repeated, and of what came with it from the receiver.
+    """Blocks with NaN in place of a repeated position, and of other channels of the same receiver.
 
-    A position is repeated where it stands still for rows and then leaps by more than the resolution of its numbers;
-    where it moves by single steps of its resolution it is a slow or coarse one, which is left as it is. Positions that
-    stand still for longer than twice the usual stay in the log.
+    A position is repeated where it stands still for rows and then jumps by more than the resolution of its numbers.
+    Where it moves by single steps of its resolution it is slow or coarse, and is left as it is. Positions that stand
+    still for longer than twice the usual stay in the log.
     """
     pair = next(
         (
@@ -77,7 +76,7 @@ def fixes_only(blocks: Iterable[Block], channels: tuple[str, ...], met: Counts) 
 
 
 def _decide(p: np.ndarray, moved: np.ndarray, state: _Held) -> None:
-    """Set how many rows a fix is usually held at most, and whether the two coordinates are renewed in different
+    """Set the most rows for which a fix is usually held, and whether the two coordinates are renewed in different
     rows."""
     starts = np.flatnonzero(moved.any(axis=1))
     if len(starts) < _LEAST:
@@ -95,8 +94,7 @@ def _decide(p: np.ndarray, moved: np.ndarray, state: _Held) -> None:
 
 
 def _resolution(leaps: np.ndarray, p: np.ndarray) -> float:
-    """The step of the grid that the readings lie on, as far as their leaps show it; their rounding where they lie on
-    none."""
+    """Step of the grid of the readings, as far as their jumps show it; their rounding where they lie on none."""
     rounding = 16.0 * np.finfo(float).eps * max(float(np.max(np.abs(p))), 1e-300)
     sizes = np.unique(np.r_[0.0, leaps])
     spaces = np.diff(sizes)
@@ -105,8 +103,8 @@ def _resolution(leaps: np.ndarray, p: np.ndarray) -> float:
 
 
 def _stale(changed: np.ndarray, state: _Held) -> np.ndarray:
-    """(n, 2) rows that repeat a fix: all since the last change, up to twice the usual time; then one in that time is
-    kept."""
+    """Mask (n, 2) of rows that repeat a fix: all since the last change, up to twice the usual time; then one in that
+    time is kept."""
     ages = np.empty(changed.shape, int)
     for k in range(2):
         rows = np.arange(len(changed))

@@ -1,5 +1,5 @@
-"""`import_logs`: logs and a mapping in, a data set's folder and a summary out, with memory that does not grow with the
-logs."""
+"""Import of logs with a mapping (`import_logs`): a data set's folder and a summary, with memory that does not grow with
+the logs."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ _FINEST = 100
 
 @dataclass
 class _Log:
-    """One recording: its name and a stream for each source; `goes_on` where it is the one before, after its clock was
-    set back."""
+    """Recording: its name and a stream for each source; `goes_on` where it continues the one before, after its clock
+    was set back."""
 
     name: str
     files: str
@@ -59,14 +59,14 @@ def import_logs(
 
     Args:
         logs: files, in the order of time where a source has several.
-        mapping: which column is what.
+        mapping: the columns of each channel.
         ship: the vessel's particulars.
         out: folder to write; it appears when everything is done.
         force: replace a data set that is there.
         tell: called with one line on each recording that is done.
 
     Raises:
-        InputError: whatever is wrong with the files, the mapping or the folder; nothing is written then.
+        InputError: a fault of the files, the mapping or the folder; nothing is written then.
     """
     met, summary = Counts(), Summary(mapping)
     for path in logs:
@@ -105,7 +105,7 @@ def rehearse(logs: Sequence[Path], mapping: Mapping, ship: Ship, rows: int, read
     """Import the first `rows` rows of each recording without writing anything, and read the logs on to row `read`.
 
     Raises:
-        InputError: what the import would raise.
+        InputError: any error that the import would raise.
     """
     met, summary = Counts(), Summary(mapping)
     for log in _recordings(logs, mapping, met):
@@ -129,7 +129,7 @@ def rehearse(logs: Sequence[Path], mapping: Mapping, ship: Ship, rows: int, read
 
 
 def _beginning(blocks: Iterator[Block], rows: int) -> Iterator[Block]:
-    """The blocks with the first `rows` rows."""
+    """Blocks with the first `rows` rows."""
     for block in blocks:
         yield block.rows(slice(0, rows))
         rows -= len(block.t)
@@ -138,7 +138,7 @@ def _beginning(blocks: Iterator[Block], rows: int) -> Iterator[Block]:
 
 
 def _free(name: str, taken: Counter[str]) -> str:
-    """`name`, or with a number where it is taken."""
+    """Name as given, or with a number where it is taken."""
     candidate = name
     while taken[candidate]:
         taken[name] += 1
@@ -177,14 +177,14 @@ def _recordings(logs: Sequence[Path], mapping: Mapping, met: Counts) -> Iterator
 
 
 def _clean(blocks: Iterable[Block], source: Source, mapping: Mapping, where: str, met: Counts) -> Iterator[Block]:
-    """The rows of a recording in order, without repeated fixes, and marked where its clock was set."""
+    """Rows of a recording in order, without repeated fixes, and marked where its clock was set."""
     channels = tuple(source.channels)
     gap = max((mapping.gap(name) for name in channels if name in ("x", "lat")), default=0.0)
     return steps_marked(fixes_only(in_order(blocks, source, where, met), channels, met), source, gap, met)
 
 
 def _chained(paths: list[Path], source: Source, met: Counts) -> Iterator[Block]:
-    """The blocks of one file after another."""
+    """Blocks of one file after another."""
     for path in paths:
         step(f"read {path.name}", 0.0, 1.0)
         for _, block in read_blocks(path, source, met):
@@ -192,7 +192,7 @@ def _chained(paths: list[Path], source: Source, met: Counts) -> Iterator[Block]:
 
 
 def _share_out(logs: Sequence[Path], sources: dict[str, Source]) -> dict[str, list[Path]]:
-    """The files of each source, by the patterns of the mapping."""
+    """Files of each source, by the patterns of the mapping."""
     files = {name: [p for p in logs if fnmatch.fnmatch(p.name, source.files)] for name, source in sources.items()}
     for name, found in files.items():
         if not found:
@@ -279,7 +279,7 @@ def _check_step(mapping: Mapping, steps: dict[str, float]) -> None:
 
 
 def _told(pieces: Iterator[Piece], samples: int, mapping: Mapping, summary: Summary) -> Iterator[Piece]:
-    """The pieces; what standing still cost goes to the summary."""
+    """Pieces, with the time at rest added to the summary."""
     kept = 0
     for piece in pieces:
         kept += len(piece.t)

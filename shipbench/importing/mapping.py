@@ -1,4 +1,4 @@
-"""mapping.toml: which column of a log is which signal, in which unit, sign and clock; and how the log is cut into
+"""Schema of mapping.toml: the columns of each signal with unit, sign and clock; and the division of the log into
 runs."""
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ SOURCE_KEYS = ("files", "time", "file", "channels", "missing", "antenna", "speed
 
 
 LATEST = 7.3e9
-"""Seconds from 1970 to 2200; no time of a log lies further from another."""
+"""Seconds from 1970 to 2200: the largest time, and the largest difference of two times, of a log."""
 
 
 class Clock(Part):
-    """Where time stands. `rate` [Hz] alone serves a log without a time column; `shift` [s] is added to every time.
+    """Columns and format of the time. `rate` [Hz] alone serves a log without a time column; `shift` [s] is added to
+    every time.
 
     `repeated`: rows that share a stamp keep it ("first"), or are spread evenly until the next stamp. `backwards`: rows
     that go back in time are refused, left out ("drop"), sorted, or begin a recording of their own ("split": the clock
@@ -45,9 +46,9 @@ class Clock(Part):
 
 
 class Layout(Part):
-    """How the file is written. `header` is the number of the header's row, 0 where there is none (columns are then
-    called "1", "2", ...); `skip` the rows between it and the data (such as a row of units); `delimiter = " "` stands
-    for runs of blanks; `thousands` stands between groups of three digits."""
+    """Layout of the file. `header` is the number of the header's row, 0 where there is none (columns are then called
+    "1", "2", ...); `skip` the rows between it and the data (such as a row of units); `delimiter = " "` stands for runs
+    of blanks; `thousands` stands between groups of three digits."""
 
     delimiter: str | None = Field(None, min_length=1, max_length=1)
     decimal: Literal[".", ","] = "."
@@ -59,22 +60,22 @@ class Layout(Part):
 
 
 class Point(Part):
-    """A place on board [m]: x forward of midship, y to starboard of the centre line; the longest ships have 460 m."""
+    """Position on board [m]: x forward of midship, y to starboard of the centre line; the longest ships have 460 m."""
 
     x: float = Field(ge=-500.0, le=500.0)
     y: float = Field(0.0, ge=-500.0, le=500.0)
 
 
 class Origin(Part):
-    """Where the local plane touches the earth [deg]."""
+    """Point where the local plane touches the earth [deg]."""
 
     lat: float = Field(ge=-90, le=90)
     lon: float = Field(ge=-180, le=180)
 
 
 class Source(Part):
-    """One kind of file. `antenna` is the point that x, y, lat, lon, sog and cog belong to, `speed_sensor` the one of u
-    and v (default: midship)."""
+    """Kind of file. `antenna` is the point that x, y, lat, lon, sog and cog belong to, `speed_sensor` the one of u and
+    v (default: midship)."""
 
     files: str = "*"
     time: Clock
@@ -87,9 +88,9 @@ class Source(Part):
 
 
 class Split(Part):
-    """How logs become runs; all in s and m/s. `gap`: longer pauses split; `window`: runs of that length; `shortest`:
-    shorter ones are left out; `longest`: longer ones are cut in parts of one group; `still_speed`: stretches slower
-    than that for `still_time` are left out."""
+    """Division of logs into runs; all in s and m/s. `gap`: longer pauses split; `window`: runs of that length;
+    `shortest`: shorter ones are left out; `longest`: longer ones are cut in parts of one group; `still_speed`:
+    stretches slower than that for `still_time` are left out."""
 
     gap: float = Field(3.0, gt=0)
     window: float | None = Field(None, gt=0, allow_inf_nan=False)
@@ -100,7 +101,7 @@ class Split(Part):
 
 
 class Mapping(Part):
-    """The whole of mapping.toml. A mapping of one kind of file has the keys of `Source` at the top; of several, tables
+    """Content of mapping.toml. A mapping of one kind of file has the keys of `Source` at the top; of several, tables
     [sources.NAME]."""
 
     name: str = Field(min_length=1)
@@ -161,10 +162,10 @@ def load_mapping(path: str | Path, **overrides: Any) -> Mapping:
 
 
 def validated(data: dict[str, Any], path: str | Path) -> Mapping:
-    """The keys and kinds of a mapping's entries, checked one by one; of one kind of file, its keys stand at the top.
+    """Mapping from checked keys and types of its entries; of one kind of file, its keys stand at the top.
 
     Raises:
-        InputError: a missing or unknown key, or a value of another kind.
+        InputError: a missing or unknown key, or a value of another type.
     """
     single = "sources" not in data
     if single:

@@ -1,4 +1,4 @@
-"""MATLAB files: up to version 7 through scipy: vectors, columns of matrices and fields of structs under names such as
+"""MATLAB files up to version 7, read with scipy: vectors, columns of matrices and fields of structs under names such as
 `log.gps.lat` or `data(3)`."""
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .table import MOST_COLUMNS, Table, as_batch
 
 _ROWS = 50_000
 _OBJECTS = "\0objects"
-"""Where names of objects are gathered among the vectors; no variable is called so."""
+"""Key under which names of objects are collected among the vectors; no variable has this name."""
 
 
 def open_matlab(path: Path) -> Table:
@@ -93,7 +93,7 @@ def _numbers(values: Any) -> Any:
 
 
 def _collect(name: str, value: Any, vectors: dict[str, Any], depth: int) -> None:
-    """Put what can serve as a column into `vectors`, under its MATLAB name."""
+    """Put possible columns into `vectors`, under their MATLAB names."""
     from scipy.io.matlab import MatlabOpaque
 
     if isinstance(value, MatlabOpaque):

@@ -1,4 +1,4 @@
-"""MATLAB 7.3 files, which are HDF5, through h5py: streamed, so that they may be larger than memory; needs the extra
+"""MATLAB 7.3 files (HDF5), read with h5py: streamed, so that they may be larger than memory; needs the extra
 `shipbench[matlab]`."""
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from .table import MOST_COLUMNS, Table, as_batch
 _ROWS = 50_000
 _DEEPEST = 8
 _LARGEST_CHUNK = 200_000_000
-"""Bytes that one piece of a data set may unpack to; MATLAB's have some 100 kB."""
+"""Most unpacked bytes of one piece of a data set; MATLAB's have some 100 kB."""
 _LARGEST = 1_100_000_000
-"""Bytes of a file with objects, which are read whole."""
+"""Most bytes of a file with objects, which are read whole."""
 _MOST_LETTERS = 100
 
 
 @dataclass(frozen=True)
 class _Vector:
-    """Where a column stands: the path of its data set, and the index of all axes but that of the samples (None where
-    the samples are)."""
+    """Location of a column: the path of its data set, and the index of all axes but that of the samples (None where the
+    samples are)."""
 
     path: str
     at: tuple[int | None, ...]
@@ -38,8 +38,8 @@ class _Vector:
 
 
 def open_matlab73(path: Path) -> Table:
-    """The vectors, columns of matrices, struct fields and tables of the file under their MATLAB names. Cells are passed
-    over.
+    """Open the vectors, columns of matrices, struct fields and tables of the file under their MATLAB names. Cells are
+    skipped.
 
     Raises:
         InputError: h5py is not installed, or the file is damaged, declares more than it holds, or has no numeric
@@ -90,7 +90,7 @@ def open_matlab73(path: Path) -> Table:
 
 
 def _declared(file: Any) -> int:
-    """Bytes that all data sets of a file unpack to; those that declare more than they hold are refused."""
+    """Unpacked bytes of all data sets of a file; those that declare more than they hold are refused."""
     import h5py
 
     sizes = []
@@ -105,7 +105,7 @@ def _declared(file: Any) -> int:
 
 
 def _check_stored(name: str, item: Any) -> None:
-    """A data set holds the samples that it declares."""
+    """Check that a data set holds the samples that it declares."""
     if item.size is None or "MATLAB_empty" in item.attrs:
         return
     if item.chunks:
@@ -138,7 +138,7 @@ def _opened(path: Path) -> Iterator[Any]:
 
 
 def _collect(name: str, group: Any, vectors: dict[str, _Vector], objects: list[str], seen: set[int]) -> None:
-    """Put what can serve as a column into `vectors`, names of objects into `objects`.
+    """Put possible columns into `vectors`, names of objects into `objects`.
 
     Only hard links are followed, each group once: no other files, no circles.
     """
@@ -170,7 +170,7 @@ def _collect(name: str, group: Any, vectors: dict[str, _Vector], objects: list[s
 
 
 def _add(name: str, item: Any, vectors: dict[str, _Vector]) -> None:
-    """A vector, or each column of a matrix. MATLAB's n x m matrix is an m x n data set."""
+    """Add a vector, or each column of a matrix. MATLAB's n x m matrix is an m x n data set."""
     if item.dtype.kind not in "fiub" or item.ndim not in (1, 2) or item.size < 2:
         return
     if item.chunks and np.prod(item.chunks, dtype=float) * item.dtype.itemsize > _LARGEST_CHUNK:

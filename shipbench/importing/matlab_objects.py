@@ -1,5 +1,4 @@
-"""Tables, timetables, datetimes and strings of MATLAB through mat-io, which reads its objects; needs the extra
-`shipbench[matlab]`."""
+"""MATLAB tables, timetables, datetimes and strings, read with mat-io; needs the extra `shipbench[matlab]`."""
 
 from __future__ import annotations
 
@@ -43,12 +42,12 @@ def object_vectors(path: Path, names: Sequence[str] | None = None) -> dict[str, 
 
 
 def not_read(path: Path, names: Sequence[str]) -> str:
-    """The message for objects that mat-io does not read."""
+    """Error for objects that mat-io does not read."""
     return f"{path} holds objects of MATLAB ({', '.join(names)}) that are not read. {how_to_save(names)}."
 
 
 def how_to_save(names: Sequence[str] | None) -> str:
-    """What to do in MATLAB where an object cannot be read."""
+    """Advice for MATLAB where an object cannot be read."""
     name = names[0] if names else "T"
     return f"Save it in MATLAB with writetable({name}, 'log.csv'), a timetable with writetimetable"
 

@@ -1,5 +1,5 @@
-"""Headings that somebody interpolated linearly across 360/0 (or 180/-180): between 359 and 1 stand numbers such as 240
-and 120.
+"""Headings that were interpolated linearly across 360/0 (or 180/-180): between 359 and 1 stand numbers such as 240 and
+120.
 
 The numbers lie between those of two neighbours, but the heading between these goes the other way round, by a few
 degrees only.
@@ -10,20 +10,20 @@ from __future__ import annotations
 import numpy as np
 
 LEAP = 10.0
-"""Times the steps beside it, and the usual step, that a step of such a heading has at least: no ship turns so, then
-not, within a sample."""
+"""Least ratio of a step of such a heading to the neighbouring and to the typical step: no ship turns so within one
+sample."""
 _EQUAL = 0.1
-"""Share by which steps of a straight line between two readings may differ: that of a rounded record."""
+"""Relative difference that rounding makes between steps of a straight line."""
 _Series = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
 def interpolated(psi: np.ndarray, turn: float = 2.0 * np.pi) -> list[tuple[int, int]]:
     """First and last samples of the stretches of psi (samples,) that were interpolated across the end of the scale;
-    turn: a whole turn.
+    turn: a full turn.
 
     Such a stretch is a straight line: its steps are equal, but for the first and the last, where samples lie between
-    the readings. It makes nearly a whole turn and begins and ends at once. A ship that turns a circle goes on as she
-    did, on either side of it.
+    the readings. It makes nearly a full turn and begins and ends at once. A ship that turns a circle continues as
+    before, on either side of it.
     """
     if len(psi) < 4:
         return []
@@ -54,7 +54,7 @@ def interpolated(psi: np.ndarray, turn: float = 2.0 * np.pi) -> list[tuple[int, 
 
 
 def fill_angle(values: np.ndarray, bad: np.ndarray, turn: float = 2.0 * np.pi) -> np.ndarray:
-    """An angle (samples,), continuous over its good samples, with straight lines in place of the bad ones."""
+    """Angle (samples,), continuous over its good samples, with linear interpolation in place of the bad ones."""
     filled, good, at = values.copy(), ~bad, np.arange(len(values))
     filled[good] = np.unwrap(values[good], period=turn)
     filled[bad] = np.interp(at[bad], at[good], filled[good])
@@ -62,8 +62,7 @@ def fill_angle(values: np.ndarray, bad: np.ndarray, turn: float = 2.0 * np.pi) -
 
 
 def without_interpolated(series: _Series) -> tuple[_Series, int]:
-    """The channels of a log (times and readings each) without headings that were interpolated so, and the number of
-    these."""
+    """Channels of a log (times and readings each) without such headings, and the number of these."""
     t, psi = series["psi"]
     keep = np.ones(len(psi), dtype=bool)
     for a, b in interpolated(psi):

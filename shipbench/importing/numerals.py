@@ -1,5 +1,5 @@
-"""Numbers as logs write them: decimal comma, thousands, minus signs of typesetters, Fortran's exponent. What can be
-read in two ways is refused."""
+"""Numbers as written in logs: decimal comma, thousands, typographic minus signs, Fortran's exponent. Ambiguous numbers
+are refused."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MARKED = r"^[-+]?\d*{mark}\d+([eE][-+]?\d+)?$"
 
 
 class UnreadError(Exception):
-    """A cell that is no number, by its place in the array, and what to do about it."""
+    """Error for a cell that is no number: its place in the array, and the advice."""
 
     def __init__(self, row: int, hint: str = "") -> None:
         super().__init__(hint)
@@ -29,7 +29,7 @@ class UnreadError(Exception):
 
 @dataclass(frozen=True)
 class Survey:
-    """Which decimal marks a block of cells has beyond doubt: 4,13 is a decimal comma; 1,090 may be a thousand and
+    """Decimal marks that a block of cells has with certainty: 4,13 is a decimal comma; 1,090 may be a thousand and
     ninety."""
 
     points: bool
@@ -37,13 +37,13 @@ class Survey:
 
 
 def survey(columns: Iterable[pa.Array]) -> Survey:
-    """The decimal marks of text columns; each (n,) text, null where empty."""
+    """Decimal marks of text columns; each (n,) text, null where empty."""
     texts = list(columns)
     return Survey(*(any(_any(_decimal(text, mark)) for text in texts) for mark in (".", ",")))
 
 
 def to_floats(text: pa.Array, layout: Layout, around: Callable[[], Survey]) -> pa.Array:
-    """(n,) numbers of trimmed cells (null where there is none); `around` surveys all columns of the block.
+    """Numbers (n,) of trimmed cells (null where there is none); `around` surveys all columns of the block.
 
     Raises:
         UnreadError: a cell is no number, or one that can be read in two ways.
@@ -96,7 +96,7 @@ def _first(mask: pa.Array) -> int:
 
 
 def _check_whole(text: pa.Array, layout: Layout) -> None:
-    """Whole numbers that cross 1000 as 990, 1.090: the point would be read as a decimal one."""
+    """Refuse whole numbers that cross 1000 as 990, 1.090: the point would be read as a decimal one."""
     if "decimal" in layout.model_fields_set:
         return
     pointed = pc.fill_null(pc.match_substring(text, "."), False)
@@ -123,7 +123,7 @@ def _ungrouped(number: pa.Array, layout: Layout) -> pa.Array:
 
 
 def _check_points(number: pa.Array, around: Survey) -> None:
-    """Points where the decimal mark is a comma, and commas where only points can be decimal."""
+    """Refuse points where the decimal mark is a comma, and commas where only points can be decimal."""
     pointed, commas = _has(number, r"\d\.\d|^[-+]?\.\d"), _has(number, ",")
     if _any(pointed) and not _any(_decimal(number, ".")):
         raise UnreadError(
@@ -143,7 +143,7 @@ def _check_points(number: pa.Array, around: Survey) -> None:
 
 
 def _advice(cell: str, layout: Layout, around: Survey) -> str:
-    """What to do about a cell that is no number, judged by all cells of the block."""
+    """Advice on a cell that is no number, from all cells of the block."""
     if layout.decimal == "." and "," in cell:
         grouped = _any(_grouped(pa.array([cell]), ","))
         if around.points and around.commas:
@@ -169,8 +169,7 @@ def _reads(text: str) -> bool:
 
 
 def no_number(where: str, column: str, cell: str, hint: str, what: str) -> InputError:
-    """The error for a cell that is no number. Only a text without digits is offered as one that stands for a missing
-    value."""
+    """Error for a cell that is no number. Only a text without digits is offered as one for a missing value."""
     accepted = "decimal numbers and empty cells"
     if not any(c.isdigit() for c in cell):
         accepted += f', and what [missing] lists: missing = ["{cell[:20]}"] takes it as missing'

@@ -1,4 +1,4 @@
-"""The rows of a recording in the order of time: late rows, clocks that were set back, and rows that share a stamp."""
+"""Ordering of a recording's rows by time: late rows, clocks that were set back, and rows that share a stamp."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from .mapping import Source
 from .track import positions, usual, was_set_back
 
 CONTEXT = 5_000
-"""Rows before and after a row that a decision about its time may look at."""
+"""Rows before and after a row that a decision on its time uses."""
 _MOST_SORTED = 20_000_000
-"""Readings of a recording that is sorted in memory: 160 MB."""
+"""Most readings of a recording that is sorted in memory: 160 MB."""
 _ROWS = 50_000
 
 
 def in_order(blocks: Iterable[Block], source: Source, where: str, met: Counts) -> Iterator[Block]:
-    """The blocks with times that go back only where `new` says that the clock was set back; rows that repeat a time
-    stay where each brings other channels.
+    """Blocks with times that go back only where `new` marks a clock that was set back; rows that repeat a time stay
+    where each has other channels.
 
     Raises:
         InputError: time goes back and [time] backwards does not say what to do; so many rows repeat a time that the
@@ -65,7 +65,7 @@ class _State:
 
 
 def _forwards(blocks: Iterable[Block], source: Source, where: str, met: Counts) -> Iterator[Block]:
-    """The rows whose time goes on, or begins a recording of its own."""
+    """Rows whose time increases, or that begin a recording of their own."""
     state = _State()
     for block, begin, end in with_context(blocks, CONTEXT):
         keep, new = np.ones(end - begin, bool), block.new[begin:end].copy()
@@ -130,7 +130,7 @@ def _begins_anew(block: Block, k: int, state: _State, source: Source, where: str
 
 
 def _pace(block: Block, k: int, low: int) -> float:
-    """Usual time between the rows before row k, from `low` on, in the order of time; of the rows after it where there
+    """Typical time between the rows before row k, from `low` on, in the order of time; of the rows after it where there
     are none."""
     before = usual(np.diff(np.sort(block.t[max(k - 50, low) : k])))
     return before if before > 0.0 else usual(np.diff(block.t[k : k + 50]))
@@ -138,7 +138,7 @@ def _pace(block: Block, k: int, low: int) -> float:
 
 def _seen(block: Block, k: int, low: int, high: float, source: Source) -> bool | None:
     """Whether the track shows that the clock was set back at row k, the latest time before it being `high`; None where
-    it cannot tell."""
+    it cannot."""
     near = _pace(block, k, low)
     depth = high - float(block.t[k])
     reach = int(min(max(4.0 * depth / near, 50.0), CONTEXT)) if near > 0.0 else 50
@@ -151,9 +151,10 @@ def _seen(block: Block, k: int, low: int, high: float, source: Source) -> bool |
 
 
 def _set_back_by_a_step(block: Block, begin: int, end: int, source: Source) -> np.ndarray:
-    """(end - begin,) rows that repeat the stamp before them because the clock was set back by one step, by the track.
+    """Mask (end - begin,) of rows that repeat the stamp before them because the clock was set back by one step, by the
+    track.
 
-    Stamps that are rounded repeat, too, now and again: where there are several such rows, they are taken for that.
+    Rounded stamps also repeat now and again: where there are several such rows, they count as rounded.
     """
     found = np.zeros(end - begin, bool)
     if source.time.repeated == "spread":
@@ -169,7 +170,7 @@ def _set_back_by_a_step(block: Block, begin: int, end: int, source: Source) -> n
 
 
 def _sorted(blocks: Iterable[Block], source: Source, where: str, met: Counts) -> Iterator[Block]:
-    """All rows, sorted by time; rows behind a clock that was set back, by the track, are sorted on their own.
+    """Rows sorted by time; rows behind a clock that was set back, by the track, are sorted on their own.
 
     Raises:
         InputError: more rows than fit in memory.
@@ -206,7 +207,7 @@ def _sorted(blocks: Iterable[Block], source: Source, where: str, met: Counts) ->
 
 
 def _over_midnight(blocks: Iterable[Block]) -> Iterator[Block]:
-    """Times of day, counted on: a step back by more than half a day is a new day."""
+    """Times of day, unwrapped: a step back by more than half a day is a new day."""
     last, days = -np.inf, 0
     for block in blocks:
         if len(block.t):

@@ -1,5 +1,5 @@
-"""From what instruments give to what the contract asks for: a local plane, midship instead of the antenna, velocity in
-body axes, true wind."""
+"""Conversion of instrument readings to the signals of the contract: a local plane, midship instead of the antenna,
+velocity in body axes, true wind."""
 
 from __future__ import annotations
 

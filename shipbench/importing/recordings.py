@@ -23,7 +23,7 @@ _ROWS = 50_000
 
 
 def read_recordings(path: Path, source: Source, met: Counts) -> Iterator[tuple[str | None, Iterator[Block]]]:
-    """(name in the run column or None, its rows) of each recording; read each to its end before the next.
+    """Recordings as (name in the run column or None, its rows); read each to its end before the next.
 
     Where the rows of a run stand in several places, as those of ships in a log of AIS messages do, they are gathered on
     disk: memory does not grow. A place whose time begins anew, at or before the first time of that run, is a recording
@@ -58,7 +58,7 @@ def read_recordings(path: Path, source: Source, met: Counts) -> Iterator[tuple[s
 
 @dataclass
 class _Pile:
-    """The rows of one recording, on disk; the number of its first row, its first and its latest time."""
+    """Rows of one recording, on disk; the number of its first row, its first and its latest time."""
 
     name: str
     path: Path
@@ -78,7 +78,7 @@ class _Pile:
 
 
 def _by_name(names: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Each name and its rows."""
+    """Names, each with its rows."""
     distinct, first, which = np.unique(names.astype(str), return_index=True, return_inverse=True)
     order = np.argsort(which, kind="stable")
     rows = np.split(order, np.cumsum(np.bincount(which))[:-1])
@@ -87,7 +87,7 @@ def _by_name(names: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _places(t: np.ndarray, rows: np.ndarray) -> Iterator[slice]:
-    """The rows in parts: a place whose time is before that of the place above begins one."""
+    """Rows in parts: a place whose time is before that of the place above begins one."""
     bounds = [0, *(np.flatnonzero((np.diff(rows) > 1) & (np.diff(t) < 0.0)) + 1).tolist(), len(rows)]
     for begin, end in itertools.pairwise(bounds):
         yield slice(begin, end)
@@ -111,7 +111,7 @@ def _in_several_places(path: Path, source: Source) -> bool:
 
 
 def parts(blocks: Iterator[Block]) -> Iterator[Iterator[Block]]:
-    """The rows up to each place where the clock was set back; read each part to its end before the next."""
+    """Rows in parts up to each place where the clock was set back; read each part to its end before the next."""
     number, last = 0, np.inf
 
     def numbered() -> Iterator[tuple[int, Block]]:
@@ -131,8 +131,7 @@ def parts(blocks: Iterator[Block]) -> Iterator[Iterator[Block]]:
 
 
 def onward(blocks: Iterator[Block], met: Counts) -> Iterator[Block]:
-    """The rows of a source that is merged with others: those that a clock that was set back counts again are left
-    out."""
+    """Rows of a source that is merged with others, without those that a clock that was set back counts again."""
     high, until = -np.inf, None
     for block in blocks:
         before = np.maximum.accumulate(np.r_[high, block.t])

@@ -1,5 +1,5 @@
-"""Irregular samples to a uniform grid: low-pass and decimate what is faster, interpolate what is slower, keep the mean
-of what is held."""
+"""Resampling of irregular samples to a uniform grid: low-pass and decimate faster ones, interpolate slower ones, keep
+the mean of held ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A stretch of a log on the uniform grid, in the contract's signals; then cut at stand-stills and into windows."""
+"""Stretch of a log on the uniform grid, in the contract's signals; then cut at standstills and into windows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Series = dict[str, tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class Piece:
-    """Uniform samples: t (n,) [s], and each column (n,) under our names; `origin` lat, lon [deg] of the local plane, if
+    """Uniform samples: t (n,) [s], and each standard column (n,); `origin` lat, lon [deg] of the local plane, if
     any."""
 
     t: np.ndarray
@@ -36,7 +36,7 @@ class Piece:
 
 
 def shortest_run(mapping: Mapping) -> float:
-    """Length [s] below which a piece is left out: as the mapping says (two samples at least), else a whole window, else
+    """Length [s] below which a piece is left out: as in the mapping (two samples at least), else a whole window, else
     20 samples."""
     split = mapping.split
     if split.shortest is not None:
@@ -128,7 +128,8 @@ def _velocity_at_midship(
     series: Series, columns: dict[str, np.ndarray], mapping: Mapping,
     states: Callable[[np.ndarray, np.ndarray], np.ndarray]
 ) -> None:  # fmt: skip
-    """u and v that the log gives, at midship: from its own columns, else from speed and course over ground."""
+    """Velocities u and v at midship, where the log has them: from its own columns, else from speed and course over
+    ground."""
     measured = [name for name in "uv" if name in columns]
     if len(measured) == 2 and (lever := _lever(mapping, "u", "speed_sensor")) is not None:
         columns["u"], columns["v"] = velocity_at_midship(columns["u"], columns["v"], columns["r"], lever)
@@ -184,7 +185,7 @@ def without_standing(piece: Piece, mapping: Mapping) -> Iterator[Piece]:
 
 
 def _blocks(flags: np.ndarray) -> list[tuple[int, int]]:
-    """[begin, end) of each block of true values."""
+    """Intervals [begin, end) of each block of true values."""
     edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -200,8 +201,7 @@ def windows(piece: Piece, mapping: Mapping) -> Iterator[Piece]:
 
 
 def outliers(piece: Piece, ship: Ship) -> dict[str, int]:
-    """Samples at which the ship would be faster than sqrt(g L), a Froude number of 1: by its track, and by its u and
-    v."""
+    """Samples with a speed above sqrt(g L), a Froude number of 1: by the track, and by u and v."""
     greatest = math.sqrt(9.81 * ship.L)
     step = np.hypot(np.diff(piece.columns["x"]), np.diff(piece.columns["y"])) / np.diff(piece.t)
     speed = np.hypot(piece.columns["u"], piece.columns["v"])

@@ -1,5 +1,5 @@
-"""Readings that stand for "not available": AIS codes, fill values of recorders, the largest integer of a field. Judged
-for each channel by itself."""
+"""Readings that stand for "not available": AIS codes, fill values of recorders, the largest integer of a field. Each
+channel is judged by itself."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ CODES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "u": ((102.3, _KNOT, f"102.3 kn ({_AIS})"),),
     "r": ((-128.0, _DEG / 60.0, f"-128 deg/min ({_AIS})"), (-731.386, _DEG / 60.0, f"-731 deg/min ({_AIS})")),
 }
-"""Value, its unit in ours, in words: position reports of the AIS (ITU-R M.1371-5, table 48; -731 deg/min is the decoded
--128), receivers without a fix."""
+"""Value, its standard unit, in words: position reports of the AIS (ITU-R M.1371-5, table 48; -731 deg/min is the
+decoded -128), receivers without a fix."""
 _LARGEST = {
     "lat": 90.0 * _DEG, "lon": _TURN, **dict.fromkeys(ANGLES, _TURN), "u": 50.0, "v": 50.0, "sog": 50.0, "r": _TURN,
     "delta": 0.5 * np.pi,
     "delta_c": 0.5 * np.pi, "n": 9000.0, "n_c": 9000.0, "wind_speed": 120.0, "apparent_wind_speed": 120.0,
     "depth": 11_000.0,
 }  # fmt: skip
-"""What no ship, shaft, sea or storm reaches, in our units; a fill value beyond it is no reading, whatever the others
-are."""
+"""Largest value of any ship, shaft, sea or storm, in standard units; a fill value beyond it is no reading, whatever the
+others are."""
 _ORDERED = ("n", "delta", "F_b", "F_s", "n_c", "delta_c", "F_b_c", "F_s_c")
 """Channels that may step to any value at once; the others are continuous."""
 _NINES = np.array([999.0, 9999.0, 99_999.0, 999_999.0])
 _WHOLE = np.array([32_767.0, 32_768.0, 65_535.0, 2_147_483_647.0, 2_147_483_648.0, 4_294_967_295.0])
 _SMALLEST = 99.0
-"""Fill values below are too near to readings to be told from them."""
+"""Smallest fill value: below it they are too close to readings."""
 _SCALED = np.unique((np.r_[_NINES, _WHOLE][:, None] / 10.0 ** np.arange(8)).ravel())
 _FILLS = _SCALED[_SCALED > _SMALLEST]
 _CONVERTED = np.unique(
     (np.r_[_NINES, 0.01 * _WHOLE[:3]][:, None] * np.array([_DEG, _DEG / 60.0, _KNOT, 1.0 / 3.6, 0.3048, 60.0])).ravel()
 )
-"""Fill values that somebody converted to our unit from degrees, knots, km/h, feet or rev/s."""
+"""Fill values that were converted to the standard unit from degrees, knots, km/h, feet or rev/s."""
 
 
 def not_available(
     name: str, readings: np.ndarray, factor: float, neutral: float = 0.0
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """(masks (n,) of readings that are none, by what they are; mask of readings that look like fill values, but may be
-    readings).
+    """Masks (n,) of readings that are none, by kind; and a mask of readings that look like fill values, but may be
+    readings.
 
     Args:
         name: the channel.
         readings: (n,) as in the log, NaN where there is none.
-        factor: of a reading to our unit; its sign does not matter.
-        neutral: reading that stands for zero.
+        factor: of a reading to the standard unit; its sign does not matter.
+        neutral: reading that corresponds to zero.
     """
     values = abs(factor) * (readings - neutral)
     known = {words: np.isclose(values, code * unit, rtol=1e-4, atol=0.0) for code, unit, words in CODES.get(name, ())}
@@ -90,8 +90,8 @@ def _is_one_of(table: np.ndarray, values: np.ndarray, tolerance: float) -> np.nd
 
 
 def _far(values: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, bool]:
-    """(values farther from the others than these are from each other, or from zero where all are alike; whether all
-    others are zero)."""
+    """Mask of values farther from the others than these are from each other, or from zero where all are alike; and
+    whether all others are zero."""
     if not others.any():
         return np.zeros(len(values), bool), True
     low, high = values[others].min(), values[others].max()
@@ -100,8 +100,8 @@ def _far(values: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, bool]:
 
 
 def _unled(values: np.ndarray, hit: np.ndarray, suspect: np.ndarray, wraps: bool) -> np.ndarray:
-    """Hits that a continuous channel cannot have come to: the steps to the readings beside that are not suspect exceed
-    every step between such readings in the block."""
+    """Hits that a continuous channel cannot have reached: the steps to the neighbouring readings exceed every step
+    between readings in the block that are not suspect."""
     others = np.flatnonzero(np.isfinite(values) & ~suspect)
     if len(others) < 2 or not hit.any():
         return np.zeros(len(values), bool)

@@ -16,8 +16,8 @@ _FACTOR, _CANDIDATES = 1.5, 10
 
 @dataclass(frozen=True)
 class Smoothed:
-    """Derivatives on the grid (count, signals), the spline's time constant [s] and the scatter that it took out
-    (r.m.s., unit of the signals)."""
+    """Derivatives on the grid (count, signals), the spline's time constant [s] and the removed scatter (r.m.s., unit of
+    the signals)."""
 
     rate: np.ndarray
     time_constant: float
@@ -58,7 +58,7 @@ def derivative(t: np.ndarray, values: np.ndarray, grid: np.ndarray, dt: float, s
 
 
 def _ends(s: np.ndarray, values: np.ndarray, reach: float) -> Any:
-    """The cubic whose accelerations at both ends are those of parabolas through the samples up to `reach` from there.
+    """Cubic whose accelerations at both ends are those of parabolas through the samples up to `reach` from there.
 
     Without it the spline, which has no acceleration at its ends, would be wrong there by acceleration times time
     constant.
@@ -79,7 +79,7 @@ def _ends(s: np.ndarray, values: np.ndarray, reach: float) -> Any:
 
 
 def _best_time(s: np.ndarray, values: np.ndarray, scale: float) -> float:
-    """Time constant [steps] with the least error on held-out blocks; of a long signal two parts are looked at."""
+    """Time constant [steps] with the least error on held-out blocks; of a long signal two parts are used."""
     from scipy.interpolate import make_smoothing_spline
 
     times = scale * _FACTOR ** np.arange(_CANDIDATES)

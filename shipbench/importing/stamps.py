@@ -1,4 +1,4 @@
-"""Texts that hold a time: stamps by a pattern with what loggers leave out or add, and durations."""
+"""Texts that hold a time: stamps by a pattern with the usual omissions and additions of loggers, and durations."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _by_pattern(values: pd.Series, pattern: str, zoned: bool) -> pd.Series:
 
 
 def _with_zeros(values: pd.Series, pattern: str) -> pd.Series:
-    """The stamps with the leading zeros that a spreadsheet takes from digits without separators."""
+    """Stamps with the leading zeros that a spreadsheet takes from digits without separators."""
     parts, widths, at = [], [], 0
     for run in _RUN.finditer(pattern):
         parts += [_matcher(pattern[at : run.start()]), r"(\d+)"]
@@ -129,7 +129,7 @@ def _with_zeros(values: pd.Series, pattern: str) -> pd.Series:
 
 
 def _matcher(pattern: str) -> str:
-    """A regular expression for the stamps of a part of a pattern; its fraction may be left out."""
+    """Regular expression for the stamps of a part of a pattern; its fraction may be left out."""
     tokens = re.findall(r"[.,:]?%f|%.|[^%]", pattern)
     return "".join(
         r"(?:[.,:]?\d+)?" if token.endswith("%f") else ".+?" if token.startswith("%") else re.escape(token)

@@ -1,4 +1,4 @@
-"""Clocks that stepped inside a pause of a log: found by the track, which shows how much time really passed."""
+"""Clocks that stepped inside a pause of a log, found by the track, which shows the true duration of the pause."""
 
 from __future__ import annotations
 
@@ -14,18 +14,17 @@ from .ordering import CONTEXT
 from .track import Jumps, jumps, positions, usual, velocities
 
 _LEAST = 0.5
-"""A pause is looked at where it is longer than the usual step by this or more, and a step of the clock is one of this
-or more [s]."""
+"""Least excess of a pause over the typical step, and least step of a clock [s], that are examined."""
 
 _PLAIN = 300
-"""Joints without a pause that show how certain the track is."""
+"""Number of joints without a pause that show the uncertainty of the track."""
 
 
 def steps_marked(blocks: Iterable[Block], source: Source, gap: float, met: Counts) -> Iterator[Block]:
-    """The blocks, `new` where the clock stepped in a pause of up to `gap` [s] that would be bridged: a plain pause
+    """Blocks with `new` where the clock stepped in a pause of up to `gap` [s] that would be bridged: a plain pause
     stays one.
 
-    In a plain pause the ship goes on by its speed times the pause; where the clock stepped, by less (set ahead) or more
+    In a plain pause the ship moves by her speed times the pause; where the clock stepped, by less (set ahead) or more
     (set back).
     """
     channels = list(source.channels)
@@ -46,7 +45,7 @@ def steps_marked(blocks: Iterable[Block], source: Source, gap: float, met: Count
 
 
 def _steps(block: Block, track: np.ndarray, stated: np.ndarray | None, gap: float) -> list[tuple[int, float]]:
-    """(first row after, seconds that the clock went ahead) of each step."""
+    """Steps of the clock, as (first row after, seconds that it went ahead)."""
     rows = np.flatnonzero(np.isfinite(track).all(axis=1))
     t = block.t[rows]
     pauses = np.diff(t)

@@ -1,5 +1,4 @@
-"""From streams of several rates to stretches of time in which every channel has samples, with as little in memory as
-that takes."""
+"""Stretches of time in which every channel has samples, from streams of several rates, with little in memory."""
 
 from __future__ import annotations
 
@@ -14,15 +13,15 @@ from .resample import usual_step
 _SLACK = 1e-6
 """Relative slack of comparisons of times: a gap of just the limit is none."""
 _MOST_VALUES = 2e7
-"""Readings of all channels that one part may have: 160 MB."""
+"""Most readings of all channels in one part: 160 MB."""
 _MOST_SAMPLES = 1_000_000
-"""Samples of the grid that one part may have."""
+"""Most samples of the grid in one part."""
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """A time span [start, end] [s] without gaps: `series` maps each channel to its times (m,) and values (m,), with
-    some context before and after.
+    """Time span [start, end] [s] without gaps: `series` maps each channel to its times (m,) and values (m,), with some
+    context before and after.
 
     `part` counts the parts of a span that is longer than the longest run, or in which a clock was set, from 0; `last`
     says that the span ends here.
@@ -45,7 +44,7 @@ class Cut:
 
 
 class Feed:
-    """One source's stream: reads on demand, forgets what is done with."""
+    """Stream of one source: it reads on demand and forgets used samples."""
 
     def __init__(self, blocks: Iterator[Block], channels: tuple[str, ...]) -> None:
         self.blocks, self.channels, self.done = blocks, channels, False
@@ -87,7 +86,7 @@ class Feed:
         self.t, self.values = self.t[k:].copy(), self.values[k:].copy()
 
     def series(self, channel: str) -> tuple[np.ndarray, np.ndarray]:
-        """Times and values of the samples that are there; of several at one time the first."""
+        """Times and values of the samples in memory; of several at one time the first."""
         column = self.values[:, self.channels.index(channel)]
         there = np.isfinite(column)
         t, v = self.t[there], column[there]
@@ -98,8 +97,10 @@ class Feed:
 
 
 class Stretches:
-    """Iterates over the stretches of one log; afterwards `cuts` tells what was left out, `start` and `end` what the log
-    spans, `steps` the usual time between the samples of each channel at the beginning.
+    """Iterator over the stretches of one log.
+
+    Afterwards `cuts` holds the times left out, `start` and `end` the span of the log, `steps` the typical time between
+    the samples of each channel at the beginning.
 
     Args:
         feeds: the sources, on one clock.
@@ -107,7 +108,7 @@ class Stretches:
         held: channels whose last value holds until the next (commands).
         longest: longest stretch [s]; longer ones come in parts.
         step: time between the end of a part and the beginning of the next [s].
-        context: how much a stretch's series may reach beyond it [s].
+        context: length of a stretch's series beyond it [s].
     """
 
     def __init__(
@@ -181,7 +182,7 @@ class Stretches:
         self.longest = min(self.longest, steps * self.step)
 
     def _pieces(self, feed: Feed, channel: str) -> np.ndarray:
-        """(m, 2) first and last time of the channel's pieces without gaps."""
+        """Times (m, 2) of the first and last sample of the channel's pieces without gaps."""
         t, _ = feed.series(channel)
         if len(t) == 0:
             return np.empty((0, 2))

@@ -1,4 +1,4 @@
-"""What an import did, for the terminal, for --json and for the notes of dataset.toml."""
+"""Summary of an import, for the terminal, for --json and for the notes of dataset.toml."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SHOWN = 12
 
 
 class Summary:
-    """Collects while the import goes on; `complete` before it is read."""
+    """Record of the import while it runs; `complete` before it is read."""
 
     def __init__(self, mapping: Mapping) -> None:
         self.mapping, self.table = mapping, Path()
@@ -45,7 +45,7 @@ class Summary:
         self.absolute = is_absolute(next(iter(mapping.sources.values())).time)
 
     def add(self, run: str, file: str, piece: Piece, group: str | None, stretch: int) -> None:
-        """A run that was written, of the recording's stretch of that number; `group` names the pieces of one
+        """Add a run that was written, of the recording's stretch of that number; `group` names the pieces of one
         uninterrupted stretch."""
         begin, end = float(piece.t[0]), float(piece.t[-1])
         written: list[Any] = [moment(begin), moment(end)] if self.absolute else [round(begin, 6), round(end, 6)]
@@ -62,12 +62,12 @@ class Summary:
             self.scatter.setdefault(name, []).append(smoothed.noise)
 
     def recording(self, goes_on: bool) -> None:
-        """What is added from now on is another recording; `goes_on`: the one before, after its clock was set back."""
+        """Begin another recording; `goes_on`: the one before, after its clock was set back."""
         self._before = self._last if goes_on and not self.mapping.split.window else []
         self._last, self._stretch = [], 0
 
     def _follow(self, run: str, stretch: int) -> None:
-        """Put the first stretch after a clock was set back into the group of the last one before: the ship went on."""
+        """Put the first stretch after a clock was set back into the group of the last one before: the ship moved on."""
         if stretch != self._stretch:
             self._last, self._stretch = [], stretch
         self._last.append(run)
@@ -79,16 +79,16 @@ class Summary:
                 written.update(self.meta[written["id"]])
 
     def cut(self, reason: str, seconds: float) -> None:
-        """Time that a rule of the mapping left out."""
+        """Add time that a rule of the mapping left out."""
         self.cuts.setdefault(reason, []).append(seconds)
 
     def gap(self, cut: Cut) -> None:
-        """Time in which some channel had no samples."""
+        """Add time in which some channel had no samples."""
         told = [f"{name} (longest pause bridged {self.mapping.gap(name):g} s)" for name in cut.channels]
         self.cut(f"no samples of {', '.join(told[:4])}{' and others' if len(told) > 4 else ''}", cut.end - cut.start)
 
     def span(self, seconds: float, shortened: float | None) -> None:
-        """The length of a recording; `shortened` where its parts had to be shorter than the mapping says, to keep
+        """Add the length of a recording; `shortened` where its parts had to be shorter than the mapping says, to keep
         memory small."""
         self.seconds += seconds
         self.part_length = shortened or self.part_length
@@ -98,7 +98,7 @@ class Summary:
         self.met = met
 
     def converted(self) -> list[str]:
-        """One line a channel: where it comes from and what was done to its numbers."""
+        """Lines, one a channel: its origin and the conversion of its numbers."""
         lines = []
         for name, channel in all_channels(self.mapping).items():
             steps = [f"from {channel.unit}"] if channel.unit != unit_of(name) else []
@@ -111,7 +111,7 @@ class Summary:
         return lines
 
     def derived(self) -> list[str]:
-        """What no column of the log holds as it is."""
+        """Lines on signals that were derived, since no column of the log holds them."""
         mapping, lines = self.mapping, []
         if mapping.has("lat"):
             fixed = mapping.origin
@@ -154,17 +154,17 @@ class Summary:
         return lines
 
     def from_course(self) -> list[str]:
-        """Speeds that are the velocity over ground, turned by the heading."""
+        """Speeds that are the velocity over ground, rotated by the heading."""
         return [n for n in "uv" if self.mapping.has("sog") and not self.mapping.has(n)]
 
     def left_out(self) -> list[str]:
-        """What was cut or skipped, and why."""
+        """Lines on cut or skipped parts, with the reason."""
         lines = [f"{sum(s):.6g} s in {len(s)} place{'s' * (len(s) > 1)}: {reason}" for reason, s in self.cuts.items()]
         lines += [f"{count} {what}" for what, count in self.met.what.items() if count]
         return lines
 
     def notes(self) -> list[str]:
-        """For dataset.toml and the terminal."""
+        """Notes for dataset.toml and the terminal."""
         lines = self.derived()
         if self.mapping.split.window:
             lines.append(
@@ -198,12 +198,12 @@ class Summary:
         return lines
 
     def actuators(self) -> str:
-        """As the mapping says, else by what is mapped."""
+        """Kind of the actuators as in the mapping, else by the mapped channels."""
         measured = any(self.mapping.has(name) for name in STATES[6:])
         return self.mapping.actuators or ("measured" if measured else "commanded")
 
     def description(self) -> dict[str, Any]:
-        """The content of dataset.toml."""
+        """Content of dataset.toml."""
         files = ", ".join(self.met.forms)
         own = {"derived": [name for name in "uvr" if name in self.times], "from_course": self.from_course()}
         source = self.mapping.source or f"imported from {files if len(files) < 200 else f'{len(self.met.forms)} logs'}"
@@ -215,7 +215,7 @@ class Summary:
         }  # fmt: skip
 
     def no_runs(self) -> str:
-        """The message where nothing is left."""
+        """Message where no run is left."""
         why = "; ".join(self.left_out()[:6]) or "no channel has two samples"
         steps = ", ".join(f"{n} {s:.4g} s" for n, s in self.steps.items() if math.isfinite(s)) or "unknown"
         return (
@@ -226,7 +226,7 @@ class Summary:
         )
 
     def document(self) -> dict[str, Any]:
-        """For --json."""
+        """Values for --json."""
         return {
             "out": str(self.table.parent), "table": self.table.name, "name": self.mapping.name, "dt": self.mapping.dt,
             "actuators": self.actuators(),
@@ -241,7 +241,7 @@ class Summary:
         return brief("\n".join(self.lines()) if self.table.name else f"<Summary of {self.mapping.name}, not complete>")
 
     def lines(self) -> list[str]:
-        """For the terminal."""
+        """Lines for the terminal."""
         dt, seconds = self.mapping.dt, sum(r["seconds"] for r in self.runs)
         runs = f"{len(self.runs)} run{'s' * (len(self.runs) > 1)}"
         of = f"{_duration(seconds)} of {_duration(self.seconds)} of log"

@@ -1,4 +1,4 @@
-"""A log that was opened: its columns and its stream of record batches, and what all readers of logs share."""
+"""Log that was opened: its columns and its stream of record batches, and common parts of all readers of logs."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from ..regular_files import open_regular
 from ..steps import within
 
 BLANKS = " "
-"""The delimiter that stands for runs of blanks and tabs."""
+"""Delimiter that stands for runs of blanks and tabs."""
 DELIMITERS = (",", ";", "\t", "|", BLANKS)
 MOST_COLUMNS = 10_000
 TEXT_BLOCK = 1 << 22
 """Bytes in which the header must stand, and the size of the blocks in which text is read."""
 DENSEST, ALWAYS = 200, 10_000_000
-"""Unpacked over packed size of a compressed log, and bytes that are unpacked whatever the packed size; those of logs
+"""Largest ratio of unpacked to packed size of a compressed log, and bytes that are unpacked at any ratio; those of logs
 are below 100."""
 _UNREADABLE = (
     zipfile.BadZipFile,
@@ -44,11 +44,10 @@ KINDS = "CSV or other delimited text (.csv, .txt, .dat, .tsv, also .gz, .bz2, .x
 
 @dataclass(frozen=True)
 class Table:
-    """A log that was opened: its columns, what was found of its form, and a function that streams some columns as Arrow
-    batches.
+    """Log that was opened: its columns, its form, and a function that streams some columns as Arrow batches.
 
-    `first_row` is the number of the first data row in the file, for messages. `notes` says how the file was read; the
-    stream adds to it. `blocks`: about how many batches the stream gives, for the progress.
+    `first_row` is the number of the first data row in the file, for messages. `notes` are on the reading of the file;
+    the stream adds to them. `blocks`: approximate number of batches of the stream, for the progress.
     """
 
     path: Path
@@ -60,7 +59,7 @@ class Table:
     blocks: float = 1.0
 
     def batches(self, columns: Sequence[str]) -> Iterator[pa.RecordBatch]:
-        """The columns, block by block, in their order in the argument.
+        """Columns block by block, in their order in the argument.
 
         Raises:
             InputError: a column is missing or stands twice in the file, or the file turns out to be damaged.
@@ -74,7 +73,7 @@ class Table:
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Turns what the libraries raise on damaged files into one message."""
+    """Convert the errors of libraries on damaged files into one message."""
     try:
         yield
     except _UNREADABLE as error:
@@ -85,7 +84,7 @@ def reading(path: Path) -> Iterator[None]:
 
 
 def check_columns(table: Table, wanted: Sequence[str]) -> None:
-    """Every wanted column is there once.
+    """Check that every wanted column is there once.
 
     Raises:
         InputError: it is missing (the message lists what there is) or stands twice.
@@ -112,7 +111,7 @@ def check_columns(table: Table, wanted: Sequence[str]) -> None:
 
 
 def check_number(path: Path, columns: int) -> None:
-    """Not more columns than a log has."""
+    """Check that the number of columns is one of a log."""
     if columns > MOST_COLUMNS:
         raise InputError(
             f"{path} has {columns} columns; accepted: up to {MOST_COLUMNS}. Save the columns that you need as a "
@@ -121,7 +120,7 @@ def check_number(path: Path, columns: int) -> None:
 
 
 def uncompressed(path: Path) -> Any:
-    """A binary file, unpacked while it is read where it is a .gz, .bz2 or .xz."""
+    """Binary file, unpacked while it is read where it is a .gz, .bz2 or .xz."""
     with open_regular(path, "log") as file:
         magic = file.read(8)
     for mark, module in ((b"\x1f\x8b", gzip), (b"BZh", bz2), (b"\xfd7zXZ", lzma)):
@@ -131,7 +130,7 @@ def uncompressed(path: Path) -> Any:
 
 
 class Bounded(io.RawIOBase):
-    """An unpacked stream that ends with an error where it is far larger than any log of its packed size."""
+    """Unpacked stream that ends with an error where it is far larger than any log of its packed size."""
 
     def __init__(self, path: Path, raw: Any) -> None:
         super().__init__()
@@ -159,7 +158,7 @@ class Bounded(io.RawIOBase):
 
 
 def as_batch(columns: dict[str, Any]) -> pa.RecordBatch:
-    """Cells of any kind as one batch: numbers stay numbers, a column with other things becomes text."""
+    """Cells of any type as one batch: numbers stay numbers, a column with other things becomes text."""
     arrays = []
     for values in columns.values():
         try:

@@ -1,5 +1,5 @@
-"""Any log as a stream of record batches: CSV and its kin, Parquet; MATLAB and Excel in files of their own. Never the
-whole file in memory."""
+"""Log of any format as a stream of record batches: CSV and similar, Parquet; MATLAB and Excel in files of their own.
+The whole file is never in memory."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ def open_table(path: Path, layout: Layout) -> Table:
 
 
 def kind_of(path: Path) -> Literal["Parquet", "MATLAB", "Excel", "text"]:
-    """The kind of a file by its first bytes and its suffix.
+    """Format of a file by its first bytes and its suffix.
 
     Raises:
-        InputError: it is missing, empty or a folder, or of a kind that is not read.
+        InputError: it is missing, empty or a folder, or of a format that is not read.
     """
     if path.is_dir():
         raise InputError(f"{path} is a folder; give the log files themselves, such as {path}/*.csv.")
@@ -68,7 +68,7 @@ def kind_of(path: Path) -> Literal["Parquet", "MATLAB", "Excel", "text"]:
 
 
 def _check_packed(path: Path) -> None:
-    """A zip archive is a workbook."""
+    """Check that a zip archive is a workbook."""
     if not zipfile.is_zipfile(path):
         return
     with zipfile.ZipFile(path) as packed:

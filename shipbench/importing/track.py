@@ -1,5 +1,4 @@
-"""The track that a log holds, and what it says about the log's clock: the time that passed, by the distance made
-good."""
+"""Track in a log as a check of its clock: time that passed, by the distance made good."""
 
 from __future__ import annotations
 
@@ -15,8 +14,8 @@ _SIGMA = 1.4826
 
 
 def positions(t: np.ndarray, values: np.ndarray, channels: Sequence[str]) -> np.ndarray | None:
-    """(n, 2) north, east [m], NaN where the row has none; None where the source has no positions. The earth is a sphere
-    here."""
+    """Positions (n, 2) north, east [m], NaN where the row has none; None where the source has no positions. The earth
+    is a sphere here."""
     names = next((pair for pair in (("x", "y"), ("lat", "lon")) if set(pair) <= set(channels)), None)
     if names is None:
         return None
@@ -37,7 +36,7 @@ def positions(t: np.ndarray, values: np.ndarray, channels: Sequence[str]) -> np.
 
 
 def velocities(t: np.ndarray, values: np.ndarray, channels: Sequence[str]) -> np.ndarray | None:
-    """(n, 2) velocity over ground north, east [m/s] that the log states, between its samples by interpolation; None
+    """Velocities (n, 2) over ground north, east [m/s] that the log states, between its samples by interpolation; None
     where it states none."""
     given = {name: values[:, k] for k, name in enumerate(channels)}
     if {"sog", "cog"} <= set(given):
@@ -54,15 +53,16 @@ def velocities(t: np.ndarray, values: np.ndarray, channels: Sequence[str]) -> np
 
 
 def usual(steps: np.ndarray) -> float:
-    """Median of the steps that lead ahead [s]; NaN where there is none."""
+    """Median of the forward steps [s]; NaN where there is none."""
     ahead = steps[steps > 0.0]
     return float(np.median(ahead)) if len(ahead) else np.nan
 
 
 @dataclass(frozen=True)
 class Jumps:
-    """Of joints (m,) between two fixes: by how much the clock went ahead of the track [s], the standard error of that,
-    what a change of velocity within the pause could explain, and the part of the leap across the course."""
+    """Jumps at joints (m,) between two fixes: time by which the clock went ahead of the track [s], its standard error,
+    the part that a change of velocity within the pause could explain, and the component of the jump across the course.
+    """
 
     seconds: np.ndarray
     error: np.ndarray
@@ -70,8 +70,8 @@ class Jumps:
     across: np.ndarray
 
     def certain(self, least: float, plain: Jumps) -> np.ndarray:
-        """Joints that only a clock explains: by `least` [s] or more, along the course, and far outside of what joints
-        without a pause show.
+        """Mask of joints that only a clock explains: by `least` [s] or more, along the course, and far outside the
+        jumps at joints without a pause.
 
         Outside means five standard errors, more where `plain` joints scatter by more than theirs (errors that last for
         seconds), and twice the 95 % quantile of `plain`.
@@ -91,11 +91,11 @@ def _quantile(values: np.ndarray) -> float:
 def jumps(
     t: np.ndarray, p: np.ndarray, v: np.ndarray | None, joints: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> Jumps:
-    """What the track says about the time between the fixes before and at each of `joints`.
+    """Jumps of the track against time between the fixes before and at each of `joints`.
 
-    A straight line is fitted to the fixes on either side; where both meet in the middle of the pause, the track leaps
-    by velocity times the seconds that did not pass. Where the log states velocities, the fixes less the way that they
-    explain are nearly constant, and more of them serve.
+    A straight line is fitted to the fixes on either side; where both meet in the middle of the pause, the track jumps
+    by velocity times the seconds that did not pass. Where the log states velocities, the fixes less the displacement
+    that they explain are nearly constant, and more of them serve.
 
     Args:
         t, p: (n,) [s], (n, 2) [m] fixes.
@@ -144,8 +144,8 @@ def _jumps(
 
 
 def _line(s: np.ndarray, q: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Value (m, 2) at s = 0, slope (m, 2) and variance (m,) of the value of a weighted straight line; NaN for fewer
-    than four points."""
+    """Fit of a weighted straight line: value (m, 2) at s = 0, slope (m, 2) and variance (m,) of the value; NaN for
+    fewer than four points."""
     n, s1, s2 = w.sum(axis=1), (w * s).sum(axis=1), (w * s**2).sum(axis=1)
     q0, q1 = np.einsum("mk,mkc->mc", w, q), np.einsum("mk,mkc->mc", w * s, q)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -157,7 +157,8 @@ def _line(s: np.ndarray, q: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def was_set_back(t: np.ndarray, p: np.ndarray, joint: int, seconds: float) -> bool | None:
-    """Whether the rows from `joint` on are later than their stamps say, by `seconds`; None where the track cannot tell.
+    """Whether the rows from `joint` on are later than their stamps, by `seconds`; None where the track does not show
+    it.
 
     Rows that are merely late lie on the track of the rows before; behind a clock that was set back, the ship was
     further on at the same stamps.

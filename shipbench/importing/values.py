@@ -1,5 +1,5 @@
-"""Values of a channel, in our unit and sign, from the cells of a block: columns, expressions of columns, positions as
-written."""
+"""Values of a channel, in standard unit and sign, from the cells of a block: columns, expressions of columns, positions
+as written."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LIMITS = {"lat": np.pi / 2, "lon": 2 * np.pi}
 
 
 def channel_values(cells: Cells, name: str, channel: Channel) -> np.ndarray:
-    """(n,) values in our unit and sign, NaN where there is none.
+    """Values (n,) in standard unit and sign, NaN where there is none.
 
     Raises:
         InputError: a cell is no number, or a position is none on earth.
@@ -40,8 +40,8 @@ def channel_values(cells: Cells, name: str, channel: Channel) -> np.ndarray:
 
 
 def _missing(cells: Cells, name: str, channel: Channel) -> list[str | float]:
-    """What stands for a missing value in a channel: its own list, and the source's without codes of other channels: 511
-    is no heading, but may be a shaft speed."""
+    """Marks of a missing value in a channel: its own list, and the source's without codes of other channels: 511 is no
+    heading, but may be a shaft speed."""
     kept = []
     for mark in cells.source.missing:
         of = [other for other, codes in CODES.items() if any(mark == code for code, _, _ in codes)]
@@ -58,7 +58,7 @@ def _missing(cells: Cells, name: str, channel: Channel) -> list[str | float]:
 
 
 def _available(cells: Cells, name: str, channel: Channel, readings: np.ndarray) -> np.ndarray:
-    """Readings without those that stand for "not available"; what is taken out or looks like it is counted for the
+    """Readings without those that stand for "not available"; removed and suspect readings are counted for the
     summary."""
     if channel.unit == "pwm":
         none = (readings <= 0.0) | (readings == 65_535.0)
@@ -78,7 +78,7 @@ def _available(cells: Cells, name: str, channel: Channel, readings: np.ndarray) 
 
 
 def _tell_turns(cells: Cells, name: str, angles: np.ndarray) -> None:
-    """Angles [rad] beyond 360 degrees by more than a turn, for the summary: those that jump, and how far they go."""
+    """Count angles [rad] beyond 360 degrees by more than a turn, for the summary: those that jump, and their range."""
     odd = beyond_a_turn(angles)
     cells.met.doubtful[f"readings of {name} jump beyond -180 to 360 deg: outliers, or a code to list in `missing`"] += (
         int(odd.sum())

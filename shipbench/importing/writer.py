@@ -1,5 +1,5 @@
-"""The three files of the contract, run by run, in a folder beside the wanted one that takes its name when all is
-there."""
+"""Writer of the three files of the contract, run by run, in a temporary folder that gets its final name when all is
+written."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _OURS = {*TABLES, "dataset.toml", "ship.toml"}
 
 
 class FolderWriter:
-    """A context: `add` runs, then `finish`. Leaving it without `finish` (an error, Ctrl-C) leaves nothing behind.
+    """Context manager: `add` runs, then `finish`. Leaving it without `finish` (an error, Ctrl-C) leaves nothing behind.
 
     Raises:
         InputError: the folder is there already and `force` is not set, or holds other files than a data set's, or
@@ -121,6 +121,6 @@ def _check_target(out: Path, force: bool) -> None:
 
 
 def run_name(text: str) -> str:
-    """Letters, digits, '_', '-', '.' and '@' of a text: safe in paths, TOML and spreadsheets (no name begins like a
-    formula)."""
+    """Name reduced to letters, digits, '_', '-', '.' and '@': safe in paths, TOML and spreadsheets (no name begins like
+    a formula)."""
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", text).strip("_.-")[:80] or "run"

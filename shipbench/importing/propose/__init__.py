@@ -1,5 +1,4 @@
-"""A draft of mapping.toml from the heads and cells of logs; every guess is called one in the file, for a person to
-check."""
+"""Draft of mapping.toml from the heads and cells of logs; every guess is marked in the file, for a person to check."""
 
 from .proposal import write_proposal
 

@@ -1,4 +1,4 @@
-"""Which columns are which channels: by their heads, and where a head cannot say it by their cells."""
+"""Assignment of columns to channels: by their heads, and where a head is ambiguous by their cells."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _LATLON = re.compile(
 )
 
 _LETTERED = re.compile(r"[NSEWOnsewo]?\s*[-+]?\d[\d.,°'\"\u2032\u2033 ]*\s*[NSEWOnsewo]?")
-"""A coordinate with the letter of its hemisphere before or after it."""
+"""Pattern of a coordinate with the letter of its hemisphere before or after it."""
 
 
 @dataclass
 class Entry:
-    """A channel of the draft: its keys in the mapping, why it is so, the columns that it is made of.
+    """Channel of the draft: its keys in the mapping, the reasons, its columns.
 
     `missing` says what a person must add before it can be imported ("" where nothing is); the draft then has it as a
     comment.
@@ -47,7 +47,7 @@ class Entry:
 
 @dataclass
 class Assigned:
-    """The channels of a log, the column of its runs, and what else is to be said."""
+    """Channels of a log, the column of its runs, and further notes."""
 
     entries: dict[str, Entry] = field(default_factory=dict)
     run: str | None = None
@@ -56,7 +56,7 @@ class Assigned:
     candidates: dict[str, Column] = field(default_factory=dict)
 
     def used(self) -> set[str]:
-        """Names of the columns that serve."""
+        """Names of the columns in use."""
         return (
             {c.name for e in self.entries.values() for c in e.columns}
             | self.helpers
@@ -65,8 +65,8 @@ class Assigned:
 
 
 def assign(columns: Sequence[Column], kept: dict[str, Any], run: str | None = None) -> Assigned:
-    """The channels of `columns`; `kept` are the [channels] of a partial mapping, whose channels and columns are not
-    asked for again."""
+    """Assign channels to `columns`; `kept` are the [channels] of a partial mapping, whose channels and columns are not
+    assigned again."""
     found = Assigned(run=run)
     by_name = {c.name: c for c in columns}
     for channel, spec in kept.items():
@@ -111,7 +111,7 @@ def _names(value: Any) -> list[str]:
 
 
 def _holds(column: Column, found: Assigned) -> bool:
-    """Whether a column holds numbers at all; a named one without is told."""
+    """Whether a column holds numbers at all; a named one without is reported."""
     cells = column.texts()
     if len(column.known) >= 0.5 * max(len(cells), 1):
         return True
@@ -128,7 +128,7 @@ def _holds(column: Column, found: Assigned) -> bool:
 
 
 def _run_column(columns: Sequence[Column]) -> str | None:
-    """A column of runs or of vessels: few values, each many times."""
+    """Find a column of runs or of vessels: few values, each many times."""
     for meaning in ("run", "vessel"):
         for column in columns:
             cells = column.texts(len(column.cells))
@@ -144,8 +144,8 @@ def _run_column(columns: Sequence[Column]) -> str | None:
 
 
 def _positions(columns: Sequence[Column], found: Assigned) -> None:
-    """Latitude and longitude with hemispheres of their own or both in one cell, and columns N and E that are no shaft
-    speed."""
+    """Assign latitude and longitude with hemispheres of their own or both in one cell, and columns N and E that are no
+    shaft speed."""
     sides = {}
     for column in columns:
         letters = {text.upper() for text in column.texts()}
@@ -205,7 +205,7 @@ def _quaternion(columns: Sequence[Column], found: Assigned) -> None:
 
 
 def _take(channel: str, columns: list[Column], found: Assigned) -> None:
-    """The column, or the pair of port and starboard, for a channel."""
+    """Assign the column, or the pair of port and starboard, to a channel."""
     if not columns:
         return
     if channel.removesuffix("_c") in ("n", "delta"):
@@ -236,7 +236,7 @@ def _take(channel: str, columns: list[Column], found: Assigned) -> None:
 
 
 def _ambiguous(found: Assigned) -> None:
-    """A course that may be the heading, and a speed that may be over ground or through the water."""
+    """Assign a course that may be the heading, and a speed that may be over ground or through the water."""
     course, speed = found.candidates.get("heading or course"), found.candidates.get("speed")
     if course is not None and course.head.channel is None and course.name not in found.used():
         channel = (
@@ -275,7 +275,7 @@ def _ambiguous(found: Assigned) -> None:
 
 
 def _complete_pairs(found: Assigned, kept: dict[str, Any]) -> None:
-    """Channels that serve only in pairs, and a position that is given twice."""
+    """Remove channels that serve only in pairs, and a position that is given twice."""
     for a, b in _PAIRS:
         for here, gone in ((a, b), (b, a)):
             if here in found.entries and gone not in found.entries and here not in kept:

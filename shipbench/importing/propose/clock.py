@@ -1,4 +1,4 @@
-"""The clock of a log: of all columns and formats that can be the time, the one with which the import's own clock runs
+"""Clock of a log: of all columns and formats that can be the time, the one with which the import's own clock runs
 forward most evenly."""
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ _SIZES = (
 )
 """Formats of moments by the size of their numbers, from 1986 (MATLAB: 1916, Excel: 1982) on."""
 _FINE = 0.02
-"""Days: numbers of the size of Excel's or MATLAB's days are days where they go on in smaller steps."""
+"""Least step of days: numbers of the size of Excel's or MATLAB's days are days where they increase in smaller steps."""
 _FORWARD = 0.6
-"""Share of steps that must not go back: two vessels in turns, or a log in disorder, have more than that; a reading has
-half."""
+"""Least share of steps that do not go back: two vessels in turns, or a log in disorder, have more than that; readings
+of a sensor have half."""
 
 
 @dataclass(frozen=True)
 class Time:
-    """The clock found: `spec` is the [time] of the mapping, `t` the seconds of the sample (n,), `step` their usual step
-    [s]."""
+    """Clock of a log: `spec` is the [time] of the mapping, `t` the seconds of the sample (n,), `step` their typical
+    step [s]."""
 
     spec: dict[str, Any]
     t: np.ndarray
@@ -49,7 +49,7 @@ class Time:
 
 
 def find_time(columns: Sequence[Column]) -> Time | None:
-    """The clock of a log, or None where no column can be it."""
+    """Find the clock of a log, or None where no column can be it."""
     found = list(_candidates(columns))
     if not found:
         return None
@@ -58,7 +58,7 @@ def find_time(columns: Sequence[Column]) -> Time | None:
 
 
 def refusal(columns: Sequence[Column]) -> str | None:
-    """Why a column that is named like a time is none: the clock's own message about its likeliest format."""
+    """Reason why a column that is named like a time is none: the clock's own message about its likeliest format."""
     for column in columns:
         if column.head.meaning == "time" and column.head.sure and column.texts():
             for form in formats_of(column.texts())[-1:]:
@@ -70,7 +70,7 @@ def refusal(columns: Sequence[Column]) -> str | None:
 
 
 def read_time(spec: dict[str, Any], columns: Sequence[Column]) -> np.ndarray:
-    """Seconds of the sample under a [time] of a mapping.
+    """Read the seconds of the sample under a [time] of a mapping.
 
     Raises:
         InputError: the cells do not fit the format.
@@ -118,7 +118,7 @@ def _candidates(columns: Sequence[Column]) -> Iterator[Time]:
 
 
 def _pairs(columns: Sequence[Column]) -> Iterator[Time]:
-    """A date and a time of day, or seconds and nanoseconds."""
+    """Pairs of a date and a time of day, or of seconds and nanoseconds."""
     fine = [c for c in columns if c.head.meaning == "nsecs"]
     for column in fine:
         whole = [c for c in columns if c is not column and _seconds_name(column.name) == c.name.lower()]
@@ -241,7 +241,7 @@ def _evenness(t: np.ndarray) -> float:
 
 
 def _with_notes(time: Time, columns: Sequence[Column]) -> Time:
-    """The clock with what is not sure about it."""
+    """Clock with notes on its uncertain points."""
     form, notes, own = time.spec["format"], [], [c for c in columns if c.name in time.names]
     texts = [text for c in own for text in c.texts()]
     if form.startswith(("%d/%m", "%d.%m", "%d-%m")) and not day_first_is_sure(texts) and "." not in form[:3]:

@@ -1,5 +1,5 @@
-"""The columns of a log: heads, cells at the beginning, and these as numbers with the decimal and thousands marks that
-fit all columns."""
+"""Columns of a log: heads, cells at the beginning, and these as numbers with the decimal and thousands marks that fit
+all columns."""
 
 from __future__ import annotations
 
@@ -23,12 +23,13 @@ _ROWS = 20_000
 _MARKS = ((".", ""), (",", ""), (".", ","), (",", "."), (".", " "), (",", " "), (".", "'"), (",", "'"))
 """Decimal and thousands marks, the usual ones first."""
 _GROUPING = {".": "[.]", ",": ",", " ": "[ \u00a0\u2009\u202f]", "'": "['\u2019]"}
-"""The characters that a thousands mark stands for, as the import reads them."""
+"""Characters that a thousands mark stands for, as the import reads them."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column: its name in the mapping, its head, its cells and these as numbers (n,), NaN where a cell is none."""
+    """Column of a log: its name in the mapping, its head, its cells and these as numbers (n,), NaN where a cell is
+    none."""
 
     name: str
     head: Head
@@ -41,7 +42,7 @@ class Column:
 
     @property
     def known(self) -> np.ndarray:
-        """The values that are numbers."""
+        """Values that are numbers."""
         return self.values[np.isfinite(self.values)]
 
     def texts(self, count: int = 2000) -> list[str]:
@@ -51,7 +52,7 @@ class Column:
         ]
 
     def evidence(self) -> str:
-        """What the beginning of the column shows, for a comment."""
+        """Text on the beginning of the column, for a comment."""
         if len(self.known) and len(self.known) >= 0.5 * len(self.texts(len(self.cells))):
             first = ", ".join(f"{v:.6g}" for v in self.known[:3])
             return f"first values {first}; {self.known.min():.6g} to {self.known.max():.6g}"
@@ -64,8 +65,8 @@ class Column:
 
 @dataclass(frozen=True)
 class Sample:
-    """The beginning of a log: `columns` that can be mapped, `form` in words, `file`, the [file] of its mapping, and
-    `notes` for the reader."""
+    """Beginning of a log: `columns` that can be mapped, `form` in words, `file`, the [file] of its mapping, and `notes`
+    for the reader."""
 
     path: Path
     form: str
@@ -79,7 +80,7 @@ class Sample:
 
 
 def read_samples(path: Path, given: dict[str, Any]) -> list[Sample]:
-    """The beginning of a log: one sample, or of a MATLAB file one for each length of its vectors.
+    """Read the beginning of a log: one sample, or of a MATLAB file one for each length of its vectors.
 
     Args:
         given: the [file] of a partial mapping.
@@ -115,7 +116,7 @@ def _sample(path: Path, form: Form, table: Table, cells: pa.RecordBatch, given: 
 
 
 def _of_one_length(table: Table, names: list[str]) -> list[list[str]]:
-    """The columns, in groups of one length: only MATLAB's vectors differ; what is shorter than ten is a parameter."""
+    """Columns in groups of one length: only MATLAB's vectors differ; a vector shorter than ten is a parameter."""
     if not table.form.startswith("MATLAB"):
         return [names]
     groups: dict[int, list[str]] = {}
@@ -154,7 +155,7 @@ def _pattern(decimal: str, thousands: str) -> str:
 
 
 def _marks(cells: list[pa.Array]) -> tuple[tuple[str, str], list[str]]:
-    """The marks with which most cells of all columns are numbers, and a note where two ways fit as well."""
+    """Marks with which most cells of all columns are numbers, and a note where two ways fit as well."""
     texts = [
         pc.utf8_trim_whitespace(a.cast(pa.string()))
         for a in cells

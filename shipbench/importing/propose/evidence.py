@@ -1,8 +1,8 @@
-"""What the columns say about each other: the track's direction and speed against heading, yaw rate and speeds.
+"""Consistency of the columns: the track's direction and speed against heading, yaw rate and speeds.
 
-Heads often name no unit, or one word for heading and course. A ship moves about where she points, at the speed that the
-log has, and her heading changes by the yaw rate: whatever unit, axis or clock contradicts that is told, and where the
-head leaves it open the one that agrees is taken.
+Heads often name no unit, or one word for heading and course. A ship moves about in the direction of her heading, at the
+logged speed, and her heading changes by the yaw rate. A unit, axis or clock that contradicts this is reported; where
+the head leaves it open, the one that agrees is chosen.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from .clock import Time
 from .columns import Sample
 
 _WINDOW = 5.0
-"""Time over which the track is looked at [s]; longer where the log is slow."""
+"""Time of one window of the track [s]; longer where the log is slow."""
 _AGREES = 0.9
-"""Mean cosine between heading and track: 25 degrees apart."""
+"""Least mean cosine between heading and track: 25 degrees apart."""
 _COURSE = np.deg2rad(1.0)
-"""A column that follows the track's direction so closely through turns is the course: a turning hull drifts by several
-degrees."""
+"""Least agreement with the track's direction through turns at which a column is the course: a turning hull drifts by
+several degrees."""
 _TURNING = np.deg2rad(30.0)
-"""Range of directions from which on a log turns enough to tell."""
+"""Least range of directions at which a log turns enough for this."""
 _ALIKE = 0.9
-"""Correlation from which on a column is taken as the sway of the track."""
+"""Least correlation at which a column is taken as the sway of the track."""
 _CLOSE = 0.15
 """Relative difference within which two speeds, or two yaw rates, are the same."""
 _UNITS = {"rad": ("deg", "rad", "cdeg"), "rad/s": ("rad/s", "deg/s", "deg/min"), "m/s": ("m/s", "kn", "km/h", "ft/s")}
@@ -42,7 +42,7 @@ _CLOCKS = {1e3: "ms", 1e6: "us", 1.0 / 60.0: "min", 1.0 / 3600.0: "h"}
 
 @dataclass(frozen=True)
 class _Track:
-    """The track in windows: times (m,) [s], direction from north [rad], speed [m/s]; only where the ship moves."""
+    """Track in windows: times (m,) [s], direction from north [rad], speed [m/s]; only where the ship moves."""
 
     t: np.ndarray
     direction: np.ndarray
@@ -81,7 +81,7 @@ def examine(sample: Sample, time: Time, found: Assigned, extra: dict[str, Any]) 
 
 
 def _series(sample: Sample, source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Times and values of each channel in our units, by the import's own reader; of a log with several runs the
+    """Times and values of each channel in standard units, by the import's own reader; of a log with several runs the
     first."""
     first: str | None = None
     t: list[np.ndarray] = []
@@ -233,7 +233,7 @@ def _settle_unit(entry: Entry, unit: str, score: float, found: Assigned) -> None
 
 
 def _heading_or_course(entry: Entry, psi: np.ndarray, track: _Track, spread: float, found: Assigned) -> None:
-    """A column that may be either is the course where it follows the track through turns."""
+    """Decide on a column that may be heading or course: it is the course where it follows the track through turns."""
     if not any("may be heading or course" in why for why in entry.why) or spread < _TURNING:
         return
     apart = float(np.sqrt(np.mean(np.angle(np.exp(1j * (track.direction - psi))) ** 2)))
@@ -294,7 +294,7 @@ def _speed(channel: str, track: _Track, series: dict[str, tuple[np.ndarray, np.n
 
 
 def _sway(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned) -> None:
-    """The unit of v from the track beside the heading; where these are too coarse for it, the unit of u."""
+    """Set the unit of v from the track beside the heading; where these are too coarse for it, the unit of u."""
     v, u = found.entries.get("v"), found.entries.get("u")
     if v is None or "v" not in series or "psi" not in found.entries or "psi" not in series:
         return
@@ -318,8 +318,8 @@ def _no_doubt_of_unit(entry: Entry, found: Assigned) -> None:
 
 
 def _settle(entry: Entry, channel: str, ratio: float, what: str, found: Assigned) -> None:
-    """Take the unit with which the channel is `ratio` times what it is now; a unit that the head names is kept and the
-    difference told."""
+    """Set the unit with which the channel is `ratio` times its present value; a unit that the head names is kept and
+    the difference reported."""
     if "as given" in entry.why or not entry.columns:
         return
     like = "u" if channel == "sog" else channel
@@ -364,7 +364,7 @@ def _in_radians(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]],
 
 
 def _clock_unit(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], time: Time, found: Assigned) -> None:
-    """The unit of a clock without one, from the time that the ship takes over her way."""
+    """Set the unit of a clock without one from the time that the ship needs for the distance."""
     channel = next(
         (c for c in ("sog", "u") if c in series and c in found.entries and found.entries[c].columns[0].head.units), None
     )

@@ -1,4 +1,4 @@
-"""Which logs are of one kind: recordings of the same instruments follow one mapping, other instruments are sources of
+"""Grouping of logs by kind: recordings of the same instruments follow one mapping, other instruments are sources of
 their own."""
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _WHOLE = ({"psi", "x", "y"}, {"psi", "lat", "lon"})
 def group(
     logs: Sequence[Path], kept: dict[str, Any], file: dict[str, Any], numbered: int = 0
 ) -> tuple[list[SourceDraft], list[str]]:
-    """A draft for each kind of log, and notes on logs that no one mapping serves together with the first.
+    """Drafts, one for each kind of log, and notes on logs that no one mapping serves together with the first.
 
     Logs with the columns that the first kind needs are recordings of that kind. A log with a heading and a position of
     its own under other names is a recording, too, and needs a mapping of its own. Others are further instruments.

@@ -1,8 +1,8 @@
-"""Columns without heads, by how a ship moves: which are the position, the heading, the yaw rate and the velocities.
+"""Identification of columns without heads from the ship's kinematics: position, heading, yaw rate and velocities.
 
-The heading changes by the yaw rate, and the track's velocity, turned into body axes by the heading, is surge and sway.
-In a log in which the ship turns, no other choice of columns fulfils both. Rudder, shaft speed and the rest fulfil
-nothing of that kind and stay with the reader.
+The heading changes by the yaw rate, and the track's velocity, rotated into body axes by the heading, is surge and sway.
+In a log in which the ship turns, no other choice of columns fulfils both. Rudder, shaft speed and the rest have no such
+relation and are left to the reader.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from .assign import Assigned, Entry
 from .columns import Column
 
 _MOST = 24
-"""Columns that are looked at; the number of choices goes with its third power."""
+"""Most columns that are tried; the number of choices grows with its third power."""
 _ROWS = 2000
 _CORRELATION = 0.95
-"""Between the change of the heading and the yaw rate, and between sway by the track and by the log. Filters and noise
-take a few per cent."""
+"""Least correlation between the change of the heading and the yaw rate, and between sway by the track and by the log.
+Filters and noise take a few per cent."""
 _CLOSE = 0.1
 """Relative difference within which a factor between two columns is that of a unit."""
 _TURNS = np.deg2rad(5.0)
-"""Range of headings below which nothing can be told."""
+"""Least range of headings for an identification."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class _Motion:
 
 
 def identify(columns: Sequence[Column], t: np.ndarray, found: Assigned) -> None:
-    """Add the channels that the motion tells to `found`, each called not sure."""
+    """Add the channels that the motion identifies to `found`, each marked as not sure."""
     free = [c for c in columns if c.name not in found.used() and not c.head.name and len(c.known) > 0.9 * len(t)]
     free = [c for c in free if np.ptp(c.known) > 0]
     if found.entries or not 3 <= len(free) <= _MOST:
@@ -82,7 +82,7 @@ def _motion(values: np.ndarray, t: np.ndarray) -> _Motion | None:
 
 
 def _choices(motion: _Motion) -> list[tuple[float, dict[str, str], dict[str, int]]]:
-    """(score, units, places) of each choice of heading, yaw rate and position that agrees."""
+    """Choices of heading, yaw rate and position that agree, as (score, units, places)."""
     found = []
     count = len(motion.means)
     for psi, r in itertools.permutations(range(count), 2):
@@ -105,7 +105,7 @@ def _choices(motion: _Motion) -> list[tuple[float, dict[str, str], dict[str, int
 
 
 def _track(motion: _Motion, heading: np.ndarray, x: int, y: int) -> tuple[float, dict[str, str], dict[str, int]] | None:
-    """How well a position agrees with the heading, with the columns of surge and sway where there are any."""
+    """Agreement of a position with the heading, and with the columns of surge and sway where there are any."""
     north, east = motion.changes[x], motion.changes[y]
     surge, sway = north * np.cos(heading) + east * np.sin(heading), east * np.cos(heading) - north * np.sin(heading)
     if np.mean(surge > 0) < 0.95 or np.sqrt(np.mean(sway**2)) > 0.5 * np.sqrt(np.mean(surge**2)):

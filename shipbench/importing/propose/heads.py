@@ -1,4 +1,4 @@
-"""The head of a column, such as "Ruderwinkel [°]": the channel that it names, what qualifies it, and its unit.
+"""Head of a column, such as "Ruderwinkel [°]": the channel that it names, its qualifiers, and its unit.
 
 The words stand in heads.csv and units.csv, one a row, in English, German, French, Spanish and Norwegian.
 """
@@ -15,19 +15,19 @@ from importlib import resources
 from ..entries import CHANNELS, unit_of
 
 QUANTITIES = {"m": "length", "m/s": "speed", "rad": "angle", "rad/s": "rate", "rpm": "shaft", "N": "force"}
-"""Kind of unit in units.csv for each unit of ours."""
+"""Quantity in units.csv for each standard unit."""
 _LETTERS = str.maketrans(
     {"ø": "o", "Ø": "O", "æ": "ae", "Æ": "Ae", "œ": "oe", "Œ": "Oe", "ß": "ss", "º": "°", "µ": "u", "μ": "u"}
 )
 _BRACKETS = r"[\[({<]([^\])}>]*)[\])}>]"
 _SIDE_LETTERS = {"p", "l", "r", "a", "b"}
 _SHORT = 2
-"""Words of so many letters name a channel only where they stand alone: the r of 'r_max' is no yaw rate."""
+"""Longest words that name a channel only where they stand alone: the r of 'r_max' is no yaw rate."""
 
 
 @dataclass(frozen=True)
 class Head:
-    """What the head of a column says.
+    """Meaning of a column's head.
 
     `meaning` is a channel or another word of heads.csv's first column, None where none or several are named;
     `qualifiers` are those with a "+"; `sure` says that no word is left over. `unit` is the text of the unit and `units`
@@ -44,7 +44,7 @@ class Head:
 
     @property
     def channel(self) -> str | None:
-        """The channel of ours that is named, with its qualifiers; None where it is none."""
+        """Standard channel that is named, with its qualifiers; None where it is none."""
         name, marks = self.meaning, self.qualifiers
         if name is None or "+other" in marks:
             return None
@@ -67,7 +67,7 @@ class Head:
 
 
 def read_head(name: str, unit_text: str = "") -> Head:
-    """The head `name` of a column; `unit_text` is the unit from a row of units under the heads ("" where there is
+    """Read the head `name` of a column; `unit_text` is the unit from a row of units under the heads ("" where there is
     none)."""
     inside = [part.strip() for part in re.findall(_BRACKETS, name)]
     unit = next((part for part in [unit_text, *inside] if part and units_of(part)), "")
@@ -93,7 +93,7 @@ def read_head(name: str, unit_text: str = "") -> Head:
 
 
 def units_of(text: str) -> dict[str, str]:
-    """The unit that a text stands for, for each quantity that has such a unit: "kN" is a force, "kn" a speed."""
+    """Unit that a text stands for, for each quantity that has such a unit: "kN" is a force, "kn" a speed."""
     plain = _plain_unit(text)
     found = {quantity: unit for quantity, unit in _units().get(plain, ())}
     if {"force", "speed"} <= set(found) and text.strip() in ("kN", "kn"):
@@ -102,14 +102,14 @@ def units_of(text: str) -> dict[str, str]:
 
 
 def _without_number(token: str) -> list[str]:
-    """'rpm1' as 'rpm', '1', where the whole is no word of the table."""
+    """Head split before its number, 'rpm1' as 'rpm', '1', where the whole is no word of the table."""
     known = any(token in phrase for phrase in _words())
     found = re.fullmatch(r"([a-z]+)(\d)", token)
     return [found[1], found[2]] if found and not known else [token]
 
 
 def _named(tokens: list[str]) -> tuple[list[str], set[str], list[str]]:
-    """(meanings, qualifiers, words left over) of a head, the longest phrases first."""
+    """Words of a head as (meanings, qualifiers, words left over), the longest phrases first."""
     whole = "".join(tokens)
     if len(tokens) == 1 and (found := _joined().get(whole)):  # such as 'rudderangle'
         return [found], set(), []
@@ -163,8 +163,8 @@ def _is_mark(token: str) -> bool:
 
 
 def _unit_at_end(words: str, tokens: list[str]) -> tuple[list[str], str]:
-    """A unit without brackets at the end, such as in 'speed_kn', 'Fahrt kn', 'rudder, deg' or 'u_m_s'; something must
-    be left before it."""
+    """Unit without brackets at the end, such as in 'speed_kn', 'Fahrt kn', 'rudder, deg' or 'u_m_s'; some text must
+    remain before it."""
     last = re.split(r"[\s,;_]+", words.strip())[-1]
     if (
         len(re.split(r"[\s,;_]+", words.strip())) > 1
@@ -192,7 +192,7 @@ def _unit_at_end(words: str, tokens: list[str]) -> tuple[list[str], str]:
 
 
 def plain(text: str) -> str:
-    """Lower case without accents."""
+    """Text in lower case without accents."""
     return "".join(
         c for c in unicodedata.normalize("NFKD", text.translate(_LETTERS)) if not unicodedata.combining(c)
     ).casefold()
@@ -213,7 +213,7 @@ def _plain_unit(text: str) -> str:
 
 @cache
 def _words() -> dict[tuple[str, ...], tuple[tuple[str, str], ...]]:
-    """(meaning, language) of each phrase."""
+    """Phrases with (meaning, language) of each."""
     table: dict[tuple[str, ...], list[tuple[str, str]]] = {}
     for row in _rows("heads.csv"):
         entries = table.setdefault(tuple(_tokens(row["word"])), [])

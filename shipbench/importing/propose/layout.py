@@ -1,4 +1,4 @@
-"""How a log is written: encoding, delimiter, the row of the heads, a row of units, and where the data begin."""
+"""Layout of a log: encoding, delimiter, the row of the heads, a row of units, and the first row of data."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ _NONE = re.compile(r"(?i)\s*(|nan|n/?a|null|none|-+|\*+|#n/a)\s*")
 
 @dataclass(frozen=True)
 class Form:
-    """The layout of a log as found: `heads` and `units` are the texts over the columns, where the layout itself cannot
-    name them."""
+    """Layout of a log as found: `heads` and `units` are the texts over the columns, where the layout itself cannot name
+    them."""
 
     layout: Layout
     heads: tuple[str, ...] = ()
@@ -43,7 +43,7 @@ class Form:
 
 
 def find_form(path: Path, given: dict[str, Any]) -> Form:
-    """The layout of a log; what `given`, the [file] of a partial mapping, says is kept.
+    """Find the layout of a log; the entries of `given`, the [file] of a partial mapping, are kept.
 
     Raises:
         InputError: the log cannot be read, or no row in its beginning looks like data.
@@ -78,7 +78,7 @@ def _form(
     path: Path, rows: list[list[str]], found: dict[str, Any], notes: tuple[str, ...], delimiter: str | None = None,
     lines: Sequence[str] = ()
 ) -> Form:  # fmt: skip
-    """The form of a table whose beginning is `rows`; `lines` is their text, where it is a text."""
+    """Form of a table whose beginning is `rows`; `lines` is their text, where it is a text."""
     width = _width(rows)
     numeric = _numeric_columns(rows, width)
     begin = found.get("header", 0)
@@ -119,7 +119,7 @@ def _split(line: str, delimiter: str) -> list[str]:
 
 
 def _delimiter(lines: list[str]) -> str | None:
-    """The mark that parts the lower half of the lines into most cells that are numbers or times."""
+    """Mark that divides the lower half of the lines into most cells that are numbers or times."""
     body = [line for line in lines[len(lines) // 2 :] if line.strip()]
     best, most = None, (0.0, 0.0)
     for mark in DELIMITERS:

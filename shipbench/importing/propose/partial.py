@@ -1,4 +1,4 @@
-"""A partial mapping: what a person knows already, kept by the draft."""
+"""Partial mapping: entries that a person knows already, kept by the draft."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _REST = {"time": {"rate": 1.0}, "channels": {"psi": {"column": "any", "unit": "r
 
 
 def read_partial(path: Path) -> dict[str, Any]:
-    """The entries of a mapping of which any part may be missing.
+    """Read the entries of a mapping of which any part may be missing.
 
     Raises:
-        InputError: not TOML; an unknown key, channel, unit or sign, or a value of another kind.
+        InputError: not TOML; an unknown key, channel, unit or sign, or a value of another type.
     """
     data = read_toml(path)
     whole: dict[str, Any] = {"name": "any", "dt": 1.0} | data

@@ -1,4 +1,4 @@
-"""`write_proposal`: logs in, a draft of mapping.toml out, tried by the import's own reader."""
+"""Proposal of a mapping (`write_proposal`): logs in, a draft of mapping.toml out, tested by the import's own reader."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ def write_proposal(
     logs: Sequence[Path], path: Path, force: bool = False, *, file: dict[str, Any] | None = None,
     partial: Path | None = None
 ) -> list[str]:  # fmt: skip
-    """Write a draft mapping for `logs` to `path`; return lines that say what is guessed, what is not sure and what is
-    missing, and, last, the command or the call of the import.
+    """Write a draft mapping for `logs` to `path`; return lines on guessed, uncertain and missing entries, and, last,
+    the command or the call of the import.
 
     Args:
         logs: files of one kind, or of several instruments; each kind becomes a source.
-        path: where the draft goes.
+        path: of the draft.
         force: replace a file that is there.
         file: keys of [file] that are known, such as encoding, sheet and header.
-        partial: a mapping that says a part; what it says is kept.
+        partial: a partial mapping, whose entries are kept.
 
     Raises:
         InputError: a log cannot be read, or `path` is there already and `force` is not set, or is one of the logs.
@@ -93,7 +93,7 @@ def _left_notes(source: SourceDraft) -> list[str]:
 
 
 def _sources(logs: Sequence[Path], known: dict[str, Any], file: dict[str, Any]) -> tuple[list[SourceDraft], list[str]]:
-    """A draft for each kind of log, and notes on logs that fit none."""
+    """Drafts, one for each kind of log, and notes on logs that fit none."""
     named = known.get("sources", {})
     drafts, notes, rest = [], [], list(logs)
     for name, kept in named.items():
@@ -121,7 +121,7 @@ def _sources(logs: Sequence[Path], known: dict[str, Any], file: dict[str, Any]) 
 
 
 def _top(sources: Sequence[SourceDraft], known: dict[str, Any], log: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The keys at the top of the mapping and those of [split]."""
+    """Keys at the top of the mapping and those of [split]."""
     steps = [s.step for s in sources if s.found.entries] or [s.step for s in sources]
     finest = min(steps)
     top: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""The draft of one kind of file: its clock, its channels and what is to be said about them."""
+"""Draft of one kind of file: its clock, its channels and notes on them."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from .headless import identify
 from .units import set_units
 
 SLOW = 5.0
-"""Channels with longer steps [s] get a limit of their own, so that theirs does not become that of all."""
+"""Step [s] above which a channel gets a gap limit of its own, so that it does not become that of all."""
 _COARSE = 0.2
 """Share of repeated times above which the stamps are coarser than the samples, as the import has it."""
 
 
 @dataclass
 class SourceDraft:
-    """One kind of file. `kept` is what a partial mapping says of it, `extra` further keys of the source (run, missing,
-    ...), `why` their comments."""
+    """Draft of one kind of file. `kept` holds the entries of a partial mapping, `extra` further keys of the source
+    (run, missing, ...), `why` their comments."""
 
     name: str
     logs: list[Path]
@@ -59,7 +59,7 @@ class SourceDraft:
 
     @property
     def step(self) -> float:
-        """Usual time between two rows of one run [s]."""
+        """Typical time between two rows of one run [s]."""
         t = self.times
         return 1.0 if t is None else usual_step(t)
 
@@ -76,7 +76,7 @@ class SourceDraft:
 
     @property
     def left(self) -> list[Column]:
-        """Columns that do not serve."""
+        """Columns that are not in use."""
         used = (
             self.found.used()
             | set(self.time.names if self.time else ())
@@ -87,7 +87,7 @@ class SourceDraft:
 
 
 def draft_source(name: str, logs: list[Path], sample: Sample, kept: dict[str, Any]) -> SourceDraft:
-    """The draft for logs of one kind.
+    """Draft for logs of one kind.
 
     Args:
         sample: the beginning of the first of them.
@@ -144,7 +144,7 @@ def _given_time(spec: dict[str, Any], sample: Sample) -> Time:
 
 
 def _marks_of_missing(draft: SourceDraft) -> None:
-    """Words without a digit in columns of numbers stand for "no reading"."""
+    """Add the words without a digit in columns of numbers to the marks of a missing value."""
     if "missing" in draft.kept:
         return
     marks: Counter[str] = Counter()
@@ -163,7 +163,7 @@ _EMPTY = {"", "na", "n/a", "nan", "null", "none", "#n/a", "nat"}
 
 
 def _disorder(draft: SourceDraft) -> None:
-    """Times that repeat or go back: say how the import shall read them."""
+    """Choose how the import reads times that repeat or go back."""
     t, spec = draft.times, draft.time_spec
     if t is None or spec is None:
         return
@@ -196,8 +196,8 @@ def _over_midnight(spec: dict[str, Any], steps: np.ndarray) -> bool:
 
 
 def channel_gaps(draft: SourceDraft, gap: float) -> None:
-    """A limit of its own for each channel that is sampled more slowly than `gap` [s] lets pass; none for a command that
-    is logged on change."""
+    """Gap limits of channels that are sampled more slowly than `gap` [s] allows; none for a command that is logged on
+    change."""
     t = draft.times
     if t is None:
         return
@@ -223,7 +223,7 @@ def channel_gaps(draft: SourceDraft, gap: float) -> None:
 
 
 def missing_channels(sources: Sequence[SourceDraft]) -> list[str]:
-    """What a data set needs and no source has."""
+    """Channels that a data set needs and no source has."""
     seen = {e.channel for s in sources for e in s.found.entries.values() if not e.missing}
     lines = []
     if "psi" not in seen:
@@ -241,8 +241,8 @@ def missing_channels(sources: Sequence[SourceDraft]) -> list[str]:
 
 
 def clocks_apart(sources: Sequence[SourceDraft]) -> list[str]:
-    """Sources whose stamps name no zone, where others are merged with them: where they begin tells how far they are
-    apart."""
+    """Notes on sources whose stamps name no zone, where others are merged with them: their beginnings show the
+    offset."""
     clocks = [
         (s, Clock(**s.time_spec), float(np.nanmin(s.time.t)))
         for s in sources

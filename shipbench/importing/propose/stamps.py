@@ -1,4 +1,4 @@
-"""Formats that a text of a date, a time of day or a duration may have."""
+"""Possible formats of a text of a date, a time of day or a duration."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _ZONES = {
 
 
 def zone_of(form: str) -> str | None:
-    """The zone for a pattern that has the name of one as a word, such as CEST."""
+    """Zone for a pattern that has the name of one as a word, such as CEST."""
     word = re.search(r"\b[A-Z]{3,4}$", form)
     hours = _ZONES.get(word[0]) if word else None
     return f"Etc/GMT{hours:+d}" if hours is not None else None

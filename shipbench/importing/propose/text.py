@@ -1,4 +1,4 @@
-"""The draft as a text: TOML with a comment on every entry that says why, and what is not sure or missing."""
+"""Draft as a text: TOML with a comment on every entry that states its reason, and any uncertain or missing part."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ _SHOWN = 40
 def draft_text(
     top: dict[str, Any], split: dict[str, Any], kept: set[str], sources: Sequence[SourceDraft], notes: Sequence[str]
 ) -> str:
-    """The whole file. `kept` names the keys of the top level that a person gave; `notes` go to its end as comments."""
+    """Text of the whole file. `kept` names the keys of the top level that a person gave; `notes` go to its end as
+    comments."""
     single = len(sources) == 1 and not sources[0].named
     lines = [
         *_HEAD,
@@ -116,7 +117,7 @@ def _time(source: SourceDraft) -> list[str]:
 
 
 def one_line(text: str) -> str:
-    """A comment or a note that has words of a log in it: in one line, without unseen characters."""
+    """Comment or note with words of a log: in one line, without invisible characters."""
     return shown(" ".join(text.splitlines()))
 
 
@@ -150,7 +151,7 @@ def _not_taken(source: SourceDraft) -> list[str]:
 
 
 def value(entry: Any) -> str:
-    """A value as TOML on one line; JSON's strings are TOML's."""
+    """Value as TOML on one line; JSON's strings are TOML's."""
     if isinstance(entry, dict):
         return "{ " + ", ".join(f"{k} = {value(v)}" for k, v in entry.items()) + " }"
     if isinstance(entry, list | tuple):

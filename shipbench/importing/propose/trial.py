@@ -1,5 +1,4 @@
-"""The draft is tried by the import itself; what the import refuses is corrected where the reason says how, else
-told."""
+"""Trial of the draft by the import itself; refused entries are corrected where the reason says how, else reported."""
 
 from __future__ import annotations
 
@@ -16,18 +15,17 @@ from ..summary import Summary
 from .source import SourceDraft
 
 _ROWS, _READ = 3000, 200_000
-"""Rows of each recording that are imported, and rows that are read for cells and times that cannot be."""
+"""Rows of each recording that are imported, and rows that are read for invalid cells and times."""
 _MOST_CORRECTIONS = 20
 _NEEDED = ("psi", "x", "y", "lat", "lon")
 _ANY_SHIP = Ship(name="any", L=50.0, B=8.0, T=3.0, mass=9e5)
-"""A ship of middling size: her length sets how smooth speeds are taken from a track, which no answer here depends
-on."""
+"""Ship of average size: her length sets the smoothing of speeds from a track, on which no result here depends."""
 
 
 def try_draft(
     write: Callable[[], Path], logs: Sequence[Path], sources: Sequence[SourceDraft], split: dict[str, Any]
 ) -> list[str]:
-    """Notes on how the import takes the draft; `write` writes it anew after a correction and returns its path."""
+    """Notes from a trial import of the draft; `write` writes it anew after a correction and returns its path."""
     corrected: list[str] = []
     for _ in range(_MOST_CORRECTIONS):
         try:
@@ -60,7 +58,7 @@ def _of_success(summary: Summary) -> list[str]:
 
 
 def _correct(message: str, sources: Sequence[SourceDraft], split: dict[str, Any]) -> str | None:
-    """What was changed in the draft after the import's `message`, or None where a person must."""
+    """Text on the change of the draft after the import's `message`, or None where a person must decide."""
     if found := re.search(r"'([^']*)' is '([^']*)', not a number", message):
         return _of_cell(found[1], found[2], sources)
     for source in sources:

@@ -1,4 +1,4 @@
-"""The unit of each channel: from its head or the row of units, else from the size of its numbers."""
+"""Unit of each channel: from its head or the row of units, else from the size of its numbers."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ ACCEPTED = {
     "N": "N, kN, MN, tf",
 }  # fmt: skip
 _RUDDER_LIMIT = 1.6
-"""No rudder turns by more radians: a right angle."""
+"""Largest rudder angle [rad]: a right angle."""
 _FULL_TURN = 6.5
-"""No heading of 0 to 360 degrees is above that in radians."""
+"""Largest heading of 0 to 360 degrees, in radians."""
 
 
 def set_units(found: Assigned) -> None:
-    """Write unit, sign and what a unit needs beside it into the entries that have none."""
+    """Write unit, sign and further keys of a unit into the entries that have none."""
     for channel in ("lat", "lon"):
         if channel in found.entries and "unit" not in found.entries[channel].spec:
             _of_position(found.entries[channel], found)
@@ -57,7 +57,7 @@ def _set_unit(entry: Entry, found: Assigned) -> None:
 
 
 def _of_full(entry: Entry, unit: str, found: Assigned) -> None:
-    """A percentage or the pulse width of a motor controller: what full means is not in the log."""
+    """Set a percentage or the pulse width of a motor controller: the value at 100 % is not in the log."""
     name = entry.columns[0].name
     entry.spec["unit"] = unit
     if entry.channel.removesuffix("_c") == "delta":
@@ -95,7 +95,7 @@ def _by_size(channel: str, column: Column) -> tuple[str, bool]:
 
 
 def _of_position(entry: Entry, found: Assigned) -> None:
-    """The unit of a latitude or longitude, with the column or the letters of its hemisphere."""
+    """Set the unit of a latitude or longitude, with the column or the letters of its hemisphere."""
     column, limit = entry.columns[0], 90.0 if entry.channel == "lat" else 180.0
     named, cells = column.head.units.get("angle"), column.texts()
     lettered = [t for t in cells if re.search(r"[NSEWOnsewo]\s*$|^\s*[NSEWO]", t)]
@@ -131,7 +131,7 @@ def _of_position(entry: Entry, found: Assigned) -> None:
 
 
 def _same_position_unit(found: Assigned) -> None:
-    """A longitude near Greenwich is small in any unit; it has the one of its latitude."""
+    """Give a longitude the unit of its latitude: near Greenwich it is small in any unit."""
     pair = [found.entries[c] for c in ("lat", "lon") if c in found.entries]
     if len(pair) == 2 and all("as given" not in e.why for e in pair) and not any(e.columns[0].head.units for e in pair):
         units = [e.spec["unit"] for e in pair]
