@@ -7,7 +7,6 @@ import json
 import re
 import shlex
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -89,15 +88,15 @@ def test_the_summary_says_the_verdict_with_sizes_and_the_next_command():
 
 
 @pytest.mark.parametrize("spec", ["{folder}", "calm[seed=3]"])
-def test_the_commands_name_the_data_as_the_user_did(spec, tmp_path, monkeypatch):
+def test_the_commands_name_the_data_as_the_user_did(spec, toy, tmp_path, monkeypatch):
     """A folder's data set has a name of its own, and one with parameters is not found without them."""
     spec = spec.format(folder=tmp_path / "my trial")
     loaded = []
-    monkeypatch.setattr(
-        "shipbench.data.base.load_dataset", lambda given: loaded.append(given) or SimpleNamespace(name="bridge")
+    monkeypatch.setattr(  # first: what it imports takes the true load_dataset
+        "shipbench.diagnosis.diagnose.diagnose", lambda data, **options: in_words(make_diagnosis(name=data.name))
     )
     monkeypatch.setattr(
-        "shipbench.diagnosis.diagnose.diagnose", lambda data, **options: in_words(make_diagnosis(name=data.name))
+        "shipbench.data.base.load_dataset", lambda given: loaded.append(given) or toy(runs=1, name="bridge")
     )
     result = CliRunner().invoke(app, ["diagnose", spec, "--out", str(tmp_path / "out")])
     assert loaded == [spec]
