@@ -1,7 +1,7 @@
 """Limits of work and memory of one diagnosis.
 
-Work is counted where fits iterate. Every loop over fits, candidates or forms asks `is_spent`. Then fits end where they
-stand, and results of these fits are not reported. Earlier results stand; what was not looked for is said.
+Work is counted where fits iterate. Every loop over fits, candidates or forms checks `is_spent`. Then fits stop where
+they are, and results of these fits are not reported. Earlier results stand; parts that were not searched are stated.
 """
 
 from __future__ import annotations
@@ -18,11 +18,10 @@ from ..steps import tick
 
 @dataclass
 class Budget:
-    """Limits of one diagnosis, or of one of its training parts, and what it has used.
+    """Limits of one diagnosis, or of one of its training parts, and the work done.
 
-    iterations: linearisations of all fits together (24 runs of 120 s take 50 to 500); seconds: CPU time of this
-    process, which other work beside it does not change; gigabytes: of the arrays of one linearisation. stopped:
-    iterations and seconds when the limit acted first.
+    iterations: linearisations of all fits together; seconds: CPU time of this process, which other processes do not
+    change; gigabytes: of the arrays of one linearisation. stopped: iterations and seconds when the limit acted first.
     """
 
     iterations: int = 2000
@@ -41,12 +40,12 @@ class Budget:
         return self.stopped is not None
 
     def part(self, parts: int) -> Budget:
-        """Budget of one of so many parts, which share the seconds that are left."""
+        """Budget of one of `parts`, which share the remaining seconds."""
         left = self.seconds - (time.process_time() - self.began)
         return Budget(self.iterations, max(left, 0.0) / parts, self.gigabytes)
 
     def said(self, nothing: bool) -> list[str]:
-        """A line for the reader where the limit has acted; nothing: so early that nothing is named."""
+        """Line for the reader where the limit has acted; nothing: so early that no cause is identified."""
         if self.stopped is None:
             return []
         iterations, seconds = self.stopped
@@ -61,7 +60,7 @@ class Budget:
         ]
 
     def refuse_large(self, pieces: int, samples: int, columns: int) -> None:
-        """Refuse a linearisation of `columns` at so many samples of each piece, before it is made.
+        """Refuse a linearisation of `columns` at so many samples of each segment, before it is made.
 
         Raises:
             InputError: it would take more than the `gigabytes`.
@@ -100,7 +99,7 @@ def count() -> None:
 
 
 def is_spent() -> bool:
-    """Check whether the diagnosis in progress is to end."""
+    """Check whether the diagnosis in progress has to end."""
     budget = _NOW.get()
     return budget is not None and budget.is_spent
 

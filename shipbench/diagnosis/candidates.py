@@ -1,4 +1,4 @@
-"""Every effect of the library as a candidate: why it was not named, and the smallest size that would have been."""
+"""Effects of the library as candidates: the reason why each was not identified, and its detection limit."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _DOUBT = "in the model, but not named while the ship file is in doubt"
 
 
 def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -> list[Candidate]:
-    """Every effect of the library once, best first, with why it was not named and the smallest size that would have
-    been; measured: whether held-out gains were."""
+    """Candidates, one for each effect of the library, best first, with the reason why it was not identified and its
+    detection limit; measured: whether held-out gains were measured."""
     lines: dict[str, Candidate] = {}
     last = {s.term.label: s for s in reversed(found.selection.last)}
     refits = {s.term.label: s.score for s in sorted(found.selection.steps, key=lambda s: s.score)}
@@ -48,7 +48,7 @@ def describe_candidates(found: Analysis, named: Sequence[str], measured: bool) -
 
 
 def _gear_candidate(found: Analysis, g: GearFinding, named: Sequence[str], motion: Candidate | None) -> Candidate:
-    """Candidate line of an effect of an actuator; motion: the line that the ship's motion gives it."""
+    """Candidate of an effect on an actuator; motion: the candidate from the ship's motion."""
     name, unit = EFFECTS.get(g.effect).parameters[0].name, EFFECTS.get(g.effect).parameters[0].unit
     sizes = [g.detectable, motion.detectable[name]] if motion else [g.detectable]
     detectable = {name: float(np.fmin.reduce(sizes))}
@@ -67,7 +67,7 @@ def _gear_candidate(found: Analysis, g: GearFinding, named: Sequence[str], motio
 
 
 def _reason(found: Analysis, s: Score, last: Score | None, named: Sequence[str]) -> str:
-    """Why a candidate that was screened is not named; last: its score beside the causes found."""
+    """Reason why a screened candidate is not identified; last: its score beside the causes found."""
     label, steps, inside = s.term.label, found.selection.steps, [t.label for t in found.final.model.terms]
     odd = found.standard.asked_besides(s.term)
     asked, score = found.threshold + odd, max([s.score, *(x.score for x in steps if x.term.label == label)])
@@ -108,8 +108,7 @@ def _shown(s: Score, fit: Fit) -> dict[str, float]:
 
 
 def _detectable(found: Analysis, s: Score) -> dict[str, float]:
-    """Size from which a cause is expected to be named, along each amplitude; of values of single runs the root mean
-    square. NaN beyond the bounds."""
+    """Detection limit along each amplitude; of values of single runs the root mean square. NaN beyond the bounds."""
     null, effect = found.selection.null, s.term.effect
     term, unit, least = s.term, null.scales.amplitudes(s.term, null.plant.c.L), detection_limit(s, found.standard)
     values = {}

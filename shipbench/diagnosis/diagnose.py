@@ -1,4 +1,4 @@
-"""The diagnosis: from a data set to a verdict with its evidence, its size and what it is worth."""
+"""Diagnosis of a data set: a verdict with its evidence, effect sizes and held-out gain."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from .selection.ship_file import doubts_of, odd_for, own_propeller
 from .thresholds import THRESHOLDS
 
 _WHOLE = 0.2
-"""Share of the time for the plain model of all runs, and for the search, where the gain is measured (progress)."""
+"""Share of the time for the baseline model of all runs, and for the search, where the gain is measured (progress)."""
 
 
 @threadpool_limits.wrap(limits=1)  # its matrices are small: threads of several processes would wait for each other
@@ -157,8 +157,8 @@ def _diagnosed(
 
 @dataclass(frozen=True)
 class Worth:
-    """Held-out gain, ED of every run before and after [m], whether the hull's derivatives are worth naming, and lines
-    for the reader."""
+    """Held-out gain, ED of every run before and after [m], whether naming the hull's derivatives is justified, and
+    lines for the reader."""
 
     gain: Gain | None = None
     per_run: tuple[tuple[str, float, float], ...] = ()
@@ -169,10 +169,11 @@ class Worth:
 def _as_it_must_be_read(
     dataset: Dataset, null: Fit, steps: int, settled: Sequence[str], seed: int
 ) -> tuple[Analysis, Dataset, list[UnitFinding], Sequence[str]]:
-    """Analysis of runs of which `null` is the plain model, with sign errors and errors of actuator records corrected.
+    """Analysis of runs of which `null` is the baseline model, with sign errors and errors of actuator records
+    corrected.
 
-    Returns the analysis, the corrected runs, the sign errors (which the model cannot tell of another ship than that of
-    the file), and the effects that are not looked for: `settled`, and delays that the track rules out.
+    Returns the analysis, the corrected runs, the sign errors (which the model cannot distinguish from another ship than
+    that of the file), and the effects that are excluded: `settled`, and delays that the track rules out.
     """
 
     def plain(read: Dataset) -> Fit:
@@ -194,7 +195,7 @@ def _as_it_must_be_read(
 
 
 def _of_depth(dataset: Dataset, plant: Plant) -> list[str]:
-    """Lines on how a recorded depth is used."""
+    """Lines on the use of a recorded depth."""
     if plant.seg.depth is not None:
         draughts = plant.seg.depth / plant.ship.T
         return [
@@ -234,7 +235,7 @@ def _one_fold(
 
 
 def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
-    """Places of the runs of each fold: groups in random order, whole, each where its middle run falls among equal
+    """Indices of the runs of each fold: groups in random order, whole, each where its middle run falls among equal
     parts."""
     members: dict[str, list[int]] = {}
     for i, run in enumerate(dataset.runs):
@@ -251,7 +252,7 @@ def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
 
 
 def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, str]:
-    """Advice on an actuator that acts otherwise than its record says, by the name of the cause.
+    """Advice on an actuator whose motion differs from its record, by the name of the cause.
 
     The actuator dynamics of the predictors end at the record, so the record has to be corrected.
     """

@@ -1,4 +1,5 @@
-"""From an analysis to the lines of the verdict: causes with sizes and intervals, and what remains."""
+"""Explanation of an analysis in lines of the verdict: causes with sizes and intervals, and the unexplained
+remainder."""
 
 from __future__ import annotations
 
@@ -35,10 +36,12 @@ def describe_causes(
     doubt: bool,
     runs: Sequence[str],
 ) -> list[Cause]:
-    """Named causes: what was taken out before the fit first (units, late velocities), then by score; the hull last,
-    because it is off the regressions on most ships. None in whose place something unknown is told; but in doubt about
-    the ship file a force may be unknown for that, and those are named that show whatever the ship is. `runs` are their
-    names."""
+    """Identified causes: first those corrected before the fit (units, late velocities), then by score; the hull last,
+    because most ships differ from the regressions.
+
+    No cause is listed in whose place an unknown one is reported. In doubt about the ship file an unknown force may be
+    due to that; causes that do not depend on the ship file are then listed. `runs` are their names.
+    """
     causes = [_unit_cause(i + 1, u) for i, u in enumerate(units)]
     if late is not None:
         causes.append(_late_cause(len(causes) + 1, found, late))
@@ -64,7 +67,7 @@ def describe_causes(
 
 
 def p_of(found: Analysis, score: float) -> float:
-    """Probability of a score as great by chance, the greatest of all candidates counted."""
+    """p-value of a score under the null, for the greatest score of all candidates."""
     return float((1 + np.sum(found.null_draws >= score)) / (1 + len(found.null_draws)))
 
 
@@ -93,7 +96,7 @@ def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs
 
 
 def _sentences(texts: Iterable[str]) -> str:
-    """Texts as sentences, those that are empty left out."""
+    """Texts as sentences, without empty ones."""
     return " ".join(
         f"{t[0].upper()}{t[1:].rstrip('.')}." if t.split()[0] not in EFFECTS else f"{t.rstrip('.')}."
         for t in texts
@@ -102,7 +105,7 @@ def _sentences(texts: Iterable[str]) -> str:
 
 
 def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
-    """Effects that were refitted in its place, when it was added, and came near to it."""
+    """Effects with which the cause is confounded: refitted in its place when it was added, with nearly its score."""
     steps = found.selection.steps
     own = max((s for s in steps if s.term.label == term.label), key=lambda s: (s.round, s.score), default=None)
     near = [s.term.label for s in steps if own is not None and s.is_near(own)]
@@ -113,7 +116,7 @@ def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
 
 def _parameters(fit: Fit, index: int, term: Term) -> dict[str, Estimate]:
     """Sizes with 95 % intervals: the wider of the model's and of the sandwich clustered by run; none for shape
-    parameters, the best of a few."""
+    parameters, chosen among a few."""
     from scipy.stats import chi2, t
 
     effect = term.effect
@@ -173,8 +176,8 @@ def _gear_cause(found: Analysis, g: GearFinding, gain: Gain | None) -> Cause:
 
 
 def _with_motion(gear: Cause, motion: Sequence[Cause]) -> Cause:
-    """A cause of a gear's record with what the motion says of the same: a record that is late by as much as the motion
-    is early is late alone."""
+    """Cause of an actuator record combined with the evidence of the motion: a record as late as the motion is early is
+    late alone."""
     for c in motion:
         sizes = ", ".join(
             f"{n} {e.value:.2g} {e.unit} (95 %: {e.ci95[0]:.2g} to {e.ci95[1]:.2g})" for n, e in c.parameters.items()
@@ -252,7 +255,7 @@ def _late_cause(rank: int, found: Analysis, late: LateVelocities) -> Cause:
 
 
 def remaining(found: Analysis) -> dict[str, Any]:
-    """Share of the latent force that the causes took away, and the dependence that the rest shows."""
+    """Share of the latent force that the causes explain, and the dependence of the remainder."""
     null, final = found.selection.null, found.final
     share = 1.0 - np.exp(final.hyper.log_force - null.hyper.log_force)
     force = np.exp(0.5 * final.hyper.log_force) * null.scales.w
@@ -267,7 +270,7 @@ def remaining(found: Analysis) -> dict[str, Any]:
 
 
 def what_is_left(found: Analysis) -> list[str]:
-    """A warning of what is there beside the named causes."""
+    """Warning on the unexplained part beside the identified causes."""
     if found.left is None:
         return []
     detected = f"{what_it_is(_described(found.left))} (log Bayes factor {0.5 * found.left.score:.0f})"
@@ -280,7 +283,7 @@ def what_is_left(found: Analysis) -> list[str]:
 
 
 def unknown_part(found: Analysis) -> dict[str, Any] | None:
-    """Axis, variable and form of the dependence that no named cause covers."""
+    """Axis, variable and form of the dependence that no identified cause covers."""
     return None if found.unknown is None else _described(found.unknown)
 
 

@@ -1,4 +1,4 @@
-"""Result of a diagnosis as plain data: the verdict and what the report shows beside it."""
+"""Result of a diagnosis as plain data: the verdict and further contents of the report."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Estimate:
-    """A size with its 95 % interval, in `unit`; NaN where none is known (null in the document)."""
+    """Effect size with its 95 % interval, in `unit`; NaN where none is known (null in the document)."""
 
     value: float
     unit: str
@@ -24,7 +24,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Gain:
-    """Error of open-loop rollouts on runs that were not fitted, before and after the model is extended.
+    """Error of open-loop rollouts on held-out runs, before and after the model is extended.
 
     relative: 1 - after/before of the means; ci95: its interval, clustered by run; runs_better: such as "19/24".
     """
@@ -39,12 +39,12 @@ class Gain:
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause. score: twice the log Bayes factor; p_value: of the greatest score of all candidates under the
+    """Identified cause. score: twice the log Bayes factor; p_value: of the greatest score of all candidates under the
     null.
 
     support: such as "12 of 12 runs". force: 99th percentile of its magnitude on the runs in "surge", "sway" [N] and
-    "yaw" [N m], where noticeable.
-    correction: the line of dataset.toml that corrects the record for it, where there is one.
+    "yaw" [N m], where practically significant. correction: the line of dataset.toml that corrects the record for it,
+    where there is one.
     """
 
     effect: str
@@ -67,8 +67,8 @@ class Cause:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A candidate and why it was not named. detectable: smallest size that would have been seen, per parameter name;
-    NaN where none would."""
+    """Candidate and the reason why it was not identified. detectable: detection limit per parameter name; NaN where it
+    cannot be detected."""
 
     effect: str
     score: float
@@ -85,7 +85,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Wrong:
-    """One line of "what is wrong". depends_on: variable that the unexplained force or error follows ("" when none);
+    """Line of errors by channel. depends_on: variable on which the unexplained force or error depends ("" when none);
     when: in words."""
 
     channel: str
@@ -123,7 +123,7 @@ class Trace:
 
 
 def what_it_is(unknown: Mapping[str, Any]) -> str:
-    """An unknown force, or error of a sensor, with what it depends on."""
+    """Words for an unknown force, or error of a sensor, with the variable on which it depends."""
     kind = "error of the" if unknown["axis"].startswith(("recorded", "ordered")) else "force in"
     if unknown["variable"] == "nothing":
         return f"a constant {kind} {unknown['axis']}"
@@ -135,9 +135,9 @@ def what_it_is(unknown: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The verdict and its evidence; `document` is what `diagnosis.json` holds.
+    """Verdict and its evidence; `document` is the content of `diagnosis.json`.
 
-    spec: how commands name the data set, a folder or name[key=value]; "" where that is its own name.
+    spec: name of the data set in commands, a folder or name[key=value]; "" where that is its own name.
     """
 
     dataset: str
@@ -160,8 +160,8 @@ class Diagnosis:
         return brief(f"<Diagnosis of {self.dataset}: {self.verdict}, {self.extended_model}>")
 
     def document(self) -> dict[str, Any]:
-        """The contract's JSON, plus `warnings`, the gain of all causes together, and `unknown` (channel and variable)
-        where that is the verdict."""
+        """Content of diagnosis.json by the contract, with `warnings`, the gain of all causes together, and `unknown`
+        (channel and variable) where that is the verdict."""
         return {
             "schema": SCHEMA, "dataset": self.dataset, "base_model": "physics", "verdict": self.verdict,
             "causes": [_plain(asdict(c)) for c in self.causes],
@@ -175,7 +175,7 @@ class Diagnosis:
 
 
 def _plain(value: Any) -> Any:
-    """JSON has no NaN and no tuples."""
+    """Value for JSON, which has no NaN and no tuples."""
     if isinstance(value, dict):
         return {k: _plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):

@@ -318,4 +318,4 @@ THRESHOLDS = Thresholds(
         "run_values_by_chance", 1e-3, "probability", "greatest for so good a line by chance", "chosen-by-judgement"
     ),
 )
-"""All of them, in the order of the diagnosis."""
+"""Thresholds in the order of the diagnosis."""

@@ -1,5 +1,5 @@
-"""Causes between command and actuator, looked for where both are recorded: every actuator alone, without the ship's
-motion."""
+"""Identification of effects between command and actuator where both are recorded: every actuator alone, without the
+ship's motion."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _SCAN, _STEP, _PARTS = (4, 12, 24), 0.02, 4
 
 
 def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear], list[RecordError]]:
-    """Findings of every actuator that moves, best first, the best ordinary gears, and what the records err by; nothing
-    where only commands are recorded (those that the motion was fitted with)."""
+    """Findings on every actuator that moves, best first, its best default dynamics, and the errors of the records;
+    empty where only commands are recorded (then the default dynamics of the motion's fit)."""
     if plant.seg.commanded:
         return [], plant.ordinary, []
     seg, gears = plant.long, ordinary_gears(plant.c.L)
@@ -49,8 +49,8 @@ def find_in_gears(plant: Plant) -> tuple[list[GearFinding], dict[str, Gear], lis
 
 @dataclass(frozen=True)
 class _Record:
-    """Commands (P, K) and positions (P, K + 1) of one actuator over P pieces; judged (P, K): real samples, after the
-    longest delay looked for: what was ordered before the record began is not known."""
+    """Commands (P, K) and positions (P, K + 1) of one actuator over P segments; judged (P, K): real samples, after the
+    longest delay searched: earlier commands are unknown."""
 
     name: str
     scale: float
@@ -78,7 +78,7 @@ class _Record:
         )
 
     def paths(self, z: np.ndarray, kind: Kind | None) -> np.ndarray:
-        """Positions (M, P, K) that M gears would give; z (M, values): logarithms of time constant, rate[, the value of
+        """Positions (M, P, K) for M sets of dynamics; z (M, values): logarithms of time constant, rate[, the value of
         `kind`]."""
         code = _follower(kind and kind.field)
         if code is not None:
@@ -92,7 +92,7 @@ class _Record:
         return path[:, parts::parts].reshape(len(z), *self.command.shape)
 
     def errors(self, z: np.ndarray, kind: Kind | None) -> np.ndarray:
-        """Record less path (M, P, K), zero where it is not judged."""
+        """Residuals (M, P, K), record less path, zero where it is not judged."""
         return np.where(self.judged, self.measured[:, 1:] - self.paths(z, kind), 0.0)
 
     def costs(self, z: np.ndarray, kind: Kind | None) -> np.ndarray:
@@ -104,8 +104,8 @@ class _Record:
         return np.concatenate([np.sum(self.errors(part, kind) ** 2, axis=(1, 2)) for part in parts])
 
     def _followed(self, code: Lanes, z: np.ndarray, kind: Kind | None, kept: int) -> np.ndarray:
-        """Motor, position and sum of squared errors so far, (M, kept, P, 3): at every sample or, if 1 is kept, at the
-        end."""
+        """Motor, position and cumulative sum of squared errors, (M, kept, P, 3): at every sample or, if 1 is kept, at
+        the end."""
         (P, K), values = self.command.shape, np.exp(z)
         whole = np.zeros(len(z), dtype=int)
         if kind is not None and kind.field == "delay":
@@ -133,10 +133,10 @@ class _Record:
         return out
 
     def findings(self, usual: Gear) -> tuple[list[GearFinding], Gear, RecordError | None]:
-        """Every effect beside the best ordinary gear, that gear, and what the record errs by.
+        """Findings of every effect beside the best default dynamics, these dynamics, and the error of the record.
 
-        Of an actuator whose record reads too little it seems that it stays short of its commands, as with a deadband:
-        where an error of the record explains more than every effect, they are judged without it.
+        An actuator whose record reads too little seems to stop short of its commands, as with a deadband: where an
+        error of the record explains more than every effect, the effects are judged without it.
         """
         found, ordinary, error = self._judged(usual)
         if error is None:
@@ -147,7 +147,7 @@ class _Record:
     def _judged(self, usual: Gear) -> tuple[list[GearFinding], Gear, RecordError | None]:
         """Findings of the record as it is, with an error that explains more than every effect.
 
-        Two stages look like a delay, end stops like an error: they are fitted only where something is to be explained,
+        Two stages look like a delay, end stops like an error: they are fitted only where a residual is to be explained,
         since that takes as long as all the others.
         """
         kinds = kinds_of(self.name, self.scale, float(np.percentile(np.abs(self.command), 98)), usual)
@@ -177,7 +177,7 @@ class _Record:
         return found, gear, error if error.score > least else None
 
     def _ended(self, z: np.ndarray, kind: Kind | None, before: float) -> tuple[float, _Record]:
-        """Score of end stops where the record of a gear shows them (and of `kind`), and its record."""
+        """Score of end stops where the record shows them (and of `kind`), and its record."""
         from scipy.optimize import minimize_scalar
 
         def ended(limit: float) -> _Record:
@@ -195,7 +195,7 @@ class _Record:
         return self._worth(before, record.errors(z[None], kind)[0], 1 + (kind is not None)), record
 
     def _misread(self, z: np.ndarray, kind: Kind | None, plain: np.ndarray) -> RecordError:
-        """Error of the record beside the positions of a gear; score: against the errors `plain`."""
+        """Error of the record beside the positions of the dynamics; score: against the errors `plain`."""
         at = self.paths(z[None], kind)[0]
         off, forms = np.where(self.judged, self.measured[:, 1:] - at, 0.0), np.where(self.judged, readings(at), 0.0)
         factors = np.linalg.lstsq(forms.reshape(len(forms), -1).T, off.ravel(), rcond=None)[0]
@@ -206,7 +206,8 @@ class _Record:
         return RecordError(self.name, best, score, float(size), factors)
 
     def _worth(self, before: float, rest: np.ndarray, values: int) -> float:
-        """Score of `values` more values that leave `rest` (P, K) of errors whose squares were `before` together."""
+        """Score of `values` more parameters with residuals `rest` (P, K) of errors whose squares were `before`
+        together."""
         samples, after = float(self.judged.sum()), max(float(np.sum(rest**2)), 1e-300)
         return float(
             samples * _discount(rest) * np.log(max(before, 1e-300) / after)
@@ -214,8 +215,8 @@ class _Record:
         )
 
     def _fitted(self, kind: Kind | None, near: Sequence[np.ndarray] = ()) -> np.ndarray:
-        """Logarithms of the time constant, the rate[, the value of `kind`] of the best gear; near: gears like whose
-        first two it may be."""
+        """Logarithms of the time constant, the rate[, the value of `kind`] of the best dynamics; near: starting values
+        of the first two."""
         span = float(np.percentile(np.abs(self.command), 98))
         rate = max(least_rate(self.name, self.scale), 0.01 * span / self.scale)
         most = max(10.0 * span / self.dt, 2.0 * rate)
@@ -246,14 +247,13 @@ class _Record:
 
     @property
     def _second(self) -> Kind:
-        """Ordinary second stage."""
+        """Default second stage."""
         longest = THRESHOLDS.value("second_stage") * ORDINARY[self.name].T * self.scale
         return Kind("", "T2", 0.02 * self.scale, longest)
 
     def _detectable(self, kind: Kind, ordinary: np.ndarray, plain: np.ndarray) -> float:
-        """Size from which `kind` is expected to be found on a gear that is like the `ordinary` one otherwise, whose
-        errors are `plain`: what its time constant, rate and a second stage cannot take up as well is seen. NaN beyond
-        the bounds."""
+        """Detection limit of `kind` for dynamics that are otherwise the `ordinary` ones, with errors `plain`: its time
+        constant, rate and a second stage are nuisance parameters. NaN beyond the bounds."""
         least, most = (kind.high, kind.low) if kind.field == "rate" else (kind.low, kind.high)
         begins = ordinary if kind.at == 2 else kind.like(ordinary, least)
         free = _STEP * np.eye(2)[[at for at in (0, 1) if at != kind.at]]
@@ -282,10 +282,8 @@ class _Record:
         """Minimum of the squared error inside a box: a grid, then a pattern of neighbours of its best point.
 
         The pattern shrinks when no neighbour is much better. Otherwise it would follow a valley where the time constant
-        hardly matters.
-
-        Deadband and play leave the cost without a usable slope. The valley is narrow in the rate and in what is
-        looked for: these are scanned closely.
+        hardly changes the cost. Deadband and play leave the cost without a usable slope. The valley is narrow in the
+        rate and in the value of `kind`: these are scanned closely.
         """
         grid = [np.linspace(a, b, n) for a, b, n in zip(low, high, _SCAN, strict=False)]
         points = np.clip([(*z[:2], *rest) for z in near for rest in product(*grid[2:])] or [*product(*grid)], low, high)
@@ -313,9 +311,9 @@ def _discount(rest: np.ndarray) -> float:
 
 @cache
 def _follower(field: str | None) -> Lanes | None:
-    """Machine code of a sample of `gear_step`: motor, position, cost; time constant, rate[, value of `field`, of a
-    delay the part of a sample]; dt; command, the one before it, record, whether it is judged. None where there is no
-    compiler."""
+    """Machine code of a sample of `gear_step`. Outputs: motor, position, cost. Inputs: time constant, rate[, value of
+    `field`, of a delay the part of a sample]; dt; command, the one before it, record, whether it is judged. None where
+    there is no compiler."""
     import casadi as ca
 
     from ...compiled import Lanes

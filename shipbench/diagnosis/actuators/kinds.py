@@ -1,4 +1,4 @@
-"""Effects between command and actuator, and ordinary actuator dynamics."""
+"""Effects between command and actuator, and default actuator dynamics."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _RATE_POWER = {"n": 2, "delta": 1, "F": 0}
 
 @dataclass(frozen=True)
 class Ordinary:
-    """Bounds of ordinary dynamics, at 130 m: greatest time constant [s], smallest rate [actuator's unit per s]."""
+    """Bounds of the default dynamics, at 130 m: greatest time constant [s], smallest rate [actuator's unit per s]."""
 
     T: float
     rate: float
@@ -27,14 +27,17 @@ ORDINARY = {
     "delta": Ordinary(THRESHOLDS.value("rudder_time_constant"), np.deg2rad(THRESHOLDS.value("rudder_rate"))),
     "F": Ordinary(THRESHOLDS.value("thruster_time_constant"), 0.0),
 }
-"""Ordinary shaft, rudder and thrusters. The rate of thrusters has no bound."""
+"""Bounds for shaft, rudder and thrusters. The rate of thrusters has no bound."""
 
 
 @dataclass(frozen=True)
 class GearFinding:
-    """An effect of a gear. score: 2 log likelihood ratio against the best ordinary gear, of one stage or two, samples
-    discounted for their correlation, less log(10 N) for the added value; value: of the effect's parameter, ci95;
-    per_run (N,); detectable: the smallest value (of a rate the greatest) that is expected to be found, NaN for none."""
+    """Effect on actuator dynamics.
+
+    score: 2 log likelihood ratio against the best default dynamics, of one stage or two, samples discounted for their
+    correlation, less log(10 N) for the added value; value: of the effect's parameter, ci95; per_run (N,); detectable:
+    detection limit (of a rate the greatest), NaN for none.
+    """
 
     effect: str
     score: float
@@ -48,8 +51,8 @@ class GearFinding:
 
 @dataclass(frozen=True)
 class Kind:
-    """An effect of one actuator: bounds of its value in the gear, and how a gear takes it; `beyond` is subtracted when
-    it is reported."""
+    """Effect on one actuator: bounds of its value, and the field of the dynamics that it sets; `beyond` is subtracted
+    when it is reported."""
 
     effect: str
     field: str
@@ -59,25 +62,25 @@ class Kind:
 
     @property
     def at(self) -> int:
-        """Place of its value beside time constant and rate, or in place of one of them."""
+        """Index of its value beside time constant and rate, or in place of one of them."""
         return {"T": 0, "rate": 1}.get(self.field, 2)
 
     def like(self, ordinary: np.ndarray, size: float) -> np.ndarray:
-        """Logarithms of time constant, rate[, value] of a gear with this effect, otherwise like the `ordinary` one."""
+        """Logarithms of time constant, rate[, value] of dynamics with this effect, otherwise the `ordinary` ones."""
         return np.concatenate([ordinary[: self.at], [np.log(size)], ordinary[self.at + 1 :]])
 
 
 def least_rate(actuator: str, scale: float) -> float:
-    """Least rate of an ordinary gear, by Froude's law; a full-scale rudder under 130 m need be no faster (SOLAS)."""
+    """Least rate of default dynamics, by Froude's law; a full-scale rudder under 130 m need be no faster (SOLAS)."""
     if actuator == "delta" and scale > 0.4:
         scale = max(scale, 1.0)
     return ORDINARY[actuator].rate / scale ** _RATE_POWER[actuator]
 
 
 def slow_on_any_ship(found: GearFinding) -> bool:
-    """Check whether a gear that is too slow for its ship is too slow for the longest ship as well.
+    """Check whether dynamics too slow for this ship are too slow for the longest ship as well.
 
-    What does not depend on the length counts as such.
+    Values that do not depend on the length count as such.
     """
     scale = (THRESHOLDS.value("longest_ship") / 130.0) ** 0.5
     changed = EFFECTS.get(found.effect).traits.gear_field

@@ -16,19 +16,20 @@ _VARIABLES = {"n": "revolutions", "delta": "rudder", "F": "thrusters"}
 
 
 def readings(at: np.ndarray) -> np.ndarray:
-    """The `FORMS` (4, ...) of positions (...)."""
+    """Functions `FORMS` (4, ...) of positions (...)."""
     return np.stack([np.ones_like(at), at, at * abs(at), abs(at)])
 
 
 @dataclass(frozen=True)
 class RecordError:
-    """Error of the record beside where the commands bring the actuator, that follows the position, best in this form.
+    """Error of the record against the position that the commands give, as a function of the position, best in this
+    form.
 
-    Such are a calibration error and a sensor that is not linear.
+    Examples are a calibration error and a sensor that is not linear.
 
-    score: 2 log likelihood ratio, as of a gear's effects; size: root mean square without the zero error, relative to
-    that of the record; factors (4,): of `readings`; worth: log evidence of the motion for the record without it (where
-    negative, the gear does not go where it is sent).
+    score: 2 log likelihood ratio, as for effects on dynamics; size: root mean square without the zero error, relative
+    to that of the record; factors (4,): of `readings`; worth: log Bayes factor of the motion for the record without it
+    (where negative, the actuator does not reach its command).
     """
 
     actuator: str
@@ -40,27 +41,27 @@ class RecordError:
 
     @property
     def variable(self) -> str:
-        """Variable that it depends on."""
+        """Variable on which it depends."""
         return _VARIABLES[self.actuator]
 
     @property
     def undecided(self) -> bool:
-        """Check whether the motion does not tell which of the two is wrong."""
+        """Check whether the motion leaves open which of the two is wrong."""
         return abs(self.worth) <= THRESHOLDS.value("record_reading_evidence")
 
     @property
     def axis(self) -> str:
-        """Signal that is wrong, as far as the motion tells."""
+        """Signal that is wrong, as far as the motion identifies it."""
         which = "recorded or ordered" if self.undecided else "recorded" if self.contradicted else "ordered"
         return f"{which} {self.variable}"
 
     @property
     def contradicted(self) -> bool:
-        """Check whether the motion speaks against the record."""
+        """Check whether the motion contradicts the record."""
         return self.worth > THRESHOLDS.value("record_reading_evidence")
 
     def taken_out(self, recorded: np.ndarray) -> np.ndarray:
-        """Positions that are recorded so (Newton's method; the record rises with the position)."""
+        """Positions corrected for the error (Newton's method; the record rises with the position)."""
         _, straight, bent, split = self.factors
         true = recorded
         for _ in range(8):

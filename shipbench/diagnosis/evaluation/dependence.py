@@ -1,6 +1,6 @@
 """Dependence of a missing force: the share of its variance that a smooth curve of one variable explains.
 
-The test gives runs each other's force.
+The null distribution assigns the runs each other's force.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ UNITS = {
     "stern thruster": "kN", "time": "s", "run": "",
 }  # fmt: skip
 _SURROGATES, _GRID = 199, 181
-"""Random forces of the test; points of a curve."""
+"""Number of random forces of the test; points of a curve."""
 
 
 class Follows(NamedTuple):
-    """One variable against the force of one axis. share: of the variance, less what chance takes; p: of the best of all
-    variables by chance."""
+    """Dependence of the force of one axis on one variable. share: of the variance, less its expectation under the null;
+    p: of the best of all variables under the null."""
 
     variable: str
     share: float
@@ -57,19 +57,19 @@ def variables(trace: Trace) -> dict[str, np.ndarray]:
 
 
 def at_knots(trace: Trace) -> dict[str, np.ndarray]:
-    """The variables at the knots of the force, (B, J)."""
+    """Variables at the knots of the force, (B, J)."""
     at = samples_of(trace)
     return {k: x[:, at] for k, x in variables(trace).items()}
 
 
 def samples_of(trace: Trace) -> np.ndarray:
-    """(J,): where among the samples the knots of the force are."""
+    """Sample indices (J,) of the knots of the force."""
     return np.clip(np.searchsorted(trace.t, trace.knots - 1e-6), 0, len(trace.t) - 1)
 
 
 def basis(name: str, x: np.ndarray, reference: np.ndarray | None = None) -> np.ndarray:
-    """Smooth functions (..., F) of a variable: two harmonics of the heading, else straight pieces between quartiles (of
-    `reference`)."""
+    """Smooth functions (..., F) of a variable: two harmonics of the heading, else piecewise linear between quartiles
+    (of `reference`)."""
     if name == "heading":
         psi = np.deg2rad(x)
         return np.stack([f(k * psi) for k in (1, 2) for f in (np.cos, np.sin)], axis=-1)
@@ -81,10 +81,10 @@ def basis(name: str, x: np.ndarray, reference: np.ndarray | None = None) -> np.n
 
 
 def follows(trace: Trace, seed: int = 0) -> dict[str, list[Follows]]:
-    """Every variable against the force of every axis, greatest share first.
+    """Dependences of every axis on every variable, greatest share first.
 
-    In the null the runs have each other's force, turned round in time by a random shift: that keeps how the force
-    varies inside a run and between runs, whatever its colour. p counts the best of all variables.
+    Under the null the runs have each other's force, shifted circularly in time at random: that keeps the spectrum of
+    the force and its variance between runs. p counts the best of all variables.
     """
     values = at_knots(trace)
     y = _centred(trace.force)
@@ -114,8 +114,8 @@ def follows(trace: Trace, seed: int = 0) -> dict[str, list[Follows]]:
 
 
 def _standardised(R2: np.ndarray, chance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Log odds of the shares (V, 3) and of those by chance (V, S, 3), about the mean and over the spread by chance:
-    alike for all variables, so that one greatest value can be taken over them."""
+    """Log odds of the shares (V, 3) and of those under the null (V, S, 3), standardised by the null: comparable over
+    all variables, so that one greatest value can be taken."""
 
     def odds(x: np.ndarray) -> np.ndarray:
         x = np.clip(x, 1e-6, 1.0 - 1e-6)
@@ -126,7 +126,7 @@ def _standardised(R2: np.ndarray, chance: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _centred(force: np.ndarray) -> np.ndarray:
-    """About the mean of all runs; zero where there is none."""
+    """Values about the mean of all runs; zero where there is none."""
     known = np.isfinite(force)
     filled = np.where(known, force, 0.0)
     return np.where(known, filled - filled.sum(axis=(0, 1)) / np.maximum(known.sum(axis=(0, 1)), 1), 0.0)
@@ -148,7 +148,7 @@ def _orthonormal(name: str, x: np.ndarray) -> np.ndarray:
 
 
 def _surrogates(trace: Trace, y: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Forces (S, B, J, 3) of other runs, turned round in time."""
+    """Forces (S, B, J, 3) of other runs, shifted circularly in time."""
     known = np.isfinite(trace.force).all(axis=-1)
     where = [(trace.run == run)[:, None] & known for run in np.unique(trace.run)]
     where = [w for w in where if w.any()]
@@ -162,8 +162,8 @@ def _surrogates(trace: Trace, y: np.ndarray, rng: np.random.Generator) -> np.nda
 
 
 def curve(trace: Trace, axis: int, name: str) -> Curve | None:
-    """Least-squares curve of the force (mean included) over the middle 96 % of the variable; None where there is
-    nothing to fit."""
+    """Least-squares curve of the force (mean included) over the middle 96 % of the variable; None where there are too
+    few values."""
     x, y = at_knots(trace)[name], trace.force[..., axis]
     known = np.isfinite(x) & np.isfinite(y)
     if known.sum() < 20:
@@ -187,8 +187,8 @@ def curve(trace: Trace, axis: int, name: str) -> Curve | None:
 def with_speed(trace: Trace, axis: int, name: str, seed: int = 0) -> float:
     """Ratio of the force's dependence on `name` in the faster half of the samples to that in the slower one.
 
-    One where the runs leave it open (bootstrap over runs, 95 %), where it changes by less than half, or with fewer than
-    8 runs.
+    The ratio is 1 where it does not differ significantly from 1 (bootstrap over runs, 95 %), where it changes by less
+    than half, or with fewer than 8 runs.
     """
     values, known_curve = at_knots(trace), curve(trace, axis, name)
     runs = np.unique(trace.run)

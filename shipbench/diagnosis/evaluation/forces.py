@@ -1,4 +1,4 @@
-"""Forces that named causes exert on the ship along the runs."""
+"""Forces of identified causes on the ship along the runs."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ AXES = ("surge", "sway", "yaw")
 
 
 def force_of_term(found: Fit, index: int) -> dict[str, float]:
-    """Greatest force of the index-th term on the runs, see `_greatest`; empty for what acts on sensors or between
-    command and actuator."""
+    """Greatest force of the index-th term on the runs, see `_greatest`; empty for effects on sensors or actuator
+    dynamics."""
     now = actives(found.plant, found.scales, _point(found))
     if now[index].effect.enters != "force":
         return {}
@@ -31,16 +31,16 @@ def force_of_hull(found: Fit) -> dict[str, float]:
 
 
 def _point(found: Fit) -> Point:
-    """The estimates."""
+    """Point of the estimates."""
     return point_from(found.model, found.point, found.solution, found.prior, found.estimate)
 
 
 def _greatest(found: Fit, without: Sequence[Active], plain_hull: bool = False) -> dict[str, float]:
-    """99th percentile of the magnitude of a cause's force in surge and sway [N] and moment about midship in yaw [N m],
+    """Percentile 99 of the magnitude of a cause's force in surge and sway [N] and moment about midship in yaw [N m],
     over all time steps.
 
     It is the change of the acceleration in the middle of every step, at the estimated motion, when the cause is left
-    out, times the inertia of the plain model. Axes where it stays below what is noticeable are left out.
+    out, times the inertia of the baseline model. Axes where it is not practically significant are left out.
     """
     plant, point = found.plant, _point(found)
     now = actives(plant, found.scales, point)

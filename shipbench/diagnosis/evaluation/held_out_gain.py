@@ -1,6 +1,6 @@
-"""Held-out gain of naming a cause: open-loop rollouts of runs that were not fitted.
+"""Held-out gain of identified causes: open-loop rollouts of held-out runs.
 
-Everything is repeated on every training part.
+Selection and fits are repeated on every training part.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ..thresholds import THRESHOLDS
 
 @dataclass(frozen=True)
 class Extension:
-    """Addition to the plain model by a diagnosis: terms with first guesses, the hull, gears that differ."""
+    """Addition to the baseline model by a diagnosis: terms with first guesses, the hull, changed actuator dynamics."""
 
     terms: tuple[Term, ...] = ()
     values: tuple[np.ndarray, ...] = ()
@@ -36,7 +36,7 @@ class Extension:
 
 @dataclass(frozen=True)
 class Rollout:
-    """A fitted open-loop model: base parameters and effects; no latent force, initial states as measured."""
+    """Fitted open-loop model: base parameters and effects; no latent force, initial states as measured."""
 
     base: np.ndarray
     terms: tuple[Term, ...]
@@ -44,9 +44,9 @@ class Rollout:
 
 
 def rollout_plant(dataset: Dataset, gears: dict[str, Gear]) -> Plant:
-    """Plant with segments as long as the horizon of rollouts (Froude-scaled), fast records averaged.
+    """Forward model with segments as long as the horizon of rollouts (Froude-scaled), fast records averaged.
 
-    The commands drive it through `gears`, from where the actuators begin.
+    The commands drive it through `gears`, from the initial positions of the actuators.
     """
     ship, dataset = complete(dataset.ship), averaged(dataset)
     horizon = THRESHOLDS.value("rollout_horizon") * (ship.L / 130.0) ** 0.5
@@ -55,19 +55,19 @@ def rollout_plant(dataset: Dataset, gears: dict[str, Gear]) -> Plant:
 
 
 def plain_base() -> np.ndarray:
-    """Base parameters of eq. (2) alone: the ordinary differences of `Structure` taken out again, so that "before" is
-    the plain physics model."""
+    """Base parameters of eq. (2) alone: the differences of `Structure` are removed, so that "before" is the plain
+    physics model."""
     base = np.zeros(NUM_BASE)
     base[len(FREE) + NUM_HULL :] = STRUCTURE.plain()
     return base
 
 
 def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
-    """Least squares of whole rollouts over p, the named effects (and the hull where it is named), weakly held by their
+    """Least squares of whole rollouts over p, the identified effects (and the hull where it is named), with weak
     priors.
 
-    Channels are weighed by the root mean square of the error before the fit, positions as one: the spread that the
-    model must explain. Once the budget is spent, it ends where it stands.
+    Channels are weighted by the root mean square of the error before the fit, positions as one: the spread that the
+    model must explain. Once the time budget is spent, the current fit is returned.
     """
     free = list(range(len(FREE) + (NUM_HULL if extension.hull else 0)))
     terms = tuple(t for t in extension.terms if not t.per_run)  # a run that was not seen has no value of its own
@@ -112,7 +112,7 @@ def _moved(point: Point, free: Sequence[int], terms: Sequence[Term], at: np.ndar
 
 
 def _lin(plant: Plant, scales: Scales, model: Rollout) -> Linearisation:
-    """The rollout, begun so that the sensors of the model read what was measured first."""
+    """Linearisation of the rollout from initial states at which the model's sensors read the first measurement."""
     B = len(plant.seg.run)
     point = Point(model.base, np.zeros((B, 6)), np.zeros((B, plant.knots, 3)), model.terms, model.values)
     lin = Linearisation(plant, scales, point)
@@ -135,14 +135,14 @@ def _weights(lin: Linearisation) -> np.ndarray:
 
 
 def _cost(lin: Linearisation, weights: np.ndarray) -> float:
-    """Diverged segments count as errors of a hundred times the ordinary."""
+    """Cost of the rollouts. Diverged segments count as errors of a hundred times the typical one."""
     with np.errstate(all="ignore"):
         e = np.clip(np.nan_to_num(_errors(lin) * weights, nan=100.0, posinf=100.0, neginf=-100.0), -100.0, 100.0)
     return float(np.sum(e**2))
 
 
 def distance(plant: Plant, scales: Scales, model: Rollout) -> tuple[np.ndarray, np.ndarray]:
-    """Mean ED [m] of every run (N,), the given sample not scored, and the predicted motion (B, K + 1, 6)."""
+    """Mean ED [m] of every run (N,), without the initial sample, and the predicted motion (B, K + 1, 6)."""
     lin = _lin(plant, scales, model)
     with np.errstate(all="ignore"):
         ed = np.hypot(*np.moveaxis(lin.predicted[..., :2] - plant.seg.states[..., :2], -1, 0))
@@ -157,8 +157,8 @@ def distance(plant: Plant, scales: Scales, model: Rollout) -> tuple[np.ndarray, 
 
 @dataclass(frozen=True)
 class FoldGain:
-    """ED [m] of the test runs: by the plain model, with the causes, and with the hull's derivatives fitted as well;
-    what the training runs led to, and whether their selection was stopped by its budget."""
+    """Errors ED [m] of the test runs: of the baseline model, with the causes, and with the hull's derivatives fitted as
+    well; the causes of the training runs, and whether the budget stopped their selection."""
 
     test: np.ndarray
     before: np.ndarray

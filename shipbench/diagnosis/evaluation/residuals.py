@@ -1,4 +1,5 @@
-"""Errors of the plain model, before any cause is named: their place, whether residuals are white, missing forces."""
+"""Errors of the baseline model, before any cause is identified: their place, whiteness of the residuals, missing
+forces."""
 
 from __future__ import annotations
 
@@ -38,15 +39,13 @@ class Slice(NamedTuple):
 
 @dataclass(frozen=True)
 class ErrorTables:
-    """The figures behind the lines.
+    """Figures behind the lines of a report.
 
     share: of the normalised squared error, per channel. size: root mean square error per channel, in `CHANNEL_UNITS`;
-    scale: what it is divided by.
-    by: variable -> slices of the normalised error of all channels together; by_channel: the same of one channel, in its
-    unit.
-    worst_runs: (name, root mean square of the normalised error), greatest first. follows: see `follows.follows`.
-    white: residual channel -> Ljung-Box statistic over its 95 % limit. inputs: (residual, input) -> greatest
-    correlation over its 95 % bound.
+    scale: its divisor. by: variable -> slices of the normalised error of all channels together; by_channel: the same of
+    one channel, in its unit. worst_runs: (name, root mean square of the normalised error), greatest first. follows: see
+    `follows.follows`. white: residual channel -> Ljung-Box statistic over its 95 % limit. inputs: (residual, input) ->
+    greatest correlation over its 95 % bound.
     """
 
     share: dict[str, float]
@@ -64,7 +63,7 @@ def squared_error(trace: Trace, predicted: np.ndarray) -> tuple[np.ndarray, np.n
     """Squared open-loop error (B, K + 1, 5) of `predicted` (B, K + 1, 6) and the scale (5,) that makes channels
     comparable.
 
-    The scale is how much the channel moves inside a run: its root mean square about each segment's own mean, and no
+    The scale is the variation of the channel inside a run: its root mean square about each segment's own mean, and no
     less than 1 deg of heading (1 deg in a tenth of the horizon for the yaw rate), 2 % of the speed. So one metre is
     never added to one degree.
     """
@@ -87,7 +86,8 @@ def squared_error(trace: Trace, predicted: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def error_tables(trace: Trace, seed: int = 0) -> ErrorTables:
-    """All tables. Padding with NaN, single runs and few samples are taken; what cannot be computed is left out."""
+    """Tables of errors. Padding with NaN, single runs and few samples are accepted; tables that cannot be computed are
+    left out."""
     squares, scale = squared_error(trace, trace.before)
     with np.errstate(over="ignore"):
         normal = squares / scale**2
@@ -152,7 +152,7 @@ def _slices(x: np.ndarray, squares: np.ndarray, edges: np.ndarray) -> list[Slice
 
 
 def what_is_wrong(trace: Trace) -> tuple[Wrong, ...]:
-    """One line for every channel with more than 5 % of the normalised error, greatest first."""
+    """Lines on every channel with more than 5 % of the normalised error, greatest first."""
     tables = error_tables(trace)
     by_chance, least = THRESHOLDS.value("dependence_by_chance"), THRESHOLDS.value("dependence_share")
     lines = []
@@ -170,7 +170,7 @@ def what_is_wrong(trace: Trace) -> tuple[Wrong, ...]:
 
 
 def _error_words(tables: ErrorTables, channel: str, variable: str) -> list[str]:
-    """Size of a channel's error, its growth, and where it is greatest."""
+    """Text on the size of a channel's error, its growth, and where it is greatest."""
     text = [f"root mean square {tables.size[channel]:.3g} {CHANNEL_UNITS[channel][0]}"]
     larger = THRESHOLDS.value("error_ratio")
     growth = tables.by_channel[(channel, "horizon")]
@@ -191,7 +191,8 @@ def _error_words(tables: ErrorTables, channel: str, variable: str) -> list[str]:
 
 
 def force_words(trace: Trace, axis: int, found: Follows) -> str:
-    """Sentence on where the missing force of one axis is greatest and smallest along the variable that it follows."""
+    """Sentence on where the missing force of one axis is greatest and smallest along the variable on which it
+    depends."""
     name, share, _ = found
     fitted = curve(trace, axis, name)
     what = f"missing {AXES[axis]} force follows {name} ({100 * share:.0f} % of its variance)"
@@ -240,7 +241,7 @@ def correlogram(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _whiteness(trace: Trace) -> dict[str, float]:
-    """Ljung & Box (1978), over its 95 % limit: below one the residual is white as far as can be told."""
+    """Statistic of Ljung & Box (1978), over its 95 % limit: below one, whiteness is not rejected."""
     from scipy.stats import chi2
 
     found = {}

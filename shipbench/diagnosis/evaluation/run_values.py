@@ -1,4 +1,4 @@
-"""Dependence of the values that single runs have of a cause: on the place where a run was sailed, or on its number."""
+"""Dependence of a cause's values in single runs on the place where a run was sailed, or on its number."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ def of_runs(fit: Fit, index: int) -> np.ndarray:
 
 
 def goes_with(fit: Fit, values: np.ndarray) -> str:
-    """Sentence on what `values` (runs, components) go with, with the share of the variance; empty if nothing."""
+    """Sentence on the variable with which `values` (runs, components) correlate, with the share of the variance; empty
+    if none."""
     seg = fit.plant.seg
     weight = np.maximum(np.bincount(seg.run, seg.mask.sum(axis=1), minlength=seg.runs), 1.0)
     x, y = (
@@ -37,7 +38,7 @@ def goes_with(fit: Fit, values: np.ndarray) -> str:
 
 
 def _chance(values: np.ndarray, at: np.ndarray) -> tuple[float, float]:
-    """Probability by the F test of `values` (N, C) on a line in `at` (N, K), and its share of the variance."""
+    """p-value of the F test of `values` (N, C) on a line in `at` (N, K), and its share of the variance."""
     from scipy.stats import f
 
     (N, C), K = values.shape, at.shape[1]

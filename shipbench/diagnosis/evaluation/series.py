@@ -13,8 +13,8 @@ from .held_out_gain import Extension, distance, fit_rollout, rollout_plant
 
 
 def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
-    """Open-loop rollouts of the models fitted to all runs (the gain is held out, these pictures are not), latent forces
-    before and after."""
+    """Trace of open-loop rollouts of the models fitted to all runs (the gain is held out, these plots are not), and of
+    latent forces before and after."""
     extension = found.extension(hull)
     plain = rollout_plant(dataset, found.plain_gears)
     scales = Scales(plain)
@@ -27,7 +27,7 @@ def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
     short, B = null.plant, len(null.estimate)
 
     def force(z: np.ndarray) -> np.ndarray:
-        """At the samples, (B, K + 1, 3)."""
+        """Force at the samples, (B, K + 1, 3)."""
         return short.hat @ (np.moveaxis(z[:, 6:].reshape(B, 3, short.knots), 1, 2) * null.scales.w)
 
     sd = np.sqrt(np.maximum(np.diagonal(null.cov, axis1=1, axis2=2), 0.0))
@@ -51,7 +51,7 @@ def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
 
 
 def _along(short: Segments, values: np.ndarray, long: Segments) -> np.ndarray:
-    """Values (B, K + 1, C) on short segments, put on long ones of the same runs."""
+    """Values (B, K + 1, C) on short segments, mapped to long ones of the same runs."""
     first = np.round(short.start / short.dt).astype(int)
     length = int(np.max(first + short.mask.sum(axis=1)))
     runs = np.full((short.runs, length, values.shape[-1]), np.nan)  # pieces that thinning left out have no force

@@ -1,5 +1,5 @@
-"""Actuators whose record lastingly differs from where the commands bring them, and which of the two the motion
-believes."""
+"""Actuators whose record differs lastingly from the position that the commands give, and which of the two the motion
+supports."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..result import what_it_is
 
 
 def judged(null: Fit, errors: Sequence[RecordError]) -> list[RecordError]:
-    """The errors with what it is worth to the plain model to read each record without them."""
+    """Errors with the log Bayes factor of the baseline model for each record without its error."""
     if not errors:
         return []
     as_recorded, actuators = first_evidence(null.plant, null), null.plant.seg.states[..., ACTUATORS]
@@ -28,7 +28,7 @@ def judged(null: Fit, errors: Sequence[RecordError]) -> list[RecordError]:
 
 
 def read_rightly(dataset: Dataset, errors: Sequence[RecordError]) -> Dataset:
-    """The data set without these errors."""
+    """Data set without these errors."""
     runs = [
         replace(r, states=np.concatenate([r.states[:, MOTION], _true(r.states[:, ACTUATORS], errors)], axis=1))
         for r in dataset.runs
@@ -37,7 +37,7 @@ def read_rightly(dataset: Dataset, errors: Sequence[RecordError]) -> Dataset:
 
 
 def said(errors: Sequence[RecordError]) -> list[str]:
-    """Warnings of these errors."""
+    """Warnings on these errors."""
     told = []
     for e in errors:
         what = what_it_is({"axis": e.axis, "variable": e.variable, "form": e.form})
@@ -57,7 +57,7 @@ def said(errors: Sequence[RecordError]) -> list[str]:
 
 
 def _true(actuators: np.ndarray, errors: Sequence[RecordError]) -> np.ndarray:
-    """Positions (..., 4) of the actuators that are recorded so."""
+    """True positions (..., 4) of the actuators for recorded ones."""
     true = actuators.copy()
     for e in errors:
         channels = list(CHANNELS[e.actuator])

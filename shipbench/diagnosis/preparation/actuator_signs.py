@@ -1,4 +1,5 @@
-"""Actuators recorded to the other side, where motion alone does not tell: the fit of the plain model does."""
+"""Sign errors of recorded actuators, identified by the fit of the baseline model where the motion alone does not show
+them."""
 
 from __future__ import annotations
 
@@ -13,16 +14,15 @@ from ..model.linearisation import CENTRE, FREE, SPREAD
 from ..thresholds import THRESHOLDS
 
 _LIFT = FREE.index(5)
-"""Place of the slope of the rudder's lift among the fit's parameters."""
+"""Index of the slope of the rudder's lift among the fit's parameters."""
 
 
 def turned_actuators(dataset: Dataset, null: Fit) -> list[UnitFinding]:
-    """A rudder, or thrusters, whose record (and order, if it agrees) has the other sign; empty when nothing is beyond
-    doubt.
+    """Rudder, or thrusters, whose record (and command, if it agrees) has the opposite sign; empty when none is certain.
 
     Args:
         dataset: that was fitted.
-        null: the plain model of it.
+        null: the baseline model of it.
     """
     found = _rudder(null) + _thrusters(null)
     return found + (check_commands(dataset.runs, dataset.dt, found) if found else [])
@@ -46,11 +46,11 @@ def _rudder(null: Fit) -> list[UnitFinding]:
 
 
 def _thrusters(null: Fit) -> list[UnitFinding]:
-    """Sign errors of the thrusters, by the pieces in which they push.
+    """Sign errors of the thrusters, by the segments in which they push.
 
-    A sign error does not act on the fit of the other pieces, nor they on its own. The recorded signs are fitted also
-    with the forces and the noise of the best other signs. In few pieces one fit may take for noise what another takes
-    for forces.
+    A sign error does not act on the fit of the other segments, nor they on its own. The recorded signs are fitted also
+    with the forces and the noise model of the best other signs. In few segments one fit may take for noise what another
+    takes for forces.
     """
     push = null.plant.seg.states[..., [F_B, F_S]] * null.plant.seg.mask[..., None]
     used = [c for c, pushes in zip((F_B, F_S), np.any(push != 0.0, axis=(0, 1)), strict=True) if pushes]

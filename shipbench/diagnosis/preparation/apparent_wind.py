@@ -1,5 +1,5 @@
-"""Wind channels that do not hold the true wind: an instrument on board feels the ship's own motion too. Read as true,
-that is a current, a drag of waves or another ship's superstructure."""
+"""Wind channels that hold apparent wind: an instrument on board also measures the ship's own motion. Read as true wind,
+it is confounded with a current, added resistance in waves or another ship's superstructure."""
 
 from __future__ import annotations
 

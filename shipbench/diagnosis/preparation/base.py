@@ -1,4 +1,4 @@
-"""Prepared runs: a data set as it is to be read, and what was found on the way to it."""
+"""Prepared runs: a corrected data set, and the findings on the way to it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ...records import Dataset
 @dataclass(frozen=True)
 class LateVelocities:
     """Velocities that are late as a vector in the earth's axes. delay, sd [s]; filtered: by a filter of first order,
-    else as they were; score: 2 log evidence of the plain model that mending the velocities adds; over_position: the
-    same over moving the position instead."""
+    else a pure delay; score: twice the log Bayes factor of the baseline model for the correction of the velocities;
+    over_position: the same against a shift of the position instead."""
 
     delay: float
     sd: float
@@ -24,12 +24,12 @@ class LateVelocities:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A data set as it is to be read.
+    """Data set after preparation.
 
     Attributes:
         dataset: the runs, corrected so far.
         notes: lines for the reader, in the order of the passes.
-        excluded: effects of which the data are free, so that they are not looked for.
+        excluded: effects of which the data are free; they are not searched.
         errors: units, signs and frames that were corrected; each is a cause.
         late: velocities that were late and are corrected; a cause, too.
     """
@@ -41,16 +41,16 @@ class Prepared:
     late: LateVelocities | None = None
 
     def corrected(self, dataset: Dataset, *notes: str) -> Prepared:
-        """Prepared data set with other runs, and lines that say what was corrected."""
+        """Prepared data set with other runs, and lines on the correction."""
         return replace(self, dataset=dataset, notes=(*self.notes, *notes))
 
 
 Pass = Callable[[Prepared], Prepared]
-"""One step of the preparation. A pass that finds nothing returns what it was given."""
+"""Step of the preparation. A pass without findings returns its argument."""
 
 
 def prepare(dataset: Dataset, passes: Iterable[Pass]) -> Prepared:
-    """The data set after all passes.
+    """Prepared data set after all passes.
 
     Raises:
         InputError: a pass refuses the runs.

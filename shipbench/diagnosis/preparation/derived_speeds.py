@@ -1,5 +1,5 @@
-"""Speeds that are no measurements: derived from positions and headings by somebody before us. Counted as measurements
-they would say twice, and with great certainty, what is known once."""
+"""Speeds that were derived from positions and headings before the import. Counted as measurements they would use the
+same information twice, with too small a variance."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from .base import Prepared
 
 
 def marked(dataset: Dataset) -> Dataset:
-    """The data set with the speeds that follow from its positions or headings among those that are `derived`.
+    """Data set with the speeds that follow from its positions or headings among those that are `derived`.
 
-    What such speeds sum up to lies beside the positions by their quick errors alone, as it follows the slow ones; the
-    sums of a sensor's own errors are slow ones besides.
+    The integral of such speeds differs from the positions by quick errors alone, as it follows the slow ones; the
+    integral of a sensor's own errors has slow ones besides.
     """
     found = list(dataset.derived)
     least_track = THRESHOLDS.value("derived_least_track") * dataset.ship.L / 130.0
@@ -39,7 +39,7 @@ def mark_derived_speeds(prepared: Prepared) -> Prepared:
 
 
 def faults_of_derived_speeds(prepared: Prepared) -> Prepared:
-    """Exclude faults of sensors that are not there."""
+    """Exclude sensor errors that derived speeds cannot have."""
     derived = prepared.dataset.derived
     if not derived:
         return prepared
@@ -59,14 +59,14 @@ def has_speeds(dataset: Dataset) -> bool:
 
 
 def beside_track(run: Run) -> np.ndarray:
-    """Positions less the summed-up velocities, (samples, 2) [m]."""
+    """Positions less the integrated velocities, (samples, 2) [m]."""
     psi, u, v = run.states[:, PSI], run.states[:, U], run.states[:, V]
     rates = np.column_stack([u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)])
     return np.asarray(run.states[:, [X, Y]] - cumulative_trapezoid(rates, run.t, axis=0, initial=0.0))
 
 
 def beside_heading(run: Run) -> np.ndarray:
-    """Headings less the summed-up yaw rates, (samples, 1) [rad]."""
+    """Headings less the integrated yaw rates, (samples, 1) [rad]."""
     return np.asarray(run.states[:, [PSI]] - cumulative_trapezoid(run.states[:, [R]], run.t, axis=0, initial=0.0))
 
 

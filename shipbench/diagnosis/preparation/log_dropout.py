@@ -1,5 +1,5 @@
-"""Speeds of the track in place of those of a log that falls silent: what it does not say would pass for a force, or for
-another sensor's fault."""
+"""Speeds of the track in place of those of a speed log with dropouts, which would be confounded with a force or another
+sensor error."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .derived_speeds import has_speeds
 
 
 def speeds_of_the_track(prepared: Prepared) -> Prepared:
-    """Take u and v from the positions where the log reads nothing though the ship makes way."""
+    """Take u and v from the positions where the log reads zero while the ship makes way."""
     dataset = prepared.dataset
     found = silence(dataset) if has_speeds(dataset) else None
     if found is None:

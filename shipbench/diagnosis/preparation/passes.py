@@ -1,4 +1,4 @@
-"""The passes of the preparation, in their order. A new pass is a file of this folder and one line here."""
+"""Passes of the preparation, in their order. A new pass is a file of this folder and one line here."""
 
 from __future__ import annotations
 

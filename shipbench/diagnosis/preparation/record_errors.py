@@ -1,6 +1,8 @@
-"""Errors of the record itself, before anything is fitted. What `shipbench data check` calls an error is corrected where
-the check has a line of dataset.toml for it, as often as one correction shows the next; a record that contradicts itself
-even so is refused: no model explains it."""
+"""Errors of the record itself, before any fit.
+
+Errors by `shipbench data check` are corrected where the check has a line of dataset.toml for them, repeated while one
+correction reveals the next. A record that still contradicts itself is refused: no model explains it.
+"""
 
 from __future__ import annotations
 
@@ -31,16 +33,16 @@ _KEEP = "To keep the correction: shipbench data check FOLDER --apply."
 
 
 def joined(errors: Sequence[UnitFinding]) -> list[UnitFinding]:
-    """One error per channel; frames and kinds of velocities, which are no factors, first."""
+    """Errors, one per channel; frames and kinds of velocities, which are no factors, first."""
     return [e for e in errors if e.factor == 1.0] + one_per_channel([e for e in errors if e.factor != 1.0])
 
 
 def correct_record_errors(prepared: Prepared) -> Prepared:
-    """Correct units, signs and frames by the errors that the check finds. A fault that an effect of the library is, of
-    a size that it may have, is left to the fit, which tells how large it is and what it is worth.
+    """Correct units, signs and frames by the errors that the check finds. A fault that is an effect of the library, of
+    a plausible size, is left to the fit, which estimates its size and gain.
 
     Raises:
-        InputError: errors are left however often they are corrected.
+        InputError: errors remain after repeated correction.
     """
     dataset = prepared.dataset
     errors: list[UnitFinding] = []
@@ -68,11 +70,11 @@ def correct_record_errors(prepared: Prepared) -> Prepared:
 
 
 def refuse_contradictions(prepared: Prepared) -> Prepared:
-    """Refuse runs whose positions and speeds, or heading and yaw rate, say different things most of the time.
+    """Refuse runs whose positions and speeds, or heading and yaw rate, contradict each other most of the time.
 
     Raises:
-        InputError: in most pieces in which the ship moves, and in three at least, more than half of the squared way, or
-            turn, is unexplained.
+        InputError: in most segments in which the ship moves, and in three at least, more than half of the squared
+            displacement, or turn, is unexplained.
     """
     dataset = prepared.dataset
     length = max(1, round(SEGMENT * (dataset.ship.L / 130.0) ** 0.5 / dataset.dt))
@@ -100,10 +102,8 @@ def refuse_contradictions(prepared: Prepared) -> Prepared:
 
 
 def _ends(run: Run, length: int) -> tuple[np.ndarray, np.ndarray]:
-    """Way of pieces of a run by positions and by speeds (east as imaginary part), turn by heading and by yaw rate.
-
-    Both (pieces, 2), in m and rad.
-    """
+    """Displacement of segments by positions and by speeds (east as imaginary part), turn by heading and by yaw rate;
+    both (segments, 2), in m and rad."""
     edges = np.linspace(0, len(run) - 1, max(1, -(-(len(run) - 1) // length)) + 1).round().astype(int)
     plane = np.array([1.0, 1j])
     pairs = (
@@ -122,7 +122,7 @@ def _has_effect(found: Finding, ship: Particulars) -> bool:
 
 
 def _errors(found: Finding) -> Sequence[UnitFinding]:
-    """Channels that a finding's line reads in another unit, sign or scale, commands beside their actuators; or in
+    """Channels that a finding's line reads in another unit, sign or scale, with the commands of their actuators; or in
     another frame."""
     entries = tomllib.loads(found.line)
     factors = {channel: float(value) for channel, value in entries.get("scale", {}).items() if channel in STATES}

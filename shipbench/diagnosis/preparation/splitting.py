@@ -1,5 +1,4 @@
-"""Parts of runs that are too few but long: a sea trial is often one log of half an hour, and what changed in it did so
-at some time."""
+"""Splitting of few but long runs: a sea trial is often one log of half an hour, within which something may change."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ from ..thresholds import THRESHOLDS
 from .base import Prepared
 
 LEAST_RUNS, LEAST_SAMPLES = THRESHOLDS.count("least_runs"), THRESHOLDS.count("least_samples")
-"""Runs and samples from which a cause is named."""
+"""Fewest runs and samples with which a cause is reported."""
 
 
 def runs_in_words(dataset: Dataset) -> str:
@@ -23,7 +22,7 @@ def runs_in_words(dataset: Dataset) -> str:
 
 
 def is_too_little(dataset: Dataset) -> bool:
-    """Check whether runs or samples are too few for any cause to be named."""
+    """Check whether runs or samples are too few for any cause to be reported."""
     return len(dataset) < LEAST_RUNS or sum(map(len, dataset.runs)) < LEAST_SAMPLES
 
 
@@ -54,7 +53,7 @@ def split_long_runs(prepared: Prepared) -> Prepared:
 
 
 def refuse_too_little(prepared: Prepared) -> Prepared:
-    """Refuse runs that cannot be fitted; say what cannot be trusted.
+    """Refuse runs that cannot be fitted; warn of unreliable results.
 
     Raises:
         InputError: too few samples, samples too rare, or a ship that never moves.
@@ -92,8 +91,7 @@ def refuse_too_little(prepared: Prepared) -> Prepared:
 
 
 def sort_by_time(prepared: Prepared) -> Prepared:
-    """Sort runs into the order in which they were sailed, where all say when they began: a change begins with one of
-    them."""
+    """Sort runs by time, where all have a beginning: a change begins with one of them."""
     dataset = prepared.dataset
     began = {run.id: run.began for run in dataset.runs}
     known = {name: moment for name, moment in began.items() if moment is not None}

@@ -1,8 +1,8 @@
-"""Velocities that are late as a vector in the earth's axes: filtered there by a receiver, then turned by the heading of
-the moment.
+"""Velocities that are late as a vector in the earth's axes: filtered there by a receiver, then rotated by the current
+heading.
 
-Kinematics alone show it, over windows of many samples. It is taken out before any model is fitted: pieces of a minute
-cannot hold it, as what came before them is not theirs, and beside it every other fault of a sensor is hidden.
+Kinematics alone show it, over windows of many samples. It is corrected before any model is fitted: segments of a minute
+do not contain the earlier samples, and it hides every other sensor error.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from .derived_speeds import has_speeds
 
 
 def correct_late_velocities(prepared: Prepared) -> Prepared:
-    """Put velocities back in time that are late as a vector, and exclude the delays that kinematics answer: all once
-    the clocks are put right, or where measured speeds and the track show none."""
+    """Shift velocities back in time that are late as a vector, and exclude the delays that kinematics answer: all once
+    the clocks are corrected, or where measured speeds and the track show none."""
     dataset = prepared.dataset
     if not has_speeds(dataset):
         return prepared
@@ -48,8 +48,8 @@ def correct_late_velocities(prepared: Prepared) -> Prepared:
 
 
 def late_velocities_of(dataset: Dataset) -> tuple[LateVelocities, Dataset] | None:
-    """Late velocities and the runs with them taken out, if the track shows them and the plain model agrees that it is
-    they that are late, not the position that is early."""
+    """Late velocities and the corrected runs, if the track shows them and the baseline model agrees that the velocities
+    are late, not the position early."""
     found = late_velocities(Recording(dataset))
     if found is None:
         return None
@@ -79,12 +79,12 @@ def late_effects() -> tuple[str, ...]:
 
 
 def late_velocities_effect() -> Effect:
-    """The delay of both velocities together."""
+    """Delay of both velocities together, as an effect."""
     return next(e for e in map(EFFECTS.get, late_effects()) if e.traits.faults_of == {"u", "v"})
 
 
 def ruled_out(dataset: Dataset, found: Fit) -> tuple[str, ...]:
-    """Delays of a model that the track, which shows none, rules out: something else is late."""
+    """Delays of a model that the track rules out: another channel is late."""
     late = [i for i, t in enumerate(found.model.terms) if t.effect.late and t.since is None]
     seen = lags(Recording(dataset)) if late and has_speeds(dataset) else None
     if seen is None:
@@ -103,8 +103,8 @@ def ruled_out(dataset: Dataset, found: Fit) -> tuple[str, ...]:
 
 
 def correct_late_yaw_rate(prepared: Prepared) -> Prepared:
-    """Put a yaw rate back in time that is late against the heading. A heading cannot be early: of the two it is the yaw
-    rate, and beside it a rudder, or whatever else turns the ship, would seem to be late."""
+    """Shift a yaw rate back in time that is late against the heading. A heading cannot be early. Uncorrected, a rudder,
+    or any other cause of turning, would seem to be late."""
     dataset = prepared.dataset
     found = None if "r" in dataset.derived else late_yaw_rate(Recording(dataset))
     if found is None:
@@ -119,8 +119,8 @@ def correct_late_yaw_rate(prepared: Prepared) -> Prepared:
 
 
 def put_back(dataset: Dataset, delay: dict[str, float], ends: float) -> Dataset:
-    """The runs with late signals put back in time, less `ends` seconds at both ends; runs that leave less than 3
-    samples are left out."""
+    """Runs with late signals shifted back in time, less `ends` seconds at both ends; runs with fewer than 3 samples
+    left are left out."""
     runs = []
     for run in dataset.runs:
         names = (*STATES, *run.inputs_names)
@@ -136,8 +136,8 @@ def put_back(dataset: Dataset, delay: dict[str, float], ends: float) -> Dataset:
 
 
 def unfiltered(dataset: Dataset, delay: float) -> tuple[Dataset, float]:
-    """The velocities before a filter y_k = a y_{k-1} + (1 - a) x_k of that mean delay, a dt / (1 - a), and the gain 1 /
-    (1 - a) by which each sample is stretched."""
+    """Velocities before a filter y_k = a y_{k-1} + (1 - a) x_k of that mean delay, a dt / (1 - a), and the gain 1 / (1
+    - a) by which each sample is amplified."""
     keep = delay / (delay + dataset.dt)
 
     def sharpened(run: Run) -> Run:
@@ -153,8 +153,8 @@ def unfiltered(dataset: Dataset, delay: float) -> tuple[Dataset, float]:
 
 
 def _evidence(dataset: Dataset, noise_gain: float) -> np.ndarray:
-    """Shares (N,) of the runs in the log evidence of the plain model for the recorded samples, where those of u and v
-    were stretched by `noise_gain`."""
+    """Log evidence (N,) by run of the baseline model for the recorded samples, where those of u and v were amplified by
+    `noise_gain`."""
     plant = Plant.of(dataset)
     scales = Scales(plant)
     origin = Origin.of(plant, scales)

@@ -1,5 +1,5 @@
-"""Velocities through water in place of those over ground: a ship's log in a current. Beside them every other fault of a
-sensor is hidden, and so is what the current does to the ship."""
+"""Velocities through water in place of those over ground: a ship's log in a current. Uncorrected they hide every other
+sensor error, and the effect of the current on the ship."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .derived_speeds import has_speeds
 
 
 def speeds_over_ground(prepared: Prepared) -> Prepared:
-    """Put velocities through water over ground. What is derived from positions is over ground."""
+    """Convert velocities through water to velocities over ground. Derived velocities are over ground already."""
     dataset = prepared.dataset
     found = through_water(Recording(dataset)) if has_speeds(dataset) else None
     if found is None:

@@ -1,5 +1,5 @@
-"""Whether the size of a cause is sure, if runs are independent, not samples (of a model that is not the ship's, its own
-errors are too small), and whether it matters."""
+"""Agreement of runs on the size of a cause, if runs are independent, not samples (the errors of a wrong model are too
+small), and its practical significance."""
 
 from __future__ import annotations
 
@@ -20,13 +20,12 @@ from ..thresholds import THRESHOLDS
 from .screening import evidence
 
 _FACTORS = np.log(np.array([0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0]) ** 2)
-"""Grid of factors of the variances of the values of single runs, or pieces; the likeliest is taken."""
+"""Grid of factors of the variances of the values of single runs, or segments; the likeliest is taken."""
 
 
 def inflation(fit: Fit, at: np.ndarray) -> np.ndarray:
-    """Variance of the shared coefficients `at` (P,) by the sandwich clustered by run, over the model's; what single
-    runs have of their own is integrated out, else each run's current would pass for its disagreement with the
-    others."""
+    """Variance of the shared coefficients `at` (P,) by the sandwich clustered by run, over the model's. Values of
+    single runs are integrated out; otherwise each run's current would count as its disagreement with the others."""
     S, *_ = shared_alone(fit.reduced, fit.prior)
     scores = S[:, :-1, -1] - S[:, :-1, :-1] @ fit.solution.mean
     bread = fit.solution.cov
@@ -47,8 +46,8 @@ def covariance(fit: Fit, index: int) -> np.ndarray:
 
 
 def is_borne_by_one(fit: Fit, index: int) -> bool:
-    """Whether one run alone bears a cause, against what the others say: there is evidence for it, and, that run taken
-    away, against it."""
+    """Whether one run alone supports a cause against the others: there is evidence for it, and, without that run,
+    against it."""
     S, *_ = shared_alone(fit.reduced, fit.prior)
     inside, whole = np.isin(fit.prior.shared, fit.columns_of(index)), S.sum(axis=0)
 
@@ -85,7 +84,8 @@ def lasts(fit: Fit) -> bool:
 
 
 def own_forces(fit: Fit) -> float:
-    """2 log evidence of a constant force of its own in each run, in all three axes of the ship, beside all causes."""
+    """Twice the log Bayes factor of a constant force of its own in each run, in all three axes of the ship, beside all
+    causes."""
     inside = np.concatenate([fit.prior.shared, fit.prior.random]).astype(int)
     gram, shared, end = fit.gram.only(inside), len(fit.prior.shared), len(inside)
     prior = replace(fit.prior, shared=np.arange(shared), random=np.arange(shared, end))
@@ -113,14 +113,14 @@ def tells_runs_apart(fit: Fit) -> bool:
 
 
 def relies_on_a_ship(fit: Fit, effect: Effect) -> bool:
-    """Whether the coefficients of the ship that the effect relies on are those of some ship (a superstructure, of a
-    wind that is not measured): else something else is taken for it."""
+    """Whether the ship coefficients on which the effect relies are those of a real ship (a superstructure, of an
+    unmeasured wind): otherwise it is confounded with another cause."""
     places = [PLACES[name] for name in effect.traits.relies_on]
     return not places or bool(np.max(np.abs(needed(fit)[places])) < STRANGE)
 
 
 def is_on_a_ship(fit: Fit, index: int) -> bool:
-    """Whether a ship may have a cause of the size found (`Effect.plausible`); of values of single runs their root mean
+    """Whether the size found is plausible on a ship (`Effect.plausible`); of values of single runs their root mean
     square counts."""
     term, values = (
         fit.model.terms[index],
@@ -131,8 +131,8 @@ def is_on_a_ship(fit: Fit, index: int) -> bool:
 
 
 def imitates(fit: Fit, index: int) -> bool:
-    """Whether it is a steady vector along the normal of a cause that it imitates (a bank): what the law of that one
-    leaves looks like it."""
+    """Whether it is a steady vector along the normal of a cause with which it is confounded (a bank): the residual of
+    that one's law looks like it."""
     of = fit.model.terms[index].effect.traits.imitates
     normals = [t.effect.normal(t.setting) for t in fit.model.terms if t.label in of]
     if not normals:
@@ -200,6 +200,6 @@ def _record_noise(seg: Segments, channel: str) -> float:
 
 
 def matters(fit: Fit, index: int) -> bool:
-    """Whether a cause reaches its least size; of one with a value for each run, their root mean square counts."""
+    """Whether a cause is practically significant; of one with a value for each run, their root mean square counts."""
     term, squares = fit.model.terms[index], np.sum(np.square(fit.values[index]), axis=-1)
     return bool(np.mean(squares) >= least_size(fit, term) ** 2)

@@ -1,4 +1,4 @@
-"""One diagnosis of one set of runs, without its gain: causes, their order, and what stays unexplained."""
+"""Analysis of one set of runs, without its gain: causes, their order, and the unexplained remainder."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .stepwise import Selection, candidates_for, select
 from .unknown import NO_FORM, Dependence, Search, dependences
 
 THRESHOLD = THRESHOLDS.value("evidence")
-"""Least gain of a named cause, 2 log Bayes factor; the bootstrap of each diagnosis may raise it."""
+"""Least score of an identified cause, 2 log Bayes factor; the bootstrap of each diagnosis may raise it."""
 HULL_THRESHOLD = THRESHOLDS.value("evidence_of_hull")
 _HULL_ALONE = ("speed", "sway velocity", "yaw rate")
 _ESTIMATED = ("rudder", "revolutions", "revolutions and rudder", "speed and rudder")
@@ -35,10 +35,13 @@ file leaves them to an estimate: they are no unknown cause, and others are judge
 
 @dataclass(frozen=True)
 class Analysis:
-    """Findings of one set of runs. threshold: that was used; hull: 2 log evidence that the hull is off the regressions,
-    or 0; gears: named findings; plain_gears: the ordinary gears that fit best; unknown: the dependence that no named
-    cause covers; rival: one that covers about as much as the named causes; left: one that is there beside them;
-    misread: what the records of actuators err by."""
+    """Findings of one set of runs.
+
+    threshold: the one in use; hull: twice the log Bayes factor that the hull differs from the regressions, or 0; gears:
+    identified effects on actuators; plain_gears: the default dynamics that fit best; unknown: the dependence that no
+    identified cause covers; rival: one that covers about as much as the identified causes; left: one that remains
+    beside them; misread: errors of the actuators' records.
+    """
 
     selection: Selection
     threshold: float
@@ -62,11 +65,11 @@ class Analysis:
         return Standard(self.selection.null, self.threshold, self.selection.off_form)
 
     def score(self, index: int) -> tuple[float, int, str]:
-        """Twice the log evidence that the index-th cause adds, number of runs that support it, and to what: beside the
-        others or where it was added.
+        """Twice the log Bayes factor of the index-th cause, number of runs that support it, and its alternative: beside
+        the others or where it was added.
 
-        The linear model, asked for the fit without it, does not hold so far from its point: what a refit gained is an
-        upper bound, or all there is.
+        The linear model of the fit without it does not hold so far from its point: the gain of a refit is an upper
+        bound, or all there is.
         """
         score, term = self.final.worth(index), self.final.model.terms[index]
         added = max((s for s in self.selection.steps if s.term == term), key=lambda s: s.score, default=None)
@@ -99,7 +102,7 @@ def causes_of(
 
 
 def _named_gears(findings: Sequence[GearFinding], threshold: float, only: Sequence[str] | None) -> list[GearFinding]:
-    """The best finding of every actuator, if it is worth the threshold."""
+    """Best finding of every actuator, if it reaches the threshold."""
     named: dict[str, GearFinding] = {}
     for g in findings:
         if (only is None or g.effect in only) and g.score > threshold:
@@ -108,7 +111,7 @@ def _named_gears(findings: Sequence[GearFinding], threshold: float, only: Sequen
 
 
 def plain_model(plant: Plant, only: Sequence[str] | None = None, settled: Sequence[str] = ()) -> Fit:
-    """The plain model, fitted, with the candidates that it is to be extended by.
+    """Baseline model, fitted, with the candidates for its extension.
 
     Args:
         only: restrict the candidates to these effects (for an oracle that knows the truth).
@@ -177,11 +180,11 @@ def analyse(
 
 
 def asked(d: Dependence, off_form: float) -> float:
-    """Least score of an unknown force or error, 2 log evidence; infinite for one that is too small.
+    """Least score of an unknown force or error, 2 log Bayes factor; infinite for one that is too small.
 
-    A force that depends on a variable of a ship's form must be worth several times `off_form` (`Selection.off_form`)
-    besides: the more, the less of the latent force it takes. A force that depends on time, but leaves the latent force
-    as large as it was, is motion with the waves.
+    A force that depends on a variable of a ship's form must exceed several times `off_form` (`Selection.off_form`)
+    besides: the more, the less of the latent force it explains. A force that depends on time, but leaves the latent
+    force as large as it was, is wave motion.
     """
     least = THRESHOLDS.value("error_size") if d.of_sensor else THRESHOLDS.value("force_size")
     if not d.of_sensor and d.variable == "time" and d.taken < least:
@@ -201,8 +204,8 @@ def asked(d: Dependence, off_form: float) -> float:
 def _unknown(
     selection: Selection, gears: Sequence[GearFinding], search: Search
 ) -> tuple[Dependence | None, Dependence | None]:
-    """The dependence that beats all named causes together, if one does; or a sensor's error that comes about as
-    near."""
+    """Dependence with a higher score than all identified causes together, if one has; or a sensor error with about the
+    same."""
     named = bool(selection.final.model.terms) or bool(gears)
     worth = (
         max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) if named else 0.0

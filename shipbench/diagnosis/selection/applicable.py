@@ -1,4 +1,4 @@
-"""Whether an effect can act on the data at all: one rule for all effects, by what each states of itself."""
+"""Rule whether an effect can act on the data at all, the same for all effects, by their own attributes."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ _PARTS = {"delta": "rudder never moves", "n": "shaft never turns", "F_b": "thrus
 
 
 def why_not(effect: Effect, plant: Plant) -> str:
-    """Why an effect cannot be a cause in these data, "" where it can: an input that it needs is not measured, the model
-    has it already, or no actuator works through which it acts."""
+    """Reason why an effect cannot be a cause in these data, "" where it can: an input that it needs is not measured,
+    the model has it already, or no actuator works through which it acts."""
     if set(effect.channels) - plant.inputs:
         return f"{' and '.join(effect.channels)} are not measured"
     if known := [name for name in effect.known_with if name in plant.inputs]:

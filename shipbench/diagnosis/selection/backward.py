@@ -1,4 +1,5 @@
-"""Causes taken out of a model again: what a later one has made needless, what is not sure, or too small to matter."""
+"""Backward elimination of causes: those that a later one makes needless, uncertain ones, and those too small to
+matter."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from .requirements import EVIDENCE, Requirement, Standard, first_unmet
 
 
 def without(before: Fit, index: int) -> Fit:
-    """`before` without one of its terms, refitted."""
+    """Fit `before` without one of its terms, refitted."""
     terms = tuple(t for i, t in enumerate(before.model.terms) if i != index)
     values = tuple(v for i, v in enumerate(before.point.values) if i != index)
     log_tau2 = {i - (i > index): v for i, v in before.log_tau2.items() if i != index}
@@ -30,7 +31,7 @@ def without(before: Fit, index: int) -> Fit:
 
 
 def needed_only(found: Fit, standard: Standard, spare_last: bool = True) -> Fit:
-    """Drop terms that are no longer worth what is asked of them, judged on the linearisation, then by a refit."""
+    """Drop terms that no longer reach their required evidence, judged on the linearisation, then by a refit."""
     index = 0
     while index < len(found.model.terms) - spare_last:
         if not EVIDENCE.check(found, index, standard).met:
@@ -43,8 +44,8 @@ def needed_only(found: Fit, standard: Standard, spare_last: bool = True) -> Fit:
 
 
 def wanted_only(found: Fit, requirements: Iterable[Requirement], standard: Standard) -> tuple[Fit, dict[str, str]]:
-    """Without the terms that do not meet all requirements, the last first; and their effects, with what they do not
-    meet."""
+    """Fit without the terms that do not meet all requirements, the last first; and their effects, with the unmet
+    requirements."""
     dropped: dict[str, str] = {}
     while standard.careful:
         verdicts = [(i, first_unmet(requirements, found, i, standard)) for i in range(len(found.model.terms))]

@@ -1,5 +1,4 @@
-"""Forms of what no named cause explains: what a force, or an error of a sensor, may follow, by the variable that it
-then depends on."""
+"""Forms of unexplained forces or sensor errors, by the variable on which they depend."""
 
 from __future__ import annotations
 
@@ -41,14 +40,14 @@ class State(NamedTuple):
 
 
 Form = Callable[[State], Features]
-"""One coefficient for each feature."""
+"""Function of a form: one coefficient for each feature."""
 Forms = Mapping[str, Mapping[str, Form]]
 
 
 class Feature(NamedTuple):
-    """The features (F, K, B) of one form in the middle of every step, and beside the trajectory
-    (`Linearisation.aside`); or (F, K + 1, B) at the samples. Of order one. odd: whether it changes its sign with the
-    ship's mirror image; ways: number of forms of which it was chosen."""
+    """Features (F, K, B) of one form in the middle of every step, and beside the trajectory (`Linearisation.aside`); or
+    (F, K + 1, B) at the samples. They are of order one. odd: whether it changes its sign with the ship's mirror image;
+    ways: number of forms of which it was chosen."""
 
     form: str
     on: np.ndarray
@@ -67,7 +66,7 @@ def _harmonic(k: int) -> Form:
 
 
 def _blown(form: Callable[[np.ndarray, np.ndarray], Features]) -> Form:
-    """A function of the relative velocity, less what it is in air at rest, which is a resistance."""
+    """Function of the relative velocity, less its value in air at rest, which is a resistance."""
     return lambda s: tuple(x - still for x, still in zip(form(*s.air), form(*s.calm), strict=True))
 
 
@@ -137,8 +136,8 @@ _OF_SENSORS: Forms = {
 
 
 def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
-    """The features of all forms of a force about a trajectory, by variable; of thrusters only where they are used;
-    "waves": of time, with the periods of waves. After `lin.columns`."""
+    """Features of all forms of a force about a trajectory, by variable; of thrusters only where they are used; "waves":
+    of time, with the periods of waves. Call it after `lin.columns`."""
     plant, seg = lin.plant, lin.plant.seg
     assert lin.aside is not None
     act, t = plant.midway(lin.path)
@@ -170,7 +169,7 @@ def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
 
 
 def of_sensors(lin: Linearisation) -> dict[str, list[Feature]]:
-    """The features of all forms of a sensor's error, likewise, at the samples."""
+    """Features of all forms of a sensor's error, by variable, at the samples."""
     plant, seg = lin.plant, lin.plant.seg
     t = (seg.start[:, None] + seg.dt * np.arange(plant.steps + 1)).T
     at = _state(plant, np.swapaxes(lin.motion, 0, 1), np.swapaxes(seg.states[..., 6:], 0, 1), t, None)
@@ -178,9 +177,9 @@ def of_sensors(lin: Linearisation) -> dict[str, list[Feature]]:
 
 
 def _waves(lin: Linearisation) -> tuple[dict[str, Form], int]:
-    """The waves over the places visited, in whatever direction, that the latent force follows best, one for each axis,
-    and of how many: a current, a depth or a shore that differs from place to place. They are compared at the knots of
-    the force, by the share of it that they take."""
+    """Waves over the positions visited, in any direction, that fit the latent force best, one for each axis, and the
+    number tried: a current, a depth or a shore that differs from place to place. They are compared at the knots of the
+    force, by the share of it that they explain."""
     plant, seg = lin.plant, lin.plant.seg
     at = np.minimum(np.round(np.arange(plant.knots) * plant.knot_time / seg.dt).astype(int), plant.steps)
     known, (centre, unit) = seg.mask[:, at], _places(seg)
@@ -223,7 +222,7 @@ def _ends(plant: Plant) -> float:
 def _features(
     of: Forms, on: State, aside: State, real: np.ndarray, ways: Mapping[str, int]
 ) -> dict[str, list[Feature]]:
-    """By variable. ways: of forms that were chosen from more than stand here."""
+    """Features by variable. ways: number of further forms from which they were chosen."""
     found: dict[str, list[Feature]] = {}
     to_starboard = np.array([1.0, -1.0])[:, None, None]
     mirrored = on._replace(v=-on.v, r=-on.r, delta=-on.delta, air=on.air * to_starboard, calm=on.calm * to_starboard)
@@ -240,7 +239,8 @@ def _features(
 
 
 def _state(plant: Plant, motion: np.ndarray, act: np.ndarray, t: np.ndarray, wind: np.ndarray | None) -> State:
-    """From motion (..., 6), actuators (..., 4), times and wind (..., 2: speed, from), each with axes (K, B) before."""
+    """State from motion (..., 6), actuators (..., 4), times and wind (..., 2: speed, from), each with axes (K, B)
+    before."""
     seg = plant.seg
     record = seg.states[seg.mask]
     units = _rms(record[:, 3:].T)[:, None, None]

@@ -1,5 +1,5 @@
-"""Whether a similar ship of quite another size would explain the runs better than that of the ship file: a slip in it,
-or another ship's file."""
+"""Test whether a similar ship of quite another size would explain the runs better than that of the ship file: an error
+in it, or another ship's file."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ..model.linearisation import Scales
 from ..thresholds import THRESHOLDS
 
 _FACTORS, _NEAR = (0.4, 2.5), (0.7, 0.85, 1.2, 1.4)
-"""Sizes that are tried, in units of that of the ship file: of another ship, and of nearly the same."""
+"""Sizes that are tried, relative to the ship file: of another ship, and of nearly the same."""
 
 
 def better_size(null: Fit) -> list[str]:
-    """A line if a smaller or a larger ship, with masses, inertia and forces of her size, is far better beside no cause;
-    none if not. null: beside its own noise, as the other's is (docs/calibration.md#another-size)."""
+    """Line if a smaller or a larger ship, with masses, inertia and forces of her size, has far more evidence beside no
+    cause; None if not. null: with its own noise model, as the other's is (docs/calibration.md#another-size)."""
     factor, gain = _best(null, _FACTORS)
     if factor == 1.0 or gain < THRESHOLDS.value("other_size") * _times(null):
         return []
@@ -25,8 +25,8 @@ def better_size(null: Fit) -> list[str]:
 
 
 def size_instead_of(causes: str, worth: float, null: Fit) -> list[str]:
-    """A line if a ship of nearly the same size does about what `causes` do for that of the file, which add `worth` to
-    the log evidence."""
+    """Line if a ship of nearly the same size has about the evidence of `causes` with the ship file, whose log Bayes
+    factor is `worth`."""
     worth *= min(1.0, THRESHOLDS.count("pieces_of_sizes") / len(null.plant.seg.run))
     factor, gain = _best(null, _NEAR)
     if factor == 1.0 or gain < (worth - THRESHOLDS.value("same_size_margin")) * _times(null):
@@ -40,7 +40,7 @@ def size_instead_of(causes: str, worth: float, null: Fit) -> list[str]:
 
 
 def _best(null: Fit, factors: Sequence[float]) -> tuple[float, float]:
-    """The best factor of the size, and the log evidence that it gains; 0 where none gains any."""
+    """Best factor of the size, and its gain of log evidence; 0 where none gains any."""
     if is_spent():
         return 1.0, 0.0
     few = null.plant.thinned(THRESHOLDS.count("pieces_of_sizes"))

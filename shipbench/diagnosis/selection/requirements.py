@@ -1,5 +1,5 @@
-"""Requirements that a cause must meet to be named: the one list by which causes are selected, rejections explained and
-detection limits counted."""
+"""Requirements on an identified cause: the one list for the selection of causes, the reasons of rejection and the
+detection limits."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ from .screening import Score
 
 @dataclass(frozen=True)
 class Standard:
-    """Measure by which causes of some runs are judged.
+    """Standard for the causes of some runs.
 
     Attributes:
-        null: the plain model.
-        threshold: least gain of a named cause, 2 log evidence.
-        off_form: gain asked besides of what the form of this hull could pass for: a hull that lies off the regressions
-            is not of the fitted form either.
-        careful: False where the causes are given: whoever is told the names asks for no evidence.
+        null: the baseline model.
+        threshold: least score of an identified cause, 2 log Bayes factor.
+        off_form: further score required of causes confounded with the form of this hull: a hull that differs from the
+            regressions also differs from the fitted form.
+        careful: False where the causes are given: then no evidence is required.
     """
 
     null: Fit
@@ -45,8 +45,8 @@ class Standard:
     careful: bool = True
 
     def asked_besides(self, term: Term, size: float = 0.0) -> float:
-        """Gain that a term must be worth besides the threshold, since what the form of a hull lacks could pass for it.
-        Not so much of one whose `size`, in typical ones, doubts the ship file: that is no name."""
+        """Score that a term needs beyond the threshold, since it is confounded with the form of the hull. It is less
+        for one whose `size`, in typical ones, casts doubt on the ship file: that identifies no cause."""
         if not self.careful:
             return 0.0
         traits = term.effect.traits
@@ -60,15 +60,14 @@ class Standard:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Answer of a requirement; `reason` says why it is not met."""
+    """Result of a requirement; `reason` says why it is not met."""
 
     met: bool
     reason: str = ""
 
 
 class Requirement:
-    """One thing that is asked of the index-th cause of a model. `of_size`: it is asked last, when all others are
-    met."""
+    """Requirement on the index-th cause of a model. `of_size`: it is checked last, when all others are met."""
 
     of_size = False
 
@@ -77,18 +76,18 @@ class Requirement:
         raise NotImplementedError
 
     def least_size(self, seen: Score, standard: Standard) -> np.ndarray | float:
-        """Smallest size of each amplitude, in typical ones, that could meet it in these runs; 0 where it asks for
+        """Smallest size of each amplitude, in typical ones, that could meet it in these runs; 0 where it requires
         none."""
         return 0.0
 
 
 class Evidence(Requirement):
-    """The cause is worth the threshold, and what is asked of its kind besides. Selection checks it by refits; here it
-    is the linearised model's."""
+    """Score of at least the threshold, and the further score required of its kind. Selection checks it by refits; here
+    it is the linearised model's."""
 
     @staticmethod
     def asked(fit: Fit, index: int, standard: Standard) -> float:
-        """Gain that the cause must be worth."""
+        """Score that the cause must reach."""
         return standard.threshold + standard.asked_besides(fit.model.terms[index], np.max(np.abs(fit.values[index])))
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
@@ -96,8 +95,8 @@ class Evidence(Requirement):
         return Verdict(bool(worth >= asked), f"score {worth:.1f} below {asked:.1f}")
 
     def least_size(self, seen: Score, standard: Standard) -> np.ndarray | float:
-        """Size x along amplitude i for which x^2 V_ii - log det(1 + V) is what is asked; of values of single runs the
-        root mean square x, where the sum of x^2 tr(V) - log det(1 + x^2 V) is."""
+        """Size x along amplitude i for which x^2 V_ii - log det(1 + V) is the required score; of values of single runs
+        the root mean square x, where the sum of x^2 tr(V) - log det(1 + x^2 V) is."""
         term = seen.term
         asked = standard.threshold + term.cost(standard.null.plant.seg.runs) + standard.asked_besides(term)
         if term.per_run:
@@ -110,15 +109,14 @@ class Evidence(Requirement):
 
 
 class Plausible(Requirement):
-    """A ship may have a cause of this size."""
+    """Size that a ship may have."""
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
         return Verdict(is_on_a_ship(fit, index), "no ship has it of the size that the runs ask for")
 
 
 class OrdinaryShip(Requirement):
-    """The ship's coefficients that the cause relies on are those of some ship (a superstructure, for a wind that is not
-    measured)."""
+    """Ship coefficients behind the cause are those of a real ship (a superstructure, for an unmeasured wind)."""
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
         return Verdict(
@@ -127,7 +125,7 @@ class OrdinaryShip(Requirement):
 
 
 class NoImitation(Requirement):
-    """The cause does not merely mend the law of another one that is in the model."""
+    """Independence of the law of another cause in the model, which it does not merely correct."""
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
         of = " and ".join(fit.model.terms[index].effect.traits.imitates)
@@ -138,7 +136,7 @@ class NoImitation(Requirement):
 
 
 class ConstantWithinRuns(Requirement):
-    """Values of single runs last for their run, and leave little in which runs differ."""
+    """Values of single runs last for their run, and leave little difference between runs."""
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
         met = not fit.model.terms[index].per_run or (lasts(fit) and tells_runs_apart(fit))
@@ -146,7 +144,7 @@ class ConstantWithinRuns(Requirement):
 
 
 class RunsAgree(Requirement):
-    """The runs, as independent witnesses, agree that the size is not zero, and no single one bears it against the
+    """Runs agree, as independent observations, that the size is not zero, and no single one supports it against the
     others."""
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
@@ -158,14 +156,14 @@ class RunsAgree(Requirement):
 
 
 class SameShip(Requirement):
-    """A cause that acts through coefficients does not turn an ordinary ship into an outlier."""
+    """Coefficients of the cause do not turn an ordinary ship into an outlier."""
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
         return Verdict(not bends(fit, index, standard.null), "beside it the ship's own coefficients become outliers")
 
 
 class Significant(Requirement):
-    """The cause is large enough to matter."""
+    """Size of practical significance."""
 
     of_size = True
 
@@ -184,19 +182,19 @@ EVIDENCE, SIGNIFICANT, SAME_SHIP = Evidence(), Significant(), SameShip()
 REQUIREMENTS: tuple[Requirement, ...] = (
     EVIDENCE, Plausible(), OrdinaryShip(), NoImitation(), ConstantWithinRuns(), RunsAgree(), SAME_SHIP, SIGNIFICANT,
 )  # fmt: skip
-"""All requirements, in the order in which they are asked."""
+"""Requirements in the order in which they are checked."""
 SURE = tuple(r for r in REQUIREMENTS if r not in (EVIDENCE, SAME_SHIP) and not r.of_size)
-"""Those of a cause by itself: evidence is asked by refits, and the ship is compared with that of the plain model once
-the causes are chosen."""
+"""Requirements on a cause by itself: evidence is checked by refits, and the ship is compared with that of the baseline
+model once the causes are chosen."""
 
 
 def first_unmet(requirements: Iterable[Requirement], fit: Fit, index: int, standard: Standard) -> Verdict:
-    """Verdict of the first requirement that is not met, or one that is."""
+    """Verdict of the first requirement that is not met, or a met one."""
     return next((v for r in requirements if not (v := r.check(fit, index, standard)).met), Verdict(True))
 
 
 def detection_limit(seen: Score, standard: Standard) -> np.ndarray:
-    """Size of each amplitude of a candidate, in typical ones, from which it is expected to be named."""
+    """Detection limit of each amplitude of a candidate, in typical sizes."""
     limits = [np.broadcast_to(r.least_size(seen, standard), (seen.term.size,)) for r in REQUIREMENTS]
     return np.max(limits, axis=0)
 

@@ -1,4 +1,4 @@
-"""The screening: every candidate's evidence on one linearisation, without another simulation."""
+"""Screening: every candidate's evidence on one linearisation, without another simulation."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Score:
 
 
 def with_columns(prior: Prior, at: np.ndarray, term: Term, log_tau2: float, width: float = 1.0) -> Prior:
-    """The prior of a model that holds the columns `at` as well."""
+    """Prior of a model that holds the columns `at` as well."""
     if term.per_run:
         return replace(
             prior, random=np.append(prior.random, at), log_tau2=np.append(prior.log_tau2, np.full(len(at), log_tau2))
@@ -50,8 +50,8 @@ def with_columns(prior: Prior, at: np.ndarray, term: Term, log_tau2: float, widt
 
 
 def evidence(gram: Gram, prior: Prior, log_force: np.ndarray, own_random: int = 0) -> tuple[float, np.ndarray, float]:
-    """Log evidence with the variances of the force, and that of the last `own_random` random columns, re-estimated; and
-    these, logarithms."""
+    """Log evidence with re-estimated variances of the force and of the last `own_random` random columns; and the log
+    variances."""
 
     def with_tau(log_tau2: np.ndarray) -> Prior:
         return replace(
@@ -76,7 +76,7 @@ def evidence(gram: Gram, prior: Prior, log_force: np.ndarray, own_random: int = 
 
 
 def _columns(fit: Fit) -> list[np.ndarray]:
-    """Places of the columns of the candidates that `fit` was given."""
+    """Indices of the columns of the candidates of `fit`."""
     at, columns = fit.reduced.S.shape[1] - 1 - sum(t.size for t in fit.candidates), []
     for term in fit.candidates:
         columns.append(np.arange(at, at + term.size))
@@ -85,23 +85,23 @@ def _columns(fit: Fit) -> list[np.ndarray]:
 
 
 def _of_all_runs(fit: Fit) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """S (N, P + 1, P + 1) with the values of single runs integrated out, and where the shared columns and those of the
-    candidates stand in it."""
+    """Sums S (N, P + 1, P + 1) with the values of single runs integrated out, and the indices of the shared columns and
+    of the candidates in them."""
     kept = np.setdiff1d(np.arange(fit.reduced.S.shape[1] - 1), fit.prior.random)
     S, *_ = shared_alone(fit.reduced, replace(fit.prior, shared=kept))
     return S, np.searchsorted(kept, fit.prior.shared), [np.searchsorted(kept, at) for at in _columns(fit)]
 
 
 def glance(fit: Fit) -> list[Score]:
-    """Scores of the candidates that `fit` was given, in their order, under the variances of `fit`."""
+    """Scores of the candidates of `fit`, in their order, under its variances."""
     null = solve(fit.reduced, fit.prior)
     terms = zip(fit.candidates, _columns(fit), strict=True)
     return [_score(fit, term, at, null.log_evidence, null.per_run, fit.reduced) for term, at in terms]
 
 
 def screen(fit: Fit) -> list[Score]:
-    """Scores of the candidates that `fit` was given, best first; for those that are not hopeless the variances are
-    re-estimated: the force of the plain model has absorbed part of whatever is missing."""
+    """Scores of the candidates of `fit`, best first. For those that are not hopeless the variances are re-estimated:
+    the force of the baseline model has absorbed part of the missing cause."""
     gram, candidates, columns, scores = fit.gram, fit.candidates, _columns(fit), glance(fit)
     if is_spent():
         return sorted(scores, key=lambda s: -s.score)
@@ -125,14 +125,14 @@ def screen(fit: Fit) -> list[Score]:
 
 
 def _wrong_way(term: Term, estimate: np.ndarray) -> bool:
-    """Whether the data ask for less than nothing of what only slows, delays or narrows: a quicker gear, water deeper
-    than deep."""
+    """Whether the estimate has the impossible sign of an effect that only slows, delays or narrows: a quicker actuator,
+    water deeper than deep."""
     (*others, last) = (p for p in term.effect.parameters if not p.shape)
     return not others and not term.per_run and last.low >= 0.0 and float(estimate[0]) < 0.0
 
 
 def _score(fit: Fit, term: Term, at: np.ndarray, null: float, null_runs: np.ndarray, reduced: Reduced) -> Score:
-    """The score under the variances of the null."""
+    """Score under the variances of the null."""
     if term.per_run:
         tries = [(solve(reduced, with_columns(fit.prior, at, term, tau)), tau) for tau in _TAUS]
         best, tau = max(tries, key=lambda pair: pair[0].log_evidence)
@@ -215,8 +215,8 @@ def places(runs: int) -> range:
 
 
 def other_kinds_from(kinds: Sequence[str]) -> list[int]:
-    """Return those of `places` from which on mostly other kinds of manoeuvre are sailed than before, and more so than
-    in random order of the kinds; none where the kind of a run is not known."""
+    """Runs among `places` from which on mostly other kinds of manoeuvre are sailed than before, and more so than in
+    random order of the kinds; none where the kind of a run is not known."""
     if not all(kinds):
         return []
     of = np.array([[kind == one for one in sorted(set(kinds))] for kind in kinds], dtype=float)

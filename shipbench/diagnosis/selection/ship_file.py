@@ -1,4 +1,4 @@
-"""Whether the ship file is that of the ship that sailed, and what can be said while that is in doubt."""
+"""Test whether the ship file is that of the ship that sailed, and the results that hold while that is in doubt."""
 
 from __future__ import annotations
 
@@ -20,10 +20,13 @@ _QUESTION = "Is the ship file that of this ship (L, B, T, displacement, propelle
 
 
 def doubts_of(found: Analysis) -> list[str]:
-    """Signs that the model does not belong to the data, in one warning: the fit leaves what is ordinary, hull or
-    propeller would be another ship's, a ship of quite another size explains the runs better, or one of nearly the same
-    size does as well as the causes where the fit is odd. Causes in whose place something unknown is told raise none,
-    nor do parameters that are ordinary without causes."""
+    """Warning on signs that the model does not belong to the data.
+
+    Signs: the fit lies outside the prior between ships, hull or propeller would be another ship's, a ship of quite
+    another size explains the runs better, or one of nearly the same size does as well as the causes while the fit is an
+    outlier. Causes in whose place an unknown one is reported raise none, nor do parameters within the prior without
+    causes.
+    """
     fit = found.final if found.unknown is None else found.selection.null
     z = needed(fit)
     signs = []
@@ -53,8 +56,8 @@ def doubts_of(found: Analysis) -> list[str]:
 
 
 def odd_for(found: Analysis, named: Sequence[str]) -> list[str]:
-    """A warning where a cause is named that the file of another ship may make, too, and the fit is odd, though not
-    beyond all ships, or a ship of nearly the same size does as well as the cause."""
+    """Warning where an identified cause may also be due to the file of another ship, and the fit is an outlier, though
+    not beyond all ships, or a ship of nearly the same size does as well as the cause."""
     by_file = [name for name in named if not whatever_the_ship(name, found)]
     if not by_file:
         return []

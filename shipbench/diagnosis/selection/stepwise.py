@@ -1,4 +1,4 @@
-"""Which causes: forward selection with nonlinear refits of the best candidates, and a backward pass."""
+"""Selection of causes: forward selection with nonlinear refits of the best candidates, and a backward pass."""
 
 from __future__ import annotations
 
@@ -24,13 +24,15 @@ from .requirements import SAME_SHIP, SIGNIFICANT, SURE, Standard, first_unmet
 from .screening import Score, changes, glance, overlap, screen
 
 CONFUSED = THRESHOLDS.value("confused_score")
-"""Candidates within this of the winner's score, 2 log evidence, are called confused with it."""
+"""Largest difference from the winner's score, 2 log Bayes factor, of candidates that are reported as confounded with
+it."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """A candidate that was refitted in a round, its score at its own optimum (2 log evidence over the model before), or
-    what it promised when it was given up, and the number of runs that are likelier there than by the model before."""
+    """Candidate that was refitted in a round, its score at its own optimum (2 log Bayes factor over the model before),
+    or its predicted score when it was given up, and the number of runs that are likelier there than by the model
+    before."""
 
     round: int
     term: Term
@@ -42,7 +44,7 @@ class Step:
         return cls(number, tried.model.terms[-1], score, int(np.sum(tried.solution.per_run > now.solution.per_run)))
 
     def is_near(self, best: Step) -> bool:
-        """Whether the data do not tell it from the step that was taken instead."""
+        """Whether the data do not distinguish it from the selected step."""
         share = THRESHOLDS.value("confused_formulas") * push_alike(self.term.effect, best.term.effect)
         return self.round == best.round and self.score > best.score - max(CONFUSED, share * best.score)
 
@@ -67,7 +69,7 @@ class Selection:
 
 
 def push_alike(one: Effect, other: Effect) -> bool:
-    """Whether two effects of one group have different formulas, by which alone they are told apart."""
+    """Whether two effects of one group have different formulas, which alone distinguish them."""
     return (
         bool(one.traits.group) and one.traits.group == other.traits.group and type(one).force is not type(other).force
     )
@@ -80,7 +82,7 @@ def shows_in_record(effect: Effect) -> bool:
 
 
 def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Sequence[str] = ()) -> list[Term]:
-    """Every effect that could act on these data, less those that are `settled`, once per shape setting."""
+    """Candidates: every effect that could act on these data, less those that are `settled`, once per shape setting."""
     found = []
     for name in names if names is not None else EFFECTS.names():
         effect = EFFECTS.get(name)
@@ -99,8 +101,8 @@ def candidates_for(plant: Plant, names: Sequence[str] | None = None, settled: Se
 
 @dataclass(frozen=True)
 class Beginning:
-    """A model and candidates at an `Origin`, where it has not been fitted yet: one linearisation `lin`, at which they
-    are `seen`, and from which a refit with any of them starts."""
+    """Model and candidates at an `Origin`, where it has not been fitted yet: one linearisation `lin`, with their
+    columns, from which a refit with any of them starts."""
 
     now: Fit
     origin: Origin
@@ -114,7 +116,7 @@ class Beginning:
         return cls(now, origin, lin, settle(lin, now.model, origin.hyper, now.log_tau2, terms, far=True))
 
     def refit(self, score: Score, least: float = -np.inf) -> Fit:
-        """The model with one more term, given up where it does not promise to gain `least`."""
+        """Fit of the model with one more term, given up where its predicted gain is below `least`."""
         now, term, columns, candidates = self.now, score.term, self.seen.columns, self.seen.candidates
         place, shared = candidates.index(term), self.seen.products.shared
         at, inside = shared - sum(t.size for t in candidates[place:]), shared - sum(t.size for t in candidates)
@@ -168,7 +170,8 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
 
 
 def _least(best: Fit, now: Fit) -> float:
-    """Gain that a refit must promise beside the best one; less by as much as that one's own promise fell short."""
+    """Predicted gain that a refit needs beside the best one; less by the amount by which that one's prediction fell
+    short."""
     share, margin = THRESHOLDS.value("refit_share_of_best"), THRESHOLDS.value("refit_margin")
     return 2.0 * (share * (best.evidence - now.evidence) - max(best.promise - best.early, 0.0)) - margin
 
@@ -216,7 +219,7 @@ class _Grown:
     again: Fit | None = None
 
     def gain(self, tried: Fit) -> float:
-        """2 log evidence of the last term of `tried` beyond that; a tiny one gains nothing."""
+        """Score of the last term of `tried` beyond that; one without practical significance gains nothing."""
         term = tried.model.terms[-1]
         # every ship is a little unequal, every run has a breath of wind, every record is a little late: what is too
         # small of that stays, and others are judged beside it
@@ -268,7 +271,7 @@ def _grown(null: Fit, threshold: float, again: bool = False) -> _Grown:
 
 
 def _or_change(now: Fit, best: Fit | None, origin: Origin, standard: Standard) -> Fit | None:
-    """The best candidate, or one that begins at a later run, where that explains the runs better by the threshold."""
+    """Best candidate, or one that begins at a later run, where that explains the runs better by the threshold."""
     if any(t.since is not None for t in now.model.terms):
         return best
     plain, gain = best, 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
@@ -322,7 +325,7 @@ def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[S
 
 
 def _tie(best: Score) -> float:
-    """Score by which another way of an effect may fall short to be refitted, too: a moment that grows with the square
+    """Difference of score within which another form of an effect is refitted, too: a moment that grows with the square
     of a size has no slope at zero."""
     tie = THRESHOLDS.value("tie")
     if best.term.effect.vector and not best.term.per_run:

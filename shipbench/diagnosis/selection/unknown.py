@@ -1,5 +1,5 @@
-"""The second library: variables on which an unexplained force, or an error of a sensor, depends where no named cause
-fits. It needs no simulation."""
+"""Library of unknown causes: variables on which an unexplained force, or a sensor error, depends where no cause of the
+library fits. It needs no simulation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .screening import evidence
 
 AXES = ("surge", "sway", "yaw")
 SENSORS = {"recorded heading": 2, "recorded surge": 3, "recorded sway": 4, "recorded yaw rate": 5}
-"""Recorded quantities of which errors are looked for, and their channels."""
+"""Recorded quantities whose errors are searched, and their channels."""
 _NAMED = ("recorded heading", "recorded yaw rate")
 """Records whose constant errors are causes of the library."""
 NO_FORM = ("nothing", "heading", "position", "time", "waves", "run", "measured wind")
@@ -36,10 +36,13 @@ are in step by chance."""
 
 @dataclass(frozen=True)
 class Dependence:
-    """A missing force on one axis or more, or the error of a recorded channel, follows one variable, best in this form.
+    """Missing force on one axis or more, or the error of a recorded channel, as a function of one variable, best in
+    this form.
+
     score: 2 log Bayes factor, less that of the choice of the form; share: of the variance of that axis's latent force
-    that it takes; size, taken: root mean square of what it is, and of what it takes of the latent force, in units of
-    the latent force, or of ordinary noise."""
+    that it explains; size, taken: root mean square of the force itself, and of the part of the latent force that it
+    explains, in units of the latent force, or of typical noise.
+    """
 
     variable: str
     axis: str
@@ -51,18 +54,18 @@ class Dependence:
 
     @property
     def of_sensor(self) -> bool:
-        """Whether it is an error of a sensor, or of an order."""
+        """Whether it is an error of a sensor, or of a command."""
         return self.axis.startswith(("recorded ", "ordered "))
 
     @property
     def has_name(self) -> bool:
-        """Whether it is a cause of the library: too small to be named, perhaps, but not unknown."""
+        """Whether it is a cause of the library: too small to be identified, perhaps, but not unknown."""
         return self.variable == "nothing" and self.axis in _NAMED
 
 
 @dataclass(frozen=True)
 class _Tried:
-    """One form on one axis, with its columns; ways: number of forms of which it was chosen."""
+    """Form on one axis, with its columns; ways: number of forms of which it was chosen."""
 
     axis: str
     variable: str
@@ -77,7 +80,7 @@ class _Tried:
 
     @property
     def cost(self) -> float:
-        """Log evidence that the choice of the form costs."""
+        """Log evidence lost by the choice of the form."""
         return float(np.log(self.ways))
 
 
@@ -134,15 +137,14 @@ class Search:
         self.found = sorted(self._parts, key=lambda d: -d.score)
 
     def settled(self, d: Dependence) -> Dependence:
-        """The same, judged as named causes are, which are fitted: with the variances of the noise re-estimated, and an
-        error of a sensor taken out of the record. Before it is known the noise holds a large one, and the fit is
-        dragged along."""
+        """Dependences judged as identified causes are, which are fitted: with the variances of the noise re-estimated,
+        and a sensor error subtracted from the record. Before, the noise absorbs a large error, and biases the fit."""
         parts, usual = self._parts[d], self._settled([])
         score = 2.0 * (self._settled(parts) - usual - sum(t.cost for t in parts))
         return replace(d, score=max(score, d.score, *(self._refitted(t) for t in parts if d.of_sensor)))
 
     def _of_runs(self, tried: Sequence[_Tried]) -> float:
-        """2 log evidence of the forces `tried` with coefficients of its own in each run."""
+        """Twice the log Bayes factor of the forces `tried` with coefficients of its own in each run."""
         num, prior = sum(t.size for t in tried), self.plain
         at = len(self.inside) + np.arange(num)
         prior = replace(prior, random=np.append(prior.random, at), log_tau2=np.append(prior.log_tau2, np.zeros(num)))
@@ -167,7 +169,7 @@ class Search:
         )
 
     def _best(self, tried: Sequence[_Tried]) -> list[tuple[Dependence, _Tried]]:
-        """The best form of every variable and axis."""
+        """Best form of every variable and axis."""
         if not tried or is_spent():
             return []
         gram = self._gram(tried)
@@ -199,8 +201,8 @@ class Search:
         return found
 
     def _together(self, of: Sequence[tuple[Dependence, _Tried]]) -> tuple[Dependence, *tuple[_Tried, ...]] | None:
-        """The best forms of a variable on all axes where they are worth something, the strongest first; None where that
-        is one axis alone."""
+        """Best forms of a variable on all axes where they have evidence, the strongest first; None where that is one
+        axis alone."""
         least = 2.0 * THRESHOLDS.value("variances_again")
         parts = sorted((pair for pair in of if pair[0].score > least), key=lambda pair: -pair[0].score)
         if len(parts) < 2 or is_spent():
@@ -211,12 +213,12 @@ class Search:
         return replace(parts[0][0], axis=" and ".join(t.axis for _, t in parts), score=score), *(t for _, t in parts)
 
     def _evidence(self, gram: Gram, at: np.ndarray) -> tuple[float, np.ndarray]:
-        """Log evidence with the columns `at` as well, and the variances of the force, re-estimated."""
+        """Log evidence with the columns `at` as well, and re-estimated variances of the force."""
         prior = _with(self.plain, len(self.inside) + np.arange(len(at)))
         return evidence(gram.only(np.append(self.inside, at)), prior, self.usual)[:2]
 
     def _gram(self, tried: Sequence[_Tried]) -> Gram:
-        """The Gram of the fit with more columns, under its noise (products of single channels would take six times the
+        """Gram of the fit with more columns, under its noise (products of single channels would take six times the
         memory)."""
         fit, seg, columns = self.fit, self.fit.plant.seg, self._columns_with(tried)
         Z = whitened(fit.plant, fit.scales, fit.point, columns)
@@ -243,7 +245,7 @@ class Search:
 
 
 def _pushed(lin: Linearisation, axis: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
-    """Forces on one axis."""
+    """Columns of forces on one axis."""
     forms = [(v, f) for v, group in of.items() for f in group]
     if not forms:
         return []
@@ -268,7 +270,7 @@ def _pushed(lin: Linearisation, axis: int, of: Mapping[str, Sequence[Feature]]) 
 
 
 def _added(lin: Linearisation, name: str, channel: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
-    """Errors in one channel of the record."""
+    """Columns of errors in one channel of the record."""
     found, sd = [], THRESHOLDS.value("error_prior") * lin.scales.noise[channel]
     for v, group in of.items():
         for f in group:
