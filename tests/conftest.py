@@ -6,6 +6,8 @@ import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy and torch load: pytest's workers share the cores
 
+from collections.abc import Iterator
+
 import pytest
 from toy_ship import toy, toy_folder
 
@@ -19,3 +21,12 @@ __all__ = ["toy", "toy_folder"]
 def harbour() -> Dataset:
     """16 runs of 40 s."""
     return small_harbour(num=16, horizon=40)
+
+
+@pytest.fixture
+def undrawn() -> Iterator[pytest.MonkeyPatch]:
+    """`run` and `leaderboard` draw no pictures, which take most of the time of a small study; `undrawn.undo()` lets
+    them draw."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("shipbench.leaderboard.plots.draw_all", lambda *_: [])
+        yield patch

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import loadmat
+from toy_ship import write_toy_folder
 from typer.testing import CliRunner
 
 from shipbench.bench.results import Cell, read_predictions, read_truth
@@ -27,20 +28,34 @@ class Broken(Wild):
 """
 
 
+def shipbench(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
 @pytest.fixture
 def cli(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("SHIPBENCH_CACHE", str(tmp_path / "cache"))
-    return lambda *arguments: CliRunner().invoke(app, [str(a) for a in arguments])
+    return shipbench
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """Two folds of a model that works, one that diverges in one window, and one that fails."""
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "mine.py").write_text(BROKEN)
+    data = write_toy_folder(folder / "toyset")
+    models = ("-m", "hold", "-m", "mine.py:Wild", "-m", "mine.py:Broken")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setattr("shipbench.leaderboard.plots.draw_all", lambda *_: [])
+        shipbench("run", *models, "-d", data, "--horizon", "20", "--folds", "2", "-q", "--out", "r")
+    return folder / "r"
 
 
 @pytest.fixture
-def study(cli, toy_folder, tmp_path) -> Path:
-    """Two folds of a model that works, one that diverges in one window, and one that fails."""
-    (tmp_path / "mine.py").write_text(BROKEN)
-    models = ("-m", "hold", "-m", "mine.py:Wild", "-m", "mine.py:Broken")
-    cli("run", *models, "-d", toy_folder(), "--horizon", "20", "--folds", "2", "-q", "--out", "r")
-    return tmp_path / "r"
+def study(made, tmp_path) -> Path:
+    """A copy of what was made, to be spoiled."""
+    return shutil.copytree(made, tmp_path / "r")
 
 
 @pytest.mark.parametrize("format", ["csv", "parquet"])

@@ -20,10 +20,9 @@ QUICK = ("--horizon", "20", "--folds", "2")
 
 
 @pytest.fixture
-def cli(tmp_path, monkeypatch):
+def cli(tmp_path, monkeypatch, undrawn):
     """Runs shipbench in an empty folder: `cli("run", ...)` gives the result with exit_code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("SHIPBENCH_CACHE", str(tmp_path / "cache"))
     return lambda *arguments: CliRunner().invoke(app, [str(a) for a in arguments])
 
 
@@ -65,7 +64,8 @@ def test_help_loads_nothing_heavy():
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_run_prints_and_writes_the_leaderboard(cli, toy_folder, tmp_path):
+def test_run_prints_and_writes_the_leaderboard(cli, toy_folder, tmp_path, undrawn):
+    undrawn.undo()
     result = cli("run", "--model", "hold", "--dataset", toy_folder(), *QUICK)
     assert result.exit_code == 0, result.output
     assert "ED μ" in result.stdout
@@ -163,9 +163,10 @@ def test_a_users_own_class_runs_and_its_failure_is_exit_code_one(cli, toy_folder
     assert "toyset mine.py:Broken fold 0 seed 0: predict: RuntimeError: boom" in result.stderr
 
 
-def test_leaderboard_renders_from_saved_results_only(cli, toy_folder, tmp_path):
+def test_leaderboard_renders_from_saved_results_only(cli, toy_folder, tmp_path, undrawn):
     folder = toy_folder()
     cli("run", "-m", "hold", "-d", folder, *QUICK, "-q", "--out", "runs/a")
+    undrawn.undo()
     shutil.rmtree(folder)
     result = cli("leaderboard")
     assert result.exit_code == 0, result.output

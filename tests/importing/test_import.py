@@ -43,7 +43,7 @@ def test_a_log_with_its_own_names_and_units_becomes_a_data_set(trial_import):
     assert run.meta == RunMeta(file="log.csv", from_=0.0, to=120.0)
 
 
-def test_what_it_writes_runs_through_the_benchmark(trial_import, tmp_path):
+def test_what_it_writes_runs_through_the_benchmark(trial_import, undrawn):
     trial_import(logged(np.arange(0.0, 400.0, 0.5)), None, "--window", "60")
     assert CliRunner().invoke(app, ["data", "check", "out"]).exit_code == 0
     assert CliRunner().invoke(app, ["data", "describe", "out"]).exit_code == 0

@@ -12,6 +12,7 @@ from shipbench.contract.rules import RULES
 from shipbench.contract.small import small_harbour
 from shipbench.contract.subject import Subject
 from shipbench.errors import InputError
+from shipbench.predictors import neural_ode
 from shipbench.predictors.base import PREDICTORS, parse_spec
 
 SMALL = {
@@ -24,9 +25,17 @@ SMALL = {
 """Quick settings of the predictors that train; the others take none."""
 
 
+@pytest.fixture(scope="module")
+def data():
+    """Few minibatches of the neural ODE: its rules are judged, not how well it is trained."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(neural_ode._Windows, "MINIBATCHES", 3)
+        yield small_harbour()
+
+
 @pytest.fixture(scope="module", params=PREDICTORS.names())
-def subject(request):
-    return Subject(parse_spec(SMALL.get(request.param, request.param)), small_harbour())
+def subject(request, data):
+    return Subject(parse_spec(SMALL.get(request.param, request.param)), data)
 
 
 @pytest.fixture(scope="module")

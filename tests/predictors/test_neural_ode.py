@@ -8,6 +8,7 @@ import torch
 
 from shipbench.errors import InputError
 from shipbench.physics.wind import apparent_wind
+from shipbench.predictors import neural_ode
 from shipbench.predictors.networks.residual import Drive, Grid, Residual, features, solve, typical_accelerations
 from shipbench.predictors.networks.stacked import Scaler, generators
 from shipbench.predictors.neural_ode import NeuralODE
@@ -33,6 +34,7 @@ def weak_resistance():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Physics, "fit", spoiled)
+        patch.setattr(neural_ode._Windows, "MINIBATCHES", 6)  # enough for twelve runs of 40 s
         yield
 
 

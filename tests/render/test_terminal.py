@@ -38,6 +38,7 @@ def folder(tmp_path_factory) -> Path:
     write_toy_folder(place / "toyset", 4, 20)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(place)
+        patch.setattr("shipbench.leaderboard.plots.draw_all", lambda *_: [])
         options = [part for model in MODELS for part in ("-m", model)]
         done = CliRunner().invoke(app, ["run", *options, "-d", "./toyset", *QUICK, "-o", "r", "-q"])
     assert done.exit_code == 0, done.output
@@ -243,7 +244,7 @@ def test_long_commands_tell_their_steps_and_none_when_quiet(cli, monkeypatch):
     assert cli("data", "check", "./toyset", "--json").stderr == ""
 
 
-def test_a_fit_of_a_network_tells_its_epochs(cli, monkeypatch):
+def test_a_fit_of_a_network_tells_its_epochs(cli, monkeypatch, undrawn):
     monkeypatch.setattr(progress, "EVERY_S", 0.0)
     done = cli("run", "-m", "mlp[epochs=3,hidden=4]", "-d", "./toyset", *QUICK, "-o", "m")
     assert "mlp[epochs=3,hidden=4] seed 0: 2 fits together: epoch 2 of 3, 67 %" in done.stderr

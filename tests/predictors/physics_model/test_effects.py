@@ -246,7 +246,7 @@ def test_a_river_s_current_on_a_boat_is_within_what_may_be_found():
     np.testing.assert_allclose(values(fitted("physics+current", data)), hidden, rtol=0.15)
 
 
-def test_it_runs_beside_the_plain_physics_on_the_command_line(tmp_path):
+def test_it_runs_beside_the_plain_physics_on_the_command_line(tmp_path, undrawn):
     from shipbench.cli.app import app
 
     write_dataset(trials(3, ("current", (0.3, 0.3)), runs=6, samples=40), tmp_path / "tiny")
