@@ -37,7 +37,7 @@ _MOTION = STATES[:6]
 
 
 def ship_of(dataset: str) -> Ship:
-    """The ship of a data set, by registered name or folder."""
+    """Ship of a data set, by registered name or folder."""
     return load_dataset(dataset).ship
 
 
@@ -50,13 +50,13 @@ def ship_benchmark(
     history_s: float = 0.0,
     split: str = "folds",
 ) -> tuple[list[Any], list[Any]]:
-    """(train, test) of a data set as lists of `Input_output_data`, one per window: exactly the runs of that fold of
+    """Lists (train, test) of `Input_output_data`, one per window of a data set: exactly the runs of that fold of
     `shipbench run`.
 
     Args:
         dataset: registered name, folder or data set.
-        fold, folds, split: which fold; as in a task.
-        horizon_s: what is scored of each record [s].
+        fold, folds, split: the fold; as in a task.
+        horizon_s: scored time of each record [s].
         history_s: seconds before it that a model may use beside s0; the initialization window has one sample more.
 
     Raises:
@@ -81,8 +81,8 @@ def ship_benchmark(
 
 
 def to_records(data: Dataset, window: int = 1) -> list[Any]:
-    """Every run as an `Input_output_data`: u (samples, inputs), y (samples, 10), named like the run; copies, so that
-    nobody writes into `data`.
+    """Runs as `Input_output_data`: u (samples, inputs), y (samples, 10), named like the run; copies, so that nobody
+    writes into `data`.
 
     `window`: number of first samples that a model may see; at least 1, since a rollout needs the state that it starts
     from.
@@ -100,8 +100,7 @@ def from_records(
     inputs: Sequence[str] = COMMANDS,
     name: str = "records",
 ) -> Dataset:
-    """A data set of records whose columns are `outputs` (of y) and `inputs` (of u), in the units and signs of
-    `signals`.
+    """Data set of records whose columns are `outputs` (of y) and `inputs` (of u), in the units and signs of `signals`.
 
     y must hold x, y, psi, u, v, r; actuators that it lacks are taken from their commands, commands that u lacks are
     zero, and the notes say so. A record is anything with u, y and sampling_time.
@@ -156,8 +155,8 @@ def _run(index: int, record: Any, outputs: Sequence[str], inputs: Sequence[str],
 
 
 class InputOutputModel:
-    """A shipbench model with the two calls of `nonlinear_benchmarks`-style code: `fit(train)` and `simulate(u,
-    y_init)`.
+    """Model of shipbench with the two calls of `nonlinear_benchmarks`-style code: `fit(train)` and
+    `simulate(u, y_init)`.
 
     Args:
         spec: model spec, such as "physics", "mlp[hidden=64]" or "path/to/model.py:ClassName".
@@ -183,8 +182,8 @@ class InputOutputModel:
         return self
 
     def simulate(self, u: np.ndarray, y_init: np.ndarray) -> np.ndarray:
-        """y (samples, outputs) under the inputs u (samples, inputs), of which the first n are `y_init` (n, outputs), n
-        >= 1, as given.
+        """Outputs y (samples, outputs) under the inputs u (samples, inputs), of which the first n are `y_init`
+        (n, outputs), n >= 1, as given.
 
         Raises:
             InputError: `fit` was not called, or the shapes do not fit.

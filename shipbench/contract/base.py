@@ -1,4 +1,4 @@
-"""What a rule and a verdict are."""
+"""Rules and verdicts of the contract."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ PASSED, BROKEN, NOT_APPLICABLE = "passed", "broken", "not applicable"
 
 @dataclass(frozen=True)
 class Rule:
-    """One sentence of the contract with the function that tries it.
+    """Rule of the contract in one sentence, with the function that tests it.
 
     Args:
-        name: short and stable; what `--json` reports.
+        name: short and stable; reported by `--json`.
         says: the rule, in one sentence.
-        tries: returns the evidence that it is kept, or raises `Broken` or `NotApplicable`; anything else that it raises
-            is the model's failure.
-        after: rules without which this one means nothing: where one of them is broken, this one is not put to the
-            model.
+        tries: returns the evidence that it is kept, or raises `Broken` or `NotApplicable`; any other exception is the
+            model's failure.
+        after: rules that must hold before this one can be tested: where one of them is broken, this one is skipped.
     """
 
     name: str
@@ -31,7 +30,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of a rule: `status` is PASSED, BROKEN or NOT_APPLICABLE; `evidence` are figures or the reason."""
+    """Result of a rule: `status` is PASSED, BROKEN or NOT_APPLICABLE; `evidence` are figures or the reason."""
 
     rule: str
     says: str

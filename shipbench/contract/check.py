@@ -1,4 +1,4 @@
-"""Puts every rule of the contract to a model, in seconds."""
+"""Check of a model against every rule of the contract, in seconds."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class Report:
         return brief("\n".join([f"Check of {self.model} on {self.data}: {counts}", *broken]))
 
     def of(self, status: str) -> list[Verdict]:
-        """The verdicts with that status."""
+        """Verdicts with that status."""
         return [v for v in self.verdicts if v.status == status]
 
     def document(self) -> dict[str, Any]:
-        """The report as one JSON document."""
+        """Report as one JSON document."""
         return {
             "model": self.model, "data": self.data, "seconds": round(self.seconds, 2),
             "passed": len(self.of(PASSED)), "broken": len(self.of(BROKEN)),
@@ -91,7 +91,7 @@ def check_model(model: Any, data: Dataset | None = None, device: str | None = No
 
 
 def check_subject(subject: Subject, began: float | None = None) -> Report:
-    """Put every rule to a model on the subject's data."""
+    """Test every rule on a model with the subject's data."""
     began = time.perf_counter() if began is None else began
     verdicts: dict[str, Verdict] = {}
     for rule in RULES:
@@ -102,7 +102,7 @@ def check_subject(subject: Subject, began: float | None = None) -> Report:
 
 
 def _try(rule: Rule, subject: Subject, before: list[Verdict]) -> Verdict:
-    """The verdict on one rule."""
+    """Verdict on one rule."""
     missing = [v.rule for v in before if v.status == BROKEN]
     if missing:
         return Verdict(rule.name, rule.says, NOT_APPLICABLE, f"not tried: the rule '{missing[0]}' is broken")

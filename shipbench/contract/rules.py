@@ -1,5 +1,5 @@
-"""The contract of a predictor, rule by rule (contract, section 2). Every rule stands here once: `shipbench check` and
-the tests of the built-in models both go through `RULES`."""
+"""Contract of a predictor, rule by rule (contract, section 2). Every rule stands here once: `shipbench check` and the
+tests of the built-in models both use `RULES`."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from .small import what_changed
 from .subject import HISTORY, Broken, NotApplicable, Subject, attempt, raised
 
 ROUNDING = 1e-4
-"""Of a state's size: what a model in single precision may lose when the same is computed in another order."""
+"""Rounding tolerance relative to a state's size: the loss of a model in single precision when the same is computed in
+another order."""
 _LEAK = 1e-6
 
 
 def _unfitted(c: Subject) -> None:
-    """A rule of `fit` cannot be put to a saved model."""
+    """Raise `NotApplicable` for a rule of `fit` on a saved model."""
     if c.saved:
         raise NotApplicable("a saved model comes fitted")
 
@@ -59,7 +60,7 @@ def parameters(c: Subject) -> str:
 
 
 def _flat(model: Any) -> dict[str, Any]:
-    """Public attributes, those of dataclass fields that are dicts spread out."""
+    """Public attributes, with dataclass fields that are dicts spread out."""
     found = (
         asdict(model)
         if is_dataclass(model) and not isinstance(model, type)

@@ -1,4 +1,4 @@
-"""The rule on saving: the same predictions after loading, and nothing pickled."""
+"""Rule on saving: the same predictions after loading, and nothing pickled."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ def same_after_loading(c: Subject) -> str:
 
 
 def _load(c: Subject, folder: Path) -> tuple[Any, str]:
-    """As a study would: by its folder where the class is registered under a name, else by the class's own `load`."""
+    """Load a saved model as a study would: by its folder where the class is registered under a name, else by the
+    class's own `load`."""
     if c.saved or (
         c.spec.path is None and c.spec.given is None and PREDICTORS.get(c.spec.name.partition(":")[0]) is type(c.model)
     ):
@@ -52,7 +53,8 @@ def _load(c: Subject, folder: Path) -> tuple[Any, str]:
 
 
 def pickle_in(name: str, data: bytes) -> str:
-    """Which file of the saved model is, or holds, a pickle; "" if none does. Nothing is unpickled to find out."""
+    """Name of the file of the saved model that is, or holds, a pickle; "" if none does. Nothing is unpickled for the
+    test."""
     if zipfile.is_zipfile(io.BytesIO(data)):
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             return next(

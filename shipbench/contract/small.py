@@ -20,7 +20,7 @@ _ENVIRONMENT = {"wind_speed": (2.0, 8.0), "wind_from": (-3.0, 3.0), "depth": (12
 def small_harbour(
     num: int = NUM_RUNS, horizon: int = STEPS, seed: int = 4, inputs: tuple[str, ...] = COMMANDS
 ) -> Dataset:
-    """`num` simulated port manoeuvres of a 130 m container ship, `horizon` seconds at 1 s.
+    """Simulated port manoeuvres, `num` runs of a 130 m container ship, `horizon` seconds at 1 s.
 
     `inputs` may add environment channels; they are constant in a run and do not act on the ship.
     """
@@ -37,7 +37,7 @@ def small_harbour(
 
 
 def few_windows(data: Dataset) -> Dataset:
-    """At most `NUM_RUNS` windows of at most `STEPS` steps, evenly spread over `data`.
+    """Windows of `data`, evenly spread: at most `NUM_RUNS` of at most `STEPS` steps.
 
     Raises:
         InputError: there are fewer than `MIN_RUNS` windows.
@@ -51,7 +51,7 @@ def few_windows(data: Dataset) -> Dataset:
 
 
 def copied(data: Dataset) -> Dataset:
-    """The same data in arrays of their own, so that nobody can write into the originals."""
+    """Copy of the data in arrays of their own, so that nobody can write into the originals."""
     return data.with_runs(
         replace(r, t=r.t.copy(), states=r.states.copy(), inputs=r.inputs.copy(), meta=replace(r.meta))
         for r in data.runs
@@ -59,7 +59,7 @@ def copied(data: Dataset) -> Dataset:
 
 
 def what_changed(before: Dataset, after: Dataset) -> str:
-    """Where two copies of the same data differ, or ""."""
+    """Name of the first difference between two copies of the same data, or ""."""
     for a, b in zip(before.runs, after.runs, strict=True):
         for name in ("t", "states", "inputs"):
             if not np.array_equal(getattr(a, name), getattr(b, name)):

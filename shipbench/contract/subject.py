@@ -1,4 +1,4 @@
-"""The model under check: made, fitted and asked on small data; and how two predictions are compared."""
+"""Model under check: made, fitted and evaluated on small data; and the comparison of two predictions."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ HISTORY = 10
 
 
 class Broken(Exception):  # noqa: N818 - a verdict, not an error of ours
-    """A rule is broken; the text is the evidence."""
+    """Error of a broken rule; the text is the evidence."""
 
 
 class NotApplicable(Exception):  # noqa: N818
-    """A rule cannot be put to this model or these data; the text is why."""
+    """Signal that a rule does not apply to this model or these data; the text is the reason."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A model after `fit`, with what it was given (copies that it may have written into), what `fit` returned and how
-    long it took."""
+    """Model after `fit`, with its arguments (copies that it may have written into), the return value of `fit` and its
+    duration."""
 
     model: Any
     train: Dataset
@@ -47,7 +47,7 @@ class Fitted:
 
 @dataclass(eq=False)
 class Subject:
-    """One model spec and the data that it is checked on; what several rules need is made once."""
+    """Model spec and the data of the check; results that several rules need are computed once."""
 
     spec: Spec
     data: Dataset
@@ -70,17 +70,17 @@ class Subject:
 
     @cached_property
     def batch(self) -> Batch:
-        """What the model is asked about."""
+        """Batch of predictions that the rules compare."""
         return self.parts[2].batch()
 
     @property
     def few(self) -> Dataset:
-        """Some of the runs to fit on, where it is only to be seen whether a fit works."""
+        """Some of the runs to fit on, for rules that only test whether a fit works."""
         return self.parts[0].subset(range(min(4, len(self.parts[0]))))
 
     def fit(self, state: int, *, train: Dataset | None = None) -> Fitted:
-        """A fresh model fitted with the seed `SEED`, on `train` alone if it is given; `state` is what the global
-        generators are set to meanwhile."""
+        """Fit a fresh model with the seed `SEED`, on `train` alone if it is given; `state` is the seed of the global
+        generators meanwhile."""
         model = make_predictor(self.spec, self.device)
         if self.saved:
             return Fitted(model, self.parts[0], None, model)
@@ -92,7 +92,7 @@ class Subject:
 
     @cached_property
     def fitted(self) -> Fitted:
-        """The model that most rules are put to."""
+        """Model on which most rules are tested."""
         return self.fit(state=1)
 
     @property
@@ -101,17 +101,17 @@ class Subject:
 
     @cached_property
     def S(self) -> np.ndarray:
-        """Its prediction of `batch`, in float64."""
+        """Prediction of `batch`, in float64."""
         return self.ask(self.batch.s0, self.batch.U)
 
     def ask(self, s0: np.ndarray, U: np.ndarray, history: Any = None, model: Any = None) -> np.ndarray:
-        """What the model says of copies of the arguments, in float64, shape unchecked."""
+        """Predict on copies of the arguments, in float64, shape unchecked."""
         copies = None if history is None else (history[0].copy(), history[1].copy())
         return np.array((model or self.model).predict(s0.copy(), U.copy(), copies), dtype=float)
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """Size (10,) by which differences are judged: how far each state moves within the runs (1 for one that never
+        """Size (10,) of each state for comparisons: its range of motion within the runs (1 for one that never
         moves)."""
         states = np.stack([r.states for r in self.data.runs])
         moved = np.concatenate([states[..., : PSI + 1] - states[:, :1, : PSI + 1], states[..., PSI + 1 :]], axis=-1)
@@ -141,7 +141,7 @@ class Subject:
 
     @property
     def earth_fixed(self) -> str:
-        """Why a moved earth frame changes what this model must say, or ""."""
+        """Reason why a moved earth frame changes this model's predictions, or ""."""
         effects = [e.name for e in self.spec.effects if EFFECTS.get(e.name).family in ("environment", "time")]
         if effects:
             return f"the model has earth-fixed effects ({', '.join(effects)})"
@@ -153,7 +153,7 @@ class Subject:
 
 
 def attempt(action: Callable[[], np.ndarray]) -> np.ndarray | Exception:
-    """What the action returns, or what it raises; numpy's warnings on overflow are the model's own business."""
+    """Result of the action, or its exception; numpy's warnings on overflow are ignored."""
     try:
         with np.errstate(all="ignore"):
             return action()
@@ -162,13 +162,13 @@ def attempt(action: Callable[[], np.ndarray]) -> np.ndarray | Exception:
 
 
 def raised(error: Exception) -> str:
-    """For the evidence."""
+    """Text of an exception for the evidence."""
     return f"raised {reason(error)}"
 
 
 @contextmanager
 def global_generators(state: int) -> Iterator[None]:
-    """Set the global generators of random, numpy and torch; put them back afterwards. A model that draws from them does
+    """Seed the global generators of random, numpy and torch; restore them afterwards. A model that draws from them does
     not follow its seed."""
     torch = sys.modules.get("torch")
     # The global state is the one that is meant.

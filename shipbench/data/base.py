@@ -1,4 +1,4 @@
-"""Data sets by name or by folder; the ones that take time to make are kept in a cache."""
+"""Data sets by name or by folder; those that take long to make are kept in a cache."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ _HELPERS = frozenset({
 DATASETS = Registry("data set", "data", "DATASET", helpers=_HELPERS, group="datasets")
 
 LOG_SUFFIXES = (".csv", ".csv.gz", ".parquet", ".mat", ".xlsx", ".txt", ".tsv", ".dat", ".log")
-"""Of files that `data import` may read."""
+"""Suffixes of files that `data import` may read."""
 _LEFT_S = 3600.0
-"""Age [s] beyond which nobody is writing a data set any more: the largest takes a minute."""
+"""Age [s] after which an unfinished data set counts as abandoned: the largest takes a minute."""
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class DatasetPart:
-    """A named data set: how to make it, under which licence, whether to keep it in the cache, and where it is
-    downloaded from if it is.
+    """Named data set: function that makes it, licence, whether to keep it in the cache, and its download address if
+    there is one.
 
     A change that alters the samples of a cached set gets a new `version` (and, once published, a new name).
     """
@@ -62,8 +62,8 @@ def public_folder(name: str) -> Path:
 
 
 def load_dataset(spec: str | os.PathLike[str], *, remake: bool = False, **options: Any) -> Dataset:
-    """A data set by registered name, `name[key=value]`, or the path of a folder in the contract's format (or of a .mat
-    file that was exported).
+    """Load a data set by registered name, `name[key=value]`, or the path of a folder in the contract's format (or of a
+    .mat file that was exported).
 
     Args:
         spec: name, folder or .mat file; a folder is recognised by its dataset.toml.
@@ -111,12 +111,12 @@ def load_dataset(spec: str | os.PathLike[str], *, remake: bool = False, **option
 
 
 def import_command(*logs: Path) -> str:
-    """The command that makes a data set of logs."""
+    """Command that makes a data set of logs."""
     return f"shipbench data import {' '.join(shlex.quote(str(log)) for log in logs)} --propose mapping.toml"
 
 
 def _no_data_set(spec: str, file: Path) -> InputError:
-    """What to give or to do instead of a file."""
+    """Advice in place of a file that is no data set."""
     if os.path.lexists(file.parent / "dataset.toml"):
         return InputError(
             f"'{spec}' is one file of a data set; accepted: its folder. Give {shlex.quote(str(file.parent))}."
@@ -129,7 +129,7 @@ def _no_data_set(spec: str, file: Path) -> InputError:
 
 
 def _logs_within(folder: Path) -> str:
-    """A hint where a folder holds logs."""
+    """Hint where a folder holds logs."""
     log = next((p for p in sorted(folder.iterdir()) if p.is_file() and p.name.lower().endswith(LOG_SUFFIXES)), None)
     return "" if log is None else f" To make one of a log: {import_command(log)}"
 
@@ -163,7 +163,7 @@ def _cache_key(part: DatasetPart, params: dict[str, Any]) -> str:
 
 
 def _from_cache(folder: Path) -> Dataset | None:
-    """The cached data set, or None where there is none or it is damaged (said in the log, then made anew)."""
+    """Cached data set, or None where there is none or it is damaged (reported in the log, then made anew)."""
     from .files import read_dataset
 
     if not os.path.lexists(folder):
@@ -190,7 +190,7 @@ def _from_cache(folder: Path) -> Dataset | None:
 
 
 def _clear(folder: Path) -> None:
-    """Remove whatever stands in the place of a cached data set."""
+    """Remove any file or folder in the place of a cached data set."""
     if folder.is_dir() and not folder.is_symlink():
         shutil.rmtree(folder)
     else:
@@ -198,7 +198,7 @@ def _clear(folder: Path) -> None:
 
 
 def _to_cache(dataset: Dataset, folder: Path) -> None:
-    """Write beside the cache, then move: a reader sees a whole data set or none. A cache that cannot be written costs
+    """Write beside the cache, then move: a reader gets a whole data set or none. A cache that cannot be written costs
     time, not results."""
     from .files import write_dataset
 

@@ -1,9 +1,8 @@
-"""What dataset.toml may say of how a record departs from ours, beyond units and signs: frames, clocks, biases, bad
-samples, gaps.
+"""Corrections of a record in dataset.toml, beyond units and signs: frames, clocks, biases, bad samples, gaps.
 
 `shipbench data check` finds these and prints the lines; the loader applies them in this order: frame, bad samples,
-biases and scales, kind of velocities, cuts and gaps, delays, kind of wind, antenna. Values are in our units and signs,
-after `[units]` and `[signs]`.
+biases and scales, kind of velocities, cuts and gaps, delays, kind of wind, antenna. Values are in standard units and
+signs, after `[units]` and `[signs]`.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ def _in_order(interval: tuple[float, float]) -> tuple[float, float]:
 
 
 Interval = Annotated[tuple[Number, Number], AfterValidator(_in_order)]
-"""[from, to] in s, both included."""
+"""Interval [from, to] in s, both included."""
 
 _MOST = 1e9
 """Largest correction in SI units, and ratio of two units (nano to one)."""
@@ -44,8 +43,8 @@ class RunCorrections(BaseModel):
     """Keys of `[runs.<id>]` that change the samples; all others are metadata.
 
     cut: [from, to] in s, both included: these samples are left out and the run is split there. fill: signal -> such
-    intervals, bridged by straight lines. bias: signal -> recorded less true. current: [north, east] m/s for velocities
-    through water.
+    intervals, bridged by linear interpolation. bias: signal -> recorded less true. current: [north, east] m/s for
+    velocities through water.
     """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -59,15 +58,14 @@ class Corrections(BaseModel):
     """Keys of dataset.toml that hold for all runs.
 
     frame: "east-north" where x is east and y north; "ENU" where psi besides is counterclockwise from east. velocities:
-    what stands in u and v: "body" over ground (ours), "earth" (north and east), "earth-east-north" (east and north), or
-    "water" (body, through water; `current` = [north, east] m/s is added). wind: what stands in wind_speed and
-    wind_from: "true" (ours), "apparent" (as felt on board, its direction from the bow), "apparent-north" (as felt on
-    board, from north), "true-bow" (the true wind, its direction from the bow). antenna: [forward, starboard] m from
-    midship of the point whose position is recorded. gaps: "refuse", or "split" runs at gaps in time and at rows that
-    lack values. scale: recorded over true. bias: recorded less true. delay: s by which the record of a signal is late;
-    "velocity" is the vector of u and v in earth axes (late or filtered there, then turned by the heading of the
-    moment). held: x, y or psi whose values a faster record repeats until the next one; straight lines from value to
-    value take their place.
+    kind of u and v: "body" over ground (standard), "earth" (north and east), "earth-east-north" (east and north), or
+    "water" (body, through water; `current` = [north, east] m/s is added). wind: kind of wind_speed and wind_from:
+    "true" (standard), "apparent" (apparent wind, its direction from the bow), "apparent-north" (apparent wind, from
+    north), "true-bow" (the true wind, its direction from the bow). antenna: [forward, starboard] m from midship of the
+    point whose position is recorded. gaps: "refuse", or "split" runs at gaps in time and at rows that lack values.
+    scale: recorded over true. bias: recorded less true. delay: s by which the record of a signal is late; "velocity" is
+    the vector of u and v in earth axes (late or filtered there, then rotated by the current heading). held: x, y or psi
+    whose values a faster record repeats until the next one; linear interpolation replaces them.
     """
 
     frame: Literal["NED", "ENU", "east-north"] = "NED"
@@ -90,7 +88,7 @@ class Corrections(BaseModel):
 
 
 def check_names(corrections: Corrections, runs: dict[str, dict[str, Any]], where: str) -> None:
-    """Every name is a signal and every number is possible.
+    """Check that every name is a signal and every number is possible.
 
     Raises:
         InputError: a name is no signal, a value is not a finite number, or a current is missing.
@@ -120,8 +118,7 @@ def check_names(corrections: Corrections, runs: dict[str, dict[str, Any]], where
 
 
 def split_meta(name: str, meta: dict[str, Any], where: str) -> tuple[RunCorrections, dict[str, Any]]:
-    """The corrections of a run, and its metadata without them (so that a data set written again is not corrected
-    twice).
+    """Corrections of a run, and its metadata without them (so that a data set written again is not corrected twice).
 
     Raises:
         InputError: a correction has another form.
@@ -138,7 +135,7 @@ def split_meta(name: str, meta: dict[str, Any], where: str) -> tuple[RunCorrecti
 
 
 def to_ned(table: pd.DataFrame, corrections: Corrections) -> None:
-    """Positions and heading of a table in another frame, in place."""
+    """Convert positions and heading of a table in another frame, in place."""
     if corrections.frame != "NED":
         table[["x", "y"]] = table[["y", "x"]].to_numpy()
     if corrections.frame == "ENU":
@@ -148,13 +145,13 @@ def to_ned(table: pd.DataFrame, corrections: Corrections) -> None:
 def correct_run(
     frame: pd.DataFrame, corrections: Corrections, own: RunCorrections, dt: float, where: str, turn: float = 2.0 * np.pi
 ) -> list[pd.DataFrame]:
-    """One run's rows, corrected, in as many pieces as cuts and gaps make of it (samples may still be faulty: the caller
+    """Corrected rows of one run, in as many pieces as cuts and gaps make of it (samples may still be faulty: the caller
     refuses them).
 
-    turn: a whole turn of the heading, which is made continuous: 360 where it may not be in rad yet.
+    turn: a full turn of the heading, which is made continuous: 360 where it may not be in rad yet.
 
     Raises:
-        InputError: a fill has no samples to stand on, velocities through water lack their current, or a kind of wind
+        InputError: a fill has no samples at its ends, velocities through water lack their current, or a kind of wind
             its columns.
     """
     frame = frame.reset_index(drop=True).copy()
@@ -184,8 +181,8 @@ def correct_run(
 
 
 def continuous(psi: np.ndarray, good: np.ndarray | bool = True, turn: float = 2.0 * np.pi) -> np.ndarray:
-    """The heading (samples,) without jumps of a whole turn between its `good` finite samples; where it has none, it
-    keeps its bits."""
+    """Heading (samples,) without jumps of a full turn between its `good` finite samples; where it has none, it is
+    unchanged bit for bit."""
     known = np.isfinite(psi) & good
     if not (np.abs(np.diff(psi[known])) > 0.5 * turn).any():
         return psi
@@ -215,7 +212,7 @@ def _at_midship(frame: pd.DataFrame, antenna: tuple[float, float] | None) -> pd.
 
 
 def _inside(t: np.ndarray, intervals: list[tuple[float, float]], dt: float = 0.0) -> np.ndarray:
-    """Samples in any of the closed intervals, widened a little against rounding."""
+    """Mask of samples in any of the closed intervals, widened a little against rounding."""
     bad = np.zeros(len(t), dtype=bool)
     for start, stop in intervals:
         bad |= (t >= start - 1e-3 * dt - 1e-9) & (t <= stop + 1e-3 * dt + 1e-9)
@@ -233,8 +230,8 @@ def _fill(frame: pd.DataFrame, signal: str, t: np.ndarray, intervals: list[tuple
 
 
 def between_fixes(values: np.ndarray) -> np.ndarray:
-    """Straight lines from fix to fix of a record (samples,) that holds each value until the next; one held for long did
-    not change."""
+    """Linear interpolation from fix to fix of a record (samples,) that holds each value until the next; one held for
+    long did not change."""
     if len(values) < 2:
         return values
     new = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1])
@@ -269,8 +266,8 @@ def _to_body_over_ground(frame: pd.DataFrame, corrections: Corrections, own: Run
 
 
 def undelayed(frame: pd.DataFrame, delay: dict[str, float], dt: float) -> pd.DataFrame:
-    """Signals that were late put back in time; samples whose values lie outside the record are dropped. Commands move
-    by whole samples."""
+    """Signals with late ones shifted back in time; samples whose values lie outside the record are dropped. Commands
+    move by whole samples."""
     late = {s: d for s, d in delay.items() if (s in frame or s == VECTOR) and d != 0.0}
     t = frame["t"].to_numpy()
     if not late or len(t) < 2 or not np.isfinite(t).all():

@@ -1,4 +1,4 @@
-"""What a data set covers, and what it therefore cannot teach: times spent in regions of state and command, in ship
+"""Coverage of a data set, and resulting identifiability gaps: times spent in regions of state and command, in ship
 lengths.
 
 Thresholds are angles, shares or multiples of sqrt(g L) and sqrt(L/g), so that a model and its ship are judged alike
@@ -18,30 +18,30 @@ from ..signals import COMMANDS, DELTA, ENVIRONMENT, F_B, F_S, PSI, N, R, U, V
 
 _G = 9.81
 NEEDED = 3.0
-"""A region counts as covered from this many unit times on: enough to see the ship answer, and more than once."""
+"""Number of unit times from which a region counts as covered: enough for the ship's response, and more than once."""
 STEERAGE = 0.01
-"""Froude number below which the ship counts as lying still, and its drift angle means nothing (0.36 m/s at 130 m)."""
+"""Froude number below which the ship counts as lying still, and its drift angle is undefined (0.36 m/s at 130 m)."""
 
 
 def unit_time(L: float) -> float:
-    """10 sqrt(L/g) [s]: the time to sail one's own length at a Froude number of 0.1 (36 s at 130 m)."""
+    """Time 10 sqrt(L/g) [s] to sail one's own length at a Froude number of 0.1 (36 s at 130 m)."""
     return 10.0 * float(np.sqrt(L / _G))
 
 
 @dataclass(frozen=True)
 class Samples:
-    """All samples of all runs, each standing for `dt` seconds."""
+    """Samples of all runs, each standing for `dt` seconds."""
 
     dataset: Dataset
 
     @cached_property
     def states(self) -> np.ndarray:
-        """(samples, 10)"""
+        """States (samples, 10)."""
         return np.concatenate([r.states for r in self.dataset.runs])
 
     @cached_property
     def inputs(self) -> np.ndarray:
-        """(samples, inputs)"""
+        """Inputs (samples, inputs)."""
         return np.concatenate([r.inputs for r in self.dataset.runs])
 
     @cached_property
@@ -62,11 +62,11 @@ class Samples:
         return np.where(np.abs(self.froude) > STEERAGE, angle, np.nan)
 
     def environment(self, name: str) -> np.ndarray | None:
-        """A measured channel, or None."""
+        """Measured channel, or None."""
         return self.inputs[:, self.dataset.inputs.index(name)] if name in self.dataset.inputs else None
 
     def heading_arc(self) -> float:
-        """The least arc [rad] that holds 95 % of the headings."""
+        """Least arc [rad] that holds 95 % of the headings."""
         angles = np.sort(self.states[:, PSI] % (2 * np.pi))
         held = int(np.ceil(0.95 * len(angles))) - 1
         ends = np.concatenate([angles, angles + 2 * np.pi])
@@ -75,7 +75,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Gap:
-    """What cannot be identified, the figures that say so, and the manoeuvre that would add it."""
+    """Identifiability gap, the figures behind it, and the manoeuvre that would close it."""
 
     subject: str
     because: str
@@ -84,7 +84,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class _Region:
-    """A set of samples: what is learnt there, its name, and what it lacks most (a figure beside the time)."""
+    """Set of samples: its information, its name, and the figure that it lacks most (beside the time)."""
 
     subject: str
     name: str
@@ -94,7 +94,7 @@ class _Region:
 
 
 def _regions(s: Samples) -> list[_Region]:
-    """The regions that a ship's model needs, with the figures that are printed beside the time."""
+    """Regions that a ship's model needs, with the figures that are printed beside the time."""
     S, fn = s.states, s.froude
     n, delta = S[:, N], np.rad2deg(S[:, DELTA])
     full = float(np.percentile(np.abs(n), 95))
@@ -145,8 +145,8 @@ def _regions(s: Samples) -> list[_Region]:
 
 
 def gaps(dataset: Dataset) -> list[Gap]:
-    """What these data cannot identify, whatever the model: by the times spent in regions, the spread of headings and
-    the channels that are there."""
+    """Parts that these data cannot identify, for any model: by the times spent in regions, the spread of headings and
+    the recorded channels."""
     s, found = Samples(dataset), []
     unit = unit_time(dataset.ship.L)
     for region in _regions(s):
@@ -167,7 +167,7 @@ def gaps(dataset: Dataset) -> list[Gap]:
 
 
 def _constant_inputs(s: Samples) -> list[Gap]:
-    """Revolutions that never change, and speeds that do not either."""
+    """Gap of a constant shaft speed, and of constant speeds."""
     found, n, fn = [], s.states[:, N], s.froude
     ahead = n > 0.1 * np.percentile(np.abs(n), 95)
     if ahead.any():
@@ -191,7 +191,7 @@ def _constant_inputs(s: Samples) -> list[Gap]:
 
 
 def _missing_channels(s: Samples) -> list[Gap]:
-    """What no manoeuvre can replace: channels that are not recorded, or never change."""
+    """Gaps that no manoeuvre can close: channels that are not recorded, or never change."""
     found, dataset = [], s.dataset
     used = [name for i, name in enumerate(COMMANDS[:2]) if np.ptp(s.inputs[:, i]) > 0.0]
     repeats = all(

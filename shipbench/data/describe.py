@@ -1,4 +1,4 @@
-"""Statistics of a data set, laid out as the source paper's Table II, and beside it."""
+"""Statistics of a data set, laid out as the source paper's Table II, and compared with it."""
 
 from __future__ import annotations
 
@@ -47,17 +47,18 @@ def statistics(dataset: Dataset) -> pd.DataFrame:
 
 
 def table_ii() -> pd.DataFrame:
-    """The source paper's Table II, same layout as `statistics`."""
+    """Table II of the source paper, in the layout of `statistics`."""
     rows = {k: [*v, "deg" if k in _SHOWN_IN_DEGREES else UNITS[k]] for k, v in _TABLE_II.items()}
     return pd.DataFrame.from_dict(rows, orient="index", columns=[*STATISTICS, "unit"])
 
 
 def compare_with_paper(dataset: Dataset) -> pd.DataFrame:
-    """Mean, std, P10 and P90 of u, v, r, n, delta: ours, the paper's, and the difference as a share of the paper's std.
+    """Mean, std, P10 and P90 of u, v, r, n, delta: of the data, of the paper, and the difference as a share of the
+    paper's std.
 
     The paper prints r with two decimals: its 0.01 stands for anything from 0.005 to 0.015 rad/s. For r `difference /
-    paper std` is taken to the nearest figure that rounds to the printed one, so that 0 means "not told apart by the
-    paper's digits", and the std is taken as 0.01. `plain difference / paper std` makes no such allowance.
+    paper std` is taken to the nearest figure that rounds to the printed one, so that 0 means no difference within the
+    paper's digits, and the std is taken as 0.01. `plain difference / paper std` makes no such allowance.
     """
     ours, paper, rows = statistics(dataset), table_ii(), []
     for signal in COMPARED:

@@ -1,5 +1,5 @@
-"""Free-running tests of a 3 m Esso Osaka model: real, measured runs (CC BY-NC-SA 4.0, not distributed here: downloaded,
-or the user's own copy).
+"""Free-running tests of a 3 m Esso Osaka model: measured runs (CC BY-NC-SA 4.0, not distributed here: downloaded, or
+the user's own copy).
 
 Source: github.com/NAOE-5thLab/FRT-DS-ESSO, Osaka University; Wakita et al. (2022), Miyauchi et al. (2022).
 """
@@ -43,7 +43,7 @@ _PUBLISHED_TEST = (
     "random_06-Aug-2020_16_24_25_3",
     "turn_14-Oct-2020_15_06_53", "zigzag_31-Jul-2020_13_42_53",
 )  # fmt: skip
-"""The test files of Wakita et al. (2022), from the table in the source's README."""
+"""Test files of Wakita et al. (2022), from the table in the source's README."""
 
 PUBLIC = PublicData(
     name="esso_osaka",
@@ -70,7 +70,7 @@ SHIP = Ship(
     rudder=Rudder(area=0.01063, height=float(np.sqrt(0.01063 * 1.539)), x=-1.5),
     wind=Wind(frontal_area=0.13544, lateral_area=0.52038),
 )  # fmt: skip
-"""Particulars and open-water propeller data that the source gives; Izz alone is not given there."""
+"""Particulars and open-water propeller data of the source; it does not give Izz."""
 
 
 def find_copy(path: str | None = None) -> Path:
@@ -101,7 +101,7 @@ def find_copy(path: str | None = None) -> Path:
 
 
 def _index(folder: Path) -> pd.DataFrame:
-    """Files, manoeuvres and published split of a copy: its runs.csv, or what the published names say."""
+    """Files, manoeuvres and published split of a copy: from its runs.csv, or from the published names."""
     import pandas as pd  # not above: `data list` imports this module
 
     if not (folder / "runs.csv").is_file():
@@ -128,7 +128,7 @@ def _index(folder: Path) -> pd.DataFrame:
 
 
 def _check_content(folder: Path) -> tuple[str, ...]:
-    """Notes on files that are not the published ones: said of a user's own copy, refused in what was downloaded."""
+    """Notes on files that are not the published ones: reported for a user's own copy, refused in a download."""
     changed = PUBLIC.changed(folder)
     if not changed:
         return ()

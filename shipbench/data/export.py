@@ -1,4 +1,4 @@
-"""Data sets written for other programs: CSV, Parquet, MATLAB."""
+"""Export of data sets for other programs: CSV, Parquet, MATLAB."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Format = Literal["csv", "parquet", "mat"]
 
 
 def check_format(format: str | None, out: Path, source: str) -> Format:
-    """The format that is meant; a file that ends in .mat needs no word.
+    """Requested format; a file that ends in .mat needs no format name.
 
     Raises:
         InputError: no format or an unknown one, a file's name that contradicts it, or `out` is the folder that is to be
@@ -44,7 +44,7 @@ def check_format(format: str | None, out: Path, source: str) -> Format:
 
 
 def export_dataset(dataset: Dataset, out: Path, format: Format) -> list[Path]:
-    """Write `dataset` and return what was written.
+    """Write `dataset` and return the paths written.
 
     csv, parquet: the contract's three files in the folder `out`; mat: one file, `out` or `out`/dataset.mat (see `mat`).
 

@@ -1,4 +1,4 @@
-"""A data set on disk: trajectories, dataset.toml and ship.toml in one folder (docs/formats.md)."""
+"""Data set on disk: trajectories, dataset.toml and ship.toml in one folder (docs/formats.md)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _SHOWN = 60
 
 
 class Description(Corrections):
-    """dataset.toml; an unknown key is an error, never ignored."""
+    """Content of dataset.toml; an unknown key is an error, never ignored."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     name: str
@@ -64,7 +64,7 @@ class Description(Corrections):
 
 
 def read_dataset(folder: str | Path) -> Dataset:
-    """Read a folder of the contract's format into SI and our signs.
+    """Read a folder of the contract's format into SI and standard signs.
 
     A unit or sign given for an actuator also holds for its command, unless the command has its own entry. Columns that
     are not signals are ignored.
@@ -97,7 +97,7 @@ def read_dataset(folder: str | Path) -> Dataset:
 
 
 def read_description(path: Path) -> Description:
-    """dataset.toml, validated.
+    """Validated content of dataset.toml.
 
     Raises:
         InputError: the file is missing, is not TOML, or has a missing, unknown or impossible entry.
@@ -106,7 +106,7 @@ def read_description(path: Path) -> Description:
 
 
 def parse_description(data: dict[str, Any], path: Path) -> Description:
-    """The content of a dataset.toml, validated; `path` is named where it is wrong.
+    """Validated content of a dataset.toml; `path` is named in messages.
 
     Raises:
         InputError: an entry is missing, unknown or impossible.
@@ -143,7 +143,7 @@ def ship_file(folder: Path, description: Description) -> Path:
 
 
 def read_table(folder: Path, description: Description) -> tuple[pd.DataFrame, Path]:
-    """The columns of the table that are ours, under our names, and the table's path.
+    """Known columns of the table, under their standard names, and the table's path.
 
     Raises:
         InputError: no table or several, a required column is missing, two columns are one signal, or as
@@ -163,7 +163,7 @@ def read_table(folder: Path, description: Description) -> tuple[pd.DataFrame, Pa
 
 
 def _needed(names: list[str], columns: dict[str, str], where: Path) -> list[str]:
-    """Those of the table's columns that are ours, or become so by [columns]."""
+    """Columns of the table that are known, or become so by [columns]."""
     for theirs, ours in columns.items():
         if theirs not in names:
             raise unknown_name(f"column of {where.name} in [columns] of dataset.toml:", theirs, names)
@@ -191,7 +191,7 @@ def _needed(names: list[str], columns: dict[str, str], where: Path) -> list[str]
 
 
 def convert_table(table: pd.DataFrame, description: Description) -> None:
-    """Units, signs and frame of all columns to ours, in place.
+    """Convert units, signs and frame of all columns to the standard ones, in place.
 
     Raises:
         InputError: an entry names no signal, or a unit or sign that is not known.
@@ -213,7 +213,7 @@ def convert_table(table: pd.DataFrame, description: Description) -> None:
 
 
 def _runs(name: str, rows: Columns, inputs: tuple[str, ...], description: Description, where: Path) -> list[Run]:
-    """The run, or the pieces that its cuts and gaps leave: these share a group, so that no fold parts them."""
+    """Run, or the pieces that its cuts and gaps leave: these share a group, so that no fold parts them."""
     if len(rows["t"]) < 2:
         raise InputError(f"{where}: run '{name}' has {len(rows['t'])} sample; at least 2 are needed.")
     own, meta = split_meta(name, description.runs.get(name, {}), str(where))
@@ -250,7 +250,7 @@ def _run(
 
 
 def write_dataset(dataset: Dataset, folder: str | Path, format: Literal["csv.gz", "csv", "parquet"] = "csv.gz") -> None:
-    """Write the three files; `read_dataset` gives back the same samples, bit for bit.
+    """Write the three files; `read_dataset` reads the same samples back, bit for bit.
 
     Raises:
         InputError: the folder cannot be written, or metadata cannot be expressed in TOML.

@@ -1,4 +1,4 @@
-"""90 simulated port approaches and departures of the 130 m container ship, 120 s at 1 s, without noise."""
+"""Simulated port approaches and departures of the 130 m container ship, 90 runs of 120 s at 1 s, without noise."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def simulate(name: str, seed: int, gusts: Gusts | None = None, noise: np.ndarray
 
 
 def make(seed: int = SEED) -> Dataset:
-    """The noise-free set; the same seed gives the same samples."""
+    """Make the noise-free set; the same seed gives the same samples."""
     return simulate("harbour90", int(seed))
 
 

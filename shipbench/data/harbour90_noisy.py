@@ -1,4 +1,4 @@
-"""The 90 port manoeuvres of `harbour90`, sailed in light hidden gusts and recorded by noisy sensors: no model can be
+"""Port manoeuvres of `harbour90`, sailed in light hidden gusts and recorded by noisy sensors: no model can be
 perfect."""
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ NOISE = np.array([0.5, 0.5, np.deg2rad(0.3), 0.05, 0.05, np.deg2rad(0.05), 0.5, 
 
 
 def make(seed: int = SEED) -> Dataset:
-    """The noisy set; the same plans as `harbour90`, so the tracks differ by the gusts and the controllers' answer to
-    them."""
+    """Make the noisy set; it has the plans of `harbour90`, so the tracks differ by the gusts and the controllers'
+    response to them."""
     return simulate("harbour90_noisy", int(seed), GUSTS, NOISE)
 
 

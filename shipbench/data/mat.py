@@ -31,7 +31,7 @@ _RUN_FIELDS = ("id", "t", "states", "commands", "environment", "names", "units",
 
 
 def cells(texts: Any) -> np.ndarray:
-    """A column of text as a MATLAB cell array."""
+    """Column of text as a MATLAB cell array."""
     found = np.empty((len(texts), 1), dtype=object)
     found[:, 0] = list(texts)
     return found
@@ -46,7 +46,7 @@ def struct_array(rows: list[dict[str, Any]]) -> np.ndarray:
 
 
 def save_mat(path: Path, variables: dict[str, Any]) -> None:
-    """Write variables into a .mat file in one step.
+    """Write variables into a .mat file atomically.
 
     Raises:
         InputError: the file cannot be written, or is too large for the format (2 GB a variable).

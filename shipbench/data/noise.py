@@ -1,4 +1,4 @@
-"""How noisy each channel of a data set is, judged from the samples alone."""
+"""Noise of each channel of a data set, estimated from the samples alone."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _MAD = 1.4826
 
 @dataclass(frozen=True)
 class ChannelNoise:
-    """One channel: noise is the standard deviation of the part that is new in every sample, in our units (median and
-    greatest over the runs, the run of the greatest); step is the resolution of the record, or not-a-number where the
-    values lie on no grid; repeated is the share of samples that repeat the one before."""
+    """Noise of one channel: noise is the standard deviation of its white part, in standard units (median and greatest
+    over the runs, the run of the greatest); step is the resolution of the record, or NaN where the values lie on no
+    grid; repeated is the share of samples that repeat the one before."""
 
     channel: str
     noise: float
@@ -34,16 +34,16 @@ def white_noise(x: np.ndarray) -> float:
 
     Differences of order m let a smooth signal vanish and leave the variance of white noise times binomial(2m, m)
     (Gasser, Sroka and Jennen-Steinmetz 1986; Hall, Kay and Titterington 1990). The least of the orders 2 to 6 is taken,
-    each by its median absolute deviation, so that neither bends nor single jumps count as noise. What changes slowly
-    (drift, bias, filtered noise) is not seen; of a motion that is sampled coarsely some is taken for noise.
+    each by its median absolute deviation, so that neither bends nor single jumps count as noise. Slow changes (drift,
+    bias, filtered noise) are not detected; of a coarsely sampled motion some is taken for noise.
     """
     found = [_MAD * np.median(np.abs(np.diff(x, m))) / np.sqrt(comb(2 * m, m)) for m in _ORDERS if len(x) > 2 * m]
     return float(min(found, default=np.nan))
 
 
 def resolution(runs: list[np.ndarray]) -> float:
-    """Step of the grid that the values of all runs lie on, or not-a-number: every value of a grid is taken again and
-    again, five times on average."""
+    """Step of the grid that the values of all runs lie on, or NaN: every value of a grid occurs again and again, five
+    times on average."""
     values = np.concatenate(runs)
     spread = float(np.ptp(values))
     changes = sum(int(np.count_nonzero(np.diff(x))) for x in runs)

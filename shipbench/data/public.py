@@ -1,5 +1,5 @@
-"""Public data sets that are downloaded, never shipped: the licence comes first, and every file must have the published
-checksum (pooch)."""
+"""Public data sets that are downloaded, never distributed: the licence comes first, and every file must have the
+published checksum (pooch)."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from ..regular_files import open_regular
 
 _TIMEOUT_S = 30
 _LARGEST = 1_000_000_000
-"""Bytes of one file, unpacked."""
+"""Most bytes of one file, unpacked."""
 
 
 @dataclass(frozen=True)
 class PublicData:
-    """Where a public data set lies, under which terms, and the checksums of its files.
+    """Address of a public data set, its terms, and the checksums of its files.
 
     Args:
         name: registered name of the data set.
         url: the folder that the file names are relative to, of one fixed version.
         licence: short name and address of the text.
-        terms: what the licence asks for, in plain words.
+        terms: conditions of the licence, in plain words.
         citation: the papers to cite.
         registry: file of names and SHA-256 checksums, in pooch's format.
     """
@@ -42,14 +42,14 @@ class PublicData:
 
     @cached_property
     def checksums(self) -> dict[str, str]:
-        """File name -> SHA-256 of its content, uncompressed."""
+        """SHA-256 of the uncompressed content by file name."""
         lines = (
             line.split() for line in self.registry.read_text(encoding="utf-8").splitlines() if not line.startswith("#")
         )
         return {name: digest.removeprefix("sha256:") for name, digest in lines}
 
     def notice(self) -> str:
-        """What a user reads before anything is downloaded."""
+        """Text for the user before anything is downloaded."""
         cite = "\n".join(f"  - {paper}" for paper in self.citation)
         return (
             f"Data set: {self.name}, {len(self.checksums)} files\nSource: {self.url}\nLicence: {self.licence}\n"
@@ -57,11 +57,11 @@ class PublicData:
         )
 
     def missing(self, folder: Path) -> list[str]:
-        """The files that `folder` lacks."""
+        """Files that `folder` lacks."""
         return [name for name in self.checksums if find(folder, name) is None]
 
     def changed(self, folder: Path) -> list[str]:
-        """The files in `folder` whose content is not the published one (missing files do not count)."""
+        """Files in `folder` whose content is not the published one (missing files do not count)."""
         found = ((name, find(folder, name)) for name in self.checksums)
         return [name for name, path in found if path is not None and _digest(path) != self.checksums[name]]
 
@@ -133,7 +133,8 @@ class PublicData:
 
 
 def find(folder: Path, name: str) -> Path | None:
-    """The file `name` of a public data set in a copy: plain or .gz, in the folder itself or in its folder `data`."""
+    """Path of the file `name` of a public data set in a copy: plain or .gz, in the folder itself or in its folder
+    `data`."""
     candidates = (folder / part / f"{name}{end}" for part in ("", "data") for end in ("", ".gz"))
     return next((path for path in candidates if path.is_file()), None)
 
@@ -150,7 +151,7 @@ def _digest(path: Path) -> str:
 
 
 def _content(path: Path) -> Iterator[bytes]:
-    """The content, uncompressed, piece by piece; OSError where it is larger than any published file."""
+    """Content, uncompressed, piece by piece; OSError where it is larger than any published file."""
     with open_regular(path) as file:
         opened = gzip.GzipFile(fileobj=file) if path.suffix == ".gz" else file
         size = 0

@@ -1,4 +1,4 @@
-"""A data set in memory, read as its folder would be with further entries of dataset.toml."""
+"""Data set in memory, read as its folder would be with further entries of dataset.toml."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .files import Description, convert_table
 
 
 def reread(dataset: Dataset, entries: dict[str, Any]) -> Dataset:
-    """`dataset` with the corrections `entries` (keys of dataset.toml, as `shipbench data check` prints them) applied to
+    """Data set with the corrections `entries` (keys of dataset.toml, as `shipbench data check` prints them) applied to
     its samples.
 
-    Values are in our units before: an entry such as `[units] x = "ft"` says what the numbers in memory are. Pieces that
-    cuts and gaps leave share a group, so that no fold parts them.
+    Values are in standard units before: an entry such as `[units] x = "ft"` gives the unit of the numbers in memory.
+    Pieces that cuts and gaps leave share a group, so that no fold parts them.
 
     Raises:
         InputError: an entry names no signal, unit or sign that is known, or leaves no two samples.

@@ -1,5 +1,5 @@
-"""What the runs of a data set tell apart: sensitivities of the physics model's rollouts to causes, and how far the
-others can imitate each.
+"""Identifiability of causes from the runs of a data set: sensitivities of the physics model's rollouts to causes, and
+their collinearity.
 
 The model is the benchmark's own (`predictors/physics.py`), fitted roughly to windows of the data; the sensitivities are
 those of its fit.
@@ -19,14 +19,13 @@ from .coverage import unit_time
 
 _WINDOW, _MOST_WINDOWS, _FIT_STEPS = 6.0, 24, 3
 IMITATED = 0.9
-"""A share of 0.9 is a variance inflation factor of 10, the usual limit of collinearity (Marquardt 1970; Belsley, Kuh
-and Welsch 1980)."""
+"""Share at which a cause counts as confounded: 0.9 is a variance inflation factor of 10, the usual limit of
+collinearity (Marquardt 1970; Belsley, Kuh and Welsch 1980)."""
 _LEAST = 1e-3
-"""Least size of what there is to predict of a channel, in ship lengths, radians and sqrt(gL): in a dead straight run
-yaw is not nothing."""
+"""Least size of the changes to predict of a channel, in ship lengths, radians and sqrt(gL): in a straight run that of
+yaw is not zero."""
 UNFELT = 1e-3
-"""A typical size that changes the tracks by less than this share of what holding the speeds gets wrong is not felt at
-all."""
+"""Least effect size, as a share of the error of constant velocities, of a cause that can be identified at all."""
 
 _PARAMETERS = {2: ("resistance", "coast down with the shaft stopped, and speed up from rest"),
                0: ("propeller walk", "straight runs with the revolutions up and down"),
@@ -50,8 +49,9 @@ _EFFECTS = (
 
 @dataclass(frozen=True)
 class Telling:
-    """One cause: felt is the change that a typical size makes (share of what holding the speeds gets wrong), imitated
-    the share of it (squared) that the others can make together, alike the one that does most and its cosine."""
+    """Identifiability of one cause: felt is the effect size of a typical amplitude (share of the error of constant
+    velocities), imitated the share of it (squared) that the others can explain together, alike the one that explains
+    most and its cosine."""
 
     subject: str
     felt: float
@@ -62,7 +62,7 @@ class Telling:
 
 
 def tellings(dataset: Dataset) -> tuple[list[Telling], str]:
-    """Every cause, and a sentence on how it was found (or why not)."""
+    """Identifiability of every cause, and a sentence on the method (or why it failed)."""
     steps = min(
         round(_WINDOW * unit_time(dataset.ship.L) / dataset.dt), int(np.median([len(r) for r in dataset.runs])) - 1
     )
@@ -130,7 +130,8 @@ def _froude_units(L: float) -> np.ndarray:
 
 
 def _compare(Z: np.ndarray, names: list[str], manoeuvres: dict[str, str]) -> list[Telling]:
-    """Size and imitation of each cause; of a cause with several columns the direction that is imitated most."""
+    """Effect size and explained share of each cause; of a cause with several columns the direction of the largest
+    share."""
     found = []
     size = np.linalg.norm(Z, axis=0)
     unit = Z / np.where(size > 0.0, size, 1.0)

@@ -1,5 +1,5 @@
-"""The table of trajectories as it stands in a file (CSV, plain or gzip; Parquet): only the columns that are used, and
-no more than memory holds."""
+"""Table of trajectories in a file (CSV, plain or gzip; Parquet): only the columns in use, and no more than memory
+holds."""
 
 from __future__ import annotations
 
@@ -19,32 +19,31 @@ from ..errors import InputError
 from ..regular_files import open_regular
 
 MOST_CELLS = 40_000_000
-"""Rows times columns of a data set, which is held in memory: reading takes up to 35 bytes a cell (measured), so 1.4 GB
-in all."""
+"""Rows times columns of a data set, which is held in memory: reading takes up to 35 bytes a cell, so 1.4 GB in all."""
 MOST_BYTES = 1_100_000_000
-"""Bytes of a table unpacked, as of a .mat file."""
+"""Most bytes of a table unpacked, as of a .mat file."""
 MOST_COLUMNS = 10_000
 _LONGEST_LINE = 1_000_000
 _LONGEST_TEXT = 1_000
-"""Characters of one text in Parquet, where a text that stands in all rows is stored once."""
+"""Most characters of one text in Parquet, where a text that stands in all rows is stored once."""
 _CELLS, _ROWS = 1_000_000, 50_000
-"""Of one block: cells of CSV, rows of Parquet."""
+"""Size of one block: cells of CSV, rows of Parquet."""
 _EMPTY = ["", "NA", "N/A", "NaN", "nan", "NAN", "null", "NULL", "None", "#N/A"]
-"""What stands for a missing number; in the column of run names it is a name like any other."""
+"""Marks of a missing number; in the column of run names they are names like any other."""
 _DAMAGED = (
     ValueError, OSError, EOFError, MemoryError, OverflowError, TypeError, KeyError, NotImplementedError, RuntimeError,
     zlib.error, pa.ArrowException, pd.errors.ParserError, pd.errors.ParserWarning,
 )  # fmt: skip
-"""What pandas, pyarrow and gzip raise on damaged files."""
+"""Exceptions of pandas, pyarrow and gzip on damaged files."""
 
 
 def read_trajectories(path: Path, ids: str, needed: Callable[[Sequence[str]], list[str]]) -> pd.DataFrame:
-    """The needed columns of a table under its own names: numbers, or text where a column holds other things than
+    """Read the needed columns of a table under its own names: numbers, or text where a column holds other things than
     numbers.
 
     Args:
-        path: the file; its suffix tells the format.
-        ids: the column of run names, which stay the text that they are ("001", "NA").
+        path: the file; its suffix gives the format.
+        ids: the column of run names, which stay text ("001", "NA").
         needed: picks from the names of all columns those that are read, or raises an InputError.
 
     Raises:
@@ -97,7 +96,7 @@ def _read_csv(file: IO[bytes], path: Path, ids: str, needed: Callable[[Sequence[
 
 
 def _check_marks(header: bytes, path: Path) -> None:
-    """Commas stand between the columns."""
+    """Check that commas stand between the columns."""
     for mark, name in ((b";", "semicolons"), (b"\t", "tabs")):
         if header.count(mark) > header.count(b","):
             raise InputError(
@@ -108,7 +107,7 @@ def _check_marks(header: bytes, path: Path) -> None:
 
 
 def _check_decimals(block: pd.DataFrame, path: Path) -> None:
-    """Numbers have decimal points."""
+    """Check that numbers have decimal points."""
     for column in block.select_dtypes(exclude="number").columns:
         commas = block[column].astype(str).str.fullmatch(r"\s*[-+\u2212]?\d[\d.]*,[\d,.]+\s*")
         if commas.any():
@@ -121,7 +120,7 @@ def _check_decimals(block: pd.DataFrame, path: Path) -> None:
 
 
 def _count_lines(text: Any, path: Path) -> int:
-    """Lines of a text, which is read in pieces: what it holds unpacked is not known before."""
+    """Count the lines of a text piece by piece: its unpacked size is not known before."""
     size = lines = unfinished = 0
     while piece := text.read(_LONGEST_LINE):
         size += len(piece)
@@ -158,7 +157,7 @@ def _check_size(path: Path, rows: int, columns: int, all_columns: int) -> None:
 
 
 def _without_truth_values(block: pd.DataFrame) -> pd.DataFrame:
-    """A column of "True" and "False" is text, not ones and zeros."""
+    """Column of "True" and "False" as text, not ones and zeros."""
     truths = [column for column in block.columns if block[column].dtype == bool]
     return block.astype(dict.fromkeys(truths, object)).astype(dict.fromkeys(truths, str)) if truths else block
 
@@ -196,8 +195,8 @@ def _is_text(kind: pa.DataType) -> bool:
 
 
 def _values(column: pa.Array, name: str, is_name: bool, path: Path) -> np.ndarray:
-    """Numbers as float64 with NaN where there is none; names of runs and all else as text, for the message that names
-    the row."""
+    """Numbers as float64 with NaN where there is none; names of runs and other texts as text, for the message that
+    names the row."""
     kind = column.type
     number = (
         pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind)

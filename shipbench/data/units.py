@@ -1,4 +1,4 @@
-"""Units and signs that a data set's files may use, as factors to ours."""
+"""Units and signs that a data set's files may use, as factors to the standard ones."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ _KEEPS = {
 
 
 def unit_factor(signal: str, unit: str) -> float:
-    """Factor from `unit` to our unit of `signal`; "1e-7 deg" and "0.1 kn" are units for logs that count in such steps.
+    """Factor from `unit` to the standard unit of `signal`; "1e-7 deg" and "0.1 kn" are units for logs that count in
+    such steps.
 
     Raises:
         InputError: the unit is not known for this signal.
@@ -44,7 +45,7 @@ def unit_factor(signal: str, unit: str) -> float:
 
 
 def sign_factor(signal: str, positive: str) -> float:
-    """+1 or -1 for the side or sense that is positive in the file.
+    """Sign (+1 or -1) for the side or sense that is positive in the file.
 
     Raises:
         InputError: the word is not known for this signal.

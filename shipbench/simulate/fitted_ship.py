@@ -1,7 +1,7 @@
-"""Sea trials of a ship that *is* the fitted model: eq. (2) with drawn parameters. Nothing is hidden and nothing differs
-in structure.
+"""Sea trials of a ship that *is* the fitted model: eq. (2) with drawn parameters. No cause is hidden and the structure
+is the same.
 
-For counting false alarms only; causes to be found are always hidden in the MMG ship.
+It serves to count false alarms only; causes to be found are always hidden in the MMG ship.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ _MAX_TURN = 1.5
 
 
 def draw_parameters(rng: np.random.Generator, c: eq2.Coefficients) -> list[float]:
-    """p0..p10 of a symmetric ship: resistance, lift and drag of the rudder near what the source paper and rudder theory
-    give."""
+    """Draw p0..p10 of a symmetric ship: resistance, lift and drag of the rudder near the values of the source paper and
+    rudder theory."""
     area, speed = 0.5 * c.rho * c.L * c.T, 0.1 * np.sqrt(9.81 * c.L)
     p = [0.0] * eq2.NUM_PARAMETERS
     p[1] = 0.002 * area * speed * rng.uniform(0.0, 2.0)
@@ -38,7 +38,7 @@ def draw_parameters(rng: np.random.Generator, c: eq2.Coefficients) -> list[float
 
 
 def draw_hull(rng: np.random.Generator) -> list[Hidden]:
-    """Differences of an ordinary ship from the regressions: hull derivatives, race at the rudder, wake in turns,
+    """Draw differences of an ordinary ship from the regressions: hull derivatives, race at the rudder, wake in turns,
     thrusters at speed."""
     hull = EFFECTS.get("hull_derivatives")
     factors = np.clip(HULL_SPREAD * rng.standard_normal(len(hull.parameters)), -0.5, 0.5)
@@ -92,7 +92,7 @@ def _gusts(rng: np.random.Generator, runs: int, steps: int, dt: float, size: np.
 
 
 def fitted_trials(ship: Vessel, seed: int, plan: Trials | None = None, name: str = "trials") -> Dataset:
-    """Trials of eq. (2) on the particulars and actuators of `ship`: same orders, sensors and size of gusts as
+    """Trials of eq. (2) on the particulars and actuators of `ship`: same commands, sensors and size of gusts as
     `sea_trials`.
 
     A drawn hull that spins (|r| L over the speed beyond 1.5) is drawn again.

@@ -1,5 +1,5 @@
-"""Closed-loop port approaches and departures: waypoints, line-of-sight steering, speed orders, stops and thrusters, for
-many runs at once."""
+"""Closed-loop port approaches and departures: waypoints, line-of-sight steering, speed commands, stops and thrusters,
+for many runs at once."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ class Gusts:
 
 @dataclass(frozen=True)
 class Plan:
-    """What the pilots of all runs intend; arrays have the run as first axis.
+    """Intentions of the pilots of all runs; arrays have the run as first axis.
 
     waypoints (runs, legs, 2) [m]; target_speed (runs, orders) [m/s] in force from order_time (runs, orders) [s];
-    engine_gain (runs,) [rpm per m/s]; stopping (runs,): the ship is brought to a stop with astern revolutions;
+    engine_gain (runs,) [rpm per m/s]; stopping (runs,): the ship is brought to a stop with astern shaft speed;
     thrusters (runs,): tunnel thrusters help to steer.
     """
 
@@ -44,7 +44,7 @@ class Plan:
 
 
 def draw_plan(rng: np.random.Generator, num: int, L: float, horizon: float, warm_up: float) -> Plan:
-    """Draw the intentions of `num` runs: winding channels, speed orders every 20 to 60 s, a few stops, a few thruster
+    """Draw the intentions of `num` runs: winding channels, speed commands every 20 to 60 s, a few stops, a few thruster
     assists."""
     speed = np.clip(np.where(rng.random(num) < 0.66, rng.normal(4.02, 0.18, num), rng.normal(5.3, 0.32, num)), 2.4, 6.3)
     course = rng.uniform(-np.pi, np.pi, num)
@@ -106,7 +106,7 @@ def fly(
 
 
 def _pilot(ship: MMGShip, plan: Plan, state: np.ndarray, leg: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Commands (runs, 4) of line-of-sight steering and the speed orders; and the leg that each run is on."""
+    """Commands (runs, 4) of line-of-sight steering and the speed commands; and the leg that each run is on."""
     rows = np.arange(len(leg))
     to_go = plan.waypoints[rows, leg] - state[:, [X, Y]]
     leg = np.minimum(leg + (np.hypot(*to_go.T) < 0.75 * ship.L), _LEGS - 1)

@@ -1,5 +1,5 @@
-"""Sailing the MMG ship with causes hidden in it: effects on the hull, in the gears and in the sensors, under gusts that
-nobody records."""
+"""Simulation of the MMG ship with hidden causes: effects on the hull, in the actuator dynamics and in the sensors,
+under unrecorded gusts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..ship import Ship, complete
 
 
 class Vessel(Protocol):
-    """What can be sailed in trials."""
+    """Ship that can be sailed in trials."""
 
     @property
     def name(self) -> str: ...
@@ -33,14 +33,14 @@ class Vessel(Protocol):
 
 @dataclass(frozen=True)
 class Hidden:
-    """An effect and its values `q`: numbers, or one per run."""
+    """Effect and its values `q`: numbers, or one per run."""
 
     effect: Effect
     q: tuple[Array, ...]
 
 
 def gears_of(ship: Vessel, hidden: Sequence[Hidden]) -> dict[str, Gear]:
-    """Gears of shaft [rpm], rudder [rad] and thrusters [N], as built and then as the hidden effects leave them."""
+    """Dynamics of shaft [rpm], rudder [rad] and thrusters [N], as built and then as changed by the hidden effects."""
     a = ship.actuators
     gears = {"n": Gear(a.T_n, 60.0 * a.rate_n), "delta": Gear(a.T_delta, a.rate_delta), "F": Gear(a.T_F, a.rate_F)}
     for h in hidden:
@@ -114,7 +114,7 @@ def sail(
 def record(
     S: np.ndarray, dt: float, hidden: Sequence[Hidden], noise: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """What the sensors write down of the true states S (runs, samples, 10): faults of the sensors, then white noise.
+    """Sensor readings of the true states S (runs, samples, 10): sensor errors, then white noise.
 
     `noise` (10,) are standard deviations; those of the thruster forces are relative to the reading.
     """

@@ -1,4 +1,4 @@
-"""Standard manoeuvres on the simulator and the indices read off them (IMO MSC.137(76), ITTC)."""
+"""Standard manoeuvres on the simulator and their indices (IMO MSC.137(76), ITTC)."""
 
 from __future__ import annotations
 

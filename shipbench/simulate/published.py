@@ -1,11 +1,11 @@
 """Four ships of the literature in their authors' own equations, which neither the MMG simulator nor the fitted model
-shares with them.
+shares.
 
-What is told from trials of these ships is told of hulls, propellers and rudders that the fit does not know: cubic hull
-forces with products of rudder and drift (Mariner), thrust and rudder flow as quadratics of speed and revolutions
-(tanker), a hull that heels in turns (S175), a small fast one that heels, with absolute values in its hull forces and
-rudders beside the races (navy). Side forces of the propeller and of zero helm and a rudder's stall are left out: they
-are causes with names.
+Trials of these ships test the diagnosis on hulls, propellers and rudders unknown to the fit: cubic hull forces with
+products of rudder and drift (Mariner), thrust and rudder flow as quadratics of speed and shaft speed (tanker), a hull
+that heels in turns (S175), a small fast one that heels, with absolute values in its hull forces and rudders beside the
+races (navy). Side forces of the propeller and of zero helm and a rudder's stall are left out: they are causes with
+names.
 """
 
 from __future__ import annotations
@@ -30,17 +30,18 @@ from .trials import Trials, draw_sailing, gusts, write_down
 Motion = tuple[np.ndarray, ...]
 Push = tuple[np.ndarray, np.ndarray, np.ndarray]
 _UNDERSTOOD = ("u_c", "v_c", "air_u", "air_v", "delta", "thrust", "X", "Y", "N")
-"""Fields of `Modifiers` that mean something in any ship's equations."""
+"""Fields of `Modifiers` that are defined for any ship's equations."""
 _SUBSTEPS = 4
 
 
 @dataclass(frozen=True)
 class Published:
-    """A ship and its equations.
+    """Ship and its equations.
 
     Attributes:
-        particulars: what a user of the diagnosis is told.
-        actuators: of an ordinary ship of this size; the sources leave them open or limit angles to what autopilots use.
+        particulars: given to a user of the diagnosis.
+        actuators: of an ordinary ship of this size; the sources leave them open or limit angles to the range of
+            autopilots.
         cruise: speed [m/s] about which the equations hold; trials begin at `ratios` of it.
         rates: (motion, n [rpm], delta [rad], factor of the thrust, (X, Y, N) [N, N, N m] to add) -> accelerations;
             motion is u, v, r through the water and, beyond the plane, further states, whose rates follow.
@@ -81,9 +82,11 @@ _SERVICE = 7.7175
 
 
 def _mariner(motion: Motion, n: np.ndarray, delta: np.ndarray, thrust: float, push: Push) -> Motion:
-    """Chislett & Strom-Tejsen (1965), HyA report Hy-5, about 15 kn; coefficients 1e-5, on rho/2 L^2 U^2. The shaft is
-    not in the equations; more thrust is more of the force that holds the service speed, half of -X_u as for a
-    resistance that grows with the square."""
+    """Ship of Chislett & Strom-Tejsen (1965), HyA report Hy-5, about 15 kn; coefficients 1e-5, on rho/2 L^2 U^2.
+
+    The shaft is not in the equations; more thrust is more of the force that holds the service speed, half of -X_u as
+    for a resistance that grows with the square.
+    """
     L, m, I_z, x_G = 160.93, 798e-5, 39.2e-5, -0.023
     U = np.hypot(motion[0], motion[1]) + 1e-9
     u, v, r, d = (motion[0] - _SERVICE) / U, motion[1] / U, motion[2] * L / U, -delta
@@ -238,9 +241,11 @@ PUBLISHED = {
         replace(_ordinary(51.5), rate_n=0.5), 8.0, (0.6, 1.1), _navy, more=2,
     ),
 }  # fmt: skip
-"""By name; displacement as in the equations. Diameter and rudder area of mariner and tanker, and areas above water, are
-round figures for ships of their kind; the diameter of the navy ship is that of one propeller with the thrust of
-both."""
+"""Ships by name; displacement as in the equations.
+
+Diameter and rudder area of mariner and tanker, and areas above water, are round figures for ships of their kind; the
+diameter of the navy ship is that of one propeller with the thrust of both.
+"""
 
 
 def rpm_at(ship: Published, speed: float) -> float:
@@ -265,8 +270,8 @@ def rpm_at(ship: Published, speed: float) -> float:
 
 def wind_force(ship: Published, u_rw: np.ndarray, v_rw: np.ndarray) -> Push:
     """Wind force and moment [N, N, N m] from the velocity through the air [m/s]: C_X = -0.6 cos, C_Y = 0.85 sin, C_N =
-    0.07 sin 2 gamma, within what Blendermann (1994) measured on ships of many kinds, and neither simulator's nor
-    fit's."""
+    0.07 sin 2 gamma, within the range that Blendermann (1994) measured on ships of many kinds. Neither the simulator
+    nor the fit has these coefficients."""
     areas, q = ship.particulars.wind, 0.5 * RHO_AIR * np.hypot(u_rw, v_rw)
     assert areas is not None
     side = q * areas.lateral_area
@@ -278,10 +283,10 @@ def wind_force(ship: Published, u_rw: np.ndarray, v_rw: np.ndarray) -> Push:
 
 
 def _modified(hidden: Sequence[Hidden], flow: Flow, ship: Published) -> Modifiers:
-    """What the hidden effects change.
+    """Changes of the equations by the hidden effects.
 
     Raises:
-        InputError: an effect acts on something that only MMG ships have.
+        InputError: an effect acts on a part that only MMG ships have.
     """
     e, particulars, neutral = Modifiers(), complete(ship.particulars), Modifiers()
     for item in hidden:
@@ -304,8 +309,8 @@ def _modified(hidden: Sequence[Hidden], flow: Flow, ship: Published) -> Modifier
 def published_trials(
     ship: Published, seed: int, hidden: Sequence[Hidden] = (), plan: Trials | None = None, name: str = "trials"
 ) -> Dataset:
-    """Trials of a published ship with `hidden` causes: orders, sensors and gusts as in `sea_trials`, ahead and without
-    thrusters.
+    """Trials of a published ship with `hidden` causes: commands, sensors and gusts as in `sea_trials`, ahead and
+    without thrusters.
 
     Raises:
         InputError: see `_modified`.

@@ -23,7 +23,7 @@ _COMMANDS = len(COMMANDS)
 
 @dataclass(frozen=True)
 class Simulator:
-    """The ship and the greatest internal step [s].
+    """Simulator of a ship with the greatest internal step [s].
 
     The default, 0.25 s, keeps the RK4 error of the 130 m ship's 120 s rollouts below 1 mm; shorter ships need steps
     shorter by sqrt(L).
@@ -67,14 +67,14 @@ class Simulator:
         return S
 
     def fast_rollout(self, s0: np.ndarray, U: np.ndarray, dt: float, env: Environment = CALM) -> np.ndarray:
-        """`rollout` for planning and Monte Carlo: the same formula as machine code (`shipbench.compiled`), the same
-        numbers to rounding.
+        """Rollout for planning and Monte Carlo: the formula of `rollout` as machine code (`shipbench.compiled`), the
+        same numbers to rounding.
 
         Data sets are made with `rollout`, whose bits do not depend on a compiler. The first call for a ship compiles,
         about 1 s, and keeps the code.
 
         Raises:
-            InputError: the water is shallow, which this path does not know.
+            InputError: the water is shallow, which this path does not support.
         """
         if env.depth is not None:
             raise InputError(f"fast_rollout knows deep water only; depth = {env.depth}. Use rollout.")

@@ -1,5 +1,5 @@
-"""Sea trials to diagnose: runs of mixed manoeuvres (steps, zig-zags, turns, engine orders, thruster pushes), on any MMG
-ship."""
+"""Sea trials to diagnose: runs of mixed manoeuvres (steps, zig-zags, turns, engine commands, thruster pushes), on any
+MMG ship."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ STANDARD = (
     ("stop", 0.0), ("pull-out", 25.0),
     ("turn", 15.0), ("turn", -15.0),
 )  # fmt: skip
-"""What a yard's trials consist of (IMO MSC.137(76)), with the rudder in degrees."""
+"""Manoeuvres of a yard's trials (IMO MSC.137(76)), with the rudder in degrees."""
 _QUICK_LEG, _SLOW_LEG = 45.0, 65.0
 
 
 @dataclass(frozen=True)
 class Trials:
-    """What is sailed: number of runs, samples after the first, gusts (standard deviation per axis [m/s] on a 130 m
+    """Plan of trials: number of runs, samples after the first, gusts (standard deviation per axis [m/s] on a 130 m
     ship; 0: calm), noise factor, whether runs go astern and use thrusters, motion in waves, as a factor of `WAVES`, the
     mean wind under the gusts (from north and from east [m/s] on a 130 m ship), and whether the runs are `STANDARD`
     manoeuvres from cruising speed on opposite courses."""
@@ -57,7 +57,7 @@ class Trials:
 
 def standard_commands(rpm: np.ndarray, steps: int, dt: float, scale: float) -> np.ndarray:
     """Commands (runs, steps, 4) of `STANDARD` in turn, from 20 s on: a turn lasts, a zig-zag reverses six times by the
-    clock, a pull-out ends after 200 s, a stop is ordered with 0.6 of the revolutions astern. Times at 130 m."""
+    clock, a pull-out ends after 200 s, a stop is commanded with 0.6 of the shaft speed astern. Times at 130 m."""
     U, t = np.zeros((len(rpm), steps, 4)), np.arange(steps) * dt / scale - 20.0
     for i, (kind, degrees) in enumerate(STANDARD[k % len(STANDARD)] for k in range(len(rpm))):
         leg = np.floor(t / (_SLOW_LEG if abs(degrees) > 15.0 else _QUICK_LEG) + 0.5)  # the first one half as long
@@ -73,7 +73,7 @@ def draw_commands(
     rng: np.random.Generator, ship: Vessel, speed: np.ndarray, rpm: np.ndarray, steps: int, dt: float, plan: Trials
 ) -> np.ndarray:
     """Commands (runs, steps, 4): a third of the runs zig-zags by the clock, a third turns, a third random steps; engine
-    orders in half of them."""
+    commands in half of them."""
     num, scale = len(speed), (ship.L / 130.0) ** 0.5
     U, t = np.zeros((num, steps, 4)), np.arange(steps) * dt / scale
     force = ship.particulars.thrusters.max_force if ship.particulars.thrusters else 0.0
@@ -143,8 +143,8 @@ def in_waves(rng: np.random.Generator, states: np.ndarray, dt: float, scale: flo
 
 @dataclass(frozen=True)
 class Sailing:
-    """One set of trials as ordered, warm-up included: scale is sqrt(L/130), s0 (runs, 10), U (runs, steps, 4), max_step
-    [s]."""
+    """Commands of one set of trials, warm-up included: scale is sqrt(L/130), s0 (runs, 10), U (runs, steps, 4),
+    max_step [s]."""
 
     scale: float
     dt: float
@@ -200,8 +200,8 @@ def write_down(
     name: str,
     source: str,
 ) -> Dataset:
-    """The data set of the true states S (runs, steps + 1, 10): the warm-up cut off, motion in waves, the sensors'
-    faults and noise added."""
+    """Data set of the true states S (runs, steps + 1, 10): the warm-up cut off, motion in waves, the sensors' errors
+    and noise added."""
     noise = plan.noise * NOISE * (ship.L / 130.0) ** _FROUDE
     S = S[:, _WARM_UP:]
     if plan.waves:
@@ -224,8 +224,8 @@ def sea_trials(
     """Sail and record a set of runs with `hidden` causes; one sample per second at 130 m, scaled with sqrt(L) for much
     smaller ships.
 
-    The runs begin after a warm-up under the same causes, so that currents and winds have had their time. wind_recorded:
-    the gusts become the input channels wind_speed and wind_from.
+    The runs begin after a warm-up under the same causes, until currents and winds have taken effect. wind_recorded: the
+    gusts become the input channels wind_speed and wind_from.
     """
     plan = plan or Trials()
     rng = np.random.default_rng(seed)

@@ -1,5 +1,5 @@
-"""The simulator beside published figures, one row a figure. Tolerances are those of the project; rows without one are
-printed for comparison."""
+"""Comparison of the simulator with published figures, one row a figure. Tolerances are those of the project; rows
+without one are printed for comparison."""
 
 from __future__ import annotations
 

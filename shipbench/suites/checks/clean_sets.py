@@ -1,5 +1,5 @@
-"""Clean data sets for `shipbench suite check`, from simulators that differ in structure: into some faults are planted,
-others must be silent."""
+"""Clean data sets for `shipbench suite check`, from simulators that differ in structure: faults are planted into some,
+the others must have no finding."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ _STEPS = {
     "instruments": (0.2, 0.2, np.deg2rad(0.1), 0.05, 0.05, np.deg2rad(0.1 / 60.0), 1.0),
     "a display": (0.2, 0.2, np.deg2rad(1.0), 0.05, 0.05, np.deg2rad(1.0 / 60.0), 1.0),
 }
-"""Last digits of x, y, psi, u, v, r, n on a ship of 130 m: positions in 0.0001', speeds in 0.1 kn."""
+"""Resolution of x, y, psi, u, v, r, n on a ship of 130 m: positions in 0.0001', speeds in 0.1 kn."""
 _NOT_HIDDEN = ("going_astern", "wind_drift")
-"""Effects of measured ships that came later: the published sets keep their numbers."""
+"""Effects that are not hidden in these sets, so that published results stay comparable."""
 
 
 @lru_cache(maxsize=32)
 def base_set(source: str, seed: int, wind: bool = False) -> Dataset:
-    """The clean set into which a fault is planted; wind: in a gale that is recorded, of an MMG ship only."""
+    """Clean set into which a fault is planted; wind: in a gale that is recorded, of an MMG ship only."""
     if source == EQUATION:
         return fitted_trials(load_mmg_ship(SHIPS[0]), seed)
     if source == HARBOUR:
@@ -59,11 +59,11 @@ def _windy(name: str, seed: int) -> Dataset:
 
 
 def clean_sets(seeds: Sequence[int]) -> Iterator[tuple[str, Callable[[], Dataset]]]:
-    """(kind, maker) of sets in which nothing is to be found.
+    """Pairs (kind, maker) of sets without faults.
 
     Trials of MMG ships in gusts, the same with strong wind recorded, without any noise, and under every effect that is
-    no sensor's; trials of the fitted model; port manoeuvres with and without noise; some of these with their last
-    digits as instruments and displays have them.
+    no sensor's; trials of the fitted model; port manoeuvres with and without noise; some of these with the resolution
+    of instruments and displays.
     """
     for name in SHIPS:
         ship = load_mmg_ship(name)
@@ -95,7 +95,8 @@ def clean_sets(seeds: Sequence[int]) -> Iterator[tuple[str, Callable[[], Dataset
 
 
 def _rounded(make: Callable[[], Dataset], steps: Sequence[float]) -> Dataset:
-    """As instruments or displays give it: in steps of lengths, angles and times of the ship's size."""
+    """Data set with the resolution of instruments or displays: in steps of lengths, angles and times of the ship's
+    size."""
     data = make()
     L = data.ship.L / 130.0
     step = np.array(steps) * L ** np.array([1.0, 1.0, 0.0, 0.5, 0.5, -0.5, -0.5])

@@ -1,4 +1,4 @@
-"""The faults of `shipbench suite check`, and the finding that each calls for."""
+"""Faults of `shipbench suite check`, with the finding expected for each."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .planting import DEG, KNOT, Planting
 
 @dataclass(frozen=True)
 class Fault:
-    """plant changes the planting; kinds: findings that count as right, as (kind, channels or None for any); also: kinds
-    that come of the fault and are neither right nor false; wind: needs recorded wind."""
+    """Fault to plant. plant changes the planting; kinds: findings that count as right, as (kind, channels or None for
+    any); also: kinds that follow from the fault and are neither right nor false; wind: needs recorded wind."""
 
     name: str
     plant: Callable[[Planting], None]
@@ -25,7 +25,7 @@ class Fault:
     also: tuple[str, ...] = ()
 
     def expects(self, kind: str, channels: Sequence[str]) -> bool:
-        """Whether a finding is one that this fault calls for."""
+        """Whether a finding is expected for this fault."""
         return any(
             kind == k and (wanted is None or bool(wanted & {c.removesuffix("_c") for c in channels}))
             for k, wanted in self.kinds

@@ -1,5 +1,4 @@
-"""The page of `shipbench suite check`: fault by fault what was found and healed, and the false findings on clean
-sets."""
+"""Page of `shipbench suite check`: found and corrected faults, and the false findings on clean sets."""
 
 from __future__ import annotations
 
@@ -101,7 +100,7 @@ def _false(clean: Sequence[tuple[str, tuple[str, ...]]]) -> Table:
 
 
 def write_page(path: Path, tables: Sequence[Table], command: str, seeds: str) -> Path:
-    """Replace the page in one step."""
+    """Replace the page atomically."""
     code = code_version()
     head = [
         "# Data check: planted faults, found or not", "",

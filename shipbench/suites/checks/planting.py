@@ -1,6 +1,6 @@
-"""Plants faults into clean data sets, in the table and dataset.toml as a user would hand them in.
+"""Planting of faults into clean data sets, in the table and dataset.toml as a user would provide them.
 
-Sizes are those of a ship of 130 m; lengths go with L, times with sqrt(L/130), speeds likewise.
+Sizes are those of a ship of 130 m; lengths go with L, times and speeds with sqrt(L/130).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ DEG, KNOT = 180.0 / np.pi, 3600.0 / 1852.0
 
 @dataclass
 class Planting:
-    """A clean set as it is handed in, to be spoilt: table, keys of dataset.toml, scales of length and time against 130
-    m, dt [s], random numbers."""
+    """Clean set to be changed: table, keys of dataset.toml, scales of length and time against 130 m, dt [s], random
+    numbers."""
 
     table: pd.DataFrame
     toml: dict[str, Any]
@@ -40,21 +40,21 @@ class Planting:
         return self.table.index[self.table["trajectory"] == run].to_numpy()
 
     def pick(self, number: int) -> list[str]:
-        """Some runs, drawn."""
+        """Draw some runs."""
         return [str(r) for r in self.rng.choice(self.ids, number, replace=False)]
 
     def moment(self, run: str, samples: int = 1) -> int:
-        """Position in the run's rows, away from its ends, from which so many samples follow."""
+        """Draw a position in the run's rows, away from its ends, followed by so many samples."""
         return int(self.rng.integers(15, len(self.rows(run)) - 15 - samples))
 
     def busy(self, run: str, channel: str, samples: int) -> int:
-        """Position from which the channel changes most over so many samples: there a standstill is one."""
+        """Position from which the channel changes most over so many samples: a standstill shows there."""
         v = self.table.loc[self.rows(run), channel].to_numpy()
         return 5 + int(np.argmax(np.abs(v[5 + samples : -5] - v[5 : -5 - samples])))
 
 
 def planting(dataset: Dataset, seed: int) -> Planting:
-    """A data set as table and TOML, in our units."""
+    """Data set as table and TOML, in standard units."""
     from ...signals import STATES
 
     frames = []
@@ -75,7 +75,7 @@ def planting(dataset: Dataset, seed: int) -> Planting:
 
 
 def times(**factors: float) -> Callable[[Planting], None]:
-    """Columns times factors; commands go with their actuators."""
+    """Multiply columns by factors; commands go with their actuators."""
 
     def plant(p: Planting) -> None:
         for channel, factor in factors.items():
@@ -87,8 +87,8 @@ def times(**factors: float) -> Callable[[Planting], None]:
 
 
 def silent_log(share: float) -> Callable[[Planting], None]:
-    """Surge and sway recorded as a hundredth of themselves, a sensor's noise about nothing, in the slowest `share` of
-    the samples."""
+    """Record surge and sway as a hundredth of themselves, sensor noise about zero, in the slowest `share` of the
+    samples."""
 
     def plant(p: Planting) -> None:
         slow = np.abs(p.table["u"]) < np.quantile(np.abs(p.table["u"]), share)
@@ -98,7 +98,7 @@ def silent_log(share: float) -> Callable[[Planting], None]:
 
 
 def late(*channels: str, seconds: float) -> Callable[[Planting], None]:
-    """Channels recorded `seconds` (at 130 m) late; the first samples of every run, which would need the time before it,
+    """Record channels `seconds` (at 130 m) late; the first samples of every run, which would need the time before it,
     are left out."""
 
     def plant(p: Planting) -> None:
@@ -203,7 +203,7 @@ def stuck_rudder(p: Planting) -> None:
 
 
 def spiked(channel: str, size: float, power: float) -> Callable[[Planting], None]:
-    """Single samples off by `size` at 130 m, scaled with L to that power, in four runs."""
+    """Add outliers of `size` at 130 m, scaled with L to that power, to single samples in four runs."""
 
     def plant(p: Planting) -> None:
         for run in p.pick(4):
@@ -296,7 +296,7 @@ def wind_to(p: Planting) -> None:
 
 
 def felt_wind(kind: str, speed: float = 1.0, angle: float = 1.0) -> Callable[[Planting], None]:
-    """The wind as an instrument of `kind` (of `KINDS`) shows it, in other units."""
+    """Record the apparent wind of an instrument of `kind` (of `KINDS`), in other units."""
 
     def plant(p: Planting) -> None:
         psi, u, v, come_from = (p.table[c].to_numpy() for c in ("psi", "u", "v", "wind_from"))
@@ -309,7 +309,7 @@ def felt_wind(kind: str, speed: float = 1.0, angle: float = 1.0) -> Callable[[Pl
 
 
 def wrapped(p: Planting) -> None:
-    """The whole set is turned so that a run crosses south, as one may."""
+    """Turn the whole set so that a run crosses south."""
     swing = p.table.groupby("trajectory")["psi"].agg(np.ptp)
     psi = p.table.loc[p.rows(str(swing.index[int(np.argmax(swing))])), "psi"]
     turn = np.pi - 0.5 * float(psi.min() + psi.max())

@@ -1,5 +1,5 @@
-"""Plants the faults of loggers and exports into clean data sets: held fixes, placeholders, interpolation across north,
-clocks that are set."""
+"""Planting of the faults of loggers and exports: held fixes, placeholders, interpolation across north, clocks that are
+set."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from .planting import Planting, wrapped
 
 
 def held_fixes(p: Planting) -> None:
-    """Positions of a receiver that gives one every five samples."""
+    """Record positions of a receiver that gives one every five samples."""
     for run in p.ids:
         at = p.rows(run)
         p.table.loc[at, ["x", "y"]] = p.table.loc[at[np.arange(len(at)) // 5 * 5], ["x", "y"]].to_numpy()
 
 
 def placeholder(channel: str, value: float, seconds: float = 8.0) -> Callable[[Planting], None]:
-    """A value that stands for "not available", for some seconds of three runs."""
+    """Record a value that stands for "not available", for some seconds of three runs."""
 
     def plant(p: Planting) -> None:
         samples = max(2, round(seconds * p.time / p.dt))
@@ -30,8 +30,8 @@ def placeholder(channel: str, value: float, seconds: float = 8.0) -> Callable[[P
 
 
 def interpolated_north(p: Planting) -> None:
-    """A heading of 0 to 360 that was logged at every third sample and interpolated as it stands; in the set that
-    `wrapped` makes."""
+    """Record a heading of 0 to 360 at every third sample, interpolated without unwrapping; in the set that `wrapped`
+    makes."""
     wrapped(p)
     for run in p.ids:
         at = p.rows(run)
@@ -41,8 +41,8 @@ def interpolated_north(p: Planting) -> None:
 
 
 def clock_set(seconds: float) -> Callable[[Planting], None]:
-    """Stamps that go on as if nothing had happened where the clock was set back by `seconds` (at 130 m) in the hardest
-    turn of a run: the rows that would stand twice are left out."""
+    """Record stamps that continue where the clock was set back by `seconds` (at 130 m) in the hardest turn of a run:
+    rows with repeated times are left out."""
 
     def plant(p: Planting) -> None:
         gone = max(2, round(seconds * p.time / p.dt))
@@ -58,8 +58,8 @@ def clock_set(seconds: float) -> Callable[[Planting], None]:
 
 
 def clock_ahead(seconds: float) -> Callable[[Planting], None]:
-    """A gap of 10 s (at 130 m) in two runs, `seconds` of which are the clock's, which was set ahead: only the rest of
-    the rows is missing."""
+    """Add a gap of 10 s (at 130 m) to two runs, `seconds` of which are due to the clock, which was set ahead: only the
+    rest of the rows is missing."""
 
     def plant(p: Planting) -> None:
         ahead, gone = (max(1, round(s * p.time / p.dt)) for s in (seconds, 10.0 - seconds))

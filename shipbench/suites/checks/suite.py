@@ -1,5 +1,5 @@
-"""`shipbench suite check`: plant faults into clean simulated sets, check them, apply the proposed lines; count false
-findings on clean sets."""
+"""Suite of the data check (`shipbench suite check`): plant faults into clean simulated sets, check them, apply the
+proposed lines; count false findings on clean sets."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .planting import planting
 
 
 def write_planted(dataset: Dataset, fault: Fault | None, seed: int, folder: Path) -> Path:
-    """The data set's folder with the fault in it (None: clean)."""
+    """Write the data set's folder with the fault in it (None: clean)."""
     p = planting(dataset, seed)
     if fault is not None:
         fault.plant(p)
@@ -41,12 +41,12 @@ def write_planted(dataset: Dataset, fault: Fault | None, seed: int, folder: Path
 
 
 def apply_lines(folder: Path, findings: Sequence[Finding]) -> None:
-    """Lay the lines of findings into a folder's dataset.toml."""
+    """Merge the lines of findings into a folder's dataset.toml."""
     write_lines(folder, findings)
 
 
 def run_case(fault: Fault, source: str, seed: int, folder: Path) -> Outcome:
-    """Plant one fault, check, apply the lines of what was rightly found, load strictly and check again."""
+    """Plant one fault, check, apply the lines of expected findings, load strictly and check again."""
     write_planted(base_set(source, seed, fault.wind), fault, seed, folder)
     _, findings = check_path(str(folder))
     right = [f for f in findings if fault.expects(f.kind, f.channels)]

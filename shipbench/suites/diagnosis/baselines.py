@@ -1,8 +1,7 @@
-"""What the diagnosis is compared with: two usual ways of naming a missing cause, on the same data, candidates and
+"""Baselines of the diagnosis: two usual methods to identify a missing cause, on the same data, candidates and
 linearised model.
 
-Both take what the model leaves unexplained for white noise. It never is, so both find something in nearly every data
-set.
+Both assume that the model's residual is white. It never is, so both find a cause in nearly every data set.
 """
 
 from __future__ import annotations
@@ -33,8 +32,9 @@ _MOST_NAMED = 4
 
 @dataclass(frozen=True)
 class Ranking:
-    """Effects with their scores (information gained: test statistic less the price of its freedoms), best first;
-    `named`: those above zero that the method would report, at most one (white residuals) or four (regression)."""
+    """Effects with their scores (information gained: test statistic less the penalty of its degrees of freedom), best
+    first; `named`: those above zero that the method would report, at most one (white residuals) or four (regression).
+    """
 
     ranking: tuple[tuple[str, float], ...]
     named: tuple[str, ...]
@@ -63,11 +63,11 @@ def candidate_terms(plant: Plant, names: Sequence[str] | None = None) -> list[Te
 
 
 def white_residual_test(dataset: Dataset, names: Sequence[str] | None = None) -> Ranking:
-    """Output-error fit (base parameters and initial states, no latent force), then the score test of every candidate on
-    its residuals.
+    """Score test of every candidate on the residuals of an output-error fit (base parameters and initial states, no
+    latent force).
 
-    The residuals count as white with one variance per channel; the price is that of BIC. Effects with one set of values
-    per run have as many freedoms as runs.
+    The residuals count as white with one variance per channel; the penalty is that of BIC. Effects with one set of
+    values per run have as many degrees of freedom as runs.
     """
     plant = Plant.of(dataset)
     scales, terms = Scales(plant), candidate_terms(plant, names)
@@ -93,8 +93,8 @@ def derivative_regression(dataset: Dataset, names: Sequence[str] | None = None) 
     Kaheman et al. 2019).
 
     du, dv, dr by a local parabola over nine samples are regressed on the base model's terms plus every candidate's
-    column, by forward selection with BIC. It cannot see the sensors' faults, which are no forces: with columns for them
-    it names `speed_scale` in every set, since smoothing makes all derivatives too small.
+    column, by forward selection with BIC. Sensor errors, which are no forces, have no columns: with them it selects
+    `speed_scale` in every set, since smoothing makes all derivatives too small.
     """
     plant = Plant.of(dataset)
     scales, terms = Scales(plant), [t for t in candidate_terms(plant, names) if t.effect.enters != "sensor"]
@@ -113,7 +113,7 @@ def derivative_regression(dataset: Dataset, names: Sequence[str] | None = None) 
 
 
 def _error(plant: Plant, predicted: np.ndarray) -> np.ndarray:
-    """Measured less predicted, (B, K + 1, 6); zero where there is no sample."""
+    """Residuals, measured less predicted, (B, K + 1, 6); zero where there is no sample."""
     return np.where(plant.seg.mask[..., None], np.nan_to_num(plant.seg.states[..., :6] - predicted), 0.0)
 
 
@@ -160,8 +160,8 @@ def _line_search(plant: Plant, scales: Scales, point: Point, target: Point, nois
 def _score_test(
     plant: Plant, columns: Columns, noise: np.ndarray, terms: Sequence[Term]
 ) -> tuple[tuple[str, float], ...]:
-    """Rao's statistic of every term with initial states and base parameters projected out, less its freedoms times
-    log(values)."""
+    """Statistic of Rao for every term with initial states and base parameters projected out, less its degrees of
+    freedom times log(values)."""
     e = _whitened(plant, _error(plant, columns.predicted).reshape(len(columns.predicted), -1, 1), noise)
     eta, base = _whitened(plant, columns.eta, noise), _whitened(plant, columns.base, noise)
     back = np.linalg.inv(np.swapaxes(eta, 1, 2) @ eta + 1e-4 * np.eye(6)) @ np.swapaxes(eta, 1, 2)
@@ -190,7 +190,7 @@ def _score_test(
 
 
 def _quadratic(V: np.ndarray, s: np.ndarray) -> float:
-    """s' V^-1 s; directions without any information count nothing."""
+    """Quadratic form s' V^-1 s; directions without any information count nothing."""
     values, vectors = np.linalg.eigh(V)
     keep = values > 1e-9 * max(float(values[-1]), 1e-12)
     return float(np.sum((vectors.T @ s)[keep] ** 2 / values[keep]))
@@ -211,7 +211,7 @@ class _Derivatives:
         return savgol_filter(values, window, 2, deriv=order, delta=self.plant.seg.dt, axis=1)
 
     def defect(self, active: Sequence[Active], base: np.ndarray) -> np.ndarray:
-        """(B, K + 1, 3): derivative less model with the effects `active`, NaN where there is no sample."""
+        """Residual (B, K + 1, 3): derivative less model with the effects `active`, NaN where there is no sample."""
         plant, seg = self.plant, self.plant.seg
         act = seg.states[..., 6:10]
         if any(a.effect.enters == "gear" for a in active):

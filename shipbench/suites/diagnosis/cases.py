@@ -1,5 +1,5 @@
-"""The hidden sets that the diagnosis is judged on: effect, size, sign, ship and seed are drawn; any case is rebuilt
-from (seed, kind, index).
+"""Hidden sets of the diagnosis suite: effect, size, sign, ship and seed are drawn; any case is rebuilt from (seed,
+kind, index).
 
 Data come from the MMG simulator or from ships of the literature in their own equations (kinds with `published`), never
 from the fitted model; `none-same` alone is made by the fitted model, to count false alarms on it.
@@ -40,11 +40,11 @@ ONE_SIDED = frozenset(
         "velocity_delay",
     }
 )  # fmt: skip
-"""Effects that nature makes in one direction only, beyond those whose lower bound is zero."""
+"""Effects of one sign only, beyond those whose lower bound is zero."""
 
 _NOT_CHANGING = frozenset({"hull_derivatives", "bank_suction", "propeller_walk_astern"})
-"""No change is made of these, nor of gears, thrusters and per-run effects: they act in few runs, and the first changed
-one might show nothing."""
+"""Effects without a change, as are actuator dynamics, thrusters and per-run effects: they act in few runs, and the
+first changed one might not show them."""
 
 ON_PUBLISHED = (
     "current", "wind", "rudder_offset", "propeller_walk", "thrust_gain", "rudder_rate_limit", "rudder_delay",
@@ -52,12 +52,12 @@ ON_PUBLISHED = (
     "heading_bias", "speed_scale", "yaw_rate_bias", "position_delay", "velocity_delay", "current_per_run",
     "wind_per_run",
 )  # fmt: skip
-"""What is hidden in published ships: causes that mean something whatever a ship's equations are."""
+"""Causes that are hidden in published ships: those that are defined for any ship's equations."""
 
 _RATES = {"rudder_rate_limit": ("delta", "rate_delta", 1.0), "shaft_rate_limit": ("n", "rate_n", 60.0)}
 _LIMITED = 0.65
-"""Of the least ordinary rate of a gear: a limit above it is none (SOLAS asks no faster rudder of a short ship, whatever
-Froude's law says)."""
+"""Share of the least default rate of an actuator: a limit above it is none (SOLAS requires no faster rudder of a short
+ship, whatever Froude's law gives)."""
 
 UNITS: tuple[tuple[str, tuple[int, ...], float], ...] = (
     ("speeds in knots", (U, V), 1.0 / 0.514444), ("sway velocity to port", (V,), -1.0),
@@ -71,10 +71,10 @@ UNITS: tuple[tuple[str, tuple[int, ...], float], ...] = (
 
 @dataclass(frozen=True)
 class Case:
-    """One hidden set.
+    """Hidden set.
 
-    effects: what was hidden, with values. truth: names that the diagnosis should give, in any order. size: of typical,
-    per effect. variables: that count as right (outside). detail: what else is drawn (run of a change, channel of a unit
+    effects: hidden effects, with values. truth: names that the diagnosis should give, in any order. size: of typical,
+    per effect. variables: that count as right (outside). detail: further draws (run of a change, channel of a unit
     error).
     """
 
@@ -100,7 +100,7 @@ class Case:
         return int(_generator(self.seed, self.kind, self.index, self.which, 1).integers(2**31))
 
     def dataset(self) -> Dataset:
-        """Sail and record it; nothing in the data set says what was hidden."""
+        """Sail and record the set; nothing in it states the hidden causes."""
         if isinstance(self.ship, Published):
             data = published_trials(self.ship, self.data_seed, self.effects, self.plan)
         elif self.kind == "none-same":
@@ -113,7 +113,7 @@ class Case:
 
     def values(self) -> list[dict[str, float]]:
         """Sizes under their reported names, per effect; of per-run effects the root mean square over runs, of a change
-        what it is after it."""
+        the values after it."""
         found = []
         for item in self.effects:
             if self.kind == "change":
@@ -149,7 +149,7 @@ def count(kind: str, per_effect: int) -> int:
 
 
 def draw_case(kind: str, index: int, seed: int, which: str = "test", plan: Trials | None = None) -> Case:
-    """The case number `index` of its kind.
+    """Case number `index` of its kind.
 
     Raises:
         InputError: the kind or `which` is unknown.
@@ -228,7 +228,7 @@ def draw_hidden(rng: np.random.Generator, effect: Effect, ship: MMGShip | Publis
 
 
 def misread(data: Dataset, channels: Sequence[int], factor: float) -> Dataset:
-    """A data set some of whose states (and the commands of the same actuators) were read in another unit or sign."""
+    """Data set some of whose states (and the commands of the same actuators) were read in another unit or sign."""
     runs = []
     for run in data.runs:
         states, inputs = run.states.copy(), run.inputs.copy()
@@ -275,7 +275,7 @@ def _sign(rng: np.random.Generator, effect: Effect, parameter: Parameter) -> flo
 
 
 def _bank(rng: np.random.Generator, effect: Effect, ship: MMGShip, size: float, case: Case) -> Hidden:
-    """A bank on one side, one to three breadths beyond the outermost place that the same trials reach without it."""
+    """Bank on one side, one to three breadths beyond the outermost position that the same trials reach without it."""
     calm = sea_trials(ship, case.data_seed, (), case.plan)
     places = np.concatenate([run.states[:, :2] for run in calm.runs])
     bearing = rng.uniform(0.0, 2.0 * np.pi)

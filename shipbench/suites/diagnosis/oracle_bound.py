@@ -1,5 +1,5 @@
-"""What a likelihood-ratio test could find that knew which effect is hidden, its size and direction, the noise and the
-background."""
+"""Upper bound of the diagnosis: power of a likelihood-ratio test with known effect, size, direction, noise and nuisance
+parameters."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ LEVEL = 0.05
 
 
 def expected_ratio(null: Fit, effect: Effect, values: Sequence[np.ndarray]) -> float:
-    """Expected log likelihood ratio, doubled, of the plain model against the one that holds `effect` with `values` (per
-    parameter one number or one per run): the non-centrality lambda = c' V c of the test, with the ship's ordinary
-    differences projected out.
+    """Expected log likelihood ratio, doubled, of the baseline model against the one that holds `effect` with `values`
+    (per parameter one number or one per run): the non-centrality lambda = c' V c of the test, with the prior
+    differences between ships projected out.
 
-    Source: docs/theory.md#evidence-of-a-cause; for gears, whose effects are seen in the record of the actuator, what
-    their own test found.
+    Source: docs/theory.md#evidence-of-a-cause; for actuator dynamics, whose effects show in the record of the actuator,
+    the score of their own test.
     """
     plant = null.plant
     if effect.enters == "gear" and not plant.seg.commanded:
@@ -56,14 +56,14 @@ def expected_ratio(null: Fit, effect: Effect, values: Sequence[np.ndarray]) -> f
 
 
 def power(expected: float, level: float = LEVEL) -> float:
-    """Chance that this test, at false alarms of `level`, says that the effect is there."""
+    """Power of this test at false alarms of `level`."""
     from scipy.stats import chi2, ncx2
 
     return float(ncx2.sf(chi2.isf(level, 1), 1, max(expected, 0.0)))
 
 
 def bound(dataset: Dataset, hidden: Sequence[tuple[Effect, Sequence[np.ndarray]]]) -> float:
-    """Power of the test for the least visible of the hidden effects."""
+    """Power of the test for the hidden effect of least non-centrality."""
     plant = Plant.of(dataset)
     null = null_fit(plant, Scales(plant))
     return min(power(expected_ratio(null, effect, values)) for effect, values in hidden)

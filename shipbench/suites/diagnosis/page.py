@@ -1,4 +1,4 @@
-"""`leaderboards/diagnosis.md` from the rows of the suite, which are kept beside it as `diagnosis.json`."""
+"""Page `leaderboards/diagnosis.md` from the rows of the suite, which are kept beside it as `diagnosis.json`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Row = scores.Row
 
 
 def tables(rows: Sequence[Row]) -> list[Table]:
-    """All tables of the page; those without rows are left out."""
+    """Tables of the page; those without rows are left out."""
     two = number(2)
     figures = scores.figures(rows)
     split = next((i for i, line in enumerate(figures) if not line["target"]), len(figures))
@@ -68,7 +68,7 @@ def tables(rows: Sequence[Row]) -> list[Table]:
 
 
 def shortfalls(rows: Sequence[Row]) -> list[str]:
-    """One line for each target that is not reached, and for each that a small number of cases leaves open."""
+    """Lines on targets that are not reached, and on those that a small number of cases leaves open."""
     lines = []
     for line in scores.figures(rows):
         if line["met"] == "no":
@@ -85,7 +85,7 @@ def shortfalls(rows: Sequence[Row]) -> list[str]:
 
 
 def render(rows: Sequence[Row], about: dict[str, Any]) -> str:
-    """The page as text."""
+    """Page as text."""
     code, machine = about["code"], about["machine"]
     ships = sorted({r["ship"].rsplit("-", 1)[0] for r in rows if r.get("ship") and "published" not in r["kind"]})
     head = [

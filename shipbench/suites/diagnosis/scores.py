@@ -1,5 +1,5 @@
-"""Figures of the diagnosis suite from its rows: rates with Wilson intervals beside the targets, and what was named in
-place of what."""
+"""Figures of the diagnosis suite from its rows: rates with Wilson intervals beside the targets, and confusions of
+causes."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ manoeuvres."""
 NOT_COMPARABLE = frozenset(
     {"hull_derivatives", "race_gain", "wake_variation", "thruster_speed_loss", "cross_flow_drag", "rudder_gain"}
 )
-"""The fitted model's own hull, race, wake, thrusters and rudder lift differ from the simulator's, so that the size
-hidden is not the size missing."""
+"""Effects whose hidden size is not the missing size: the fitted model's own hull, race, wake, thrusters and rudder lift
+differ from the simulator's."""
 
 TARGETS = {
     "first-named cause right, 1x": (0.90, 1), "first-named cause right, 0.3x": (0.65, 1), "right class, 1x": (0.95, 1),
@@ -41,7 +41,7 @@ TARGETS = {
     "size: coverage of the 95 % intervals": (0.90, 1),
     "share of the oracle's gain": (0.90, 1), "seconds: share within 60 s": (1.0, 1),
 }  # fmt: skip
-"""Value that must be reached and its sense: 1 at least, -1 at most. Coverage must also stay below 0.97."""
+"""Target value and its sense: 1 at least, -1 at most. Coverage must also stay below 0.97."""
 
 
 def wilson(hits: int, total: int) -> tuple[float, float]:
@@ -64,7 +64,7 @@ def named(row: Row, skip_hull: bool = False) -> list[str]:
 
 
 def first(row: Row, skip_hull: bool = False) -> str:
-    """First-named cause, else the verdict."""
+    """First identified cause, else the verdict."""
     causes = named(row, skip_hull)
     return (
         causes[0] if causes else ("failed" if not ok(row) else "none" if row["verdict"] == "found" else row["verdict"])
@@ -76,7 +76,7 @@ def right(row: Row, skip_hull: bool = False) -> bool:
 
 
 def right_class(row: Row, skip_hull: bool = False) -> bool:
-    """Right, or said to be indistinguishable from the truth, or declared equal to it."""
+    """Whether the cause is right, reported as confounded with the truth, or declared equal to it."""
     if right(row, skip_hull):
         return True
     cause = first(row, skip_hull)
@@ -89,7 +89,7 @@ def exact_pair(row: Row, skip_hull: bool = True) -> bool:
 
 
 def alarm(row: Row, skip_hull: bool = False) -> bool:
-    """Something is named, or a cause outside the library is claimed; a failed case counts as an alarm."""
+    """Whether a cause is identified, or one outside the library is claimed; a failed case counts as an alarm."""
     return not ok(row) or bool(named(row, skip_hull)) or row["verdict"] == "unknown"
 
 
@@ -98,7 +98,7 @@ def says_unknown(row: Row) -> bool:
 
 
 def right_variable(row: Row) -> bool:
-    """`unknown`, and one of the variables that the force follows."""
+    """Whether the verdict is `unknown`, with one of the variables on which the force depends."""
     if not says_unknown(row):
         return False
     told = row.get("unknown") or {}
@@ -107,7 +107,8 @@ def right_variable(row: Row) -> bool:
 
 
 def right_change(row: Row) -> bool:
-    """`change_point`, with the effect that changed named in the cause or its evidence, and the run within one."""
+    """Whether the verdict is `change_point`, with the changed effect in the cause or its evidence, and the run within
+    one."""
     if not right(row, True):
         return False
     estimates = row["estimates"].get("change_point", {})
@@ -117,7 +118,7 @@ def right_change(row: Row) -> bool:
 
 
 def size_errors(rows: Iterable[Row], comparable: bool = True) -> tuple[list[float], list[bool]]:
-    """Relative errors and coverages of the sizes of all hidden effects that were named; no directions, no shape
+    """Relative errors and coverages of the sizes of all hidden effects that were identified; no directions, no shape
     parameters."""
     errors, covered = [], []
     for row in rows:
@@ -136,7 +137,7 @@ def size_errors(rows: Iterable[Row], comparable: bool = True) -> tuple[list[floa
 
 
 def rate(figure: str, rows: Sequence[Row], hit: Callable[[Row], bool], note: str = "") -> Row:
-    """One line of the table of figures."""
+    """Line of the table of figures."""
     hits = sum(hit(row) for row in rows)
     low, high = wilson(hits, len(rows))
     return _line(figure, hits / len(rows) if rows else math.nan, low, high, len(rows), note)
@@ -166,7 +167,7 @@ def _line(figure: str, value: float, low: float, high: float, total: int, note: 
 
 
 def figures(rows: Sequence[Row]) -> list[Row]:
-    """All figures of the issue's table, then the same with other ways of counting."""
+    """Lines of all target figures, then the same with other counting rules."""
     kinds = {kind: [r for r in rows if r["kind"] == kind] for kind in {r["kind"] for r in rows}}
     by_size = {size: [r for r in kinds.get("single", []) if r.get("size") == [size]] for size in (1.0, 0.3)}
     same, other, pairs = (kinds.get(k, []) for k in ("none-same", "none-other", "pair"))
@@ -263,7 +264,7 @@ def figures(rows: Sequence[Row]) -> list[Row]:
 
 
 def oracle_share(rows: Sequence[Row]) -> Row:
-    """Mean gain over the mean gain of the model that was told the names, where that gains 2 % or more."""
+    """Mean gain over the mean gain of the oracle's model, where that gains 2 % or more."""
     both = [(r.get("gain") or 0.0, r["oracle_gain"]) for r in rows if ok(r) and (r.get("oracle_gain") or 0.0) >= 0.02]
     value = sum(g for g, _ in both) / sum(o for _, o in both) if both else math.nan
     return _line(
@@ -272,8 +273,8 @@ def oracle_share(rows: Sequence[Row]) -> Row:
 
 
 def oracle_power(figure: str, rows: Sequence[Row]) -> Row:
-    """Mean power of the likelihood-ratio test that knows effect, size, noise and background, at 5 % false alarms of its
-    own."""
+    """Mean power of the likelihood-ratio test with known effect, size, noise and nuisance parameters, at 5 % false
+    alarms of its own."""
     powers = [r["bound"] for r in rows if ok(r) and r.get("bound") is not None]
     value = float(np.mean(powers)) if powers else math.nan
     return _line(
@@ -282,7 +283,7 @@ def oracle_power(figure: str, rows: Sequence[Row]) -> Row:
 
 
 def per_effect(rows: Sequence[Row]) -> list[Row]:
-    """One line per hidden effect: right at both sizes, what was named instead, size error and coverage."""
+    """Lines, one per hidden effect: right at both sizes, confusions, size error and coverage."""
     table = []
     singles = [r for r in rows if r["kind"] == "single" and r.get("truth")]
     for effect in sorted({r["truth"][0] for r in singles}):
@@ -306,7 +307,8 @@ def per_effect(rows: Sequence[Row]) -> list[Row]:
 
 
 def confusion(rows: Sequence[Row]) -> list[Row]:
-    """True effect against first-named (hull skipped), with the causes of the other kinds under their own names."""
+    """Table of the true effect against the first identified one (hull skipped), with the causes of the other kinds
+    under their own names."""
     counts: Counter[tuple[str, str, str]] = Counter()
     for row in rows:
         if row["kind"] != "pair":
@@ -320,7 +322,8 @@ def confusion(rows: Sequence[Row]) -> list[Row]:
 
 
 def baseline_lines(rows: Sequence[Row]) -> list[Row]:
-    """First-named right, exact pairs and false alarms of the diagnosis and both baselines, on the same data sets."""
+    """Lines of first cause right, exact pairs and false alarms, for the diagnosis and both baselines, on the same data
+    sets."""
     done = [r for r in rows if ok(r) and r.get("baselines")]
     if not done:
         return []

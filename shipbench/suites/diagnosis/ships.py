@@ -2,7 +2,7 @@
 thrusters.
 
 Development ships come from container130, half of them with its hull forces rewritten as a cubic polynomial, test ships
-from KCS and KVLCC2: nothing that is tuned on the first has seen the hulls of the second.
+from KCS and KVLCC2: tuning on the first does not use the hulls of the second.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _RESISTANCE = {"R0", "X0_F", "X0_A"}
 
 
 def scaled(ship: MMGShip, L: float) -> MMGShip:
-    """The same ship at length L [m] by Froude's law; coefficients without dimension stay."""
+    """Same ship at length L [m] by Froude's law; dimensionless coefficients stay."""
     k = L / ship.L
     p, a = ship.particulars, ship.actuators
     prop, blade = p.propeller or Propeller(diameter=ship.propeller.D), p.rudder or Rudder(area=ship.rudder.A_R)
@@ -66,8 +66,8 @@ def scaled(ship: MMGShip, L: float) -> MMGShip:
 
 
 def with_thrusters(ship: MMGShip, rng: np.random.Generator) -> MMGShip:
-    """Two tunnel thrusters of a size and at places that fit the hull (those of container130 by Froude's law, 20 % up or
-    down)."""
+    """Ship with two tunnel thrusters of a size and at places that fit the hull (those of container130 by Froude's law,
+    20 % up or down)."""
     x_bow, x_stern = rng.uniform(0.36, 0.44) * ship.L, -rng.uniform(0.32, 0.42) * ship.L
     force = float(63_000.0 * ship.m / 9.6e6 * rng.uniform(0.8, 1.2))
     tunnels = Tunnels(x_bow, x_stern, rng.uniform(0.15, 0.35), rng.uniform(0.3, 0.5), 2.1 * (ship.L / 130.0) ** 0.5)
@@ -78,7 +78,7 @@ def with_thrusters(ship: MMGShip, rng: np.random.Generator) -> MMGShip:
 
 
 def with_actuators(ship: MMGShip, rng: np.random.Generator) -> MMGShip:
-    """Actuators of an ordinary ship: those of container130 by Froude's law, each 20 % faster or slower."""
+    """Ship with actuators of container130 by Froude's law, each 20 % faster or slower."""
     like = scaled(load_mmg_ship("container130"), ship.L).actuators
     force = ship.particulars.thrusters.max_force if ship.particulars.thrusters else 1.0
     own = {
@@ -92,8 +92,8 @@ def with_actuators(ship: MMGShip, rng: np.random.Generator) -> MMGShip:
 
 
 def with_other_hull(ship: MMGShip, rng: np.random.Generator, which: str) -> MMGShip:
-    """Other derivatives and added masses: 10 to 40 % up or down (development), N(0, s) with s of 15 to 30 % (test);
-    resistance a third of that."""
+    """Ship with other derivatives and added masses: 10 to 40 % up or down (development), N(0, s) with s of 15 to 30 %
+    (test); resistance a third of that."""
     spread = rng.uniform(0.15, 0.3)
 
     def change() -> float:
@@ -117,8 +117,8 @@ def with_other_hull(ship: MMGShip, rng: np.random.Generator, which: str) -> MMGS
 
 
 def as_polynomial(hull: UnifiedHull) -> PolynomialHull:
-    """The cubic polynomial nearest to a hull's forces up to 25 deg of drift and r' = 0.8: another structure, which
-    differs where the cubic ends."""
+    """Cubic polynomial nearest to a hull's forces up to 25 deg of drift and r' = 0.8: another structure, which differs
+    where the cubic ends."""
     beta, rp = (a.ravel() for a in np.meshgrid(np.deg2rad(np.linspace(-25.0, 25.0, 21)), np.linspace(-0.8, 0.8, 17)))
     v = -np.sin(beta)
     X, Y, N = (f / 0.5 for f in unified(np.cos(beta), v, rp, hull, 1.0, 1.0, 1.0))
@@ -132,8 +132,8 @@ def as_polynomial(hull: UnifiedHull) -> PolynomialHull:
 
 
 def with_other_gear(ship: MMGShip, rng: np.random.Generator) -> MMGShip:
-    """Another rudder area and propeller diameter (the ship file says so), another race and flow straightening (it does
-    not)."""
+    """Ship with another rudder area and propeller diameter (the ship file states them), another race and flow
+    straightening (it does not)."""
     area, diameter = rng.uniform(0.85, 1.2), rng.uniform(0.95, 1.05)
     p, c = ship.particulars, ship.rudder
     blade, prop = p.rudder, p.propeller
@@ -170,7 +170,7 @@ def steers(ship: MMGShip) -> bool:
 
 
 def draw_ship(rng: np.random.Generator, which: str, thrusters: bool) -> MMGShip:
-    """A development or test ship; `thrusters`: it must have them (else test ships have them in half of the draws).
+    """Draw a development or test ship; `thrusters`: it must have them (else test ships have them in half of the draws).
 
     Raises:
         WorkError: no drawn variant steers.

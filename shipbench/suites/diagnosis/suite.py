@@ -1,5 +1,5 @@
-"""`shipbench suite diagnosis`: hide effects in simulated trials, diagnose them, keep one row per case; a crash loses
-nothing that is done."""
+"""Suite of the diagnosis (`shipbench suite diagnosis`): hide effects in simulated trials, diagnose them, keep one row
+per case; a crash loses no finished case."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ _FAILURES = (
 
 @dataclass(frozen=True)
 class Job:
-    """One case and what is done with it. oracle: diagnose once more with the true effects as the only candidates;
-    baselines: run both of them."""
+    """Case and its treatment. oracle: diagnose once more with the true effects as the only candidates; baselines: run
+    both of them."""
 
     kind: str
     index: int
@@ -60,7 +60,7 @@ class Job:
         return f"{self.which}-{self.kind}-{self.seed}-{self.index:04d}"
 
     def signature(self) -> dict[str, Any]:
-        """What a finished row must agree with to be kept on resuming."""
+        """Signature that a finished row must have to be kept on resuming."""
         named = f"{self.diagnose.__module__}.{self.diagnose.__qualname__}"
         options = {
             "diagnose": named,
@@ -74,7 +74,7 @@ class Job:
 
 @threadpool_limits.wrap(limits=1)  # workers share the cores, and sums in another number of threads round differently
 def run_case(job: Job) -> dict[str, Any]:
-    """The row of one case; whatever fails in it is its row's reason."""
+    """Row of one case; an exception becomes the reason of its row."""
     row: dict[str, Any] = {
         "key": job.key,
         "kind": job.kind,
@@ -126,8 +126,8 @@ def _found_row(found: Diagnosis) -> dict[str, Any]:
 
 
 def _oracle_gain(job: Job, dataset: Dataset, truth: tuple[str, ...]) -> float | None:
-    """Gain of the model that is told the names: the most that a diagnosis can reach. None where the diagnosing function
-    cannot be told."""
+    """Gain of the oracle's model, with the true causes given: the upper bound of a diagnosis. None where the diagnosing
+    function cannot be given them."""
     if "only" not in inspect.signature(job.diagnose).parameters:
         return None
     found = job.diagnose(dataset, gain=True, seed=job.seed, only=truth)
@@ -135,7 +135,7 @@ def _oracle_gain(job: Job, dataset: Dataset, truth: tuple[str, ...]) -> float | 
 
 
 def _bound(case: Case, dataset: Dataset) -> float:
-    """Power of the likelihood-ratio test that knows everything but whether the effect is there."""
+    """Power of the likelihood-ratio test in which only the presence of the effect is unknown."""
     from .oracle_bound import bound
 
     return bound(dataset, [(item.effect, item.q) for item in case.effects])
@@ -213,7 +213,7 @@ def _in_processes(jobs: Sequence[Job], workers: int, keep: Callable[[Job, dict[s
 
 
 def _kept(out: Path, job: Job) -> dict[str, Any] | None:
-    """The finished row of an earlier run of the same code and options; failed ones are run again."""
+    """Finished row of an earlier run of the same code and options; failed ones are run again."""
     path = out / "rows" / f"{job.key}.json"
     if not path.is_file():
         return None
@@ -222,7 +222,7 @@ def _kept(out: Path, job: Job) -> dict[str, Any] | None:
 
 
 def _plain(value: Any) -> Any:
-    """As JSON keeps it: six digits, no NaN, no numpy."""
+    """Value for JSON: six digits, no NaN, no numpy."""
     if isinstance(value, dict):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
@@ -234,7 +234,7 @@ def _plain(value: Any) -> Any:
 
 
 def outcome(row: dict[str, Any]) -> str:
-    """A row in a few words."""
+    """Row in a few words."""
     if row["status"] != "ok":
         return row["reason"]
     hidden = " + ".join(row["truth"]) or row["detail"].get("name", "nothing")
@@ -248,7 +248,7 @@ def suite_command(
     plan: Trials | None = None,
     progress: Progress | None = None, command: str = "shipbench suite diagnosis", gain: bool = True,
 ) -> tuple[Path, list[dict[str, Any]]]:  # fmt: skip
-    """What `shipbench suite diagnosis` does: run, save rows and page.
+    """Run `shipbench suite diagnosis`, save rows and page.
 
     Args:
         kinds: names separated by commas (default all).

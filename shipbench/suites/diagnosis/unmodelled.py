@@ -1,7 +1,7 @@
-"""Causes that are in no library: what a diagnosis must answer `unknown` to, with the variable that the force follows.
+"""Causes outside the library: a diagnosis must answer `unknown`, with the variable on which the force depends.
 
-They are not registered and no candidate has their form. q: amplitude as a factor of `STRENGTH`, or of a fault of 2 deg
-or 10 %, then a phase or a reference value.
+They are not registered and no candidate has their form. q: amplitude as a factor of `STRENGTH`, or of a sensor error of
+2 deg or 10 %, then a phase or a reference value.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ container ship."""
 
 Formula = Callable[[Modifiers, Flow, Sequence[Array], Particulars], None]
 Misreading = Callable[[np.ndarray, Sequence[Array]], None]
-"""Changes the states (runs, samples, 10) that the sensors record, in place."""
+"""Function that changes the states (runs, samples, 10) of the sensors, in place."""
 
 
 class Outside(Effect):
-    """A cause with a name that nobody is asked for. variables: those whose naming counts as right."""
+    """Cause outside the library. variables: those that count as right."""
 
     family = "outside"
     summary = "a cause outside the library"
@@ -45,7 +45,7 @@ class Outside(Effect):
 
 
 class OutsideSensor(Outside):
-    """A fault of a sensor with a name that nobody is asked for."""
+    """Sensor error outside the library."""
 
     def __init__(self, name: str, variables: Sequence[str], misread: Misreading) -> None:
         super().__init__(name, variables, lambda *_: None)
@@ -127,12 +127,12 @@ _ALIASES = {
 
 
 def get(name: str) -> Outside:
-    """The outside cause of that name."""
+    """Outside cause of that name."""
     return next(item for item in OUTSIDE if item.name == name)
 
 
 def canonical(variable: str) -> frozenset[str]:
-    """The names used here of the variables that a text such as "psi", "|delta|", "n*r" or "yaw rate" speaks of."""
+    """Standard names of the variables in a text such as "psi", "|delta|", "n*r" or "yaw rate"."""
     text = (
         variable.lower()
         .replace("yaw rate", "yaw_rate")
