@@ -151,7 +151,7 @@ class _Record:
         since that takes as long as all the others.
         """
         kinds = kinds_of(self.name, self.scale, float(np.percentile(np.abs(self.command), 98)), usual)
-        asked = THRESHOLDS.value("actuator_evidence")
+        asked = THRESHOLDS.value("evidence")
         ordinary, fits = self._fitted(None), [self._fitted(kind) for kind in kinds]
         gear, plain = Gear(*(float(v) for v in np.exp(ordinary))), self.errors(ordinary[None], None)[0]
         found = [self._finding(kind, z, ordinary, plain) for kind, z in zip(kinds, fits, strict=True)]
@@ -165,7 +165,7 @@ class _Record:
         error = self._misread(z, second, plain)
         least, before = max(asked, *(f.score for f in found)), float(np.sum(plain**2))
         # record and actuator are corrected in turn where that may make the error the best explanation
-        for _ in range(3 if error.score > THRESHOLDS.value("record_error_promising") * least else 0):
+        for _ in range(3 if error.score > THRESHOLDS.value("minor_share") * least else 0):
             z = replace(self, measured=error.taken_out(self.measured))._fitted(second, [ordinary, *fits])
             error = self._misread(z, second, plain)
         worth, record = max(
@@ -269,7 +269,7 @@ class _Record:
         def is_seen(size: float) -> bool:
             off = self.errors(kind.like(ordinary, size)[None], kind).ravel() - at_first
             off -= slopes @ np.linalg.lstsq(slopes, off, rcond=None)[0]
-            return self._worth(squares + float(off @ off), plain, 1) > THRESHOLDS.value("actuator_evidence")
+            return self._worth(squares + float(off @ off), plain, 1) > THRESHOLDS.value("evidence")
 
         if not is_seen(most):
             return np.nan

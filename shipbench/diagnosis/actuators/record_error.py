@@ -47,7 +47,7 @@ class RecordError:
     @property
     def undecided(self) -> bool:
         """Check whether the motion leaves open which of the two is wrong."""
-        return abs(self.worth) <= THRESHOLDS.value("record_reading_evidence")
+        return 2.0 * abs(self.worth) <= THRESHOLDS.value("evidence_beyond_library")
 
     @property
     def axis(self) -> str:
@@ -58,7 +58,7 @@ class RecordError:
     @property
     def contradicted(self) -> bool:
         """Check whether the motion contradicts the record."""
-        return self.worth > THRESHOLDS.value("record_reading_evidence")
+        return 2.0 * self.worth > THRESHOLDS.value("evidence_beyond_library")
 
     def taken_out(self, recorded: np.ndarray) -> np.ndarray:
         """Positions corrected for the error (Newton's method; the record rises with the position)."""

@@ -49,7 +49,7 @@ def rollout_plant(dataset: Dataset, gears: dict[str, Gear]) -> Plant:
     The commands drive it through `gears`, from the initial positions of the actuators.
     """
     ship, dataset = complete(dataset.ship), averaged(dataset)
-    horizon = THRESHOLDS.value("rollout_horizon") * (ship.L / 130.0) ** 0.5
+    horizon = THRESHOLDS.value("run_duration") * (ship.L / 130.0) ** 0.5
     segments = cut(dataset, max(20, round(horizon / dataset.dt)))
     return Plant(ship, replace(segments, commanded=True), gears=gears, recorded=not segments.commanded)
 

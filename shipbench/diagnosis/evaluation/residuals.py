@@ -157,7 +157,7 @@ def what_is_wrong(trace: Trace) -> tuple[Wrong, ...]:
     by_chance, least = THRESHOLDS.value("dependence_by_chance"), THRESHOLDS.value("dependence_share")
     lines = []
     for channel, share in sorted(tables.share.items(), key=lambda item: -item[1]):
-        if share < THRESHOLDS.value("channel_share"):
+        if share < THRESHOLDS.value("reported_share"):
             continue
         found = ((f, axis) for axis in _AXES_OF[channel] for f in tables.follows[AXES[axis]])
         known = [(f, axis) for f, axis in found if f.p <= by_chance and f.share >= least]
@@ -172,7 +172,7 @@ def what_is_wrong(trace: Trace) -> tuple[Wrong, ...]:
 def _error_words(tables: ErrorTables, channel: str, variable: str) -> list[str]:
     """Text on the size of a channel's error, its growth, and where it is greatest."""
     text = [f"root mean square {tables.size[channel]:.3g} {CHANNEL_UNITS[channel][0]}"]
-    larger = THRESHOLDS.value("error_ratio")
+    larger = THRESHOLDS.value("reported_ratio")
     growth = tables.by_channel[(channel, "horizon")]
     if len(growth) > 1 and growth[-1].rms > larger * growth[0].rms > 0.0:
         text.append(

@@ -50,7 +50,7 @@ def fit(
     for number in range(iterations):
         free = number < free_steps  # later, variances move little, or two linearisations may alternate for ever
         found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else 0.3, seen=seen, far=far and not number)
-        if not (number or far) and found.excess < THRESHOLDS.value("near_convergence"):
+        if not (number or far) and found.excess < THRESHOLDS.value("unconverged_excess"):
             free_steps = 0
         if number < 2:
             early = found.promise

@@ -314,7 +314,7 @@ def update_force(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution,
             + np.sum(own * covs)
         )
         log_force[j] = np.log((np.sum(w @ gram.K_inv * w) + spread) / (B * gram.knots))
-    least, most = THRESHOLDS.value("least_latent_force"), THRESHOLDS.value("most_latent_force")
+    least, most = THRESHOLDS.value("least_spread"), THRESHOLDS.value("most_latent_force")
     return np.clip(log_force, float(np.log(least**2)), float(np.log(most**2)))
 
 

@@ -361,7 +361,7 @@ def _variances(
     """Variances of force, noise and random effects on one linearisation; more: shared columns behind those of the
     model."""
     random = [i for i, term in enumerate(model.terms) if term.per_run]
-    least = np.log(THRESHOLDS.value("least_noise") ** 2)
+    least = np.log(THRESHOLDS.value("least_spread") ** 2)
 
     def step(theta: np.ndarray) -> tuple[float, np.ndarray]:
         now, tau2 = Hyper(theta[:3], theta[3:9], hyper.tau), dict(zip(random, theta[9:], strict=True))

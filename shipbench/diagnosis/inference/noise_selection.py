@@ -129,7 +129,7 @@ def swinging_force(found: Fit, colour: Colour) -> Colour:
         half = int(np.argmax(later - lowest))
         if np.isinf(colour.period[channel]) and later[half] - lowest[half] > THRESHOLDS.value("swell_correlation"):
             period = 1.0 + half + float(np.argmax(correlation[half:]))
-            share, time = THRESHOLDS.value("swell_variance"), period / (2.0 * np.pi * _WAVES[2][0])
+            share, time = _WAVES[0][1], period / (2.0 * np.pi * _WAVES[2][0])
             colour = colour.with_channel(channel, share, time, period)
     return colour
 

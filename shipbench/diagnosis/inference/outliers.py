@@ -42,7 +42,7 @@ def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
         float(sum(run.t[-1] - run.t[0] - seg.dt for run in runs)),
     )
     found = []
-    if fitted < THRESHOLDS.value("fitted_share") * whole:
+    if fitted < (1.0 - THRESHOLDS.value("reported_share")) * whole:
         found.append(
             f"{fitted / whole:.0%} of the record is fitted, {len(seg.run)} pieces of {plant.steps * seg.dt:.0f} s, "
             "spread over all runs; "

@@ -28,8 +28,8 @@ NUM_HULL = len(HULL.parameters)
 NO_GEAR = Gear(1e-3, 1e12)
 SEGMENT = THRESHOLDS.value("segment_length")
 MOST_STEPS = THRESHOLDS.count("most_steps")
-FOLD_STEPS = THRESHOLDS.count("most_steps_of_a_fold")
-THOROUGH_STEPS = THRESHOLDS.count("most_steps_thorough")
+FOLD_STEPS = MOST_STEPS // 4
+THOROUGH_STEPS = 2 * MOST_STEPS
 """Integration steps of all segments together, per stage."""
 DEEP = THRESHOLDS.value("deep_water")
 FEW_PIECES = THRESHOLDS.count("segments_for_noise")

@@ -62,7 +62,7 @@ def _thrusters(null: Fit) -> list[UnitFinding]:
         ((first_fit(plant.turned([c - N for c in reading]), null), reading) for reading in readings),
         key=lambda x: x[0].evidence,
     )
-    gain, least = best.evidence - first_evidence(plant, null), THRESHOLDS.value("thruster_sign_evidence")
+    gain, least = best.evidence - first_evidence(plant, null), 0.5 * THRESHOLDS.value("evidence_beyond_library")
     if gain > least:
         gain = min(gain, best.evidence - first_fit(plant, null, like=best).evidence)
     return [UnitFinding(STATES[c], "sign", -1.0, _better(gain)) for c in turned] if gain > least else []

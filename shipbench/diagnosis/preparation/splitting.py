@@ -34,7 +34,7 @@ def split_long_runs(prepared: Prepared) -> Prepared:
         return prepared
     seconds = [float(run.t[-1] - run.t[0]) for run in dataset.runs]
     total = sum(seconds)
-    shortest = THRESHOLDS.value("part_seconds") * (dataset.ship.L / 130.0) ** 0.5
+    shortest = THRESHOLDS.value("run_duration") * (dataset.ship.L / 130.0) ** 0.5
     length = max(shortest, total / THRESHOLDS.count("most_parts"))
     parts = []
     for run, lasts in zip(dataset.runs, seconds, strict=True):

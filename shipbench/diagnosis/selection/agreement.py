@@ -107,9 +107,7 @@ def tells_runs_apart(fit: Fit) -> bool:
     force in each manoeuvre, and no current or wind explains it."""
     alone = replace(fit.prior, random=fit.prior.random[:0], log_tau2=fit.prior.log_tau2[:0])
     worth = 2.0 * (fit.solution.log_evidence - solve(fit.reduced, alone).log_evidence)
-    return own_forces(fit) < THRESHOLDS.value("own_forces_left") + THRESHOLDS.value("own_forces_share") * max(
-        worth, 0.0
-    )
+    return own_forces(fit) < THRESHOLDS.value("evidence_of_misfit") + THRESHOLDS.value("minor_share") * max(worth, 0.0)
 
 
 def relies_on_a_ship(fit: Fit, effect: Effect) -> bool:
@@ -169,7 +167,9 @@ def runs_agree(fit: Fit, index: int) -> bool:
     squares = float(value @ np.linalg.solve(covariance(fit, index), value))
     doubt = float(f.sf(squares * free / (size * max(num - 1, 1)), size, free))
     return doubt < (
-        THRESHOLDS.value("doubt") if fit.model.terms[index].since is None else THRESHOLDS.value("doubt_of_a_change")
+        THRESHOLDS.value("error_probability")
+        if fit.model.terms[index].since is None
+        else THRESHOLDS.value("doubt_of_a_change")
     )
 
 

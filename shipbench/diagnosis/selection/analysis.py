@@ -26,7 +26,7 @@ from .unknown import NO_FORM, Dependence, Search, dependences
 
 THRESHOLD = THRESHOLDS.value("evidence")
 """Least score of an identified cause, 2 log Bayes factor; the bootstrap of each diagnosis may raise it."""
-HULL_THRESHOLD = THRESHOLDS.value("evidence_of_hull")
+HULL_THRESHOLD = THRESHOLDS.value("evidence_of_misfit")
 _HULL_ALONE = ("speed", "sway velocity", "yaw rate")
 _ESTIMATED = ("rudder", "revolutions", "revolutions and rudder", "speed and rudder")
 """Variables of forces that belong to the hull where its derivatives are off, and to rudder and propeller where the ship
@@ -144,7 +144,9 @@ def analyse(
     Once the budget is spent, no dependences are told: they are compared with each other.
     """
     draws = null_maxima(null, seed)
-    threshold = max(THRESHOLD, float(np.quantile(draws, THRESHOLDS.value("null_quantile")))) if only is None else 0.0
+    threshold = (
+        max(THRESHOLD, float(np.quantile(draws, 1.0 - THRESHOLDS.value("error_probability")))) if only is None else 0.0
+    )
     selection = select(null, np.inf if cautious else threshold)
     null = selection.null
     findings, plain, errors = find_in_gears(null.plant)
@@ -198,7 +200,7 @@ def asked(d: Dependence, off_form: float) -> float:
     seen, hardly = THRESHOLDS.value("off_form_of_large"), THRESHOLDS.value("off_form_of_small")
     ordinary = seen + (hardly - seen) * max(2.0 - d.taken / NOTICEABLE, 0.0)
     times = max(ordinary, THRESHOLDS.value("off_form_slope") * off_form)
-    return THRESHOLDS.value("evidence_of_unknown") + times * off_form if d.taken > least else np.inf
+    return THRESHOLDS.value("evidence_beyond_library") + times * off_form if d.taken > least else np.inf
 
 
 def _unknown(
@@ -213,7 +215,7 @@ def _unknown(
     least, first = THRESHOLDS.value("contender_share") * worth, THRESHOLDS.count("contenders")
     found = [d for d in search.found if d.score > max(asked(d, selection.off_form), least)]
     contenders = [d if is_spent() else search.settled(d) for d in found[:first]] if named else found[:1]
-    best, margin = max(contenders, key=lambda d: d.score, default=None), THRESHOLDS.value("unknown_margin")
+    best, margin = max(contenders, key=lambda d: d.score, default=None), THRESHOLD
     if best is None or best.has_name:
         return None, None
     if not named or best.score > worth + margin:

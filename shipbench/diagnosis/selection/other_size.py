@@ -15,6 +15,10 @@ _FACTORS, _NEAR = (0.4, 2.5), (0.7, 0.85, 1.2, 1.4)
 """Sizes that are tried, relative to the ship file: of another ship, and of nearly the same."""
 
 
+_FEW = THRESHOLDS.count("segments_per_outlier") - 1
+"""Pieces of a long record by which sizes are compared: so few that no fit leaves one out as an outlier."""
+
+
 def better_size(null: Fit) -> list[str]:
     """Line if a smaller or a larger ship, with masses, inertia and forces of her size, has far more evidence beside no
     cause; None if not. null: with its own noise model, as the other's is (docs/calibration.md#another-size)."""
@@ -27,9 +31,9 @@ def better_size(null: Fit) -> list[str]:
 def size_instead_of(causes: str, worth: float, null: Fit) -> list[str]:
     """Line if a ship of nearly the same size has about the evidence of `causes` with the ship file, whose log Bayes
     factor is `worth`."""
-    worth *= min(1.0, THRESHOLDS.count("pieces_of_sizes") / len(null.plant.seg.run))
+    worth *= min(1.0, _FEW / len(null.plant.seg.run))
     factor, gain = _best(null, _NEAR)
-    if factor == 1.0 or gain < (worth - THRESHOLDS.value("same_size_margin")) * _times(null):
+    if factor == 1.0 or gain < (worth - 0.5 * THRESHOLDS.value("evidence")) * _times(null):
         return []
     return [
         (
@@ -43,7 +47,7 @@ def _best(null: Fit, factors: Sequence[float]) -> tuple[float, float]:
     """Best factor of the size, and its gain of log evidence; 0 where none gains any."""
     if is_spent():
         return 1.0, 0.0
-    few = null.plant.thinned(THRESHOLDS.count("pieces_of_sizes"))
+    few = null.plant.thinned(_FEW)
     own = null if few is null.plant else null_fit(few, Scales(few))
     best, most = 1.0, 0.0
     for plant, factor in ((few.resized(factor), factor) for factor in factors):

@@ -54,7 +54,7 @@ class Standard:
         if term.per_run:
             besides = THRESHOLDS.value("evidence_of_run_values")
         elif traits.absorbs_misfit and size < STRANGE_SIZE:
-            besides = THRESHOLDS.value("evidence_of_misfit")
+            besides = THRESHOLDS.value("evidence")
         return besides + self.off_form * (term.per_run or term.since is not None or traits.between_ships)
 
 

@@ -114,7 +114,7 @@ def screen(fit: Fit) -> list[Score]:
         if _wrong_way(term, scores[i].estimate):
             scores[i] = replace(scores[i], score=min(scores[i].score, 0.0))
             continue
-        if scores[i].score < -THRESHOLDS.value("hopeless_score") * term.per_run or is_spent():
+        if scores[i].score < -THRESHOLDS.value("values_per_run") * term.per_run or is_spent():
             continue
         own = term.size if term.per_run else 0
         start = max(scores[i].log_tau2, float(np.log(0.1**2)))  # least variance at the start
@@ -223,7 +223,7 @@ def other_kinds_from(kinds: Sequence[str]) -> list[int]:
     at, shuffle = np.array(places(len(kinds)), dtype=int), np.random.default_rng(0)
     by_chance = [_alike(shuffle.permutation(of), at) for _ in range(500)]  # random orders
     bounds = THRESHOLDS.value("alike_lower"), THRESHOLDS.value("alike_upper")
-    least = np.clip(np.quantile(by_chance, THRESHOLDS.value("alike_by_chance"), axis=0), *bounds)
+    least = np.clip(np.quantile(by_chance, THRESHOLDS.value("error_probability"), axis=0), *bounds)
     return [int(k) for k in at[_alike(of, at) < least]]
 
 

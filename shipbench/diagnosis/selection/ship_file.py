@@ -105,7 +105,7 @@ def whatever_the_ship(name: str, found: Analysis) -> bool:
 def own_propeller(found: Analysis) -> list[str]:
     """Return a note on the thrust of a propeller that the ship file leaves open."""
     factor, ship = _thrust_factor(found.final), found.final.plant.ship
-    if max(factor, 1.0 / factor) < THRESHOLDS.value("thrust_reported"):
+    if max(factor, 1.0 / factor) < THRESHOLDS.value("reported_ratio"):
         return []
     what = "diameter, kt" if ship.lacks("propeller") else "kt"
     return [

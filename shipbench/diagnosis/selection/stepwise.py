@@ -23,7 +23,7 @@ from .backward import needed_only, wanted_only
 from .requirements import SAME_SHIP, SIGNIFICANT, SURE, Standard, first_unmet
 from .screening import Score, changes, glance, overlap, screen
 
-CONFUSED = THRESHOLDS.value("confused_score")
+CONFUSED = THRESHOLDS.value("evidence")
 """Largest difference from the winner's score, 2 log Bayes factor, of candidates that are reported as confounded with
 it."""
 
@@ -45,7 +45,7 @@ class Step:
 
     def is_near(self, best: Step) -> bool:
         """Whether the data do not distinguish it from the selected step."""
-        share = THRESHOLDS.value("confused_formulas") * push_alike(self.term.effect, best.term.effect)
+        share = THRESHOLDS.value("minor_share") * push_alike(self.term.effect, best.term.effect)
         return self.round == best.round and self.score > best.score - max(CONFUSED, share * best.score)
 
 
@@ -172,7 +172,7 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
 def _least(best: Fit, now: Fit) -> float:
     """Predicted gain that a refit needs beside the best one; less by the amount by which that one's prediction fell
     short."""
-    share, margin = THRESHOLDS.value("refit_share_of_best"), THRESHOLDS.value("refit_margin")
+    share, margin = THRESHOLDS.value("refit_share_of_best"), THRESHOLDS.value("unconverged_excess")
     return 2.0 * (share * (best.evidence - now.evidence) - max(best.promise - best.early, 0.0)) - margin
 
 
@@ -257,7 +257,7 @@ def _grown(null: Fit, threshold: float, again: bool = False) -> _Grown:
         )
         # what the causes found leave unexplained, because their formulas are not the ship's, passes for another cause
         left = THRESHOLDS.value("left_by_causes_share") * 2.0 * (now.evidence - null.evidence)
-        imprecise = min(left, THRESHOLDS.value("left_by_causes_most"))
+        imprecise = min(left, THRESHOLDS.value("evidence_beyond_library"))
         # what a fit that does not rest could still gain by itself is no gain of the next cause
         if best is None or state.gain(best) < threshold + imprecise + now.excess:
             break
@@ -276,7 +276,7 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin, standard: Standard) -
         return best
     plain, gain = best, 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
     margin = THRESHOLDS.value("change_margin")
-    present, least = {t.label for t in now.model.terms}, max(margin, THRESHOLDS.value("refit_share_of_score") * gain)
+    present, least = {t.label for t in now.model.terms}, max(margin, THRESHOLDS.value("minor_share") * gain)
     late = [s for s in changes(now) if s.score > least and s.term.label not in present]
     late = [s for s in late if not s.term.effect.traits.persistent][: THRESHOLDS.count("changes_refitted")]
     if not late:
@@ -299,10 +299,10 @@ def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[S
         if s.term.label not in present:
             best.setdefault(s.term.label, s)
     ranked = sorted(best.values(), key=lambda s: -s.score)
-    worth, refitted = THRESHOLDS.value("refit_share_of_threshold") * threshold, THRESHOLDS.count("refits")
+    worth, refitted = THRESHOLDS.value("prediction_share") * threshold, THRESHOLDS.count("refits")
     if not ranked or ranked[0].score < worth:
         return []
-    least = max(worth, THRESHOLDS.value("refit_share_of_score") * ranked[0].score)
+    least = max(worth, THRESHOLDS.value("minor_share") * ranked[0].score)
     chosen = [s for s in ranked[:refitted] if s.score > least]
     families = {s.term.effect.family for s in chosen}
     for s in ranked[refitted:]:
@@ -329,7 +329,7 @@ def _tie(best: Score) -> float:
     of a size has no slope at zero."""
     tie = THRESHOLDS.value("tie")
     if best.term.effect.vector and not best.term.per_run:
-        return max(tie, THRESHOLDS.value("tie_of_vectors") * best.score)
+        return max(tie, THRESHOLDS.value("prediction_share") * best.score)
     return tie
 
 
@@ -350,6 +350,6 @@ def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -
     best: dict[str, Score] = {}
     for s in screen(Beginning.of(now, origin, terms).seen):
         best.setdefault(s.term.label, s)
-    least = max(threshold, THRESHOLDS.value("refit_share_of_score") * max(s.score for s in best.values()))
+    least = max(threshold, THRESHOLDS.value("minor_share") * max(s.score for s in best.values()))
     seen = _beside(now) | {f.model.terms[-1].label for f in tried}
     return [s for label, s in best.items() if label not in seen and s.score > least][: THRESHOLDS.count("rivals")]

@@ -121,7 +121,7 @@ class Search:
             pair for pair in apart["nothing"] if pair[0].axis != "surge"
         ]  # where another form of resistance comes near a constant
         joined = [self._together(pairs) for pairs in apart.values()]
-        often = fit.plant.seg.dt < THRESHOLDS.value("samples_for_errors") * fit.plant.froude
+        often = fit.plant.seg.dt < 0.5 * THRESHOLDS.value("shortest_period") * fit.plant.froude
         channels = [(name, channel) for name, channel in SENSORS.items() if often and fit.plant.seg.seen[channel]]
         alone += self._best([t for name, channel in channels for t in _added(lin, name, channel, errors)])
         self._parts = {d: parts for d, *parts in [*alone, *(pair for pair in joined if pair is not None)]}

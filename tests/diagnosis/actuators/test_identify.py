@@ -16,9 +16,9 @@ from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.evaluation.held_out_gain import rollout_plant
 from shipbench.diagnosis.model.forward import Plant
 from shipbench.diagnosis.model.rollout import Active
+from shipbench.diagnosis.selection import stepwise
 from shipbench.diagnosis.selection.analysis import plain_model
 from shipbench.diagnosis.selection.stepwise import select
-from shipbench.diagnosis.thresholds import THRESHOLDS
 from shipbench.effects.base import EFFECTS, Effect, Parameter
 from shipbench.ops import Array
 from shipbench.physics.actuators import Gear, gear_path
@@ -199,8 +199,7 @@ def test_play_is_judged_beside_a_lag_that_is_too_small_to_matter(monkeypatch: py
         scaled(load_mmg_ship("kcs"), 12.0),
         Trials(runs=12, samples=120, thrusters=False, astern=False, gusts=0.5, noise=0.3),
     )
-    margin = replace(THRESHOLDS.rows["refit_margin"], value=np.inf)  # no refit is given up
-    monkeypatch.setitem(THRESHOLDS.rows, margin.name, margin)
+    monkeypatch.setattr(stepwise, "_least", lambda best, now: -np.inf)  # no refit is given up
     found = select(plain_model(Plant.of(_recorded_before(ship, Behind("delta", "T2"), 0.2, DELTA, trials))), 10.0)
     (play,) = [s for s in found.steps if s.term.label == "rudder_backlash" and s.round == 0]
     assert play.score > 30.0
