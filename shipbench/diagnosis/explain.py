@@ -76,7 +76,7 @@ def _term_cause(found: Analysis, index: int, term: Term, gain: Gain | None, runs
     score, supporters, compared = found.score(index)
     rivals = rivals_of(found, term)
     notes = [f"The log Bayes factor compares the models {compared}", effect.way]
-    notes += [goes_with(fit, of_runs(fit, index))] if term.per_run else []
+    notes += [goes_with(fit.plant.seg, of_runs(fit, index))] if term.per_run else []
     notes += (
         [f"{effect.name} begins with run {runs[term.since]} (number {term.since}, the first is 0)"]
         if term.since is not None

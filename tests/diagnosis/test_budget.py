@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
+from made_fits import made_analysis, made_fit
 
 from shipbench.diagnosis import diagnose as whole
 from shipbench.diagnosis.budget import Budget, count, is_spent, limited
@@ -16,6 +15,7 @@ from shipbench.diagnosis.inference.gauss_newton import Origin, fit
 from shipbench.diagnosis.inference.laplace import Fit, Model
 from shipbench.diagnosis.model.forward import Plant
 from shipbench.diagnosis.model.linearisation import Scales
+from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.preparation import time_offsets as clocks
 from shipbench.diagnosis.selection import analysis
 from shipbench.diagnosis.selection import stepwise as selection
@@ -129,13 +129,7 @@ def test_no_gain_is_measured_with_a_training_part_that_was_stopped(turned):
             test, np.ones(len(test)), np.zeros(len(test)), np.zeros(len(test)), ("heading_bias",), stopped=fold == 1
         )
 
-    found = SimpleNamespace(
-        hull=0.0,
-        final=SimpleNamespace(model=SimpleNamespace(terms=("heading_bias",))),
-        gears=(),
-        unknown=None,
-        threshold=10.0,
-    )
+    found = made_analysis(made_fit((Term(EFFECTS.get("heading_bias")),)))
     worth = whole._cross_validated(turned, found, 0, work, None, None)
     assert (worth.gain, worth.per_run) == (None, ())
     assert "1 of 5 training parts were stopped" in worth.told[0]

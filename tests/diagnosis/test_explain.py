@@ -3,14 +3,12 @@ dropped."""
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
+from made_fits import fit_to, made_analysis, made_fit
 
 from shipbench.diagnosis.explain import rivals_of
 from shipbench.diagnosis.model.term import Term
-from shipbench.diagnosis.selection.analysis import Analysis
 from shipbench.diagnosis.selection.stepwise import Step
 from shipbench.effects.base import EFFECTS
 
@@ -27,13 +25,9 @@ def test_only_what_came_near_in_the_round_in_which_a_cause_was_added_is_its_riva
         step(1, "wave_drift", 38.0),
         step(1, "list", 12.0),
     ]
-    named = [Term(EFFECTS.get("wind"))]
-    found = SimpleNamespace(
-        selection=SimpleNamespace(steps=steps), final=SimpleNamespace(model=SimpleNamespace(terms=named))
-    )
-    assert rivals_of(found, named[0]) == ("wave_drift",)
-    named.append(Term(EFFECTS.get("wave_drift")))
-    assert rivals_of(found, named[0]) == ()
+    wind, waves = Term(EFFECTS.get("wind")), Term(EFFECTS.get("wave_drift"))
+    assert rivals_of(made_analysis(made_fit((wind,)), steps), wind) == ("wave_drift",)
+    assert rivals_of(made_analysis(made_fit((wind, waves)), steps), wind) == ()
 
 
 def test_mass_and_thrust_are_always_told_as_confused():
@@ -42,10 +36,7 @@ def test_mass_and_thrust_are_always_told_as_confused():
         [step(0, "mass_change", 40.0), step(0, "thrust_gain", 18.0), step(0, "wind", 17.0)],
         Term(EFFECTS.get("mass_change")),
     )
-    found = SimpleNamespace(
-        selection=SimpleNamespace(steps=steps), final=SimpleNamespace(model=SimpleNamespace(terms=[mass]))
-    )
-    assert rivals_of(found, mass) == ("thrust_gain",)
+    assert rivals_of(made_analysis(made_fit((mass,)), steps), mass) == ("thrust_gain",)
 
 
 @pytest.mark.parametrize(
@@ -55,10 +46,7 @@ def test_mass_and_thrust_are_always_told_as_confused():
 def test_wind_and_waves_are_told_as_confused_where_their_formulas_decide(named: str, other: str, told: bool):
     """Drift in waves by another formula on a tanker: wind was ahead by 25 of 706, and waves not spoken of."""
     steps, cause = [step(0, named, 706.0), step(0, other, 681.0)], Term(EFFECTS.get(named))
-    found = SimpleNamespace(
-        selection=SimpleNamespace(steps=steps), final=SimpleNamespace(model=SimpleNamespace(terms=[cause]))
-    )
-    assert rivals_of(found, cause) == ((other,) if told else ())
+    assert rivals_of(made_analysis(made_fit((cause,)), steps), cause) == ((other,) if told else ())
 
 
 @pytest.mark.parametrize(
@@ -66,13 +54,9 @@ def test_wind_and_waves_are_told_as_confused_where_their_formulas_decide(named: 
     [(("wind",), "with and without it"), (("wind", "list"), "with and without it beside the other causes")],
 )
 def test_a_cause_alone_is_not_told_to_be_beside_others(names: tuple[str, ...], told: str):
-    model, with_it, without = (
-        SimpleNamespace(terms=names),
-        SimpleNamespace(per_run=np.ones(3)),
-        SimpleNamespace(per_run=np.zeros(3)),
-    )
-    final = SimpleNamespace(
-        worth=lambda index: 179.0, model=model, solution=with_it, solution_without=lambda index: without
-    )
-    found = SimpleNamespace(final=final, selection=SimpleNamespace(steps=[]), threshold=10.0)
-    assert Analysis.score(found, 0) == (179.0, 3, told)
+    terms = [Term(EFFECTS.get(name)) for name in names]
+    S = np.tile(np.eye(sum(t.size for t in terms) + 1), (3, 1, 1))
+    S[:, 0, -1] = S[:, -1, 0] = 10.0  # three runs agree on the first component of the wind
+    final = fit_to(terms, S)
+    assert final.worth(0) > 100.0
+    assert made_analysis(final).score(0) == (final.worth(0), 3, told)

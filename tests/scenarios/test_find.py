@@ -9,10 +9,10 @@ import os
 import random
 import secrets
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_fits import made_analysis, made_fit
 
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.inference.baseline import null_fit
@@ -262,7 +262,7 @@ def test_what_shows_whatever_the_ship_is_is_named_under_doubt(name, values, ship
 )  # fmt: skip
 def test_under_doubt_a_wind_of_each_run_and_a_bank_are_not_told(name, told):
     """What the coefficients of another ship lack in a run's manoeuvre, or in those of one place, passes for them."""
-    assert whatever_the_ship(name, SimpleNamespace(gears=())) is told
+    assert whatever_the_ship(name, made_analysis(made_fit())) is told
 
 
 @pytest.mark.long

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_fits import made_fit, made_plant
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 import shipbench.simulate.trials
@@ -346,14 +346,9 @@ def test_a_delay_that_the_track_rules_out_is_none(
     asked."""
     monkeypatch.setattr(clocks, "lags", lambda _: (track, (-1.9, 0.3) if earth else (0.1, 0.2)))
     term = Term(EFFECTS.get(name), () if earth is None else (earth,))
-    model = SimpleNamespace(terms=(term,))
-    fit = SimpleNamespace(
-        model=model,
-        values=(np.array([delay]),),
-        scales=SimpleNamespace(amplitudes=lambda *_: np.ones(1)),
-        plant=SimpleNamespace(c=trials.ship),
-    )
-    assert clocks.ruled_out(trials, fit) == ((name,) if out else ())
+    plant = made_plant()
+    typical = Scales(plant).amplitudes(term, plant.c.L)
+    assert clocks.ruled_out(trials, made_fit((term,), (delay / typical,), plant)) == ((name,) if out else ())
 
 
 @pytest.mark.long

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..inference.laplace import Fit
+from ..model.forward import Segments
 from ..thresholds import THRESHOLDS
 
 
@@ -18,10 +19,9 @@ def of_runs(fit: Fit, index: int) -> np.ndarray:
     return np.stack([size * np.cos(towards), size * np.sin(towards)], axis=1)
 
 
-def goes_with(fit: Fit, values: np.ndarray) -> str:
+def goes_with(seg: Segments, values: np.ndarray) -> str:
     """Sentence on the variable with which `values` (runs, components) correlate, with the share of the variance; empty
     if none."""
-    seg = fit.plant.seg
     weight = np.maximum(np.bincount(seg.run, seg.mask.sum(axis=1), minlength=seg.runs), 1.0)
     x, y = (
         np.bincount(seg.run, np.sum(seg.states[..., i] * seg.mask, axis=1), minlength=seg.runs) / weight for i in (0, 1)

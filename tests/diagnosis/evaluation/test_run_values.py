@@ -3,10 +3,9 @@ each run."""
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
+from made_fits import made_segments
 
 from shipbench.diagnosis.evaluation.run_values import goes_with
 
@@ -20,20 +19,16 @@ def sailed():
     places = rng.uniform(-2000.0, 2000.0, (RUNS, 2))
     run = np.repeat(np.arange(RUNS), 2)
     states = places[run][:, None, :] + rng.normal(0.0, 50.0, (2 * RUNS, SAMPLES, 2))
-    return places, SimpleNamespace(
-        plant=SimpleNamespace(
-            seg=SimpleNamespace(run=run, runs=RUNS, mask=np.ones((2 * RUNS, SAMPLES), bool), states=states)
-        )
-    )
+    return places, made_segments(run, states=np.pad(states, [(0, 0), (0, 0), (0, 8)]))
 
 
 def test_a_current_that_differs_from_place_to_place_is_told_so(sailed):
-    places, fit = sailed
+    places, seg = sailed
     current = np.stack([0.05 + 2e-4 * places[:, 1], np.full(RUNS, 0.1)], axis=1) + np.random.default_rng(1).normal(
         0.0, 0.05, (RUNS, 2)
     )
-    assert goes_with(fit, current).startswith("it differs from place to place: ")
-    assert goes_with(fit, 5.0 * current) == goes_with(fit, current)
+    assert goes_with(seg, current).startswith("it differs from place to place: ")
+    assert goes_with(seg, 5.0 * current) == goes_with(seg, current)
 
 
 def test_a_tide_goes_with_the_number_of_the_run(sailed):

@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_fits import made_ship
 
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.inference import robust_prior as ordinary
@@ -63,7 +63,7 @@ def test_a_wider_spread_is_taken_only_where_its_fit_is_no_worse(mariner, monkeyp
     """Winds of single runs of 10 m/s: the fit with wider spreads ended 68 of log evidence below the one before, with
     winds of 1.5 m/s."""
     narrow = replace(mariner, model=replace(mariner.model, widths=()))
-    other = SimpleNamespace(evidence=narrow.evidence + gain, model=mariner.model)
+    other = replace(mariner, excess=mariner.excess + 2.0 * (mariner.evidence - narrow.evidence - gain))
     monkeypatch.setattr(ordinary, "widths_of", lambda found: np.asarray(mariner.model.widths))
     monkeypatch.setattr(ordinary, "fit", lambda *_, **__: other)
     assert widened(narrow) is (other if gain > 0.0 else narrow)
@@ -128,7 +128,9 @@ def test_a_propeller_of_the_b_series_is_that_of_an_ordinary_ship(name, value):
 def test_a_full_hull_makes_waves_at_a_lower_froude_number(Cb: float, factor: float):
     """A barge with a block coefficient of 0.88 needed 9 spreads of it at a Froude number of 0.18, and her file was
     doubted."""
-    assert STRUCTURE.wider(SimpleNamespace(Cb=Cb))["wave_resistance"] == pytest.approx(factor, rel=0.02)
+    assert STRUCTURE.wider(made_ship().model_copy(update={"Cb": Cb}))["wave_resistance"] == pytest.approx(
+        factor, rel=0.02
+    )
 
 
 @pytest.fixture(scope="module")

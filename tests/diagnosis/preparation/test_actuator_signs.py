@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_fits import made_fit
 
 from shipbench.checking.units import check_units, corrected, merged
 from shipbench.diagnosis.diagnose import diagnose
@@ -72,9 +72,9 @@ def test_thrusters_are_not_turned_for_another_rest_of_the_fit(monkeypatch, as_re
     null = plain_model(Plant.of(data))
     pushed = float(np.sum(null.plant.seg.states[..., [F_B, F_S]] * [1.0, 0.3]))
 
-    def first(plant: Plant, null: Fit, like: Fit | None = None) -> SimpleNamespace:
+    def first(plant: Plant, null: Fit, like: Fit | None = None) -> Fit:
         as_they_are = np.isclose(np.sum(plant.seg.states[..., [F_B, F_S]] * [1.0, 0.3]), pushed)
-        return SimpleNamespace(evidence=54.0 if not as_they_are else as_recorded if like is not None else 0.0)
+        return made_fit(log_evidence=54.0 if not as_they_are else as_recorded if like is not None else 0.0)
 
     monkeypatch.setattr(turned, "first_fit", first)
     assert bool(turned_actuators(data, null)) is (as_recorded == 0.0)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from collections.abc import Iterable
 
 import numpy as np
 import pytest
-from made_fits import _NONE, RUNS, _reduced, fit_of
+from made_fits import RUNS, fit_of, fit_to, fit_to_pieces, made_fit, made_plant
 
 from shipbench.diagnosis.actuators.kinds import ORDINARY
-from shipbench.diagnosis.inference.gram import Gram, Prior, solve
+from shipbench.diagnosis.inference.laplace import Fit
 from shipbench.diagnosis.model.forward import ordinary_gears
 from shipbench.diagnosis.model.linearisation import NUM_BASE, PLACES
 from shipbench.diagnosis.model.term import Term
@@ -30,21 +30,22 @@ from shipbench.effects.base import EFFECTS
 from shipbench.signals import DELTA
 
 
-def is_sure(fit: SimpleNamespace, index: int) -> bool:
+def is_sure(fit: Fit, index: int) -> bool:
     """Whether a cause meets all that is asked of it by itself, but for a ship that may have it."""
     return first_unmet(SURE[1:], fit, index, Standard(fit, 10.0)).met
 
 
 def test_runs_that_scatter_as_the_model_says_are_not_inflated():
     estimates = np.random.default_rng(3).standard_normal(2000) / 3.0
-    assert inflation(fit_of(estimates), np.array([0]))[0] == pytest.approx(1.0, abs=0.1)
+    assert inflation(fit_of(estimates), np.array([NUM_BASE]))[0] == pytest.approx(1.0, abs=0.1)
     np.testing.assert_allclose(covariance(fit_of(0.1 * estimates), 0), 1.0 / 18001.0)
 
 
 @pytest.mark.parametrize(("scatter", "sure"), [(0.3, True), (3.0, False)])
 def test_the_same_mean_is_sure_only_if_the_runs_agree(scatter: float, sure: bool):
     fit = fit_of(0.5 + scatter * np.resize([1.0, -1.0], RUNS))
-    assert fit.values[0][0] ** 2 / fit.solution.cov[0, 0] > 40.0  # by the model's own error it is sure beyond doubt
+    own_error = fit.solution.cov[NUM_BASE, NUM_BASE] ** 0.5
+    assert fit.values[0][0] / own_error > 40.0**0.5  # sure beyond doubt
     assert is_sure(fit, 0) is sure
 
 
@@ -63,14 +64,9 @@ def test_what_one_run_alone_bears_is_sure_only_if_the_others_do_not_speak_agains
     itself."""
     S, weights = np.zeros((RUNS, 2, 2)), np.append(400.0, np.full(RUNS - 1, informed))
     S[:, 0, 0], S[0, 0, 1], S[0, 1, 0] = weights, 400.0, 400.0
-    reduced, prior = _reduced(S), Prior(np.array([0]), np.ones(1), *_NONE)
-    fit = SimpleNamespace(reduced=reduced, prior=prior, columns_of=lambda index: np.array([0]))
+    fit = fit_to((Term(EFFECTS.get("rudder_offset")),), S)
     assert is_borne_by_one(fit, 0) is not sure
-    whole, nothing = (
-        solve(reduced, prior).log_evidence,
-        solve(reduced, Prior(prior.shared[:0], prior.precision[:0], *_NONE)).log_evidence,
-    )
-    assert 2.0 * (whole - nothing) > 100.0
+    assert fit.worth(0) > 100.0
 
 
 def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
@@ -79,18 +75,10 @@ def test_what_runs_have_of_their_own_is_no_disagreement_on_what_they_share():
     Z = rng.standard_normal((RUNS, 200, 3))
     Z[..., 1] += 0.5 * Z[..., 0]  # shared, own, e
     Z[..., 2] += 0.5 * Z[..., 0] + 5.0 * rng.standard_normal((RUNS, 1)) * Z[..., 1]
-    reduced = _reduced(np.swapaxes(Z, 1, 2) @ Z)
-    prior = Prior(np.array([0]), np.ones(1), np.array([1]), np.log([25.0]))
-    solution = solve(reduced, prior)
-    fit = SimpleNamespace(
-        reduced=reduced, prior=prior, solution=solution, values=(solution.mean,),
-        columns_of=lambda index: np.array([0]),
-        plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS), c=SimpleNamespace(L=130.0)),
-        scales=SimpleNamespace(amplitudes=lambda *_: np.ones(1)),
-        model=SimpleNamespace(terms=(Term(EFFECTS.get("rudder_offset")),)),
-    )  # fmt: skip
-    assert solution.mean[0] == pytest.approx(0.5, abs=0.05)
-    assert inflation(fit, np.array([0]))[0] < 3.0
+    terms = (Term(EFFECTS.get("rudder_offset")), Term(EFFECTS.get("thrust_gain"), per_run=True))
+    fit = fit_to(terms, np.swapaxes(Z, 1, 2) @ Z, log_tau2=(0.0, np.log(25.0)))
+    assert fit.values[0] == pytest.approx(0.5, abs=0.05)
+    assert inflation(fit, np.array([NUM_BASE]))[0] < 3.0
     assert is_sure(fit, 0)
 
 
@@ -104,14 +92,8 @@ def test_how_far_ahead_velocities_are_is_as_sure_as_where_the_forces_of_a_hull_a
     assert is_sure(fit, 0) is sure
 
 
-def _of_runs(gram: Gram, prior: Prior) -> SimpleNamespace:
-    """A fit of causes with values of single runs."""
-    reduced = gram.reduce(np.zeros(3))
-    return SimpleNamespace(
-        gram=gram, hyper=SimpleNamespace(log_force=np.zeros(3)), prior=prior, reduced=reduced,
-        solution=solve(reduced, prior),
-        model=SimpleNamespace(terms=tuple(Term(EFFECTS.get("current_per_run"), per_run=True) for _ in prior.random)),
-    )  # fmt: skip
+OWN = Term(EFFECTS.get("thrust_gain"), per_run=True)
+"""A cause with one value for each run."""
 
 
 @pytest.mark.parametrize(("pieces", "steady", "sure"), [(4, True, True), (4, False, False), (1, True, True)])
@@ -122,11 +104,7 @@ def test_a_value_for_each_run_is_sure_only_if_it_lasts_for_the_run(pieces: int, 
     value = rng.standard_normal((RUNS if steady else len(run), 1))
     Z = rng.standard_normal((len(run), 50, 11))  # eta, w of one knot for each axis, own, e
     Z[..., -1] += 2.0 * (value[run] if steady else value) * Z[..., -2]
-    gram = Gram(
-        np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 2)), run, RUNS
-    )
-    prior = Prior(*_NONE, np.array([0]), np.log([4.0]))
-    assert is_sure(_of_runs(gram, prior), 0) is sure
+    assert is_sure(fit_to_pieces((OWN,), Z, run, [np.log(4.0)]), 0) is sure
 
 
 @pytest.mark.parametrize("steady", [True, False])
@@ -138,12 +116,8 @@ def test_a_wind_with_gusts_is_sure_beside_a_current_that_lasts(steady: bool):
     wind = 0.2 * rng.standard_normal((RUNS, 1))[run] + 0.3 * rng.standard_normal((len(run), 1))
     current = 2.0 * (rng.standard_normal((RUNS, 1))[run] if steady else rng.standard_normal((len(run), 1)))
     Z[..., -1] += wind * Z[..., 9] + current * Z[..., 10]
-    gram = Gram(
-        np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 3)), run, RUNS
-    )
-    for random, sure in ((np.array([0]), False), (np.array([0, 1]), steady)):
-        prior = Prior(*_NONE, random, np.log([0.1, 4.0])[random])
-        assert is_sure(_of_runs(gram, prior), 0) is sure
+    assert not is_sure(fit_to_pieces((OWN,), np.delete(Z, 10, axis=2), run, [np.log(0.1)]), 0)
+    assert is_sure(fit_to_pieces((OWN, OWN), Z, run, np.log([0.1, 4.0])), 0) is steady
 
 
 @pytest.mark.parametrize(("own", "sure"), [(0.3, True), (3.0, False)])
@@ -154,38 +128,35 @@ def test_a_value_for_each_run_is_sure_only_if_little_else_differs_between_runs(o
     Z = rng.standard_normal((len(run), 50, 11))  # eta, w of one knot for each axis, own, e
     Z[..., -1] += rng.standard_normal((RUNS, 1))[run] * Z[..., -2]
     Z[..., -1] += np.einsum("bkj,bj->bk", Z[..., 6:9], own * rng.standard_normal((RUNS, 3))[run])
-    gram = Gram(
-        np.swapaxes(Z, 1, 2) @ Z, 1, np.ones((1, 1)), 0.0, np.zeros(len(run)), np.zeros((len(run), 2)), run, RUNS
-    )
-    assert is_sure(_of_runs(gram, Prior(*_NONE, np.array([0]), np.zeros(1))), 0) is sure
+    assert is_sure(fit_to_pieces((OWN,), Z, run, [0.0]), 0) is sure
 
 
 @pytest.mark.parametrize("per_run", [False, True])
 @pytest.mark.parametrize("effect", ["current", "rudder_delay", "thruster_lag"])
 def test_a_size_matters_from_its_least_on(effect: str, per_run: bool):
+    term = Term(EFFECTS.get(effect), per_run=per_run)
+    direction = np.array([0.6, -0.8] if term.size == 2 else [1.0])
     for factor, wanted in ((0.9, False), (1.1, True)):
-        size = factor * np.array([0.6, -0.8]) * _least(effect)
-        assert matters(_sized(effect, np.outer([1.0, -1.0, 1.0], size) if per_run else size, dt=0.5), 0) is wanted
+        size = factor * direction * _least(effect)
+        values = np.outer([1.0, -1.0, 1.0], size) if per_run else size
+        assert matters(made_fit((term,), (values,), made_plant(3, dt=0.5)), 0) is wanted
 
 
 def _least(effect: str) -> float:
-    some = _sized(effect, np.zeros(1), dt=0.5)
-    return least_size(some, some.model.terms[0])
+    return least_size(made_fit(plant=made_plant(dt=0.5)), Term(EFFECTS.get(effect)))
 
 
 def _sized(
-    effect: str, values: np.ndarray, dt: float = 1.0, L: float = 130.0, setting: tuple[float, ...] = ()
-) -> SimpleNamespace:
-    term = Term(EFFECTS.get(effect), setting)
-    c, ship = SimpleNamespace(L=L), SimpleNamespace(L=L, B=0.12 * L, x_bow=0.38 * L)
-    plant = SimpleNamespace(seg=SimpleNamespace(dt=dt), c=c, ship=ship)
-    typical = np.array([abs(p.typical) for p in term.effect.sized(L) if not p.shape])
-    return SimpleNamespace(
-        values=(values,),
-        model=SimpleNamespace(terms=(term,)),
-        plant=plant,
-        scales=SimpleNamespace(amplitudes=lambda *_: typical),
-    )
+    effect: str,
+    values: np.ndarray,
+    dt: float = 1.0,
+    L: float = 130.0,
+    setting: tuple[float, ...] = (),
+    beside: Iterable[Term] = (),
+) -> Fit:
+    """A fit with a cause of `values` typical sizes, and others `beside` it."""
+    terms = (Term(EFFECTS.get(effect), setting), *beside)
+    return made_fit(terms, (values, *(np.zeros(t.size) for t in terms[1:])), made_plant(L=L, dt=dt))
 
 
 @pytest.mark.parametrize(("dt", "wanted"), [(1.0, True), (2.5, False)])
@@ -212,12 +183,10 @@ def test_play_that_takes_the_noise_out_of_a_record_or_the_lag_out_of_a_ship_is_n
 ):
     """0.5 deg of it, with noise of 0.1 deg on a boat of 12 m that had none (beside orders there is no noise to take
     out); 0.64 deg on a trainer of 50 m that answers her rudder late."""
-    fit, states = _sized("rudder_backlash", np.array([play / 2.0])), np.zeros((8, 61, 10))
+    states = np.zeros((8, 61, 10))
     states[..., DELTA] = np.deg2rad(noise * np.random.default_rng(2).standard_normal(states.shape[:2]))
-    fit.plant.seg = SimpleNamespace(
-        dt=0.5, commanded=commanded, states=states, mask=np.ones(states.shape[:2], dtype=bool)
-    )
-    assert matters(fit, 0) is wanted
+    plant = made_plant(8, dt=0.5, states=states, commanded=commanded)
+    assert matters(made_fit((Term(EFFECTS.get("rudder_backlash")),), (np.array([play / 2.0]),), plant), 0) is wanted
 
 
 @pytest.mark.parametrize(
@@ -226,9 +195,8 @@ def test_play_that_takes_the_noise_out_of_a_record_or_the_lag_out_of_a_ship_is_n
 def test_of_two_sensors_that_are_late_each_must_be_so_by_more(others: tuple[str, ...], wanted: bool):
     """Velocities early by 0.14 s stood beside positions 0.3 s late on a model whose positions alone were late, by 0.5
     s."""
-    fit = _sized("velocity_delay", np.array([-0.4]))
-    fit.model.terms += tuple(Term(EFFECTS.get(name)) for name in others)
-    assert matters(fit, 0) is wanted
+    beside = [Term(EFFECTS.get(name)) for name in others]
+    assert matters(_sized("velocity_delay", np.array([-0.4]), setting=(0.0,), beside=beside), 0) is wanted
 
 
 @pytest.mark.parametrize(
@@ -244,10 +212,11 @@ def test_what_asks_for_a_stranger_ship_than_nothing_does_is_no_cause(
     monkeypatch, effect: str, strange: tuple[str, ...], wanted: bool
 ):
     """Else the ship file was doubted for it; a current shows whatever the ship is."""
-    fit = _sized(effect, np.array([1.0]))
+    term = Term(EFFECTS.get(effect))
+    fit = made_fit((term,), (np.ones(term.size),))
     monkeypatch.setattr(robust, "needed", lambda found: "with" if found is fit else "null")
     monkeypatch.setattr(robust, "is_strange", lambda z: z in strange)
-    assert bends(fit, 0, SimpleNamespace()) is wanted
+    assert bends(fit, 0, made_fit()) is wanted
 
 
 @pytest.mark.parametrize(("shift", "wanted"), [(-1.4, True), (1.4, True), (4.1, False)])
@@ -278,10 +247,8 @@ def test_an_antenna_stands_on_the_ship(forward: float, starboard: float, wanted:
 def test_a_wind_straight_at_a_bank_mends_its_law(towards: float, bank: tuple[float, ...] | None, wanted: bool):
     """A wind of 5.3 m/s from 270 deg and a current to 270 deg were named beside a bank at 90 deg that all runs of a
     barge followed."""
-    fit = _sized("wind", np.array([np.cos(towards), np.sin(towards)]))
-    if bank is not None:
-        fit.model.terms = (*fit.model.terms, Term(EFFECTS.get("bank_suction"), bank))
-    assert imitates(fit, 0) is wanted
+    beside = () if bank is None else (Term(EFFECTS.get("bank_suction"), bank),)
+    assert imitates(_sized("wind", np.array([np.cos(towards), np.sin(towards)]), beside=beside), 0) is wanted
 
 
 @pytest.mark.parametrize(("share", "wanted"), [(0.0027, False), (0.01, True)])
@@ -335,4 +302,4 @@ def test_a_wind_that_needs_a_superstructure_of_no_ship_is_none(monkeypatch, effe
     monkeypatch.setattr(robust, "needed", lambda fit: z)
     monkeypatch.setattr(requirements, "lasts", lambda fit: True)
     monkeypatch.setattr(requirements, "tells_runs_apart", lambda fit: True)
-    assert is_sure(SimpleNamespace(model=SimpleNamespace(terms=(Term(EFFECTS.get(effect), per_run=True),))), 0) is sure
+    assert is_sure(made_fit((Term(EFFECTS.get(effect), per_run=True),)), 0) is sure

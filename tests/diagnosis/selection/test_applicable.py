@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_fits import made_fit
 
 from shipbench.diagnosis.model.forward import Plant
 from shipbench.diagnosis.model.term import Term
@@ -74,7 +74,7 @@ def test_a_plug_in_is_asked_as_much_as_a_built_in_effect():
     assert why_not(flap, without(DELTA)) == why_not(EFFECTS.get("rudder_lag"), without(DELTA)) != ""
     assert why_not(flap, Plant.of(trials())) == ""
     for size, wanted in ((3.0, True), (9.0, False)):
-        assert is_on_a_ship(_found(flap, np.array([size / 2.0])), 0) is wanted
+        assert is_on_a_ship(made_fit((Term(flap),), (np.array([size / 2.0]),)), 0) is wanted
 
 
 def test_inputs_that_are_missing_or_known_already_are_told():
@@ -90,7 +90,7 @@ def test_inputs_that_are_missing_or_known_already_are_told():
 @pytest.mark.parametrize(("heel", "wanted"), [(4.0, True), (-9.0, True), (11.8, False), (-15.0, False)])
 def test_no_ship_sails_with_a_list_that_no_intact_ship_may_have(heel: float, wanted: bool):
     """11.8 degrees were named for a compass 3 degrees off, by which velocities from satellites had been turned, too."""
-    found = _found(EFFECTS.get("list"), np.array([heel / 4.0, 1.0]))
+    found = made_fit((Term(EFFECTS.get("list")),), (np.array([heel / 4.0, 1.0]),))
     assert is_on_a_ship(found, 0) is wanted
 
 
@@ -98,13 +98,3 @@ def test_no_ship_sails_with_a_list_that_no_intact_ship_may_have(heel: float, wan
 def test_every_effect_may_have_its_typical_size(name: str):
     effect = EFFECTS.get(name)
     assert effect.plausible(tuple(p.typical for p in effect.sized(SHIP.L)), SHIP)
-
-
-def _found(effect: Effect, values: np.ndarray) -> SimpleNamespace:
-    """A fit with one cause of `values` typical sizes."""
-    typical = np.array([abs(p.typical) for p in effect.sized(130.0) if not p.shape])
-    plant = SimpleNamespace(c=SimpleNamespace(L=130.0), ship=SimpleNamespace(L=130.0, B=20.0, x_bow=50.0))
-    model = SimpleNamespace(terms=(Term(effect),))
-    return SimpleNamespace(
-        values=(values,), model=model, plant=plant, scales=SimpleNamespace(amplitudes=lambda *_: typical)
-    )

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import pytest
+from made_fits import made_fit
 
 from shipbench.diagnosis.inference.baseline import null_fit
 from shipbench.diagnosis.model.forward import Plant
@@ -52,9 +51,9 @@ def test_a_size_that_suits_an_estimated_propeller_needs_more_evidence(plant, mon
     """Mariner, known by her main dimensions alone, gains 127 as a ship of 2.5 times her size."""
     evidence = {True: 0.0, False: gain}
     monkeypatch.setattr(other_size, "first_evidence", lambda *_: gain)
-    monkeypatch.setattr(other_size, "null_fit", lambda at, _: SimpleNamespace(plant=at, evidence=evidence[at is few]))
+    monkeypatch.setattr(other_size, "null_fit", lambda at, _: made_fit(plant=at, log_evidence=evidence[at is few]))
     monkeypatch.setattr(
         plant, "ship", complete(Ship(name="bare", L=175.0, B=25.4, T=8.5, displacement=21222.0)) if bare else plant.ship
     )
     few = plant.thinned(99)
-    assert bool(better_size(SimpleNamespace(plant=plant, evidence=0.0))) is doubted
+    assert bool(better_size(made_fit(plant=plant))) is doubted

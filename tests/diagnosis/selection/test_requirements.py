@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import importlib
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_fits import RUNS, fit_of
+from made_fits import RUNS, fit_of, made_fit
 
 from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection import requirements
@@ -57,7 +56,7 @@ def _seen(effect: str = "rudder_offset", information: float = 900.0) -> Score:
 
 
 def test_the_detection_limit_is_what_the_most_demanding_requirement_asks_for(monkeypatch):
-    fit = SimpleNamespace(plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS)), model=SimpleNamespace(terms=()))
+    fit = made_fit()
     limit = detection_limit(_seen(), Standard(fit, 10.0))
     assert limit == pytest.approx(np.sqrt((10.0 + np.log(901.0)) / 900.0))
     assert detection_limit(_seen(), Standard(fit, 40.0)) > limit
@@ -78,7 +77,7 @@ def test_an_effect_of_a_plug_in_is_asked_the_same_as_one_of_the_library():
     own, theirs = Term(EFFECTS.get("mass_change")), Term(Stranger())
     standard = Standard(fit_of(np.zeros(RUNS)), 10.0, off_form=5.0)
     assert standard.asked_besides(theirs) == standard.asked_besides(own) > 5.0
-    fit = SimpleNamespace(plant=SimpleNamespace(seg=SimpleNamespace(runs=RUNS)), model=SimpleNamespace(terms=()))
+    fit = made_fit()
     seen = Score(theirs, 50.0, np.zeros(1), np.nan, 1e9 * np.eye(1), np.zeros(RUNS))
     assert detection_limit(seen, Standard(fit, 10.0)) == 0.4
 
@@ -91,12 +90,10 @@ def test_the_effect_of_the_example_package_is_a_candidate_and_meets_the_same_req
         standard.asked_besides(term) == standard.asked_besides(Term(EFFECTS.get("current"))) == 0.0
     )  # neither differs between ships
     assert standard.asked_besides(Term(effect, since=3)) == 5.0
-    own = fit_of(np.full(RUNS, 0.5))
-    own.model.terms = (term,)
+    own = fit_of(np.full(RUNS, 0.5), term=term)
     met = first_unmet(SURE[1:], own, 0, standard)
     assert met == Verdict(True)
-    scattered = fit_of(0.5 + 3.0 * np.resize([1.0, -1.0], RUNS))
-    scattered.model.terms = (term,)
+    scattered = fit_of(0.5 + 3.0 * np.resize([1.0, -1.0], RUNS), term=term)
     assert first_unmet(SURE[1:], scattered, 0, standard) == Verdict(
         False, "the runs do not agree that its size differs from zero"
     )

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_fits import made_analysis, made_fit
 
 from shipbench.checking.units import UnitFinding
 from shipbench.diagnosis import diagnose as whole
@@ -79,7 +79,7 @@ def test_sizes_are_compared_beside_noise_of_their_own(monkeypatch):
     assert found.null.evidence < null.evidence
     monkeypatch.setattr(ship_file, "needed", lambda _: np.ones(NUM_BASE))
     monkeypatch.setattr(ship_file, "better_size", lambda of: ["beside its own noise"] if of is null else [])
-    (doubt,) = doubts_of(SimpleNamespace(selection=found, final=found.final, unknown=None))
+    (doubt,) = doubts_of(replace(made_analysis(found.final), selection=found))
     assert doubt.startswith("beside its own noise")
 
 
@@ -88,8 +88,7 @@ def test_sizes_are_compared_beside_noise_of_their_own(monkeypatch):
 )
 def test_of_a_change_what_has_changed_decides_whether_it_shows_whatever_the_ship(changed, shows):
     terms = (Term(EFFECTS.get("current")), Term(EFFECTS.get(changed), since=9))
-    found = SimpleNamespace(final=SimpleNamespace(model=SimpleNamespace(terms=terms)), gears=())
-    assert whatever_the_ship("change_point", found) is shows
+    assert whatever_the_ship("change_point", made_analysis(made_fit(terms))) is shows
 
 
 @pytest.mark.long
