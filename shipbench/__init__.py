@@ -1,5 +1,5 @@
-"""shipbench: a benchmark of ship-motion prediction. Names below are loaded when they are first used; importing costs
-nothing."""
+"""Benchmark of ship-motion prediction. The names below are loaded when they are first used, so that the import is
+quick."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`python -m shipbench` is the command line."""
+"""Command line as `python -m shipbench`."""
 
 from .cli.app import main
 

@@ -1,4 +1,4 @@
-"""shipbench from Python, in a notebook or a script: the commands as functions that take names, paths and objects
+"""Interface for Python, in a notebook or a script: the commands as functions that take names, paths and objects
 alike."""
 
 from __future__ import annotations
@@ -115,17 +115,17 @@ def benchmark(
 
 
 _SET_BY_ARGUMENTS = ("dataset", "models", "horizon_s", "folds", "seeds")
-"""Keys of a task that `benchmark` takes under names of its own."""
+"""Keys of a task for which `benchmark` has arguments of its own."""
 _COMMAND = "shipbench.benchmark(...) in Python"
 
 
 def _several(given: Any) -> list[Any]:
-    """A list of one where one is given."""
+    """List of one where one is given."""
     return list(given) if isinstance(given, list | tuple) else [given]
 
 
 def _named(models: Any) -> dict[str, Spec]:
-    """Specs by the label that stands in tables; of objects with one label the later ones are numbered."""
+    """Specs by their label in tables; of objects with one label the later ones are numbered."""
     if isinstance(models, Mapping):
         found = [(str(label), spec_of(model, str(label))) for label, model in models.items()]
         if strange := [label for label, spec in found if spec.given is None and label != spec.text]:
@@ -146,7 +146,7 @@ def _named(models: Any) -> dict[str, Spec]:
 
 
 class Verdict(Diagnosis):
-    """A diagnosis that shows its verdict in words; `verdict`, `causes`, `extended_model` and `gain` are the main
+    """Diagnosis that shows its verdict in words; `verdict`, `causes`, `extended_model` and `gain` are the main
     fields."""
 
     def __repr__(self) -> str:
@@ -193,7 +193,7 @@ class Findings(tuple[Finding, ...]):
     """Findings of a data check, errors first."""
 
     def table(self) -> pd.DataFrame:
-        """A row for each finding: severity, kind, channels, runs, text and what to do."""
+        """Table with a row for each finding: severity, kind, channels, runs, text and correction."""
         import pandas as pd
 
         columns = ["severity", "kind", "channels", "runs", "text", "todo"]
@@ -252,7 +252,7 @@ def import_log(
 
 @dataclass(frozen=True)
 class Proposal:
-    """A draft of mapping.toml and remarks on it: what is guessed, what is not sure, what is missing."""
+    """Draft of mapping.toml and remarks on its guessed, uncertain and missing entries."""
 
     text: str
     remarks: tuple[str, ...]

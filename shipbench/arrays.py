@@ -1,4 +1,4 @@
-"""Arrays from outside."""
+"""Arrays of user code."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .errors import InputError
 
 
 def numbers(given: Any, what: str) -> np.ndarray:
-    """An array of float64; values that are masked become not-a-number.
+    """Array of float64; masked values become NaN.
 
     Raises:
         InputError: they are no real numbers, or rows differ in length.

@@ -1,4 +1,4 @@
-"""Folder of made data sets, downloads and compiled code, and the check that it is the user's alone."""
+"""Folder of made data sets, downloads and compiled code, and the check that it belongs to the user alone."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pathlib import Path
 
 
 def cache_folder() -> Path:
-    """The environment variable SHIPBENCH_CACHE, else ~/.cache/shipbench."""
+    """Folder in the environment variable SHIPBENCH_CACHE, else ~/.cache/shipbench."""
     return Path(os.environ.get("SHIPBENCH_CACHE") or Path.home() / ".cache" / "shipbench")
 
 
 def make_private(*parts: str) -> Path:
-    """The folder `parts` of the cache, made with the mode 0700 like all folders of the cache above it; those that are
-    there keep theirs.
+    """Make the folder `parts` of the cache, with the mode 0700 like all folders of the cache above it; existing ones
+    keep theirs.
 
     Raises:
         OSError: it cannot be made.
@@ -28,10 +28,9 @@ def make_private(*parts: str) -> Path:
 
 
 def stranger(path: Path) -> str | None:
-    """Why a file or folder of the cache is not the user's alone, or None where it is.
+    """Reason why others could change a file or folder of the cache, or None where only the user can.
 
-    All folders up to the cache's are looked at: who can write in one of them can put another file in the place of this
-    one.
+    All folders up to the cache's are checked: a user who can write in one of them can replace this one.
     """
     if not hasattr(os, "geteuid"):  # Windows: the profile's folder is the user's
         return None

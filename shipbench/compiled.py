@@ -99,7 +99,7 @@ _C = {
 
 
 class Rollout:
-    """Repeats a step over many runs.
+    """Repetition of a step over many runs.
 
     Args:
         step: x' = step(x (nx,), w (nw,), p) in SX; p is shared by all runs.
@@ -155,7 +155,7 @@ class Rollout:
 
 
 class Lanes:
-    """A function of bundles of numbers, evaluated over lanes (D, K, B) in S parts each: what numpy's broadcasting does,
+    """Function of bundles of numbers, evaluated over lanes (D, K, B) in S parts each, with numpy's broadcasting but
     without its loops.
 
     Where it has as many results as the first bundle has numbers it is a step: the parts follow each other, and so do
@@ -172,8 +172,8 @@ class Lanes:
 
     @classmethod
     def of(cls, function: casadi.Function) -> Lanes | None:
-        """Of a function in SX, one vector per bundle, to one vector. None where there is no compiler, or it holds an
-        operation that is not known: use the formula itself."""
+        """Lanes of a function in SX, one vector per bundle, to one vector. None where there is no compiler, or it holds
+        an operation that is not known: use the formula itself."""
         compiled = machine_code(c_source(function), "lanes", _LANES_ARGUMENTS)
         return (
             None
@@ -217,7 +217,7 @@ def c_source(function: casadi.Function) -> str | None:
 
 
 def _instructions(function: casadi.Function, places: Sequence[str]) -> str | None:
-    """The function's instructions in C, its inputs taken from `places`."""
+    """Instructions of the function in C, its inputs taken from `places`."""
     import casadi
 
     names = {number: name[3:] for name, number in vars(casadi).items() if name.startswith("OP_")}
@@ -242,6 +242,6 @@ def _instructions(function: casadi.Function, places: Sequence[str]) -> str | Non
 
 
 def c_function(code: str, name: str, arguments: Sequence[Any]) -> Callable[..., Any] | None:
-    """A C function of other code that treats vectors `v` of W numbers, with what the code above has; None where there
-    is no compiler."""
+    """Compiled C function for other modules that handles vectors `v` of W numbers, with the preamble of this module;
+    None where there is no compiler."""
     return machine_code(_HEAD + code, name, arguments)

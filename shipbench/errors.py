@@ -18,11 +18,11 @@ class ShipbenchError(Exception):
 
 
 class InputError(ShipbenchError):
-    """Bad input from the user (the command line ends with exit code 2)."""
+    """Error for bad input from the user (the command line ends with exit code 2)."""
 
 
 class WorkError(ShipbenchError):
-    """The work itself failed on valid input (exit code 1, or a `failed` row in a study)."""
+    """Error of the work itself on valid input (exit code 1, or a `failed` row in a study)."""
 
 
 @contextmanager
@@ -36,7 +36,7 @@ def command_line() -> Iterator[None]:
 
 
 def option(command: str, python: str) -> str:
-    """Spelling of an option for whoever called: `command` such as "--out" on the command line, else `python` such as
+    """Spelling of an option for the caller: `command` such as "--out" on the command line, else `python` such as
     "out="."""
     return command if _on_command_line.get() else python
 

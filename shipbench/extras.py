@@ -1,4 +1,4 @@
-"""Optional packages: the extra of shipbench that brings each, and the one message where it is not installed."""
+"""Optional packages: the extra of shipbench that installs each, and the one message where it is not installed."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ has the versions)."""
 
 
 def not_installed(packages: Iterable[str]) -> str:
-    """The first of `packages` (import names) that is missing, and the command that installs it; "" where all are here.
-    Imports none of them."""
+    """First of `packages` (import names) that is missing, and the command that installs it; "" where all are here. It
+    imports none of them."""
     return next((_lack(package) for package in packages if find_spec(package) is None), "")
 
 

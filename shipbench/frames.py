@@ -1,4 +1,4 @@
-"""The long table of a data set: one row per sample, with the columns trajectory, t, the states, the commands and the
+"""Long table of a data set: one row per sample, with the columns trajectory, t, the states, the commands and the
 environment channels."""
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Columns = dict[str, np.ndarray]
 
 
 def long_table(runs: Iterable[Any]) -> pd.DataFrame:
-    """The samples of runs of the same inputs, one below the other."""
+    """Samples of runs of the same inputs, one below the other."""
     frames = []
     for run in runs:
         frame = pd.DataFrame(
@@ -73,7 +73,7 @@ def check_columns(table: pd.DataFrame, where: object, first_row: int = 2) -> Non
 
 
 def complete_columns(table: pd.DataFrame, notes: list[str]) -> tuple[str, ...]:
-    """Add what may be missing (with a note), and return the names of the inputs."""
+    """Add missing optional columns (with a note), and return the names of the inputs."""
     for actuator, command in zip(ACTUATOR_STATES, COMMANDS, strict=True):
         if actuator not in table and command not in table:
             table[actuator] = table[command] = 0.0
@@ -105,7 +105,8 @@ def samples(rows: Columns, names: Sequence[str]) -> np.ndarray:
 
 
 def samples_of(frame: Any) -> tuple[dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]], tuple[str, ...], list[str]]:
-    """By run the t, states and inputs of a long table; the names of the inputs; notes on columns that were filled in.
+    """Samples t, states and inputs of a long table by run; the names of the inputs; notes on columns that were filled
+    in.
 
     Raises:
         InputError: no DataFrame, a column is missing or given twice, or as `check_columns`.

@@ -13,7 +13,7 @@ State = tuple[Array, ...]
 
 
 def rk4_step(rhs: Callable[[State, int], State], state: State, dt: Array) -> State:
-    """One classical Runge-Kutta step of order 4.
+    """Step of the classical Runge-Kutta method of order 4.
 
     `rhs(state, stage)` returns the derivatives; `stage` is 0 at the beginning, 1 at the middle and 2 at the end of the
     step, for inputs that are known at those times.

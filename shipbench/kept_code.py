@@ -1,4 +1,4 @@
-"""C code compiled once and kept in the cache folder, under the digests of what it was made of and of its own bytes."""
+"""C code compiled once and kept in the cache folder, under the digests of its source and of its own bytes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .storage import put
 
 _log = logging.getLogger(__name__)
 _SECONDS = 30
-"""After these a compiler counts as hanging; the largest code of shipbench takes it 3 s."""
+"""Time limit of a compiler [s]; the largest code of shipbench takes about 3 s."""
 _FLAGS = (
     "-std=gnu11", "-O1", "-ftree-vectorize", "-march=native", "-mprefer-vector-width=512", "-fopenmp-simd",
     "-fno-math-errno", "-fno-trapping-math",  # neither is ever read; without them no square root would be a vector's
@@ -34,7 +34,7 @@ _FAILED = (OSError, subprocess.SubprocessError)
 
 
 def machine_code(source: str | None, function: str, arguments: Sequence[Any]) -> Callable[..., Any] | None:
-    """The C function of `source`, compiled or taken from the cache folder; None where that cannot be done."""
+    """Compiled C function of `source`, new or from the cache folder; None where that cannot be done."""
     command, machine = compiler()
     if source is None or not command:
         return None
@@ -61,7 +61,7 @@ def machine_code(source: str | None, function: str, arguments: Sequence[Any]) ->
 
 @cache
 def compiler() -> tuple[tuple[str, ...], str]:
-    """The C compiler's command (empty: there is none) and what tells its version and this processor apart.
+    """Command of the C compiler (empty: there is none) and a text that identifies its version and this processor.
 
     SHIPBENCH_COMPILER names another than `cc`; "none" switches compiling off.
     """
@@ -81,7 +81,7 @@ def compiler() -> tuple[tuple[str, ...], str]:
 
 
 def _give_up(command: tuple[str, ...]) -> None:
-    """Say that the compiler hangs, and ask it no more: neither this process nor those that it starts."""
+    """Report that the compiler hangs, and do not use it again: neither in this process nor in those that it starts."""
     _log.warning(
         "the C compiler '%s' did not end within %d s and was stopped; CasADi interprets instead: slower, the same "
         "numbers. "
@@ -117,7 +117,7 @@ def _run(command: Sequence[str], folder: Path | None) -> str:
 
 
 def _folder() -> Path | None:
-    """The folder of the code, made if there is none; None where others could write in it (said once), so that nothing
+    """Folder of the code, made if there is none; None where others could write in it (reported once), so that nothing
     of it may be loaded."""
     folder = cache_folder() / "compiled"
     with contextlib.suppress(OSError):
@@ -139,7 +139,7 @@ def _warn_once(reason: str) -> None:
 
 
 def _kept(folder: Path, key: str) -> Path | None:
-    """The kept library, if it is whole and the user's alone; what else stands in its place is removed."""
+    """Kept library, if it is whole and the user's alone; any other file in its place is removed."""
     for path in folder.glob(f"{key}-*.so"):
         if stranger(path) is None and path.is_file() and path.stem == f"{key}-{_digest(path)}":
             return path
@@ -152,8 +152,8 @@ def _digest(path: Path) -> str:
 
 
 def _compile(command: tuple[str, ...], source: str, folder: Path, key: str) -> Path:
-    """Write the shared library into `folder` in one step: processes that compile the same at the same time do not
-    meet."""
+    """Write the shared library into `folder` atomically: processes that compile the same at the same time do not
+    conflict."""
     _sweep(folder)
     with tempfile.TemporaryDirectory(prefix=".", dir=folder) as work, _locked(Path(work)):
         written, made = Path(work) / "rollout.c", Path(work) / "rollout.so"
@@ -168,7 +168,7 @@ def _compile(command: tuple[str, ...], source: str, folder: Path, key: str) -> P
 
 
 def _sweep(folder: Path) -> None:
-    """Remove what killed compilations left; those at work hold a lock."""
+    """Remove leftovers of killed compilations; running ones hold a lock."""
     for left in folder.glob(".*"):
         with contextlib.suppress(OSError), _locked(left):
             shutil.rmtree(left)
@@ -176,7 +176,7 @@ def _sweep(folder: Path) -> None:
 
 @contextlib.contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder, which the system takes from a killed process; OSError where another holds it."""
+    """Hold the lock of a folder, which the system releases when a process is killed; OSError where another holds it."""
     try:
         import fcntl
     except ImportError:  # Windows

@@ -1,5 +1,5 @@
-"""MATLAB files of versions 5 to 7, looked through before scipy reads them: it trusts sizes and nesting, and ends the
-process on deep ones."""
+"""Check of MATLAB files of versions 5 to 7 before scipy reads them: it trusts sizes and nesting, and crashes on deep
+ones."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import zlib
 from typing import IO
 
 MOST_MATLAB = 1_100_000_000
-"""Bytes of a file unpacked; it is read whole."""
+"""Most bytes of a file unpacked; it is read whole."""
 _MOST_PARTS = 5_000_000
-"""Arrays in cells and structs; each takes some 200 bytes of memory, however small it is."""
+"""Most arrays in cells and structs; each takes some 200 bytes of memory, however small it is."""
 _DEEPEST = 32
 _MATRIX, _COMPRESSED = 14, 15
 _KNOWN = frozenset((1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 14, 15, 16, 17, 18))
@@ -19,9 +19,9 @@ _CELL, _STRUCT, _OBJECT = 1, 2, 3
 
 
 def check_matlab(file: IO[bytes]) -> None:
-    """Go through all elements of an open file, and leave it at its beginning.
+    """Check all elements of an open file, and leave it at its beginning.
 
-    What is no file of these versions is left to its reader.
+    A file of another version is left to its reader.
 
     Raises:
         ValueError: it holds too much, is nested too deeply, or declares more elements than it holds.
@@ -54,7 +54,7 @@ def _unpacked(file: IO[bytes], size: int, most: int) -> bytes:
 
 
 def _check_parts(data: memoryview, order: str) -> int:
-    """Number of arrays in the element `data`. A loop, not a recursion: they may be nested without end."""
+    """Count the arrays in the element `data`. A loop, not a recursion: nesting has no limit."""
     found, todo = 0, [(0, len(data), 0)]
     while todo:
         at, end, depth = todo.pop()

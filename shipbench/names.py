@@ -1,6 +1,6 @@
-"""Names from outside: which ones are accepted, how they become file names, and how any text is shown on a terminal.
+"""Names given by users: accepted ones, their file names, and safe display of any text on a terminal.
 
-A name is text and never a path: whatever is written under a name goes through `file_name`.
+A name is text and never a path: every file that is named after one goes through `file_name`.
 """
 
 from __future__ import annotations
@@ -12,29 +12,28 @@ import unicodedata
 from .errors import InputError
 
 LONGEST = 80
-"""Characters of a name."""
+"""Most characters of a name."""
 LONGEST_LABEL = 1000
-"""Characters of a model's label, which may hold the path of a file and many parameters."""
+"""Most characters of a model's label, which may hold the path of a file and many parameters."""
 LONGEST_REPR = 1000
-"""Characters that an object shows of itself in a notebook."""
+"""Most characters of an object's display in a notebook."""
 _FILE_BYTES = 200
-"""Bytes of a file name; file systems take 255, and a temporary file's name is longer than that of the file that it
-becomes."""
+"""Most bytes of a file name; file systems take 255, and a temporary file's name is longer than that of the final
+file."""
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 """Unicode categories without a glyph: control characters, direction marks and zero widths, lone surrogates, line and
 paragraph separators."""
 _WINDOWS = re.compile(r"@[-+.\de]+s")
-"""What `Dataset.windows` adds to the name of a run."""
+"""Suffix that `Dataset.windows` adds to the name of a run."""
 
 
 def unseen(text: str) -> bool:
-    """Whether a text holds a character that nobody sees: a terminal, a page or a spreadsheet may take it for a
-    command."""
+    """Whether a text holds an invisible character: a terminal, a page or a spreadsheet may take it for a command."""
     return not text.isprintable() and any(unicodedata.category(c) in _UNSEEN for c in text)
 
 
 def shown(text: object, keep: str = "") -> str:
-    """Text in which every unseen character stands as its escape (``\\x1b``, ``\\u202e``), but for those in `keep`."""
+    r"""Text with every invisible character as its escape (``\x1b``, ``\u202e``), except those in `keep`."""
     text = str(text)
     if not unseen(text):
         return text
@@ -47,13 +46,14 @@ def shown(text: object, keep: str = "") -> str:
 
 
 def brief(text: str, longest: int = LONGEST_REPR) -> str:
-    """Text of at most `longest` characters without unseen ones, for a `repr`; what is cut off is marked."""
+    """Text of at most `longest` characters without invisible ones, for a `repr`; a cut is marked."""
     text = shown(text, keep="\n")
     return text if len(text) <= longest else f"{text[: longest - 4]} ..."
 
 
 def check_label(text: object, key: str, longest: int = LONGEST) -> str:
-    """`text`, if it can stand in a table: text without unseen characters, of at most `longest` characters.
+    """Check that `text` can stand in a table, and return it: text without invisible characters, of at most `longest`
+    characters.
 
     Labels are the names of runs, groups, kinds of manoeuvre and models; "zigzag 20/20" is one. `key` names the entry in
     the message.
@@ -75,7 +75,8 @@ def check_label(text: object, key: str, longest: int = LONGEST) -> str:
 
 
 def check_run(text: object, key: str) -> str:
-    """`text`, if it can be the name of a run (see `check_label`); what windows add to it is not counted.
+    """Check that `text` can be the name of a run (see `check_label`), and return it; the suffix of windows is not
+    counted.
 
     Raises:
         InputError: it cannot.
@@ -85,8 +86,8 @@ def check_run(text: object, key: str) -> str:
 
 
 def check_name(text: object, key: str) -> str:
-    """`text`, if it can be the name of a data set: a label (see `check_label`) that is not empty and has nothing of a
-    path.
+    """Check that `text` can be the name of a data set, and return it: a label (see `check_label`) that is not empty and
+    has no part of a path.
 
     Raises:
         InputError: it cannot.
@@ -101,7 +102,7 @@ def check_name(text: object, key: str) -> str:
 
 
 def file_name(text: str) -> str:
-    """The file name of a label; a changed text keeps a digest, so that two labels never share a file."""
+    """File name of a label; a changed text gets a digest, so that two labels never share a file."""
     safe = re.sub(r"[^\w.+=,\[\]-]+", "-", text)[:LONGEST]
     safe = safe.encode()[:_FILE_BYTES].decode(errors="ignore")
     if safe in ("", ".", ".."):

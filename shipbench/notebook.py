@@ -1,4 +1,4 @@
-"""Texts and small HTML that runs and data sets show of themselves in a notebook."""
+"""Texts and small HTML that display runs and data sets in a notebook."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _TRACKS, _POINTS = 60, 80
 
 
 def run_text(run: Any) -> str:
-    """A run in one line."""
+    """Line on a run."""
     kind = f", {run.kind}" if run.kind else ""
     return (
         f"<Run '{run.id}': {len(run)} samples, t = {run.t[0]:g} to {run.t[-1]:g} s{kind}; inputs "
@@ -33,12 +33,12 @@ class Runs(tuple[Any, ...]):
 
 
 def dataset_text(data: Any) -> str:
-    """A data set in one line for each fact."""
+    """Text on a data set, one line for each fact."""
     return "\n".join([_title(data), *(f"  {key}: {text}" for key, text in _facts(data).items())])
 
 
 def dataset_html(data: Any) -> str:
-    """A table of the same facts beside the tracks."""
+    """HTML table of the same facts beside the tracks."""
     return facts_html(_title(data), _facts(data), tracks_svg((run.id, run.states[:, [X, Y]]) for run in data.runs))
 
 
@@ -47,7 +47,7 @@ def _title(data: Any) -> str:
 
 
 def _facts(data: Any) -> dict[str, str]:
-    """What a reader wants to know first, in words."""
+    """Main facts for a reader, in words."""
     seconds = [(len(run) - 1) * data.dt for run in data.runs]
     least, most = f"{min(seconds):g}", f"{max(seconds):g}"
     each = f"{least} s each" if least == most else f"{least} to {most} s each"
@@ -70,7 +70,7 @@ def _listed(names: Sequence[str], most: int = 4) -> str:
 
 
 def facts_html(title: str, facts: Mapping[str, str], beside: str = "") -> str:
-    """A table of facts under a title, with a picture at its side."""
+    """HTML table of facts under a title, with a picture at its side."""
     rows = "".join(
         f'<tr><th style="text-align:left">{escape(shown(key))}</th><td '
         f'style="text-align:left">{escape(shown(value))}</td></tr>'
@@ -83,8 +83,8 @@ def facts_html(title: str, facts: Mapping[str, str], beside: str = "") -> str:
 
 
 def tracks_svg(tracks: Iterable[tuple[str, np.ndarray]]) -> str:
-    """Tracks, each a name and positions (samples, 2) [m] north and east, at one scale with north up; the name shows
-    under the mouse.
+    """Picture of tracks, each a name and positions (samples, 2) [m] north and east, at one scale with north up; the
+    name shows under the mouse.
 
     Of many tracks some are drawn, evenly spread.
     """
@@ -123,6 +123,6 @@ def _path(name: str, positions: np.ndarray, west: float, top: float, scale: floa
 
 
 def _round_length(metres: float) -> float:
-    """The greatest of 1, 2, 5, 10, ... that is not longer."""
+    """Greatest of 1, 2, 5, 10, ... that is not longer."""
     power = 10.0 ** np.floor(np.log10(metres))
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= metres * (1 + 1e-9)))

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 Array = Any
-"""A float, numpy array, torch tensor or casadi SX/MX; all operands of one formula come from one back end (or are
-floats)."""
+"""Type of a float, numpy array, torch tensor or casadi SX/MX; all operands of one formula come from one back end (or
+are floats)."""
 
 
 _NUMPY = frozenset({np.ndarray, np.float64, float, int})
-"""Types that need no closer look: the loops of a simulation come here a million times."""
+"""Types for which the numpy function is called at once: the loops of a simulation call it a million times."""
 
 
 def _backend(*args: Array) -> str:
@@ -89,7 +89,7 @@ maximum = _binary("maximum", "maximum", "fmax")
 
 
 def where(condition: Array, yes: Array, no: Array) -> Array:
-    """`yes` where `condition` holds, else `no`. Both sides are evaluated: keep both finite.
+    """Select `yes` where `condition` holds, else `no`. Both sides are evaluated: keep both finite.
 
     With a torch condition at least one side must be a tensor: two plain numbers have no dtype, and torch would round
     them to float32.
@@ -107,11 +107,11 @@ def where(condition: Array, yes: Array, no: Array) -> Array:
 
 
 def clip(x: Array, low: Array, high: Array) -> Array:
-    """`x` limited to [low, high]."""
+    """Limit `x` to [low, high]."""
     return minimum(maximum(x, low), high)
 
 
 def smoothstep(x: Array, low: float, high: float) -> Array:
-    """0 below `low`, 1 above `high`, 3 s^2 - 2 s^3 between (continuous slope)."""
+    """Smooth step: 0 below `low`, 1 above `high`, 3 s^2 - 2 s^3 between (continuous slope)."""
     s = clip((x - low) / (high - low), 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)

@@ -1,4 +1,4 @@
-"""A pool of processes that leaves the user's script alone: it needs no `if __name__ == "__main__":`."""
+"""Pool of processes for scripts without `if __name__ == "__main__":`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from typing import Any, ClassVar
 
 
 class _Process(SpawnProcess):
-    """A process that does not run the main script again: nothing of it is needed, and it would start the same work once
-    more."""
+    """Process that does not run the main script again: that would start the same work once more."""
 
     def start(self) -> None:
         main = sys.modules["__main__"]
@@ -27,5 +26,6 @@ class _Context(SpawnContext):
 
 
 def process_pool(workers: int) -> ProcessPoolExecutor:
-    """A pool of `workers` new processes; what is sent to it must be importable, and not from the main script."""
+    """Pool of `workers` new processes; functions and data sent to it must be importable, and not from the main
+    script."""
     return ProcessPoolExecutor(workers, mp_context=_Context())

@@ -1,4 +1,4 @@
-"""Runs and data sets in memory: SI units, our signs, checked once on construction."""
+"""Runs and data sets in memory: SI units, standard signs, checked once on construction."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LARGEST = 1e12
-"""Of any signal in our unit: beyond every sensor, and squares of it are still numbers."""
+"""Largest value of any signal in its standard unit: beyond every sensor, and its square is still finite."""
 _SHOWN_NAMES = 20
 """Most names of runs in a message."""
 _UNEVEN = 2e-3
-"""Of a sample time: the farthest that two steps of one run lie apart."""
+"""Largest difference of two steps of one run, relative to the sample time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +119,8 @@ class Run:
 
     @property
     def group(self) -> str:
-        """Runs of one group (pieces of one log, copies of one manoeuvre, windows of one run) must not be split; a run
-        without one is its own."""
+        """Name of the group whose runs (pieces of one log, copies of one manoeuvre, windows of one run) must not be
+        split; a run without one is its own."""
         return str(self.parent if self.meta.group is None else self.meta.group)
 
     @property
@@ -150,15 +150,15 @@ class Run:
         )  # fmt: skip
 
     def windows(self, samples: int, stride: int) -> list[Run]:
-        """Every window of that many samples, `stride` apart; a single one keeps the run's name."""
+        """Windows of that many samples, `stride` apart; a single one keeps the run's name."""
         starts = range(0, len(self) - samples + 1, stride)
         return [self.slice(s, s + samples, f"@{self.t[s]:g}s" if len(starts) > 1 else "") for s in starts]
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Runs of equal length, stacked for a rollout: what a predictor gets (s0, U, history) and the truth that it must
-    not see.
+    """Runs of equal length, stacked for a rollout: the input of a predictor (s0, U, history) and the truth, which it
+    must not use.
 
     Shapes: s0 (batch, 10), U (batch, K, inputs), truth (batch, K, 10), history ((batch, H, 10), (batch, H, inputs)) or
     None.
@@ -243,7 +243,7 @@ class Dataset:
         actuators: str = "measured",
         meta: Mapping[str, RunMeta | Mapping[str, Any]] | None = None, **about: Any,
     ) -> Dataset:  # fmt: skip
-        """The data set of a long table, one row per sample, in SI units and our signs.
+        """Data set of a long table, one row per sample, in SI units and standard signs.
 
         Args:
             frame: columns trajectory, t [s], the ten states, the four commands, then wind_speed, wind_from, depth where
@@ -251,7 +251,7 @@ class Dataset:
             ship: the vessel's particulars, or the path of a ship.toml.
             dt: sample time [s]; None: that of t.
             name, actuators: as of a data set.
-            meta: what is known of each run, by its id: a RunMeta, or a dict with the keys of dataset.toml.
+            meta: metadata of each run, by its id: a RunMeta, or a dict with the keys of dataset.toml.
             about: source, licence, simulation, notes or derived of the data set.
 
         Raises:
@@ -273,8 +273,8 @@ class Dataset:
         return cls(name, ship if isinstance(ship, Ship) else Ship.load(ship), step, runs, actuators, **about)
 
     def to_frame(self) -> pd.DataFrame:
-        """The long table, one row per sample: trajectory, t, the states, the inputs. `from_frame` gives back the same
-        samples, bit for bit."""
+        """Long table, one row per sample: trajectory, t, the states, the inputs. `from_frame` reads the same samples
+        back, bit for bit."""
         from .frames import long_table
 
         return long_table(self.runs)
@@ -335,11 +335,11 @@ class Dataset:
         return replace(self, runs=tuple(runs))
 
     def subset(self, indices: Sequence[int]) -> Dataset:
-        """The runs at `indices`."""
+        """Data set of the runs at `indices`."""
         return self.with_runs(self.runs[i] for i in indices)
 
     def merged(self, other: Dataset | None) -> Dataset:
-        """The runs of both (used by predictors that need no validation set)."""
+        """Data set with the runs of both (used by predictors that need no validation set)."""
         return self if other is None else self.with_runs((*self.runs, *other.runs))
 
     def windows(self, steps: int, stride: int | None = None, history: int = 0) -> Dataset:

@@ -1,8 +1,8 @@
 """Parts found by file name: `predictors/lstm.py` is the predictor "lstm"; listing imports none of them.
 
 Outside packages add parts through the entry-point group of the registry (for example `shipbench.predictors`). A plug-in
-that cannot be used is told of in one line of the log and left out; asked for by its name, it raises an `InputError`
-with the reason. A name that two parts claim is given to neither: shipbench cannot know which one is meant.
+that cannot be used is reported in one line of the log and left out; asked for by its name, it raises an `InputError`
+with the reason. A name that two parts claim is given to neither, since it is ambiguous.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ _OFFERS = {
     "datasets": ("make", "summary", "licence", "cached"),
     "metrics": ("function", "columns", "per_run"),
 }
-"""What the object behind an entry point of each group must have; without it other commands would stumble over it
+"""Attributes that the object behind an entry point of each group must have; without them other commands would fail
 later."""
 
 _problems: dict[tuple[str, str, str], str] = {}
-"""Why a plug-in (group, name, value) could not be used: a failed import is not tried again."""
+"""Reasons why a plug-in (group, name, value) could not be used: a failed import is not tried again."""
 _told: set[str] = set()
 
 
 @cache
 def scanned(group: str) -> tuple[EntryPoint, ...]:
-    """The entry points of a group. Going through all installed packages takes about 0.1 s, so it is done once:
+    """Entry points of a group. Reading all installed packages takes about 0.1 s, so it is done once:
     `scanned.cache_clear()` where packages were installed meanwhile."""
     return tuple(entry_points(group=group))
 
@@ -61,7 +61,7 @@ def package_digest(name: str) -> str:
 
 
 def _tell(problem: str) -> None:
-    """One line, once in a process."""
+    """Log one line, once in a process."""
     if problem not in _told:
         _told.add(problem)
         _log.warning("warning: %s", problem)
@@ -73,13 +73,13 @@ def _origin(point: EntryPoint) -> str:
 
 
 def reason(error: BaseException) -> str:
-    """An exception in one line."""
+    """Text of an exception in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:300]
 
 
 @dataclass(frozen=True)
 class Registry:
-    """The parts of one kind.
+    """Parts of one kind.
 
     Args:
         kind: word used in messages ("predictor").
@@ -88,7 +88,7 @@ class Registry:
         helpers: modules of the folder that are not parts.
         group: entry-point group `shipbench.<group>` for outside packages; the folder's name unless given.
         lazy: a plug-in is imported only when it is asked for by name. Else listing imports the plug-ins (never
-            shipbench's own parts), so that commands which go through all parts meet only those that work.
+            shipbench's own parts), so that commands over all parts have only those that work.
     """
 
     kind: str
@@ -99,7 +99,7 @@ class Registry:
     lazy: bool = False
 
     def __repr__(self) -> str:
-        """The names, of plug-ins too; nothing is imported for it."""
+        """Names, of plug-ins too; nothing is imported for it."""
         return brief(f"<Registry of {self.kind}s: {', '.join(sorted({*self._files(), *self.plugins()}))}>")
 
     def _files(self) -> dict[str, str]:
@@ -115,11 +115,11 @@ class Registry:
         return {name: list(points.values()) for name, points in found.items()}
 
     def built_in(self) -> list[str]:
-        """The names of shipbench's own parts, sorted."""
+        """Names of shipbench's own parts, sorted."""
         return sorted(self._files())
 
     def names(self) -> list[str]:
-        """All usable names, sorted; shipbench's own parts are not imported for it."""
+        """Names of all usable parts, sorted; shipbench's own parts are not imported for it."""
         files, usable = self._files(), []
         for name, points in self.plugins().items():
             problem = self._clash(name, points) or ("" if self.lazy else self._load(points[0])[1])
@@ -156,7 +156,7 @@ class Registry:
         return part
 
     def package(self, name: str) -> str:
-        """The importable package (or module) that adds `name`; "" for a part of shipbench's own.
+        """Importable package (or module) that adds `name`; "" for a part of shipbench's own.
 
         Raises:
             InputError: the plug-in cannot be used.
@@ -171,8 +171,8 @@ class Registry:
         )  # folders of several packages have no origin
 
     def digest(self, name: str) -> str:
-        """What tells one version of a plug-in from another: its package's Python files, and the list of all installed
-        files with their hashes.
+        """Digest of a plug-in's version: its package's Python files, and the list of all installed files with their
+        hashes.
 
         "" for a part of shipbench's own, whose version is that of shipbench.
 
@@ -187,7 +187,7 @@ class Registry:
         return hashlib.sha256((package_digest(package) + listed).encode()).hexdigest()[:12]
 
     def _clash(self, name: str, points: list[EntryPoint]) -> str:
-        """What is wrong with a name that two parts claim, or ""."""
+        """Message on a name that two parts claim, or ""."""
         claims = [
             *(["shipbench itself"] if name in self._files() else []),
             *(f"the plug-in {_origin(p)}" for p in points),
@@ -200,7 +200,7 @@ class Registry:
         )
 
     def _load(self, point: EntryPoint) -> tuple[Any, str]:
-        """The part behind an entry point, or None and why it cannot be used."""
+        """Part behind an entry point, or None and the reason why it cannot be used."""
         key = (point.group, point.name, point.value)
         if key in _problems:
             return None, _problems[key]

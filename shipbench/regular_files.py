@@ -1,9 +1,9 @@
-"""Files of strangers, opened safely: regular files only, and their size known before memory is taken.
+"""Safe opening of files from unknown sources: regular files only, with their size known before memory is allocated.
 
-A named pipe would wait for ever, a device such as /dev/zero never ends, and opening a device may set it in motion.
-Every reader of shipbench opens its files here: `open_regular` for readers that take an open file, `check_regular` for
-those that insist on a path, `read_text`, `read_json` and `read_npz` for files that are read whole. `check_output` keeps
-what is written from what is read.
+A named pipe would wait for ever, a device such as /dev/zero never ends, and opening a device may start it. Every reader
+of shipbench opens its files here: `open_regular` for readers that take an open file, `check_regular` for those that
+insist on a path, `read_text`, `read_json` and `read_npz` for files that are read whole. `check_output` keeps output
+files apart from input files.
 """
 
 from __future__ import annotations
@@ -26,15 +26,16 @@ if TYPE_CHECKING:
     import numpy as np
 
 MOST_TEXT = 64_000_000
-"""Bytes of a text that is read whole (JSON, Python); those that shipbench writes for 10,000 runs have some 5 MB."""
+"""Most bytes of a text that is read whole (JSON, Python); those that shipbench writes for 10,000 runs have some
+5 MB."""
 MOST_ARRAYS = 1_000_000_000
-"""Bytes of arrays that are read whole."""
+"""Most bytes of arrays that are read whole."""
 _DAMAGED = (
     OSError, ValueError, KeyError, TypeError, EOFError, SyntaxError, MemoryError, RecursionError, RuntimeError,
     NotImplementedError,
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, tokenize.TokenError,
 )  # fmt: skip
-"""What zipfile and numpy raise on a damaged .npz file."""
+"""Exceptions of zipfile and numpy on a damaged .npz file."""
 _KINDS: dict[str, Callable[[int], bool]] = {
     "a folder": stat.S_ISDIR, "a named pipe": stat.S_ISFIFO, "a socket": stat.S_ISSOCK,
     "a device": lambda mode: stat.S_ISCHR(mode) or stat.S_ISBLK(mode),
@@ -55,7 +56,7 @@ def check_regular(path: str | Path, what: str = "file") -> int:
 
 
 def open_regular(path: str | Path, what: str = "file") -> IO[bytes]:
-    """Open a regular file for reading. Looked at before and after opening: what is put in its place in between is
+    """Open a regular file for reading. It is checked before and after opening, so that a file replaced in between is
     refused, too.
 
     Raises:
@@ -78,7 +79,7 @@ def open_regular(path: str | Path, what: str = "file") -> IO[bytes]:
 
 
 def read_bytes(path: str | Path, what: str = "file", most: int = MOST_TEXT) -> bytes:
-    """The whole of a regular file.
+    """Read a whole regular file.
 
     Raises:
         InputError: as `open_regular`, or the file is larger than `most` bytes.
@@ -97,7 +98,7 @@ def read_bytes(path: str | Path, what: str = "file", most: int = MOST_TEXT) -> b
 
 
 def read_text(path: str | Path, what: str = "text file", most: int = MOST_TEXT) -> str:
-    """The whole of a UTF-8 text.
+    """Read a whole UTF-8 text.
 
     Raises:
         InputError: as `read_bytes`, or it is not UTF-8.
@@ -112,7 +113,7 @@ def read_text(path: str | Path, what: str = "text file", most: int = MOST_TEXT) 
 
 
 def read_json(path: str | Path, what: str = "JSON file", most: int = MOST_TEXT) -> Any:
-    """The document of a JSON file.
+    """Read the document of a JSON file.
 
     Raises:
         InputError: as `read_text`, or it is not JSON, or is nested too deeply.
@@ -126,8 +127,8 @@ def read_json(path: str | Path, what: str = "JSON file", most: int = MOST_TEXT) 
 
 
 def read_npz(path: str | Path, what: str = "file of arrays (.npz)", most: int = MOST_ARRAYS) -> dict[str, np.ndarray]:
-    """The arrays of a .npz file. Nothing is unpickled, and no array is made before its declared size is known to be in
-    the file.
+    """Read the arrays of a .npz file. Nothing is unpickled, and no array is made before its declared size is known to
+    be in the file.
 
     Raises:
         InputError: as `open_regular`, the file is damaged or holds other things than arrays of numbers or text, or more
@@ -170,13 +171,13 @@ def _check_array(packed: zipfile.ZipFile, part: zipfile.ZipInfo) -> None:
 
 
 def check_output(path: Path, inputs: Iterable[str | Path] = (), option: str = "--out") -> None:
-    """Refuse to write a file over what the same command reads, or in the place of a device, a named pipe or a folder.
+    """Refuse to write a file over an input of the same command, or in the place of a device, a named pipe or a folder.
 
-    `inputs` are files, and folders whose files are not replaced; a link counts as what it leads to. A path where
-    nothing is yet is accepted.
+    `inputs` are files, and folders whose files are not replaced; a link counts as its target. A path where nothing is
+    yet is accepted.
 
     Raises:
-        InputError: as said.
+        InputError: the path is one of these.
     """
     if not path.exists():
         return
@@ -215,7 +216,7 @@ def _size(found: os.stat_result, path: str | Path, what: str) -> int:
 
 
 def _unreadable(path: str | Path, what: str, error: OSError | ValueError) -> InputError:
-    """The message of what the system says; a ValueError comes of a path that no file can have (with a zero byte, or no
+    """Error with the system's reason; a ValueError comes of a path that no file can have (with a zero byte, or no
     text)."""
     if isinstance(error, OSError):
         dangling = isinstance(error, FileNotFoundError) and os.path.islink(path)

@@ -1,4 +1,4 @@
-"""What is known of a run beside its samples: the table [runs.<id>] of dataset.toml, checked."""
+"""Metadata of a run: the table [runs.<id>] of dataset.toml, checked."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .names import check_label, check_run, shown
 SPLITS = ("train", "test")
 """Sides of a published split."""
 _FILES = 1_000_000
-"""Characters of `file`, which names thousands of logs where a run comes from so many."""
+"""Most characters of `file`, which names thousands of logs where a run comes from so many."""
 
 
 class Origin(NamedTuple):
-    """Latitude and longitude [deg] of the point that x = y = 0 stands for."""
+    """Latitude and longitude [deg] of the point x = y = 0."""
 
     lat: float
     lon: float
@@ -27,7 +27,7 @@ class Origin(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class RunMeta:
-    """What is known of a run; None is what nobody stated.
+    """Metadata of a run; None where not stated.
 
     Args:
         manoeuvre: kind of manoeuvre, such as "zigzag 20/20".
@@ -38,10 +38,10 @@ class RunMeta:
             The key of `from_` in files is `from`.
         file: log from which the run was imported, or several with commas between them.
         origin: latitude and longitude [deg] of x = y = 0.
-        other: whatever else is stated of the run, by its key.
+        other: further entries of the run, by key.
 
     Raises:
-        InputError: an entry has another type, is no accepted value, or holds characters that nobody sees.
+        InputError: an entry has another type, is no accepted value, or holds invisible characters.
     """
 
     manoeuvre: str | None = None
@@ -54,7 +54,7 @@ class RunMeta:
     origin: Origin | None = None
     other: Mapping[str, Any] = field(default_factory=dict)
     _order: tuple[str, ...] = field(default=(), repr=False, compare=False)
-    """Keys in the order in which they were stated, so that a file is written again as it was."""
+    """Keys in their original order, so that a file is written again as it was."""
 
     def __post_init__(self) -> None:
         for key, check in _CHECKS.items():
@@ -90,11 +90,11 @@ class RunMeta:
             raise InputError(f"{where}: {error}") from None
 
     def in_group(self, group: str) -> RunMeta:
-        """Return a copy that belongs to a group; the group that is stated already goes first."""
+        """Return a copy that belongs to a group; a group that is stated already has priority."""
         return self if self.group is not None else replace(self, group=group)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the flat table of what is stated: keys of dataset.toml, those of `other` among them."""
+        """Return the flat table of the stated entries: keys of dataset.toml, those of `other` among them."""
         own = {key: getattr(self, _attribute(key)) for key in _CHECKS}
         if self.origin is not None:
             own["origin"] = self.origin._asdict()
@@ -154,7 +154,7 @@ def _origin(value: object, key: str) -> Origin:
 
 
 def _other(value: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy, so that nobody writes into the caller's; each key is a label and no field."""
+    """Copy, so that nobody writes into the caller's; each key is a label and no field."""
     if not isinstance(value, Mapping):
         raise InputError(f"other = {shown(value)[:80]}; accepted: a table of what else is known of the run.")
     for key in value:

@@ -1,4 +1,4 @@
-"""The scores of a study in a notebook: a table, plots and the page."""
+"""Scores of a study in a notebook: a table, plots and the page."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Scores:
 
     @property
     def failed(self) -> list[str]:
-        """The fits that failed, each with its reason."""
+        """Fits that failed, each with its reason."""
         return [
             f"{s['dataset']} {s['model']} fold {s['fold']} seed {s['seed']}: {s['reason']}"
             for s in self.results.summaries
@@ -56,7 +56,7 @@ class Scores:
 
     @property
     def notes(self) -> list[str]:
-        """Warnings on the fits: physics that does not follow its own training runs."""
+        """Warnings on the fits: physics that does not fit its own training runs."""
         return [f"{dataset}, {model}: {note}" for (dataset, model), note in fit_notes(self.results.summaries).items()]
 
     def table(self, metrics: Sequence[str] = TABLE_III) -> pd.DataFrame:
@@ -206,7 +206,7 @@ class Scores:
 
 
 def _shown_in_notebooks(figure: Figure) -> Figure:
-    """The figure as a notebook shows it without pyplot, whose global state stays as it is."""
+    """Figure that a notebook shows without pyplot, whose global state stays as it is."""
 
     def png() -> bytes:
         buffer = io.BytesIO()

@@ -1,4 +1,4 @@
-"""The vessel's particulars as a user knows them (`ship.toml`), and what is estimated where they are silent.
+"""Particulars of the vessel as a user knows them (`ship.toml`), and estimates of missing ones.
 
 Units are SI; lengths along the ship are measured from midship, forward positive (a rudder has x < 0).
 """
@@ -16,17 +16,17 @@ from .errors import InputError, unknown_name
 from .toml_files import Number, Whole, fault, read_toml
 
 _LENGTHS = (1e-3, 1000.0)
-"""Main dimensions [m] of every ship and model; the longest ship has 458 m."""
+"""Range of main dimensions [m] of ships and models; the longest ship has 458 m."""
 _LEAST_FULLNESS = 0.1
-"""Block coefficient over the whole breadth below which a unit is wrong."""
+"""Least block coefficient over the whole breadth; below it a unit is wrong."""
 _WITHIN, _DIAMETER, _RUDDER, _GYRATION = 0.6, 2.0, 0.15, (0.1, 0.5)
-"""Beyond every ship, so that a unit or an axis is wrong: place over L, propeller over T, rudder over L T (0.1 on yachts
-and tugs), radius of gyration over L (0.2 to 0.3)."""
+"""Limits beyond which a unit or an axis is wrong: place over L, propeller over T, rudder over L T (0.1 on yachts and
+tugs), radius of gyration over L (0.2 to 0.3)."""
 _SPAN, _FRONTAL, _LATERAL, _THRUST = 2.0, 10.0, 1.0, 1.0
-"""Likewise: rudder's span over T (1 at most), wind areas over B^2 (1 to 3) and L^2 (0.05 to 0.2), thruster force over
-the ship's weight (0.01)."""
+"""Limits beyond which a unit is wrong: rudder's span over T (1 at most), wind areas over B^2 (1 to 3) and L^2 (0.05 to
+0.2), thruster force over the ship's weight (0.01)."""
 _PITCH, _KT = 5.0, 5.0
-"""Likewise: pitch ratio (0.5 to 2), and each coefficient of K_T (below 1 in size)."""
+"""Limits beyond which a value is wrong: pitch ratio (0.5 to 2), and each coefficient of K_T (below 1 in size)."""
 
 
 class _Part(BaseModel):
@@ -34,7 +34,7 @@ class _Part(BaseModel):
 
 
 class Propeller(_Part):
-    """One fixed-pitch screw. `kt` are k0, k1, k2 of K_T = k0 + k1 J + k2 J^2."""
+    """Fixed-pitch propeller. `kt` are k0, k1, k2 of K_T = k0 + k1 J + k2 J^2."""
 
     diameter: Number = Field(gt=0)
     x: Number | None = None
@@ -141,7 +141,7 @@ class Ship(_Part):
 
 
 class Particulars(BaseModel):
-    """A ship with nothing missing: `complete(ship)` fills in estimates and says so."""
+    """Ship with all particulars: `complete(ship)` fills in estimates and notes them."""
 
     model_config = ConfigDict(frozen=True)
     L: float
@@ -168,22 +168,22 @@ class Particulars(BaseModel):
     notes: tuple[str, ...]
 
     def resized(self, factor: float) -> Particulars:
-        """A geometrically similar ship whose lengths are `factor` times these; thrusters keep their force."""
+        """Geometrically similar ship whose lengths are `factor` times these; thrusters keep their force."""
         powers = dict.fromkeys(("L", "B", "T", "xG", "D_P", "x_P", "H_R", "x_R", "x_bow", "x_stern"), 1)
         powers |= {"A_R": 2, "A_F": 2, "A_L": 2, "mass": 3, "Izz": 5}
         return self.model_copy(update={key: getattr(self, key) * factor**power for key, power in powers.items()})
 
     def lacks(self, key: str) -> bool:
-        """True where the file did not give `key`, such as "xG" or "propeller.kt", which an estimate stands in for."""
+        """Whether the file did not give `key`, such as "xG" or "propeller.kt", so that an estimate replaces it."""
         return any(note.startswith(f"{key} not given: ") for note in self.notes)
 
 
 def complete(ship: Ship) -> Particulars:
-    """Fill in what `ship` does not give from published regressions and rules of thumb, each named in `notes`.
+    """Fill in missing values of `ship` from published regressions and rules of thumb, each named in `notes`.
 
     Raises:
         InputError: mass, displacement and Cb contradict one another by more than 10 %, no hull is so full or so
-            slender, or something is too large for the ship or outside of her.
+            slender, or a part is too large for the ship or outside of her.
     """
     notes: list[str] = []
 
@@ -255,7 +255,7 @@ def complete(ship: Ship) -> Particulars:
 
 
 def _check_proportions(ship: Ship, mass: float) -> None:
-    """Raise InputError for what no ship has, all faults in one message."""
+    """Raise InputError for proportions of no ship, all faults in one message."""
     faults = []
     if not ship.L >= ship.B >= ship.T:
         faults.append(f"L, B, T are {ship.L:g}, {ship.B:g}, {ship.T:g} m; accepted: L >= B >= T")

@@ -33,8 +33,8 @@ def wrap_angle(angle):
 
 
 def move_frame(states: np.ndarray, origin: np.ndarray, rotation: float) -> np.ndarray:
-    """States (..., 10) seen after turning the earth frame's content by `rotation` [rad, clockwise] about (0, 0), then
-    shifting by `origin` (2,) [m].
+    """Move states (..., 10) to another earth frame: turn its content by `rotation` [rad, clockwise] about (0, 0), then
+    shift by `origin` (2,) [m].
 
     Predictions must commute with this map (translation and rotation equivariance) where the inputs hold no earth-fixed
     channel.

@@ -14,11 +14,11 @@ from .errors import InputError
 from .names import brief
 
 _PARAMS = r"\[(?:[^\[\]]|\[[^\[\]]*\])*\]"
-"""A bracket, which may hold lists: [hidden_layer_sizes=[20,20],max_iter=30]."""
+"""Pattern of a bracket, which may hold lists: [hidden_layer_sizes=[20,20],max_iter=30]."""
 _ITEM = re.compile(r"(?:[^,\[\]()]|\[[^\[\]]*\]|\([^()]*\))+")
-"""What stands between two commas of a bracket; a list in brackets or parentheses holds commas of its own."""
+"""Pattern of the text between two commas of a bracket; a list in brackets or parentheses holds commas of its own."""
 _LONGEST_TOLD = 200
-"""Characters of the values in the label of a model in memory."""
+"""Most characters of the values in the label of a model in memory."""
 _TAIL = rf"(?P<tail>(\+[^\[\]+]+({_PARAMS})?)*)"
 _FILE = re.compile(rf"(?P<base>[^\[\]]+\.py:\w+)(?P<params>{_PARAMS})?{_TAIL}")
 _NAME = re.compile(rf"(?P<base>[^\[\]+]+)(?P<params>{_PARAMS})?{_TAIL}")
@@ -26,7 +26,7 @@ _NAME = re.compile(rf"(?P<base>[^\[\]+]+)(?P<params>{_PARAMS})?{_TAIL}")
 
 @dataclass(frozen=True)
 class EffectSpec:
-    """An effect that a spec adds, `current[speed=0.3,to=1.0]`, and the values that it sets."""
+    """Effect that a spec adds, `current[speed=0.3,to=1.0]`, and the values that it sets."""
 
     name: str
     params: dict[str, Any] = field(default_factory=dict)
@@ -34,7 +34,7 @@ class EffectSpec:
 
 @dataclass(frozen=True)
 class Spec:
-    """A model spec taken apart: `physics+current[..]` -> name "physics", effects (EffectSpec("current", {..}),).
+    """Model spec in its parts: `physics+current[..]` -> name "physics", effects (EffectSpec("current", {..}),).
 
     given: the class or object of a model in memory, which `name` and `text` only label.
     """
@@ -52,12 +52,12 @@ class Spec:
 
     @property
     def seeds(self) -> list[int] | None:
-        """The seed that the spec itself fixes, if any."""
+        """Seed that the spec itself fixes, if any."""
         return [self.params["seed"]] if "seed" in self.params else None
 
 
 def _value(text: str) -> Any:
-    """A number, true, false, null, a list of them such as [20,20] or (20,20), or else the text itself."""
+    """Value as a number, true, false, null, a list of them such as [20,20] or (20,20), or else the text itself."""
     if text.startswith("(") and text.endswith(")"):
         return [_value(item.strip()) for item in text[1:-1].split(",") if item.strip()]
     try:
@@ -67,7 +67,7 @@ def _value(text: str) -> Any:
 
 
 def _params(text: str, bracket: str | None) -> dict[str, Any]:
-    """What stands in a bracket, `[key=value,key=value]`."""
+    """Parameters in a bracket, `[key=value,key=value]`."""
     params: dict[str, Any] = {}
     for item in _ITEM.findall((bracket or "[]")[1:-1]):
         key, sep, value = item.partition("=")
@@ -81,7 +81,7 @@ def _params(text: str, bracket: str | None) -> dict[str, Any]:
 
 
 def parse_spec(text: str) -> Spec:
-    """Take a model spec apart; a folder that holds a saved model is taken as it is, whatever its name.
+    """Parse a model spec; a folder that holds a saved model is taken as it is, whatever its name.
 
     Raises:
         InputError: the text has none of the accepted forms.
@@ -108,11 +108,12 @@ def parse_spec(text: str) -> Spec:
 
 
 def spec_of(model: Any, label: str = "") -> Spec:
-    """The spec of a model: text as `parse_spec` takes it, a path, a Spec, or a class or object in memory with `fit` and
+    """Spec of a model: text as `parse_spec` takes it, a path, a Spec, or a class or object in memory with `fit` and
     `predict`.
 
     Args:
-        label: name of a model in memory; default its class with what differs from its defaults, `MyNet[hidden=64]`.
+        label: name of a model in memory; default its class with the parameters that differ from their defaults,
+            `MyNet[hidden=64]`.
 
     Raises:
         InputError: it is none of these.

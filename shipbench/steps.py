@@ -1,5 +1,4 @@
-"""Progress of long work: whoever works says at which step it is, whoever shows that listens. Without a listener nothing
-happens."""
+"""Progress of long work: functions report their current step to a listener. Without a listener nothing happens."""
 
 from __future__ import annotations
 
@@ -9,12 +8,12 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 
 Listener = Callable[[str, float], None]
-"""Takes the name of a step and the share of the whole work that is done, 0 to 1."""
+"""Function of the name of a step and the finished share of the whole work, 0 to 1."""
 
 
 @dataclass
 class _Now:
-    """The step at work: it takes the work from the share `begin` to `end`; ticks: iterations in it."""
+    """Current step: it takes the work from the share `begin` to `end`; ticks: iterations in it."""
 
     listener: Listener
     what: str = ""
@@ -31,7 +30,7 @@ _NOW: ContextVar[_Now | None] = ContextVar("steps", default=None)
 
 @contextmanager
 def listening(listener: Listener) -> Iterator[None]:
-    """Tell `listener` of every step that begins inside, and how far it is."""
+    """Report to `listener` every step that begins inside, and its progress."""
     token = _NOW.set(_Now(listener))
     try:
         yield
@@ -48,7 +47,7 @@ def step(what: str, begin: float, end: float) -> None:
 
 
 def within(share: float, what: str = "") -> None:
-    """Say how much of the step is done, 0 to 1; `what` renames it."""
+    """Report the finished share of the step, 0 to 1; `what` renames it."""
     now = _NOW.get()
     if now is not None:
         now.what = what or now.what
@@ -56,7 +55,7 @@ def within(share: float, what: str = "") -> None:
 
 
 def tick(usual: int) -> None:
-    """Count one iteration of a step that takes about `usual` of them; it nears its end the slower the more it takes."""
+    """Count one iteration of a step that takes about `usual` of them; its progress slows down the more it takes."""
     now = _NOW.get()
     if now is not None:
         now.ticks += 1

@@ -1,4 +1,4 @@
-"""Files and folders that are written whole or not at all: a reader sees the old or the new one, never half of it."""
+"""Atomic writing of files and folders: a reader gets the old or the new one, never half of it."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from pathlib import Path
 from typing import Any
 
 Frame = Any
-"""A pandas DataFrame. pandas' own annotations are unions of all that a method can return, which no checker can
+"""Type of a pandas DataFrame. pandas' own annotations are unions of all possible return types, which no checker can
 follow."""
 
 
 @contextmanager
 def in_one_step(path: Path, suffix: str = ".tmp") -> Iterator[Path]:
-    """A hidden sibling of `path` to write (a file or a folder), which then takes its place. It goes if writing fails.
+    """Provide a hidden sibling of `path` to write (a file or a folder), which then takes its place. It is removed if
+    writing fails.
 
     Args:
-        suffix: of the sibling's name, where a library goes by it.
+        suffix: of the sibling's name, where a library depends on it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}{suffix}")
@@ -33,8 +34,8 @@ def in_one_step(path: Path, suffix: str = ".tmp") -> Iterator[Path]:
 
 
 def put(made: Path, path: Path) -> None:
-    """Move a file or folder that is complete to its place, in one step; both on one file system. A folder in its place
-    must be empty."""
+    """Move a complete file or folder to its place, atomically; both on one file system. A folder in its place must be
+    empty."""
     os.replace(made, path)
 
 
@@ -54,19 +55,19 @@ def exchange(made: Path, path: Path) -> None:
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write text in one step and return its path; lone surrogates, from badly decoded names, become question marks."""
+    """Write text atomically and return its path; lone surrogates, from badly decoded names, become question marks."""
     with in_one_step(path) as part:
         part.write_text(text, encoding="utf-8", errors="replace")
     return path
 
 
 def write_json(path: Path, data: Any) -> None:
-    """Write JSON in one step."""
+    """Write JSON atomically."""
     with in_one_step(path) as part:
         part.write_text(json.dumps(data, indent=1, default=str) + "\n", encoding="utf-8")
 
 
 def write_rows(path: Path, rows: Frame) -> None:
-    """Write a table as parquet in one step."""
+    """Write a table as parquet atomically."""
     with in_one_step(path) as part:
         rows.to_parquet(part, index=False)

@@ -1,4 +1,4 @@
-"""Numbers by which decisions are made: each with its unit, what it means, and where its evidence stands."""
+"""Thresholds of decisions: each with its unit, its meaning, and the place of its evidence."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Threshold:
-    """One number that decides. `evidence` is a heading of docs/calibration.md, as in a link: `evidence-asked`."""
+    """Number that decides. `evidence` is a heading of docs/calibration.md, as in a link: `evidence-asked`."""
 
     name: str
     value: float
@@ -17,7 +17,7 @@ class Threshold:
 
 
 class Thresholds:
-    """Table of a package; a name that is not in it, or stands twice, is an error of the code."""
+    """Thresholds of a package; an unknown name, or one that stands twice, is an error of the code."""
 
     def __init__(self, *rows: Threshold) -> None:
         self.rows = {row.name: row for row in rows}

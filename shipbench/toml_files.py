@@ -15,13 +15,12 @@ from .errors import InputError
 from .regular_files import read_text
 
 MOST_TOML = 8_000_000
-"""Bytes; the dataset.toml of 10,000 runs has some 2 MB."""
+"""Most bytes of a file; the dataset.toml of 10,000 runs has some 2 MB."""
 _DEEPEST = 32
-"""Levels of tables and lists inside each other; the files of shipbench have 4."""
+"""Most levels of nested tables and lists; the files of shipbench have 4."""
 _PART = r"""(?:"[^"\n]*+"|'[^'\n]*+'|[\w-]++)\s*+"""
 _CHAIN = re.compile(rf"(?<![\w-])(?:{_PART}\.\s*+){{{_DEEPEST},}}+(?:{_PART}([=\]]))?")
-"""Words and dots in turn, and what follows if it makes a key of them. The parser's time grows with the square of a
-key's parts."""
+"""Pattern of a long dotted key. The parser's time grows with the square of a key's parts."""
 _LONGEST_SHOWN = 80
 
 
@@ -51,8 +50,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 
 def _check_bounds(data: dict[str, Any], path: str | Path) -> None:
-    """Refuse nesting and integers that TOML does not promise to hold. A loop, not a recursion: a table may be nested
-    without end."""
+    """Refuse nesting and integers beyond the limits of TOML. A loop, not a recursion: nesting has no limit."""
     levels = [iter(data.values())]
     while levels:
         for value in levels[-1]:
@@ -82,7 +80,7 @@ def _too_large(path: str | Path) -> InputError:
 
 
 def _number(value: Any) -> Any:
-    """Refuse what pydantic would turn into a number: "2" and true."""
+    """Refuse values that pydantic would convert to a number: "2" and true."""
     if isinstance(value, str | bytes | bool):
         raise ValueError(f"Input should be a number, not {'true or false' if isinstance(value, bool) else 'text'}")
     return value
@@ -95,17 +93,16 @@ def _switch(value: Any) -> Any:
 
 
 Number = Annotated[float, BeforeValidator(_number)]
-"""A number that was written as one; infinite and not-a-number are the model's choice (`allow_inf_nan` of its
-config)."""
+"""Number that was written as one; infinite and NaN are the model's choice (`allow_inf_nan` of its config)."""
 Whole = Annotated[int, BeforeValidator(_number)]
-"""A whole number (2 or 2.0)."""
+"""Whole number (2 or 2.0)."""
 Switch = Annotated[bool, BeforeValidator(_switch)]
-"""true or false; 1 and "yes" are neither."""
+"""Value true or false; 1 and "yes" are neither."""
 
 
 def fault(error: ValidationError) -> tuple[tuple[str, ...], str, str]:
-    """The first fault that pydantic found: the place as keys, the kind of fault, and what is wrong with the value
-    received, in words."""
+    """First fault that pydantic found: the place as keys, the kind of fault, and the message on the value received, in
+    words."""
     first = error.errors()[0]
     place = tuple(str(key) for key in first["loc"])
     received = first["input"]

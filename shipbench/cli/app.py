@@ -51,7 +51,8 @@ _GROUPS = {
 
 
 class _Group(TyperGroup):
-    """Turns shipbench's own errors into one message on stderr and an exit code, and remembers the command line."""
+    """Command group that turns shipbench's own errors into one message on stderr and an exit code, and remembers the
+    command line."""
 
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
         command = shlex.join(["shipbench", *args])
@@ -60,7 +61,7 @@ class _Group(TyperGroup):
         return context
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """The commands in the groups of `_GROUPS`; a command that is in none of them comes last."""
+        """Write the commands in the groups of `_GROUPS`; a command that is in none of them comes last."""
         left = dict.fromkeys(self.list_commands(ctx))
         for title, names in [*_GROUPS.items(), ("More", tuple(left))]:
             rows = [(name, self.commands[name].get_short_help_str(HELP)) for name in names if name in left]
@@ -270,7 +271,6 @@ def predict(
 
 
 def main() -> None:
-    """Entry point of the `shipbench` command. SIGTERM ends it as Ctrl-C does: what is finished is kept, nothing goes on
-    behind it."""
+    """Run the `shipbench` command. SIGTERM ends it as Ctrl-C does: finished work is kept, no process continues."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     app()

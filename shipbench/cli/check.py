@@ -79,8 +79,8 @@ _BRIEF = ("name", "ship", "runs")
 
 
 def _show(facts: dict[str, Any], findings: list[Finding], full: bool) -> None:
-    """The number of findings in a sentence, facts of the data set, then each finding with what to do; notes with --full
-    only."""
+    """Print the number of findings in a sentence, facts of the data set, then each finding with its correction; notes
+    with --full only."""
     counts = {severity: sum(f.severity == severity for f in findings) for severity in ("error", "warning", "note")}
     numbers = [f"{number} {severity}{'s' * (number != 1)}" for severity, number in counts.items()]
     say(f"Findings: {', '.join(numbers)}.\n")
@@ -110,7 +110,7 @@ def _show_finding(finding: Finding) -> None:
 
 
 _LINES = 6
-"""Lines for dataset.toml that are printed with a finding; all stand together below, and in the folder of --out."""
+"""Most lines for dataset.toml that are printed with a finding; all stand together below, and in the folder of --out."""
 
 
 def _cut(line: str, width: int) -> str:
@@ -118,7 +118,7 @@ def _cut(line: str, width: int) -> str:
 
 
 def _show_lines(lines: Laid, applied: bool) -> None:
-    """The entries of dataset.toml that the findings change, and what is left out."""
+    """Print the entries of dataset.toml that the findings change, and the omitted ones."""
     from ..checking.finding import toml_line
 
     if lines.changed:

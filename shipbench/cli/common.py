@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..render.table import Table
 
 SETTINGS: dict[str, Any] = {"context_settings": {"help_option_names": ["-h", "--help"]}, "no_args_is_help": True}
-"""Of every group of commands."""
+"""Settings of every group of commands."""
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document to stdout and nothing else.")]
 Quiet = Annotated[
     bool,
@@ -38,14 +38,14 @@ DatasetArgument = Annotated[str, typer.Argument(metavar="DATASET", help="Registe
 
 
 HELP = 200
-"""Characters of the help of one command in a list of commands: it wraps, and is not cut."""
+"""Most characters of the help of one command in a list of commands: it wraps, and is not cut."""
 
 
 class Commands(TyperGroup):
-    """A group of commands whose list shows their help whole."""
+    """Group of commands whose list shows their help whole."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """The commands in their order."""
+        """Write the commands in their order."""
         with formatter.section("Commands"):
             formatter.write_dl(
                 [(name, self.commands[name].get_short_help_str(HELP)) for name in self.list_commands(ctx)]
@@ -53,17 +53,19 @@ class Commands(TyperGroup):
 
 
 def say(text: str, err: bool = False) -> None:
-    """Print text that may hold names and words of a stranger's: what a terminal would take for a command is shown."""
+    """Print text that may hold names and words of others: characters that a terminal would take for a command are shown
+    as escapes."""
     typer.echo(shown(text, keep="\n\t"), err=err)
 
 
 def print_json(data: Any) -> None:
-    """One document on stdout."""
+    """Print one document on stdout."""
     typer.echo(json.dumps(data, indent=1, default=str, allow_nan=False))
 
 
 def console_for_tables() -> Console:
-    """A console for tables, as wide as the terminal; 80 columns in a file, a pipe or a notebook, or as COLUMNS says."""
+    """Console for tables, as wide as the terminal; 80 columns in a file, a pipe or a notebook, or the number in
+    COLUMNS."""
     from rich.console import Console
 
     return Console(highlight=False)
@@ -86,12 +88,12 @@ def say_wrapped(text: str, indent: str = "", hanging: str = "", err: bool = Fals
 
 
 def screen_width() -> int:
-    """Columns of the terminal, as `console_for_tables` has them."""
+    """Columns of the terminal, as for `console_for_tables`."""
     return console_for_tables().width
 
 
 def parse_numbers(option: str, text: str) -> tuple[int, ...]:
-    """The whole numbers of an option such as `--seeds 0,1,2`.
+    """Whole numbers of an option such as `--seeds 0,1,2`.
 
     Raises:
         InputError: it is no such list.
@@ -103,7 +105,7 @@ def parse_numbers(option: str, text: str) -> tuple[int, ...]:
 
 
 def parse_seeds(text: str | None) -> tuple[int, ...] | None:
-    """`--seeds`, or None where it is not given."""
+    """Seeds of `--seeds`, or None where it is not given."""
     return None if text is None else parse_numbers("--seeds", text)
 
 

@@ -112,7 +112,7 @@ def data_import(
 
 
 def _hanging(line: str) -> str:
-    """Indent of what follows when a line is wrapped."""
+    """Indent of the continuation of a wrapped line."""
     return " " * (len(line) - len(line.lstrip()) + 4)
 
 

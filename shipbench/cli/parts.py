@@ -53,7 +53,7 @@ def _chosen(kind: str, name: str, parts: list[dict[str, Any]]) -> dict[str, Any]
 
 
 def _model(part: dict[str, Any], about: list[str], meanings: dict[str, str], as_json: bool) -> None:
-    """What a model is, its parameters with their defaults, and a command that uses it."""
+    """Lines on a model: description, parameters with their defaults, and a command that uses it."""
     if as_json:
         print_json(part | {"about": about, "meanings": meanings})
         return
@@ -104,7 +104,8 @@ def _sizes(part: dict[str, Any]) -> list[str]:
 
 
 def _effect(part: dict[str, Any], as_json: bool) -> None:
-    """What an effect is, its sizes with units, its source, the trial that separates it, and a command that uses it."""
+    """Lines on an effect: description, sizes with units, source, the trial that separates it, and a command that uses
+    it."""
     from ..effects.base import EFFECTS
     from ..render.table import Table, TableColumn, display_unit, significant
     from ..render.terminal import command_lines

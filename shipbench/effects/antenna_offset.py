@@ -51,11 +51,12 @@ class AntennaOffset(Effect):
         return [(0.0,), (1.0,)]
 
     def form_spread(self, setting: Sequence[float], L: float) -> tuple[float, ...]:
-        """The antenna's own velocities agree with the track: how far ahead they belong only the forces tell."""
+        """Standard deviation of the antenna's place by the form of the hull: the antenna's own velocities agree with
+        the track, so that only the forces identify how far ahead it is."""
         return (_FORM * L if any(setting) else 0.0, 0.0)
 
     def correction(self, values: Mapping[str, float]) -> str:
-        """The antenna's place, where the velocities are midship's."""
+        """Line with the antenna's place, where the velocities are midship's."""
         return "" if values.get("own_velocities") else f"antenna = [{values['forward']:.3g}, {values['starboard']:.3g}]"
 
 

@@ -1,5 +1,4 @@
-"""An effect: one formula, used to hide a cause in simulated data, to test for it in measured data, and to extend a
-model.
+"""Effect: one formula, used to hide a cause in simulated data, to test for it in measured data, and to extend a model.
 
 A part is one file of this folder whose instance is bound to `EFFECT`; the file's name is the effect's name. It
 overrides one of three methods, which say where the cause enters: `force` (anything that acts on the hull), `gear`
@@ -132,14 +131,14 @@ class Effect:
         raise NotImplementedError
 
     def plausible(self, q: Sequence[float], ship: Particulars) -> bool:
-        """True where all sizes `q` lie within the bounds of their parameters, shapes left out or not."""
+        """Whether all sizes `q` lie within the bounds of their parameters, shapes left out or not."""
         return all(p.shape or p.low <= value <= p.high for p, value in zip(self.sized(ship.L), q, strict=False))
 
     def force(self, e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         """Write the effect of size `q` into `e`, at the instant `s`."""
 
     def gear(self, gears: dict[str, Gear], q: Sequence[Array]) -> None:
-        """Change the gears of `n`, `delta` and `F` (both thrusters); `q` holds numbers or one value per run."""
+        """Change the dynamics of `n`, `delta` and `F` (both thrusters); `q` holds numbers or one value per run."""
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
         """Measurement of the true states S (runs, samples, 10); `q` holds numbers or one value per run."""
@@ -150,25 +149,24 @@ class Effect:
         return [()]
 
     def fitted(self, L: float) -> tuple[Effect, ...]:
-        """Effect with values in which it acts about linearly on a ship of length L [m] (`public` gives what they mean),
-        once for each way in which it may act."""
+        """Effect in variables in which it acts about linearly on a ship of length L [m] (`public` converts them back),
+        once for each form in which it may act."""
         return (self,)
 
     def sized(self, L: float) -> tuple[Parameter, ...]:
-        """The parameters for a ship of length L [m]."""
+        """Parameters for a ship of length L [m]."""
         return tuple(p.for_length(L) for p in self.parameters)
 
     def public(self, q: Sequence[float]) -> dict[str, float]:
-        """The values under the names that are reported; two earth-fixed components become a size and a direction
-        [rad]."""
+        """Values under the names that are reported; two earth-fixed components become a size and a direction [rad]."""
         if self.vector is None:
             return {p.name: float(v) for p, v in zip(self.parameters, q, strict=True)}
         north, east = (float(v) for v in q)
         return {self.vector[0]: math.hypot(north, east), self.vector[1]: math.atan2(east, north) % (2.0 * math.pi)}
 
     def correction(self, values: Mapping[str, float]) -> str:
-        """The line of dataset.toml that corrects the record for it, from values under the reported names; empty where
-        there is none."""
+        """Line of dataset.toml that corrects the record for it, from values under the reported names; empty where there
+        is none."""
         return ""
 
     def units(self) -> dict[str, str]:
@@ -178,8 +176,8 @@ class Effect:
         return {self.vector[0]: self.parameters[0].unit, self.vector[1]: "rad"}
 
     def internal(self, values: Mapping[str, float]) -> tuple[float, ...]:
-        """`q` from values under the reported names; those not given are zero, shape parameters typical, a vector's
-        direction north.
+        """Values `q` from those under the reported names; values not given are zero, shape parameters typical, a
+        vector's direction north.
 
         Raises:
             InputError: a name is unknown, or a vector's size is missing.
@@ -203,7 +201,7 @@ def searched_by(search: str) -> tuple[Effect, ...]:
 
 
 class Holder(Protocol):
-    """Whatever carries an effect: with its values, in a simulator or in a fitted model."""
+    """Object that carries an effect with its values, in a simulator or in a fitted model."""
 
     @property
     def effect(self) -> Effect: ...
@@ -223,16 +221,16 @@ def body_axes(north: Array, east: Array, psi: Array) -> tuple[Array, Array]:
 
 
 def per_run(value: Array) -> Array:
-    """A number, or one value per run as a column that spreads over samples."""
+    """Number, or one value per run as a column that broadcasts over samples."""
     return np.asarray(value)[:, None] if np.ndim(value) == 1 else value
 
 
 def delayed(S: np.ndarray, channels: Sequence[int], delay: Array, dt: float) -> np.ndarray:
     """States (runs, samples, 10) whose `channels` are read `delay` seconds late (a number or one per run); before the
-    run they go on as they began.
+    run they continue as they began.
 
-    Between samples a cubic with central slopes (Catmull & Rom): a fit would not settle where the slope against the
-    delay jumps, as it does at whole samples of straight lines.
+    Between samples a cubic with central slopes (Catmull & Rom) interpolates: a fit would not converge where the slope
+    against the delay jumps, as it does at whole samples of linear interpolation.
     """
     runs, samples = S.shape[:2]
     shift = np.broadcast_to(np.asarray(delay, dtype=float) / dt, (runs,))

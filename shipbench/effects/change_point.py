@@ -44,8 +44,8 @@ class ChangePoint(Effect):
         from_time: float | None = None,
         rows: Sequence[int] | np.ndarray | None = None,
     ) -> ChangePoint:
-        """`effect` from the run number `from_run` (0 is the first) or from `from_time` [s] after the beginning of every
-        run.
+        """Effect `effect` from the run number `from_run` (0 is the first) or from `from_time` [s] after the beginning
+        of every run.
 
         Args:
             rows: number of the run of each row (simulated run, segment) where rows are not the runs in order; values
@@ -106,7 +106,7 @@ class ChangePoint(Effect):
         return self._inner().units() | {key: "s" if key == "from_time" else "1" for key in self._begins()}
 
     def internal(self, values: Mapping[str, float]) -> tuple[float, ...]:
-        """`q` of the inner effect; where it begins may be repeated.
+        """Values `q` of the inner effect; its beginning may be repeated.
 
         Raises:
             InputError: as the inner effect, or the change shall begin elsewhere than this effect does.

@@ -28,7 +28,7 @@ class HeadingBias(Effect):
     separate = "straight runs on one course at two speeds"
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
-        """As `Effect.measure`; without a second value the velocities are not turned."""
+        """Measurement as by `Effect.measure`; without a second value the velocities are not rotated."""
         bias, *turned = (per_run(value) for value in q)
         out = S.copy()
         out[..., PSI] += bias
@@ -41,7 +41,7 @@ class HeadingBias(Effect):
         return [(0.0,), (1.0,)]
 
     def correction(self, values: Mapping[str, float]) -> str:
-        """The bias of psi, where the velocities are not turned with it."""
+        """Line with the bias of psi, where the velocities are not rotated with it."""
         return "" if values.get("turned_velocities") else f"[bias] psi = {values['bias']:.3g}"
 
 

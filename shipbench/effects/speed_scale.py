@@ -27,7 +27,7 @@ class SpeedScale(Effect):
     sway = 1.0
 
     def fitted(self, L: float) -> tuple[Self, ...]:
-        """Both ways: a log has one axis or two, and the sway beside one axis comes from elsewhere."""
+        """Both forms: a log has one axis or two, and with one axis the sway comes from another sensor."""
         alone = copy(self)
         alone.sway, alone.way = 0.0, "surge alone is off, sway is not"
         return self, alone

@@ -1,5 +1,5 @@
-"""Facts that an effect states about ships and about its look-alikes: all that a diagnosis asks of one effect and not of
-another."""
+"""Facts that an effect states about ships and about confounded effects: all differences between effects that a
+diagnosis uses."""
 
 from __future__ import annotations
 
@@ -15,40 +15,40 @@ SEARCHES = {
 }
 """Ways in which a diagnosis looks for an effect."""
 NEGLIGIBLE = 0.05
-"""Least size of an effect that matters, in typical sizes. With enough samples the form of a hull makes tiny causes
-certain: speeds 0.1 % off, a bank of a 65th of the usual suction."""
+"""Least size of a practically significant effect, in typical sizes. With enough samples the form of a hull makes tiny
+causes certain."""
 
 
 @dataclass(frozen=True)
 class Traits:
-    """Facts about an effect; the defaults are those of an effect that looks like no other and that ships do not differ
-    in.
+    """Facts about an effect; the defaults are those of an effect that is confounded with no other and that ships do not
+    differ in.
 
     Attributes:
-        search: how the diagnosis looks for it, a key of `SEARCHES`. A limit has no slope where it does not act: the
-            record shows it alone.
+        search: method of the search for it, a key of `SEARCHES`. A limit has no slope where it does not act: the record
+            shows it alone.
         describes_data: it is a fault of the data, or of their order, and no part of a predictor: the data are
             corrected, or split.
         wraps: it takes another effect (`Effect.of`), whose values are its own.
         local: it depends on the place or on the time within a run, which a model of accelerations is not given.
-        between_ships: ordinary ships differ in it, so that what the form of a hull lacks passes for it: it must be
-            worth more.
-        absorbs_misfit: such forms were mistaken for it most often: it must be worth more again.
+        between_ships: ordinary ships differ in it, so that it is confounded with errors of the hull's form: it needs
+            more evidence.
+        absorbs_misfit: it is confounded with such errors most often: it needs more evidence again.
         persistent: hull, rudder and propeller keep their shape during trials, a bank its place: it does not begin with
             a run.
         least_size: size from which it is practically significant, in typical sizes.
         least_unrecorded: the same behind the record of an actuator, where the motion alone shows it.
-        aliases: effects that it is told as confused with, however far apart their scores are.
-        group: effects of one group come together and push alike: beside one of them the others are not named.
-        imitates: effects whose own law leaves what looks like this one along their normal (`Effect.normal`): there it
-            is not believed.
+        aliases: effects with which it is reported as confounded, however far apart their scores are.
+        group: effects of one group occur together and have similar forces: beside one of them the others are not
+            reported.
+        imitates: effects whose own law leaves a residual like this one along their normal (`Effect.normal`): there it
+            is rejected.
         by_coefficients: a force that breaks a symmetry, but shows by the ship's coefficients alone.
-        relies_on: coefficients of the ship (`between_ships`) that it is judged by: beyond those of all ships it is not
-            believed.
-        faults_of: channels of whose sensors it is a fault.
-        gear_field: value of the gear that it changes: T, rate, delay, deadband or backlash.
-        in_place_of: parameters p of eq. (2) to (8), by number, that stay zero where it is fitted: data cannot tell the
-            two apart.
+        relies_on: coefficients of the ship (`between_ships`) by which it is judged: beyond those of all ships it is
+            rejected.
+        faults_of: channels of whose sensors it is an error.
+        gear_field: value of the actuator dynamics that it changes: T, rate, delay, deadband or backlash.
+        in_place_of: parameters p of eq. (2) to (8), by number, that stay zero where it is fitted: they are confounded.
         in_place_beside_hull: the same where the hull's derivatives are free, too.
     """
 

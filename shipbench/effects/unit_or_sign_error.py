@@ -20,7 +20,7 @@ from .base import Effect, Parameter
 from .traits import Traits
 
 KNOT = 1852.0 / 3600.0
-"""[m/s]."""
+"""Metres per second in one knot [m/s]."""
 
 _ANGLE = {"degrees": math.degrees(1.0)}
 _SPEED = {"knots": 1.0 / KNOT, "km/h": 3.6}
@@ -59,7 +59,7 @@ class UnitOrSignError(Effect):
         return {"factor": 1.0 + float(q[0]), "channel": float(q[1])}
 
     def internal(self, values: Mapping[str, float | str]) -> tuple[float, ...]:
-        """`q` from `factor` (recorded over true) and `channel` (index or name of a state).
+        """Values `q` from `factor` (recorded over true) and `channel` (index or name of a state).
 
         Raises:
             InputError: a name is unknown, the factor or the channel is missing, or the channel is no state.
@@ -82,7 +82,7 @@ class UnitOrSignError(Effect):
         return float(values["factor"]) - 1.0, float(channel)
 
     def describe(self, q: Sequence[float]) -> str:
-        """In words, such as "delta recorded in degrees" or "r recorded with the other sign"."""
+        """Words such as "delta recorded in degrees" or "r recorded with the other sign"."""
         channel = STATES[round(q[1])]
         return f"{channel} recorded {in_words(channel, 1.0 + float(q[0]))}"
 

@@ -28,8 +28,8 @@ class VelocityDelay(Effect):
     separate = "changes of speed and quick turns"
 
     def measure(self, S: np.ndarray, q: Sequence[Array], dt: float) -> np.ndarray:
-        """Late as a vector in the ship's axes (a speed log), or in the earth's (from positions), then turned by the
-        heading of the moment."""
+        """Measurement late as a vector in the ship's axes (a speed log), or in the earth's (from positions), then
+        rotated by the current heading."""
         body = delayed(S, (U, V), q[0], dt)
         if not np.any(q[1]):
             return body

@@ -1,11 +1,11 @@
-"""A metric: a function of the true and the predicted states, with its label and unit.
+"""Metric: a function of the true and the predicted states, with its label and unit.
 
 One file per metric; the file's name is the metric's name and the file binds a `Metric` to `METRIC`. The function takes
 keyword-only arguments, and only those of these that it needs:
 
-- `true`, `pred`: (batch, K, 10), states at the K predicted knots, order and units of `signals.STATES`;
+- `true`, `pred`: (batch, K, 10), states at the K predicted time steps, order and units of `signals.STATES`;
 - `s0`: (batch, 10), the state that the predictor was given. It is known, so it is never scored;
-- `U`: (batch, K, inputs), the recorded orders and what else was measured, `U[:, k]` held on the step that ends at knot
+- `U`: (batch, K, inputs), the recorded commands and environment, `U[:, k]` held on the interval that ends at time step
 k;
 - `L`: the ship's length [m]; `dt`: sample time [s].
 """
@@ -27,7 +27,7 @@ METRICS = Registry("metric", "metrics", "METRIC", helpers=frozenset({"base"}))
 
 @dataclass(frozen=True)
 class Column:
-    """One number per run: its name in the rows, the label and unit that tables and axes print."""
+    """Number per run: its name in the rows, the label and unit that tables and axes print."""
 
     name: str
     label: str
@@ -36,13 +36,13 @@ class Column:
 
 @dataclass(frozen=True)
 class Metric:
-    """A function with what is needed to print its values.
+    """Function with the data to print its values.
 
     Args:
         function: keyword-only; returns (batch, K) if `per_knot`, else (batch,); with several columns they are a
             further, last axis.
-        columns: what the function returns, in that order.
-        per_knot: the per-run value is the mean over the K knots.
+        columns: of the returned values, in that order.
+        per_knot: the per-run value is the mean over the K time steps.
         smaller_is_better: direction of ranking.
     """
 
@@ -79,7 +79,7 @@ class Metric:
     def per_run(
         self, *, true: np.ndarray, pred: np.ndarray, s0: np.ndarray, L: float, dt: float, U: np.ndarray | None = None
     ) -> dict[str, np.ndarray]:
-        """For each column the values (batch,): the mean over knots where the metric is one per knot."""
+        """Values (batch,) of each column: the mean over time steps where the metric is one per time step."""
         values = self.values(true=true, pred=pred, s0=s0, L=L, dt=dt, U=U)
         if self.per_knot:
             values = values.mean(axis=1)
@@ -89,18 +89,19 @@ class Metric:
 
 
 def state_error(true: np.ndarray, pred: np.ndarray) -> np.ndarray:
-    """`pred - true` (batch, K, 10); the heading's difference is wrapped to (-pi, pi]."""
+    """Error `pred - true` (batch, K, 10); the heading's difference is wrapped to (-pi, pi]."""
     error = pred - true
     error[..., PSI] = wrap_angle(error[..., PSI])
     return error
 
 
 def fit_percent(*, true: np.ndarray, pred: np.ndarray) -> np.ndarray:
-    """100 (1 - |pred - true| / |true - mean(true)|) of each signal [%], (K, 10) to (10,): the NRMSE fit of MATLAB's
+    """Fit 100 (1 - |pred - true| / |true - mean(true)|) of each signal [%], (K, 10) to (10,): the NRMSE fit of MATLAB's
     `compare`.
 
-    100 is exact, 0 no better than the mean; NaN where the true signal is constant. Source: MATLAB documentation of
-    `compare`.
+    100 is exact, 0 no better than the mean; NaN where the true signal is constant.
+
+    Source: MATLAB documentation of `compare`.
     """
     with np.errstate(all="ignore"):
         error = np.linalg.norm(state_error(true, pred), axis=0)

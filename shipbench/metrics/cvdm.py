@@ -12,12 +12,12 @@ R_MAX = np.pi / 100.0
 
 
 def cvdm(*, true: np.ndarray, pred: np.ndarray, s0: np.ndarray) -> np.ndarray:
-    """100 (|dx|/Lt + |dy|/Lt + |dpsi|/pi + |du|/Ut + |dv|/Ut + |dr|/r_max) [%], (batch, K); its mean over knots is the
-    cVDM.
+    """Error 100 (|dx|/Lt + |dy|/Lt + |dpsi|/pi + |du|/Ut + |dv|/Ut + |dr|/r_max) [%], (batch, K); its mean over time
+    steps is the cVDM.
 
-    Lt [m] is the length of the true track from s0 through the K knots, Ut [m/s] the mean resultant speed at the K
-    knots. A run whose true ship does not move (Lt = 0 or Ut = 0) has no scale: its cVDM is NaN, and tables count such
-    runs.
+    Lt [m] is the length of the true track from s0 through the K time steps, Ut [m/s] the mean resultant speed at the K
+    time steps. A run whose true ship does not move (Lt = 0 or Ut = 0) has no scale: its cVDM is NaN, and tables count
+    such runs.
 
     Source: seed paper, eq. (17).
     """

@@ -9,7 +9,7 @@ from .base import Column, Metric
 
 
 def ed(*, true: np.ndarray, pred: np.ndarray) -> np.ndarray:
-    """sqrt(dx^2 + dy^2) [m], (batch, K). Source: seed paper, eq. (15)."""
+    """Distance sqrt(dx^2 + dy^2) [m], (batch, K). Source: seed paper, eq. (15)."""
     return np.hypot(pred[..., X] - true[..., X], pred[..., Y] - true[..., Y])
 
 

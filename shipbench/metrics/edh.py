@@ -1,4 +1,4 @@
-"""EDH, the distance plus what the heading error moves the ship's ends."""
+"""EDH, the distance plus the displacement of the ship's ends by the heading error."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from .ed import ed
 
 
 def final_displacement(*, true: np.ndarray, pred: np.ndarray) -> np.ndarray:
-    """ED at the last knot [m], (batch,)."""
+    """Distance ED at the last time step [m], (batch,)."""
     return ed(true=true, pred=pred)[:, -1]
 
 

@@ -9,7 +9,7 @@ from .base import Column, Metric
 
 
 def heading_error(*, true: np.ndarray, pred: np.ndarray) -> np.ndarray:
-    """|dpsi| [rad], wrapped to [0, pi], (batch, K)."""
+    """Heading error |dpsi| [rad], wrapped to [0, pi], (batch, K)."""
     return np.abs(wrap_angle(pred[..., PSI] - true[..., PSI]))
 
 

@@ -9,7 +9,7 @@ from .ed import ed
 
 
 def position_rmse(*, true: np.ndarray, pred: np.ndarray) -> np.ndarray:
-    """sqrt(mean_k(dx^2 + dy^2)) [m], (batch,)."""
+    """Root mean square sqrt(mean_k(dx^2 + dy^2)) [m], (batch,)."""
     return np.sqrt(np.mean(ed(true=true, pred=pred) ** 2, axis=1))
 
 

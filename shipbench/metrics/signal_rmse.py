@@ -11,8 +11,8 @@ SIGNALS = ("psi", "u", "v", "r", "n", "delta", "F_b", "F_s")
 
 
 def signal_rmse(*, true: np.ndarray, pred: np.ndarray) -> np.ndarray:
-    """sqrt(mean_k(error^2)) of each of `SIGNALS` (batch, 8), in the units of `signals.UNITS`; the heading's difference
-    is wrapped."""
+    """Root mean square sqrt(mean_k(error^2)) of each of `SIGNALS` (batch, 8), in the units of `signals.UNITS`; the
+    heading's difference is wrapped."""
     error = state_error(true, pred)[..., [STATES.index(s) for s in SIGNALS]]
     return np.sqrt(np.mean(error**2, axis=1))
 

@@ -1,9 +1,9 @@
 """Indices of standard manoeuvres (IMO MSC.137(76), ITTC): advance, transfer, tactical diameter of turns, overshoot
 angles of zig-zags.
 
-They are read off any track that begins on a straight course under recorded orders. In a rollout the orders are the true
-ship's, also for the model: its rudder is reversed when the true one was, so its overshoot is counted from its own
-heading at that moment.
+They are computed for any track that begins on a straight course under recorded commands. In a rollout the commands are
+the true ship's, also for the model: its rudder is reversed when the true one was, so its overshoot is counted from its
+own heading at that moment.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from ..signals import PSI, R, U, V, X, Y
 from .base import Column, Metric
 
 DELTA_C = 1
-"""Column of the rudder's order in U."""
+"""Column of the rudder command in U."""
 SMALLEST = np.deg2rad(5.0)
-"""Rudder angle [rad] below which it is course keeping and no manoeuvre."""
+"""Smallest rudder angle [rad] of a manoeuvre; below it is course keeping."""
 STEADY = 0.1
-"""|r| L / speed below which a course is straight; hard turns have 0.5 to 1."""
+"""Largest |r| L / speed of a straight course; hard turns have 0.5 to 1."""
 NEAR, SHARE = 0.1, 0.9
-"""The order stands at the manoeuvre's angle, within 10 %, in 90 % of the samples; in the rest the rudder is on its way
-to the other side."""
+"""Tolerance of the manoeuvre's angle, 10 %, and least share of samples within it, 90 %; in the rest the rudder moves to
+the other side."""
 
 NAMES = ("advance", "transfer", "tactical_diameter", "overshoot_1", "overshoot_2")
 _LABELS = ("advance", "transfer", "tactical diameter", "first overshoot", "second overshoot")
@@ -29,11 +29,11 @@ _UNITS = ("L", "L", "L", "rad", "rad")
 
 
 def turning_indices(path: np.ndarray, L: float) -> tuple[float, float, float]:
-    """Advance and transfer (at 90 degrees of heading change) and tactical diameter (at 180) in ship lengths;
-    not-a-number where not reached.
+    """Advance and transfer (at 90 degrees of heading change) and tactical diameter (at 180) in ship lengths; NaN where
+    not reached.
 
     path: (samples, 10) states from the moment the rudder is put over; advance is along the course there, transfer
-    square to it.
+    perpendicular to it.
     """
     course = path[0, PSI]
     east, north = path[:, Y] - path[0, Y], path[:, X] - path[0, X]
@@ -64,8 +64,8 @@ def overshoots(psi: np.ndarray, reversals: np.ndarray, side: float) -> tuple[flo
 
 
 def _orders(start: np.ndarray, path: np.ndarray, orders: np.ndarray, L: float) -> tuple[int, np.ndarray] | None:
-    """The sample at which the rudder is put over from a straight course, and those at which it is reversed; None for
-    any other orders."""
+    """Sample at which the rudder is put over from a straight course, and those at which it is reversed; None for any
+    other commands."""
     angle = float(np.max(np.abs(orders)))
     if angle < SMALLEST:
         return None
@@ -82,13 +82,12 @@ def _orders(start: np.ndarray, path: np.ndarray, orders: np.ndarray, L: float) -
 
 
 def trial_indices(*, s0: np.ndarray, states: np.ndarray, true: np.ndarray, U: np.ndarray, L: float) -> np.ndarray:
-    """`NAMES` of each run, (batch, 5) in ship lengths and rad; not-a-number where the orders are no such manoeuvre or
+    """Indices `NAMES` of each run, (batch, 5) in ship lengths and rad; NaN where the commands are no such manoeuvre or
     the track does not get there.
 
     A turn: from a straight course the rudder goes to one angle and stays. A zig-zag: it goes to one angle, then to and
-    fro between that angle on both sides. s0 (batch, 10), states and true (batch, K, 10), U (batch, K, inputs); which
-    runs are manoeuvres, and from when, is told by the orders and by the true track, so that it is the same for every
-    model.
+    fro between that angle on both sides. s0 (batch, 10), states and true (batch, K, 10), U (batch, K, inputs). The
+    manoeuvre and its beginning follow from the commands and the true track, so that they are the same for every model.
     """
     found = np.full((len(states), len(NAMES)), np.nan)
     for i, (start, path, truth, orders) in enumerate(zip(s0, states, true, U[..., DELTA_C], strict=True)):

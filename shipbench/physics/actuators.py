@@ -12,7 +12,7 @@ from .modifiers import is_neutral
 
 
 def lag_with_rate_limit(value: Array, command: Array, dt: Array, T: Array, rate: Array) -> Array:
-    """The actuator after `dt` seconds of a held command.
+    """Actuator after `dt` seconds of a held command.
 
     d(value)/dt = clip((command - value)/T, -rate, rate): it moves at `rate` while the error exceeds rate T, then decays
     with time constant T [s]. `rate` is in units of `value` per second; T must be positive.
@@ -28,9 +28,12 @@ def lag_with_rate_limit(value: Array, command: Array, dt: Array, T: Array, rate:
 
 @dataclass(frozen=True)
 class Gear:
-    """What lies between a command and its actuator: transport delay [s], time constant T [s], rate limit, deadband of
-    the controller and play (backlash) of the transmission, these three in the actuator's units (and per second); T2:
-    time constant [s] of what follows the motor, such as the filter of a sensor, in place of play."""
+    """Dynamics between a command and its actuator.
+
+    Transport delay [s], time constant T [s], rate limit, deadband of the controller and play (backlash) of the
+    transmission, these three in the actuator's units (and per second); T2: time constant [s] of a second stage, such as
+    the filter of a sensor, in place of play.
+    """
 
     T: Array
     rate: Array
@@ -41,11 +44,11 @@ class Gear:
 
 
 def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, substeps: int = 1) -> np.ndarray:
-    """The actuator (runs, samples * substeps + 1) that follows held commands (runs, samples) from `start` (runs,).
+    """Actuator (runs, samples * substeps + 1) that follows held commands (runs, samples) from `start` (runs,).
 
-    The controller sees the command `delay` seconds late (the first command held before) and rests while |command -
+    The controller receives the command `delay` seconds late (the first command held before) and rests while |command -
     position| < deadband; the motor moves with lag and rate limit; the actuator follows the motor once the play is taken
-    up (it starts in the middle of it). Each value of the gear may be one per run.
+    up (it starts in the middle of it). Each value of the dynamics may be one per run.
     """
     runs, samples = command.shape
     h = dt / substeps
@@ -73,8 +76,7 @@ def gear_path(start: np.ndarray, command: np.ndarray, dt: float, gear: Gear, sub
 
 
 def gear_step(motor: Array, position: Array, wanted: Sequence[tuple[Array, Array]], gear: Gear) -> tuple[Array, Array]:
-    """Motor and actuator after commands that reach the controller one after the other, each with the seconds that it
-    stands there."""
+    """Motor and actuator after commands that reach the controller one after the other, each with its duration [s]."""
     for command, time in wanted:
         before = motor
         moved = lag_with_rate_limit(motor, command, time, gear.T, gear.rate)
@@ -89,14 +91,15 @@ def gear_step(motor: Array, position: Array, wanted: Sequence[tuple[Array, Array
 
 
 def _second_lag(value: Array, before: Array, after: Array, dt: Array, T: Array) -> Array:
-    """What follows with time constant T a motor that moves evenly from `before` to `after` within `dt` seconds."""
+    """Output of a lag with time constant T behind a motor that moves evenly from `before` to `after` within `dt`
+    seconds."""
     behind = (after - before) * T / dt
     return after - behind + (value - before + behind) * exp(-dt / T)
 
 
 def _stopped_short(before: Array, after: Array, wanted: Array, deadband: Array) -> Array:
-    """Where a controller with a deadband leaves the motor that would have moved from `before` to `after`: it stops the
-    moment it is near enough."""
+    """Motor position under a deadband: it would have moved from `before` to `after`, and stops the moment it is near
+    enough."""
     side = sign(wanted - before)
     near = absolute(wanted - before) <= deadband
     return where(near, before, side * minimum(side * after, side * wanted - deadband))

@@ -1,9 +1,8 @@
-"""The model that is fitted to data: equations (2) to (8) of the source paper, in the reading of
-docs/theory.md#equations-of-motion.
+"""Fitted model: equations (2) to (8) of the source paper, in the reading of docs/theory.md#equations-of-motion.
 
 The left side (masses, hull derivatives) comes from published regressions on the main dimensions; the right side holds
-p0..p10. Its structure (quadratic
-hull, lift and drag polynomials of the rudder) differs from the MMG simulator's on purpose.
+p0..p10. Its structure (quadratic hull, lift and drag polynomials of the rudder) differs from the MMG simulator's on
+purpose.
 """
 
 from __future__ import annotations
@@ -19,7 +18,8 @@ from .modifiers import Modifiers, is_neutral
 
 NUM_PARAMETERS = 11
 ALPHA_MAX = 1.2
-"""Angle of attack [rad] beyond which the lift and drag polynomials are held: cubic polynomials mean nothing there."""
+"""Angle of attack [rad] beyond which the lift and drag polynomials are held constant: cubic polynomials are not valid
+there."""
 
 
 @dataclass(frozen=True)
@@ -105,8 +105,8 @@ def coefficients(ship: Particulars) -> Coefficients:
 
 
 def propulsion(u: Array, n: Array, c: Coefficients, e: Modifiers | None = None) -> tuple[Array, Array, Array]:
-    """(X_n, V_A, race): thrust on the ship (1 - t) T [N], axial speed at the propeller and of its race [m/s]; n in
-    rpm."""
+    """Thrust and flow (X_n, V_A, race): thrust on the ship (1 - t) T [N], axial speed at the propeller and of its race
+    [m/s]; n in rpm."""
     e = e or Modifiers()
     V_A = u - (c.w_P0 + e.wake) * maximum(u, 0.0)  # no wake going astern: the propeller then leads
     thrust = propeller.thrust_quadratic(n / 60.0, V_A, c.D_P, c.kt, c.rho) * e.thrust
@@ -166,7 +166,7 @@ class _Inertia(NamedTuple):
 
 
 def _inertia(c: Coefficients, e: Modifiers) -> _Inertia:
-    """Masses of the left side, with what effects make of them."""
+    """Masses of the left side, as changed by effects."""
     if (
         all(is_neutral(field, 1.0) for field in (e.mass, e.m_x, e.m_y, e.J_z))
         and is_neutral(e.x_G, 0.0)
@@ -196,7 +196,7 @@ def accelerations(
     p: Sequence[Array],
     mods: Modifiers | None = None,
 ) -> tuple[Array, Array, Array]:
-    """(du, dv, dr) of eq. (2) [m/s^2, m/s^2, rad/s^2].
+    """Accelerations (du, dv, dr) of eq. (2) [m/s^2, m/s^2, rad/s^2].
 
     n in rpm, delta in rad, F_b and F_s in N; `air` is the ship's velocity relative to the air in body axes
     (`wind.apparent_wind`) or None without wind; p holds p0..p10: p0 lateral over axial propeller force [1], p1..p3
@@ -207,8 +207,8 @@ def accelerations(
     N_vrr v r^2/U would exceed the yaw damping N_rr r|r|: beyond, a ship set sideways by wind at low speed would spin up
     without limit.
 
-    X_e, Y_e, N_e are thrusters and measured wind. R(u) = -(p1 u + p2 u|u| + p3 u^3): it opposes the motion on both
-    tacks of u.
+    X_e, Y_e, N_e are thrusters and measured wind. R(u) = -(p1 u + p2 u|u| + p3 u^3): it opposes the motion for both
+    signs of u.
     """
     e = mods or Modifiers()
     f = e.hull

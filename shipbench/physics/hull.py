@@ -1,6 +1,6 @@
 """Hull forces of the MMG model: the published polynomial and the low-speed form that is regular at rest.
 
-Velocities are relative to the water, at midship. Returns (X_H, Y_H, N_H) in N and N m about midship.
+Velocities are relative to the water, at midship. Each returns (X_H, Y_H, N_H) in N and N m about midship.
 """
 
 from __future__ import annotations
@@ -117,8 +117,8 @@ def cross_flow(v: Array, r: Array, L: float, C_rY: float, C_rN: float) -> tuple[
 
 
 def tilted_cross_flow(v: Array, r: Array, L: float) -> tuple[Array, Array]:
-    """The same of a drag that grows along the length: integrals of 2 xi w|w| and 2 xi^2 w|w|, w = v + r L xi
-    (distributions along the hull: J. P. Hooft, Ocean Eng. 21 (1994) 329)."""
+    """Integrals of 2 xi w|w| and 2 xi^2 w|w|, w = v + r L xi, of a drag that grows along the length (distributions
+    along the hull: J. P. Hooft, Ocean Eng. 21 (1994) 329)."""
     Y, N = 0.0, 0.0
     for xi, weight in zip(_NODES.tolist(), _WEIGHTS.tolist(), strict=True):
         w = v + L * xi * r

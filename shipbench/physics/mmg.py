@@ -1,7 +1,8 @@
-"""The MMG ship: hull, propeller, rudder, thrusters, wind, current and depth summed into accelerations. This is the
+"""MMG ship: hull, propeller, rudder, thrusters, wind, current and depth summed into accelerations. This is the
 simulator's truth.
 
-The fitted model (`eq2`) is a different structure on purpose: data made and fitted with the same equations prove little.
+The fitted model (`eq2`) has a different structure on purpose: data made and fitted with the same equations prove
+little.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from .modifiers import Modifiers, is_neutral
 
 @dataclass(frozen=True)
 class MMGPropeller:
-    """Screw and wake; `form` is "quadratic" (K_T polynomial) or "four_quadrant" (B4-70, P/D 0.8)."""
+    """Propeller and wake; `form` is "quadratic" (K_T polynomial) or "four_quadrant" (B4-70, P/D 0.8)."""
 
     form: str
     D: float
@@ -50,7 +51,7 @@ class MMGActuators:
 
 @dataclass(frozen=True)
 class MMGShip:
-    """Everything the simulator knows of a ship; masses in kg, inertia in kg m^2, lengths in m."""
+    """Particulars and coefficients of a simulated ship; masses in kg, inertia in kg m^2, lengths in m."""
 
     name: str
     L: float
@@ -76,7 +77,7 @@ class MMGShip:
 
 @dataclass(frozen=True)
 class Environment:
-    """What surrounds the ship, uniform over the field; each value a float or one per run.
+    """Current, wind and depth, uniform over the field; each value a float or one per run.
 
     current_speed [m/s] and current_to [rad, direction it flows towards]; wind_speed [m/s] and wind_from [rad]; depth
     [m].
@@ -105,11 +106,12 @@ def accelerations(
     env: Environment = CALM,
     mods: Modifiers | None = None,
 ) -> tuple[Array, Array, Array]:
-    """(du, dv, dr) over ground at midship [m/s^2, m/s^2, rad/s^2]; n in rpm, delta in rad, F_b and F_s in N.
+    """Accelerations (du, dv, dr) over ground at midship [m/s^2, m/s^2, rad/s^2]; n in rpm, delta in rad, F_b and F_s in
+    N.
 
-    (m + m_x) du - (m + m_y) v r - m x_G r^2 = X;  (m + m_y) dv + (m + m_x) u r + m x_G dr = Y;
-    (I_zG + m x_G^2 + J_z) dr + m x_G (dv + u r) = N, all with velocities through the
-    water, to which the turning of a constant current is added. `mods` carries hidden effects.
+    (m + m_x) du - (m + m_y) v r - m x_G r^2 = X;  (m + m_y) dv + (m + m_x) u r + m x_G dr = Y; (I_zG + m x_G^2 + J_z)
+    dr + m x_G (dv + u r) = N, all with velocities through the water, to which the turning of a constant current is
+    added. `mods` carries hidden effects.
 
     Source: Yasukawa & Yoshimura (2015), eq. 4; current as in Fossen (2021), section 10.3.
     """

@@ -1,9 +1,9 @@
-"""Where a cause that the plain model leaves out enters it: one list of places, read by the simulated ship and by the
-fitted one alike.
+"""Modifications of a ship's equations by effects: one list of places, read by the simulated ship and by the fitted one
+alike.
 
-An effect (`shipbench.effects`) writes its formula once, as changes of these fields; what each ship makes of a field
-(its own rudder, hull and propeller) stays its own. That keeps hidden cause and named cause the same physics in two
-different structures.
+An effect (`shipbench.effects`) writes its formula once, as changes of these fields; each ship applies a field to its
+own rudder, hull and propeller. That keeps hidden cause and identified cause the same physics in two different
+structures.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .hull import DEEP, HullFactors
 
 
 class Flow(NamedTuple):
-    """What an effect may look at, at one instant: place [m], time since the run began [s], motion over ground,
+    """State of the flow for an effect, at one instant: place [m], time since the run began [s], motion over ground,
     actuators [rpm, rad, N, N]."""
 
     x: Array
@@ -107,7 +107,7 @@ class Modifiers:
         return self.u_c + self.drift * (u - air[0]), self.v_c + self.drift * (v - air[1])
 
     def wind_on(self, X: Array, Y: Array, N: Array) -> tuple[Array, Array, Array]:
-        """The wind's force [N] and moment [N m] on this ship, from those on an ordinary superstructure."""
+        """Wind force [N] and moment [N m] on this ship, from those on an ordinary superstructure."""
         return self.wind_X * X, self.wind_Y * Y, self.wind_N * N + self.wind_lever * Y
 
     def sideways(self, w_R: Array) -> Array:

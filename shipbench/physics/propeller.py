@@ -117,7 +117,7 @@ def race_speed(V_A: Array, thrust: Array, D: float, rho: float) -> Array:
 
 
 def race_through(V_A: Array, thrust: Array, D: float, rho: float) -> Array:
-    """The same of a propeller that drives ahead in a flow which may come from astern: negative where that is the
-    stronger of the two."""
+    """Axial speed far behind a propeller that drives ahead in a flow which may come from astern: negative where that is
+    the stronger of the two."""
     s = V_A * absolute(V_A) + 8.0 * thrust / (rho * math.pi * D**2)
     return s / sqrt(sqrt(s * s + 1e-8))

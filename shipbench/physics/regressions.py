@@ -2,8 +2,7 @@
 L T U^2.
 
 Validity: merchant ships. Against measured KCS and KVLCC2 values the linear derivatives are off by 10 to 25 %, the cubic
-ones by 50 % and
-more: a fit that calls them exact inherits that.
+ones by 50 % and more: a fit that takes them as exact has these errors.
 """
 
 from __future__ import annotations
@@ -92,6 +91,6 @@ def surge_added_mass(displacement: float, L: float, rho: float) -> float:
 
 
 def hull_rudder_interaction(L: float, B: float, Cb: float) -> tuple[float, float]:
-    """(a_H, x'_H): force increase factor 3.6 Cb B/L and its point of application, -0.4 L (Yoshimura & Masumoto
-    2012)."""
+    """Interaction (a_H, x'_H): force increase factor 3.6 Cb B/L and its point of application, -0.4 L (Yoshimura &
+    Masumoto 2012)."""
     return 3.6 * Cb * B / L, -0.4

@@ -17,8 +17,7 @@ def apparent_wind(psi: Array, u: Array, v: Array, wind_speed: Array, wind_from: 
 
 
 KINDS = {"true": (0.0, 0.0), "true-bow": (1.0, 0.0), "apparent-north": (0.0, 1.0), "apparent": (1.0, 1.0)}
-"""How a wind may be recorded -> whether its direction counts from the bow, and whether the ship's own motion is in
-it."""
+"""Kinds of recorded wind -> whether its direction counts from the bow, and whether the ship's own motion is in it."""
 
 
 def true_wind(psi: Array, u: Array, v: Array, speed: Array, come_from: Array, kind: str) -> tuple[Array, Array]:
