@@ -195,7 +195,8 @@ def _fewer(rest: list[Run], task: Task, index: int) -> tuple[list[Run], int | No
 
 
 def split_notes(dataset: Dataset, task: Task) -> tuple[str, ...]:
-    """What a reader must know of an extrapolation split: which fold scores which kind, or where the speeds part."""
+    """Notes on an extrapolation split: the kind that each fold scores, or the speeds that separate training and test
+    runs."""
     if task.split == "kind":
         pairs = _by_kind(dataset)
         return tuple(
@@ -213,7 +214,7 @@ def split_notes(dataset: Dataset, task: Task) -> tuple[str, ...]:
 
 
 def _pairs(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]:
-    """(rest, test) of each fold."""
+    """Remaining and scored runs (rest, test) of each fold."""
     if task.split == "published":
         return _published(dataset)
     if task.split == "kind":

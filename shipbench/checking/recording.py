@@ -35,10 +35,12 @@ class Recording:
 
     @property
     def runs(self) -> tuple[Run, ...]:
+        """Runs of the data set."""
         return self.dataset.runs
 
     @property
     def dt(self) -> float:
+        """Sample time [s]."""
         return self.dataset.dt
 
     @property
@@ -75,6 +77,7 @@ class Recording:
         return self.parent.get(run.id, run.id)
 
     def names(self, runs: Any) -> tuple[str, ...]:
+        """Ids of runs as the user knows them, each once."""
         return tuple(dict.fromkeys(self.name_of(run) for run in runs))
 
     def without(self, bad: dict[str, np.ndarray]) -> Recording:
@@ -101,4 +104,5 @@ class Recording:
         return replace(self, dataset=self.dataset.with_runs(runs), parent=parent)
 
     def with_dataset(self, dataset: Dataset) -> Recording:
+        """Recording with another data set."""
         return replace(self, dataset=dataset)

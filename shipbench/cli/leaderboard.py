@@ -1,4 +1,4 @@
-"""`shipbench leaderboard` and `shipbench learning-curve`."""
+"""Commands of leaderboards: `shipbench leaderboard` and `shipbench learning-curve`."""
 
 from __future__ import annotations
 

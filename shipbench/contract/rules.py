@@ -164,7 +164,7 @@ def start(c: Subject) -> str:
 
 
 def repeatable(c: Subject) -> str:
-    """`predict` changes nothing in the model and draws nothing: asked again, after another question, it says the
+    """`predict` changes nothing in the model and draws nothing: called again, after another call, it returns the
     same."""
     batch = c.batch
     first = c.S
@@ -201,7 +201,7 @@ def single_run(c: Subject) -> str:
 
 
 def batch_independence(c: Subject) -> str:
-    """What is predicted for a run depends neither on the runs beside it nor on their order."""
+    """The prediction for a run depends neither on the runs beside it nor on their order."""
     batch = c.batch
     loop = np.concatenate([c.ask(batch.s0[i : i + 1], batch.U[i : i + 1]) for i in range(len(batch.s0))])
     said = c.same(loop, c.S, ROUNDING, "run by run")

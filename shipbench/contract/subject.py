@@ -75,7 +75,7 @@ class Subject:
 
     @property
     def few(self) -> Dataset:
-        """Some of the runs to fit on, for rules that only test whether a fit works."""
+        """Runs to fit on, fewer, for rules that only test whether a fit works."""
         return self.parts[0].subset(range(min(4, len(self.parts[0]))))
 
     def fit(self, state: int, *, train: Dataset | None = None) -> Fitted:
@@ -97,6 +97,7 @@ class Subject:
 
     @property
     def model(self) -> Any:
+        """Model of `fitted`."""
         return self.fitted.model
 
     @cached_property

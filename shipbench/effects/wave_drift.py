@@ -35,9 +35,9 @@ class WaveDrift(Effect):
     ahead, moment = 0.3, -0.1
 
     def fitted(self, L: float) -> tuple[Self, ...]:
-        """With the force ahead of short waves, and five times that, as waves of the ship's length push her (added
-        resistance in head waves: 3 to 10 rho g B^2/L times the amplitude squared, Faltinsen et al. 1980); and with the
-        moment either way, as bow or stern are the fuller."""
+        """Effects with the force ahead of short waves, and five times that, as waves of the ship's length push her
+        (added resistance in head waves: 3 to 10 rho g B^2/L times the amplitude squared, Faltinsen et al. 1980); and
+        with the moment either way, as bow or stern are the fuller."""
         found = []
         for ahead in (self.ahead, 5.0 * self.ahead):
             for moment in (self.moment, -self.moment):

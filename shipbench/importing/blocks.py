@@ -24,6 +24,7 @@ class Block:
             object.__setattr__(self, "new", np.zeros(len(self.t), bool))
 
     def rows(self, select: slice | np.ndarray) -> Block:
+        """Block of some rows."""
         return Block(self.t[select], self.values[select], self.new[select])
 
 

@@ -32,6 +32,7 @@ class Piece:
     derived: dict[str, Smoothed] = field(default_factory=dict)
 
     def rows(self, begin: int, end: int) -> Piece:
+        """Piece of some samples."""
         return Piece(self.t[begin:end], {k: v[begin:end] for k, v in self.columns.items()}, self.origin, self.derived)
 
 

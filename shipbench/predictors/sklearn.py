@@ -1,4 +1,4 @@
-"""Any scikit-learn regressor as a one-step model, `sklearn:HistGradientBoostingRegressor[max_iter=50]` (needs the extra
+"""Regressors of scikit-learn as one-step models, `sklearn:HistGradientBoostingRegressor[max_iter=50]` (needs the extra
 `sklearn`).
 
 It learns y_k+1 - y_k from y_k and the inputs at k, both standardised, and is rolled out like the paper's network. A

@@ -79,7 +79,7 @@ class Segments:
     working: frozenset[str] = frozenset(STATES[ACTUATORS])
 
     def thinned(self, most: int) -> Segments:
-        """At most `most` segments, evenly spread; every run keeps at least one."""
+        """Segments evenly spread, at most `most`; every run keeps at least one."""
         if len(self.run) <= most:
             return self
         first = np.flatnonzero(np.diff(self.run, prepend=-1))
@@ -198,10 +198,10 @@ class Plant:
         self.knots = int(np.ceil(self.steps * segments.dt / self.knot_time)) + 1
         at = np.minimum(np.arange(self.steps + 1) * segments.dt / self.knot_time, self.knots - 1 - 1e-9)
         self.hat = np.maximum(1.0 - np.abs(at[:, None] - np.arange(self.knots)), 0.0)
-        """(K + 1, knots): interpolation matrix of the latent acceleration from its knots to the samples, piecewise
+        """Interpolation matrix (K + 1, knots) of the latent acceleration from its knots to the samples, piecewise
         linear."""
         self.parts = (np.arange(self.substeps)[:, None] + 0.5 * np.arange(3)) / self.substeps
-        """(substeps, 3): times of the integration stages within a sample, as shares of the sample time."""
+        """Times (substeps, 3) of the integration stages within a sample, as shares of the sample time."""
         k = np.arange(self.steps)[:, None, None]
         t = segments.start[:, None, None] + np.minimum(k + self.parts, k + 1.0 - 1e-9)[:, None] * segments.dt
         wind = None if segments.wind is None else np.swapaxes(segments.wind[:, :-1], 0, 1)
@@ -241,7 +241,7 @@ class Plant:
         return plant
 
     def thinned(self, most: int) -> Plant:
-        """At most `most` of its segments, evenly spread; every run keeps at least one."""
+        """Forward model of at most `most` of its segments, evenly spread; every run keeps at least one."""
         return self if len(self.seg.run) <= most else Plant(self.ship, self.seg.thinned(most), self.long, self.ordinary)
 
     def where(self, wanted: np.ndarray) -> Plant:
@@ -380,7 +380,7 @@ class Plant:
         return (1.0 - part) * ends[:-1] + part * ends[1:]
 
     def _by_sample(self, path: np.ndarray | None) -> np.ndarray:
-        """(K, B, substeps, 3, 4) from a path (B, steps * substeps, 3, 4)."""
+        """Path by sample (K, B, substeps, 3, 4) from a path (B, steps * substeps, 3, 4)."""
         path = self.path if path is None else path
         return np.moveaxis(path.reshape(len(path), self.steps, self.substeps, 3, 4), 1, 0)
 

@@ -58,10 +58,12 @@ class Analysis:
 
     @property
     def final(self) -> Fit:
+        """Fit with the causes found."""
         return self.selection.final
 
     @property
     def standard(self) -> Standard:
+        """Standard for the causes."""
         return Standard(self.selection.null, self.threshold, self.selection.off_form)
 
     def score(self, index: int) -> tuple[float, int, str]:

@@ -175,14 +175,13 @@ def overlap(fit: Fit, term: Term, value: np.ndarray) -> dict[str, float]:
 
 
 def changes(fit: Fit) -> list[Score]:
-    """For every candidate with one value for all runs: its best beginning at a run, if that is better than from the
-    first run on; best first.
+    """Best beginning at a run of every candidate with one value for all runs, if that is better than from the first run
+    on; best first.
 
     Two coefficients, one for all runs and one from run k on, are free; the score is that of the second beside the
     first, less 2 log N for the choice of k. The order of the runs is taken for their order in time. Where the kinds of
-    manoeuvre change with it, a change is not told from what the model lacks in one of them, and none is looked for.
-    What the run that speaks most for it carries nearly alone is no change: a hull or propeller that is not of the
-    fitted form does that.
+    manoeuvre change with it, a change is confounded with the model's errors in one of them, and none is searched. A
+    change that one run supports nearly alone is none: a hull or propeller that is not of the fitted form does that.
     """
     (S, base, columns), barred = _of_all_runs(fit), other_kinds_from(fit.plant.seg.kinds)
     begins = np.array([k for k in places(len(S)) if k not in barred], dtype=int)

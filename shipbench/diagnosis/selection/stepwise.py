@@ -143,11 +143,11 @@ class Beginning:
 
 
 def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) -> list[tuple[Fit, float]]:
-    """`now` with each of the candidates, and what it gains (2 log evidence), or promised to gain when it was given up
-    beside a better one that gains more than the threshold.
+    """Refits of `now` with each of the candidates, and the score of each (2 log Bayes factor), or its predicted score
+    when it was given up beside a better one above the threshold.
 
-    In the order of their scores at `origin`, where refits begin, at a glance: what comes first is mostly the best,
-    beside which others are given up soon.
+    They are in the order of their scores at `origin`, where refits begin: the first is mostly the best, beside which
+    others are given up soon.
     """
     if not scores:
         return []

@@ -38,6 +38,7 @@ class Column:
 
     @property
     def is_text(self) -> bool:
+        """Whether the cells are texts."""
         return bool(pa.types.is_string(self.cells.type) or pa.types.is_large_string(self.cells.type))
 
     @property

@@ -85,7 +85,7 @@ class Recipe:
 
 
 class BestWeights:
-    """Per-member early stopping: the weights of the lowest score until the member stops."""
+    """Early stopping per member: the weights of the lowest score until the member stops."""
 
     def __init__(self, task: StackedTask, patience: int | None, min_delta: float) -> None:
         self.patience, self.min_delta = patience, min_delta

@@ -33,6 +33,7 @@ class Planting:
 
     @property
     def ids(self) -> list[str]:
+        """Names of the runs."""
         return list(self.table["trajectory"].unique())
 
     def rows(self, run: str) -> np.ndarray:
@@ -116,6 +117,7 @@ def late(*channels: str, seconds: float) -> Callable[[Planting], None]:
 
 
 def vector_late(p: Planting) -> None:
+    """Record the velocities 5 s (at 130 m) late as a vector in the earth's axes."""
     turn = np.exp(1j * p.table["psi"])
     vector = (p.table["u"] + 1j * p.table["v"]) * turn
     p.table["u"], p.table["v"] = np.real(vector), np.imag(vector)
@@ -126,6 +128,8 @@ def vector_late(p: Planting) -> None:
 
 
 def enu(v: float, r: float) -> Callable[[Planting], None]:
+    """Record x east, y north and psi counterclockwise from east; factors `v` and `r` of sway and yaw rate."""
+
     def plant(p: Planting) -> None:
         p.table[["x", "y"]] = p.table[["y", "x"]].to_numpy()
         p.table["psi"] = np.pi / 2.0 - p.table["psi"]
@@ -136,15 +140,19 @@ def enu(v: float, r: float) -> Callable[[Planting], None]:
 
 
 def swapped(p: Planting) -> None:
+    """Exchange x and y."""
     p.table[["x", "y"]] = p.table[["y", "x"]].to_numpy()
 
 
 def from_east(p: Planting) -> None:
+    """Record the heading counterclockwise from east."""
     p.table["psi"] = wrap_angle(np.pi / 2.0 - p.table["psi"].to_numpy())
     p.table["psi"] = p.table.groupby("trajectory")["psi"].transform(lambda s: np.unwrap(s))
 
 
 def earth(first: str, second: str) -> Callable[[Planting], None]:
+    """Record the velocity north and east in the channels `first` and `second`."""
+
     def plant(p: Planting) -> None:
         vector = (p.table["u"] + 1j * p.table["v"]) * np.exp(1j * p.table["psi"])
         p.table[first], p.table[second] = np.real(vector), np.imag(vector)
@@ -153,18 +161,22 @@ def earth(first: str, second: str) -> Callable[[Planting], None]:
 
 
 def through_water(p: Planting) -> None:
+    """Record velocities through water that flows at 0.5 m/s (at 130 m) in a drawn direction."""
     way = 0.5 * p.time * np.exp(1j * p.rng.uniform(-np.pi, np.pi)) * np.exp(-1j * p.table["psi"])
     p.table["u"] -= np.real(way)
     p.table["v"] -= np.imag(way)
 
 
 def off_midship(p: Planting) -> None:
+    """Record the position of an antenna 8 m forward and 2 m to starboard of midship (at 130 m)."""
     arm = (8.0 + 2.0j) * p.length * np.exp(1j * p.table["psi"])
     p.table["x"] += np.real(arm)
     p.table["y"] += np.imag(arm)
 
 
 def plus(share_of_runs: float = 1.0, **offsets: float) -> Callable[[Planting], None]:
+    """Add `offsets` to channels, in a share of the runs; those of r at 130 m."""
+
     def plant(p: Planting) -> None:
         for run in p.ids if share_of_runs == 1.0 else p.pick(max(1, round(share_of_runs * len(p.ids)))):
             for channel, offset in offsets.items():
@@ -174,6 +186,7 @@ def plus(share_of_runs: float = 1.0, **offsets: float) -> Callable[[Planting], N
 
 
 def repeated(p: Planting) -> None:
+    """Repeat the position of the sample before in 5 % of the samples."""
     at = p.rng.random(len(p.table)) < 0.05
     at[0] = False
     at &= (p.table["trajectory"] == p.table["trajectory"].shift()).to_numpy()
@@ -182,6 +195,8 @@ def repeated(p: Planting) -> None:
 
 
 def frozen(*channels: str, seconds: float = 15.0) -> Callable[[Planting], None]:
+    """Freeze channels for `seconds` (at 130 m) in an eighth of the runs, where the heading changes most."""
+
     def plant(p: Planting) -> None:
         samples = round(seconds * p.time / p.dt)
         turning = p.table.groupby("trajectory")["psi"].agg(np.ptp).sort_values(ascending=False)
@@ -194,6 +209,7 @@ def frozen(*channels: str, seconds: float = 15.0) -> Callable[[Planting], None]:
 
 
 def stuck_rudder(p: Planting) -> None:
+    """Freeze the rudder for 25 s (at 130 m) after a large step of its command."""
     swing = p.table.groupby("trajectory")["delta_c"].agg(np.ptp)
     run = str(swing.index[int(np.argmax(swing))])
     at = p.rows(run)
@@ -213,6 +229,8 @@ def spiked(channel: str, size: float, power: float) -> Callable[[Planting], None
 
 
 def jumped(channel: str, size: float, power: float) -> Callable[[Planting], None]:
+    """Add a lasting step of `size` at 130 m, scaled with L to that power, in two runs."""
+
     def plant(p: Planting) -> None:
         for run in p.pick(2):
             p.table.loc[p.rows(run)[p.moment(run) :], channel] += p.rng.choice([-1.0, 1.0]) * size * p.length**power
@@ -221,12 +239,15 @@ def jumped(channel: str, size: float, power: float) -> Callable[[Planting], None
 
 
 def without_rows(p: Planting) -> None:
+    """Remove four rows from two runs."""
     for run in p.pick(2):
         k = p.moment(run, 4)
         p.table = p.table.drop(index=p.rows(run)[k : k + 4])
 
 
 def nan(where: str) -> Callable[[Planting], None]:
+    """Replace values by NaN in two runs: velocities, whole rows, or the last 20 rows."""
+
     def plant(p: Planting) -> None:
         for run in p.pick(2):
             at, k = p.rows(run), p.moment(run, 4)
@@ -237,12 +258,15 @@ def nan(where: str) -> Callable[[Planting], None]:
 
 
 def text(p: Planting) -> None:
+    """Write a word into three cells of u."""
     p.table["u"] = p.table["u"].astype(object)
     for k in p.rng.choice(len(p.table), 3, replace=False):
         p.table.loc[k, "u"] = "error"
 
 
 def time(kind: str) -> Callable[[Planting], None]:
+    """Change the time stamps: another dt in dataset.toml, a start at 1000 samples, a stamp twice, or uneven steps."""
+
     def plant(p: Planting) -> None:
         if kind == "dt":
             p.toml["dt"] = 2.0 * p.dt
@@ -259,6 +283,8 @@ def time(kind: str) -> Callable[[Planting], None]:
 
 
 def copied(kind: str) -> Callable[[Planting], None]:
+    """Add a run with samples of another: the whole, a piece, or an overlap with new samples after it."""
+
     def plant(p: Planting) -> None:
         at = p.rows(p.ids[3])
         part = {"whole": at, "piece": at[20 : 20 + len(at) // 2], "overlap": at[len(at) // 2 :]}[kind]
@@ -274,6 +300,7 @@ def copied(kind: str) -> Callable[[Planting], None]:
 
 
 def cut_log(p: Planting) -> None:
+    """Cut one run into two that continue each other."""
     at = p.rows(p.ids[2])
     p.table.loc[at[len(at) // 2 :], "trajectory"] = "second_half"
     p.table.loc[at[len(at) // 2 :], "t"] -= p.table.loc[at[len(at) // 2], "t"]
@@ -282,16 +309,19 @@ def cut_log(p: Planting) -> None:
 
 
 def commands(p: Planting) -> None:
+    """Record the commands of the sample before as actuator positions."""
     for name in ("n", "delta", "F_b", "F_s"):
         p.table[name] = p.table.groupby("trajectory")[f"{name}_c"].shift(1).fillna(p.table[f"{name}_c"])
 
 
 def commands_only(p: Planting) -> None:
+    """Record the commands as actuator positions, without command columns."""
     commands(p)
     p.table = p.table.drop(columns=["n_c", "delta_c", "F_b_c", "F_s_c"])
 
 
 def wind_to(p: Planting) -> None:
+    """Record the direction that the wind blows to."""
     p.table["wind_from"] = wrap_angle(p.table["wind_from"].to_numpy() + np.pi)
 
 
@@ -319,9 +349,11 @@ def wrapped(p: Planting) -> None:
 
 
 def degrees_wrapped(p: Planting) -> None:
+    """Record the heading in degrees from 0 to 360."""
     p.table["psi"] = np.rad2deg(p.table["psi"]) % 360.0
 
 
 def coarse(p: Planting) -> None:
+    """Record the rudder in steps of 0.56 deg."""
     step = np.deg2rad(0.56)
     p.table["delta"] = np.round(p.table["delta"] / step) * step

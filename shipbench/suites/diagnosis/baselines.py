@@ -41,6 +41,7 @@ class Ranking:
 
     @property
     def verdict(self) -> str:
+        """Verdict of the method by the effects that it reports."""
         return "found" if self.named else "none"
 
 

@@ -92,6 +92,7 @@ class Case:
 
     @property
     def key(self) -> str:
+        """Name of the case in file names."""
         return f"{self.which}-{self.kind}-{self.seed}-{self.index:04d}"
 
     @cached_property

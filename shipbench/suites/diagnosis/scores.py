@@ -54,6 +54,7 @@ def wilson(hits: int, total: int) -> tuple[float, float]:
 
 
 def ok(row: Row) -> bool:
+    """Whether the case was diagnosed without an error."""
     return row["status"] == "ok"
 
 
@@ -72,6 +73,7 @@ def first(row: Row, skip_hull: bool = False) -> str:
 
 
 def right(row: Row, skip_hull: bool = False) -> bool:
+    """Whether the first identified cause is a true one."""
     return first(row, skip_hull) in row.get("truth", ())
 
 
@@ -85,6 +87,7 @@ def right_class(row: Row, skip_hull: bool = False) -> bool:
 
 
 def exact_pair(row: Row, skip_hull: bool = True) -> bool:
+    """Whether the identified causes are exactly the true ones."""
     return ok(row) and set(named(row, skip_hull)) == set(row["truth"])
 
 
@@ -94,6 +97,7 @@ def alarm(row: Row, skip_hull: bool = False) -> bool:
 
 
 def says_unknown(row: Row) -> bool:
+    """Whether the verdict is `unknown`."""
     return ok(row) and row["verdict"] == "unknown"
 
 

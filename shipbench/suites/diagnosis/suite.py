@@ -57,6 +57,7 @@ class Job:
 
     @property
     def key(self) -> str:
+        """Name of the job in file names."""
         return f"{self.which}-{self.kind}-{self.seed}-{self.index:04d}"
 
     def signature(self) -> dict[str, Any]:
