@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.selection.screening import other_kinds_from
 from shipbench.effects.base import EFFECTS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset, Run
@@ -50,31 +49,6 @@ def test_a_change_is_named_among_mixed_manoeuvres_and_not_where_other_manoeuvres
         "not looked for at 7 of 7 places"
         in next(c for c in verdict.candidates if c.effect == "change_point").rejected_because
     )
-
-
-@pytest.mark.parametrize(
-    ("kinds", "other"),
-    [
-        ("tztztztz", []),
-        ("ttttzzzz", [3, 4, 5]),
-        ("tttttttt", []),
-        ("tttt?zzz", []),
-        ("ttztttzttz", []),
-        ("ttttttttzz", [7]),
-        ("tz", []),
-    ],
-)
-def test_other_kinds_of_manoeuvre_begin_where_less_than_half_is_alike(kinds: str, other: list[int]):
-    assert other_kinds_from(["" if k == "?" else k for k in kinds]) == other
-
-
-def test_kinds_that_come_in_random_order_leave_places_for_a_change():
-    """Of six kinds in 24 runs less than half is alike before and after any run, as in most random orders; apart in
-    order, all places are barred."""
-    barred = other_kinds_from("szzzzrrczcttteetssreress")
-    assert 15 not in barred
-    assert len(barred) < 13
-    assert other_kinds_from("sssszzzzrrrrcccctttteeee") == [*range(3, 22)]
 
 
 @pytest.mark.parametrize(

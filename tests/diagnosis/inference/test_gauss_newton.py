@@ -163,3 +163,13 @@ def test_the_evidence_for_a_hull_off_the_regressions_is_that_of_two_linear_model
         for width in (1.0, 0.1)
     )
     assert hull_evidence(null) == pytest.approx(2.0 * (wide - narrow), abs=0.05)
+
+
+def test_a_refit_ends_where_another_start_does(plant):
+    """The evidence belongs to the model, not to the path of the fit."""
+    scales = Scales(plant)
+    origin = Origin.of(plant, scales)
+    one = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion)
+    far = replace(origin.point, base=origin.point.base + 0.5 * np.cos(np.arange(len(origin.point.base))))
+    other = fit(plant, scales, Model(), far, origin.hyper, guess=origin.motion)
+    assert other.evidence == pytest.approx(one.evidence, abs=0.5)
