@@ -9,12 +9,16 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy and torch load: py
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 from toy_ship import toy, toy_folder
 
 from shipbench.contract.small import small_harbour
 from shipbench.records import Dataset
 
 __all__ = ["toy", "toy_folder"]
+
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.load_profile("repeatable")
 
 
 @pytest.fixture(scope="session")

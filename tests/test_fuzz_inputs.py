@@ -30,9 +30,7 @@ sys.modules["fuzz_inputs"] = fuzz_inputs
 if sys.platform != "win32":
     spec.loader.exec_module(fuzz_inputs)
 
-DRAWN = settings(
-    derandomize=True, deadline=None, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+DRAWN = settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 SHIP = 'name = "toy"\nL = 50.0\nB = 8.0\nT = 3.0\nmass = 9e5\n'
 HEAD = "trajectory,t,x,y,psi,u,v,r\n"
 
