@@ -13,6 +13,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from shipbench.effects.base import EFFECTS
+
 pytest.importorskip("yaml", reason="mkdocs is not installed (extra `docs`)")
 ROOT = Path(__file__).parents[1]
 PAGES = [
@@ -63,6 +65,7 @@ def _hooks():
                 module = importlib.util.module_from_spec(spec)
                 spec.loader.exec_module(module)
                 if hasattr(module, "on_page_markdown"):
+                    vars(module)["_picture"] = lambda effect: None  # only words are read here
                     yield module
     finally:
         sys.path.remove(str(ROOT / "docs"))
@@ -97,6 +100,16 @@ def test_sentences_are_parted_and_counted() -> None:
     )
     text += "\n- five six\n- seven $x + y$ eight\n"
     assert [len(_words(s)) for s in sentences(text)] == [6, 8, 2, 3]
+
+
+def test_the_catalogue_of_causes_has_a_picture_of_each() -> None:
+    sys.path.insert(0, str(ROOT / "docs"))
+    try:
+        import effects_hook
+    finally:
+        sys.path.remove(str(ROOT / "docs"))
+    assert effects_hook._picture(EFFECTS.get("current")).startswith('<svg role="img" aria-label="current: tracks')
+    assert effects_hook._picture(EFFECTS.get("unit_or_sign_error")) is None
 
 
 def test_readme_has_no_commit_and_no_date() -> None:

@@ -6,12 +6,30 @@ import json
 import re
 
 import numpy as np
+import pytest
 from typer.testing import CliRunner
 
 from shipbench.cli.app import app
+from shipbench.data import demo
 from shipbench.data.demo import SPEED, TOWARDS
 
 
+def test_a_trial_too_short_to_name_its_current_has_all_lines_and_files_too(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(demo, "RUNS", 3)
+    monkeypatch.setattr(demo, "SAMPLES", 61)
+    done = CliRunner().invoke(app, ["demo", "-q"])
+    assert done.exit_code == 0, done.output
+    lines = done.stdout.splitlines()
+    assert len(lines) == 5
+    assert lines[0].endswith("Found: nothing.")
+    assert re.fullmatch(r".*held-out runs: hold [\d.]+ m, physics [\d.]+ m\.", lines[1])
+    assert json.loads((tmp_path / "demo" / "diagnosis" / "diagnosis.json").read_text())["causes"] == []
+    assert 'href="./diagnosis/report.html"' in (tmp_path / "demo" / "report.html").read_text()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["demo"]
+
+
+@pytest.mark.long
 def test_demo_finds_the_current_and_says_so_in_five_lines(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, ["demo", "-q"])
