@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from shipbench.bench.regimes import COLUMNS as REGIME_COLUMNS
 from shipbench.bench.results import PROTOCOL
 from shipbench.bench.submissions import Results
+from shipbench.metrics.trial_indices import NAMES as TRIAL_NAMES
 
 COLUMNS = [
     {"name": "ed", "label": "ED", "unit": "m"},
@@ -58,3 +60,29 @@ def many(seed, runs=30, offset=0.0):
     """ED of two folds of runs."""
     rng = np.random.default_rng(seed)
     return [(rng.lognormal(size=runs // 2) + offset).tolist() for _ in range(2)]
+
+
+def first_table(board):
+    """Rows of the first table by model."""
+    return {row["model"]: row for row in board.tables[0].rows}
+
+
+def by_title(board, words):
+    """The first table with these words in its title."""
+    return next(t for t in board.tables if words in t.title)
+
+
+def windows_of(found, **values):
+    """Motion of the true ship by window: 0 and no manoeuvre, but for `values`."""
+    frame = found.rows.drop_duplicates(["fold", "run"])[["dataset", "fingerprint", "task", "fold", "run"]].reset_index(
+        drop=True
+    )
+    blank = dict.fromkeys(REGIME_COLUMNS[:5], 0.0) | dict.fromkeys(TRIAL_NAMES, np.nan)
+    return frame.assign(**(blank | values))
+
+
+def with_columns(found, columns):
+    """Results with further columns of the rows."""
+    made = Results(found.rows.assign(**columns), found.summaries, found.sources)
+    made.__dict__["windows"] = found.windows  # a cached property
+    return made

@@ -3,9 +3,8 @@ dropped."""
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from made_fits import fit_to, made_analysis, made_fit
+from made_fits import made_analysis, made_fit
 
 from shipbench.diagnosis.explain import rivals_of
 from shipbench.diagnosis.model.term import Term
@@ -47,16 +46,3 @@ def test_wind_and_waves_are_told_as_confused_where_their_formulas_decide(named: 
     """Drift in waves by another formula on a tanker: wind was ahead by 25 of 706, and waves not spoken of."""
     steps, cause = [step(0, named, 706.0), step(0, other, 681.0)], Term(EFFECTS.get(named))
     assert rivals_of(made_analysis(made_fit((cause,)), steps), cause) == ((other,) if told else ())
-
-
-@pytest.mark.parametrize(
-    ("names", "told"),
-    [(("wind",), "with and without it"), (("wind", "list"), "with and without it beside the other causes")],
-)
-def test_a_cause_alone_is_not_told_to_be_beside_others(names: tuple[str, ...], told: str):
-    terms = [Term(EFFECTS.get(name)) for name in names]
-    S = np.tile(np.eye(sum(t.size for t in terms) + 1), (3, 1, 1))
-    S[:, 0, -1] = S[:, -1, 0] = 10.0  # three runs agree on the first component of the wind
-    final = fit_to(terms, S)
-    assert final.worth(0) > 100.0
-    assert made_analysis(final).score(0) == (final.worth(0), 3, told)

@@ -11,14 +11,12 @@ import pytest
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.model.forward import HULL, NUM_HULL, Plant
 from shipbench.diagnosis.model.linearisation import hull_changes
-from shipbench.diagnosis.selection.analysis import THRESHOLD, asked, plain_model
+from shipbench.diagnosis.selection.analysis import THRESHOLD, plain_model
 from shipbench.diagnosis.selection.stepwise import select
-from shipbench.diagnosis.selection.unknown import Dependence
 from shipbench.effects.base import EFFECTS
 from shipbench.ops import Array
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.physics.modifiers import Flow, Modifiers
-from shipbench.physics.thruster import fading
 from shipbench.records import Dataset
 from shipbench.ship import Particulars, complete
 from shipbench.signals import U
@@ -155,36 +153,3 @@ def test_currents_of_single_runs_are_named_on_a_large_tanker():
     """A hull without damping explained them as well."""
     found = select(plain_model(Plant.of(draw_case("published", 57, 0).dataset())), THRESHOLD)
     assert [t.label for t in found.final.model.terms] == ["current_per_run"]
-
-
-def test_thrusters_fade_alike_ahead_and_astern_and_not_at_rest():
-    speeds = np.array([0.0, 3.57, -3.57, 100.0])
-    np.testing.assert_allclose(fading(speeds, 130.0), [0.0, 1.0 - np.exp(-1.0), 1.0 - np.exp(-1.0), 1.0], rtol=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("variable", "axis", "taken", "told"),
-    [
-        ("time", "yaw", 0.03, False),  # motion with the waves: the latent force is as large without it
-        ("time", "yaw", 0.3, True),
-        ("heading", "yaw", 0.03, True),
-        ("nothing", "surge", 0.3, False),  # a resistance of another form
-        ("nothing", "sway", 0.3, True),
-    ],
-)
-def test_what_is_asked_of_an_unknown_force(variable, axis, taken, told):
-    force = Dependence(variable, axis, "form", 24.0, 0.3, 0.6, taken)
-    assert (force.score > asked(force, off_form=5.0)) == told
-
-
-def test_what_is_asked_of_an_unknown_force_does_not_leap_at_what_is_noticeable():
-    """S175, ten standard manoeuvres, nothing hidden: 101 for a sway force that took 1 % more than that, where the leap
-    asked 88."""
-    scores = [
-        asked(Dependence("rudder", "sway", "form", 100.0, 0.6, 0.6, taken), off_form=5.0)
-        for taken in np.linspace(0.08, 0.32, 49)
-    ]
-    assert scores[12] == pytest.approx(80.0)
-    assert scores[-1] == 40.0
-    assert -2.0 < np.min(np.diff(scores)) < 0.0
-    assert np.max(np.diff(scores)) == 0.0

@@ -11,7 +11,7 @@ import pytest
 from shipbench import kept_code
 from shipbench.diagnosis.actuators import identify as gears
 from shipbench.diagnosis.actuators.identify import _Record, find_in_gears
-from shipbench.diagnosis.actuators.kinds import GearFinding, kinds_of, slow_on_any_ship
+from shipbench.diagnosis.actuators.kinds import GearFinding, kinds_of
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.evaluation.held_out_gain import rollout_plant
 from shipbench.diagnosis.model.forward import Plant
@@ -217,18 +217,3 @@ def test_a_lag_behind_the_record_follows_the_motor_where_orders_drive_the_ship(a
         for gear in (ordinary, replace(ordinary, **{field: getattr(ordinary, field) + 3.0}))
     )
     np.testing.assert_allclose(plant.path_of([Active(EFFECTS.get("rudder_lag"), (3.0,))]), goal.path, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("effect", "actuator", "gear", "slow"),
-    [
-        ("shaft_lag", "n", Gear(25.0, 10.0), True),  # a Diesel of 12 s on a ship of 130 m needs 21 s on one of 400 m
-        ("shaft_lag", "n", Gear(15.0, 10.0), False),
-        ("rudder_rate_limit", "delta", Gear(1.0, np.deg2rad(0.6)), True),
-        ("rudder_rate_limit", "delta", Gear(1.0, np.deg2rad(1.6)), False),
-        ("rudder_delay", "delta", Gear(1.0, 0.1, delay=1.0), True),
-    ],
-)
-def test_what_is_slow_for_the_longest_ship_is_slow_for_any(effect, actuator, gear, slow):
-    found = GearFinding(effect, 100.0, 1.0, (0.9, 1.1), np.zeros(4), actuator, gear)
-    assert slow_on_any_ship(found) is slow
