@@ -61,7 +61,7 @@ def _without_consequences(found: list[Finding]) -> list[Finding]:
     rudder seems late. Under a speed-log dropout the track identifies nothing else; a meaningless yaw rate says nothing
     on the rudder.
     """
-    if any(f.kind == "log reads nothing" for f in found):
+    if any(f.kind == "speed-log dropout" for f in found):
         found = [f for f in found if f.check not in ("track", "spikes") or not set(f.channels) <= {"x", "y", "u", "v"}]
     if any(f.kind == "unrelated" for f in found):
         found = [f for f in found if f.check != "response" or "r" not in f.channels]

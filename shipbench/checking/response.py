@@ -202,24 +202,24 @@ def _judge(recording: Recording, pair: _Pair, found: _Search, waits: float) -> F
         lag, late_gain = min(lag, waits), pair.agreed
     if at_130 >= pair.late[0] and found.gain >= late_gain:
         line = {pair.cause: lag}
-        said = f"{pair.cause} is recorded about {lag:.2g} s late: the {pair.effect} answers before it"
+        said = f"{pair.cause} is recorded about {lag:.2g} s late: the {pair.effect} responds before it"
         todo = "" if not pair.order else "Commands are moved by whole samples."
     elif pair.early is not None and at_130 <= -pair.early[0] and found.gain >= pair.early[1]:
         line = dict.fromkeys(_MOTION, -lag)
-        said = f"the motion is recorded about {-lag:.2g} s late against {pair.cause}: no hull waits that long"
+        said = f"the motion is recorded about {-lag:.2g} s late against {pair.cause}: no hull responds so late"
         todo = f"If the clock of {pair.cause} is wrong instead, write [delay] {pair.cause} = {lag:.3g}."
     else:
         return None
     share = float(np.sqrt(found.squares[found.best] / found.squares[found.plain]))
     text = (
-        f"{said}. Moved so, a regression of the {pair.effect} leaves {share:.0%} of what it leaves as recorded "
+        f"{said}. With this shift the residual of a regression of the {pair.effect} is {share:.0%} of that as recorded "
         f"({found.windows} windows)."
     )
     curve = Curve(
         f"{pair.effect} by {pair.cause}", found.lags, np.sqrt(found.squares / found.squares[found.plain]), ".-"
     )
-    title = f"What the causes of the {pair.effect} leave, with {pair.cause} moved in time"
-    picture = Picture(title, "lag of the record [s]", "left, as recorded = 1", (curve,))
+    title = f"Residual of the {pair.effect}, with {pair.cause} shifted in time"
+    picture = Picture(title, "lag of the record [s]", "residual, as recorded = 1", (curve,))
     return Finding(
         "response", "warning", "lag", text, toml_line({"delay": {k: round(v, 3) for k, v in line.items()}}), todo,
         tuple(line),

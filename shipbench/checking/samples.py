@@ -214,7 +214,7 @@ def _quantised(recording: Recording) -> list[Finding]:
         "Values of delta", "delta [deg]", "samples", (Curve("samples", np.rad2deg(levels), counts.astype(float), "."),)
     )
     return [Finding(
-        "samples", "note", "quantised", text, todo="Nothing; a rudder offset below half a step cannot be told.",
+        "samples", "note", "quantised", text, todo="Nothing; a rudder offset below half a step cannot be detected.",
         channels=("delta",),
         evidence={"step_rad": step, "levels": len(levels)}, picture=picture,
     )]  # fmt: skip

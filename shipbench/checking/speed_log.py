@@ -68,7 +68,7 @@ def silence(dataset: Dataset) -> Silence | None:
 def in_words(found: Silence) -> str:
     """Sentence on the dropout, with its figures."""
     return (
-        f"u and v read nothing (below {found.level:.2g} m/s) in {found.pieces} pieces, {found.share:.0%} of the "
+        f"u and v read zero (below {found.level:.2g} m/s) in {found.pieces} pieces, {found.share:.0%} of the "
         "samples, but the ship makes way "
         f"there: the track departs from a steady drift by up to {found.departure:.3g} m in {found.seconds:.3g} s."
     )
@@ -98,7 +98,7 @@ def check(recording: Recording) -> list[Finding]:
         Curve("speed of the track", run.t, by_track),
     )
     return [Finding(
-        "speed_log", "error", "log reads nothing", in_words(found), channels=("u", "v"),
+        "speed_log", "error", "speed-log dropout", in_words(found), channels=("u", "v"),
         todo="Import it again without u and v: `shipbench data import` takes them from the track then, as "
              "`shipbench diagnose` does by itself.",
         evidence={"level": found.level, "pieces": found.pieces, "share": found.share, "departure_m": found.departure},

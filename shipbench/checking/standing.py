@@ -56,7 +56,7 @@ def _driven(dataset: Dataset) -> _Shown | None:
         return None
     speed, loss, least = float(np.mean(ends[driven, 0])), float(np.mean(lost[driven])), float(np.mean(expected[driven]))
     text = (
-        f"The revolutions are zero throughout, and the ship keeps her way, {np.sum(driven)} times in {len(ends)}: "
+        f"The shaft speed is zero throughout, but the ship keeps her speed, {np.sum(driven)} times in {len(ends)}: "
         f"of {speed:.3g} m/s "
         f"{loss:.2g} m/s are lost in {seconds:.3g} s; without thrust it would be {least:.2g} m/s or more."
     )
@@ -87,7 +87,7 @@ def check(recording: Recording) -> list[Finding]:
     todo = {
         "delta": "Give the rudder, or its command as delta_c; without it these turns cannot be predicted.",
         "n": (
-            "Give the revolutions, or their command as n_c; without them speed and the flow at the rudder cannot "
+            "Give the shaft speed, or its command as n_c; without it speed and the flow at the rudder cannot "
             "be predicted."
         ),
     }

@@ -119,7 +119,7 @@ def _finding(recording: Recording, w: Windows, chosen: Chosen, name: str) -> lis
     if name == "scale of v" and factor < -0.5:
         positive = "starboard" if recording.given.get("signs", {}).get("v") == "port" else "port"
         text = (
-            f"v is recorded with the other sign: {factor:.3f} of what the position says (standard error "
+            f"v is recorded with the other sign: {factor:.3f} of the value from the position (standard error "
             f"{sd[0]:.3f}): {shares}."
         )
         line = toml_line({"signs": {"v": positive}})

@@ -318,8 +318,8 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
             # a turning rate of rev/s x sqrt(D) is 1 to 7 on ships of any size (Froude), 2 pi times that in rad/s
             unit = "rev/s" if advance > 12.0 or np.median(np.abs(turning[:, N])) * diameter**0.5 < 7.0 else "rad/s"
             text = (
-                f"At its highest revolutions the ship advances {advance:.3g} diameters per turn if n is in rpm; "
-                "a screw gives way below 1.5."
+                f"At its highest shaft speed the ship advances {advance:.3g} propeller diameters per turn "
+                "if n is in rpm; propellers advance less than 1.5."
             )
             found.append(_finding("n", FACTORS["n"][unit], text))
     greatest = ship.thrusters.max_force if ship.thrusters else 0.0
@@ -356,8 +356,8 @@ def _shaft_sign(runs: Sequence[Run], dt: float, froude: float, ahead: float) -> 
     if against < THRESHOLDS.count("occurrences") or against < THRESHOLDS.count("keeping_ratio") * with_it:
         return []
     text = (
-        f"In {against} stretches of {width * dt:.3g} s the ship keeps her speed against her revolutions as "
-        f"recorded, in {with_it} with them."
+        f"In {against} stretches of {width * dt:.3g} s the ship keeps her speed against the recorded shaft "
+        f"speed, in {with_it} with it."
     )
     return [_finding("n", -1.0, text)]
 

@@ -27,8 +27,8 @@ from .thresholds import THRESHOLDS
 CHANNELS = ("wind_speed", "wind_from")
 _WORDS = {
     "true": "the true wind from north", "true-bow": "the true wind off the bow",
-    "apparent": "the wind felt on board, off the bow",
-    "apparent-north": "the wind felt on board, from north",
+    "apparent": "the apparent wind, off the bow",
+    "apparent-north": "the apparent wind, from north",
 }  # fmt: skip
 
 

@@ -28,7 +28,10 @@ def diagnose(
         bool, typer.Option("--thorough", help="Use up to twice as much of a long record (twice the time or more).")
     ] = False,
     cpu_limit: Annotated[
-        float, typer.Option(min=1.0, max=86_400.0, help="CPU seconds after which it ends with what stands; it is said.")
+        float,
+        typer.Option(
+            min=1.0, max=86_400.0, help="CPU time limit [s]; the results so far are then reported, with a note."
+        ),
     ] = 900.0,
     full: Full = False,
     quiet: Quiet = False,

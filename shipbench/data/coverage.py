@@ -101,7 +101,7 @@ def _regions(s: Samples) -> list[_Region]:
     drift = np.rad2deg(np.nan_to_num(s.drift))
     turning = np.abs(S[:, R]) * s.dataset.ship.L / np.maximum(s.speed, 1e-9)
     regions = [
-        _Region("reversed propeller: stopping, propeller walk astern", "revolutions below -10 % of the usual most",
+        _Region("reversed propeller: stopping, propeller walk astern", "shaft speed below -10 % of the usual maximum",
             n < -0.1 * full,
                 f"least {n.min():.3g} rpm", "a crash stop: full astern from cruising speed, until the ship lies still"),
         _Region("forces going astern", f"sternway (Froude number below -{STEERAGE})", fn < -STEERAGE,
@@ -173,10 +173,10 @@ def _constant_inputs(s: Samples) -> list[Gap]:
     if ahead.any():
         low, high = np.percentile(n[ahead], [5, 95])
         if high < 1.1 * low:
-            found.append(Gap("propeller walk apart from a rudder offset; thrust and race against the revolutions",
-                             f"ahead, 90 % of the revolutions lie between {low:.4g} and {high:.4g} rpm, a ratio of "
+            found.append(Gap("propeller walk apart from a rudder offset; thrust and race against the shaft speed",
+                             f"ahead, 90 % of the shaft speeds lie between {low:.4g} and {high:.4g} rpm, a ratio of "
                              f"{high / low:.2f}; 1.1 is needed",
-                             "straight runs with the revolutions up and down by a quarter"))  # fmt: skip
+                             "straight runs with the shaft speed up and down by a quarter"))  # fmt: skip
     moving = fn > STEERAGE
     if moving.any():
         low, high = np.percentile(s.speed[moving], [5, 95])
@@ -203,8 +203,8 @@ def _missing_channels(s: Samples) -> list[Gap]:
                 "n and delta repeat their "
                 "commands in every sample: the "
                          "positions of the actuators are not measured",
-                         "record rudder angle and revolutions beside "
-                         "the orders"))  # fmt: skip
+                         "record rudder angle and shaft speed beside "
+                         "the commands"))  # fmt: skip
     wind = s.environment("wind_speed")
     if wind is None or s.environment("wind_from") is None:
         found.append(Gap("gusts, and wind that differs from run to run", "wind_speed and wind_from are not recorded",

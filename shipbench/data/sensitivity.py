@@ -28,9 +28,9 @@ UNFELT = 1e-3
 """Least effect size, as a share of the error of constant velocities, of a cause that can be identified at all."""
 
 _PARAMETERS = {2: ("resistance", "coast down with the shaft stopped, and speed up from rest"),
-               0: ("propeller walk", "straight runs with the revolutions up and down"),
+               0: ("propeller walk", "straight runs with the shaft speed up and down"),
                4: ("rudder offset",
-                   "vary the revolutions at one speed: the offset acts with the race, propeller "
+                   "vary the shaft speed at one ship speed: the offset acts with the race, propeller "
                    "walk with the thrust"),
                5: ("rudder lift", "zig-zags at two speeds"),
                10: ("rudder drag", "turns at two rudder angles from "

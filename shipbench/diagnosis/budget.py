@@ -50,8 +50,8 @@ class Budget:
             return []
         iterations, seconds = self.stopped
         stands = (
-            "The plain model did not come to rest, so no cause is named." if nothing
-            else "What is named so far stands; what could have followed was not looked for."
+            "The plain model did not converge, so no cause is named." if nothing
+            else "The causes named so far are valid; further ones were not searched."
         )  # fmt: skip
         return [
             f"stopped after {iterations} iterations of fits in {seconds:.0f} s of CPU time; the limits are "

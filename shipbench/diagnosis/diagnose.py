@@ -269,8 +269,10 @@ def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, st
         if size.unit == "s":
             how = f"{abs(size.value):.2g} s {'later' if size.value > 0.0 else 'sooner'} than"
             near = ", which comes near" if effect.traits.gear_field == "T" else ""
-            mend = f"Put the record right first, by [delay] {channel} = {-size.value:.2g} in dataset.toml{near}."
-        told[c.effect] = f"the motion shows the {what} {how} its record, to which predictors fit their gears. {mend}"
+            mend = f"Correct the record first, by [delay] {channel} = {-size.value:.2g} in dataset.toml{near}."
+        told[c.effect] = (
+            f"the motion shows the {what} {how} its record, to which predictors fit the actuator dynamics. {mend}"
+        )
     return told
 
 

@@ -31,7 +31,7 @@ class WaveDrift(Effect):
     )
     breaks_symmetry = True
     vector = ("amplitude_squared", "to")
-    separate = "an anemometer or a wave buoy: wind and waves from one side push alike"
+    separate = "an anemometer or a wave buoy: wind and waves from one side have similar forces"
     ahead, moment = 0.3, -0.1
 
     def fitted(self, L: float) -> tuple[Self, ...]:

@@ -199,13 +199,13 @@ def _share_out(logs: Sequence[Path], sources: dict[str, Source]) -> dict[str, li
             told = ", ".join(p.name for p in logs)
             raise InputError(
                 f"no log for the source '{name}' (files = \"{sources[name].files}\"). Given: {told}. Give it, or "
-                "mend `files`."
+                "correct `files`."
             )
     unused = [p for p in logs if not any(p in found for found in files.values())]
     if unused:
         told = ", ".join(f'{n} "{s.files}"' for n, s in sources.items())
         raise InputError(
-            f"{unused[0]} belongs to no source; their files: {told}. Leave it out, or mend `files` in the mapping."
+            f"{unused[0]} belongs to no source; their files: {told}. Leave it out, or correct `files` in the mapping."
         )
     return files
 

@@ -159,7 +159,7 @@ def slice_table(scores: Scores) -> Table | None:
     notes = [
         "ED [m], mean over the windows. Speed, drift angle (weighted with speed) and |rudder| are means over the "
         "window, cut into thirds of them; "
-        "astern: astern revolutions are ordered; thrusters: one has an order."
+        "astern: astern shaft speed is commanded; thrusters: one has a command."
     ]
     return Table("Regime slices", columns, by_slice, notes)
 
@@ -184,7 +184,7 @@ def trial_table(scores: Scores) -> Table | None:
     notes = [
         "Predicted less true, over windows that are a turn or a zig-zag (the rudder leaves a straight course for "
         "one angle and stays, or goes to "
-        "and fro), under the recorded orders: a model's overshoot is counted from its own heading when the true "
+        "and fro), under the recorded commands: a model's overshoot is counted from its own heading when the true "
         "rudder was reversed.",
         (
             "Reached: windows in which the model gets there too (turns 90 or 180 degrees, comes back from the "

@@ -66,7 +66,7 @@ def _certainty(scores: Scores, first: str, second: str) -> str:
     if pair is None:
         return "They are not compared, since one of them lacks a score on some runs."
     if not np.isfinite(pair.p_holm):
-        return f"How sure that is cannot be told from {_runs(scores)}."
+        return f"Its significance is unknown with {_runs(scores)}."
     if pair.difference == 0.0:
         return f"They do not differ on {_runs(scores)}."
     sure = "The difference is significant" if pair.p_holm < _CERTAIN else "The difference is not significant"

@@ -84,7 +84,7 @@ def _diagram(ranks: dict[str, float], p_values: Any, axis: Any) -> None:
         label_fmt_left="{label} ({rank:.2f})  ",
         label_fmt_right="  {label} ({rank:.2f})",
     )
-    axis.set_title("Mean rank over data sets (1 is best); joined: not told apart at 5 %", fontsize=11)
+    axis.set_title("Mean rank over data sets (1 is best); joined: no significant difference at 5 %", fontsize=11)
 
 
 def _ranks(errors: np.ndarray) -> np.ndarray:

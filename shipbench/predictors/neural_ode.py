@@ -165,8 +165,8 @@ class NeuralODE(PredictorBase):
             if part.traits.local or part.enters == "sensor":
                 raise InputError(
                     f"effect '{effect.name}' cannot extend neural_ode: it acts on the sensors, or at a place or time. "
-                    f"Accepted: effects that act as forces or in the gears. Write physics+{effect.name}, or mend "
-                    "the data."
+                    f"Accepted: effects that act as forces or on actuators. Write physics+{effect.name}, or "
+                    "correct the data."
                 )
         self.effects = tuple(effects)
         return self

@@ -301,7 +301,7 @@ def _modified(hidden: Sequence[Hidden], flow: Flow, ship: Published) -> Modifier
                 raise InputError(
                     f"effect '{item.effect.name}' changes '{f.name}', which published ships do not have; accepted: "
                     "effects that act through "
-                    f"{', '.join(_UNDERSTOOD)}, gears or sensors."
+                    f"{', '.join(_UNDERSTOOD)}, actuators or sensors."
                 )
     return e
 

@@ -59,7 +59,7 @@ def test_it_is_told_on_ships_of_any_size(ship, noise, share):
     data = trials(ship, noise)
     assert silence(data) is None
     (finding,) = check_dataset(silent(data, share))
-    assert finding.kind == "log reads nothing"
+    assert finding.kind == "speed-log dropout"
     assert finding.channels == ("u", "v")
     assert finding.severity == "error"
 
@@ -97,7 +97,7 @@ def test_the_diagnosis_takes_the_speeds_of_the_track():
     data = trials()
     ready = speeds_of_the_track(Prepared(silent(data)))
     mended, (line,) = ready.dataset, ready.notes
-    assert line.startswith("u and v read nothing (below ")
+    assert line.startswith("u and v read zero (below ")
     assert line.endswith("u and v are taken from the positions in all runs instead.")
     assert mended.derived == ("u", "v")
     error = np.concatenate(

@@ -75,7 +75,7 @@ REVERSING, STERNWAY, STALL = (
 )
 DRIFT, TURNING = "cross-flow drag of the hull", "turning: yaw damping and its nonlinear terms"
 HEADINGS = "current and wind apart from offsets of rudder, hull and propeller"
-ONE_RPM = "propeller walk apart from a rudder offset; thrust and race against the revolutions"
+ONE_RPM = "propeller walk apart from a rudder offset; thrust and race against the shaft speed"
 ONE_SPEED, ZERO_SPEED = "resistance apart from thrust", "forces near zero speed"
 THRUSTERS = {"bow thruster", "stern thruster"}
 RUDDER = {f"rudder force to {side}, and with it the ship's asymmetry" for side in ("port", "starboard")}
@@ -106,7 +106,8 @@ def test_every_gap_has_a_figure_or_a_missing_channel_and_a_manoeuvre():
         assert gap.manoeuvre
     because = {gap.subject: gap.because for gap in gaps(trial("turns"))}
     assert (
-        because[REVERSING] == "revolutions below -10 % of the usual most: 0 s, at least 109 s are needed; least 100 rpm"
+        because[REVERSING]
+        == "shaft speed below -10 % of the usual maximum: 0 s, at least 109 s are needed; least 100 rpm"
     )
 
 

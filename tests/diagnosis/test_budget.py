@@ -108,7 +108,7 @@ def test_a_round_that_is_cut_short_names_nothing(turned, monkeypatch):
     found = diagnose(turned, gain=False, budget=budget)
     assert (found.verdict, found.causes) == ("none", ())
     (line,) = [w for w in found.warnings if w.startswith("stopped after")]
-    assert "What is named so far stands" in line
+    assert "The causes named so far are valid" in line
     assert budget.used <= budget.iterations + 2
 
 

@@ -274,7 +274,7 @@ def test_the_file_of_a_ship_of_another_size_is_doubted():
         published_trials(PUBLISHED["s175"], 3, (), Trials(runs=16, samples=100)), ship=PUBLISHED["navy"].particulars
     )
     verdict = diagnose(trials, gain=False)
-    assert verdict.warnings[0].startswith("a similar ship of 2.5 times the size explains the runs better")
+    assert verdict.warnings[0].startswith("a similar ship of 2.5 times the size fits the runs better")
     assert "Is the ship file that of this ship" in verdict.warnings[0]
     slow = next(c for c in verdict.candidates if c.effect == "rudder_lag")
     assert slow.score > THRESHOLD

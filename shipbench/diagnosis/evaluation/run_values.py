@@ -34,7 +34,7 @@ def goes_with(seg: Segments, values: np.ndarray) -> str:
     if chance > THRESHOLDS.value("run_values_by_chance") or share < THRESHOLDS.value("run_values_share"):
         return ""
     told = "from place to place" if words == "place" else "with time"
-    return f"it differs {told}: {share:.0%} of the variance of its values goes with the {words} of the runs"
+    return f"it differs {told}: {share:.0%} of the variance of its values depends on the {words} of the runs"
 
 
 def _chance(values: np.ndarray, at: np.ndarray) -> tuple[float, float]:

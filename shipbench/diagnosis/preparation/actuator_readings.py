@@ -42,15 +42,15 @@ def said(errors: Sequence[RecordError]) -> list[str]:
     for e in errors:
         what = what_it_is({"axis": e.axis, "variable": e.variable, "form": e.form})
         motion = (
-            "does not tell which of the two is right"
+            "does not show which of the two is right"
             if e.undecided
-            else f"believes the {'order' if e.contradicted else 'record'}"
+            else f"agrees with the {'command' if e.contradicted else 'record'}"
         )
         told.append(
-            f"the runs show {what}: they differ by {e.size:.0%} (root mean square), however long the order stands. "
-            f"The motion {motion} (log evidence "
-            f"of the plain model {e.worth:+.1f} as ordered): it is taken as "
-            f"{'ordered' if e.contradicted else 'recorded'}. Check the calibration of "
+            f"the runs show {what}: they differ by {e.size:.0%} (root mean square), however long the command is held. "
+            f"The motion {motion} (log Bayes factor "
+            f"{e.worth:+.1f} for the command): it is taken as "
+            f"{'commanded' if e.contradicted else 'recorded'}. Check the calibration of "
             "both; delay, lag, deadband and play are judged without it."
         )
     return told

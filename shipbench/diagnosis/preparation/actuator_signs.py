@@ -69,4 +69,4 @@ def _thrusters(null: Fit) -> list[UnitFinding]:
 
 
 def _better(gain: float) -> str:
-    return f"Read to the other side the plain model explains the runs better by {gain:.0f} of log evidence."
+    return f"With the sign reversed the plain model fits the runs better (log Bayes factor {gain:.0f})."

@@ -26,8 +26,8 @@ def true_wind(prepared: Prepared) -> Prepared:
     found = wind_reading(Recording(dataset))
     if found is not None:
         dataset = found[0].applied(dataset)
-        lines.append(f"wind_speed and wind_from are {said(found[0])}: they are read so. {_ADVICE}")
+        lines.append(f"wind_speed and wind_from are {said(found[0])}: they are converted to true wind. {_ADVICE}")
     if blows_to(Recording(dataset)) is not None:
         dataset = WindReading(sign="to").applied(dataset)
-        lines.append(f"wind_from is where the wind blows to: it is turned. {_ADVICE}")
+        lines.append(f"wind_from is where the wind blows to: it is reversed. {_ADVICE}")
     return prepared.corrected(dataset, *lines)

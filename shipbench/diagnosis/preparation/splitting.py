@@ -86,7 +86,7 @@ def refuse_too_little(prepared: Prepared) -> Prepared:
             f"(at least {LEAST_RUNS} runs and {LEAST_SAMPLES} samples): candidates are ranked, none is named."
         )
     if np.std(states[:, 7]) < 1e-3 and np.std(states[:, 5]) < 1e-5:
-        warnings.append("the rudder is never used and the ship never turns: nothing can be said about rudder and hull.")
+        warnings.append("the rudder is never used and the ship never turns: rudder and hull cannot be identified.")
     return prepared.corrected(dataset, *warnings)
 
 

@@ -111,9 +111,9 @@ def correct_late_yaw_rate(prepared: Prepared) -> Prepared:
         return prepared
     delay, sd = found
     line = (
-        f"the yaw rate follows the heading {delay:.2g} s late (standard error {sd:.1g} s; seen by kinematics). It "
-        "is put back before anything else "
-        f"is looked for; in dataset.toml: [delay] r = {delay:.3g}."
+        f"the yaw rate follows the heading {delay:.2g} s late (standard error {sd:.1g} s, by kinematics). It "
+        "is corrected before any cause "
+        f"is searched; in dataset.toml: [delay] r = {delay:.3g}."
     )
     return prepared.corrected(put_back(dataset, {"r": delay}, 0.0), line)
 

@@ -25,7 +25,7 @@ def speeds_over_ground(prepared: Prepared) -> Prepared:
     line = (
         f"u and v are through water: the track drifts {np.hypot(north, east):.3g} m/s towards "
         f"{np.rad2deg(np.arctan2(east, north)) % 360.0:.0f} deg "
-        "more than they say. That is added to them; the current that the ship feels is looked for as any other "
+        "more than they give. That is added to them; the current is searched like any other "
         "cause. `shipbench data check` has "
         "the lines for dataset.toml."
     )

@@ -25,7 +25,7 @@ def better_size(null: Fit) -> list[str]:
     factor, gain = _best(null, _FACTORS)
     if factor == 1.0 or gain < THRESHOLDS.value("other_size") * _times(null):
         return []
-    return [f"a similar ship of {factor:g} times the size explains the runs better (by {gain:.0f} of log evidence)"]
+    return [f"a similar ship of {factor:g} times the size fits the runs better (log Bayes factor {gain:.0f})"]
 
 
 def size_instead_of(causes: str, worth: float, null: Fit) -> list[str]:
@@ -37,7 +37,7 @@ def size_instead_of(causes: str, worth: float, null: Fit) -> list[str]:
         return []
     return [
         (
-            f"a similar ship of {factor:g} times the size explains the runs about as well as {causes} (log evidence "
+            f"a similar ship of {factor:g} times the size fits the runs about as well as {causes} (log Bayes factor "
             f"{gain:.0f}, against {worth:.0f})"
         )
     ]

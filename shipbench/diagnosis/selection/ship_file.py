@@ -47,11 +47,10 @@ def doubts_of(found: Analysis) -> list[str]:
     if not signs:
         return []
     return [
-        f"{'; '.join(signs)}. {_QUESTION} Until that is sure, nothing is named but what shows whatever the ship is "
-        "(faults of sensors, delay and "
-        "play of gears seen in their own record, those slow for any ship, and forces that know port from starboard "
-        "or a direction of the earth, with "
-        "their sizes on the ship of the file); the candidates below are ranked as if it were."
+        f"{'; '.join(signs)}. {_QUESTION} Until that is sure, only causes that do not depend on it are named. "
+        "These are errors of sensors, delay and play of actuators in their own record, actuators too slow for any "
+        "ship, and forces that break the symmetry of port and starboard or depend on an earth-fixed direction. "
+        "The candidates below are ranked as if the file were right."
     ]
 
 
@@ -66,8 +65,8 @@ def odd_for(found: Analysis, named: Sequence[str]) -> list[str]:
     if not signs:
         return []
     return [
-        f"{'; '.join(signs)}. {_QUESTION} The file of another ship, too, may make {' and '.join(by_file)}: believe "
-        f"{'it' if len(by_file) == 1 else 'them'} only when that is sure."
+        f"{'; '.join(signs)}. {_QUESTION} A wrong ship file may also cause {' and '.join(by_file)}: "
+        f"{'it is' if len(by_file) == 1 else 'they are'} certain only when the file is."
     ]
 
 

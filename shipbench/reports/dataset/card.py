@@ -18,18 +18,18 @@ from ...steps import step
 from .facts import dataset_facts, describe_tables
 
 _NOISE = (
-    "Noise: standard deviation of what is new in every sample (least of the differences of order 2 to 6, by their "
-    "median absolute deviation). It "
-    "sees white noise only, some 5 % too small; drifts, biases and filtered noise are not in it, and real gusts "
-    "are. Step: resolution of the record."
+    "Noise: standard deviation of the white part (least of the differences of order 2 to 6, by their "
+    "median absolute deviation). The "
+    "estimate is some 5 % too small. Drifts, biases and filtered noise are not in it; real gusts are. "
+    "Step: resolution of the record."
 )
 _FELT = (
-    "Felt: change of the runs by a typical size, as a share of what holding the speeds gets wrong; below "
-    f"{100 * UNFELT:g} % it is not felt at all. "
-    f"Imitated: share of that change (squared) that the other causes can make together; above {100 * IMITATED:.0f} "
-    "% (a variance inflation of 10) "
-    "the cause cannot be told apart, whatever the size of the data set. Of a current or wind the direction that is "
-    "told worst counts."
+    "Effect size: change of the runs by a typical amplitude, relative to the error of constant velocities. Below "
+    f"{100 * UNFELT:g} % it is too small. "
+    "Explained by others: share of the squared change that the other causes can explain together. Above "
+    f"{100 * IMITATED:.0f} % (a variance inflation factor of 10) "
+    "the cause cannot be identified, whatever the size of the data set. Of a current or wind the least "
+    "identifiable direction counts."
 )
 
 
@@ -49,7 +49,7 @@ class Card:
         """Summary in two sentences: content of the data set, and the share of causes that cannot be identified."""
         missing = len(self.tables[_GAPS].rows)
         what = (
-            f"{missing} of the causes that are looked for cannot be identified with it."
+            f"{missing} of the causes considered cannot be identified with it."
             if missing
             else "No cause is known that it cannot identify."
         )
@@ -79,7 +79,7 @@ def make_card(dataset: Dataset) -> Card:
     """Statistics, durations, noise, gaps and sensitivities of a data set."""
     step("statistics", 0.0, 0.1)
     statistics = dict(zip(("statistics", "table_ii", "against_the_paper"), describe_tables(dataset), strict=False))
-    step("what the runs tell apart", 0.1, 0.9)
+    step("identifiability of causes", 0.1, 0.9)
     told, how = tellings(dataset)
     step("noise and coverage", 0.9, 1.0)
     tables = {
@@ -93,7 +93,7 @@ def _gap_table(found: Sequence[Gap], dataset: Dataset) -> Table:
     columns = [
         TableColumn("cannot be identified", "subject"),
         TableColumn("because", "because"),
-        TableColumn("what would add it", "manoeuvre"),
+        TableColumn("trial that would close the gap", "manoeuvre"),
     ]
     rows = [{"subject": g.subject, "because": g.because, "manoeuvre": g.manoeuvre} for g in found]
     unit = unit_time(dataset.ship.L)
@@ -103,7 +103,7 @@ def _gap_table(found: Sequence[Gap], dataset: Dataset) -> Table:
             f"{NEEDED:g} of them are needed."
         ),
         (
-            "What is not listed can still be weakly determined: fits print intervals, and `shipbench diagnose` prints "
+            "Other causes may still be weakly determined: fits print intervals, and `shipbench diagnose` prints "
             "detection limits."
         ),
     ]
@@ -111,7 +111,7 @@ def _gap_table(found: Sequence[Gap], dataset: Dataset) -> Table:
         "What these data cannot identify",
         columns,
         rows,
-        notes if rows else ["Nothing of what is looked for is missing.", *notes],
+        notes if rows else ["No gap was found.", *notes],
     )
 
 
@@ -126,12 +126,12 @@ def _alike(told: Sequence[Telling]) -> list[Gap]:
         if twins.get(t.alike) == t.subject:
             done.add(t.alike)
         who = (
-            f"{t.alike} alone makes {100 * t.cosine**2:.1f} %"
+            f"{t.alike} alone explains {100 * t.cosine**2:.1f} %"
             if alone
-            else f"most alike: {t.alike} (cosine {t.cosine:.2f})"
+            else f"most collinear: {t.alike} (cosine {t.cosine:.2f})"
         )
         because = (
-            f"{100 * t.imitated:.1f} % of what it does to the runs can be made by other causes, "
+            f"other causes can explain {100 * t.imitated:.1f} % of its effect on the runs, "
             f"{100 * IMITATED:.0f} % is the limit; {who}"
         )
         found.append(
@@ -189,16 +189,16 @@ def _told_apart(told: Sequence[Telling], how: str) -> Table:
     rows = []
     for t in told:
         felt = t.felt > UNFELT
-        verdict = "not felt" if not felt else "no" if t.imitated > IMITATED else "yes"
+        verdict = "too small" if not felt else "no" if t.imitated > IMITATED else "yes"
         rows.append({
             "subject": t.subject, "felt": 100 * t.felt, "imitated": 100 * t.imitated if felt else None,
             "alike": t.alike,
             "cosine": t.cosine if felt else None, "verdict": verdict,
         })  # fmt: skip
     columns = [
-        TableColumn("cause", "subject"), TableColumn("felt [%]", "felt", significant(2)),
-        TableColumn("imitated [%]", "imitated", number(1)),
-        TableColumn("most alike", "alike"), TableColumn("cosine", "cosine", number(2)),
-        TableColumn("can be told apart", "verdict"),
+        TableColumn("cause", "subject"), TableColumn("effect size [%]", "felt", significant(2)),
+        TableColumn("explained by others [%]", "imitated", number(1)),
+        TableColumn("most collinear", "alike"), TableColumn("cosine", "cosine", number(2)),
+        TableColumn("identifiable", "verdict"),
     ]  # fmt: skip
-    return Table("What the runs tell apart", columns, rows, [f"How: {how}", *([_FELT] if rows else [])])
+    return Table("Identifiability of causes", columns, rows, [f"Method: {how}", *([_FELT] if rows else [])])

@@ -113,7 +113,7 @@ FAULTS: tuple[Fault, ...] = (
     Fault("frozen heading", plant.frozen("psi"), _of("frozen", "psi"), size="15 s"),
     Fault("frozen position", plant.frozen("x", "y"), _of("frozen", "x", "y"), size="15 s", also=("jump",)),
     Fault("frozen surge", plant.frozen("u"), _of("frozen", "u"), size="15 s"),
-    Fault("silent log", plant.silent_log(0.3), _any("log reads nothing"), size="slowest 30 % of samples"),
+    Fault("silent log", plant.silent_log(0.3), _any("speed-log dropout"), size="slowest 30 % of samples"),
     Fault("stuck rudder", plant.stuck_rudder, _of("frozen", "delta"), size="25 s"),
     Fault("rudder dead", plant.times(delta=0.0), _of("actuator never moves", "delta"), size="0 throughout"),
     Fault("revolutions dead", plant.times(n=0.0), _of("actuator never moves", "n"), size="0 throughout"),

@@ -41,7 +41,7 @@ def _figures(mine: Sequence[Outcome]) -> dict[str, Any]:
 
 _FIGURES = (
     TableColumn("found", "found"), TableColumn("95 % from", "low", number(2)), TableColumn("to", "high", number(2)),
-    TableColumn("healed by its line", "healed"), TableColumn("other findings", "others"),
+    TableColumn("corrected by its line", "healed"), TableColumn("other findings", "others"),
 )  # fmt: skip
 
 
@@ -55,8 +55,8 @@ def _by_fault(outcomes: Sequence[Outcome]) -> Table:
     low, high = _interval(hits, len(outcomes))
     notes = [
         f"Found {hits} of {len(outcomes)} ({hits / len(outcomes):.1%}; {low:.1%} to {high:.1%}). "
-        f"Sets with a finding that the fault does not call for: {extra} ({extra / len(outcomes):.1%}). "
-        "Healed: with its lines in dataset.toml the set loads and a second check is silent."
+        f"Sets with an unexpected finding: {extra} ({extra / len(outcomes):.1%}). "
+        "Corrected: with its lines in dataset.toml the set loads and a second check has no finding."
     ]
     return Table(
         "Planted faults", [TableColumn("fault", "fault"), TableColumn("size at 130 m", "size"), *_FIGURES], rows, notes
@@ -108,7 +108,7 @@ def write_page(path: Path, tables: Sequence[Table], command: str, seeds: str) ->
          "ships of 130, 230 and 7 m"),
         ("(24 runs of 120 samples, sensor noise, gusts), sea trials of drawn hulls of the fitted model (eq. (2), "
          "another structure), and 90 port"),
-        ("manoeuvres. `shipbench data check` must find each and propose a line of dataset.toml that heals it. Clean "
+        ("manoeuvres. `shipbench data check` must find each and propose a line of dataset.toml that corrects it. Clean "
          "sets must give no finding at all,"),
         ("notes included. Thresholds were set on the seeds of `--development` (from 7500); what 500 to 560 taught is "
          "in the code."), "",

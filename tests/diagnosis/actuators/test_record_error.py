@@ -151,7 +151,10 @@ def test_the_motion_tells_whether_record_or_order_is_wrong():
         data.with_runs([replace(r, inputs=r.inputs * np.r_[1.1, np.ones(r.inputs.shape[1] - 1)]) for r in data.runs]),
         gain=False,
     )
-    for result, axis, taken in ((low, "recorded revolutions", "ordered"), (ordered, "ordered revolutions", "recorded")):
+    for result, axis, taken in (
+        (low, "recorded revolutions", "commanded"),
+        (ordered, "ordered revolutions", "recorded"),
+    ):
         assert (result.verdict, result.causes) == ("unknown", ())
         assert (result.unknown["axis"], result.unknown["variable"]) == (axis, "revolutions")
         (text,) = (w for w in result.warnings if f"error of the {axis}" in w)
@@ -170,4 +173,4 @@ def test_beside_a_named_cause_it_is_a_warning_and_of_a_rudder_the_motion_does_no
         gain=False,
     )
     assert [c.effect for c in result.causes] == ["current"]
-    assert any("error of the recorded or ordered rudder" in w and "does not tell" in w for w in result.warnings)
+    assert any("error of the recorded or ordered rudder" in w and "does not show" in w for w in result.warnings)

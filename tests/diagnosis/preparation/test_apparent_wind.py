@@ -71,4 +71,4 @@ def test_half_a_wind_is_none_and_said(windy, kept: int):
 def test_a_wind_as_felt_makes_no_cause(windy):
     found = diagnose(_felt(windy, 1.0, 1.0), gain=False)
     assert found.verdict == "none"
-    assert any("felt on board" in line for line in found.warnings)
+    assert any("apparent wind" in line for line in found.warnings)

@@ -43,7 +43,7 @@ def test_a_thrust_that_a_ship_of_nearly_the_same_size_explains_too_is_told_with_
     assert [c.effect for c in verdict.causes] == ["thrust_gain"]
     (warning,) = [w for w in verdict.warnings if QUESTION in w]
     assert warning.startswith(
-        "a similar ship of 1.4 times the size explains the runs about as well as thrust_gain (log evidence "
+        "a similar ship of 1.4 times the size fits the runs about as well as thrust_gain (log Bayes factor "
     )
 
 
