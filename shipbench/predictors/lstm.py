@@ -252,8 +252,7 @@ class LSTM(PredictorBase):
         commanded = trains[0].actuators == "commanded"
         net = _Network(features, lead.hidden, scalers, draw, commanded)
         task = _Rollouts(net, training, validation, lead._stages(training.steps), draw, dt * stride, lead.pose_weight)
-        # Hundreds of small dependent steps: threads that wait for one another gain a third at best, and on a busy
-        # machine cost tenfold.
+        # one thread: in hundreds of small dependent steps threads mostly wait for each other
         train(task, Recipe(lr=lead.lr, lr_end=0.01, chunks=task.num_chunks, clip=1.0, device=lead.device, threads=1))
         state = {k: v.detach().cpu().numpy() for k, v in net.state_dict().items()}
         for m, model in enumerate(models):

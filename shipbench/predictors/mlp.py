@@ -152,8 +152,7 @@ class MLP(PredictorBase):
         # Not bound to names: the samples as they are would otherwise be kept beside the standardised ones.
         trained, stopped = zip(*pairs, strict=True)
         task = _OneStep(lead, _samples(trained, features), _samples(stopped, features), seeds)
-        # Matrices this small gain nothing from a second thread, and on a busy machine two that wait for one another
-        # cost tenfold.
+        # one thread: with matrices this small threads mostly wait for each other
         watch = train(
             task,
             Recipe(

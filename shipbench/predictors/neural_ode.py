@@ -223,7 +223,7 @@ class NeuralODE(PredictorBase):
         scale_in = Scaler.fit(seen.split(learn.counts))
         residual = Residual(physics, lead.hidden, scale_in, typical_accelerations(physics, learn), draw)
         task = _Windows(residual, learn, check, grid, lead._stages(learn.S.shape[1] - 1), draw, lead.penalty)
-        # Many small elementwise operations: a second thread only costs.
+        # one thread: in small elementwise operations threads mostly wait for each other
         recipe = Recipe(
             lead.lr,
             clip=1.0,

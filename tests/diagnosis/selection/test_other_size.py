@@ -43,7 +43,7 @@ def test_a_right_file_is_not_doubted(plant):
 def test_a_file_of_a_smaller_or_larger_similar_ship_is_doubted(plant, factor, better):
     wrong = plant.resized(factor)
     (line,) = better_size(null_fit(wrong, Scales(wrong)))
-    assert line.startswith(f"a similar ship of {better} times the size explains the runs better (by ")
+    assert line.startswith(f"a similar ship of {better} times the size fits the runs better (log Bayes factor ")
 
 
 @pytest.mark.parametrize(("bare", "gain", "doubted"), [(False, 127.0, True), (True, 127.0, False), (True, 200.0, True)])

@@ -63,7 +63,7 @@ def test_a_slow_gear_of_an_odd_ship_is_told_with_a_warning():
     assert named == ["rudder_lag", "shaft_lag"]
     (warning,) = [w for w in verdict.warnings if QUESTION in w]
     assert warning.endswith(
-        "The file of another ship, too, may make rudder_lag and shaft_lag: believe them only when that is sure."
+        "A wrong ship file may also cause rudder_lag and shaft_lag: they are certain only when the file is."
     )
 
 
