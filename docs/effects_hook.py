@@ -8,7 +8,6 @@ import io
 from collections.abc import Iterator
 from typing import Any
 
-FAMILIES = ("environment", "rudder", "propulsion", "thruster", "hull", "sensor", "time")
 _DT, _STEPS, _RPM, _SPEED = 2.0, 120, 93.0, 3.7
 """Sample time [s], samples, shaft speed [rpm] and speed [m/s] at which the 130 m container ship starts."""
 
@@ -21,7 +20,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
 
 
 def _sections() -> Iterator[str]:
-    from shipbench.effects.base import EFFECTS
+    from shipbench.effects.base import EFFECTS, FAMILIES
 
     effects = [EFFECTS.get(name) for name in EFFECTS.names()]
     for family in FAMILIES:

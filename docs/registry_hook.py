@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 from commands_hook import one_line
-from effects_hook import FAMILIES
 
 ROOT = Path(__file__).parents[1]
 
@@ -131,7 +130,7 @@ def _checks() -> Iterator[str]:
 
 
 def _trials() -> Iterator[str]:
-    from shipbench.effects.base import EFFECTS
+    from shipbench.effects.base import EFFECTS, FAMILIES
 
     effects = [EFFECTS.get(name) for name in EFFECTS.built_in()]
     for family in FAMILIES:

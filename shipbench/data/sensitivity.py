@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effects.base import EFFECTS
+from ..effects.base import Effect, having
 from ..errors import ShipbenchError
 from ..records import Dataset
 from ..signals import F_B
@@ -35,16 +35,6 @@ _PARAMETERS = {2: ("resistance", "coast down with the shaft stopped, and speed u
                5: ("rudder lift", "zig-zags at two speeds"),
                10: ("rudder drag", "turns at two rudder angles from "
                                    "one speed")}  # fmt: skip
-_EFFECTS = (
-    "thrust_gain",
-    "race_gain",
-    "rudder_stall",
-    "cross_flow_drag",
-    "propeller_walk_astern",
-    "thruster_gain",
-    "current",
-    "wind",
-)
 
 
 @dataclass(frozen=True)
@@ -71,22 +61,26 @@ def tellings(dataset: Dataset) -> tuple[list[Telling], str]:
     windows = dataset.windows(steps)
     windows = windows.subset(np.unique(np.linspace(0, len(windows) - 1, _MOST_WINDOWS).astype(int)).tolist())
     try:
-        columns, names, manoeuvres = _columns(windows)
+        columns, names, manoeuvres = _columns(windows, _asked(dataset))
     except ShipbenchError as error:
         return [], f"the physics model cannot be fitted to these runs: {error}"
     how = f"Rollouts of the fitted physics over {len(windows)} windows of {steps * dataset.dt:.3g} s."
     if not len(columns):
         return [], "the rollouts of the fitted physics diverge; check units and signs with `shipbench data check`."
-    unasked = set()
-    if "wind_speed" in dataset.inputs:
-        unasked.add("wind")
-    if dataset.ship.thrusters is None and not any(run.states[:, F_B:].any() for run in dataset.runs):
-        unasked.add("thruster gain")
-    kept = [name not in unasked for name in names]
-    return _compare(columns[:, kept], [name for name in names if name not in unasked], manoeuvres), how
+    return _compare(columns, names, manoeuvres), how
 
 
-def _columns(windows: Dataset) -> tuple[np.ndarray, list[str], dict[str, str]]:
+def _asked(dataset: Dataset) -> list[Effect]:
+    """Effects of a data card that the runs can show: none that is measured, none of thrusters that are never used."""
+    thrusters = dataset.ship.thrusters is not None or any(run.states[:, F_B:].any() for run in dataset.runs)
+    return [
+        effect
+        for effect in having("on_card")
+        if not set(effect.known_with) & set(dataset.inputs) and (thrusters or effect.family != "thruster")
+    ]
+
+
+def _columns(windows: Dataset, effects: list[Effect]) -> tuple[np.ndarray, list[str], dict[str, str]]:
     """Changes (samples, causes) of the weighted rollouts by typical sizes; columns of one name belong together."""
     from ..predictors.physics import Physics
     from ..predictors.physics_model.fit import Data, parameter_scale, rollout_function  # casadi
@@ -97,7 +91,6 @@ def _columns(windows: Dataset) -> tuple[np.ndarray, list[str], dict[str, str]]:
     data = Data(
         model.c, batch, model.actuator_path(batch.s0, batch.U), model._wind(batch.U), windows.dt, model.substeps
     )
-    effects = [EFFECTS.get(name) for name in _EFFECTS]
     sized = [effect.sized(windows.ship.L) for effect in effects]
     held = [tuple(p.typical if p.shape else 0.0 if p.other else None for p in parameters) for parameters in sized]
     forces = tuple(zip(effects, held, strict=True))

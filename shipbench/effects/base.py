@@ -25,6 +25,8 @@ from .traits import SEARCHES, Traits
 
 EFFECTS = Registry("effect", "effects", "EFFECT", helpers=frozenset({"base", "traits"}))
 
+FAMILIES = ("environment", "rudder", "propulsion", "thruster", "hull", "sensor", "time")
+"""Families of effects, in the order in which they are listed."""
 _FROUDE = {"1": 0.0, "speed": 0.5, "time": 0.5, "rate": -0.5, "length": 1.0, "area": 2.0, "rpm rate": -1.0}
 _REFERENCE_LENGTH = 130.0
 _ACTS_THROUGH = {"rudder": ("delta",), "propulsion": ("n",), "thruster": ("F_b", "F_s")}
@@ -198,6 +200,12 @@ def searched_by(search: str) -> tuple[Effect, ...]:
     """Effects that a diagnosis looks for in one way, a key of `SEARCHES`."""
     assert search in SEARCHES
     return tuple(effect for effect in map(EFFECTS.get, EFFECTS.names()) if effect.traits.search == search)
+
+
+def having(trait: str) -> tuple[Effect, ...]:
+    """Effects for which a trait is set, by family and name."""
+    found = [effect for effect in map(EFFECTS.get, EFFECTS.names()) if getattr(effect.traits, trait)]
+    return tuple(sorted(found, key=lambda effect: FAMILIES.index(effect.family)))
 
 
 class Holder(Protocol):

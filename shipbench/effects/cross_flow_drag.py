@@ -18,7 +18,7 @@ class CrossFlowDrag(Effect):
     summary = "cross-flow drag at large drift and yaw rate"
     phrase = "a cross-flow drag coefficient that differs by {coefficient}"
     source = "Faltinsen (1990), Sea Loads on Ships and Offshore Structures; docs/theory.md#hull-and-loading"
-    traits = Traits(between_ships=True, persistent=True)
+    traits = Traits(between_ships=True, persistent=True, on_card=True)
     parameters = (Parameter("coefficient", "1", 0.5, -0.6, 2.0),)
     separate = "thruster pushes sideways at rest, and hard turns"
 

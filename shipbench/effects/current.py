@@ -20,7 +20,7 @@ class Current(Effect):
     summary = "uniform current, the same in all runs"
     phrase = "a current of {speed} towards {to}"
     source = "Fossen (2021), section 10.3; added masses act on the velocity through the water"
-    traits = Traits(imitates=("bank_suction",))
+    traits = Traits(imitates=("bank_suction",), on_card=True)
     parameters = (
         Parameter("north", "m/s", 0.3, -6.0, 6.0, scaling="speed"),
         Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"),

@@ -21,7 +21,7 @@ class PropellerWalkAstern(Effect):
     summary = "side force of the propeller astern"
     phrase = "a side force of the propeller astern"
     source = "Miyauchi et al. (2022), doi 10.1007/s00773-022-00889-3: form of Hachii, values of the Esso Osaka"
-    traits = Traits(persistent=True)
+    traits = Traits(persistent=True, on_card=True)
     parameters = (
         Parameter("size", "1", 1.0, -4.0, 4.0),
         Parameter("share", "1", 0.1, -0.5, 0.5, other=True, title="side force", share_of="thrust at rest"),

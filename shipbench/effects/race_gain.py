@@ -16,7 +16,7 @@ class RaceGain(Effect):
     summary = "speed of the propeller race at the rudder"
     phrase = "a propeller race that is {gain} at the rudder"
     source = "kappa of Yasukawa & Yoshimura (2015), eq. 38"
-    traits = Traits(between_ships=True, persistent=True)
+    traits = Traits(between_ships=True, persistent=True, on_card=True, ordinary=(-0.45, 0.1))
     parameters = (Parameter("gain", "1", 0.3, -0.9, 1.5, title="race speed", relative=True),)
     separate = "turns at low and high shaft speed from one speed"
 

@@ -23,7 +23,7 @@ class RudderStall(Effect):
     summary = "stall of the rudder at large angles"
     phrase = "a rudder that loses {lost_share} at large angles"
     source = "Brix (1993), Manoeuvring Technical Manual; docs/theory.md#rudder"
-    traits = Traits(between_ships=True, absorbs_misfit=True, persistent=True, least_size=0.5)
+    traits = Traits(between_ships=True, absorbs_misfit=True, persistent=True, least_size=0.5, on_card=True)
     parameters = (
         Parameter("lost_share", "1", 0.5, 0.0, 0.95, title="lift loss", share_of="lift"),
         Parameter("angle", "rad", 0.3, 0.1, 0.7, shape=True),

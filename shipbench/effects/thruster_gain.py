@@ -16,7 +16,7 @@ class ThrusterGain(Effect):
     summary = "force of the thrusters"
     phrase = "thruster forces that are {gain}"
     source = "docs/theory.md#thrusters"
-    traits = Traits(between_ships=True)
+    traits = Traits(between_ships=True, on_card=True)
     parameters = (Parameter("gain", "1", -0.4, -1.0, 1.0, title="thruster force", relative=True),)
     separate = "thruster pushes at rest"
 

@@ -23,7 +23,7 @@ class ThrusterSpeedLoss(Effect):
         "Int. Shipbuilding Progress (1967), doi 10.3233/ISP-1967-1415601, and k = exp(-|u|/u_0); "
         "docs/theory.md#thrusters"
     )
-    traits = Traits(between_ships=True)
+    traits = Traits(between_ships=True, ordinary=(0.25, 0.12))
     parameters = (Parameter("loss", "1", 0.5, -0.5, 1.2), Parameter("fading", "1", 0.5, -0.2, 1.2, other=True))
     separate = "thruster pushes at 0, 1 and 2 m/s"
 

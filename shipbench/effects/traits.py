@@ -50,6 +50,9 @@ class Traits:
         gear_field: value of the actuator dynamics that it changes: T, rate, delay, deadband or backlash.
         in_place_of: parameters p of eq. (2) to (8), by number, that stay zero where it is fitted: they are confounded.
         in_place_beside_hull: the same where the hull's derivatives are free, too.
+        on_card: a data card says whether the runs tell it apart from the other causes.
+        ordinary: mean and standard deviation of its first value between the ordinary ships that are simulated with the
+            fitted model.
     """
 
     search: str = "screening"
@@ -70,3 +73,5 @@ class Traits:
     gear_field: str = ""
     in_place_of: tuple[int, ...] = ()
     in_place_beside_hull: tuple[int, ...] = ()
+    on_card: bool = False
+    ordinary: tuple[float, ...] = ()

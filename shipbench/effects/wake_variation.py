@@ -19,7 +19,7 @@ class WakeVariation(Effect):
     summary = "wake fraction in turns"
     phrase = "a wake fraction that changes in turns"
     source = "Yasukawa & Yoshimura (2015), eq. 24"
-    traits = Traits(between_ships=True, persistent=True)
+    traits = Traits(between_ships=True, persistent=True, ordinary=(0.35, 0.12))
     parameters = (Parameter("size", "1", 0.6, -1.0, 2.0),)
     separate = "the same turn with the shaft stopped"
 

@@ -23,7 +23,10 @@ class Wind(Effect):
         "docs/theory.md#environment"
     )
     traits = Traits(
-        group="wind and waves", imitates=("bank_suction",), relies_on=("wind_X", "wind_Y", "wind_N", "wind_lever")
+        group="wind and waves",
+        imitates=("bank_suction",),
+        relies_on=("wind_X", "wind_Y", "wind_N", "wind_lever"),
+        on_card=True,
     )
     parameters = (
         Parameter("north", "m/s", 7.0, -60.0, 60.0, scaling="speed"),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..effects.base import EFFECTS
+from ..effects.base import having, searched_by
 from ..errors import InputError, WorkError
 from ..ops import Array
 from ..physics import eq2, wind
@@ -38,17 +38,13 @@ def draw_parameters(rng: np.random.Generator, c: eq2.Coefficients) -> list[float
 
 
 def draw_hull(rng: np.random.Generator) -> list[Hidden]:
-    """Draw differences of an ordinary ship from the regressions: hull derivatives, race at the rudder, wake in turns,
-    thrusters at speed."""
-    hull = EFFECTS.get("hull_derivatives")
+    """Draw differences of an ordinary ship from the regressions: hull derivatives, and the effects with the trait
+    `ordinary`."""
+    (hull,) = searched_by("hull")
     factors = np.clip(HULL_SPREAD * rng.standard_normal(len(hull.parameters)), -0.5, 0.5)
     own = []
-    for name, centre, spread in (
-        ("race_gain", -0.45, 0.1),
-        ("wake_variation", 0.35, 0.12),
-        ("thruster_speed_loss", 0.25, 0.12),
-    ):
-        effect = EFFECTS.get(name)
+    for effect in having("ordinary"):
+        centre, spread = effect.traits.ordinary
         own.append(
             Hidden(effect, effect.internal({effect.parameters[0].name: centre + spread * rng.standard_normal()}))
         )

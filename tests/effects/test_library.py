@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shipbench.effects.base import EFFECTS, Effect
+from shipbench.effects.base import EFFECTS, FAMILIES, Effect
 from shipbench.errors import InputError
 from shipbench.physics import eq2, mmg, wind
 from shipbench.physics.actuators import gear_path
@@ -29,7 +29,6 @@ CONTRACT = (
     "speed_scale", "position_delay",
     "velocity_delay", "unit_or_sign_error", "change_point",
 )  # fmt: skip
-FAMILIES = {"environment", "rudder", "propulsion", "thruster", "hull", "sensor", "time"}
 NAMES = [
     name for name in EFFECTS.names() if name != "change_point"
 ]  # it has no values of its own: see test_change_point

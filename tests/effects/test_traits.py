@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import shipbench
-from shipbench.effects.base import EFFECTS, Effect, searched_by
+from shipbench.effects.base import EFFECTS, Effect, having, searched_by
 from shipbench.effects.traits import SEARCHES, Traits
 
 PACKAGE = Path(shipbench.__file__).parent
@@ -17,7 +17,7 @@ GENERIC = {"current", "wind", "list"}
 """Names of effects that are words of their own: a group of channels, a command."""
 FILES = [
     p
-    for folder in ("diagnosis", "predictors", "bench", "leaderboard", "reports")
+    for folder in ("bench", "data", "diagnosis", "importing", "leaderboard", "predictors", "reports", "simulate")
     for p in sorted((PACKAGE / folder).rglob("*.py"))
 ]
 
@@ -51,6 +51,17 @@ def test_traits_are_consistent(name: str) -> None:
 @pytest.mark.parametrize("search", ["hull", "change", "units"])
 def test_what_has_a_search_of_its_own_is_one_effect(search: str) -> None:
     assert len(searched_by(search)) == 1
+
+
+def test_effects_with_a_trait_come_by_family_and_name() -> None:
+    assert [effect.name for effect in having("ordinary")] == ["race_gain", "wake_variation", "thruster_speed_loss"]
+    assert {effect.family for effect in having("on_card")} == {
+        "environment", "rudder", "propulsion", "thruster", "hull",
+    }  # fmt: skip
+    for effect in having("ordinary"):
+        centre, spread = effect.traits.ordinary
+        assert spread > 0.0
+        assert effect.parameters[0].low < centre < effect.parameters[0].high
 
 
 def test_every_trait_is_used_by_an_effect() -> None:
