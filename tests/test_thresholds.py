@@ -9,6 +9,7 @@ from markdown.extensions.toc import slugify
 
 from shipbench.checking.thresholds import THRESHOLDS as CHECKING
 from shipbench.diagnosis.thresholds import THRESHOLDS
+from shipbench.importing.thresholds import THRESHOLDS as IMPORTING
 from shipbench.thresholds import Thresholds
 
 ROOT = Path(__file__).parents[1]
@@ -17,7 +18,7 @@ ANCHORS = {
     for line in (ROOT / "docs" / "calibration.md").read_text("utf-8").splitlines()
     if line.startswith("#")
 }
-TABLES = {"checking": CHECKING, "diagnosis": THRESHOLDS}
+TABLES = {"checking": CHECKING, "diagnosis": THRESHOLDS, "importing": IMPORTING}
 
 
 @pytest.mark.parametrize("package", TABLES)

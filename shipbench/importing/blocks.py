@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+ROWS = 50_000
+"""Rows of a log that are read at once."""
+
 
 @dataclass(frozen=True)
 class Block:

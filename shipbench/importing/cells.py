@@ -15,9 +15,9 @@ import pyarrow.compute as pc
 from ..errors import InputError
 from .mapping import Source
 from .numerals import Survey, UnreadError, no_number, survey, to_floats
+from .thresholds import THRESHOLDS
 
 EMPTY = ("", "NA", "N/A", "NaN", "nan", "NAN", "null", "NULL", "None", "#N/A", "NaT")
-_GREATEST = 1e30
 _TEXTS = (pa.types.is_string, pa.types.is_large_string, pa.types.is_string_view)
 _NUMBERS = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_boolean, pa.types.is_null)
 
@@ -69,8 +69,9 @@ class Cells:
     def finite(self, array: pa.Array, missing: Sequence[str | float]) -> np.ndarray:
         """Numbers (n,) of an array, NaN where there is no quantity."""
         values = pc.fill_null(array.cast(pa.float64(), safe=False), np.nan).to_numpy(zero_copy_only=False).astype(float)
-        absurd = np.abs(values) > _GREATEST
-        self.met.what[f"infinite values (above {_GREATEST:g}), taken as missing"] += int(absurd.sum())
+        infinite = THRESHOLDS.value("infinite_reading")
+        absurd = np.abs(values) > infinite
+        self.met.what[f"infinite values (above {infinite:g}), taken as missing"] += int(absurd.sum())
         return np.where(absurd | np.isin(values, [m for m in missing if not isinstance(m, str)]), np.nan, values)
 
     def parsed(self, column: str, text: pa.Array) -> pa.Array:

@@ -13,12 +13,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from ..errors import InputError
-from .mapping import LATEST, Clock
+from .constants import DAY
+from .mapping import Clock
 from .stamps import parsed, text_durations
+from .thresholds import THRESHOLDS
 
 RELATIVE = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 _ABSOLUTE = {"unix": (1.0, 0.0), "unix_ms": (1e-3, 0.0), "unix_us": (1e-6, 0.0), "unix_ns": (1e-9, 0.0),
-             "excel": (86400.0, 25569.0), "matlab": (86400.0, 719529.0)}  # fmt: skip
+             "excel": (DAY, 25569.0), "matlab": (DAY, 719529.0)}  # fmt: skip
 """Factor to s, and the reading of 1970-01-01: Excel counts days from 1899-12-30, MATLAB's datenum from the year 0."""
 FORMATS = (*RELATIVE, *_ABSOLUTE, "unix+ns (columns = [seconds, nanoseconds])",
     "timedelta (such as '0 days "
@@ -26,8 +28,8 @@ FORMATS = (*RELATIVE, *_ABSOLUTE, "unix+ns (columns = [seconds, nanoseconds])",
            "hhmmss (number, counted on over midnight)", "iso", "%d/%m/%Y %H:%M:%S.%f (strptime)",
            "%H:%M:%S (time of day, counted on over midnight)")  # fmt: skip
 _DATE = re.compile("%[-#]?[aAbBcdDFgGjmsuUVwWxyY]")
-_1900, _2200 = -2208988800.0, 7258118400.0
-"""Time that strptime gives to a time of day without a date, and the latest time of a log; s since 1970."""
+_1900 = -2208988800.0
+"""Time that strptime gives to a time of day without a date [s since 1970]."""
 
 
 def is_absolute(clock: Clock) -> bool:
@@ -73,8 +75,9 @@ def to_seconds(
             2199.
     """
     seconds = _read(clock, columns, numbers, where, [] if told is None else told)
+    latest = THRESHOLDS.value("latest_time")
     if is_absolute(clock):
-        far = ~((seconds >= _1900) & (seconds < _2200)) & np.isfinite(seconds)
+        far = ~((seconds >= _1900) & (seconds < latest)) & np.isfinite(seconds)
         if far.any():
             year = 1970 + float(seconds[np.argmax(far)]) / 31_556_952
             raise InputError(
@@ -82,10 +85,10 @@ def to_seconds(
                 "2199. "
                 f"Check the format, such as 'unix_ms' for 'unix'. Accepted formats: {', '.join(FORMATS)}."
             )
-    elif (np.abs(seconds) > LATEST).any():
+    elif (np.abs(seconds) > latest).any():
         raise InputError(
             f"{where}: [time] format = '{clock.format}' makes a time of {np.nanmax(np.abs(seconds)):.3g} s; "
-            f"accepted: up to {LATEST:g} s, 230 years. "
+            f"accepted: up to {latest:.2g} s, 230 years. "
             "Check the format, such as 'ms' for 's'."
         )
     return seconds + clock.shift

@@ -17,6 +17,7 @@ from ..errors import InputError, option
 from .blanks import Collapsed
 from .mapping import Layout
 from .table import BLANKS, DELIMITERS, KINDS, TEXT_BLOCK, Table, check_number, uncompressed
+from .thresholds import THRESHOLDS
 
 _NO_TEXT = ("idna", "punycode", "undefined", "unicode_escape", "raw_unicode_escape")
 """Codecs of Python that convert text to text, not a file's bytes."""
@@ -26,7 +27,6 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )  # fmt: skip
-_MOST_ODD = 1000
 _BEGINS_DATA = re.compile(r"\s*[\"']?[-+\u2212]?[.,]?\d")
 
 
@@ -116,7 +116,7 @@ class _OddRows:
             return "skip"
         self.rows.append(row)
         self._blank_before.append(self.blank)
-        return "error" if len(self.rows) > _MOST_ODD else "skip"
+        return "error" if len(self.rows) > THRESHOLDS.count("odd_rows") else "skip"
 
     def refuse(self) -> None:
         """Raise the error for a file whose reading ended early.
@@ -124,7 +124,7 @@ class _OddRows:
         Raises:
             InputError: reading ended since too many rows do not fit.
         """
-        if len(self.rows) > _MOST_ODD:
+        if len(self.rows) > THRESHOLDS.count("odd_rows"):
             raise self._refused(self.rows[0])
 
     def check(self, good: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from ..data.units import sign_factor, unit_factor
 from ..errors import InputError, unknown_name
 from ..signals import COMMANDS, ENVIRONMENT, STATES, UNITS
+from .thresholds import THRESHOLDS
 
 EXTRA_UNITS = {
     "lat": "rad",
@@ -24,6 +26,8 @@ EXTRA_UNITS = {
 CHANNELS = (*STATES, *COMMANDS, *ENVIRONMENT, *EXTRA_UNITS)
 ANGLES = ("psi", "cog", "wind_from", "apparent_wind_from")
 """Angles that wrap around; lon is converted to a position before anything else."""
+LIMITS = {"lat": 0.5 * math.pi, "lon": 2.0 * math.pi}
+"""Greatest size of a position on earth [rad]."""
 EXPRESSIONS = ("column", "mean", "sum", "diff", "atan2", "quaternion")
 """Expressions for a channel: one column; mean or sum of several; the first less the second; the angle of [y, x]; the
 heading of the body-to-earth quaternion [x, y, z, w]."""
@@ -44,8 +48,7 @@ _UNITS_LIKE = {
 }
 
 
-MOST = 1e12
-"""Largest factor and offset of a unit."""
+_MOST = THRESHOLDS.value("largest_factor")
 
 
 class Part(BaseModel):
@@ -72,13 +75,13 @@ class Channel(Part):
     quaternion: tuple[str, str, str, str] | None = None
     unit: str
     sign: str | None = None
-    offset: float = Field(0.0, ge=-MOST, le=MOST)
-    factor: float = Field(1.0, ge=-MOST, le=MOST)
+    offset: float = Field(0.0, ge=-_MOST, le=_MOST)
+    factor: float = Field(1.0, ge=-_MOST, le=_MOST)
     gap: float | None = Field(None, gt=0)
     missing: list[str | float] | None = None
     hemisphere: str | None = None
     part: Literal[1, 2] | None = None
-    full: float | None = Field(None, ge=-MOST, le=MOST)
+    full: float | None = Field(None, ge=-_MOST, le=_MOST)
     full_unit: str | None = None
 
     @model_validator(mode="before")
@@ -174,7 +177,7 @@ def check_channel(name: str, channel: Channel, path: str | Path) -> None:
         channel_factor(name, channel)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    if any(abs(size) < 1.0 / MOST for size in (channel.factor, channel.full) if size is not None):
+    if any(abs(size) < 1.0 / _MOST for size in (channel.factor, channel.full) if size is not None):
         raise InputError(
             f"{where}: factor or full is 0 or next to it; accepted: any other number (it multiplies the reading)."
         )

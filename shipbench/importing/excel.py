@@ -14,12 +14,11 @@ import pyarrow as pa
 from ..errors import InputError, option
 from ..extras import needed_by
 from .mapping import Layout
-from .table import MOST_COLUMNS, Table, as_batch
+from .table import MOST_COLUMNS, Table, as_batch, most_unpacked
+from .thresholds import THRESHOLDS
 
-_LARGEST, _LARGEST_WHOLE = 1_000_000_000, 100_000_000
-_DENSEST = 200
-"""Largest accepted ratio of unpacked to packed size of a workbook; those of logs are below 50."""
 _ROWS = 20_000
+"""Rows of a block: fewer than of other logs, since each cell is a Python object."""
 
 
 def open_excel(path: Path, layout: Layout) -> Table:
@@ -78,12 +77,13 @@ def _check_book(path: Path) -> None:
         sum(p.file_size for p in parts),
         sum(p.file_size for p in parts if not p.filename.startswith("xl/worksheets/")),
     )
-    if size > _LARGEST or whole > _LARGEST_WHOLE or size > max(_DENSEST * path.stat().st_size, 10_000_000):
+    largest, texts = THRESHOLDS.count("workbook_size"), THRESHOLDS.count("workbook_texts")
+    if size > largest or whole > texts or size > most_unpacked(path):
         raise InputError(
             f"{path} has {path.stat().st_size / 1e6:.1f} MB and holds {size / 1e6:.0f} MB unpacked, "
             f"{whole / 1e6:.0f} MB of them texts and styles; "
-            f"accepted: up to {_LARGEST / 1e6:.0f} MB, {_LARGEST_WHOLE / 1e6:.0f} MB of texts and styles, and "
-            f"{_DENSEST} times its size. "
+            f"accepted: up to {largest / 1e6:.0f} MB, {texts / 1e6:.0f} MB of texts and styles, and "
+            f"{THRESHOLDS.count('unpacked_ratio')} times its size. "
             "Save the sheet as CSV, which is streamed."
         )
 

@@ -9,10 +9,9 @@ import numpy as np
 
 from .blocks import Block
 from .cells import Counts
+from .thresholds import THRESHOLDS
 from .track import usual
 
-_LEAST = 8
-"""Fewest changes of a position in a block to estimate the time between fixes; with fewer, the block before decides."""
 _WITH_THE_FIX = ("psi", "u", "v", "r", "sog", "cog")
 """Channels that may come from the same receiver."""
 
@@ -79,18 +78,19 @@ def _decide(p: np.ndarray, moved: np.ndarray, state: _Held) -> None:
     """Set the most rows for which a fix is usually held, and whether the two coordinates are renewed in different
     rows."""
     starts = np.flatnonzero(moved.any(axis=1))
-    if len(starts) < _LEAST:
+    if len(starts) < THRESHOLDS.count("fix_changes"):  # the block before decides
         return
+    share = THRESHOLDS.value("fix_share")
     stands = np.diff(starts)
     leaps = np.abs(np.diff(p[starts], axis=0))
     long = stands >= 2
     steps = np.column_stack([leaps[:, k] / _resolution(leaps[:, k], p[:, k]) for k in range(2)]).max(axis=1)
-    held = long.any() and np.mean(steps[long] > 1.5) > 0.5
+    held = long.any() and np.mean(steps[long] > THRESHOLDS.value("fix_leap")) > share
     both, fewer, more = int(moved.all(axis=1).sum()), *sorted(moved.sum(axis=0))
-    state.apart = bool(both < 0.5 * fewer and fewer >= 0.5 * more)
+    state.apart = bool(both < THRESHOLDS.value("renewed_together") * fewer and fewer >= share * more)
     if state.apart:
         stands = np.concatenate([np.diff(np.flatnonzero(moved[:, k])) for k in range(2)])
-    state.longest = int(np.quantile(stands, 0.9, method="higher")) if held else 1
+    state.longest = int(np.quantile(stands, THRESHOLDS.value("fix_quantile"), method="higher")) if held else 1
 
 
 def _resolution(leaps: np.ndarray, p: np.ndarray) -> float:
@@ -120,6 +120,6 @@ def _companions(values: np.ndarray, fix: np.ndarray, channels: tuple[str, ...]) 
     for column, name in enumerate(channels):
         if name in _WITH_THE_FIX:
             change = np.diff(values[:, column], prepend=np.nan) != 0.0
-            if change[1:][~fix[1:]].sum() == 0 and change[fix].mean() > 0.5:
+            if change[1:][~fix[1:]].sum() == 0 and change[fix].mean() > THRESHOLDS.value("fix_share"):
                 found.append(column)
     return found

@@ -30,11 +30,8 @@ from .runs import Piece, on_grid, outliers, shortest_run, windows, without_stand
 from .steps import steps_marked
 from .stretches import Feed, Stretches
 from .summary import Summary
+from .thresholds import THRESHOLDS
 from .writer import FolderWriter, run_name
-
-_CONTEXT = 20
-"""Samples of the grid that filter and smoother may see beyond the ends of a part."""
-_FINEST = 100
 
 
 @dataclass
@@ -238,7 +235,7 @@ def _runs(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator
     feeds = [Feed(blocks, tuple(mapping.sources[name].channels)) for name, blocks in log.feeds.items()]
     gaps = {name: mapping.gap(name) for name in channels}
     longest = max(math.floor(mapping.split.longest / dt + 1e-6), 1) * dt
-    stretches = Stretches(feeds, gaps, frozenset(COMMANDS), longest, dt, _CONTEXT * dt)
+    stretches = Stretches(feeds, gaps, frozenset(COMMANDS), longest, dt, THRESHOLDS.count("filter_context") * dt)
     absolute = is_absolute(next(iter(mapping.sources.values())).time)
     number = 0
     for stretch in stretches:
@@ -270,9 +267,10 @@ def _runs(log: _Log, mapping: Mapping, ship: Ship, summary: Summary) -> Iterator
 
 def _check_step(mapping: Mapping, steps: dict[str, float]) -> None:
     finest = min(steps, key=lambda name: steps[name])
-    if mapping.dt < steps[finest] / _FINEST:
+    most = THRESHOLDS.count("steps_per_sample")
+    if mapping.dt < steps[finest] / most:
         raise InputError(
-            f"dt = {mapping.dt:g} s is less than 1/{_FINEST} of the time between samples of '{finest}', the fastest "
+            f"dt = {mapping.dt:g} s is less than 1/{most} of the time between samples of '{finest}', the fastest "
             f"channel ({steps[finest]:g} s). "
             "Accepted: a dt that the log can show. Give a longer one."
         )

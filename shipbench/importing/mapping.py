@@ -13,12 +13,9 @@ from ..errors import InputError, option
 from ..names import check_name
 from ..toml_files import read_toml
 from .entries import Channel, Part, check_channel
+from .thresholds import THRESHOLDS
 
 SOURCE_KEYS = ("files", "time", "file", "channels", "missing", "antenna", "speed_sensor", "run")
-
-
-LATEST = 7.3e9
-"""Seconds from 1970 to 2200: the largest time, and the largest difference of two times, of a log."""
 
 
 class Clock(Part):
@@ -34,8 +31,8 @@ class Clock(Part):
     columns: tuple[str, str] | None = None
     format: str = "s"
     zone: str | None = None
-    rate: float | None = Field(None, ge=1e-4, le=1e6)
-    shift: float = Field(0.0, ge=-LATEST, le=LATEST)
+    rate: float | None = Field(None, ge=THRESHOLDS.value("least_rate"), le=THRESHOLDS.value("largest_rate"))
+    shift: float = Field(0.0, ge=-THRESHOLDS.value("latest_time"), le=THRESHOLDS.value("latest_time"))
     repeated: Literal["first", "spread"] = "first"
     backwards: Literal["error", "drop", "sort", "split"] = "error"
 
@@ -54,16 +51,16 @@ class Layout(Part):
     decimal: Literal[".", ","] = "."
     thousands: Literal[".", ",", " ", "'"] | None = None
     encoding: str = "utf-8"
-    header: int = Field(1, ge=0, le=10_000)
-    skip: int = Field(0, ge=0, le=10_000)
+    header: int = Field(1, ge=0, le=THRESHOLDS.count("rows_above_data"))
+    skip: int = Field(0, ge=0, le=THRESHOLDS.count("rows_above_data"))
     sheet: str | None = None
 
 
 class Point(Part):
     """Position on board [m]: x forward of midship, y to starboard of the centre line; the longest ships have 460 m."""
 
-    x: float = Field(ge=-500.0, le=500.0)
-    y: float = Field(0.0, ge=-500.0, le=500.0)
+    x: float = Field(ge=-THRESHOLDS.value("largest_lever"), le=THRESHOLDS.value("largest_lever"))
+    y: float = Field(0.0, ge=-THRESHOLDS.value("largest_lever"), le=THRESHOLDS.value("largest_lever"))
 
 
 class Origin(Part):
@@ -92,12 +89,12 @@ class Split(Part):
     `shortest`: shorter ones are left out; `longest`: longer ones are cut in parts of one group; `still_speed`:
     stretches slower than that for `still_time` are left out."""
 
-    gap: float = Field(3.0, gt=0)
+    gap: float = Field(THRESHOLDS.value("default_gap"), gt=0)
     window: float | None = Field(None, gt=0, allow_inf_nan=False)
     shortest: float | None = Field(None, ge=0, allow_inf_nan=False)
-    longest: float = Field(3600.0, gt=0, allow_inf_nan=False)
+    longest: float = Field(THRESHOLDS.value("default_longest"), gt=0, allow_inf_nan=False)
     still_speed: float | None = Field(None, gt=0)
-    still_time: float = Field(60.0, gt=0)
+    still_time: float = Field(THRESHOLDS.value("default_still_time"), gt=0)
 
 
 class Mapping(Part):

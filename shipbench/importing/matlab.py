@@ -14,11 +14,12 @@ import pyarrow as pa
 from ..errors import InputError
 from ..matlab_files import check_matlab
 from ..regular_files import open_regular
+from .blocks import ROWS
 from .matlab73 import open_matlab73
 from .matlab_objects import not_read, object_vectors
 from .table import MOST_COLUMNS, Table, as_batch
+from .thresholds import THRESHOLDS
 
-_ROWS = 50_000
 _OBJECTS = "\0objects"
 """Key under which names of objects are collected among the vectors; no variable has this name."""
 
@@ -81,8 +82,8 @@ def open_matlab(path: Path) -> Table:
                 f"{path}: vectors of one source differ in length: {told}. Give each rate a [sources.NAME] with its "
                 "own time column."
             )
-        for begin in range(0, max(lengths.values()), _ROWS):
-            yield as_batch({name: _numbers(vectors[name][begin : begin + _ROWS]) for name in wanted})
+        for begin in range(0, max(lengths.values()), ROWS):
+            yield as_batch({name: _numbers(vectors[name][begin : begin + ROWS]) for name in wanted})
 
     return Table(path, tuple(vectors), stream, 1, "MATLAB", notes)
 
@@ -100,7 +101,7 @@ def _collect(name: str, value: Any, vectors: dict[str, Any], depth: int) -> None
         vectors.setdefault(_OBJECTS, []).append(value["s0"].item().decode(errors="replace") if name == "None" else name)
         return
     fields = getattr(value, "_fieldnames", None)
-    if fields is not None and depth < 8:
+    if fields is not None and depth < THRESHOLDS.count("structure_depth"):
         for field in fields:
             _collect(f"{name}.{field}", getattr(value, field), vectors, depth + 1)
     elif isinstance(value, np.ndarray) and value.ndim == 1 and len(value) > 1:

@@ -14,16 +14,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..extras import needed_by
+from .blocks import ROWS
 from .matlab_objects import how_to_save, not_read, object_vectors
 from .table import MOST_COLUMNS, Table, as_batch
-
-_ROWS = 50_000
-_DEEPEST = 8
-_LARGEST_CHUNK = 200_000_000
-"""Most unpacked bytes of one piece of a data set; MATLAB's have some 100 kB."""
-_LARGEST = 1_100_000_000
-"""Most bytes of a file with objects, which are read whole."""
-_MOST_LETTERS = 100
+from .thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -53,9 +47,10 @@ def open_matlab73(path: Path) -> Table:
     whole: dict[str, Any] = {}
     notes: list[str] = []
     if objects:
-        if size > _LARGEST:
+        largest = THRESHOLDS.count("objects_size")
+        if size > largest:
             raise InputError(f"{path} holds objects such as a table, and {size / 1e6:.0f} MB; accepted with "
-                             f"objects: {_LARGEST / 1e6:.0f} MB. "
+                             f"objects: {largest / 1e6:.0f} MB. "
                              f"{how_to_save(objects)}.")  # fmt: skip
         whole = object_vectors(path, sorted({name.split(".")[0] for name in objects}))
         if not whole and not vectors:
@@ -76,12 +71,12 @@ def open_matlab73(path: Path) -> Table:
                 f"{path}: vectors of one source differ in length: {told}. Give each rate a [sources.NAME] with its "
                 "own time column."
             )
-        for begin in range(0, max(lengths.values()), _ROWS):
+        for begin in range(0, max(lengths.values()), ROWS):
             with _opened(path) as file:  # opened for each block: nothing stays open where the reader stops
                 block = {
                     name: _read(file[vectors[name].path], vectors[name], begin)
                     if name in vectors
-                    else whole[name][begin : begin + _ROWS]
+                    else whole[name][begin : begin + ROWS]
                     for name in wanted
                 }
             yield as_batch(block)
@@ -150,7 +145,7 @@ def _collect(name: str, group: Any, vectors: dict[str, _Vector], objects: list[s
             continue
         item, full = group[key], f"{name}.{key}" if name else key
         if isinstance(item, h5py.Group):
-            if h5py.h5o.get_info(item.id).addr not in seen and full.count(".") < _DEEPEST:
+            if h5py.h5o.get_info(item.id).addr not in seen and full.count(".") < THRESHOLDS.count("structure_depth"):
                 _collect(full, item, vectors, objects, seen)
         elif (
             isinstance(item, h5py.Dataset)
@@ -173,15 +168,15 @@ def _add(name: str, item: Any, vectors: dict[str, _Vector]) -> None:
     """Add a vector, or each column of a matrix. MATLAB's n x m matrix is an m x n data set."""
     if item.dtype.kind not in "fiub" or item.ndim not in (1, 2) or item.size < 2:
         return
-    if item.chunks and np.prod(item.chunks, dtype=float) * item.dtype.itemsize > _LARGEST_CHUNK:
+    largest = THRESHOLDS.count("chunk_size")
+    if item.chunks and np.prod(item.chunks, dtype=float) * item.dtype.itemsize > largest:
         raise InputError(
-            f"{item.file.filename}: '{name}' is packed in pieces above {_LARGEST_CHUNK / 1e6:.0f} MB; accepted: "
-            "smaller ones."
+            f"{item.file.filename}: '{name}' is packed in pieces above {largest / 1e6:.0f} MB; accepted: smaller ones."
         )
     _check_stored(name, item)
     if item.attrs.get("MATLAB_class", b"") == b"char":
         if (
-            item.ndim == 2 and item.shape[0] <= _MOST_LETTERS and item.shape[1] > 1
+            item.ndim == 2 and item.shape[0] <= THRESHOLDS.count("letters_of_a_sample") and item.shape[1] > 1
         ):  # a row of letters for each sample, such as time stamps
             vectors[name] = _Vector(item.name, (None,), item.shape[1], text=True)
     elif item.ndim == 1:
@@ -195,7 +190,7 @@ def _add(name: str, item: Any, vectors: dict[str, _Vector]) -> None:
 
 def _read(item: Any, vector: _Vector, begin: int) -> Any:
     """Samples from `begin` on: floats, or texts without the blanks that fill them up."""
-    rows = slice(begin, begin + _ROWS)
+    rows = slice(begin, begin + ROWS)
     if vector.text:
         return ["".join(map(chr, letters)).rstrip() for letters in item[:, rows].T]
     return item[tuple(rows if index is None else index for index in vector.at)].astype(float)

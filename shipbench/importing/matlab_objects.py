@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ..extras import needed_by
-
-_DEEPEST = 8
+from .thresholds import THRESHOLDS
 
 
 def object_vectors(path: Path, names: Sequence[str] | None = None) -> dict[str, Any]:
@@ -59,7 +58,7 @@ def _collect(name: str, value: Any, vectors: dict[str, Any], depth: int) -> None
         for column in value.columns:
             _collect(f"{name}.{column}", value[column].to_numpy(), vectors, depth)
     elif isinstance(value, np.ndarray) and value.dtype.names is not None:  # a struct
-        if value.size == 1 and depth < _DEEPEST:
+        if value.size == 1 and depth < THRESHOLDS.count("structure_depth"):
             for field in value.dtype.names:
                 _collect(f"{name}.{field}", value[field].item(), vectors, depth + 1)
     elif isinstance(value, np.ndarray) and value.size > 1:

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-LEAP = 10.0
+from .thresholds import THRESHOLDS
+
+LEAP = THRESHOLDS.value("heading_leap")
 """Least ratio of a step of such a heading to the neighbouring and to the typical step: no ship turns so within one
 sample."""
-_EQUAL = 0.1
-"""Relative difference that rounding makes between steps of a straight line."""
 _Series = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
@@ -25,6 +25,7 @@ def interpolated(psi: np.ndarray, turn: float = 2.0 * np.pi) -> list[tuple[int, 
     the readings. It makes nearly a full turn and begins and ends at once. A ship that turns a circle continues as
     before, on either side of it.
     """
+    equal = THRESHOLDS.value("straight_line")
     if len(psi) < 4:
         return []
     moved = np.remainder(np.diff(psi) + 0.5 * turn, turn) - 0.5 * turn
@@ -42,7 +43,7 @@ def interpolated(psi: np.ndarray, turn: float = 2.0 * np.pi) -> list[tuple[int, 
                 first = a - 1 if a > 0 and 0.0 < rises[a - 1] < full else a  # a small part of a step
                 last = b + 1 if b < len(rises) and 0.0 < rises[b] < full else b
                 inner, whole = rises[first + 1 : last - 1], abs(float(number[last] - number[first]))
-                straight = last - first >= 2 and bool(np.all(np.abs(inner - full) < _EQUAL * full))
+                straight = last - first >= 2 and bool(np.all(np.abs(inner - full) < equal * full))
                 beside = [
                     abs(s)
                     for s in (*moved[max(first - 1, 0) : first], *moved[last : last + 1])

@@ -8,17 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from .blocks import Block, joined, with_context
+from .blocks import ROWS, Block, joined, with_context
 from .cells import Counts
 from .clock import is_daily, shown
+from .constants import DAY
 from .mapping import Source
+from .thresholds import THRESHOLDS
 from .track import positions, usual, was_set_back
 
-CONTEXT = 5_000
+CONTEXT = THRESHOLDS.count("decision_rows")
 """Rows before and after a row that a decision on its time uses."""
-_MOST_SORTED = 20_000_000
-"""Most readings of a recording that is sorted in memory: 160 MB."""
-_ROWS = 50_000
 
 
 def in_order(blocks: Iterable[Block], source: Source, where: str, met: Counts) -> Iterator[Block]:
@@ -46,7 +45,7 @@ def in_order(blocks: Iterable[Block], source: Source, where: str, met: Counts) -
         last, last_row = block.t[-1], block.values[-1:]
         yield block
     met.what["readings at a time that was there before, left out"] += repeats
-    if repeats > 0.2 * rows:
+    if repeats > THRESHOLDS.value("coarse_stamps") * rows:
         raise InputError(
             f"{where}: {repeats} of {rows} rows repeat the time of the row before: the stamps are coarser than the "
             "samples. "
@@ -124,16 +123,18 @@ def _begins_anew(block: Block, k: int, state: _State, source: Source, where: str
     # pace.
     ahead = np.flatnonzero(block.t[k:] >= state.high)
     if not len(ahead):
-        return len(block.t) - k > 3
+        return len(block.t) - k > THRESHOLDS.count("rows_of_a_recording")
     e = k + int(ahead[0])
-    return bool(block.t[e] - block.t[e - 1] <= 1.5 * _pace(block, k, max(k - state.rows, 0)))
+    pace = _pace(block, k, max(k - state.rows, 0))
+    return bool(block.t[e] - block.t[e - 1] <= THRESHOLDS.value("pace_after_late_rows") * pace)
 
 
 def _pace(block: Block, k: int, low: int) -> float:
     """Typical time between the rows before row k, from `low` on, in the order of time; of the rows after it where there
     are none."""
-    before = usual(np.diff(np.sort(block.t[max(k - 50, low) : k])))
-    return before if before > 0.0 else usual(np.diff(block.t[k : k + 50]))
+    rows = THRESHOLDS.count("rows_of_a_pace")
+    before = usual(np.diff(np.sort(block.t[max(k - rows, low) : k])))
+    return before if before > 0.0 else usual(np.diff(block.t[k : k + rows]))
 
 
 def _seen(block: Block, k: int, low: int, high: float, source: Source) -> bool | None:
@@ -141,7 +142,8 @@ def _seen(block: Block, k: int, low: int, high: float, source: Source) -> bool |
     it cannot."""
     near = _pace(block, k, low)
     depth = high - float(block.t[k])
-    reach = int(min(max(4.0 * depth / near, 50.0), CONTEXT)) if near > 0.0 else 50
+    least = THRESHOLDS.count("rows_of_a_pace")
+    reach = int(min(max(THRESHOLDS.value("rows_of_a_lag") * depth / near, least), CONTEXT)) if near > 0.0 else least
     rows = block.rows(slice(max(k - reach, low), k + reach))
     track = positions(rows.t, rows.values, list(source.channels))
     if track is None:
@@ -160,8 +162,11 @@ def _set_back_by_a_step(block: Block, begin: int, end: int, source: Source) -> n
     if source.time.repeated == "spread":
         return found
     steps = np.diff(block.t)
+    side = THRESHOLDS.count("rows_of_a_repeat")
     alone = [
-        int(k) + 1 for k in np.flatnonzero(steps == 0.0) if np.count_nonzero(steps[max(k - 3, 0) : k + 4] <= 0.0) == 1
+        int(k) + 1
+        for k in np.flatnonzero(steps == 0.0)
+        if np.count_nonzero(steps[max(k - side, 0) : k + side + 1] <= 0.0) == 1
     ]
     seen = [k for k in alone if _seen(block, k, 0, float(block.t[k]), source)]
     if len(seen) == 1 and begin <= seen[0] < end:
@@ -175,13 +180,13 @@ def _sorted(blocks: Iterable[Block], source: Source, where: str, met: Counts) ->
     Raises:
         InputError: more rows than fit in memory.
     """
-    everything, size = [], 0
+    everything, size, most = [], 0, THRESHOLDS.count("readings_in_memory")
     for block in blocks:
         everything.append(block)
         size += block.values.size + block.t.size
-        if size > _MOST_SORTED:
+        if size > most:
             raise InputError(
-                f'{where}: more than {_MOST_SORTED:.0g} readings with [time] backwards = "sort", which sorts in '
+                f'{where}: more than {most:.0g} readings with [time] backwards = "sort", which sorts in '
                 "memory; accepted: fewer. "
                 "Sort the file itself by its time column, or split it."
             )
@@ -201,8 +206,8 @@ def _sorted(blocks: Iterable[Block], source: Source, where: str, met: Counts) ->
         moved += int((order != np.arange(len(order))).sum())
         rows = rows.rows(order)
         rows.new[0] = part.start > 0
-        for first in range(0, len(rows.t), _ROWS):
-            yield rows.rows(slice(first, first + _ROWS))
+        for first in range(0, len(rows.t), ROWS):
+            yield rows.rows(slice(first, first + ROWS))
     met.what["rows sorted by time"] += moved
 
 
@@ -211,9 +216,9 @@ def _over_midnight(blocks: Iterable[Block]) -> Iterator[Block]:
     last, days = -np.inf, 0
     for block in blocks:
         if len(block.t):
-            new = days + np.cumsum(np.diff(block.t, prepend=last) < -43_200.0)
+            new = days + np.cumsum(np.diff(block.t, prepend=last) < -THRESHOLDS.value("new_day"))
             last, days = block.t[-1], int(new[-1])
-            yield Block(block.t + 86_400.0 * new, block.values, block.new)
+            yield Block(block.t + DAY * new, block.values, block.new)
 
 
 def _spread(blocks: Iterable[Block]) -> Iterator[Block]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-# WGS84 (EPSG 7030): semi-major axis [m], flattening.
-_A = 6378137.0
-_F = 1.0 / 298.257223563
-_E2 = _F * (2.0 - _F)
+from .constants import WGS84_AXIS, WGS84_FLATTENING
+
+_E2 = WGS84_FLATTENING * (2.0 - WGS84_FLATTENING)
+"""Square of the ellipsoid's eccentricity."""
 Angle = np.ndarray | float
 
 
@@ -42,7 +42,7 @@ def to_plane(
 
 
 def _geocentric(lat: Angle, lon: Angle, height: Angle) -> tuple[Angle, Angle, Angle]:
-    normal = _A / np.sqrt(1.0 - _E2 * np.sin(lat) ** 2)
+    normal = WGS84_AXIS / np.sqrt(1.0 - _E2 * np.sin(lat) ** 2)
     across = (normal + height) * np.cos(lat)
     return across * np.cos(lon), across * np.sin(lon), ((1.0 - _E2) * normal + height) * np.sin(lat)
 

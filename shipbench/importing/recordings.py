@@ -11,15 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .blocks import Block
+from .blocks import ROWS, Block
 from .cells import Cells, Counts
 from .channels import read_blocks, read_named
 from .clock import is_daily
 from .mapping import Source
 from .table import reading
 from .tables import open_table
-
-_ROWS = 50_000
 
 
 def read_recordings(path: Path, source: Source, met: Counts) -> Iterator[tuple[str | None, Iterator[Block]]]:
@@ -73,7 +71,7 @@ class _Pile:
 
     def blocks(self, channels: int) -> Iterator[Block]:
         with self.path.open("rb") as file:
-            while len(rows := np.fromfile(file, count=_ROWS * (channels + 1)).reshape(-1, channels + 1)):
+            while len(rows := np.fromfile(file, count=ROWS * (channels + 1)).reshape(-1, channels + 1)):
                 yield Block(rows[:, 0], rows[:, 1:])
 
 

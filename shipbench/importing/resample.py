@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-_ORDER = 4
-_CUTOFF = 0.8
+from .thresholds import THRESHOLDS
 
 
 def usual_step(t: np.ndarray) -> float:
@@ -23,7 +22,7 @@ def sample(t: np.ndarray, v: np.ndarray, start: float, dt: float, count: int, an
     interpolated linearly.
     """
     grid = start + dt * np.arange(count)
-    fine = int(np.ceil(dt / usual_step(t) - 0.05)) if len(t) > 1 else 1
+    fine = int(np.ceil(dt / usual_step(t) - THRESHOLDS.value("equal_rates"))) if len(t) > 1 else 1
     if fine < 2 or not antialias:
         return np.interp(grid, t, v)
     from scipy.signal import bessel, sosfiltfilt
@@ -34,10 +33,11 @@ def sample(t: np.ndarray, v: np.ndarray, start: float, dt: float, count: int, an
     after = max(int((t[-1] - grid[-1]) / step + 1e-6), 0)
     dense = start + step * np.arange(-before, fine * (count - 1) + after + 1)
     values = np.interp(dense, t, v)
-    pad = min(len(values) - 1, 10 * fine)
+    pad = min(len(values) - 1, THRESHOLDS.count("filter_padding") * fine)
     if pad < 1:
         return np.interp(grid, t, v)
-    smooth = sosfiltfilt(bessel(_ORDER, _CUTOFF / fine, output="sos", norm="mag"), values, padtype="odd", padlen=pad)
+    order, cutoff = THRESHOLDS.count("filter_order"), THRESHOLDS.value("filter_cutoff") / fine
+    smooth = sosfiltfilt(bessel(order, cutoff, output="sos", norm="mag"), values, padtype="odd", padlen=pad)
     return smooth[before::fine][:count]
 
 
@@ -62,6 +62,6 @@ def interval_means(t: np.ndarray, v: np.ndarray, start: float, dt: float, count:
 def interval_values(t: np.ndarray, v: np.ndarray, start: float, dt: float, count: int) -> np.ndarray:
     """Value (count,) of a continuous input for [t_k, t_k+1): the mean of its samples there, or where they are slower,
     interpolated at the middle."""
-    if usual_step(t) < 0.95 * dt:
+    if usual_step(t) < (1.0 - THRESHOLDS.value("equal_rates")) * dt:
         return interval_means(t, v, start, dt, count)
     return np.interp(start + dt * (np.arange(count) + 0.5), t, v)

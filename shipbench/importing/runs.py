@@ -11,12 +11,14 @@ import numpy as np
 from ..physics.wind import true_wind
 from ..ship import Ship
 from ..signals import COMMANDS, ENVIRONMENT, STATES
+from .constants import GRAVITY
 from .entries import ANGLES
 from .mapping import Mapping, Point
 from .position import to_body, to_midship, to_plane, velocity_at_midship
 from .resample import interval_means, interval_values, sample
 from .speeds import Smoothed, derivative
 from .stretches import Stretch
+from .thresholds import THRESHOLDS
 
 Series = dict[str, tuple[np.ndarray, np.ndarray]]
 
@@ -42,7 +44,8 @@ def shortest_run(mapping: Mapping) -> float:
     split = mapping.split
     if split.shortest is not None:
         return max(split.shortest, mapping.dt)
-    return round(split.window / mapping.dt) * mapping.dt if split.window else 20 * mapping.dt
+    samples = round(split.window / mapping.dt) if split.window else THRESHOLDS.count("default_shortest")
+    return samples * mapping.dt
 
 
 def on_grid(stretch: Stretch, mapping: Mapping, ship: Ship) -> Piece:
@@ -62,7 +65,7 @@ def on_grid(stretch: Stretch, mapping: Mapping, ship: Ship) -> Piece:
     derived: dict[str, Smoothed] = {}
     origin = _positions_at_midship(series, mapping)
     columns = {name: states(*series[name]) for name in STATES if name in series}
-    froude_time = math.sqrt(ship.L / 9.81)
+    froude_time = math.sqrt(ship.L / GRAVITY)
     if "r" not in columns:
         t, psi = series["psi"]
         derived["r"] = derivative(t, psi[:, None], grid, mapping.dt, froude_time)
@@ -118,7 +121,7 @@ def _together(
     """Samples of two channels of one source at their common times; where they are renewed in different rows, at the
     times of both."""
     t, i, j = np.intersect1d(a[0], b[0], assume_unique=True, return_indices=True)
-    if len(t) >= 0.5 * min(len(a[0]), len(b[0])):
+    if len(t) >= THRESHOLDS.value("renewed_together") * min(len(a[0]), len(b[0])):
         return t, a[1][i], b[1][j]
     t = np.union1d(a[0], b[0])
     t = t[(t >= max(a[0][0], b[0][0])) & (t <= min(a[0][-1], b[0][-1]))]
@@ -203,7 +206,7 @@ def windows(piece: Piece, mapping: Mapping) -> Iterator[Piece]:
 
 def outliers(piece: Piece, ship: Ship) -> dict[str, int]:
     """Samples with a speed above sqrt(g L), a Froude number of 1: by the track, and by u and v."""
-    greatest = math.sqrt(9.81 * ship.L)
+    greatest = math.sqrt(GRAVITY * ship.L)
     step = np.hypot(np.diff(piece.columns["x"]), np.diff(piece.columns["y"])) / np.diff(piece.t)
     speed = np.hypot(piece.columns["u"], piece.columns["v"])
     return {

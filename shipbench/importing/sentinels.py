@@ -5,9 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from .entries import ANGLES
+from ..data.units import unit_factor
+from .entries import ANGLES, LIMITS
+from .thresholds import THRESHOLDS
 
-_DEG, _KNOT, _TURN = np.pi / 180.0, 1852.0 / 3600.0, 2.0 * np.pi
+_DEG, _DEG_PER_MIN, _KNOT = unit_factor("psi", "deg"), unit_factor("r", "deg/min"), unit_factor("u", "kn")
+_TURN = 2.0 * np.pi
+_MARGIN = THRESHOLDS.value("angle_margin") * _DEG
 _AIS, _NO_FIX = "AIS: not available", "no fix"
 CODES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "lat": ((91.0, _DEG, f"91 deg ({_AIS})"), (0.0, _DEG, f"0 deg ({_NO_FIX})")),
@@ -16,15 +20,17 @@ CODES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "cog": ((511.0, _DEG, f"511 deg ({_AIS})"), (360.0, _DEG, f"360 deg ({_AIS})")),
     "sog": ((102.3, _KNOT, f"102.3 kn ({_AIS})"),),
     "u": ((102.3, _KNOT, f"102.3 kn ({_AIS})"),),
-    "r": ((-128.0, _DEG / 60.0, f"-128 deg/min ({_AIS})"), (-731.386, _DEG / 60.0, f"-731 deg/min ({_AIS})")),
+    "r": ((-128.0, _DEG_PER_MIN, f"-128 deg/min ({_AIS})"), (-731.386, _DEG_PER_MIN, f"-731 deg/min ({_AIS})")),
 }
 """Value, its standard unit, in words: position reports of the AIS (ITU-R M.1371-5, table 48; -731 deg/min is the
 decoded -128), receivers without a fix."""
 _LARGEST = {
-    "lat": 90.0 * _DEG, "lon": _TURN, **dict.fromkeys(ANGLES, _TURN), "u": 50.0, "v": 50.0, "sog": 50.0, "r": _TURN,
-    "delta": 0.5 * np.pi,
-    "delta_c": 0.5 * np.pi, "n": 9000.0, "n_c": 9000.0, "wind_speed": 120.0, "apparent_wind_speed": 120.0,
-    "depth": 11_000.0,
+    **LIMITS, **dict.fromkeys((*ANGLES, "r"), _TURN),
+    **dict.fromkeys(("u", "v", "sog"), THRESHOLDS.value("largest_speed")),
+    **dict.fromkeys(("delta", "delta_c"), THRESHOLDS.value("largest_rudder")),
+    **dict.fromkeys(("n", "n_c"), THRESHOLDS.value("largest_shaft_speed")),
+    **dict.fromkeys(("wind_speed", "apparent_wind_speed"), THRESHOLDS.value("largest_wind")),
+    "depth": THRESHOLDS.value("largest_depth"),
 }  # fmt: skip
 """Largest value of any ship, shaft, sea or storm, in standard units; a fill value beyond it is no reading, whatever the
 others are."""
@@ -32,13 +38,12 @@ _ORDERED = ("n", "delta", "F_b", "F_s", "n_c", "delta_c", "F_b_c", "F_s_c")
 """Channels that may step to any value at once; the others are continuous."""
 _NINES = np.array([999.0, 9999.0, 99_999.0, 999_999.0])
 _WHOLE = np.array([32_767.0, 32_768.0, 65_535.0, 2_147_483_647.0, 2_147_483_648.0, 4_294_967_295.0])
-_SMALLEST = 99.0
-"""Smallest fill value: below it they are too close to readings."""
 _SCALED = np.unique((np.r_[_NINES, _WHOLE][:, None] / 10.0 ** np.arange(8)).ravel())
-_FILLS = _SCALED[_SCALED > _SMALLEST]
-_CONVERTED = np.unique(
-    (np.r_[_NINES, 0.01 * _WHOLE[:3]][:, None] * np.array([_DEG, _DEG / 60.0, _KNOT, 1.0 / 3.6, 0.3048, 60.0])).ravel()
-)
+_FILLS = _SCALED[THRESHOLDS.value("smallest_fill") < _SCALED]
+_FACTORS = [
+    _DEG, _DEG_PER_MIN, _KNOT, unit_factor("u", "km/h"), unit_factor("x", "ft"), unit_factor("n", "rev/s"),
+]  # fmt: skip
+_CONVERTED = np.unique((np.r_[_NINES, 0.01 * _WHOLE[:3]][:, None] * np.array(_FACTORS)).ravel())
 """Fill values that were converted to the standard unit from degrees, knots, km/h, feet or rev/s."""
 
 
@@ -67,7 +72,7 @@ def not_available(
         return {}, hits
     others = np.isfinite(values) & ~hits
     counted_on = name in ANGLES and bool(
-        (np.abs(values[others]) > _TURN + _DEG).any()
+        (np.abs(values[others]) > _TURN + _MARGIN).any()
     )  # over north: readings beyond a turn are readings
     sure = hits & beyond & (not counted_on)
     doubtful = np.zeros(len(values), bool)
@@ -120,7 +125,7 @@ def _unled(values: np.ndarray, hit: np.ndarray, suspect: np.ndarray, wraps: bool
         place < len(others), distance(values[rows], values[others[np.minimum(place, len(others) - 1)]]), np.inf
     )
     limit = np.maximum(
-        largest, _DEG if wraps else 0.01 * np.abs(values[rows])
+        largest, _MARGIN if wraps else THRESHOLDS.value("flicker") * np.abs(values[rows])
     )  # a flicker of the last digit is no step
     unled = np.zeros(len(values), bool)
     unled[rows] = np.minimum(before, after) > limit
@@ -132,7 +137,7 @@ def beyond_a_turn(values: np.ndarray) -> np.ndarray:
     half a turn or more."""
     rows = np.flatnonzero(np.isfinite(values))
     found = np.zeros(len(values), bool)
-    out = (values[rows] > _TURN + _DEG) | (values[rows] < -0.5 * _TURN - _DEG)
+    out = (values[rows] > _TURN + _MARGIN) | (values[rows] < -0.5 * _TURN - _MARGIN)
     jumps = np.abs(np.diff(values[rows])) >= 0.5 * _TURN
     edges = np.diff(out.astype(int))
     begins, ends = np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1

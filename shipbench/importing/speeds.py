@@ -8,10 +8,7 @@ from typing import Any
 
 import numpy as np
 
-_BINS = 4
-_BLOCK = 1200
-_HELD_OUT, _END = 5.0, 6.0
-_FACTOR, _CANDIDATES = 1.5, 10
+from .thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -43,14 +40,14 @@ def derivative(t: np.ndarray, values: np.ndarray, grid: np.ndarray, dt: float, s
     """
     from scipy.interpolate import make_smoothing_spline
 
-    t, values = _binned(t, values, dt / _BINS)
-    if len(t) < 5:
+    t, values = _binned(t, values, dt / THRESHOLDS.count("spline_bins"))
+    if len(t) < THRESHOLDS.count("spline_least_samples"):
         slope = np.polyfit(t - t[0], values, 1)[0] if len(t) > 1 else np.zeros(values.shape[1])
         return Smoothed(np.tile(slope, (len(grid), 1)), scale, 0.0)
     step = float(np.median(np.diff(t)))
     s = (t - t[0]) / step  # unit spacing keeps the penalty matrix well scaled
     time = _best_time(s, values - values.mean(axis=0), scale / step)
-    trend = _ends(s, values, _END * time)
+    trend = _ends(s, values, THRESHOLDS.value("spline_end") * time)
     spline = make_smoothing_spline(s, values - trend(s), lam=time**4)
     at = np.clip((grid - t[0]) / step, s[0], s[-1])
     rate = (spline.derivative()(at) + trend.derivative()(at)) / step
@@ -67,7 +64,7 @@ def _ends(s: np.ndarray, values: np.ndarray, reach: float) -> Any:
 
     accelerations = []
     for near in (s <= s[0] + reach, s >= s[-1] - reach):
-        enough = near.sum() >= 5
+        enough = near.sum() >= THRESHOLDS.count("spline_least_samples")
         accelerations.append(
             2.0 * np.polyfit(s[near] - s[near].mean(), values[near], 2)[0] if enough else np.zeros(values.shape[1])
         )
@@ -82,17 +79,17 @@ def _best_time(s: np.ndarray, values: np.ndarray, scale: float) -> float:
     """Time constant [steps] with the least error on held-out blocks; of a long signal two parts are used."""
     from scipy.interpolate import make_smoothing_spline
 
-    times = scale * _FACTOR ** np.arange(_CANDIDATES)
-    parts = [slice(0, None)]
-    if len(s) > 2 * _BLOCK:
-        parts = [slice(k - _BLOCK // 2, k + _BLOCK // 2) for k in (len(s) // 4, 3 * len(s) // 4)]
+    times = scale * THRESHOLDS.value("spline_factor") ** np.arange(THRESHOLDS.count("spline_candidates"))
+    parts, length = [slice(0, None)], THRESHOLDS.count("spline_block")
+    if len(s) > 2 * length:
+        parts = [slice(k - length // 2, k + length // 2) for k in (len(s) // 4, 3 * len(s) // 4)]
     errors = np.zeros(len(times))
     for part in parts:
         a, b = s[part], values[part]
-        block = np.floor((a - a[0]) / max(_HELD_OUT * scale, 2.0)).astype(int)
+        block = np.floor((a - a[0]) / max(THRESHOLDS.value("spline_held_out") * scale, 2.0)).astype(int)
         for third in range(3):
             held_out = (block % 3 == third) & (block > 0) & (block < block[-1])
-            if held_out.any() and (~held_out).sum() >= 5:
+            if held_out.any() and (~held_out).sum() >= THRESHOLDS.count("spline_least_samples"):
                 for k, time in enumerate(times):
                     spline = make_smoothing_spline(a[~held_out], b[~held_out], lam=time**4)
                     errors[k] += np.sum((b[held_out] - spline(a[held_out])) ** 2)

@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from ..errors import InputError
+from .constants import DAY
 from .mapping import Clock
 
 _ZONED = r"[T ].*([zZ]|[+-]\d\d:?\d\d|[+-]\d\d)$"
@@ -40,7 +41,7 @@ def text_durations(texts: pa.Array, where: str) -> np.ndarray:
         for name in ("days", "h", "m", "s")
     )
     sign = np.where(parts["sign"].eq("-").fillna(False), -1.0, 1.0)
-    return np.nan_to_num(days) * 86_400.0 + sign * (3600.0 * hours + 60.0 * minutes + seconds)
+    return np.nan_to_num(days) * DAY + sign * (3600.0 * hours + 60.0 * minutes + seconds)
 
 
 def parsed(texts: pa.Array, clock: Clock, accepted: tuple[str, ...], where: str, told: list[str]) -> pd.Series:

@@ -11,13 +11,8 @@ from .cells import Counts
 from .clock import shown
 from .mapping import Source
 from .ordering import CONTEXT
+from .thresholds import THRESHOLDS
 from .track import Jumps, jumps, positions, usual, velocities
-
-_LEAST = 0.5
-"""Least excess of a pause over the typical step, and least step of a clock [s], that are examined."""
-
-_PLAIN = 300
-"""Number of joints without a pause that show the uncertainty of the track."""
 
 
 def steps_marked(blocks: Iterable[Block], source: Source, gap: float, met: Counts) -> Iterator[Block]:
@@ -50,7 +45,8 @@ def _steps(block: Block, track: np.ndarray, stated: np.ndarray | None, gap: floa
     t = block.t[rows]
     pauses = np.diff(t)
     anew = np.flatnonzero(np.diff(np.cumsum(block.new)[rows]) > 0) + 1
-    joints = np.flatnonzero((pauses >= usual(pauses) + _LEAST) & (pauses <= gap * (1 + 1e-6))) + 1
+    least = THRESHOLDS.value("clock_step")
+    joints = np.flatnonzero((pauses >= usual(pauses) + least) & (pauses <= gap * (1 + 1e-6))) + 1
     joints = np.setdiff1d(joints, anew)
     if not len(joints):
         return []
@@ -60,10 +56,10 @@ def _steps(block: Block, track: np.ndarray, stated: np.ndarray | None, gap: floa
         place = np.searchsorted(bounds, joints, side="right")
         return jumps(t, track[rows], None if stated is None else stated[rows], joints, bounds[place - 1], bounds[place])
 
-    plain = np.setdiff1d(np.flatnonzero(pauses < usual(pauses) + _LEAST) + 1, anew)
-    found = at(joints)
+    plain = np.setdiff1d(np.flatnonzero(pauses < usual(pauses) + least) + 1, anew)
+    found, every = at(joints), len(plain) // THRESHOLDS.count("plain_joints") + 1
     steps = []
-    for k in np.flatnonzero(found.certain(_LEAST, at(plain[:: len(plain) // _PLAIN + 1]))):
+    for k in np.flatnonzero(found.certain(least, at(plain[::every]))):
         a, b = rows[joints[k] - 1], rows[joints[k]]
         steps.append((int(a + 1 + np.argmax(np.diff(block.t[a : b + 1]))), float(found.seconds[k])))
     return steps

@@ -9,13 +9,10 @@ import numpy as np
 
 from .blocks import Block
 from .resample import usual_step
+from .thresholds import THRESHOLDS
 
 _SLACK = 1e-6
 """Relative slack of comparisons of times: a gap of just the limit is none."""
-_MOST_VALUES = 2e7
-"""Most readings of all channels in one part: 160 MB."""
-_MOST_SAMPLES = 1_000_000
-"""Most samples of the grid in one part."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +175,8 @@ class Stretches:
     def _limit_memory(self) -> None:
         """Shorten the parts of a log that is sampled so densely that the longest part would not fit."""
         rates = [len(f.t) * len(f.channels) / (f.last - f.first) for f in self.feeds if f.last > f.first]
-        steps = min(max(int(_MOST_VALUES / max(sum(rates), 1e-9) / self.step), 1), _MOST_SAMPLES)
+        held = THRESHOLDS.count("readings_in_memory") / max(sum(rates), 1e-9)
+        steps = min(max(int(held / self.step), 1), THRESHOLDS.count("samples_of_a_part"))
         self.longest = min(self.longest, steps * self.step)
 
     def _pieces(self, feed: Feed, channel: str) -> np.ndarray:

@@ -19,16 +19,14 @@ import pyarrow as pa
 from ..errors import InputError, unknown_name
 from ..regular_files import open_regular
 from ..steps import within
+from .thresholds import THRESHOLDS
 
 BLANKS = " "
 """Delimiter that stands for runs of blanks and tabs."""
 DELIMITERS = (",", ";", "\t", "|", BLANKS)
-MOST_COLUMNS = 10_000
+MOST_COLUMNS = THRESHOLDS.count("most_columns")
 TEXT_BLOCK = 1 << 22
 """Bytes in which the header must stand, and the size of the blocks in which text is read."""
-DENSEST, ALWAYS = 200, 10_000_000
-"""Largest ratio of unpacked to packed size of a compressed log, and bytes that are unpacked at any ratio; those of logs
-are below 100."""
 _UNREADABLE = (
     zipfile.BadZipFile,
     ValueError,
@@ -119,6 +117,11 @@ def check_number(path: Path, columns: int) -> None:
         )
 
 
+def most_unpacked(path: Path) -> int:
+    """Bytes to which a file of that size may unpack."""
+    return max(THRESHOLDS.count("unpacked_ratio") * path.stat().st_size, THRESHOLDS.count("unpacked_always"))
+
+
 def uncompressed(path: Path) -> Any:
     """Binary file, unpacked while it is read where it is a .gz, .bz2 or .xz."""
     with open_regular(path, "log") as file:
@@ -135,7 +138,7 @@ class Bounded(io.RawIOBase):
     def __init__(self, path: Path, raw: Any) -> None:
         super().__init__()
         self._path, self._raw, self._count = path, raw, 0
-        self._most = max(DENSEST * path.stat().st_size, ALWAYS)
+        self._most, self._ratio = most_unpacked(path), THRESHOLDS.count("unpacked_ratio")
 
     def readable(self) -> bool:
         return True
@@ -145,8 +148,8 @@ class Bounded(io.RawIOBase):
         self._count += len(block)
         if self._count > self._most:
             raise InputError(
-                f"{self._path} unpacks to more than {DENSEST} times its size ({self._most / 1e6:.0f} MB); logs have "
-                "up to 100 times. "
+                f"{self._path} unpacks to more than {self._ratio} times its size ({self._most / 1e6:.0f} MB); "
+                "logs have up to 100 times. "
                 "If it is a log, unpack it first and give that file."
             )
         buffer[: len(block)] = block

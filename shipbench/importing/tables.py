@@ -13,10 +13,10 @@ import pyarrow.parquet
 
 from ..errors import InputError
 from ..regular_files import open_regular
+from .blocks import ROWS
 from .mapping import Layout
-from .table import ALWAYS, DENSEST, Table, check_number, reading
-
-_ROWS = 50_000
+from .table import Table, check_number, reading
+from .thresholds import THRESHOLDS
 
 
 def open_table(path: Path, layout: Layout) -> Table:
@@ -87,16 +87,17 @@ def _open_parquet(path: Path) -> Table:
         columns, rows = tuple(file.schema_arrow.names), file.metadata.num_rows
     if rows == 0:
         raise InputError(f"{path} has no rows. Give a log with one row per sample.")
-    if 8 * rows * len(columns) > max(DENSEST * path.stat().st_size, 10 * ALWAYS):
+    ratio, always = THRESHOLDS.count("unpacked_ratio"), 10 * THRESHOLDS.count("unpacked_always")
+    if 8 * rows * len(columns) > max(ratio * path.stat().st_size, always):
         raise InputError(
             f"{path} declares {rows} rows of {len(columns)} columns in {path.stat().st_size / 1e6:.3g} MB; "
-            f"accepted: up to {DENSEST} times its size. If it is a log, save it as CSV."
+            f"accepted: up to {ratio} times its size. If it is a log, save it as CSV."
         )
 
     def stream(wanted: Sequence[str]) -> Iterator[pa.RecordBatch]:
         with pa.parquet.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20) as file:
-            for batch in file.iter_batches(_ROWS, columns=list(wanted), use_threads=False):
+            for batch in file.iter_batches(ROWS, columns=list(wanted), use_threads=False):
                 yield batch.select(list(wanted))
 
     check_number(path, len(columns))
-    return Table(path, columns, stream, 1, "Parquet", blocks=rows / _ROWS)
+    return Table(path, columns, stream, 1, "Parquet", blocks=rows / ROWS)

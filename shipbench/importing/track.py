@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_EARTH = 6_371_000.0
-_POINTS, _FEWEST = 16, 4
-_SIGMA = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
+from .constants import EARTH_RADIUS, SIGMA
+from .thresholds import THRESHOLDS
 
 
 def positions(t: np.ndarray, values: np.ndarray, channels: Sequence[str]) -> np.ndarray | None:
@@ -21,7 +19,7 @@ def positions(t: np.ndarray, values: np.ndarray, channels: Sequence[str]) -> np.
         return None
     first, second = (values[:, channels.index(name)] for name in names)
     a, b = np.isfinite(first), np.isfinite(second)
-    if b.any() and (a & b).sum() < 0.5 * a.sum():  # renewed in different rows
+    if b.any() and (a & b).sum() < THRESHOLDS.value("renewed_together") * a.sum():  # renewed in different rows
         second = np.where(a, np.interp(t, t[b], second[b]), np.nan)
     if names == ("x", "y"):
         return np.column_stack([first, second])
@@ -30,8 +28,8 @@ def positions(t: np.ndarray, values: np.ndarray, channels: Sequence[str]) -> np.
     found = np.full((len(values), 2), np.nan)
     if there.any():
         first = lat[there][0]
-        found[there, 0] = _EARTH * (lat[there] - first)
-        found[there, 1] = _EARTH * np.cos(first) * (np.unwrap(lon[there]) - lon[there][0])
+        found[there, 0] = EARTH_RADIUS * (lat[there] - first)
+        found[there, 1] = EARTH_RADIUS * np.cos(first) * (np.unwrap(lon[there]) - lon[there][0])
     return found
 
 
@@ -47,7 +45,7 @@ def velocities(t: np.ndarray, values: np.ndarray, channels: Sequence[str]) -> np
     else:
         return None
     there = np.isfinite(stated).all(axis=1)
-    if there.sum() < _FEWEST:
+    if there.sum() < THRESHOLDS.count("line_least_points"):
         return None
     return np.column_stack([np.interp(t, t[there], stated[there, k]) for k in range(2)])
 
@@ -76,16 +74,20 @@ class Jumps:
         Outside means five standard errors, more where `plain` joints scatter by more than theirs (errors that last for
         seconds), and twice the 95 % quantile of `plain`.
         """
+        doubt, twice = THRESHOLDS.value("clock_doubt"), THRESHOLDS.value("clock_spread")
+        part, chance = THRESHOLDS.value("clock_across"), THRESHOLDS.value("clock_across_doubt")
         with np.errstate(invalid="ignore", divide="ignore"):
             spread = max(1.0, 0.5 * _quantile(np.abs(plain.seconds) / plain.error))
             size, error = np.abs(self.seconds), spread * self.error
-            far = (size > 5.0 * error) & (size > 2.0 * _quantile(np.abs(plain.seconds)))
-            return (size >= least) & far & (size > self.turning) & (self.across < np.maximum(0.5 * size, 3.0 * error))
+            far = (size > doubt * error) & (size > twice * _quantile(np.abs(plain.seconds)))
+            return (
+                (size >= least) & far & (size > self.turning) & (self.across < np.maximum(part * size, chance * error))
+            )
 
 
 def _quantile(values: np.ndarray) -> float:
     values = values[np.isfinite(values)]
-    return float(np.quantile(values, 0.95)) if len(values) else 0.0
+    return float(np.quantile(values, THRESHOLDS.value("clock_quantile"))) if len(values) else 0.0
 
 
 def jumps(
@@ -105,15 +107,17 @@ def jumps(
     """
     pause = t[joints] - t[joints - 1]
     step = usual(np.diff(t))
-    reach = np.ceil(2.0 * np.abs(pause) / step).astype(int)
-    counts, strides = np.clip(reach, _FEWEST + 1, _POINTS), np.maximum(reach // _POINTS, 1)
+    reach = np.ceil(THRESHOLDS.value("line_reach") * np.abs(pause) / step).astype(int)
+    most, least = THRESHOLDS.count("line_points"), THRESHOLDS.count("line_least_points")
+    counts, strides = np.clip(reach, least + 1, most), np.maximum(reach // most, 1)
     found = _jumps(t, p, np.zeros_like(p), joints, low, high, counts, strides)
     if v is None:
         return found
     way = np.vstack([np.zeros(2), np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t)[:, None], axis=0)])
-    stated = _jumps(t, p - way, v, joints, low, high, np.full_like(counts, _POINTS), strides)
+    stated = _jumps(t, p - way, v, joints, low, high, np.full_like(counts, most), strides)
+    doubt = THRESHOLDS.value("clock_doubt")
     with np.errstate(invalid="ignore"):
-        better = ~(5.0 * found.error + found.turning < 5.0 * stated.error + stated.turning)
+        better = ~(doubt * found.error + found.turning < doubt * stated.error + stated.turning)
     return Jumps(
         *(np.where(better, getattr(stated, f), getattr(found, f)) for f in ("seconds", "error", "turning", "across"))
     )
@@ -124,7 +128,7 @@ def _jumps(
     counts: np.ndarray, strides: np.ndarray
 ) -> Jumps:  # fmt: skip
     middle = 0.5 * (t[joints] + t[joints - 1])
-    number = np.arange(_POINTS)
+    number = np.arange(THRESHOLDS.count("line_points"))
     sides = []
     for first, way in ((joints - 1, -1), (joints, 1)):
         rows = first[:, None] + way * strides[:, None] * number
@@ -149,7 +153,7 @@ def _line(s: np.ndarray, q: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.n
     n, s1, s2 = w.sum(axis=1), (w * s).sum(axis=1), (w * s**2).sum(axis=1)
     q0, q1 = np.einsum("mk,mkc->mc", w, q), np.einsum("mk,mkc->mc", w * s, q)
     with np.errstate(invalid="ignore", divide="ignore"):
-        det = np.where(n >= _FEWEST, n * s2 - s1**2, np.nan)
+        det = np.where(n >= THRESHOLDS.count("line_least_points"), n * s2 - s1**2, np.nan)
         value = (s2[:, None] * q0 - s1[:, None] * q1) / det[:, None]
         slope = (n[:, None] * q1 - s1[:, None] * q0) / det[:, None]
         rest = w[:, :, None] * (q - value[:, None, :] - slope[:, None, :] * s[:, :, None]) ** 2
@@ -178,13 +182,13 @@ def was_set_back(t: np.ndarray, p: np.ndarray, joint: int, seconds: float) -> bo
         return None
     expected = np.column_stack([np.interp(new_t[shared], old_t, old_p[:, k]) for k in range(2)])
     away = float(np.median(np.hypot(*(new_p[shared] - expected).T)))
-    recent = old_t >= old_t[-1] - max(seconds, old_t[-1] - old_t[-min(_FEWEST, joint)])
+    recent = old_t >= old_t[-1] - max(seconds, old_t[-1] - old_t[-min(THRESHOLDS.count("line_least_points"), joint)])
     length = old_t[-1] - old_t[recent][0]
     speed = float(np.hypot(*(old_p[-1] - old_p[recent][0]))) / length if length > 0 else 0.0
     noise = _scatter(old_t[recent], old_p[recent])
-    if speed * seconds <= 10.0 * noise or speed * seconds == 0.0:
+    if speed * seconds <= THRESHOLDS.value("set_back_noise") * noise or speed * seconds == 0.0:
         return None
-    return away > 0.5 * speed * seconds
+    return away > THRESHOLDS.value("set_back_share") * speed * seconds
 
 
 def _scatter(t: np.ndarray, p: np.ndarray) -> float:
@@ -194,4 +198,4 @@ def _scatter(t: np.ndarray, p: np.ndarray) -> float:
         return 0.0
     share = np.where(span > 0.0, (t[1:-1] - t[:-2]) / np.where(span > 0.0, span, 1.0), 0.5)[:, None]
     off = p[1:-1] - (1.0 - share) * p[:-2] - share * p[2:]
-    return _SIGMA * float(np.median(np.abs(off - np.median(off, axis=0)))) / np.sqrt(1.5)
+    return SIGMA * float(np.median(np.abs(off - np.median(off, axis=0)))) / np.sqrt(1.5)

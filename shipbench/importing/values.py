@@ -10,10 +10,9 @@ import numpy as np
 from ..errors import InputError
 from .cells import Cells
 from .coordinates import coordinates
-from .entries import ANGLES, ARCS, MINUTES, Channel, channel_factor
+from .entries import ANGLES, ARCS, LIMITS, MINUTES, Channel, channel_factor
 from .sentinels import CODES, beyond_a_turn, not_available
-
-_LIMITS = {"lat": np.pi / 2, "lon": 2 * np.pi}
+from .thresholds import THRESHOLDS
 
 
 def channel_values(cells: Cells, name: str, channel: Channel) -> np.ndarray:
@@ -117,7 +116,7 @@ _EXPRESSIONS: dict[str, Callable[[Sequence[np.ndarray]], np.ndarray]] = {
 
 
 def _check_range(cells: Cells, name: str, channel: Channel, values: np.ndarray) -> None:
-    limit = _LIMITS.get(name)
+    limit = LIMITS.get(name)
     if limit is None or not (np.abs(values) > limit + 1e-9).any():
         return
     worst = float(np.rad2deg(np.nanmax(np.abs(values))))
@@ -125,7 +124,7 @@ def _check_range(cells: Cells, name: str, channel: Channel, values: np.ndarray) 
     hint = "Check unit and format of its column."
     if channel.unit == "deg":
         degrees = np.abs(np.rad2deg(values[np.isfinite(values)]))
-        if 1e5 <= worst <= np.rad2deg(limit) * 1e7:
+        if THRESHOLDS.value("counted_position") <= worst <= np.rad2deg(limit) * 1e7:
             hint = f'Is it counted in 1e-7 deg? Then write unit = "1e-7 deg" (or factor = 1e-7) in {name}.'
         elif worst <= np.rad2deg(limit) * 100.0 and (degrees % 100.0 <= 60.0).all() and _lat_in_minutes(cells):
             hint = (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
@@ -14,6 +16,7 @@ from shipbench.importing.position import to_body, to_midship, to_plane, velocity
 from shipbench.importing.resample import interval_means, interval_values, sample
 from shipbench.importing.speeds import derivative
 from shipbench.importing.stretches import Feed, Stretches
+from shipbench.importing.thresholds import THRESHOLDS
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.physics.wind import true_wind
 from shipbench.simulate.harbour import draw_plan, fly
@@ -177,7 +180,8 @@ def test_a_stream_is_forgotten_as_it_is_read():
 
 
 def test_a_dense_stream_comes_in_parts_that_fit_into_memory(monkeypatch):
-    monkeypatch.setattr("shipbench.importing.stretches._MOST_VALUES", 1000)
+    row = THRESHOLDS.rows["readings_in_memory"]
+    monkeypatch.setitem(THRESHOLDS.rows, row.name, replace(row, value=1000))
     t = np.arange(0.0, 50.0, 0.01)
     found = Stretches([Feed(stream(t, [t], 500), ("x",))], {"x": 3.0}, frozenset(), 3600.0, 1.0, 0.5)
     assert max(s.end - s.start for s in found) <= 10.0

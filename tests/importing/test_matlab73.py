@@ -55,7 +55,7 @@ def write_mat(path, table: pd.DataFrame, stamps: list[str] | None = None, **opti
 
 @pytest.mark.parametrize("options", [{}, {"chunks": True, "compression": "gzip"}])
 def test_it_gives_the_same_data_as_the_table(trial_import, tmp_path, options, monkeypatch):
-    monkeypatch.setattr("shipbench.importing.matlab73._ROWS", 50)  # several blocks
+    monkeypatch.setattr("shipbench.importing.matlab73.ROWS", 50)  # several blocks
     table = logged(T)
     trial_import(table)
     expected = load_dataset("out").runs[0]

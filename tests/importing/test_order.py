@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,7 @@ from shipbench.importing.blocks import Block
 from shipbench.importing.cells import Counts
 from shipbench.importing.mapping import Source
 from shipbench.importing.steps import steps_marked
+from shipbench.importing.thresholds import THRESHOLDS
 
 T = np.arange(0.0, 180.5, 0.5)
 SECONDS = np.arange(0.0, 181.0)
@@ -100,7 +102,8 @@ def test_rows_of_instruments_one_after_another_are_sorted(trial_import):
 
 
 def test_more_rows_than_are_sorted_in_memory_are_refused(trial_import, monkeypatch):
-    monkeypatch.setattr(ordering, "_MOST_SORTED", 1000)
+    row = THRESHOLDS.rows["readings_in_memory"]
+    monkeypatch.setitem(THRESHOLDS.rows, row.name, replace(row, value=1000))
     result = trial_import(logged(T), backwards("sort"))
     assert result.exit_code == 2
     assert "Sort the file itself" in result.stderr
@@ -230,7 +233,7 @@ def test_ships_that_share_a_log_become_a_run_each(trial_import, ships):
 
 
 def test_ships_that_share_a_log_are_gathered_over_blocks(trial_import, monkeypatch, tmp_path):
-    monkeypatch.setattr(recordings, "_ROWS", 17)
+    monkeypatch.setattr(recordings, "ROWS", 17)
     fleet(3).to_parquet(tmp_path / "log.parquet", row_group_size=10)
     result = trial_import([tmp_path / "log.parquet"], mapping(top='run = "mmsi"'))
     assert result.exit_code == 0, result.output

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..entries import unit_of
+from ..thresholds import THRESHOLDS
 from .columns import Column
 from .heads import QUANTITIES
 
@@ -113,7 +114,7 @@ def _names(value: Any) -> list[str]:
 def _holds(column: Column, found: Assigned) -> bool:
     """Whether a column holds numbers at all; a named one without is reported."""
     cells = column.texts()
-    if len(column.known) >= 0.5 * max(len(cells), 1):
+    if len(column.known) >= THRESHOLDS.value("numeric_share") * max(len(cells), 1):
         return True
     if column.head.channel in ("lat", "lon") and 2 * sum(bool(_LETTERED.fullmatch(cell)) for cell in cells) > len(
         cells
@@ -132,7 +133,7 @@ def _run_column(columns: Sequence[Column]) -> str | None:
     for meaning in ("run", "vessel"):
         for column in columns:
             cells = column.texts(len(column.cells))
-            few = 0 < len(set(cells)) <= 0.2 * len(cells)
+            few = 0 < len(set(cells)) <= THRESHOLDS.value("values_per_row") * len(cells)
             if (
                 column.head.meaning == meaning
                 and column.head.sure

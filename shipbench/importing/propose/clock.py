@@ -15,23 +15,19 @@ import pyarrow as pa
 from ...errors import InputError
 from ..clock import check_format, to_seconds
 from ..mapping import Clock
+from ..thresholds import THRESHOLDS
 from .columns import Column
 from .stamps import day_first_is_sure, formats_of, is_clock, is_date, zone_of
 
 _SIZES = (
-    ("unix", 5e8, 4e9),
-    ("unix_ms", 5e11, 4e12),
-    ("unix_us", 5e14, 4e15),
-    ("unix_ns", 5e17, 4e18),
-    ("matlab", 7e5, 8e5),
-    ("excel", 3e4, 6e4),
+    *(
+        (form, per_second * THRESHOLDS.value("earliest_stamp"), per_second * THRESHOLDS.value("latest_stamp"))
+        for form, per_second in (("unix", 1.0), ("unix_ms", 1e3), ("unix_us", 1e6), ("unix_ns", 1e9))
+    ),
+    ("matlab", THRESHOLDS.value("earliest_datenum"), THRESHOLDS.value("latest_datenum")),
+    ("excel", THRESHOLDS.value("earliest_workbook_day"), THRESHOLDS.value("latest_workbook_day")),
 )
-"""Formats of moments by the size of their numbers, from 1986 (MATLAB: 1916, Excel: 1982) on."""
-_FINE = 0.02
-"""Least step of days: numbers of the size of Excel's or MATLAB's days are days where they increase in smaller steps."""
-_FORWARD = 0.6
-"""Least share of steps that do not go back: two vessels in turns, or a log in disorder, have more than that; readings
-of a sensor have half."""
+"""Formats of moments, with the range of their numbers."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +166,7 @@ def _of_one(column: Column, trust: float) -> Iterator[Time]:
         yield from _tried({"column": column.name, "format": form}, (column,), trust + 0.5, "typed as times in the file")
         return
     texts = column.texts()
-    if len(column.known) < 0.5 * len(texts) or not len(column.known):
+    if len(column.known) < THRESHOLDS.value("numeric_share") * len(texts) or not len(column.known):
         for form in formats_of(texts):
             zone = {"zone": zone} if (zone := zone_of(form)) else {}
             yield from _tried(
@@ -190,7 +186,8 @@ def _counted(column: Column, texts: list[str]) -> Iterator[tuple[str, str]]:
     steps = np.abs(np.diff(column.known))
     for form, low, high in _SIZES:
         if low < middle < high and (
-            form not in ("excel", "matlab") or (unit is None and np.median(steps) < _FINE and (steps > 0).any())
+            form not in ("excel", "matlab")
+            or (unit is None and np.median(steps) < THRESHOLDS.value("step_of_days") and (steps > 0).any())
         ):
             yield form, "from the size of the numbers"
             return
@@ -209,7 +206,7 @@ def _looks_packed(values: np.ndarray, texts: list[str]) -> bool:
     seconds = values - whole + whole % 100 + 60 * (whole // 100 % 100) + 3600 * (whole // 10_000)
     padded = all(len(text.split(".")[0]) == 6 for text in texts[:200])
     leaps = np.diff(values) - np.diff(seconds)
-    return padded or bool((leaps >= 40).any() and _evenness(seconds) > _evenness(values))
+    return padded or bool((leaps >= THRESHOLDS.value("minute_leap")).any() and _evenness(seconds) > _evenness(values))
 
 
 def _tried(spec: dict[str, Any], columns: Sequence[Column], trust: float, why: str) -> Iterator[Time]:
@@ -220,7 +217,8 @@ def _tried(spec: dict[str, Any], columns: Sequence[Column], trust: float, why: s
     known = t[np.isfinite(t)]
     steps = np.diff(known)
     runs = float((steps > 0).any())
-    if len(known) < 2 or (steps >= 0).mean() < _FORWARD or len(known) < 0.5 * len(t) or (not runs and steps.any()):
+    few = len(known) < max(THRESHOLDS.value("numeric_share") * len(t), 2)
+    if few or (steps >= 0).mean() < THRESHOLDS.value("forward_share") or (not runs and steps.any()):
         return
     yield Time(
         spec,
@@ -237,7 +235,8 @@ def _evenness(t: np.ndarray) -> float:
     """Share of the steps forward that are within a fifth of the usual one."""
     steps = np.diff(t[np.isfinite(t)])
     steps = steps[steps > 0]
-    return float((np.abs(steps - np.median(steps)) <= 0.2 * np.median(steps)).mean()) if len(steps) else 0.0
+    even = THRESHOLDS.value("even_step")
+    return float((np.abs(steps - np.median(steps)) <= even * np.median(steps)).mean()) if len(steps) else 0.0
 
 
 def _with_notes(time: Time, columns: Sequence[Column]) -> Time:
@@ -250,7 +249,11 @@ def _with_notes(time: Time, columns: Sequence[Column]) -> Time:
         notes.append(
             f"NOT SURE: '{own[0].name}' is taken as the time: it goes forward in even steps of {time.step:.4g}."
         )
-    elif "no unit" in time.why and time.step >= 20.0 and (np.mod(own[0].known, 1.0) == 0).all():
+    elif (
+        "no unit" in time.why
+        and time.step >= THRESHOLDS.value("step_of_milliseconds")
+        and (np.mod(own[0].known, 1.0) == 0).all()
+    ):
         notes.append(
             f"NOT SURE: '{own[0].name}' goes on by {time.step:g}; seconds are taken. If it counts milliseconds, "
             'write format = "ms".'

@@ -16,10 +16,10 @@ from ...errors import InputError
 from ..mapping import Layout
 from ..table import Table
 from ..tables import open_table
+from ..thresholds import THRESHOLDS
 from .heads import Head, read_head
 from .layout import Form, find_form
 
-_ROWS = 20_000
 _MARKS = ((".", ""), (",", ""), (".", ","), (",", "."), (".", " "), (",", " "), (".", "'"), (",", "'"))
 """Decimal and thousands marks, the usual ones first."""
 _GROUPING = {".": "[.]", ",": ",", " ": "[ \u00a0\u2009\u202f]", "'": "['\u2019]"}
@@ -54,7 +54,7 @@ class Column:
 
     def evidence(self) -> str:
         """Text on the beginning of the column, for a comment."""
-        if len(self.known) and len(self.known) >= 0.5 * len(self.texts(len(self.cells))):
+        if len(self.known) and len(self.known) >= THRESHOLDS.value("numeric_share") * len(self.texts(len(self.cells))):
             first = ", ".join(f"{v:.6g}" for v in self.known[:3])
             return f"first values {first}; {self.known.min():.6g} to {self.known.max():.6g}"
         return (
@@ -123,18 +123,15 @@ def _of_one_length(table: Table, names: list[str]) -> list[list[str]]:
     groups: dict[int, list[str]] = {}
     for name in names:
         groups.setdefault(sum(batch.num_rows for batch in table.batches([name])), []).append(name)
-    long = {length: group for length, group in groups.items() if length >= _PARAMETERS}
+    long = {length: group for length, group in groups.items() if length >= THRESHOLDS.count("least_samples")}
     return list((long or groups).values())
-
-
-_PARAMETERS = 10
 
 
 def _first(table: Table, names: list[str]) -> pa.RecordBatch:
     first = next(itertools.islice(table.batches(names), 1), None)
     if first is None or first.num_rows == 0:
         raise InputError(f"{table.path} has no rows. Give a log with a header and rows.")
-    return first.slice(0, _ROWS)
+    return first.slice(0, THRESHOLDS.count("proposal_rows"))
 
 
 def numbers(array: pa.Array, decimal: str, thousands: str) -> np.ndarray:
@@ -171,7 +168,8 @@ def _marks(cells: list[pa.Array]) -> tuple[tuple[str, str], list[str]]:
         for text in texts:
             plain, grouped = numbers(text, *best), numbers(text, *other)
             changed = np.isfinite(plain) & (plain != grouped)
-            if changed.any() and not changed.all() and _roughness(grouped) < 0.3 * _roughness(plain):
+            smoother = _roughness(grouped) < THRESHOLDS.value("thousands_gain") * _roughness(plain)
+            if changed.any() and not changed.all() and smoother:
                 return other, [
                     (
                         f"NOT SURE: '{text[int(np.argmax(changed))]}' is read as thousands: only so does its column "

@@ -19,23 +19,13 @@ from ..channels import read_blocks
 from ..entries import Channel
 from ..mapping import Source
 from ..position import to_plane
+from ..thresholds import THRESHOLDS
 from .assign import Assigned, Entry
 from .clock import Time
 from .columns import Sample
 
-_WINDOW = 5.0
-"""Time of one window of the track [s]; longer where the log is slow."""
-_AGREES = 0.9
-"""Least mean cosine between heading and track: 25 degrees apart."""
-_COURSE = np.deg2rad(1.0)
-"""Least agreement with the track's direction through turns at which a column is the course: a turning hull drifts by
-several degrees."""
-_TURNING = np.deg2rad(30.0)
-"""Least range of directions at which a log turns enough for this."""
-_ALIKE = 0.9
-"""Least correlation at which a column is taken as the sway of the track."""
-_CLOSE = 0.15
-"""Relative difference within which two speeds, or two yaw rates, are the same."""
+_TURNING = np.deg2rad(THRESHOLDS.value("turning_range"))
+_CLOSE = THRESHOLDS.value("same_speed")
 _UNITS = {"rad": ("deg", "rad", "cdeg"), "rad/s": ("rad/s", "deg/s", "deg/min"), "m/s": ("m/s", "kn", "km/h", "ft/s")}
 _CLOCKS = {1e3: "ms", 1e6: "us", 1.0 / 60.0: "min", 1.0 / 3600.0: "h"}
 
@@ -93,7 +83,7 @@ def _series(sample: Sample, source: Source) -> dict[str, tuple[np.ndarray, np.nd
             t.append(block.t)
             values.append(block.values)
         rows += len(block.t)
-        if rows > 20_000:
+        if rows > THRESHOLDS.count("proposal_rows"):
             break
     if not t:
         return {}
@@ -115,20 +105,21 @@ def _track(series: dict[str, tuple[np.ndarray, np.ndarray]]) -> _Track | None:
         x, y = to_plane(x, y, (x[0], y[0]))
     moved = np.r_[True, (np.diff(x) != 0) | (np.diff(y) != 0)]  # a fix that is repeated until the next is one fix
     t, x, y = t[moved], x[moved], y[moved]
-    if len(t) < 10:
+    if len(t) < THRESHOLDS.count("track_samples"):
         return None
-    window = min(max(_WINDOW, 2.0 * float(np.median(np.diff(t)))), (t[-1] - t[0]) / 8)
+    window = max(THRESHOLDS.value("track_window"), 2.0 * float(np.median(np.diff(t))))
+    window = min(window, (t[-1] - t[0]) / THRESHOLDS.count("track_windows"))
     ends = np.searchsorted(t, t + window)
     starts = np.flatnonzero(ends < len(t))
     ends = ends[starts]
     lasted = t[ends] - t[starts]
     near = (lasted > 0) & (lasted < 3 * window)
     starts, ends, lasted = starts[near], ends[near], lasted[near]
-    if len(starts) < 5:
+    if len(starts) < THRESHOLDS.count("track_least"):
         return None
     north, east = x[ends] - x[starts], y[ends] - y[starts]
     speed = np.hypot(north, east) / lasted
-    moving = speed > 0.5 * np.quantile(speed, 0.9)
+    moving = speed > THRESHOLDS.value("moving_track") * np.quantile(speed, THRESHOLDS.value("moving_quantile"))
     return _Track(0.5 * (t[starts] + t[ends])[moving], np.arctan2(east, north)[moving], speed[moving])
 
 
@@ -148,8 +139,8 @@ def _heading(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], fo
                 scores[unit, turned, axes] = float(np.mean(np.cos(way - (np.pi / 2 - psi if turned else psi))))
     spread = float(np.ptp(np.unwrap(track.direction)))
     plain = {k: v for k, v in scores.items() if k[1:] == (False, "")}
-    best = max(plain, key=lambda k: plain[k])
-    if plain[best] >= _AGREES:
+    best, agrees = max(plain, key=lambda k: plain[k]), THRESHOLDS.value("heading_agrees")
+    if plain[best] >= agrees:
         _settle_unit(entry, best[0], plain[best], found)
         _heading_or_course(
             entry, _at(track.t, raw[0], np.unwrap(raw[1] * unit_factor("psi", best[0]))), track, spread, found
@@ -157,7 +148,7 @@ def _heading(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], fo
         return
     any_way = max(scores, key=lambda k: (round(scores[k], 2), -bool(k[1]), -len(k[2])))
     degrees = np.rad2deg(np.arccos(np.clip(plain[best], -1, 1)))
-    if scores[any_way] >= _AGREES and spread > _TURNING:
+    if scores[any_way] >= agrees and spread > _TURNING:
         _turn(entry, any_way, found)
         entry.why.append(
             f"NOT SURE: only so the heading agrees with the track (as it stands they are {degrees:.0f} deg apart)"
@@ -238,7 +229,7 @@ def _heading_or_course(entry: Entry, psi: np.ndarray, track: _Track, spread: flo
         return
     apart = float(np.sqrt(np.mean(np.angle(np.exp(1j * (track.direction - psi))) ** 2)))
     name = entry.columns[0].name
-    if apart < _COURSE:
+    if apart < np.deg2rad(THRESHOLDS.value("course_agrees")):
         del found.entries["psi"]
         found.notes[:] = [n for n in found.notes if f"'{name}' may be the heading" not in n]
         found.notes.append(
@@ -254,16 +245,19 @@ def _yaw_rate(series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned)
     t, psi = series["psi"]
     psi = np.unwrap(psi)
     at, r = series["r"]
-    window = max(2.0, 2.0 * float(np.median(np.diff(at))))
+    window = max(THRESHOLDS.value("yaw_window"), 2.0 * float(np.median(np.diff(at))))
     inside = at[(at >= t[0] + window) & (at <= t[-1] - window)]
-    if len(inside) < 10:
+    if len(inside) < THRESHOLDS.count("track_samples"):
         return
     change = (np.interp(inside + window / 2, t, psi) - np.interp(inside - window / 2, t, psi)) / window
-    steady = np.abs(change) <= 3 * np.quantile(
-        np.abs(change), 0.9
-    )  # leaves out where a heading was interpolated across 360/0
+    # Leave out where a heading was interpolated across 360/0.
+    fast = THRESHOLDS.value("steady_rate") * np.quantile(np.abs(change), THRESHOLDS.value("moving_quantile"))
+    steady = np.abs(change) <= fast
     change, rate = change[steady], _mean_over(inside[steady], at, r, window)
-    if np.std(change) == 0 or np.std(rate) == 0 or abs(correlation := float(np.corrcoef(change, rate)[0, 1])) < 0.8:
+    if np.std(change) == 0 or np.std(rate) == 0:
+        return
+    correlation = float(np.corrcoef(change, rate)[0, 1])
+    if abs(correlation) < THRESHOLDS.value("yaw_correlation"):
         return
     ratio = float(np.sum(change * rate) / np.sum(rate * rate))
     _settle(entry, "r", ratio, "the change of the heading", found)
@@ -282,8 +276,8 @@ def _mean_over(times: np.ndarray, at: np.ndarray, values: np.ndarray, window: fl
 
 def _speed(channel: str, track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], found: Assigned) -> None:
     recorded = np.abs(_at(track.t, *series[channel]))
-    moving = recorded > 0.3 * np.quantile(recorded, 0.9)
-    if moving.sum() >= 5:
+    moving = recorded > THRESHOLDS.value("moving_log") * np.quantile(recorded, THRESHOLDS.value("moving_quantile"))
+    if moving.sum() >= THRESHOLDS.count("track_least"):
         _settle(
             found.entries[channel],
             channel,
@@ -300,7 +294,8 @@ def _sway(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]], found
         return
     beside = track.speed * np.sin(track.direction - _at(track.t, series["psi"][0], np.unwrap(series["psi"][1])))
     recorded = _at(track.t, *series["v"])
-    if np.std(beside) > 0 and np.std(recorded) > 0 and np.corrcoef(beside, recorded)[0, 1] > _ALIKE:
+    moves = np.std(beside) > 0 and np.std(recorded) > 0
+    if moves and np.corrcoef(beside, recorded)[0, 1] > THRESHOLDS.value("sway_correlation"):
         _settle(v, "v", float(np.sum(beside * recorded) / np.sum(recorded**2)), "the track beside the heading", found)
     elif u and not u.columns[0].head.units and not v.columns[0].head.units and "as given" not in v.why:
         v.spec["unit"] = u.spec["unit"]

@@ -14,19 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...data.units import unit_factor
+from ..thresholds import THRESHOLDS
 from .assign import Assigned, Entry
 from .columns import Column
-
-_MOST = 24
-"""Most columns that are tried; the number of choices grows with its third power."""
-_ROWS = 2000
-_CORRELATION = 0.95
-"""Least correlation between the change of the heading and the yaw rate, and between sway by the track and by the log.
-Filters and noise take a few per cent."""
-_CLOSE = 0.1
-"""Relative difference within which a factor between two columns is that of a unit."""
-_TURNS = np.deg2rad(5.0)
-"""Least range of headings for an identification."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +29,10 @@ class _Motion:
 
 def identify(columns: Sequence[Column], t: np.ndarray, found: Assigned) -> None:
     """Add the channels that the motion identifies to `found`, each marked as not sure."""
-    free = [c for c in columns if c.name not in found.used() and not c.head.name and len(c.known) > 0.9 * len(t)]
+    known = THRESHOLDS.value("headless_known") * len(t)
+    free = [c for c in columns if c.name not in found.used() and not c.head.name and len(c.known) > known]
     free = [c for c in free if np.ptp(c.known) > 0]
-    if found.entries or not 3 <= len(free) <= _MOST:
+    if found.entries or not THRESHOLDS.count("headless_least") <= len(free) <= THRESHOLDS.count("headless_most"):
         return
     motion = _motion(np.array([c.values for c in free]), t)
     if motion is None:
@@ -71,10 +62,11 @@ def _motion(values: np.ndarray, t: np.ndarray) -> _Motion | None:
         & np.isfinite(values).all(axis=0)
     )
     t, values = t[new], values[:, new]
-    if len(t) < 60:
+    if len(t) < THRESHOLDS.count("headless_samples"):
         return None
-    window = max(2.0, 4.0 * float(np.median(np.diff(t))))
-    at = np.linspace(t[0] + window / 2, t[-1] - window / 2, min(_ROWS, len(t)))
+    window = max(THRESHOLDS.value("yaw_window"), THRESHOLDS.value("headless_window") * float(np.median(np.diff(t))))
+    points = min(THRESHOLDS.count("headless_points"), len(t))
+    at = np.linspace(t[0] + window / 2, t[-1] - window / 2, points)
     parts = np.array(
         [[np.interp(at + shift * window, t, v) for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)] for v in values]
     )
@@ -84,16 +76,14 @@ def _motion(values: np.ndarray, t: np.ndarray) -> _Motion | None:
 def _choices(motion: _Motion) -> list[tuple[float, dict[str, str], dict[str, int]]]:
     """Choices of heading, yaw rate and position that agree, as (score, units, places)."""
     found = []
-    count = len(motion.means)
+    count, turn = len(motion.means), np.deg2rad(THRESHOLDS.value("headless_turn"))
     for psi, r in itertools.permutations(range(count), 2):
         fit = _line(motion.means[r], motion.changes[psi])
-        if fit is None or fit[1] < _CORRELATION:
+        if fit is None or fit[1] < THRESHOLDS.value("headless_correlation"):
             continue
         for psi_unit, r_unit in itertools.product(("deg", "rad"), ("deg/s", "rad/s", "deg/min")):
             heading = motion.means[psi] * unit_factor("psi", psi_unit)
-            if np.ptp(heading) < _TURNS or not _is_unit(
-                fit[0] * unit_factor("psi", psi_unit), unit_factor("r", r_unit)
-            ):
+            if np.ptp(heading) < turn or not _is_unit(fit[0] * unit_factor("psi", psi_unit), unit_factor("r", r_unit)):
                 continue
             for x, y in itertools.permutations([k for k in range(count) if k not in (psi, r)], 2):
                 scored = _track(motion, heading, x, y)
@@ -108,16 +98,17 @@ def _track(motion: _Motion, heading: np.ndarray, x: int, y: int) -> tuple[float,
     """Agreement of a position with the heading, and with the columns of surge and sway where there are any."""
     north, east = motion.changes[x], motion.changes[y]
     surge, sway = north * np.cos(heading) + east * np.sin(heading), east * np.cos(heading) - north * np.sin(heading)
-    if np.mean(surge > 0) < 0.95 or np.sqrt(np.mean(sway**2)) > 0.5 * np.sqrt(np.mean(surge**2)):
+    ahead, most = THRESHOLDS.value("headless_ahead"), THRESHOLDS.value("headless_sway")
+    if np.mean(surge > 0) < ahead or np.sqrt(np.mean(sway**2)) > most * np.sqrt(np.mean(surge**2)):
         return None
     units: dict[str, str] = {}
     places: dict[str, int] = {}
-    score = 0.0
+    score, least = 0.0, THRESHOLDS.value("headless_correlation")
     for channel, wanted in (("v", sway), ("u", surge)):
         for k in range(len(motion.means)):
             fit = _line(motion.means[k], wanted)
             unit = next(
-                (u for u in ("m/s", "kn") if fit and fit[1] > _CORRELATION and _is_unit(fit[0], unit_factor("u", u))),
+                (u for u in ("m/s", "kn") if fit and fit[1] > least and _is_unit(fit[0], unit_factor("u", u))),
                 None,
             )
             if fit and unit and k not in (x, y):
@@ -127,7 +118,7 @@ def _track(motion: _Motion, heading: np.ndarray, x: int, y: int) -> tuple[float,
     way = np.unwrap(np.arctan2(east, north))
     apart = np.angle(np.exp(1j * (way - heading)))
     followed = 1.0 - float(np.var(apart) / np.var(way)) if np.var(way) > 0 else 0.0
-    if "v" not in places and followed < 0.7:
+    if "v" not in places and followed < THRESHOLDS.value("headless_followed"):
         return None
     return score + followed, units, places
 
@@ -140,4 +131,4 @@ def _line(of: np.ndarray, wanted: np.ndarray) -> tuple[float, float] | None:
 
 
 def _is_unit(slope: float, factor: float) -> bool:
-    return slope > 0 and abs(np.log(slope / factor)) < _CLOSE
+    return slope > 0 and abs(np.log(slope / factor)) < THRESHOLDS.value("same_unit")

@@ -13,6 +13,7 @@ from functools import cache
 from importlib import resources
 
 from ..entries import CHANNELS, unit_of
+from ..thresholds import THRESHOLDS
 
 QUANTITIES = {"m": "length", "m/s": "speed", "rad": "angle", "rad/s": "rate", "rpm": "shaft", "N": "force"}
 """Quantity in units.csv for each standard unit."""
@@ -21,8 +22,8 @@ _LETTERS = str.maketrans(
 )
 _BRACKETS = r"[\[({<]([^\])}>]*)[\])}>]"
 _SIDE_LETTERS = {"p", "l", "r", "a", "b"}
-_SHORT = 2
-"""Longest words that name a channel only where they stand alone: the r of 'r_max' is no yaw rate."""
+_SHORT = THRESHOLDS.count("short_word")
+"""Letters of the longest word that names a channel only where it stands alone: the r of 'r_max' is no yaw rate."""
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from ..excel import first_rows
 from ..mapping import Layout
 from ..table import BLANKS, DELIMITERS, TEXT_BLOCK, reading, uncompressed
 from ..tables import kind_of
+from ..thresholds import THRESHOLDS
 from .heads import read_head, units_of
 
-_LINES = 400
 _SIGN = "[-+\u2212]?"
 _NUMBER = rf"{_SIGN}(\d+([.,]\d*)?|[.,]\d+|\d{{1,3}}([ .,'\u00a0\u2009\u202f\u2019]\d{{3}})+([.,]\d+)?)([eE][-+]?\d+)?"
 _DATE = r"\d{1,4}[-./]([A-Za-z]{3,9}|\d{1,2})[-./]\d{2,4}"
@@ -48,11 +48,11 @@ def find_form(path: Path, given: dict[str, Any]) -> Form:
     Raises:
         InputError: the log cannot be read, or no row in its beginning looks like data.
     """
-    kind = kind_of(path)
+    kind, count = kind_of(path), THRESHOLDS.count("proposal_lines")
     if kind == "Excel":
         layout = Layout(**{k: v for k, v in given.items() if k == "sheet"})
         with reading(path):
-            rows = [["" if cell is None else str(cell) for cell in row] for row in first_rows(path, layout, _LINES)]
+            rows = [["" if cell is None else str(cell) for cell in row] for row in first_rows(path, layout, count)]
         return _form(path, rows, dict(given), ())
     if kind != "text":
         return Form(Layout(**given), given=dict(given))
@@ -69,7 +69,7 @@ def find_form(path: Path, given: dict[str, Any]) -> Form:
         raise InputError(
             f"{path} is not {encoding} text. Accepted: Python's names of encodings, such as {example}."
         ) from None
-    lines = [line.rstrip("\n") for line, _ in zip(io.StringIO(text, newline=None), range(_LINES), strict=False)]
+    lines = [line.rstrip("\n") for line, _ in zip(io.StringIO(text, newline=None), range(count), strict=False)]
     delimiter = given.get("delimiter") or _delimiter(lines)
     return _form(path, [_split(line, delimiter or ",") for line in lines], found, tuple(notes), delimiter, lines)
 

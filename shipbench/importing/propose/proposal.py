@@ -12,11 +12,12 @@ from ...errors import InputError, option
 from ...regular_files import check_output
 from ...storage import put
 from ..mapping import SOURCE_KEYS
+from ..thresholds import THRESHOLDS
 from ..writer import run_name
 from .columns import read_samples
 from .groups import group
 from .partial import read_partial
-from .source import SLOW, SourceDraft, channel_gaps, clocks_apart, draft_source, missing_channels
+from .source import SourceDraft, channel_gaps, clocks_apart, draft_source, missing_channels
 from .text import draft_text, one_line
 from .trial import try_draft
 
@@ -124,11 +125,13 @@ def _top(sources: Sequence[SourceDraft], known: dict[str, Any], log: Path) -> tu
     """Keys at the top of the mapping and those of [split]."""
     steps = [s.step for s in sources if s.found.entries] or [s.step for s in sources]
     finest = min(steps)
+    usual = THRESHOLDS.value("proposed_step"), THRESHOLDS.value("proposed_slow_step")
     top: dict[str, Any] = {
         "name": run_name(log.name.split(".")[0]),
-        "dt": 0.5 if finest <= 0.5 else 1.0 if finest <= 1.0 else float(f"{finest:.2g}"),
+        "dt": next((dt for dt in usual if finest <= dt), float(f"{finest:.2g}")),
     }
     top |= {key: entry for key, entry in known.items() if key not in (*SOURCE_KEYS, "sources", "split")}
-    slow = [step for step in steps if step <= SLOW] or [finest]
-    split = {"gap": float(f"{max(3.0, 3.0 * max(slow)):.3g}")} | known.get("split", {})
+    slow = [step for step in steps if step <= THRESHOLDS.value("slow_channel")] or [finest]
+    gap = max(THRESHOLDS.value("default_gap"), THRESHOLDS.count("gap_steps") * max(slow))
+    split = {"gap": float(f"{gap:.3g}")} | known.get("split", {})
     return top, split

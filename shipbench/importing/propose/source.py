@@ -15,17 +15,13 @@ import numpy as np
 from ...errors import InputError
 from ..clock import is_absolute
 from ..mapping import Clock
+from ..thresholds import THRESHOLDS
 from .assign import Assigned, assign
 from .clock import Time, find_time, read_time, refusal, usual_step
 from .columns import Column, Sample
 from .evidence import examine
 from .headless import identify
 from .units import set_units
-
-SLOW = 5.0
-"""Step [s] above which a channel gets a gap limit of its own, so that it does not become that of all."""
-_COARSE = 0.2
-"""Share of repeated times above which the stamps are coarser than the samples, as the import has it."""
 
 
 @dataclass
@@ -172,14 +168,14 @@ def _disorder(draft: SourceDraft) -> None:
     if len(steps) == 0:
         return
     back = steps < 0
-    if (steps == 0).mean() > _COARSE and spec.get("format") not in ("unix+ns",):
+    if (steps == 0).mean() > THRESHOLDS.value("coarse_stamps") and spec.get("format") not in ("unix+ns",):
         spec["repeated"] = "spread"
         draft.found.notes.append(
             f"NOT SURE: {(steps == 0).mean():.0%} of the rows repeat the time of the row before; they are spread "
             "evenly until the next stamp."
         )
     if back.any() and not _over_midnight(spec, steps):
-        often = back.mean() > 0.01
+        often = back.mean() > THRESHOLDS.value("rows_out_of_order")
         spec["backwards"] = "sort" if often else "split"
         what = (
             "rows are not in the order of time; sorted" if often else "what follows is taken as a recording of its own"
@@ -192,7 +188,7 @@ def _disorder(draft: SourceDraft) -> None:
 def _over_midnight(spec: dict[str, Any], steps: np.ndarray) -> bool:
     form = spec.get("format", "")
     daily = form == "hhmmss" or ("%" in form and "%d" not in form)
-    return daily and bool((steps[steps < 0] < -43_200).all())
+    return daily and bool((steps[steps < 0] < -THRESHOLDS.value("new_day")).all())
 
 
 def channel_gaps(draft: SourceDraft, gap: float) -> None:
@@ -215,11 +211,13 @@ def channel_gaps(draft: SourceDraft, gap: float) -> None:
         if len(steps) < 2:
             continue
         usual = float(np.median(steps))
-        if entry.channel.endswith("_c") and there.mean() < 0.5 and steps.max() > 3 * usual:
+        pause = THRESHOLDS.count("gap_steps") * usual
+        on_change = entry.channel.endswith("_c") and there.mean() < THRESHOLDS.value("logged_on_change")
+        if on_change and steps.max() > pause:
             entry.spec["gap"] = math.inf
             entry.why.append("logged when it changes")
-        elif usual > SLOW and 3 * usual > gap * (1 + 1e-9):
-            entry.spec["gap"] = float(f"{3 * usual:.3g}")
+        elif usual > THRESHOLDS.value("slow_channel") and pause > gap * (1 + 1e-9):
+            entry.spec["gap"] = float(f"{pause:.3g}")
 
 
 def missing_channels(sources: Sequence[SourceDraft]) -> list[str]:

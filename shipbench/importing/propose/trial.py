@@ -12,11 +12,9 @@ from ...ship import Ship
 from ..importer import rehearse
 from ..mapping import load_mapping
 from ..summary import Summary
+from ..thresholds import THRESHOLDS
 from .source import SourceDraft
 
-_ROWS, _READ = 3000, 200_000
-"""Rows of each recording that are imported, and rows that are read for invalid cells and times."""
-_MOST_CORRECTIONS = 20
 _NEEDED = ("psi", "x", "y", "lat", "lon")
 _ANY_SHIP = Ship(name="any", L=50.0, B=8.0, T=3.0, mass=9e5)
 """Ship of average size: her length sets the smoothing of speeds from a track, on which no result here depends."""
@@ -27,9 +25,10 @@ def try_draft(
 ) -> list[str]:
     """Notes from a trial import of the draft; `write` writes it anew after a correction and returns its path."""
     corrected: list[str] = []
-    for _ in range(_MOST_CORRECTIONS):
+    rows, read = THRESHOLDS.count("proposal_trial_rows"), THRESHOLDS.count("proposal_trial_read")
+    for _ in range(THRESHOLDS.count("proposal_corrections")):
         try:
-            summary = rehearse(logs, load_mapping(write()), _ANY_SHIP, _ROWS, _READ)
+            summary = rehearse(logs, load_mapping(write()), _ANY_SHIP, rows, read)
         except InputError as error:
             told = _correct(str(error), sources, split)
             if told is None or told in corrected:
@@ -81,9 +80,10 @@ def _correct(message: str, sources: Sequence[SourceDraft], split: dict[str, Any]
             )
     if message.startswith("no run is left") and (steps := re.search(r"Usual time between samples: (.*?)\. ", message)):
         slowest = max((float(s) for s in re.findall(r"([\d.]+(?:e[-+]?\d+)?) s", steps[1])), default=0.0)
-        if 3 * slowest > split.get("gap", 3.0):
-            split["gap"] = 3 * slowest
-            return f"split.gap is {3 * slowest:g} s, three times the usual time between samples of the slowest channel."
+        pause = THRESHOLDS.count("gap_steps") * slowest
+        if pause > split.get("gap", THRESHOLDS.value("default_gap")):
+            split["gap"] = pause
+            return f"split.gap is {pause:g} s, three times the usual time between samples of the slowest channel."
     return None
 
 

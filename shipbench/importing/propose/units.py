@@ -7,6 +7,7 @@ import re
 import numpy as np
 
 from ..entries import unit_of
+from ..thresholds import THRESHOLDS
 from .assign import Assigned, Entry, quantity, sign_of
 from .columns import Column
 
@@ -15,10 +16,6 @@ ACCEPTED = {
     "rpm": "rpm, rev/s, rad/s",
     "N": "N, kN, MN, tf",
 }  # fmt: skip
-_RUDDER_LIMIT = 1.6
-"""Largest rudder angle [rad]: a right angle."""
-_FULL_TURN = 6.5
-"""Largest heading of 0 to 360 degrees, in radians."""
 
 
 def set_units(found: Assigned) -> None:
@@ -83,14 +80,16 @@ def _by_size(channel: str, column: Column) -> tuple[str, bool]:
     whole = bool(len(known)) and bool((known == np.round(known)).all())
     ours = unit_of(channel)
     if ours == "rad":
-        limit = _RUDDER_LIMIT if channel in ("delta", "delta_c") else _FULL_TURN
-        if size > 720.0 and whole:
+        rudder, heading = THRESHOLDS.value("largest_rudder"), THRESHOLDS.value("heading_in_radians")
+        limit = rudder if channel in ("delta", "delta_c") else heading
+        if size > THRESHOLDS.value("angle_in_degrees") and whole:
             return "cdeg", True
         return ("deg" if size > limit else "rad"), size > limit
     if ours == "rad/s":
-        return ("deg/min" if size > 20 else "deg/s" if size > 0.3 else "rad/s"), False
+        deg, rad = THRESHOLDS.value("yaw_rate_in_degrees"), THRESHOLDS.value("yaw_rate_in_radians")
+        return ("deg/min" if size > deg else "deg/s" if size > rad else "rad/s"), False
     if ours == "rpm":
-        return "rpm", "rpm" in column.head.base or size > 30.0
+        return "rpm", "rpm" in column.head.base or size > THRESHOLDS.value("shaft_in_revolutions")
     return {"sog": "kn"}.get(channel, ours), ours == "m" and channel in ("x", "y", "depth")
 
 
@@ -115,7 +114,7 @@ def _of_position(entry: Entry, found: Assigned) -> None:
     if size <= limit and named is not None and not padded:
         entry.spec["unit"] = named
         entry.why.append(f"unit from the head, [{column.head.unit}]")
-    elif size > 1e5 and not lettered:
+    elif size > THRESHOLDS.value("counted_position") and not lettered:
         entry.spec["unit"] = "1e-7 deg"
         entry.why.append("whole numbers of 1e-7 deg, from their size")
     elif padded or (size > (limit if entry.channel == "lat" else 360.0) and size < 18_000 and minutes):
