@@ -10,10 +10,10 @@ from ..registry import Registry
 from ..signals import STATES
 from ..steps import step
 from .finding import SEVERITIES, Finding
-from .gross import mend as mend_gross
-from .held import mend_held
-from .north import mend_north
-from .placeholders import mend_placeholders
+from .gross import correct as correct_gross
+from .held import correct_held
+from .north import correct_north
+from .placeholders import correct_placeholders
 from .reading import read_recording
 from .recording import Recording
 
@@ -36,17 +36,17 @@ def check_recording(recording: Recording) -> list[Finding]:
 
     None concerns a channel that import derived from others: it has no error of its own.
     """
-    mended, found = recording, []
-    mends = (mend_placeholders, mend_north, mend_held, mend_gross)
+    corrected, found = recording, []
+    corrections = (correct_placeholders, correct_north, correct_held, correct_gross)
     checks = _checks()
-    total = len(mends) + len(checks)
-    for number, mend in enumerate(mends):
+    total = len(corrections) + len(checks)
+    for number, correct in enumerate(corrections):
         step("look for gross errors", number / total, (number + 1) / total)
-        mended, more = mend(mended)
+        corrected, more = correct(corrected)
         found += more
-    for number, check in enumerate(checks, len(mends)):
-        step(f"check {number - len(mends) + 1} of {len(checks)}", number / total, (number + 1) / total)
-        found += check(mended)
+    for number, check in enumerate(checks, len(corrections)):
+        step(f"check {number - len(corrections) + 1} of {len(checks)}", number / total, (number + 1) / total)
+        found += check(corrected)
     found = [f for f in found if not f.channels or not set(f.channels) <= set(recording.dataset.derived)]
     found = _without_consequences(found)
     if recording.wrapped:

@@ -21,7 +21,7 @@ from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
 from .thresholds import THRESHOLDS
 from .units import UnitFinding, check_units, corrected
-from .wind_reading import mend_wind
+from .wind_reading import correct_wind
 
 _HEMISPHERES = (
     "Did the import leave N/S or E/W of latitude and longitude unread? Then import again with "
@@ -47,7 +47,7 @@ class _Reading:
 
     kind: str
     text: str
-    mend: Callable[[np.ndarray], None]
+    change: Callable[[np.ndarray], None]
     line: dict[str, Any]
 
 
@@ -91,11 +91,11 @@ READINGS = (
 )  # fmt: skip
 
 
-def _mended(dataset: Dataset, mend: Callable[[np.ndarray], None]) -> Dataset:
+def _changed(dataset: Dataset, change: Callable[[np.ndarray], None]) -> Dataset:
     runs = []
     for run in dataset.runs:
         states = run.states.copy()
-        mend(states)
+        change(states)
         runs.append(replace(run, states=states))
     return dataset.with_runs(runs)
 
@@ -130,7 +130,7 @@ def _misfit(recording: Recording, dataset: Dataset) -> _Misfit | None:
     return _Misfit(share if scale > 0.0 else 1.0, scale, said, made)
 
 
-def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
+def correct(recording: Recording) -> tuple[Recording, list[Finding]]:
     """Recording with gross errors corrected, and the findings on them."""
     findings: list[Finding] = []
     plain = _misfit(recording, recording.dataset)
@@ -142,7 +142,7 @@ def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
         recording = replace(recording, dataset=dataset, turned=recording.turned or "velocities" in reading.line)
         units = _units(recording)
     findings += [_unit_finding(recording, f, units) for f in units if not _follows(f, units)]
-    recording, wind = mend_wind(recording.with_dataset(corrected(recording.dataset, units)))
+    recording, wind = correct_wind(recording.with_dataset(corrected(recording.dataset, units)))
     return recording, findings + wind
 
 
@@ -161,7 +161,7 @@ def _best_reading(
     """Interpretation of the frame that explains the track, unless units and signs explain it with as few errors."""
     options = []
     for reading in READINGS:
-        dataset = _mended(recording.dataset, reading.mend)
+        dataset = _changed(recording.dataset, reading.change)
         left = _misfit(recording, dataset)
         if left is None or left.track > THRESHOLDS.value("reading_misfit"):
             continue

@@ -49,7 +49,7 @@ def _held(recording: Recording, channel: int) -> int:
     return round(float(np.median(lengths))) if len(lengths) > max(0.5 * values, THRESHOLDS.count("occurrences")) else 0
 
 
-def mend_held(recording: Recording) -> tuple[Recording, list[Finding]]:
+def correct_held(recording: Recording) -> tuple[Recording, list[Finding]]:
     """Recording with linear interpolation from fix to fix, and one finding."""
     made = (
         {PSI} if "r" in recording.dataset.derived else {X, Y} if {"u", "v"} & set(recording.dataset.derived) else set()

@@ -14,7 +14,7 @@ from .recording import Recording
 from .statistics import times
 
 
-def mend_north(recording: Recording) -> tuple[Recording, list[Finding]]:
+def correct_north(recording: Recording) -> tuple[Recording, list[Finding]]:
     """Recording with linear interpolation in place of such samples, and one finding."""
     found = {run.id: places for run in recording.runs if (places := interpolated(run.states[:, PSI], recording.turn))}
     if not found:

@@ -68,7 +68,7 @@ def _impossible(recording: Recording, found: dict[str, list[tuple[int, int]]]) -
     return {name: blocks for name, blocks in kept.items() if blocks}
 
 
-def mend_placeholders(recording: Recording) -> tuple[Recording, list[Finding]]:
+def correct_placeholders(recording: Recording) -> tuple[Recording, list[Finding]]:
     """Recording without such samples, and one finding for each channel."""
     findings, bad = [], {run.id: np.zeros(len(run), dtype=bool) for run in recording.runs}
     for channels in ((X, Y), (PSI,), (U,), (V,), (R,), (DELTA,)):

@@ -22,7 +22,7 @@ from .thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
-class Silence:
+class Dropout:
     """Speed-log dropout. level: speed [m/s] up to which the log reads zero; pieces that show it, and their share of the
     samples; departure: the greatest of the track from a steady drift [m], and its seconds; worst: the run with that."""
 
@@ -34,7 +34,7 @@ class Silence:
     worst: Run
 
 
-def silence(dataset: Dataset) -> Silence | None:
+def dropout(dataset: Dataset) -> Dropout | None:
     """Speed-log dropout: u and v read nothing though the ship makes way; None where there is none."""
     L, dt = dataset.ship.L, dataset.dt
     limits = THRESHOLDS.value("silent_shortest"), THRESHOLDS.value("silent_longest")
@@ -57,7 +57,7 @@ def silence(dataset: Dataset) -> Silence | None:
                     samples += len(S)
     if len(found) < THRESHOLDS.count("silent_pieces"):
         return None
-    return Silence(
+    return Dropout(
         float(np.hypot(u, v)),
         len(found),
         samples / sum(map(len, dataset.runs)),
@@ -65,7 +65,7 @@ def silence(dataset: Dataset) -> Silence | None:
     )
 
 
-def in_words(found: Silence) -> str:
+def in_words(found: Dropout) -> str:
     """Sentence on the dropout, with its figures."""
     return (
         f"u and v read zero (below {found.level:.2g} m/s) in {found.pieces} pieces, {found.share:.0%} of the "
@@ -87,7 +87,7 @@ def _departures(S: np.ndarray, dt: float) -> tuple[float, float]:
 
 def check(recording: Recording) -> list[Finding]:
     """Find a speed-log dropout; one finding at most."""
-    found = silence(recording.dataset)
+    found = dropout(recording.dataset)
     if found is None:
         return []
     run = found.worst

@@ -108,11 +108,11 @@ def explain_windows(w: Windows, turned: bool, only: Collection[str] | None = Non
 
 @dataclass(frozen=True)
 class Explained:
-    """Windows as recorded (`plain`) and with the lags corrected (`mended`), the explanations chosen on each, and lag
+    """Windows as recorded (`plain`) and with the lags corrected (`corrected`), the explanations chosen on each, and lag
     [s] by channel."""
 
     plain: Windows
-    mended: Windows
+    corrected: Windows
     first: Chosen
     chosen: Chosen
     late: dict[int, float]

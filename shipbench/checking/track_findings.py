@@ -22,7 +22,8 @@ def check(recording: Recording) -> list[Finding]:
         return []
     most = THRESHOLDS.value("unexplained")
     others = [name for name in x.chosen.names if name not in LAGS and x.chosen.held[name] < most]
-    return _lag_findings(recording, x) + [f for name in others for f in _finding(recording, x.mended, x.chosen, name)]
+    found = [f for name in others for f in _finding(recording, x.corrected, x.chosen, name)]
+    return _lag_findings(recording, x) + found
 
 
 def _possible_lag(recording: Recording, x: Explained, name: str) -> bool:

@@ -191,7 +191,7 @@ def wind_reading(recording: Recording) -> tuple[WindReading, _Windows, _Windows]
     return None if angle == "rad" else (ours, plain, plain)
 
 
-def mend_wind(recording: Recording) -> tuple[Recording, list[Finding]]:
+def correct_wind(recording: Recording) -> tuple[Recording, list[Finding]]:
     """Recording with the true wind in its channels, and the finding."""
     found = wind_reading(recording)
     if found is None:

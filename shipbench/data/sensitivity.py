@@ -18,13 +18,13 @@ from ..signals import F_B
 from .coverage import unit_time
 
 _WINDOW, _MOST_WINDOWS, _FIT_STEPS = 6.0, 24, 3
-IMITATED = 0.9
+COLLINEAR = 0.9
 """Share at which a cause counts as confounded: 0.9 is a variance inflation factor of 10, the usual limit of
 collinearity (Marquardt 1970; Belsley, Kuh and Welsch 1980)."""
 _LEAST = 1e-3
 """Least size of the changes to predict of a channel, in ship lengths, radians and sqrt(gL): in a straight run that of
 yaw is not zero."""
-UNFELT = 1e-3
+LEAST_EFFECT = 1e-3
 """Least effect size, as a share of the error of constant velocities, of a cause that can be identified at all."""
 
 _PARAMETERS = {2: ("resistance", "coast down with the shaft stopped, and speed up from rest"),
@@ -38,20 +38,22 @@ _PARAMETERS = {2: ("resistance", "coast down with the shaft stopped, and speed u
 
 
 @dataclass(frozen=True)
-class Telling:
-    """Identifiability of one cause: felt is the effect size of a typical amplitude (share of the error of constant
-    velocities), imitated the share of it (squared) that the others can explain together, alike the one that explains
-    most and its cosine."""
+class Identifiability:
+    """Identifiability of one cause.
+
+    effect_size: of a typical amplitude, relative to the error of constant velocities. explained: share of its square
+    that the other causes can explain together. closest, cosine: the cause that explains most alone, and its cosine.
+    """
 
     subject: str
-    felt: float
-    imitated: float
-    alike: str
+    effect_size: float
+    explained: float
+    closest: str
     cosine: float
     manoeuvre: str
 
 
-def tellings(dataset: Dataset) -> tuple[list[Telling], str]:
+def identifiability(dataset: Dataset) -> tuple[list[Identifiability], str]:
     """Identifiability of every cause, and a sentence on the method (or why it failed)."""
     steps = min(
         round(_WINDOW * unit_time(dataset.ship.L) / dataset.dt), int(np.median([len(r) for r in dataset.runs])) - 1
@@ -122,7 +124,7 @@ def _froude_units(L: float) -> np.ndarray:
     return np.array([L, L, 1.0, speed, speed, speed / L])
 
 
-def _compare(Z: np.ndarray, names: list[str], manoeuvres: dict[str, str]) -> list[Telling]:
+def _compare(Z: np.ndarray, names: list[str], manoeuvres: dict[str, str]) -> list[Identifiability]:
     """Effect size and explained share of each cause; of a cause with several columns the direction of the largest
     share."""
     found = []
@@ -130,10 +132,10 @@ def _compare(Z: np.ndarray, names: list[str], manoeuvres: dict[str, str]) -> lis
     unit = Z / np.where(size > 0.0, size, 1.0)
     for subject in dict.fromkeys(names):
         own = np.array([name == subject for name in names])
-        others = ~own & (size > UNFELT)
-        felt = float(size[own].max(initial=0.0))
-        if felt <= UNFELT or not others.any():
-            found.append(Telling(subject, felt, 0.0, "", 0.0, manoeuvres[subject]))
+        others = ~own & (size > LEAST_EFFECT)
+        effect_size = float(size[own].max(initial=0.0))
+        if effect_size <= LEAST_EFFECT or not others.any():
+            found.append(Identifiability(subject, effect_size, 0.0, "", 0.0, manoeuvres[subject]))
             continue
         mine = np.linalg.qr(unit[:, own])[0]
 
@@ -142,6 +144,6 @@ def _compare(Z: np.ndarray, names: list[str], manoeuvres: dict[str, str]) -> lis
             return float(min(np.linalg.svd(mine.T @ np.linalg.qr(unit[:, columns])[0], compute_uv=False)[0], 1.0))
 
         rivals = dict.fromkeys(name for name, there in zip(names, others, strict=True) if there)
-        cosine, alike = max((shared(np.array([name == rival for name in names]) & others), rival) for rival in rivals)
-        found.append(Telling(subject, felt, shared(others) ** 2, alike, cosine, manoeuvres[subject]))
+        cosine, closest = max((shared(np.array([name == rival for name in names]) & others), rival) for rival in rivals)
+        found.append(Identifiability(subject, effect_size, shared(others) ** 2, closest, cosine, manoeuvres[subject]))
     return found

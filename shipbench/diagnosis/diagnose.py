@@ -265,13 +265,13 @@ def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, st
             continue
         (size,) = c.parameters.values()
         what, channel = ("rudder", "delta") if effect.family == "rudder" else ("shaft", "n")
-        how, mend = f"with a play of {math.degrees(size.value):.2g} deg behind", "Measure behind that play."
+        how, advice = f"with a play of {math.degrees(size.value):.2g} deg behind", "Measure behind that play."
         if size.unit == "s":
             how = f"{abs(size.value):.2g} s {'later' if size.value > 0.0 else 'sooner'} than"
             near = ", which comes near" if effect.traits.gear_field == "T" else ""
-            mend = f"Correct the record first, by [delay] {channel} = {-size.value:.2g} in dataset.toml{near}."
+            advice = f"Correct the record first, by [delay] {channel} = {-size.value:.2g} in dataset.toml{near}."
         told[c.effect] = (
-            f"the motion shows the {what} {how} its record, to which predictors fit the actuator dynamics. {mend}"
+            f"the motion shows the {what} {how} its record, to which predictors fit the actuator dynamics. {advice}"
         )
     return told
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipbench.checking.base import check_dataset
-from shipbench.checking.speed_log import silence
+from shipbench.checking.speed_log import dropout
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.preparation.base import Prepared
 from shipbench.diagnosis.preparation.log_dropout import speeds_of_the_track
@@ -57,7 +57,7 @@ def drifting(slowly: float, water: tuple[float, float], noise: float = 0.02) -> 
 )
 def test_it_is_told_on_ships_of_any_size(ship, noise, share):
     data = trials(ship, noise)
-    assert silence(data) is None
+    assert dropout(data) is None
     (finding,) = check_dataset(silent(data, share))
     assert finding.kind == "speed-log dropout"
     assert finding.channels == ("u", "v")
@@ -69,27 +69,27 @@ def test_runs_of_a_few_samples_tell_nothing_and_hinder_nothing():
         replace(run, id=f"{run.id}-short", t=run.t[:3], states=run.states[:3], inputs=run.inputs[:3])
         for run in trials().runs
     ]
-    assert silence(trials().with_runs(short)) is None
+    assert dropout(trials().with_runs(short)) is None
     whole = silent(trials())
-    assert silence(whole.with_runs([*whole.runs, *short])).pieces == silence(whole).pieces
+    assert dropout(whole.with_runs([*whole.runs, *short])).pieces == dropout(whole).pieces
 
 
 @pytest.mark.parametrize(("slowly", "water"), [(0.0, (0.5, -0.3)), (0.08, (0.0, 0.0)), (0.08, (1.0, 1.0))])
 def test_a_ship_that_lies_still_in_a_current_or_creeps_has_a_log(slowly, water):
-    assert silence(drifting(slowly, water)) is None
+    assert dropout(drifting(slowly, water)) is None
 
 
 def test_what_a_noisy_log_says_within_its_noise_counts():
     """It never reads more than six times its noise, the track departs by 6 m, and the log explains it."""
     seen = drifting(0.4, (0.5, -0.3), noise=0.1)
-    assert silence(seen) is None
-    assert silence(silent(seen, 1.0)) is not None
+    assert dropout(seen) is None
+    assert dropout(silent(seen, 1.0)) is not None
 
 
 def test_the_same_creep_with_a_log_that_does_not_see_it_is_told():
     seen = drifting(1.0, (0.5, -0.3))
-    assert silence(seen) is None
-    assert silence(silent(seen, 1.0)) is not None
+    assert dropout(seen) is None
+    assert dropout(silent(seen, 1.0)) is not None
 
 
 @pytest.mark.long

@@ -12,7 +12,7 @@ import pytest
 from shipbench.data.coverage import Samples, gaps
 from shipbench.data.harbour90_noisy import NOISE
 from shipbench.data.noise import channel_noise, resolution, white_noise
-from shipbench.data.sensitivity import IMITATED, UNFELT, tellings
+from shipbench.data.sensitivity import COLLINEAR, LEAST_EFFECT, identifiability
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset, Run
 from shipbench.ship import Ship
@@ -160,34 +160,35 @@ def test_headings_are_an_arc_on_the_circle():
 
 
 def test_the_models_sensitivities_tell_what_is_alike():
-    turns, everything = ({t.subject: t for t in tellings(trial(kind))[0]} for kind in ("turns", "all"))
+    turns, everything = ({t.subject: t for t in identifiability(trial(kind))[0]} for kind in ("turns", "all"))
     # at one speed of the shaft, walk and offset push the stern alike; with the revolutions up and down they do not
-    assert turns["propeller walk"].alike == "rudder offset"
-    assert turns["propeller walk"].imitated > IMITATED
-    assert everything["rudder offset"].imitated < turns["rudder offset"].imitated
-    assert everything["resistance"].imitated < turns["resistance"].imitated
-    assert everything["thrust gain"].imitated < turns["thrust gain"].imitated
+    assert turns["propeller walk"].closest == "rudder offset"
+    assert turns["propeller walk"].explained > COLLINEAR
+    assert everything["rudder offset"].explained < turns["rudder offset"].explained
+    assert everything["resistance"].explained < turns["resistance"].explained
+    assert everything["thrust gain"].explained < turns["thrust gain"].explained
     for subject in ("propeller walk astern", "thruster gain"):  # never used
-        assert turns[subject].felt <= UNFELT < everything[subject].felt
+        assert turns[subject].effect_size <= LEAST_EFFECT < everything[subject].effect_size
 
 
 def test_on_one_course_a_current_cannot_be_told_apart_and_in_turns_it_can():
     current = {
-        kind: next(t for t in tellings(trial(kind))[0] if t.subject == "current") for kind in ("straight", "turns")
+        kind: next(c for c in identifiability(trial(kind))[0] if c.subject == "current")
+        for kind in ("straight", "turns")
     }
-    assert current["straight"].imitated > IMITATED > current["turns"].imitated
+    assert current["straight"].explained > COLLINEAR > current["turns"].explained
 
 
 def test_sensitivities_of_a_model_and_its_ship_agree():
-    ours, small = (tellings(data)[0] for data in (trial("turns"), scaled(trial("turns"), 1 / 43)))
+    ours, small = (identifiability(data)[0] for data in (trial("turns"), scaled(trial("turns"), 1 / 43)))
     for a, b in zip(ours, small, strict=True):
-        assert (a.subject, a.felt > UNFELT) == (b.subject, b.felt > UNFELT)
-        assert a.imitated == pytest.approx(b.imitated, abs=0.03)
+        assert (a.subject, a.effect_size > LEAST_EFFECT) == (b.subject, b.effect_size > LEAST_EFFECT)
+        assert a.explained == pytest.approx(b.explained, abs=0.03)
 
 
 def test_runs_too_short_for_rollouts_say_so():
     data = trial("turns")
-    found, how = tellings(data.with_runs(r.slice(0, 3) for r in data.runs))
+    found, how = identifiability(data.with_runs(r.slice(0, 3) for r in data.runs))
     assert found == []
     assert "too short" in how
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ...checking.speed_log import in_words, silence
+from ...checking.speed_log import dropout, in_words
 from ...importing.position import to_body
 from ...importing.speeds import derivative
 from ...records import Run
@@ -17,7 +17,7 @@ from .derived_speeds import has_speeds
 def speeds_of_the_track(prepared: Prepared) -> Prepared:
     """Take u and v from the positions where the log reads zero while the ship makes way."""
     dataset = prepared.dataset
-    found = silence(dataset) if has_speeds(dataset) else None
+    found = dropout(dataset) if has_speeds(dataset) else None
     if found is None:
         return prepared
     runs = [_by_track(run, dataset.dt, (dataset.ship.L / 9.81) ** 0.5) for run in dataset.runs]

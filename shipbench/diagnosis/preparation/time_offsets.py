@@ -38,8 +38,8 @@ def correct_late_velocities(prepared: Prepared) -> Prepared:
         return prepared
     found = late_velocities_of(dataset)
     if found is not None:
-        late, mended = found
-        return replace(prepared, dataset=mended, late=late, excluded=(*prepared.excluded, *late_effects()))
+        late, corrected = found
+        return replace(prepared, dataset=corrected, late=late, excluded=(*prepared.excluded, *late_effects()))
     return (
         replace(prepared, excluded=(*prepared.excluded, *late_effects()))
         if keeps_time(Recording(dataset))

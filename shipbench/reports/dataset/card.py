@@ -10,7 +10,7 @@ import numpy as np
 
 from ...data.coverage import NEEDED, Gap, gaps, unit_time
 from ...data.noise import channel_noise
-from ...data.sensitivity import IMITATED, UNFELT, Telling, tellings
+from ...data.sensitivity import COLLINEAR, LEAST_EFFECT, Identifiability, identifiability
 from ...records import Dataset
 from ...render.table import Table, TableColumn, display_unit, number, significant
 from ...signals import UNITS
@@ -23,11 +23,11 @@ _NOISE = (
     "estimate is some 5 % too small. Drifts, biases and filtered noise are not in it; real gusts are. "
     "Step: resolution of the record."
 )
-_FELT = (
+_EFFECT_SIZE = (
     "Effect size: change of the runs by a typical amplitude, relative to the error of constant velocities. Below "
-    f"{100 * UNFELT:g} % it is too small. "
+    f"{100 * LEAST_EFFECT:g} % it is too small. "
     "Explained by others: share of the squared change that the other causes can explain together. Above "
-    f"{100 * IMITATED:.0f} % (a variance inflation factor of 10) "
+    f"{100 * COLLINEAR:.0f} % (a variance inflation factor of 10) "
     "the cause cannot be identified, whatever the size of the data set. Of a current or wind the least "
     "identifiable direction counts."
 )
@@ -80,11 +80,12 @@ def make_card(dataset: Dataset) -> Card:
     step("statistics", 0.0, 0.1)
     statistics = dict(zip(("statistics", "table_ii", "against_the_paper"), describe_tables(dataset), strict=False))
     step("identifiability of causes", 0.1, 0.9)
-    told, how = tellings(dataset)
+    causes, how = identifiability(dataset)
     step("noise and coverage", 0.9, 1.0)
     tables = {
-        **statistics, "durations": _durations(dataset), "noise": _noise(dataset), "told_apart": _told_apart(told, how),
-        _GAPS: _gap_table(gaps(dataset) + _alike(told), dataset),
+        **statistics, "durations": _durations(dataset), "noise": _noise(dataset),
+        "identifiability": _identifiable(causes, how),
+        _GAPS: _gap_table(gaps(dataset) + _confounded(causes), dataset),
     }  # fmt: skip
     return Card(dataset.name, dataset_facts(dataset), tables)
 
@@ -115,27 +116,27 @@ def _gap_table(found: Sequence[Gap], dataset: Dataset) -> Table:
     )
 
 
-def _alike(told: Sequence[Telling]) -> list[Gap]:
+def _confounded(causes: Sequence[Identifiability]) -> list[Gap]:
     """Causes that are confounded with others; two that are confounded with each other make one line."""
     found, done = [], set()
-    twins = {t.subject: t.alike for t in told if t.cosine**2 > IMITATED}
-    for t in told:
-        if t.imitated <= IMITATED or t.subject in done:
+    twins = {t.subject: t.closest for t in causes if t.cosine**2 > COLLINEAR}
+    for t in causes:
+        if t.explained <= COLLINEAR or t.subject in done:
             continue
         alone = t.subject in twins
-        if twins.get(t.alike) == t.subject:
-            done.add(t.alike)
+        if twins.get(t.closest) == t.subject:
+            done.add(t.closest)
         who = (
-            f"{t.alike} alone explains {100 * t.cosine**2:.1f} %"
+            f"{t.closest} alone explains {100 * t.cosine**2:.1f} %"
             if alone
-            else f"most collinear: {t.alike} (cosine {t.cosine:.2f})"
+            else f"most collinear: {t.closest} (cosine {t.cosine:.2f})"
         )
         because = (
-            f"other causes can explain {100 * t.imitated:.1f} % of its effect on the runs, "
-            f"{100 * IMITATED:.0f} % is the limit; {who}"
+            f"other causes can explain {100 * t.explained:.1f} % of its effect on the runs, "
+            f"{100 * COLLINEAR:.0f} % is the limit; {who}"
         )
         found.append(
-            Gap(f"{t.subject} apart from {t.alike if alone else 'the other causes together'}", because, t.manoeuvre)
+            Gap(f"{t.subject} apart from {t.closest if alone else 'the other causes together'}", because, t.manoeuvre)
         )
     return found
 
@@ -185,20 +186,20 @@ def _noise(dataset: Dataset) -> Table:
     return Table("Noise of the channels", columns, rows, [_NOISE])
 
 
-def _told_apart(told: Sequence[Telling], how: str) -> Table:
+def _identifiable(causes: Sequence[Identifiability], how: str) -> Table:
     rows = []
-    for t in told:
-        felt = t.felt > UNFELT
-        verdict = "too small" if not felt else "no" if t.imitated > IMITATED else "yes"
+    for t in causes:
+        detectable = t.effect_size > LEAST_EFFECT
+        verdict = "too small" if not detectable else "no" if t.explained > COLLINEAR else "yes"
         rows.append({
-            "subject": t.subject, "felt": 100 * t.felt, "imitated": 100 * t.imitated if felt else None,
-            "alike": t.alike,
-            "cosine": t.cosine if felt else None, "verdict": verdict,
+            "subject": t.subject, "effect_size": 100 * t.effect_size,
+            "explained": 100 * t.explained if detectable else None, "closest": t.closest,
+            "cosine": t.cosine if detectable else None, "verdict": verdict,
         })  # fmt: skip
     columns = [
-        TableColumn("cause", "subject"), TableColumn("effect size [%]", "felt", significant(2)),
-        TableColumn("explained by others [%]", "imitated", number(1)),
-        TableColumn("most collinear", "alike"), TableColumn("cosine", "cosine", number(2)),
+        TableColumn("cause", "subject"), TableColumn("effect size [%]", "effect_size", significant(2)),
+        TableColumn("explained by others [%]", "explained", number(1)),
+        TableColumn("most collinear", "closest"), TableColumn("cosine", "cosine", number(2)),
         TableColumn("identifiable", "verdict"),
     ]  # fmt: skip
-    return Table("Identifiability of causes", columns, rows, [f"Method: {how}", *([_FELT] if rows else [])])
+    return Table("Identifiability of causes", columns, rows, [f"Method: {how}", *([_EFFECT_SIZE] if rows else [])])
