@@ -167,7 +167,7 @@ def diagnose(
 
     Args:
         data: a data set, its registered name or its folder.
-        gain: measure on held-out runs what naming the causes is worth, which takes most of the time.
+        gain: measure the gain of the causes on held-out runs, which takes most of the time.
         seed: of folds and bootstrap.
         workers: number of processes; 1: everything runs in this one.
         thorough: use up to twice as much of a long record.
@@ -229,7 +229,7 @@ def import_log(
 
     Args:
         logs: one or several files.
-        mapping: mapping.toml, which says what the columns are.
+        mapping: mapping.toml, the columns of each channel.
         ship: ship.toml, or the ship's particulars.
         out: folder of the data set.
         force: replace a data set that is there.
@@ -278,7 +278,7 @@ def propose_mapping(
         logs: one or several files.
         out: file to write, such as "mapping.toml"; None: only the text is returned.
         force: replace a file that is there.
-        partial: a mapping that says a part; what it says is kept.
+        partial: a partial mapping, whose entries are kept.
         file: keys of [file] that are known: encoding, sheet or header.
 
     Raises:

@@ -37,7 +37,7 @@ def diagnose(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Show what the physics model gets wrong on a data set, name the cause, and measure what naming it is worth."""
+    """Show what the physics model gets wrong on a data set, name the cause, and measure its held-out gain."""
     from ..bench.progress import steps_shown
     from ..data.base import load_dataset
     from ..diagnosis.budget import Budget

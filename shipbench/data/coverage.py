@@ -56,8 +56,8 @@ class Samples:
 
     @cached_property
     def drift(self) -> np.ndarray:
-        """Drift angle [rad], from the bow (or the stern, going astern) to the velocity, positive to starboard;
-        not-a-number lying still."""
+        """Drift angle [rad], from the bow (or the stern, going astern) to the velocity, positive to starboard; NaN
+        lying still."""
         angle = np.arctan2(self.states[:, V], np.abs(self.states[:, U]))
         return np.where(np.abs(self.froude) > STEERAGE, angle, np.nan)
 

@@ -52,20 +52,17 @@ def diagnose(
     thorough: bool = False,
     budget: Budget | None = None,
 ) -> Diagnosis:  # fmt: skip
-    """Show what the plain physics model gets wrong on measured runs, name the causes, and measure what naming them is
-    worth.
+    """Identify the causes of the plain physics model's errors on measured runs, and measure their held-out gain.
 
     Args:
         gain: cross-validate (everything is repeated on every training part); without, gains are None, and the hull is
-            not named: that it lies off the regressions is named only where fitting it pays on runs that were not
-            fitted.
+            not named: its difference from the regressions is named only where fitting it improves held-out runs.
         seed: of the bootstrap and of the folds.
-        only: effects to consider (an oracle that knows what is hidden); default all.
+        only: effects to consider (an oracle that knows the hidden causes); default all.
         workers: processes for the folds; 1: everything runs in this one.
         thorough: use up to twice as much of a long record (the folds use a quarter); 90 runs of 120 s are used whole
             either way.
-        budget: how much work and memory the whole may take; default that of `Budget`. A warning says where it has
-            acted.
+        budget: limits of work and memory of the whole; default that of `Budget`. A warning states where it has acted.
 
     Raises:
         InputError: the ship never moves, there are too few samples for any fit, the record contradicts itself,

@@ -30,7 +30,7 @@ _SHAFT = {"rev/s": 1.0 / 60.0, "rad/s": 2.0 * math.pi / 60.0}
 FACTORS: dict[str, dict[str, float]] = {
     "psi": _ANGLE, "u": _SPEED, "v": _SPEED, "r": _RATE, "n": _SHAFT, "delta": _ANGLE, "F_b": _FORCE, "F_s": _FORCE,
 }  # fmt: skip
-"""Units met in records in place of ours, per state: recorded number over ours."""
+"""Units in records other than the standard one, per state: recorded over standard number."""
 
 
 class UnitOrSignError(Effect):

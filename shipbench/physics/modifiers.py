@@ -101,7 +101,7 @@ class Modifiers:
 
     def water(self, air: tuple[Array, Array] | None, u: Array, v: Array) -> tuple[Array, Array]:
         """Velocity of the water in body axes [m/s]; u, v over ground, `air` the same relative to the air, or None where
-        nothing is known of it."""
+        it is unknown."""
         if air is None or is_neutral(self.drift, 0.0):
             return self.u_c, self.v_c
         return self.u_c + self.drift * (u - air[0]), self.v_c + self.drift * (v - air[1])

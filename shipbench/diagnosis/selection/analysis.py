@@ -143,7 +143,7 @@ def analyse(
         cautious: name nothing (too little data), but rank everything.
         misread: errors of actuators' records that were taken out before.
 
-    Once the budget is spent, no dependences are told: they are compared with each other.
+    Once the budget is spent, no dependences are reported: they are compared with each other.
     """
     draws = null_maxima(null, seed)
     threshold = (

@@ -51,11 +51,14 @@ class Step:
 
 @dataclass(frozen=True)
 class Selection:
-    """null: the plain model, beside the noise that suits the causes; plain: beside its own; final: with the causes
-    found; scores: of every candidate in the first round, and `last` beside the final one; off_form: what a cause for
-    which the form of a hull could pass must be worth besides (`Standard.asked_besides`); unmet: effects that gain more
-    than the threshold, and why they are not named (the first requirement that they do not meet); small: the plain model
-    with those of them that are too small to matter, where nothing else was found."""
+    """Result of the selection.
+
+    null: the baseline model, with the noise model that fits the causes; plain: with its own; final: with the causes
+    found; scores: of every candidate in the first round, and `last` beside the final model; off_form: further score
+    required of a cause confounded with the form of a hull (`Standard.asked_besides`); unmet: effects above the
+    threshold that are not identified, with the first requirement that they do not meet; small: the baseline model with
+    those of them that are not practically significant, where nothing else was found.
+    """
 
     null: Fit
     plain: Fit
@@ -206,9 +209,9 @@ def select(null: Fit, threshold: float) -> Selection:
 
 @dataclass(frozen=True)
 class _Grown:
-    """A model `now` with every cause that was worth adding to the plain one, and the steps to it, as in `Selection`;
-    again: the plain model beside other noise, from which to begin once more; then `now` holds the first cause alone.
-    tiny: effects that are too small to matter, and why."""
+    """Model `now` with every cause added to the baseline model, and the steps to it, as in `Selection`; again: the
+    baseline model with another noise model, from which to begin once more; then `now` holds the first cause alone.
+    tiny: effects without practical significance, and why."""
 
     now: Fit
     first: list[Score]
@@ -341,9 +344,9 @@ def _beside(now: Fit) -> set[str]:
 
 
 def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -> list[Score]:
-    """Vectors and values of single runs that are worth a refit as seen from `origin`, where the model has not been
-    fitted yet: in few or short runs in calm weather latent force and parameters take a current over so well that
-    nothing is left of it where they rest."""
+    """Vectors and values of single runs that deserve a refit as seen from `origin`, where the model has not been fitted
+    yet: in few or short runs in calm weather latent force and parameters absorb a current so well that a converged fit
+    shows none of it."""
     terms = [t for t in now.candidates if t.effect.vector or t.per_run]
     if not terms or np.isinf(threshold):
         return []
