@@ -48,7 +48,7 @@ def test_effects_of_one_group_with_formulas_of_their_own_push_alike():
 
 @pytest.mark.parametrize(
     ("name", "shows"),
-    [("rudder_rate_limit", True), ("rudder_lag", False), ("rudder_offset", False), ("current", False)],
+    [("rudder_deadband", True), ("rudder_lag", False), ("rudder_offset", False), ("current", False)],
 )
 def test_what_acts_between_command_and_record_alone_is_not_looked_for_in_recorded_motion(name: str, shows: bool):
     assert shows_in_record(EFFECTS.get(name)) is shows
