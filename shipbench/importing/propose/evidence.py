@@ -16,6 +16,7 @@ from ...data.units import unit_factor
 from ...errors import InputError
 from ..cells import Counts
 from ..channels import read_blocks
+from ..clock import RELATIVE
 from ..entries import Channel
 from ..mapping import Source
 from ..position import to_plane
@@ -27,7 +28,7 @@ from .columns import Sample
 _TURNING = np.deg2rad(THRESHOLDS.value("turning_range"))
 _CLOSE = THRESHOLDS.value("same_speed")
 _UNITS = {"rad": ("deg", "rad", "cdeg"), "rad/s": ("rad/s", "deg/s", "deg/min"), "m/s": ("m/s", "kn", "km/h", "ft/s")}
-_CLOCKS = {1e3: "ms", 1e6: "us", 1.0 / 60.0: "min", 1.0 / 3600.0: "h"}
+_CLOCKS = ("ms", "us", "min", "h")
 
 
 @dataclass(frozen=True)
@@ -367,8 +368,8 @@ def _clock_unit(track: _Track, series: dict[str, tuple[np.ndarray, np.ndarray]],
         return
     recorded = np.abs(_at(track.t, *series[channel]))
     ratio = float(np.median(recorded) / np.median(track.speed))
-    for factor, form in _CLOCKS.items():
-        if abs(np.log(ratio / factor)) < _CLOSE:
+    for form in _CLOCKS:
+        if abs(np.log(ratio * RELATIVE[form])) < _CLOSE:
             time.spec["format"] = form
             found.notes.append(
                 f"NOT SURE: the time is taken in {form}: only so the ship runs along her track at the recorded speed."
