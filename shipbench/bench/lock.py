@@ -53,7 +53,7 @@ def claimed(out: Path) -> Iterator[None]:
         where = f"{error.filename}: " if error.filename else ""
         raise WorkError(
             f"the study stopped: {where}{error.strerror or error}. What is finished is kept in {out}; "
-            f"make room (or correct the folder) and run the same command with {option('--resume', 'resume=True')}."
+            f"make room (or repair it) and run the same command again with {option('--resume', 'resume=True')}."
         ) from error
     finally:
         os.close(handle)  # and with it the lock, which the system also takes from a killed process
