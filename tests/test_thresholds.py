@@ -36,6 +36,11 @@ def test_every_number_is_used(package: str) -> None:
     assert not [name for name in TABLES[package].rows if f'("{name}")' not in code]
 
 
+def test_the_diagnosis_decides_by_few_numbers() -> None:
+    """A new number takes the place of another one, or is one that stands already: same question, same number."""
+    assert len(THRESHOLDS.rows) <= 80
+
+
 def test_a_count_is_whole() -> None:
     with pytest.raises(KeyError):
         Thresholds().value("missing")

@@ -1,271 +1,107 @@
 """Every number by which the diagnosis decides. Lengths, times and forces that go with the ship are for 130 m, scaled by
 Froude's law.
 
-Numbers of single effects are traits of these effects (`effects/traits.py`).
+One question has one number. Numbers of single effects are traits of these effects (`effects/traits.py`).
 """
 
 from __future__ import annotations
 
+from statistics import NormalDist
+
 from ..thresholds import Threshold, Thresholds
 
+_ANOTHER_MODEL = "least gain of correlated noise, or of a ship of another size"
+_BEYOND = "least gain of unknown forces, and of other signs or records of actuators"
+_MISFIT = "least gain of a form of the hull, or of forces of runs, that the model lacks"
+_BETWEEN_SHIPS = "ordinary-differences-between-ships"
+
 THRESHOLDS = Thresholds(
-    # one question, one number: how much evidence, how probable an error, what share counts
+    # evidence that is asked
     Threshold("evidence", 10.0, "2 log evidence", "least gain, and lead, of what the library names", "evidence-asked"),
-    Threshold(
-        "evidence_beyond_library",
-        20.0,
-        "2 log evidence",
-        "least gain of unknown forces, and of other signs or records of actuators",
-        "evidence-asked",
-    ),
-    Threshold(
-        "evidence_of_misfit",
-        30.0,
-        "2 log evidence",
-        "least gain of a form of the hull, or forces of runs, that the model lacks",
-        "evidence-asked",
-    ),
+    Threshold("evidence_beyond_library", 20.0, "2 log evidence", _BEYOND, "evidence-asked"),
+    Threshold("evidence_of_misfit", 30.0, "2 log evidence", _MISFIT, "evidence-asked"),
+    Threshold("evidence_of_another_model", 100.0, "2 log evidence", _ANOTHER_MODEL, "evidence-asked"),
+    Threshold("evidence_of_run_values", 50.0, "2 log evidence", "asked besides of one value a run", "evidence-asked"),
+    Threshold("values_per_run", 14.0, "2 log evidence", "cost of one value a run", "cost-of-values-per-run"),
+    Threshold("off_form", 0.02, "share", "of the hull's evidence, asked besides where ships differ", "evidence-asked"),
+    Threshold("off_form_of_unknown", 14.0, "times", "that share, asked of an unknown force", "unknown-forces"),
+    # probabilities and distances
     Threshold("error_probability", 0.05, "probability", "of an error in one test", "probabilities-of-error"),
+    Threshold("error_probability_of_many", 1e-5, "probability", "of one among many tests", "probabilities-of-error"),
+    Threshold("huber_knee", 3.5, "spreads", "distance from which a value is not normal", "distances-from-the-ordinary"),
+    Threshold("doubtful_distance", 5.0, "spreads", "distance of a doubtful value", "distances-from-the-ordinary"),
+    Threshold("outlying_parameter", 8.0, "spreads", "distance of an outlier", "distances-from-the-ordinary"),
+    Threshold("doubtful_sum", 75.0, "squared spreads", "sum from which the ship file is doubtful", "ship-file"),
+    Threshold("outlying_sum", 160.0, "squared spreads", "sum at which a ship is an outlier", "outlying-ships"),
+    # shares of evidence, and what is reported
     Threshold("minor_share", 0.1, "share", "of the best evidence, below which a rest is minor", "shares-of-evidence"),
-    Threshold("prediction_share", 0.5, "share", "of its gain that a linear prediction shows", "shares-of-evidence"),
+    Threshold("prediction_share", 0.4, "share", "of its gain that a linear prediction shows", "shares-of-evidence"),
+    Threshold("change_without_one_run", 0.25, "share", "of a change's score left without any one run", "changes"),
+    Threshold("alike_runs", 0.35, "share", "of runs alike before and after: always asked", "chosen-by-judgement"),
     Threshold("reported_share", 0.05, "share", "least part of a whole that is reported", "what-is-reported"),
     Threshold("reported_ratio", 1.3, "times", "least ratio that is reported", "what-is-reported"),
-    Threshold("run_duration", 120.0, "s at 130 m", "duration of a run: horizon, least part", "chosen-by-judgement"),
-    # preparation
+    Threshold("heading_sailed", 2.0, "deg", "to a sailed heading: farthest point of a curve", "chosen-by-judgement"),
+    # sizes that matter
+    Threshold("noticeable_force", 0.14, "force scales", "size of a practically significant force", "latent-force"),
+    Threshold("error_size", 0.3, "sd of ordinary noise", "least size of an unknown error", "unknown-forces"),
+    Threshold("delay_beside_delay", 0.6, "typical sizes", "least delay beside that of a sensor", "sizes-that-matter"),
+    Threshold("along_the_normal", 0.1, "rad", "from a bank's normal: wind or current mends its law", "a-bank"),
+    # record and runs
     Threshold("least_runs", 5, "runs", "least number for a cause to be named", "chosen-by-judgement"),
     Threshold("least_samples", 300, "samples", "least number for a cause to be named", "chosen-by-judgement"),
-    Threshold("least_parts", 8, "parts", "least number into which long runs are cut", "chosen-by-judgement"),
     Threshold("most_parts", 24, "parts", "greatest number into which long runs are cut", "chosen-by-judgement"),
-    Threshold("correction_rounds", 3, "rounds", "of corrections after which errors are refused", "record-errors"),
+    Threshold("run_duration", 120.0, "s at 130 m", "duration of a run: horizon, least part", "chosen-by-judgement"),
+    Threshold("segment_length", 60.0, "s at 130 m", "length of a segment of the record", "chosen-by-judgement"),
+    Threshold("sample_interval", 1.0, "s at 130 m", "interval to which fast records are averaged", "segments"),
+    Threshold("segments_per_outlier", 100, "segments", "of which one may be an outlier", "chosen-by-judgement"),
     Threshold("contradiction_least_way", 0.1, "ship lengths", "least way of a piece that is judged", "record-errors"),
     Threshold("contradiction_least_turn", 15.0, "deg", "least turn of a piece that is judged", "record-errors"),
     Threshold("derived_low_frequencies", 2, "frequencies", "number of lowest ones that are compared", "derived-speeds"),
-    Threshold("derived_power_ratio", 0.5, "share", "greatest power at low over high frequencies", "derived-speeds"),
-    Threshold("derived_by_chance", 1e-4, "probability", "of so low a ratio for independent sensors", "derived-speeds"),
     Threshold("derived_least_track", 0.02, "m at 130 m", "errors above those of the integration", "derived-speeds"),
     Threshold("derived_least_heading", 0.02, "deg", "errors above those of the integration", "derived-speeds"),
-    Threshold("derived_least_samples", 20, "samples", "least length of a run that is judged", "chosen-by-judgement"),
-    Threshold("late_velocity_doubt", 2.0, "standard errors", "evidence of an early position", "chosen-by-judgement"),
-    Threshold("delay_against_track", 2.0, "standard errors", "by which a track rules out delays", "late-velocities"),
-    Threshold("falling_rudder_lift", 2.5, "standard deviations", "slope below zero: wrong sign", "actuator-signs"),
-    # model and inference
-    Threshold("sample_interval", 1.0, "s", "interval to which fast records are averaged", "segments"),
-    Threshold("segment_length", 60.0, "s", "length of a segment of the record", "chosen-by-judgement"),
-    Threshold("long_segment", 5, "segments", "length of pieces for actuator dynamics", "chosen-by-judgement"),
-    Threshold(
-        "commands_before_segment",
-        40.0,
-        "s",
-        "commands before a segment, for its first positions",
-        "chosen-by-judgement",
-    ),
-    Threshold("most_steps", 24_000, "steps", "limit of all segments together", "segments"),
-    Threshold("segments_for_noise", 200, "segments", "segments for noise and actuator dynamics", "chosen-by-judgement"),
+    Threshold("wave_correlation", 0.1, "autocorrelation", "swing from which waves are tried", "noise-of-sensors"),
     Threshold("deep_water", 10.0, "draughts", "depth from which water counts as deep", "segments"),
-    Threshold(
-        "initial_state_precision",
-        1e-4,
-        "1 / variance",
-        "prior precision of initial states",
-        "chosen-by-judgement",
-    ),
-    Threshold(
-        "hull_spread",
-        0.3,
-        "share",
-        "prior spread of hull derivatives about regressions",
-        "ordinary-differences-between-ships",
-    ),
-    Threshold(
-        "hull_change_linear",
-        0.5,
-        "share",
-        "decrease of Y_v, N_v, N_r from which they only approach zero",
-        "ordinary-differences-between-ships",
-    ),
-    Threshold(
-        "hull_on_regressions",
-        0.1,
-        "share of the spread",
-        "prior spread of a hull on the regressions",
-        "chosen-by-judgement",
-    ),
-    Threshold("huber_knee", 3.5, "spreads", "distance at which Huber's linear tail begins", "chosen-by-judgement"),
-    Threshold(
-        "outlying_parameter",
-        8.0,
-        "spreads",
-        "distance at which a parameter is an outlier",
-        "chosen-by-judgement",
-    ),
-    Threshold(
-        "outlying_size",
-        3.0,
-        "typical sizes",
-        "size at which a mass or thrust is an outlier",
-        "chosen-by-judgement",
-    ),
-    Threshold("outlying_sum", 160.0, "squared spreads", "sum at which a ship is an outlier", "outlying-ships"),
-    Threshold("noticeable_force", 0.14, "force scales", "size of a practically significant force", "latent-force"),
-    Threshold("least_spread", 0.1, "scales", "least sd of latent force and noise", "chosen-by-judgement"),
-    Threshold(
-        "most_latent_force",
-        30.0,
-        "force scales",
-        "greatest standard deviation of the latent force",
-        "chosen-by-judgement",
-    ),
-    Threshold(
-        "coloured_noise",
-        50.0,
-        "log evidence",
-        "gain from which noise is taken as correlated",
-        "chosen-by-judgement",
-    ),
-    Threshold(
-        "wave_correlation",
-        -0.1,
-        "autocorrelation",
-        "value of residuals below which waves are tried",
-        "noise-of-sensors",
-    ),
-    Threshold("wave_lag", 12, "samples", "longest lag of that autocorrelation", "chosen-by-judgement"),
-    Threshold(
-        "swell_correlation",
-        0.2,
-        "autocorrelation",
-        "rise of the latent force's from which it is a swell",
-        "noise-of-sensors",
-    ),
-    Threshold("swell_lag", 30, "samples", "longest lag of that autocorrelation", "chosen-by-judgement"),
-    Threshold(
-        "values_per_run",
-        14.0,
-        "2 log evidence",
-        "cost of a cause with one value per run",
-        "cost-of-values-per-run",
-    ),
-    Threshold(
-        "outlier_segment",
-        30.0,
-        "mean squares",
-        "square of the latent force of an outlier",
-        "chosen-by-judgement",
-    ),
-    Threshold(
-        "segments_per_outlier",
-        100,
-        "segments",
-        "segments of which one may be an outlier",
-        "chosen-by-judgement",
-    ),
-    Threshold("unconverged_excess", 30.0, "2 log posterior", "excess of a fit that has not converged", "convergence"),
-    Threshold("led_astray", 100.0, "2 log posterior", "excess from which free steps are taken back", "convergence"),
-    Threshold(
-        "other_gear",
-        6.0,
-        "2 log evidence",
-        "gain from which other actuator dynamics are taken",
-        "chosen-by-judgement",
-    ),
-    # actuators
+    # priors
+    Threshold("ordinary_spread", 0.3, "share", "spread of hull derivatives and time constants", _BETWEEN_SHIPS),
+    Threshold("hull_change_linear", 0.5, "share", "decrease of Y_v, N_v, N_r to approach zero", _BETWEEN_SHIPS),
+    Threshold("hull_on_regressions", 0.1, "share", "of the spread: a hull on the regressions", "chosen-by-judgement"),
+    Threshold("force_prior", 0.5, "latent force", "prior sd of a force's coefficient", "chosen-by-judgement"),
+    Threshold("error_prior", 3.0, "sd of ordinary noise", "prior sd of an error's coefficient", "chosen-by-judgement"),
+    Threshold("shortest_period", 8.0, "s at 130 m", "shortest period of a force in time", "chosen-by-judgement"),
+    Threshold("longest_swell", 1.8, "s/m^0.5", "longest wave period per root of the ship length", "unknown-forces"),
+    Threshold("shortest_wave", 4.0, "ship lengths", "shortest wave over the places", "chosen-by-judgement"),
+    # actuators and ship file
     Threshold("shaft_time_constant", 12.0, "s at 130 m", "greatest one of an ordinary shaft", "ordinary-actuators"),
     Threshold("shaft_rate", 2.0, "rpm/s at 130 m", "least rate of an ordinary shaft", "ordinary-actuators"),
     Threshold("rudder_time_constant", 2.0, "s at 130 m", "greatest one of an ordinary rudder", "ordinary-actuators"),
     Threshold("rudder_rate", 1.9, "deg/s at 130 m", "least rate of an ordinary rudder", "ordinary-actuators"),
     Threshold("thruster_time_constant", 4.5, "s at 130 m", "greatest one of ordinary thrusters", "ordinary-actuators"),
     Threshold("second_stage", 0.5, "share", "of that: greatest time constant of a second stage", "chosen-by-judgement"),
-    Threshold("longest_ship", 400.0, "m", "length of the longest ships", "chosen-by-judgement"),
     Threshold("longest_delay", 10.0, "s at 130 m", "greatest delay that is looked for", "chosen-by-judgement"),
-    Threshold(
-        "least_record_error", 0.03, "share", "least reported size of an error of a record", "chosen-by-judgement"
-    ),
-    Threshold("time_constant_spread", 0.25, "share", "spread of ordinary time constants", "chosen-by-judgement"),
-    Threshold("record_scale_uncertainty", 0.01, "share", "uncertainty of a record's scale", "chosen-by-judgement"),
-    Threshold("time_uncertainty", 0.02, "samples", "uncertainty of a time", "chosen-by-judgement"),
-    # selection: whether a size is sure, and matters
-    Threshold("off_form", 0.02, "share", "of that gain, asked besides where ships differ", "evidence-asked"),
-    Threshold("evidence_of_run_values", 50.0, "2 log evidence", "asked besides of one value a run", "evidence-asked"),
-    Threshold(
-        "play_over_noise",
-        6.0,
-        "standard deviations",
-        "play behind a record of the rudder that is no noise of it",
-        "sizes-that-matter",
-    ),
-    Threshold(
-        "delay_beside_delay", 0.6, "typical sizes", "least delay beside that of another sensor", "sizes-that-matter"
-    ),
-    Threshold(
-        "along_the_normal",
-        0.1,
-        "rad",
-        "angle to the normal of a bank within which a steady wind or current mends its law",
-        "a-bank",
-    ),
-    Threshold(
-        "doubt_of_a_change", 1e-5, "probability", "the same of a cause that begins with a run", "agreement-of-runs"
-    ),
-    Threshold(
-        "against",
-        -2.0,
-        "2 log evidence",
-        "of a cause without any one run, below which the other runs speak against it",
-        "agreement-of-runs",
-    ),
-    # selection: screening, steps, changes
+    Threshold("record_uncertainty", 0.02, "share; samples", "uncertainty of a record", "chosen-by-judgement"),
+    Threshold("longest_ship", 400.0, "m", "length of the longest ships", "chosen-by-judgement"),
+    Threshold("other_size_estimated", 3.0, "times", "lead of another size beside estimated parts", "another-size"),
+    # limits of work and numerics, which decide no name by themselves
+    Threshold("most_steps", 24_000, "steps", "limit of all segments together", "segments"),
+    Threshold("segments_for_noise", 200, "segments", "segments for noise and actuator dynamics", "chosen-by-judgement"),
+    Threshold("long_segment", 5, "segments", "length of pieces for actuator dynamics", "chosen-by-judgement"),
+    Threshold("wave_lag", 30, "samples", "longest lag at which waves are seen", "chosen-by-judgement"),
     Threshold("causes", 6, "1", "greatest number of causes", "chosen-by-judgement"),
-    Threshold("refits", 3, "1", "number of best candidates that are refitted", "chosen-by-judgement"),
-    Threshold("rival_overlap", 0.25, "share", "of the best evidence that a rival could take", "chosen-by-judgement"),
-    Threshold("rivals", 4, "1", "greatest number of rivals that are refitted", "chosen-by-judgement"),
-    Threshold("tie", 0.1, "2 log evidence", "in which two settings of an effect are equal", "chosen-by-judgement"),
-    Threshold("refit_share_of_best", 0.6, "share", "of the best gain: least predicted gain of a refit", "refits"),
-    Threshold("near_threshold", 1.0, "2 log evidence", "below the threshold: a refit is iterated further", "refits"),
-    Threshold("left_by_causes_share", 0.05, "share", "of the causes' gain, asked of the next", "chosen-by-judgement"),
-    Threshold("changes_refitted", 2, "1", "number of changes that are refitted", "chosen-by-judgement"),
-    Threshold("change_margin", 14.0, "2 log evidence", "lead of a change over other causes", "chosen-by-judgement"),
-    Threshold("change_margin_own", 4.0, "2 log evidence", "lead over it from the first run on", "chosen-by-judgement"),
-    Threshold("runs_for_a_change", 8, "runs", "least number in which a change is looked for", "chosen-by-judgement"),
-    Threshold("change_without_one_run", 0.25, "share", "of a change's score left without any one run", "changes"),
-    Threshold("alike_lower", 0.35, "share", "of runs alike before and after: always asked", "chosen-by-judgement"),
-    Threshold("alike_upper", 0.5, "share", "of runs alike before and after: always enough", "chosen-by-judgement"),
-    # selection: unknown forces and errors
-    Threshold("off_form_of_large", 4.0, "times", "`Selection.off_form` asked of a large force", "unknown-forces"),
-    Threshold("off_form_of_small", 12.0, "times", "`Selection.off_form` asked of a small force", "unknown-forces"),
-    Threshold("off_form_slope", 0.75, "per unit", "growth of `off_form_of_large` with `off_form`", "unknown-forces"),
-    Threshold("evidence_free_of_form", 16.0, "2 log evidence", "least gain of what no hull does", "unknown-forces"),
-    Threshold("contender_share", 0.4, "share", "of the gain of named causes, to be refitted", "unknown-forces"),
-    Threshold("contenders", 3, "1", "greatest number of unknown forces that are refitted", "chosen-by-judgement"),
-    Threshold("force_size", 0.07, "latent force", "least size of an unknown force", "unknown-forces"),
-    Threshold("error_size", 0.3, "sd of ordinary noise", "least size of an unknown error", "unknown-forces"),
-    Threshold("force_prior", 0.5, "latent force", "prior sd of a force's coefficient", "chosen-by-judgement"),
-    Threshold("error_prior", 3.0, "sd of ordinary noise", "prior sd of an error's coefficient", "chosen-by-judgement"),
-    Threshold("variances_again", 2.0, "log evidence", "gain to estimate variances again", "chosen-by-judgement"),
-    Threshold("shortest_period", 8.0, "s", "shortest period of a force in time", "chosen-by-judgement"),
-    Threshold("longest_period", 200.0, "s", "longest period of a force in time", "chosen-by-judgement"),
+    Threshold("refits", 4, "1", "number of candidates of a kind that are refitted", "chosen-by-judgement"),
     Threshold("periods", 60, "1", "greatest number of periods", "chosen-by-judgement"),
-    Threshold("longest_swell", 1.8, "s/m^0.5", "longest wave period per root of the ship length", "unknown-forces"),
-    Threshold("shortest_wave", 4.0, "ship lengths", "shortest wave over the places", "chosen-by-judgement"),
     Threshold("waves", 25, "1", "most waves in twice the extent of the places", "chosen-by-judgement"),
-    # selection: the ship file
-    Threshold("other_size_sum", 20.0, "prior variances", "sum from which other ship sizes are tried", "ship-file"),
-    Threshold("doubtful_parameter", 5.0, "prior sd", "of a parameter: the ship file is doubtful", "ship-file"),
-    Threshold("doubtful_sum", 75.0, "prior variances", "sum from which the ship file is doubtful", "ship-file"),
-    Threshold("thrust_outlier", 4.0, "prior sd", "of the thrust: the ship file is in doubt", "chosen-by-judgement"),
-    Threshold("other_size", 60.0, "log evidence", "lead of a ship of another size over the ship file", "another-size"),
-    Threshold("other_size_estimated", 3.0, "times", "that lead, if propeller or rudder are estimated", "another-size"),
-    Threshold("other_size_first_fit", 0.0, "log evidence", "the same lead after a first fit, to go on", "another-size"),
-    # evaluation
     Threshold("folds", 5, "parts", "number of training parts of the held-out gain", "chosen-by-judgement"),
-    Threshold("heading_sailed", 2.0, "deg", "to a sailed heading: farthest point of a curve", "chosen-by-judgement"),
-    Threshold("stronger_with_speed", 1.5, "times", "least reported ratio between speeds", "chosen-by-judgement"),
-    Threshold("dependence_by_chance", 0.02, "probability", "greatest for a reported dependence", "chosen-by-judgement"),
-    Threshold("dependence_share", 0.01, "share", "of the variance: least reported dependence", "chosen-by-judgement"),
-    Threshold("single_run_slices", 12, "runs", "greatest number with a slice for each run", "chosen-by-judgement"),
+    Threshold("correction_rounds", 3, "rounds", "of corrections after which errors are refused", "record-errors"),
     Threshold("correlation_lags", 10, "samples", "greatest lag of correlations of residuals", "chosen-by-judgement"),
-    Threshold("run_values_share", 0.7, "share", "of the variance that a line explains, least", "chosen-by-judgement"),
-    Threshold(
-        "run_values_by_chance", 1e-3, "probability", "greatest for so good a line by chance", "chosen-by-judgement"
-    ),
+    Threshold("tie", 0.5, "2 log evidence", "in which two fits are equal, or one still converges", "refits"),
+    Threshold("unconverged_excess", 30.0, "2 log posterior", "excess of a fit that has not converged", "convergence"),
+    Threshold("least_spread", 0.1, "scales", "least sd of latent force and noise", "chosen-by-judgement"),
+    Threshold("most_latent_force", 30.0, "force scales", "greatest sd of the latent force", "chosen-by-judgement"),
+    Threshold("initial_state_precision", 1e-4, "1 / variance", "of the prior of initial states", "chosen-by-judgement"),
 )
-"""Thresholds in the order of the diagnosis."""
+"""Thresholds by the question that they answer."""
+
+
+def standard_errors(name: str) -> float:
+    """Distance from zero, in standard errors, that is exceeded by chance with a probability of the table, two-sided."""
+    return -NormalDist().inv_cdf(0.5 * THRESHOLDS.value(name))

@@ -142,7 +142,7 @@ class _Record:
         if error is None:
             return found, ordinary, None
         found, ordinary, _ = replace(self, measured=error.taken_out(self.measured))._judged(usual)
-        return found, ordinary, error if error.size > THRESHOLDS.value("least_record_error") else None
+        return found, ordinary, error if error.size > THRESHOLDS.value("reported_share") else None
 
     def _judged(self, usual: Gear) -> tuple[list[GearFinding], Gear, RecordError | None]:
         """Findings of the record as it is, with an error that explains more than every effect.
@@ -236,9 +236,9 @@ class _Record:
         slopes = ((self.errors(z + steps, kind) - self.errors(z - steps, kind)) / (2.0 * _STEP)).reshape(len(z), -1)
         relative = np.linalg.inv(discount / variance * slopes @ slopes.T + np.eye(len(z)))[kind.at, kind.at] ** 0.5
         size = float(np.exp(z[kind.at]))
-        clock = THRESHOLDS.value("time_uncertainty") * self.dt if kind.field in ("T", "delay") else 0.0
-        relative = np.hypot(relative, THRESHOLDS.value("record_scale_uncertainty"))
-        own = THRESHOLDS.value("time_constant_spread") * kind.beyond
+        clock = THRESHOLDS.value("record_uncertainty") * self.dt if kind.field in ("T", "delay") else 0.0
+        relative = np.hypot(relative, THRESHOLDS.value("record_uncertainty"))
+        own = THRESHOLDS.value("ordinary_spread") * kind.beyond
         spread = 1.96 * float(np.sqrt((size * relative) ** 2 + own**2 + clock**2))
         value = size - kind.beyond
         gear = replace(Gear(*(float(v) for v in np.exp(z[:2]))), **{kind.field: size})

@@ -211,6 +211,6 @@ def with_speed(trace: Trace, axis: int, name: str, seed: int = 0) -> float:
     found = float(ratio(sums.sum(axis=0)))
     draws = ratio(sums[np.random.default_rng(seed).integers(len(runs), size=(400, len(runs)))].sum(axis=1))
     low, high = np.nanquantile(draws, (0.025, 0.975))
-    least = THRESHOLDS.value("stronger_with_speed")
+    least = THRESHOLDS.value("reported_ratio")
     sure = (low > 1.0 and found > least) or (0.0 < found < 1.0 / least and high < 1.0)
     return found if sure and np.isfinite(found) else 1.0

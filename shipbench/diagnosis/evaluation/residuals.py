@@ -132,8 +132,6 @@ def _cuts(trace: Trace) -> list[tuple[str, np.ndarray, np.ndarray]]:
         values = x[np.isfinite(x)]
         if name == "heading":
             edges = np.arange(0.0, 361.0, 45.0)
-        elif name == "run" and len(trace.names) <= THRESHOLDS.count("single_run_slices"):
-            edges = np.arange(len(trace.names) + 1.0) - 0.5
         elif name == "run":
             edges = np.unique(np.linspace(0, len(trace.names), 7).round()) - 0.5
         else:
@@ -154,10 +152,10 @@ def _slices(x: np.ndarray, squares: np.ndarray, edges: np.ndarray) -> list[Slice
 def what_is_wrong(trace: Trace) -> tuple[Wrong, ...]:
     """Lines on every channel with more than 5 % of the normalised error, greatest first."""
     tables = error_tables(trace)
-    by_chance, least = THRESHOLDS.value("dependence_by_chance"), THRESHOLDS.value("dependence_share")
+    by_chance, least = THRESHOLDS.value("error_probability"), THRESHOLDS.value("reported_share")
     lines = []
     for channel, share in sorted(tables.share.items(), key=lambda item: -item[1]):
-        if share < THRESHOLDS.value("reported_share"):
+        if share < least:
             continue
         found = ((f, axis) for axis in _AXES_OF[channel] for f in tables.follows[AXES[axis]])
         known = [(f, axis) for f, axis in found if f.p <= by_chance and f.share >= least]

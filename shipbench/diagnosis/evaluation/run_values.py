@@ -31,7 +31,7 @@ def goes_with(seg: Segments, values: np.ndarray) -> str:
         for at, words in ((np.stack([x, y], axis=1), "place"), (np.arange(seg.runs)[:, None], "number"))
     ]
     (chance, share), words = min(found, key=lambda f: f[0][0])
-    if chance > THRESHOLDS.value("run_values_by_chance") or share < THRESHOLDS.value("run_values_share"):
+    if chance > THRESHOLDS.value("error_probability_of_many"):
         return ""
     told = "from place to place" if words == "place" else "with time"
     return f"it differs {told}: {share:.0%} of the variance of its values depends on the {words} of the runs"

@@ -63,7 +63,8 @@ def beside_noise_of(named: Fit, null: Fit) -> Fit | None:
     if is_spent() or not null.scales.colour.share.any():
         return None
     colour = colour_of(named)
-    if evidence_with(named, colour) < evidence_with(named, named.scales.colour) + THRESHOLDS.value("coloured_noise"):
+    gain = 2.0 * (evidence_with(named, colour) - evidence_with(named, named.scales.colour))
+    if gain < THRESHOLDS.value("evidence_of_another_model"):
         return None
     return widened(
         fit(
@@ -161,7 +162,7 @@ def _with_gear(found: Fit, name: str, field: str) -> Fit:
     for factors in _GEAR_FACTORS:
         for factor in factors:
             tried = _behind(found, name, field, getattr(first.plant.ordinary[name], field) * factor)
-            if is_spent() or 2.0 * (tried.evidence - found.evidence) < THRESHOLDS.value("other_gear"):
+            if is_spent() or 2.0 * (tried.evidence - found.evidence) < THRESHOLDS.value("evidence"):
                 break
             found = tried
         if found is not first or is_spent():

@@ -28,7 +28,7 @@ def colour_of(found: Fit, share: float = 1.0, waves_alone: bool = False) -> Colo
     found: a fit of this share of the segments. waves_alone: look for wave motion only, not for errors that last.
     Channels that are not reached before the time budget is spent keep white noise.
     """
-    worth = THRESHOLDS.value("coloured_noise") * share
+    worth = 0.5 * THRESHOLDS.value("evidence_of_another_model") * share
     colour = Colour.white(found.plant.steps + 1)
     best = evidence_with(found, colour)
     for channel in np.flatnonzero(found.plant.seg.seen).tolist():
@@ -104,7 +104,7 @@ def _swinging(found: Fit, colour: Colour, channel: int) -> list[np.ndarray]:
     e = np.where(seg.mask, seg.states[..., channel] - found.columns.predicted[..., channel], 0.0)
     lags = range(1, min(THRESHOLDS.count("wave_lag"), e.shape[1] - 1) + 1)
     correlation = [float(np.sum(e[:, lag:] * e[:, :-lag]) / np.sum(e**2)) for lag in lags]
-    if min(correlation) > THRESHOLDS.value("wave_correlation"):
+    if min(correlation) > -THRESHOLDS.value("wave_correlation"):
         return []
     half = 1 + int(np.argmin(correlation))
 
@@ -123,11 +123,11 @@ def swinging_force(found: Fit, colour: Colour) -> Colour:
     """
     for axis, channel in enumerate((U, V, R)):
         w = np.where(found.plant.seg.mask, found.point.w[..., axis] @ found.plant.hat.T, 0.0)
-        lags = range(1, min(THRESHOLDS.count("swell_lag"), w.shape[1] - 1) + 1)
+        lags = range(1, min(THRESHOLDS.count("wave_lag"), w.shape[1] - 1) + 1)
         correlation = np.array([np.sum(w[:, lag:] * w[:, :-lag]) for lag in lags]) / max(np.sum(w**2), 1e-300)
         lowest, later = np.minimum.accumulate(correlation), np.maximum.accumulate(correlation[::-1])[::-1]
         half = int(np.argmax(later - lowest))
-        if np.isinf(colour.period[channel]) and later[half] - lowest[half] > THRESHOLDS.value("swell_correlation"):
+        if np.isinf(colour.period[channel]) and later[half] - lowest[half] > THRESHOLDS.value("wave_correlation"):
             period = 1.0 + half + float(np.argmax(correlation[half:]))
             share, time = _WAVES[0][1], period / (2.0 * np.pi * _WAVES[2][0])
             colour = colour.with_channel(channel, share, time, period)

@@ -31,7 +31,7 @@ def strange_pieces(found: Fit) -> np.ndarray:
     others = (squares.sum(axis=0) - squares) / (len(z) - 1)
     worst = np.max(squares / others, axis=1)
     order = np.argsort(-worst)[:left]
-    return order[worst[order] > THRESHOLDS.value("outlier_segment")]
+    return order[worst[order] > THRESHOLDS.value("doubtful_distance") ** 2]
 
 
 def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
@@ -54,7 +54,7 @@ def left_out(plant: Plant, runs: Sequence[Run]) -> list[str]:
         begins = run.t[0] + seg.start[piece]
         pieces.append(f"run '{run.id}', {begins:g} to {min(begins + plant.steps * seg.dt, run.t[-1]):g} s")
     if pieces:
-        times = THRESHOLDS.value("outlier_segment") ** 0.5
+        times = THRESHOLDS.value("doubtful_distance")
         found.append(
             f"left out, since the missing force is more than {times:.0f} times the ordinary one there "
             f"(ship held or pushed, or a record that jumps?): {'; '.join(pieces)}."

@@ -20,7 +20,7 @@ from .laplace import Fit
 NOTICEABLE = THRESHOLDS.value("noticeable_force")
 """Size from which a force is practically significant, in units of the latent force."""
 STRANGE = THRESHOLDS.value("outlying_parameter")
-STRANGE_SIZE = THRESHOLDS.value("outlying_size")
+STRANGE_SIZE = THRESHOLDS.value("huber_knee")
 STRANGE_SUM = THRESHOLDS.value("outlying_sum")
 """Limits of the prior between ships: a parameter, a mass or thrust, the sum of squares of all parameters."""
 _SAME = 0.05

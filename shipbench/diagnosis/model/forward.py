@@ -136,7 +136,7 @@ def cut(dataset: Dataset, steps: int) -> Segments:
         if ship.T < least_depth(dataset) < DEEP * ship.T
         else None
     )
-    back = np.arange(-round(THRESHOLDS.value("commands_before_segment") * scale / dataset.dt) if commanded else 0, 0)
+    back = np.arange(-round(SEGMENT * scale / dataset.dt) if commanded else 0, 0)
     return Segments(
         dt=dataset.dt, commanded=commanded, states=states, commands=inputs[..., :4],
         earlier=np.stack([run.inputs[np.maximum(a + back, 0), :4] for _, run, a, _ in pieces]),

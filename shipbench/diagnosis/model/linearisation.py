@@ -95,7 +95,7 @@ class Scales:
 
 def hull_changes(base: np.ndarray) -> np.ndarray:
     """Relative changes (..., NUM_HULL) of the hull's derivatives and added masses, from their values in `base`."""
-    change, linear = THRESHOLDS.value("hull_spread") * base, THRESHOLDS.value("hull_change_linear")
+    change, linear = THRESHOLDS.value("ordinary_spread") * base, THRESHOLDS.value("hull_change_linear")
     least = 1.0 - linear
     bounded = np.maximum(change, least * np.exp(np.minimum(change + linear, 0.0) / least) - 1.0)
     return np.where(_ONE_SIGN, bounded, change)

@@ -11,7 +11,7 @@ from ...signals import DELTA, F_B, F_S, STATES, N
 from ..inference.baseline import first_evidence, first_fit
 from ..inference.laplace import Fit
 from ..model.linearisation import CENTRE, FREE, SPREAD
-from ..thresholds import THRESHOLDS
+from ..thresholds import THRESHOLDS, standard_errors
 
 _LIFT = FREE.index(5)
 """Index of the slope of the rudder's lift among the fit's parameters."""
@@ -33,7 +33,7 @@ def _rudder(null: Fit) -> list[UnitFinding]:
         CENTRE[_LIFT] + SPREAD[_LIFT] * null.solution.mean[_LIFT],
         SPREAD[_LIFT] * np.sqrt(null.solution.cov[_LIFT, _LIFT]),
     )
-    if slope > -THRESHOLDS.value("falling_rudder_lift") * sd:
+    if slope > -standard_errors("error_probability") * sd:
         return []
     gain = first_evidence(null.plant.turned([DELTA - N]), null) - null.evidence
     if gain < 0.0:

@@ -72,11 +72,10 @@ def beside_heading(run: Run) -> np.ndarray:
 
 def _hollow(errors: Sequence[np.ndarray], least: float) -> bool:
     """Check whether low frequencies of these series, (samples, signals) each, have far less power than high ones."""
-    least_samples, num_low = THRESHOLDS.count("derived_least_samples"), THRESHOLDS.count("derived_low_frequencies")
-    powers = [dct(e, axis=0, norm="ortho") ** 2 for e in errors if len(e) >= least_samples]
+    num_low = THRESHOLDS.count("derived_low_frequencies")
+    powers = [dct(e, axis=0, norm="ortho") ** 2 for e in errors if len(e) >= 4 * num_low]
     if not powers:
         return False
     slow, quick = np.array([p[1 : 1 + num_low] for p in powers]), np.mean([p[len(p) // 2 :].mean() for p in powers])
-    by_chance = chi2.ppf(THRESHOLDS.value("derived_by_chance"), slow.size) / slow.size
-    share = min(THRESHOLDS.value("derived_power_ratio"), by_chance)
-    return bool(quick > least**2 and slow.mean() < share * quick)
+    by_chance = chi2.ppf(THRESHOLDS.value("error_probability_of_many"), slow.size) / slow.size
+    return bool(quick > least**2 and slow.mean() < by_chance * quick)

@@ -40,7 +40,7 @@ def split_long_runs(prepared: Prepared) -> Prepared:
     for run, lasts in zip(dataset.runs, seconds, strict=True):
         edges = np.linspace(0, len(run) - 1, max(1, int(lasts / length)) + 1).round().astype(int)
         parts += [run.slice(a, b + 1, f" + {run.t[a] - run.t[0]:.0f} s") for a, b in pairwise(edges)]
-    if len(parts) < THRESHOLDS.count("least_parts"):
+    if len(parts) < LEAST_RUNS:
         return prepared
     line = (
         f"{runs_in_words(dataset)} of {total:.0f} s in all: cut into {len(parts)} parts of about "

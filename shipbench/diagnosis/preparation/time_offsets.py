@@ -25,7 +25,7 @@ from ..inference.gram import by_run
 from ..inference.laplace import Fit, Model
 from ..model.forward import Plant
 from ..model.linearisation import Scales
-from ..thresholds import THRESHOLDS
+from ..thresholds import standard_errors
 from .base import LateVelocities, Prepared
 from .derived_speeds import has_speeds
 
@@ -65,7 +65,7 @@ def late_velocities_of(dataset: Dataset) -> tuple[LateVelocities, Dataset] | Non
     best = max(("filtered", "late"), key=lambda name: np.sum(shares[name]))
     over, over_position = (shares[best] - shares[other] for other in ("as recorded", "position"))
     # a position cannot be early, only all else late: that is believed where the runs agree
-    sure = THRESHOLDS.value("late_velocity_doubt") * len(over) ** 0.5 * np.std(over_position)
+    sure = standard_errors("error_probability") * len(over) ** 0.5 * np.std(over_position)
     if np.sum(over) < 0.0 or -np.sum(over_position) > sure:
         return None
     return LateVelocities(
@@ -97,7 +97,7 @@ def ruled_out(dataset: Dataset, found: Fit) -> tuple[str, ...]:
         lag, sd = own if term.effect.traits.faults_of == {"u", "v"} else position
         if any(term.setting):  # velocities that are late in the earth's axes are a position that is early
             lag, sd = -position[0], position[1]
-        if may_be_none((lag, sd)) and abs(delay - lag) > THRESHOLDS.value("delay_against_track") * sd:
+        if may_be_none((lag, sd)) and abs(delay - lag) > standard_errors("error_probability") * sd:
             out.append(term.label)
     return tuple(out)
 

@@ -59,7 +59,7 @@ def is_borne_by_one(fit: Fit, index: int) -> bool:
         return np.asarray(fitted - np.linalg.slogdet(A)[1] + np.sum(np.log(precision)))
 
     with_all, *left = evidence(np.ones_like(inside)) - evidence(~inside)
-    return bool(with_all > 0.0 and len(left) > 1 and min(left) < THRESHOLDS.value("against"))
+    return bool(with_all > 0.0 and len(left) > 1 and min(left) < 0.0)
 
 
 def lasts(fit: Fit) -> bool:
@@ -169,7 +169,7 @@ def runs_agree(fit: Fit, index: int) -> bool:
     return doubt < (
         THRESHOLDS.value("error_probability")
         if fit.model.terms[index].since is None
-        else THRESHOLDS.value("doubt_of_a_change")
+        else THRESHOLDS.value("error_probability_of_many")
     )
 
 
@@ -189,7 +189,7 @@ def least_size(fit: Fit, term: Term) -> float:
         noise = _record_noise(fit.plant.seg, term.effect.acts_through[0]) / float(
             fit.scales.amplitudes(term, fit.plant.c.L)[0]
         )
-        least = max(least, term.effect.traits.least_unrecorded, THRESHOLDS.value("play_over_noise") * noise)
+        least = max(least, term.effect.traits.least_unrecorded, THRESHOLDS.value("doubtful_distance") * noise)
     return least
 
 

@@ -187,22 +187,19 @@ def asked(d: Dependence, off_form: float) -> float:
     """Least score of an unknown force or error, 2 log Bayes factor; infinite for one that is too small.
 
     A force that depends on a variable of a ship's form must exceed several times `off_form` (`Selection.off_form`)
-    besides: the more, the less of the latent force it explains. A force that depends on time, but leaves the latent
-    force as large as it was, is wave motion.
+    besides. A force that depends on time, but leaves the latent force as large as it was, is wave motion.
     """
-    least = THRESHOLDS.value("error_size") if d.of_sensor else THRESHOLDS.value("force_size")
+    least = THRESHOLDS.value("error_size") if d.of_sensor else 0.5 * NOTICEABLE
     if not d.of_sensor and d.variable == "time" and d.taken < least:
         return np.inf
+    beyond = THRESHOLDS.value("evidence_beyond_library")
     ahead = (d.axis, d.variable) == (
         "surge",
         "nothing",
     )  # a resistance or a propeller of another form comes near a constant
     if d.of_sensor or (d.variable in NO_FORM and not ahead):
-        return THRESHOLDS.value("evidence_free_of_form") if d.size > least else np.inf
-    seen, hardly = THRESHOLDS.value("off_form_of_large"), THRESHOLDS.value("off_form_of_small")
-    ordinary = seen + (hardly - seen) * max(2.0 - d.taken / NOTICEABLE, 0.0)
-    times = max(ordinary, THRESHOLDS.value("off_form_slope") * off_form)
-    return THRESHOLDS.value("evidence_beyond_library") + times * off_form if d.taken > least else np.inf
+        return beyond if d.size > least else np.inf
+    return beyond + THRESHOLDS.value("off_form_of_unknown") * off_form if d.taken > least else np.inf
 
 
 def _unknown(
@@ -214,7 +211,7 @@ def _unknown(
     worth = (
         max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) if named else 0.0
     )
-    least, first = THRESHOLDS.value("contender_share") * worth, THRESHOLDS.count("contenders")
+    least, first = THRESHOLDS.value("prediction_share") * worth, THRESHOLDS.count("refits")
     found = [d for d in search.found if d.score > max(asked(d, selection.off_form), least)]
     contenders = [d if is_spent() else search.settled(d) for d in found[:first]] if named else found[:1]
     best, margin = max(contenders, key=lambda d: d.score, default=None), THRESHOLD

@@ -144,7 +144,7 @@ def of_forces(lin: Linearisation) -> dict[str, list[Feature]]:
     wind = None if seg.wind is None else np.swapaxes(seg.wind[:, :-1], 0, 1)
     on, aside = (_state(plant, middle[0], act, t, wind) for middle in (lin.middle, lin.aside))
     ends = _ends(plant)
-    low = 1.0 / (THRESHOLDS.value("longest_period") * plant.froude)
+    low = 1.0 / ends  # what is slower is not told from what grows with time
     high = 1.0 / max(THRESHOLDS.value("shortest_period") * plant.froude, 4.0 * seg.dt)
     # even in frequency: from one to the next the longest run sees half a cycle more, so that one is near enough to any
     even = 1 + int(np.ceil(2.0 * max(high - low, 0.0) * ends))

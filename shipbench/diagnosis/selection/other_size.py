@@ -23,7 +23,7 @@ def better_size(null: Fit) -> list[str]:
     """Line if a smaller or a larger ship, with masses, inertia and forces of her size, has far more evidence beside no
     cause; None if not. null: with its own noise model, as the other's is (docs/calibration.md#another-size)."""
     factor, gain = _best(null, _FACTORS)
-    if factor == 1.0 or gain < THRESHOLDS.value("other_size") * _times(null):
+    if factor == 1.0 or gain < 0.5 * THRESHOLDS.value("evidence_of_another_model") * _times(null):
         return []
     return [f"a similar ship of {factor:g} times the size fits the runs better (log Bayes factor {gain:.0f})"]
 
@@ -51,7 +51,7 @@ def _best(null: Fit, factors: Sequence[float]) -> tuple[float, float]:
     own = null if few is null.plant else null_fit(few, Scales(few))
     best, most = 1.0, 0.0
     for plant, factor in ((few.resized(factor), factor) for factor in factors):
-        if is_spent() or first_evidence(plant, own) - own.evidence < THRESHOLDS.value("other_size_first_fit"):
+        if is_spent() or first_evidence(plant, own) < own.evidence:
             continue
         gain = null_fit(plant, Scales(plant)).evidence - own.evidence
         if gain > most:

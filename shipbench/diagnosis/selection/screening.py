@@ -185,7 +185,7 @@ def changes(fit: Fit) -> list[Score]:
     """
     (S, base, columns), barred = _of_all_runs(fit), other_kinds_from(fit.plant.seg.kinds)
     begins = np.array([k for k in places(len(S)) if k not in barred], dtype=int)
-    if not len(begins) or len(S) < THRESHOLDS.count("runs_for_a_change"):
+    if not len(begins):
         return []
     total, from_run = S.sum(axis=0), np.cumsum(S[::-1], axis=0)[::-1]
     prior, cost, found = fit.prior.precision, 2.0 * float(np.log(len(S))), []
@@ -221,8 +221,8 @@ def other_kinds_from(kinds: Sequence[str]) -> list[int]:
     of = np.array([[kind == one for one in sorted(set(kinds))] for kind in kinds], dtype=float)
     at, shuffle = np.array(places(len(kinds)), dtype=int), np.random.default_rng(0)
     by_chance = [_alike(shuffle.permutation(of), at) for _ in range(500)]  # random orders
-    bounds = THRESHOLDS.value("alike_lower"), THRESHOLDS.value("alike_upper")
-    least = np.clip(np.quantile(by_chance, THRESHOLDS.value("error_probability"), axis=0), *bounds)
+    chance, mostly = np.quantile(by_chance, THRESHOLDS.value("error_probability"), axis=0), 0.5
+    least = np.clip(chance, THRESHOLDS.value("alike_runs"), mostly)
     return [int(k) for k in at[_alike(of, at) < least]]
 
 

@@ -32,7 +32,7 @@ def doubts_of(found: Analysis) -> list[str]:
     signs = []
     if is_strange(z) and is_strange(needed(found.selection.null)):
         signs.append(_moved(z))
-    if abs(z[PLACES["log_thrust"]]) > THRESHOLDS.value("thrust_outlier"):
+    if abs(z[PLACES["log_thrust"]]) > THRESHOLDS.value("doubtful_distance"):
         signs.append(
             f"the propeller would have to give {_thrust_factor(fit):.2g} times the thrust that the ship file makes "
             "likely"
@@ -40,7 +40,7 @@ def doubts_of(found: Analysis) -> list[str]:
     for term, value in zip(fit.model.terms, fit.values, strict=True):
         if term.effect.family in ("hull", "propulsion") and np.max(np.abs(value)) > STRANGE_SIZE:
             signs.append(f"{term.label} would have to be {np.max(np.abs(value)):.1f} times its typical size")
-    if not signs and np.sum(z**2) > THRESHOLDS.value("other_size_sum"):
+    if not signs and np.sum(z**2) > THRESHOLDS.value("huber_knee") ** 2:
         signs = better_size(found.selection.plain)
     if not signs and _is_odd(z) and (size := _size_instead(found, [term.label for term in fit.model.terms])):
         signs = [_moved(z), *size]
@@ -71,7 +71,7 @@ def odd_for(found: Analysis, named: Sequence[str]) -> list[str]:
 
 
 def _is_odd(z: np.ndarray) -> bool:
-    one, together = THRESHOLDS.value("doubtful_parameter"), THRESHOLDS.value("doubtful_sum")
+    one, together = THRESHOLDS.value("doubtful_distance"), THRESHOLDS.value("doubtful_sum")
     return bool(np.max(np.abs(z)) > one or np.sum(z**2) > together)
 
 

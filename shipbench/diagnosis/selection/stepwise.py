@@ -161,7 +161,7 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
         if is_spent():
             break
         tried = start.refit(score, least)
-        if threshold - THRESHOLDS.value("near_threshold") < 2.0 * (tried.evidence - now.evidence) < threshold:
+        if threshold - THRESHOLDS.value("tie") < 2.0 * (tried.evidence - now.evidence) < threshold:
             tried = fit(
                 tried.plant, tried.scales, tried.model, tried.point, tried.hyper, tried.log_tau2, guess=tried.motion
             )
@@ -175,7 +175,7 @@ def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) 
 def _least(best: Fit, now: Fit) -> float:
     """Predicted gain that a refit needs beside the best one; less by the amount by which that one's prediction fell
     short."""
-    share, margin = THRESHOLDS.value("refit_share_of_best"), THRESHOLDS.value("unconverged_excess")
+    share, margin = THRESHOLDS.value("prediction_share"), THRESHOLDS.value("unconverged_excess")
     return 2.0 * (share * (best.evidence - now.evidence) - max(best.promise - best.early, 0.0)) - margin
 
 
@@ -259,7 +259,7 @@ def _grown(null: Fit, threshold: float, again: bool = False) -> _Grown:
             else _or_change(now, max((f for f, _ in tried), key=state.gain, default=None), origin, standard)
         )
         # what the causes found leave unexplained, because their formulas are not the ship's, passes for another cause
-        left = THRESHOLDS.value("left_by_causes_share") * 2.0 * (now.evidence - null.evidence)
+        left = THRESHOLDS.value("minor_share") * 2.0 * (now.evidence - null.evidence)
         imprecise = min(left, THRESHOLDS.value("evidence_beyond_library"))
         # what a fit that does not rest could still gain by itself is no gain of the next cause
         if best is None or state.gain(best) < threshold + imprecise + now.excess:
@@ -277,19 +277,17 @@ def _or_change(now: Fit, best: Fit | None, origin: Origin, standard: Standard) -
     """Best candidate, or one that begins at a later run, where that explains the runs better by the threshold."""
     if any(t.since is not None for t in now.model.terms):
         return best
-    plain, gain = best, 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
-    margin = THRESHOLDS.value("change_margin")
+    gain = 2.0 * (best.evidence - now.evidence) if best is not None else 0.0
+    margin = THRESHOLDS.value("evidence")
     present, least = {t.label for t in now.model.terms}, max(margin, THRESHOLDS.value("minor_share") * gain)
     late = [s for s in changes(now) if s.score > least and s.term.label not in present]
-    late = [s for s in late if not s.term.effect.traits.persistent][: THRESHOLDS.count("changes_refitted")]
+    late = [s for s in late if not s.term.effect.traits.persistent][: THRESHOLDS.count("refits")]
     if not late:
         return best
     start = Beginning.of(now, origin, [s.term for s in late])
     for score in late:
         found = start.refit(score, _least(best, now) if best is not None and gain > margin else -np.inf)
-        own = plain is not None and plain.model.terms[-1].label == score.term.label
-        ahead = THRESHOLDS.value("change_margin_own") if own else margin
-        if 2.0 * (found.evidence - now.evidence) > gain + ahead and first_unmet(SURE, found, -1, standard).met:
+        if 2.0 * (found.evidence - now.evidence) > gain + margin and first_unmet(SURE, found, -1, standard).met:
             best, gain = found, 2.0 * (found.evidence - now.evidence)
     return best
 
@@ -318,8 +316,9 @@ def worth_a_refit(scores: Sequence[Score], now: Fit, threshold: float) -> list[S
         best_of_all.vector or best_of_all.per_run
     ):  # their sensitivities depend on the size too much for the linear overlap
         rivals |= {s.term.label: 1.0 for s in ranked if s.term.effect.vector or s.term.effect.per_run}
-    near = [s for s in ranked if rivals.get(s.term.label, 0.0) > THRESHOLDS.value("rival_overlap") and s not in chosen]
-    chosen += sorted(near, key=lambda s: -rivals[s.term.label])[: THRESHOLDS.count("rivals")]
+    share = THRESHOLDS.value("prediction_share")
+    near = [s for s in ranked if rivals.get(s.term.label, 0.0) > share and s not in chosen]
+    chosen += sorted(near, key=lambda s: -rivals[s.term.label])[: THRESHOLDS.count("refits")]
     return [
         s
         for s in scores
@@ -332,7 +331,7 @@ def _tie(best: Score) -> float:
     of a size has no slope at zero."""
     tie = THRESHOLDS.value("tie")
     if best.term.effect.vector and not best.term.per_run:
-        return max(tie, THRESHOLDS.value("prediction_share") * best.score)
+        return max(tie, (1.0 - THRESHOLDS.value("prediction_share")) * best.score)
     return tie
 
 
@@ -355,4 +354,4 @@ def absorbed(tried: Sequence[Fit], now: Fit, threshold: float, origin: Origin) -
         best.setdefault(s.term.label, s)
     least = max(threshold, THRESHOLDS.value("minor_share") * max(s.score for s in best.values()))
     seen = _beside(now) | {f.model.terms[-1].label for f in tried}
-    return [s for label, s in best.items() if label not in seen and s.score > least][: THRESHOLDS.count("rivals")]
+    return [s for label, s in best.items() if label not in seen and s.score > least][: THRESHOLDS.count("refits")]

@@ -182,7 +182,7 @@ class Search:
                 ((solve(reduced, _with(self.prior, at)), t, at) for t, at in group), key=lambda way: way[0].log_evidence
             )
             gain, log_force = solution.log_evidence - null, self.usual
-            if gain - best.cost > THRESHOLDS.value("variances_again") and not is_spent():
+            if gain > best.cost and not is_spent():
                 after, log_force = self._evidence(gram, at)
                 gain = after - self.before
             size, share, taken = float(np.linalg.norm(solution.mean[-best.size :])), np.nan, 0.0
@@ -203,8 +203,7 @@ class Search:
     def _together(self, of: Sequence[tuple[Dependence, _Tried]]) -> tuple[Dependence, *tuple[_Tried, ...]] | None:
         """Best forms of a variable on all axes where they have evidence, the strongest first; None where that is one
         axis alone."""
-        least = 2.0 * THRESHOLDS.value("variances_again")
-        parts = sorted((pair for pair in of if pair[0].score > least), key=lambda pair: -pair[0].score)
+        parts = sorted((pair for pair in of if pair[0].score > 0.0), key=lambda pair: -pair[0].score)
         if len(parts) < 2 or is_spent():
             return None
         gram, size = self._gram([t for _, t in parts]), sum(t.size for _, t in parts)

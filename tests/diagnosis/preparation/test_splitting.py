@@ -41,7 +41,7 @@ def test_a_few_long_runs_are_cut_into_parts_of_equal_length(runs: int, seconds: 
         )
 
 
-@pytest.mark.parametrize(("runs", "seconds"), [(1, 900), (4, 230), (LEAST_RUNS, 400)])
+@pytest.mark.parametrize(("runs", "seconds"), [(1, 590), (4, 230), (LEAST_RUNS, 400)])
 def test_short_runs_and_runs_enough_stay_as_they_are(runs: int, seconds: int):
     data = _logs(runs, seconds)
     assert split_long_runs(Prepared(data)) == Prepared(data)
