@@ -98,7 +98,7 @@ def test_a_uniform_current_carries_a_drifting_ship_along():
 def test_shallow_water_widens_the_turn():
     sim = Simulator(load_mmg_ship("container130"))
     s0 = straight_state(3.7, 93.0)
-    U = np.zeros((1, 200, 4))
+    U = np.zeros((1, 100, 4))
     U[..., 0], U[..., 1] = 93.0, np.deg2rad(15)
     deep, shallow = sim.rollout(s0, U, 1.0), sim.rollout(s0, U, 1.0, Environment(depth=8.0))
     assert shallow[0, -1, 2] < 0.97 * deep[0, -1, 2]
@@ -116,8 +116,8 @@ def test_a_beam_wind_sets_the_ship_to_leeward():
 
 
 def test_a_crash_stop_ends_within_the_references_time():
-    sim = Simulator(load_mmg_ship("container130"))
-    S = sim.rollout(straight_state(3.8, 93.0), np.tile([-150.0, 0, 0, 0], (1, 300, 1)), 1.0)
+    sim = Simulator(load_mmg_ship("container130"), 1.0)
+    S = sim.rollout(straight_state(3.8, 93.0), np.tile([-150.0, 0, 0, 0], (1, 200, 1)), 1.0)
     stopped = int(np.argmax(S[0, :, 3] < 0))
     assert 60 < stopped < 180
 

@@ -27,11 +27,6 @@ N_R = BASE.index("N_r")
 
 
 @pytest.fixture(scope="module")
-def plant() -> Plant:
-    return Plant.of(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=4, samples=60)))
-
-
-@pytest.fixture(scope="module")
 def fitted(plant) -> Fit:
     scales = Scales(plant)
     coloured = scales.coloured(scales.colour.with_channel(2, 4.0, 6.0))

@@ -138,7 +138,7 @@ def test_a_sail_follows_the_measured_wind_and_nothing_does_without_one():
     assert best.score > 40.0
 
 
-@pytest.mark.parametrize("in_step", [False, True])
+@pytest.mark.parametrize("in_step", [pytest.param(False, marks=pytest.mark.long), True])
 def test_waves_that_rock_the_ship_are_no_force_that_follows_the_time_but_one_in_step_with_the_runs_is(in_step):
     """Of 14 s on 232 m. Phases of their own in each run scored 26, where 16 are asked."""
 
@@ -152,7 +152,7 @@ def test_waves_that_rock_the_ship_are_no_force_that_follows_the_time_but_one_in_
     assert (("yaw", "time") in found) == in_step
 
 
-@pytest.mark.parametrize("in_order", [False, True])
+@pytest.mark.parametrize("in_order", [pytest.param(False, marks=pytest.mark.long), True])
 def test_what_goes_with_the_number_of_the_run_explains_more_than_a_force_of_each_run(in_order):
     """A side force of its own in each run, by chance greater in the later ones, passed for one that follows the
     number."""

@@ -53,7 +53,7 @@ def commanded(data: Dataset) -> Dataset:
     return replace(data, actuators="commanded", runs=tuple(runs))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_a_hidden_current_is_found_and_the_rollouts_gain_on_runs_not_fitted(seed):
     hidden = ("current", (0.3, -0.25))
     data, unseen = trials(seed, hidden), trials(seed + 100, hidden)

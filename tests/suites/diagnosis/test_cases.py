@@ -40,11 +40,11 @@ def test_a_case_is_drawn_again_from_seed_kind_and_index(kind):
 def test_singles_cover_every_effect_at_both_sizes():
     drawn = {
         (case.truth[0], case.size[0])
-        for case in (draw_case("single", i, 0, plan=TINY) for i in range(0, count("single", 1), 7))
+        for case in (draw_case("single", i, 0, plan=TINY) for i in range(0, count("single", 1), 13))
     }
     expected = {(name, size) for name in EFFECTS.names() if name not in OWN_KINDS for size in SIZES}
     assert drawn <= expected
-    assert len(drawn) == len(range(0, count("single", 1), 7))
+    assert len(drawn) == len(range(0, count("single", 1), 13))
     assert count("single", 1) == len(expected)
 
 
@@ -59,7 +59,7 @@ def test_what_is_hidden_has_the_size_that_is_said():
 def test_signs_and_directions_are_drawn_both_ways():
     names = singles()
     signs = {
-        np.sign(draw_case("single", names.index("rudder_offset"), seed, plan=TINY).effects[0].q[0]) for seed in range(8)
+        np.sign(draw_case("single", names.index("rudder_offset"), seed, plan=TINY).effects[0].q[0]) for seed in range(4)
     }
     assert signs == {-1.0, 1.0}
     assert all(
@@ -147,15 +147,15 @@ def test_a_hull_as_polynomial_is_the_same_where_it_was_fitted_and_another_beyond
 
 
 def test_half_of_the_development_ships_have_a_polynomial_hull():
-    names = [draw_ship(np.random.default_rng(seed), "development", False).name for seed in range(12)]
-    assert 2 <= sum(name.endswith("polynomial") for name in names) <= 10
+    names = [draw_ship(np.random.default_rng(seed), "development", False).name for seed in range(6)]
+    assert 1 <= sum(name.endswith("polynomial") for name in names) <= 5
 
 
 def test_development_and_test_ships_come_from_other_hulls():
     for which, parents in PARENTS.items():
-        ships = [draw_ship(np.random.default_rng(seed), which, False) for seed in range(4)]
+        ships = [draw_ship(np.random.default_rng(seed), which, False) for seed in range(2)]
         assert all(ship.name.startswith(tuple(f"{parent}-" for parent in parents)) for ship in ships)
-        assert len({ship.L for ship in ships}) == 4
+        assert len({ship.L for ship in ships}) == 2
     assert not set(PARENTS["test"]) & set(PARENTS["development"])
 
 
