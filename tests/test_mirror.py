@@ -93,7 +93,7 @@ THROUGH = {
     "importing/propose/groups": "importing/propose/test_propose.py",
     "importing/propose/headless": "importing/propose/test_propose.py",
     "importing/propose/layout": "importing/propose/test_propose.py",
-    "importing/propose/partial": "importing/propose/test_propose.py",
+    "importing/propose/partial": "importing/propose/test_propose_logs.py",
     "importing/propose/proposal": "importing/propose/test_propose.py",
     "importing/propose/source": "importing/propose/test_propose.py",
     "importing/propose/stamps": "importing/propose/test_propose.py",
