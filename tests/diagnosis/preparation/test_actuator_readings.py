@@ -46,15 +46,15 @@ def test_an_error_of_the_thrusters_is_taken_out_of_both(toy):
 @pytest.mark.parametrize(
     ("worth", "told"),
     [
-        (SURE, "The motion believes the order"),
-        (-SURE, "The motion believes the record"),
-        (0.4 * SURE, "The motion does not tell which of the two is right"),
+        (SURE, "The motion agrees with the command"),
+        (-SURE, "The motion agrees with the record"),
+        (0.4 * SURE, "The motion does not show which of the two is right"),
     ],
 )
 def test_what_the_motion_says_is_told_by_its_evidence(worth: float, told: str):
     (line,) = said([error(worth=worth)])
     assert told in line
-    assert f"it is taken as {'ordered' if worth == SURE else 'recorded'}" in line
+    assert f"it is taken as {'commanded' if worth == SURE else 'recorded'}" in line
     assert "they differ by 10% (root mean square)" in line
 
 
