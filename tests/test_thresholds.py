@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 
 import pytest
 from markdown.extensions.toc import slugify
 
+from shipbench.checking.reading import read_recording
 from shipbench.checking.thresholds import THRESHOLDS as CHECKING
 from shipbench.diagnosis.thresholds import THRESHOLDS
 from shipbench.importing.thresholds import THRESHOLDS as IMPORTING
+from shipbench.suites.checks.clean_sets import base_set
+from shipbench.suites.checks.faults import FAULTS
+from shipbench.suites.checks.suite import write_planted
 from shipbench.thresholds import Thresholds
 
 ROOT = Path(__file__).parents[1]
@@ -19,6 +24,8 @@ ANCHORS = {
     if line.startswith("#")
 }
 TABLES = {"checking": CHECKING, "diagnosis": THRESHOLDS, "importing": IMPORTING}
+MOST = {"checking": 50, "diagnosis": 80}
+"""Rows of a table at most: a new number takes the place of another one, or is one that stands already."""
 
 
 @pytest.mark.parametrize("package", TABLES)
@@ -36,9 +43,24 @@ def test_every_number_is_used(package: str) -> None:
     assert not [name for name in TABLES[package].rows if f'("{name}")' not in code]
 
 
-def test_the_diagnosis_decides_by_few_numbers() -> None:
-    """A new number takes the place of another one, or is one that stands already: same question, same number."""
-    assert len(THRESHOLDS.rows) <= 80
+@pytest.mark.parametrize("package", MOST)
+def test_few_numbers_decide(package: str) -> None:
+    assert len(TABLES[package].rows) <= MOST[package]
+
+
+@pytest.mark.long
+def test_halving_and_doubling_a_number_shows_which_findings_it_decides(tmp_path: Path) -> None:
+    path = ROOT / "benchmarks" / "threshold_effects.py"
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    number = next(i for i, fault in enumerate(FAULTS) if fault.name == "yaw rate late")
+    folder = write_planted(base_set("container130", script.SEED), FAULTS[number], script.SEED, tmp_path / "set")
+    found = script.effects(("late", number, read_recording(str(folder))[0]), ["most", "chance", "wind_change"])
+    assert found["most", 0.5] == (1, 0, "late: +[] -[('lag', ('r',))]")
+    assert [found["chance", factor][0] for factor in script.FACTORS] == [0, 0]
+    assert ("wind_change", 0.5) not in found  # no wind is recorded
+    assert CHECKING.value("most") == script.ROWS["most"].value
 
 
 def test_a_count_is_whole() -> None:

@@ -100,7 +100,7 @@ def _sudden(recording: Recording, channel: int) -> tuple[int, float]:
     values = np.concatenate([run.states[:, channel] for run in recording.runs])
     reach = float(np.ptp(np.quantile(values, [0.001, 0.999])))
     sweep = THRESHOLDS.value("sudden_sweep") * recording.froude
-    least = reach * max(THRESHOLDS.value("sudden_step"), recording.dt / sweep)
+    least = reach * max(THRESHOLDS.value("large_share"), recording.dt / sweep)
     if reach <= 0.0 or least > reach:
         return 0, 0.0
     steps = [0.0]

@@ -31,7 +31,7 @@ def set_back(run: Run, k: int, leap: complex, turned: float) -> float | None:
     the motion; else None."""
     way, rate, _ = _motion(run.states[max(0, k - 3) : k + 1], run.states[k + 1 : k + 5])
     seconds = float(np.real(leap * np.conj(way)) / max(abs(way) ** 2, 1e-12))
-    share = THRESHOLDS.value("clock_step_misfit")
+    share = THRESHOLDS.value("little")
     explained = abs(leap - seconds * way) < share * abs(leap) and abs(turned - seconds * rate) < share * abs(turned)
     return seconds if explained and abs(seconds) >= THRESHOLDS.value("clock_step") else None
 
@@ -102,7 +102,8 @@ def _ahead(before: np.ndarray, after: np.ndarray, gap: float, recording: Recordi
     seconds = float(np.real(moved * np.conj(way)) / max(abs(way) ** 2, 1e-12))
     turned = float(np.remainder(after[0, PSI] - before[-1, PSI] + np.pi, 2.0 * np.pi) - np.pi)
     early, beside = gap - seconds, abs(moved - seconds * way)
-    doubt = (0.5 * change * gap + beside + 0.01 * recording.dataset.ship.L) / max(abs(way), 1e-12)
+    least = THRESHOLDS.value("least_distance") * recording.dataset.ship.L
+    doubt = (0.5 * change * gap + beside + least) / max(abs(way), 1e-12)
     alike = abs(turned - rate * seconds) <= abs(turned - rate * gap) or abs(rate * gap) < 0.01
     long = early >= THRESHOLDS.value("clock_step") and early > 2.0 * doubt
     return early if long and seconds > 0.0 and alike else None

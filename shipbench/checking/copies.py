@@ -228,7 +228,7 @@ def _noise(recording: Recording) -> np.ndarray:
     second = np.concatenate(
         [run.states[2:] - 2.0 * run.states[1:-1] + run.states[:-2] for run in recording.runs if len(run) >= 4]
     )
-    own = 6.0 * np.array(
+    own = THRESHOLDS.value("beyond_noise") * np.array(
         [np.hypot(spread(second[:, X]), spread(second[:, Y])), *(spread(second[:, c]) for c in (PSI, U, V, R))]
     )
     step, turn = recording.speed * recording.dt, recording.turning * recording.dt

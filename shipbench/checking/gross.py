@@ -114,18 +114,18 @@ class _Misfit:
 def _misfit(recording: Recording, dataset: Dataset) -> _Misfit | None:
     """Misfit of the track to heading and speeds, with a free scale; None where the ship hardly moves."""
     dt = recording.dt
-    width = max(3, round(THRESHOLDS.value("track_window") * recording.froude / dt))
+    width = max(3, round(THRESHOLDS.value("window") * recording.froude / dt))
     pieces = [run.states[a : a + width + 1] for run in dataset.runs for a in range(0, len(run) - width, width)]
     if len(pieces) < THRESHOLDS.count("windows"):
         return None
     S = np.stack(pieces)
     made = S[:, -1, X] - S[:, 0, X] + 1j * (S[:, -1, Y] - S[:, 0, Y])
     said = np.asarray(np.trapezoid((S[..., U] + 1j * S[..., V]) * np.exp(1j * S[..., PSI]), dx=dt, axis=1))
-    if np.mean(np.abs(made) ** 2) < (0.02 * recording.dataset.ship.L) ** 2:
+    if np.mean(np.abs(made) ** 2) < (THRESHOLDS.value("least_distance") * recording.dataset.ship.L) ** 2:
         return None
     scale = float(np.real(np.vdot(said, made)) / max(np.real(np.vdot(said, said)), 1e-300))
     keep = np.abs(made - scale * said)
-    keep = keep <= 6.0 * np.median(keep) + 1e-12
+    keep = keep <= THRESHOLDS.value("beyond_noise") * np.median(keep) + 1e-12
     share = float(np.sqrt(np.sum(np.abs(made - scale * said)[keep] ** 2) / np.sum(np.abs(made[keep]) ** 2)))
     return _Misfit(share if scale > 0.0 else 1.0, scale, said, made)
 
@@ -163,9 +163,8 @@ def _best_reading(
     for reading in READINGS:
         dataset = _changed(recording.dataset, reading.change)
         left = _misfit(recording, dataset)
-        if left is None or left.track > THRESHOLDS.value("reading_misfit"):
-            continue
-        if THRESHOLDS.value("reading_gain") * left.track**2 > plain.track**2:
+        little = THRESHOLDS.value("little")
+        if left is None or left.track > little or left.track**2 > little * plain.track**2:
             continue
         further = check_units(dataset)
         options.append((1 + len(_errors(further)), left.track, reading, dataset, left))

@@ -44,7 +44,7 @@ def _held(recording: Recording, channel: int) -> int:
     for run in recording.runs:
         moved = _moved(run, recording.dt)[channel]
         holds = stretches(np.diff(run.states[:, channel]) == 0.0)
-        lengths += [b - a + 1 for a, b in holds if abs(moved[b] - moved[a]) > 2.0 * digit]
+        lengths += [b - a + 1 for a, b in holds if abs(moved[b] - moved[a]) > THRESHOLDS.value("hidden_steps") * digit]
         values += int(np.sum(np.diff(run.states[:, channel]) != 0.0))
     return round(float(np.median(lengths))) if len(lengths) > max(0.5 * values, THRESHOLDS.count("occurrences")) else 0
 

@@ -30,20 +30,19 @@ class _Pair:
     """Cause and effect. columns: (states (T, 10), inputs, shift) -> effect (T,) and causes [(T,), ...], where shift
     moves a channel in time.
 
-    late, early: smallest lag of the cause, or lead, that is reported [s at 130 m], and the log likelihood that it must
-    gain. agreed: the gain that a lag needs where the actuator also lags its command. Noise in the motion and unrecorded
-    forces make the rudder seem late, never early; early None: a lead is confounded with the dead time of the actuator.
+    lag: least lag of the cause that is reported [s at 130 m]. gain: log likelihood that it must gain, unless the
+    actuator lags its command, too. Noise in the motion and unrecorded forces make the rudder seem late, never early.
     of: the state of the effect. order: the cause is a command, which is held until the next sample, and windows that it
-    does not explain count; else these are left out.
+    does not explain count; else these are left out. A lead of a command is confounded with the dead time of the
+    actuator.
     """
 
     cause: str
     effect: str
     of: str
     columns: _Columns
-    late: tuple[float, float]
-    agreed: float
-    early: tuple[float, float] | None
+    lag: float
+    gain: float
     order: bool
 
 
@@ -81,17 +80,24 @@ def _gear(actuator: int) -> _Columns:
     return columns
 
 
-_RUDDER_LAG = (THRESHOLDS.value("rudder_lag"), THRESHOLDS.value("rudder_lag_gain"))
-_RUDDER_LEAD = (THRESHOLDS.value("motion_lag_rudder"), THRESHOLDS.value("motion_lag_rudder_gain"))
-_SHAFT_LAG = (THRESHOLDS.value("shaft_lag"), THRESHOLDS.value("shaft_lag_gain"))
-_SHAFT_LEAD = (THRESHOLDS.value("motion_lag_shaft"), THRESHOLDS.value("motion_lag_shaft_gain"))
-_ORDER_LAG = (THRESHOLDS.value("order_lag"), THRESHOLDS.value("order_lag_gain"))
-_PAIRS = (
-    _Pair("delta", "yaw rate", "r", _yaw, _RUDDER_LAG, THRESHOLDS.value("rudder_lag_gain_agreed"), _RUDDER_LEAD, False),
-    _Pair("n", "surge", "u", _surge, _SHAFT_LAG, THRESHOLDS.value("shaft_lag_gain_agreed"), _SHAFT_LEAD, False),
-    _Pair("delta_c", "rudder", "delta", _gear(DELTA), _ORDER_LAG, _ORDER_LAG[1], None, True),
-    _Pair("n_c", "shaft", "n", _gear(N), _ORDER_LAG, _ORDER_LAG[1], None, True),
-)
+def _pairs() -> tuple[_Pair, ...]:
+    """All pairs, with what is asked of each."""
+    lag, order_lag, gain = THRESHOLDS.value("actuator_lag"), THRESHOLDS.value("order_lag"), _gain()
+    return (
+        _Pair("delta", "yaw rate", "r", _yaw, lag, THRESHOLDS.value("rudder_lag_gain"), False),
+        _Pair("n", "surge", "u", _surge, lag, gain, False),
+        _Pair("delta_c", "rudder", "delta", _gear(DELTA), order_lag, gain, True),
+        _Pair("n_c", "shaft", "n", _gear(N), order_lag, gain, True),
+    )
+
+
+def _gain() -> float:
+    """Log likelihood that every explanation has to gain."""
+    return 0.5 * THRESHOLDS.value("explanation_gain")
+
+
+_STEP = 0.5
+"""Step between the lags that are tried [s at 130 m]."""
 
 
 @dataclass(frozen=True)
@@ -120,17 +126,17 @@ class _Search:
 
 def _search(recording: Recording, pair: _Pair) -> _Search | None:
     """Search over lags of one pair; None where there are too few windows."""
-    times = THRESHOLDS.value("lag_interval"), THRESHOLDS.value("lag_mean")
+    times = THRESHOLDS.value("response_time"), THRESHOLDS.value("averaging_time")
     ahead, edge = (max(1, round(seconds * recording.froude / recording.dt)) for seconds in times)
-    half = round(THRESHOLDS.value("longest_lag") / THRESHOLDS.value("lag_step"))
-    lags = np.arange(-half, half + 1) * THRESHOLDS.value("lag_step") * recording.froude
+    half = round(THRESHOLDS.value("longest_lag") / _STEP)
+    lags = np.arange(-half, half + 1) * _STEP * recording.froude
     margin = int(np.ceil(lags[-1] / recording.dt))
     lengths = np.array([len(run) for run in recording.runs])
     ends = np.cumsum(lengths)
     windows = np.concatenate(
         [np.arange(b - n + margin, b - margin - ahead - edge + 1, ahead) for n, b in zip(lengths, ends, strict=True)]
     )
-    if len(windows) < THRESHOLDS.count("lag_windows"):
+    if len(windows) < THRESHOLDS.count("regression_windows"):
         return None
     S, orders = (
         np.concatenate([run.states for run in recording.runs]),
@@ -175,11 +181,10 @@ def check(recording: Recording) -> list[Finding]:
     if recording.dataset.actuators != "measured" or command_like(recording):
         return []
     missing = standing(recording.dataset)
-    made = {pair.cause for pair in _PAIRS if pair.of in recording.dataset.derived}
-    asked = [pair for pair in _PAIRS if pair.cause in recording.recorded - made and (pair.order or not missing)]
+    made = {pair.cause for pair in _pairs() if pair.of in recording.dataset.derived}
+    asked = [pair for pair in _pairs() if pair.cause in recording.recorded - made and (pair.order or not missing)]
     searches = {pair.cause: _search(recording, pair) for pair in asked}
-    least = THRESHOLDS.value("agreed_lag_gain")
-    waits = {cause: -float(s.lags[s.best]) for cause, s in searches.items() if s is not None and s.gain >= least}
+    waits = {cause: -float(s.lags[s.best]) for cause, s in searches.items() if s is not None and s.gain >= _gain()}
     found = [
         f for pair in asked
         if (s := searches[pair.cause]) is not None and (f := _judge(recording, pair, s,
@@ -194,17 +199,17 @@ def _judge(recording: Recording, pair: _Pair, found: _Search, waits: float) -> F
 
     None where the best lag is the last one searched: unrecorded forces do that.
     """
-    lag, late_gain = float(found.lags[found.best]), pair.late[1]
+    lag, gain = float(found.lags[found.best]), pair.gain
     at_130 = lag / recording.froude
     if found.best in (0, len(found.lags) - 1):
         return None
-    if at_130 >= pair.late[0] and waits >= THRESHOLDS.value("agreed_lag") * recording.froude:
-        lag, late_gain = min(lag, waits), pair.agreed
-    if at_130 >= pair.late[0] and found.gain >= late_gain:
+    if at_130 >= pair.lag and waits >= THRESHOLDS.value("order_lag") * recording.froude:
+        lag, gain = min(lag, waits), _gain()
+    if at_130 >= pair.lag and found.gain >= gain:
         line = {pair.cause: lag}
         said = f"{pair.cause} is recorded about {lag:.2g} s late: the {pair.effect} responds before it"
         todo = "" if not pair.order else "Commands are moved by whole samples."
-    elif pair.early is not None and at_130 <= -pair.early[0] and found.gain >= pair.early[1]:
+    elif not pair.order and at_130 <= -pair.lag and found.gain >= _gain():
         line = dict.fromkeys(_MOTION, -lag)
         said = f"the motion is recorded about {-lag:.2g} s late against {pair.cause}: no hull responds so late"
         todo = f"If the clock of {pair.cause} is wrong instead, write [delay] {pair.cause} = {lag:.3g}."

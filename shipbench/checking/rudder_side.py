@@ -25,13 +25,12 @@ class Side:
 def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
     """Side to which the ship turns under a rudder, ahead and without thrusters.
 
-    It must show in turns by a clear angle, which no gust makes against the rudder, and just after the rudder: r(t +
-    6 s) - r(t) against delta(t), given r(t). On a straight course the rudder responds to the motion, which alone would
-    mislead. unit: of the recorded yaw rate, over rad/s.
+    It must show in clear turns and just after the rudder: r(t + 8 s) - r(t) against delta(t), given r(t). On a straight
+    course the rudder responds to the motion, which alone would mislead. unit: of the recorded yaw rate, over rad/s.
     """
     froude = (dataset.ship.L / 130.0) ** 0.5
-    times = THRESHOLDS.value("rudder_answer"), THRESHOLDS.value("side_turn_time"), THRESHOLDS.value("side_turn_delay")
-    ahead, width, lag = (max(1, round(seconds * froude / dataset.dt)) for seconds in times)
+    times = THRESHOLDS.value("response_time"), THRESHOLDS.value("window")
+    ahead, width = (max(1, round(seconds * froude / dataset.dt)) for seconds in times)
     rows, turns = [], []
     for S in (run.states for run in runs):
         idle = (
@@ -42,23 +41,26 @@ def rudder_side(dataset: Dataset, runs: Sequence[Run], unit: float) -> Side:
             if len(at):
                 block = np.stack([S[at + ahead, R] - S[at, R], S[at, R], S[at, DELTA]], axis=-1)
                 rows.append(block - block.mean(axis=0))
-            at = np.arange(a + lag, b - width, max(1, width // 2))
+            at = np.arange(a + ahead, b - width, max(1, width // 2))
             turned, helm = (np.concatenate([[0.0], np.cumsum(S[:, channel])]) for channel in (R, DELTA))
             turns.append(
                 np.stack(
-                    [(turned[at + width] - turned[at]) * dataset.dt, (helm[at + width - lag] - helm[at - lag]) / width],
+                    [
+                        (turned[at + width] - turned[at]) * dataset.dt,
+                        (helm[at + width - ahead] - helm[at - ahead]) / width,
+                    ],
                     axis=-1,
                 )
             )
     turn, helm = np.concatenate(turns).T if turns else np.zeros((2, 0))
-    clear = np.abs(turn) > np.deg2rad(THRESHOLDS.value("side_turn")) * unit
+    clear = np.abs(turn) > np.deg2rad(THRESHOLDS.value("least_turn")) * unit
     turn, helm = turn[clear], helm[clear]
     if len(turn) < THRESHOLDS.count("occurrences") or not np.any(helm):
         return Side()
     likeness = float(turn @ helm / np.sqrt((turn @ turn) * (helm @ helm)))
     slope, sd = _slopes(np.concatenate(rows))
     sign = float(np.sign(likeness))
-    if abs(likeness) < THRESHOLDS.value("side_correlation") or slope[0] * sign < THRESHOLDS.value("side_slope") * sd:
+    if abs(likeness) < THRESHOLDS.value("most") or slope[0] * sign < THRESHOLDS.value("beyond_noise") * sd:
         return Side()
     against = int(np.sum(turn * helm < 0.0))
     text = (

@@ -30,14 +30,15 @@ def _moving(recording: Recording, run: Run, channels: Sequence[int]) -> np.ndarr
         if X not in channels
         else np.hypot(S[1:, U], S[1:, V])
     )
-    wide = max(3, round(2.0 * recording.froude / recording.dt)) | 1
+    wide = max(3, round(THRESHOLDS.value("averaging_time") * recording.froude / recording.dt)) | 1
     way = _averaged(way, wide)
-    ahead = way > 0.2 * recording.speed
+    large = THRESHOLDS.value("large_share")
+    ahead = way > large * recording.speed
     if PSI in channels or V in channels:  # on a straight course v is zero to the last bit where there is no noise
-        ahead &= np.abs(S[1:, R]) > 0.2 * recording.turning
+        ahead &= np.abs(S[1:, R]) > large * recording.turning
     if R in channels:
         rate = _averaged(np.diff(S[:, PSI]) / recording.dt, wide)
-        ahead &= np.abs(rate) > 0.2 * recording.turning
+        ahead &= np.abs(rate) > large * recording.turning
     return ahead
 
 
@@ -62,7 +63,7 @@ def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[F
     steps = sum(int(m.sum()) for m in moving)
     if not steps:
         return []
-    needed = _needed(recording, THRESHOLDS.value("frozen_time"))
+    needed = _needed(recording, THRESHOLDS.value("standstill_time"))
     still = [_standstills(r, m, needed) for r, m in zip(repeats, moving, strict=True)]
     single, shares = 0, {}
     for run, r, m, stops in zip(recording.runs, repeats, moving, still, strict=True):
@@ -73,7 +74,7 @@ def _channel(recording: Recording, name: str, channels: Sequence[int]) -> list[F
         if m.sum() >= 20:
             shares[recording.name_of(run)] = float(alone.sum() / m.sum())
     usual = single / steps
-    rare = np.log(THRESHOLDS.value("repeats_by_chance"))
+    rare = np.log(THRESHOLDS.value("chance"))
     allowed = max(needed, int(np.ceil(rare / np.log(usual))) if 0.0 < usual < 1.0 else 0)
     frozen = {
         run.id: [(a, b) for a, b in stops if b - a >= allowed and _visible(recording, run, channels, a, b)]
@@ -104,13 +105,14 @@ def _needed(recording: Recording, seconds: float) -> int:
 
 def _standstills(repeated: np.ndarray, moving: np.ndarray, needed: int) -> list[tuple[int, int]]:
     """Standstills of at least `needed` repeats, most of them while the ship moves."""
-    return [(a, b) for a, b in stretches(repeated) if b - a >= needed and np.mean(moving[a:b]) > 0.7]
+    most = THRESHOLDS.value("most")
+    return [(a, b) for a, b in stretches(repeated) if b - a >= needed and np.mean(moving[a:b]) > most]
 
 
 def _visible(recording: Recording, run: Run, channels: Sequence[int], a: int, b: int) -> bool:
     """Whether the motion from sample a to b, by the other channels, exceeds the resolution of the record."""
     S, dt, step = run.states, recording.dt, float(np.max(recording.steps[list(channels)]))
-    hides, sure = THRESHOLDS.value("hidden_steps"), THRESHOLDS.value("hidden_noise")
+    hides, sure = THRESHOLDS.value("hidden_steps"), THRESHOLDS.value("beyond_noise")
     if X in channels:
         return float(np.sum(np.hypot(S[a:b, U], S[a:b, V])) * dt) > hides * step
     if PSI in channels:
@@ -177,11 +179,11 @@ def _stuck(recording: Recording, channel: int) -> list[Finding]:
     """Find an actuator that keeps one value while its command is far from it, or while noise would move its record."""
     values = np.concatenate([run.states[:, channel] for run in recording.runs])
     reach = float(np.ptp(values))
-    needed = _needed(recording, THRESHOLDS.value("stuck_time"))
+    needed = _needed(recording, THRESHOLDS.value("standstill_time"))
     noisy = _noisy(recording, channel)
     stops: dict[str, list[tuple[int, int]]] = {}
     for run in recording.runs if reach > 0.0 else ():
-        far = np.abs(run.inputs[:-1, channel - N] - run.states[1:, channel]) > 0.2 * reach
+        far = np.abs(run.inputs[:-1, channel - N] - run.states[1:, channel]) > THRESHOLDS.value("large_share") * reach
         stops[run.id] = [(a, b) for a, b in stretches(_equal(run, (channel,)) & (far | noisy)) if b - a >= needed]
     return _frozen(recording, STATES[channel], (channel,), stops)
 
@@ -191,7 +193,7 @@ def _noisy(recording: Recording, channel: int) -> bool:
     steps = [np.diff(run.states[:, channel]) for run in recording.runs]
     back = np.concatenate([s[1:] * s[:-1] < 0.0 for s in steps])
     repeats = np.mean(np.concatenate(steps) == 0.0)
-    rarely, often = THRESHOLDS.value("noisy_repeats"), THRESHOLDS.value("noisy_reversals")
+    rarely, often = THRESHOLDS.value("least_share"), THRESHOLDS.value("noisy_reversals")
     return bool(repeats < rarely and len(back) and np.mean(back) > often)
 
 

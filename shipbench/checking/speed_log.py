@@ -37,22 +37,22 @@ class Dropout:
 def dropout(dataset: Dataset) -> Dropout | None:
     """Speed-log dropout: u and v read nothing though the ship makes way; None where there is none."""
     L, dt = dataset.ship.L, dataset.dt
-    limits = THRESHOLDS.value("silent_shortest"), THRESHOLDS.value("silent_longest")
+    limits = THRESHOLDS.value("short_window"), THRESHOLDS.value("silent_longest")
     shortest, longest = (max(round(seconds * (L / 130.0) ** 0.5 / dt), 5) for seconds in limits)
     runs = [run for run in dataset.runs if len(run) >= shortest]
     if not runs:
         return None
     noise = {c: float(np.median([white_noise(run.states[:, c]) for run in runs])) for c in (X, Y, U, V)}
-    noises, speed = THRESHOLDS.value("silent_noise"), THRESHOLDS.value("silent_speed") * (9.81 * L) ** 0.5
+    noises, speed = THRESHOLDS.value("beyond_noise"), THRESHOLDS.value("speed_at_rest") * (9.81 * L) ** 0.5
     u, v = (max(noises * noise[c], speed) for c in (U, V))
-    least = max(THRESHOLDS.value("silent_departure") * L, noises * noise[X], noises * noise[Y])
+    least = max(THRESHOLDS.value("least_distance") * L, noises * noise[X], noises * noise[Y])
     found, samples = [], 0
     for run in runs:
         for begin, end in stretches((np.abs(run.states[:, U]) < u) & (np.abs(run.states[:, V]) < v)):
             for a in range(begin, end, longest):
                 S = run.states[a : min(a + longest, end)]
                 departure, left = _departures(S, dt) if len(S) >= shortest else (0.0, 0.0)
-                if departure > least and left > THRESHOLDS.value("silent_unexplained") * departure:
+                if departure > least and left > THRESHOLDS.value("most") * departure:
                     found.append((departure, len(S) * dt, run))
                     samples += len(S)
     if len(found) < THRESHOLDS.count("silent_pieces"):

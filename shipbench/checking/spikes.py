@@ -40,12 +40,12 @@ def _least(recording: Recording, channel: int, values: list[np.ndarray]) -> floa
     """Size of the smallest outlier: more than one step of a quantised record, which may alternate between two of
     them."""
     if channel in (X, Y):
-        own = THRESHOLDS.value("outlier_position") * recording.dataset.ship.L
+        own = THRESHOLDS.value("least_distance") * recording.dataset.ship.L
     elif channel == PSI:
-        own = THRESHOLDS.value("outlier_heading")
+        own = float(np.deg2rad(THRESHOLDS.value("least_angle")))
     else:
         reach = float(np.ptp(np.concatenate([np.quantile(v, [0.02, 0.98]) for v in values])))
-        own = THRESHOLDS.value("outlier_share") * reach
+        own = THRESHOLDS.value("least_share") * reach
     return max(own, 1.5 * float(recording.steps[channel]))
 
 
@@ -74,7 +74,7 @@ def find_spikes(recording: Recording) -> dict[int, dict[str, np.ndarray]]:
                 np.maximum(d[:-3], d[3:]), np.abs(v[3:-1] - v[1:-3])
             )  # neighbours among themselves, without the sample
             off = np.abs(_off(v))
-            at = np.flatnonzero((off > limit) & (off > THRESHOLDS.value("outlier_ratio") * near)) + 2
+            at = np.flatnonzero((off > limit) & (off > THRESHOLDS.value("beyond_noise") * near)) + 2
             at = at[~_held(states[name], channel)[at]]
             if len(at):
                 found.setdefault(channel, {})[name] = at
@@ -174,7 +174,7 @@ def _places(recording: Recording, channels: tuple[int, ...], levels: dict[str, n
     """Last samples before the jumps of position or heading, by run id."""
     steps = np.concatenate([np.diff(v) for v in levels.values()])
     noise = float(np.hypot(spread(steps.real), spread(steps.imag)))
-    limit = max(THRESHOLDS.value("jump_size") * noise, 2.0 * _least(recording, channels[0], []))
+    limit = max(THRESHOLDS.value("outlier_size") * noise, 2.0 * _least(recording, channels[0], []))
     made = {"u", "v"} if X in channels else {"r"}
     found = {}
     for run in recording.runs:

@@ -27,12 +27,12 @@ def standing(dataset: Dataset) -> dict[str, _Shown]:
 
 def _turned(dataset: Dataset) -> _Shown | None:
     delta = np.concatenate([run.states[:, DELTA] for run in dataset.runs])
-    if np.ptp(delta) > np.deg2rad(THRESHOLDS.value("still_rudder")):
+    if np.ptp(delta) > np.deg2rad(THRESHOLDS.value("least_angle")):
         return None
     turns = np.array([np.sum(part[:-1, R]) * dataset.dt for part in _windows(dataset)])
-    least = THRESHOLDS.value("still_turn")
+    least = THRESHOLDS.value("least_turn")
     hard, angle = turns[np.abs(turns) > np.deg2rad(least)], float(np.median(delta))
-    held = abs(angle) > np.deg2rad(THRESHOLDS.value("still_midships")) and abs(np.sum(np.sign(hard))) == len(hard)
+    held = abs(angle) > np.deg2rad(THRESHOLDS.value("least_turn")) and abs(np.sum(np.sign(hard))) == len(hard)
     if held or len(hard) < _fewest(len(turns)):
         return None
     text = (
@@ -51,7 +51,7 @@ def _driven(dataset: Dataset) -> _Shown | None:
     way = ends[:, 0] * seconds
     stopping = THRESHOLDS.value("stopping_length") * dataset.ship.L
     lost, expected = ends[:, 0] - ends[:, 1], ends[:, 0] * way / (way + stopping)
-    driven = lost < THRESHOLDS.value("driven_loss") * expected
+    driven = lost < THRESHOLDS.value("little") * expected
     if np.sum(driven) < _fewest(len(ends)):
         return None
     speed, loss, least = float(np.mean(ends[driven, 0])), float(np.mean(lost[driven])), float(np.mean(expected[driven]))
@@ -65,11 +65,11 @@ def _driven(dataset: Dataset) -> _Shown | None:
 
 def _fewest(windows: int) -> float:
     """Least number of windows that show the fault."""
-    return max(THRESHOLDS.count("occurrences"), THRESHOLDS.value("still_share") * windows)
+    return max(THRESHOLDS.count("occurrences"), THRESHOLDS.value("large_share") * windows)
 
 
 def _seconds(dataset: Dataset) -> float:
-    return float(THRESHOLDS.value("still_window") * (dataset.ship.L / 130.0) ** 0.5)
+    return float(THRESHOLDS.value("window") * (dataset.ship.L / 130.0) ** 0.5)
 
 
 def _windows(dataset: Dataset) -> Iterator[np.ndarray]:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .thresholds import THRESHOLDS
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -40,10 +42,10 @@ def clustered_fit(y: np.ndarray, X: np.ndarray, cluster: np.ndarray) -> Fit:
     return Fit(value, sd, 2.0 * student.sf(np.abs(value) / sd, max(count - 1, 1)), float(left @ left), len(y))
 
 
-def clusters(run: np.ndarray, fewest: int = 12) -> np.ndarray:
-    """Cluster of each row: its run, or a stretch of its run where there are fewer than `fewest` runs. run (T,): index
+def clusters(run: np.ndarray) -> np.ndarray:
+    """Cluster of each row: its run, or a stretch of its run where there are fewer runs than `windows`. run (T,): index
     of the run, ascending."""
-    found = np.unique(run)
+    found, fewest = np.unique(run), THRESHOLDS.count("windows")
     if len(found) >= fewest:
         return run
     pieces = -(-fewest // max(len(found), 1))
@@ -65,12 +67,12 @@ def stretches(flags: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
 
 
-def inliers(residual: np.ndarray, groups: int = 1, limit: float = 6.0) -> np.ndarray:
+def inliers(residual: np.ndarray, groups: int = 1) -> np.ndarray:
     """Mask of rows (T,) whose residual lies within `limit` robust standard deviations; with `groups` of 2, equations (2
     T/2) of one window go together."""
     size = np.sqrt(np.sum(residual.reshape(groups, -1) ** 2, axis=0))
     typical = float(np.median(size))
-    return np.tile(size <= limit * max(typical, 1e-12), groups)
+    return np.tile(size <= THRESHOLDS.value("beyond_noise") * max(typical, 1e-12), groups)
 
 
 def times(number: int, runs: int) -> str:

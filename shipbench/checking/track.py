@@ -62,7 +62,7 @@ def shifted(recording: Recording, late: dict[int, float]) -> list[tuple[int, np.
 
 def windows(recording: Recording, late: dict[int, float]) -> Windows | None:
     """Windows of the data set, each half over the next, or None where there are fewer than 12."""
-    width = max(3, round(THRESHOLDS.value("track_window") * recording.froude / recording.dt))
+    width = max(3, round(THRESHOLDS.value("window") * recording.froude / recording.dt))
     pieces = [
         (i, S[a : a + width + 1]) for i, S in shifted(recording, late) for a in range(0, len(S) - width, width // 2)
     ]
@@ -122,7 +122,8 @@ def explain(recording: Recording) -> Explained | None:
     """Explanations of the track beside heading and speeds; None where the ship hardly moves or records are short."""
     late: dict[int, float] = {}
     w = plain = windows(recording, late)
-    if w is None or plain is None or np.sqrt(np.mean(np.abs(w.moved) ** 2)) < 0.02 * recording.dataset.ship.L:
+    least = THRESHOLDS.value("least_distance") * recording.dataset.ship.L
+    if w is None or plain is None or np.sqrt(np.mean(np.abs(w.moved) ** 2)) < least:
         return None
     first = chosen = explain_windows(w, recording.turned)
     for _ in range(
@@ -174,13 +175,13 @@ def lags(recording: Recording) -> tuple[tuple[float, float], tuple[float, float]
 
 def keeps_time(recording: Recording) -> bool:
     """Whether the track shows that neither the velocities nor the position lag the other."""
-    found, least = lags(recording), THRESHOLDS.value("no_lag") * recording.froude
+    found, least = lags(recording), THRESHOLDS.value("least_lag") * recording.froude
     return found is not None and all(may_be_none(f) and abs(f[0]) + 2.0 * f[1] < least for f in found)
 
 
 def may_be_none(lag: tuple[float, float]) -> bool:
     """Whether a lag is zero within its standard error."""
-    return abs(lag[0]) < THRESHOLDS.value("lag_doubt") * lag[1]
+    return abs(lag[0]) < THRESHOLDS.value("within_error") * lag[1]
 
 
 def through_water(recording: Recording) -> tuple[float, float] | None:
@@ -190,8 +191,8 @@ def through_water(recording: Recording) -> tuple[float, float] | None:
     if found is None or "through water" not in found.chosen.names:
         return None
     (north, east), sd = found.chosen.value["through water"], found.chosen.sd["through water"]
-    doubt = THRESHOLDS.value("current_doubt") * float(np.hypot(*sd))
-    sure = max(THRESHOLDS.value("least_current") * recording.speed, doubt)
+    doubt = THRESHOLDS.value("beyond_noise") * float(np.hypot(*sd))
+    sure = max(THRESHOLDS.value("least_share") * recording.speed, doubt)
     return (float(north), float(east)) if np.hypot(north, east) > sure else None
 
 

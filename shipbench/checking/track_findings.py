@@ -20,7 +20,7 @@ def check(recording: Recording) -> list[Finding]:
     x = None if {"u", "v"} & set(recording.dataset.derived) else explain(recording)
     if x is None:
         return []
-    most = THRESHOLDS.value("unexplained")
+    most = THRESHOLDS.value("most")
     others = [name for name in x.chosen.names if name not in LAGS and x.chosen.held[name] < most]
     found = [f for name in others for f in _finding(recording, x.corrected, x.chosen, name)]
     return _lag_findings(recording, x) + found
@@ -36,7 +36,7 @@ def _possible_lag(recording: Recording, x: Explained, name: str) -> bool:
     kept = [n for n in x.chosen.names if n not in LAGS]
     if without is None:
         return False
-    return x.chosen.out < THRESHOLDS.value("unexplained") * explain_windows(without, recording.turned, kept).out
+    return x.chosen.out < THRESHOLDS.value("most") * explain_windows(without, recording.turned, kept).out
 
 
 def _lag_findings(recording: Recording, x: Explained) -> list[Finding]:
@@ -89,7 +89,7 @@ def _finding(recording: Recording, w: Windows, chosen: Chosen, name: str) -> lis
         return _through_water(recording, w, chosen, shares, evidence)
     if name == "off midship":
         ahead, abeam = map(float, value)
-        if np.hypot(ahead, abeam) < THRESHOLDS.value("least_antenna") * recording.dataset.ship.L:
+        if np.hypot(ahead, abeam) < THRESHOLDS.value("least_distance") * recording.dataset.ship.L:
             return []
         text = (
             f"x, y are of a point {ahead:+.3g} m ahead (standard error {sd[0]:.2g}), {abeam:+.3g} m to starboard "
@@ -103,7 +103,7 @@ def _finding(recording: Recording, w: Windows, chosen: Chosen, name: str) -> lis
         )]  # fmt: skip
     if name == "heading reference":
         angle = float(value[0])
-        if abs(angle) < np.deg2rad(THRESHOLDS.value("least_heading")):
+        if abs(angle) < np.deg2rad(THRESHOLDS.value("least_angle")):
             return []
         text = (
             f"the heading reads {np.rad2deg(-angle):+.2f} deg (standard error {np.rad2deg(sd[0]):.2f}) off the "
@@ -128,7 +128,7 @@ def _finding(recording: Recording, w: Windows, chosen: Chosen, name: str) -> lis
         return [
             Finding("track", "error", "sign", text, line, channels=channels, evidence=figures, picture=_sway_picture(w))
         ]
-    least = THRESHOLDS.value("least_sway_scale") if name == "scale of v" else THRESHOLDS.value("least_scale")
+    least = THRESHOLDS.value("fault_scale") if name == "scale of v" else THRESHOLDS.value("least_share")
     if abs(factor - 1.0) < least:
         return []
     gross = next((unit for unit, size in LENGTHS.items() if unit != "m" and abs(factor / size - 1.0) < 0.03), None)
@@ -169,7 +169,7 @@ def _through_water(
 ) -> list[Finding]:
     north, east = chosen.value["through water"]
     speed = float(np.hypot(north, east))
-    if speed < THRESHOLDS.value("least_current") * recording.speed:
+    if speed < THRESHOLDS.value("least_share") * recording.speed:
         return []
     towards = float(np.rad2deg(np.arctan2(east, north)) % 360.0)
     left, own = w.moved - w.surge - w.sway, {}

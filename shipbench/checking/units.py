@@ -4,8 +4,8 @@ Increments over windows of some seconds are compared with integrals, never with 
 heading and speeds, heading against yaw rate. Every combination of units and signs is tried with the usual errors of
 sensors as free parameters (a scale of 15 %, a compass error, an antenna away from midship, a delay, a drift).
 
-A combination is accepted if it leaves a quarter or less of the plain reading's squares; for the small sway alone three
-quarters, if that is significant and better than no sway at all. Of combinations that explain the same (a mirrored track
+A combination is accepted if it leaves `little` of the plain reading's squares. For the small sway alone it may leave
+`most`, if that is significant and better than no sway at all. Of combinations that explain the same (a mirrored track
 with mirrored sway is a mirrored heading), that with the fewest errors is taken, the rudder's side included.
 """
 
@@ -25,6 +25,8 @@ from .thresholds import THRESHOLDS
 
 _SWAPPED = "exchanged with y"
 _REVERSED = "x and y reversed"
+_MOST_WINDOWS = 1500
+"""Greatest number of windows that are compared, for the time that they take."""
 
 
 @dataclass(frozen=True)
@@ -150,22 +152,22 @@ class _Motion:
 
     def _tracks(self, plain: _Reading) -> list[_Reading]:
         """Readings of the track that fit."""
-        gain, poor = THRESHOLDS.value("sway_gain"), THRESHOLDS.value("reading_misfit")
-        sane = {k: s for k, s in self.track.items() if k.v in (1.0, k.u) or gain * s < self.track[replace(k, v=np.inf)]}
+        most, little = THRESHOLDS.value("most"), THRESHOLDS.value("little")
+        sane = {k: s for k, s in self.track.items() if k.v in (1.0, k.u) or s < most * self.track[replace(k, v=np.inf)]}
         best, as_read = min(sane.values()), self.track[plain]
-        if as_read > THRESHOLDS.value("reading_gain") * best and best < poor:
-            return [k for k, s in sane.items() if s <= THRESHOLDS.value("similar_readings") * best]
+        if best < little * min(as_read, 1.0):
+            return [k for k, s in sane.items() if s <= THRESHOLDS.value("similar") * best]
         sway = min((k for k in sane if k == replace(plain, v=k.v)), key=lambda k: sane[k])
-        better = as_read / sane[sway]
-        sure = better > gain and 2.0 * self.windows * np.log(better) > THRESHOLDS.value("sway_evidence")
-        return [sway] if sure and sane[sway] < poor else [plain]
+        gain = 2.0 * self.windows * np.log(as_read / sane[sway])
+        sure = sane[sway] < most * as_read and gain > THRESHOLDS.value("explanation_gain")
+        return [sway] if sure and sane[sway] < little else [plain]
 
     def _headings(self) -> list[float]:
         """Readings of psi that fit, without a track."""
-        best, gain = min(self.yaw.values(), default=np.inf), THRESHOLDS.value("reading_gain")
-        if best > THRESHOLDS.value("reading_misfit") or self.yaw[1.0, 1.0] <= gain * best:
+        best, little = min(self.yaw.values(), default=np.inf), THRESHOLDS.value("little")
+        if best > little * min(self.yaw.get((1.0, 1.0), 1.0), 1.0):
             return [1.0]
-        return sorted({psi for (psi, _), s in self.yaw.items() if s <= gain * best})
+        return sorted({psi for (psi, _), s in self.yaw.items() if best > little * s})
 
     def _rates(self, psi: float) -> list[float]:
         """Readings of r that fit a reading of psi."""
@@ -173,9 +175,9 @@ class _Motion:
             return [1.0]
         here = {r: s for (p, r), s in self.yaw.items() if p == psi}
         best = min(here.values())
-        if here[1.0] <= THRESHOLDS.value("reading_gain") * best or best > THRESHOLDS.value("reading_misfit"):
+        if best > THRESHOLDS.value("little") * min(here[1.0], 1.0):
             return [1.0]
-        return [r for r, s in here.items() if s <= THRESHOLDS.value("similar_readings") * best]
+        return [r for r, s in here.items() if s <= THRESHOLDS.value("similar") * best]
 
     def findings(self, chosen: _Reading) -> list[UnitFinding]:
         """Findings under the reading chosen."""
@@ -212,11 +214,11 @@ def _motion(dataset: Dataset, runs: Sequence[Run]) -> _Motion:
     """Compare track, heading, speeds and yaw rate under all readings."""
     L, dt = dataset.ship.L, dataset.dt
     froude = (L / 130.0) ** 0.5
-    width = max(3, round(THRESHOLDS.value("unit_window") * froude / dt))
+    width = max(3, round(THRESHOLDS.value("short_window") * froude / dt))
     pieces = [run.states[a : a + width + 1] for run in runs for a in range(0, len(run) - width, width)]
     if len(pieces) < THRESHOLDS.count("windows"):
         return _Motion({}, {}, width * dt, len(pieces))
-    S = np.stack(pieces[:: max(1, -(-len(pieces) // THRESHOLDS.count("unit_windows")))])
+    S = np.stack(pieces[:: max(1, -(-len(pieces) // _MOST_WINDOWS))])
     limits = _limits(L, froude)
     moved, turned = S[:, -1, [X, Y]] - S[:, 0, [X, Y]], S[:, -1, PSI] - S[:, 0, PSI]
     track: dict[_Reading, float] = {}
@@ -224,7 +226,7 @@ def _motion(dataset: Dataset, runs: Sequence[Run]) -> _Motion:
     headings = [
         f for f in _signed("psi") if abs(f) == 1.0 or np.ptp(S[..., PSI]) > 2.0 * np.pi
     ]  # degrees: else all courses would be one
-    if whole > len(S) * (0.02 * L) ** 2:
+    if whole > len(S) * (THRESHOLDS.value("least_distance") * L) ** 2:
         floor = 2.0 * len(S) * (0.001 * L) ** 2
         for psi in headings:
             parts = _track_parts(S, psi, dt)
@@ -245,7 +247,7 @@ def _motion(dataset: Dataset, runs: Sequence[Run]) -> _Motion:
 
 def _limits(L: float, froude: float) -> np.ndarray:
     """Bounds (8,) of scale [1], heading [rad], antenna [m], delays in earth and ship axes [s], drift [m/s]."""
-    antenna, delay = THRESHOLDS.value("fault_antenna") * L, THRESHOLDS.value("fault_delay") * froude
+    antenna, delay = THRESHOLDS.value("fault_antenna") * L, THRESHOLDS.value("longest_lag") * froude
     drift = THRESHOLDS.value("fault_drift") * froude
     scale, heading = THRESHOLDS.value("fault_scale"), THRESHOLDS.value("fault_heading")
     return np.array([scale, heading, antenna, antenna, delay, delay, drift, drift])
@@ -309,7 +311,7 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
                 "delta", FACTORS["delta"]["degrees"], f"The rudder goes to {rudder:.3g}, which no rudder does in rad."
             )
         )
-    turning = S[np.abs(S[:, N]) > 0.7 * np.max(np.abs(S[:, N]))]
+    turning = S[np.abs(S[:, N]) > THRESHOLDS.value("most") * np.max(np.abs(S[:, N]))]
     diameter = ship.propeller.diameter if ship.propeller else 0.6 * ship.T
     noise = float(np.median(np.abs(np.concatenate([np.diff(run.states[:, N]) for run in runs]))))
     if len(turning) and np.median(np.abs(turning[:, N])) > 20.0 * noise:
@@ -326,7 +328,7 @@ def _actuator_units(dataset: Dataset, runs: Sequence[Run]) -> list[UnitFinding]:
     for channel in (F_B, F_S):
         push = float(np.max(np.abs(S[:, channel])))
         ordered = any(np.any(run.inputs[:, channel - N]) for run in runs)  # else it is the noise of a thruster at rest
-        used = THRESHOLDS.value("thruster_used") * greatest
+        used = THRESHOLDS.value("large_share") * greatest
         if ordered and used < push * 1e3 and push < 1.5e-3 * greatest:
             text = f"The greatest force recorded is {push:.3g}, that of the ship file {greatest:.4g} N."
             found.append(_finding(STATES[channel], FACTORS["F_b"]["kN"], text))
@@ -344,16 +346,16 @@ def _lagged(runs: Sequence[Run], i: int, lag: int) -> tuple[float, np.ndarray, n
 def _shaft_sign(runs: Sequence[Run], dt: float, froude: float, ahead: float) -> list[UnitFinding]:
     """Find a reversed sign of the shaft speed: the ship keeps her speed against the record, and hardly ever with it.
     ahead: sign of the recorded u."""
-    width = max(1, round(THRESHOLDS.value("keeping_time") * froude / dt))
+    width = max(1, round(THRESHOLDS.value("window") * froude / dt))
     pieces = [run.states[a : a + width + 1] for run in runs for a in range(0, len(run) - width, width)]
     if not pieces:
         return []
     n, u = (np.stack(pieces)[..., channel] for channel in (N, U))
-    keeps = np.abs(u[:, -1]) > THRESHOLDS.value("keeping_share") * np.abs(u[:, 0])
-    keeps &= (np.abs(u[:, 0]) > 0.2 * np.max(np.abs(u))) & (u[:, -1] * u[:, 0] > 0.0)
+    keeps = np.abs(u[:, -1]) > (1.0 - THRESHOLDS.value("least_share")) * np.abs(u[:, 0])
+    keeps &= (np.abs(u[:, 0]) > THRESHOLDS.value("large_share") * np.max(np.abs(u))) & (u[:, -1] * u[:, 0] > 0.0)
     along = np.sign(u[:, :1] * n * ahead)[keeps & np.all(np.abs(n) > 0.3 * np.max(np.abs(n)), axis=1)]
     with_it, against = (int(np.sum(np.all(along == side, axis=1))) for side in (1.0, -1.0))
-    if against < THRESHOLDS.count("occurrences") or against < THRESHOLDS.count("keeping_ratio") * with_it:
+    if against < THRESHOLDS.count("occurrences") or with_it > THRESHOLDS.value("little") * against:
         return []
     text = (
         f"In {against} stretches of {width * dt:.3g} s the ship keeps her speed against the recorded shaft "
@@ -369,7 +371,7 @@ def check_commands(runs: Sequence[Run], dt: float, findings: Sequence[UnitFindin
     for i, command in enumerate(COMMANDS):
         actuator = command.removesuffix("_c")
         like, wanted, is_ = max((_lagged(runs, i, round(lag / dt)) for lag in lags), key=lambda found: abs(found[0]))
-        if abs(like) < 0.7:
+        if abs(like) < THRESHOLDS.value("most"):
             continue
         ratio = float(wanted @ is_) / float(is_ @ is_) * own.get(actuator, 1.0)
         near = min(_signed(actuator), key=lambda f: abs(np.log(abs(f / ratio))) + 10.0 * (f * ratio < 0.0))

@@ -1,6 +1,6 @@
 """Check for a wind direction that is recorded as where the wind blows to: it would push the ship against the wind.
 
-Changes of surge and sway over 10 s (at 130 m, Froude-scaled) are regressed on state, actuators and the wind's force
+Changes of surge and sway over 8 s (at 130 m, Froude-scaled) are regressed on state, actuators and the wind's force
 along and across the ship, once with the wind coming from the recorded direction and once going to it. The direction
 whose force pushes to leeward is accepted.
 """
@@ -22,9 +22,9 @@ from .thresholds import THRESHOLDS
 def _rows(recording: Recording, turn: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Rows of the regressions: run (W,), change of (u, v) (W, 2), other columns of u's and of v's equation, wind's
     (along, across) (W, 2), with the direction turned."""
-    ahead = max(1, round(THRESHOLDS.value("wind_push_time") * recording.froude / recording.dt))
+    ahead = max(1, round(THRESHOLDS.value("response_time") * recording.froude / recording.dt))
     speed, direction = (recording.dataset.inputs.index(name) for name in ("wind_speed", "wind_from"))
-    edge = max(1, round(THRESHOLDS.value("wind_push_mean") * recording.froude / recording.dt))
+    edge = max(1, round(THRESHOLDS.value("averaging_time") * recording.froude / recording.dt))
     owner, changes, surge, sway, wind = [], [], [], [], []
     for i, run in enumerate(recording.runs):
         S, W = run.states, run.inputs
@@ -78,13 +78,14 @@ def blows_to(recording: Recording) -> _Turned | None:
     has too little effect."""
     if not {"wind_speed", "wind_from"} <= set(recording.dataset.inputs):
         return None
-    if len(_rows(recording, 0.0)[0]) < THRESHOLDS.count("wind_push_windows"):
+    if len(_rows(recording, 0.0)[0]) < THRESHOLDS.count("regression_windows"):
         return None
     (as_from, wind, changes), (as_to, _, _) = _fits(recording, 0.0), _fits(recording, np.pi)
     t_from, t_to = (np.array([f.value[-1] / f.sd[-1] for f in fits]) for fits in (as_from, as_to))
     clear = int(np.argmax(np.abs(t_from)))
-    unsure = t_to[clear] < THRESHOLDS.value("leeward_t") or as_to[clear].p[-1] > THRESHOLDS.value("chance")
-    suits = t_from[clear] > THRESHOLDS.value("windward_t") or t_to[1 - clear] < THRESHOLDS.value("leeward_t_other")
+    error = THRESHOLDS.value("within_error")
+    unsure = t_to[clear] < 0.0 or as_to[clear].p[-1] > THRESHOLDS.value("chance")
+    suits = t_from[clear] > -error or t_to[1 - clear] < -error
     if unsure or suits:
         return None
     return _Turned(t_from, t_to, wind[:, 1], changes[:, 1])

@@ -126,7 +126,7 @@ class _Windows:
 
 def _ends(recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Records at the beginnings and at the ends of all windows, (5, W) each, and the run of each, (W,)."""
-    ahead = max(1, round(THRESHOLDS.value("wind_window") * recording.froude / recording.dt))
+    ahead = max(1, round(THRESHOLDS.value("window") * recording.froude / recording.dt))
     begins, ends, owner = [], [], []
     for i, run in enumerate(recording.runs):
         at = np.arange(0, len(run) - ahead, max(1, ahead // 2))
@@ -155,7 +155,7 @@ def _evidence(plain: _Windows, reading: WindReading, read: _Windows) -> tuple[fl
         _squares(size * a) / max(_squares(b), 1e-12)
         for a, b in ((plain.changes, read.changes), (plain.departures, read.departures))
     ]
-    joint = float(np.sum(t) / 2.0**0.5) if min(t) > THRESHOLDS.value("wind_t_each") else 0.0
+    joint = float(np.sum(t) / 2.0**0.5) if min(t) > -THRESHOLDS.value("within_error") else 0.0
     return float(np.sum(np.log(ratios))), joint
 
 
@@ -179,14 +179,14 @@ def wind_reading(recording: Recording) -> tuple[WindReading, _Windows, _Windows]
         return _Windows(reading.wind(*begin), reading.wind(*end), begin[0], owner)
 
     plain = windows(ours)
-    enough = len(plain.changes) >= THRESHOLDS.count("wind_windows")
+    enough = len(plain.changes) >= THRESHOLDS.count("windows")
     if enough and _squares(plain.changes) > THRESHOLDS.value("wind_change") ** 2:
         read = {reading: windows(reading) for reading in _readings(angle)}
         found = {reading: _evidence(plain, reading, w) for reading, w in read.items() if reading != ours}
         best = max(log for log, _ in found.values())
-        alike = best - THRESHOLDS.value("similar_winds")
+        alike = best - np.log(THRESHOLDS.value("similar"))
         chosen = min((k for k, (log, _) in found.items() if log > alike), key=lambda k: (k.errors, -found[k][0]))
-        if found[chosen][1] > THRESHOLDS.value("wind_t"):
+        if found[chosen][1] > THRESHOLDS.value("within_error"):
             return chosen, plain, read[chosen]
     return None if angle == "rad" else (ours, plain, plain)
 
@@ -197,7 +197,7 @@ def correct_wind(recording: Recording) -> tuple[Recording, list[Finding]]:
     if found is None:
         return recording, []
     reading, plain, read = found
-    size, window = unit_factor("wind_speed", reading.speed), THRESHOLDS.value("wind_window") * recording.froude
+    size, window = unit_factor("wind_speed", reading.speed), THRESHOLDS.value("window") * recording.froude
     text = f"wind_speed and wind_from are {said(reading)}"
     if reading.kind != "true":
         text += (

@@ -21,7 +21,7 @@ from .track import least_lag, possible_scale, shifted
 def _windows(recording: Recording, lag: float) -> tuple[np.ndarray, np.ndarray, float] | None:
     """Windows (run (W,), columns (W, 3): heading's change, integral of r, change of r; span [s]), r shifted back by
     `lag` s. Windows overlap by half: they are judged by runs, which are independent."""
-    width = max(3, round(THRESHOLDS.value("track_window") * recording.froude / recording.dt))
+    width = max(3, round(THRESHOLDS.value("window") * recording.froude / recording.dt))
     pieces = [
         (i, S[a : a + width + 1])
         for i, S in shifted(recording, {R: lag} if lag else {})
@@ -83,7 +83,7 @@ def check(recording: Recording) -> list[Finding]:
     found = None if "r" in recording.dataset.derived else _settled(recording)
     if found is None:
         return []
-    if found.chosen.left["all chosen"] ** 2 > THRESHOLDS.value("unexplained"):
+    if found.chosen.left["all chosen"] ** 2 > THRESHOLDS.value("most"):
         return [_unrelated(found)]
     made, first, chosen, lag, lag_sd = found
     return (
@@ -150,7 +150,7 @@ def _lag(
     plain = _windows(recording, 0.0) or made
     if not least_lag(recording) <= abs(lag) <= 0.5 * made[2]:
         return []
-    if chosen.out > THRESHOLDS.value("unexplained") * _explain(*plain, lag=False).out:
+    if chosen.out > THRESHOLDS.value("most") * _explain(*plain, lag=False).out:
         return []
     late, other = ("r", "the heading") if lag > 0.0 else ("psi", "the yaw rate")  # sensors are late, not early
     text = f"{late} lags {other} by {abs(lag):.2g} s (standard error {sd:.1g} s): {_shares(first, chosen)}."
@@ -162,10 +162,10 @@ def _lag(
 
 
 def _scale(made: tuple[np.ndarray, np.ndarray, float], first: Chosen, chosen: Chosen) -> list[Finding]:
-    if chosen.held.get("scale", 1.0) > THRESHOLDS.value("unexplained"):
+    if chosen.held.get("scale", 1.0) > THRESHOLDS.value("most"):
         return []
     factor, sd = 1.0 / (1.0 + float(chosen.value["scale"][0])), float(chosen.sd["scale"][0])
-    if abs(factor - 1.0) < THRESHOLDS.value("least_scale") or not possible_scale(factor):
+    if abs(factor - 1.0) < THRESHOLDS.value("least_share") or not possible_scale(factor):
         return []
     text = f"r reads {factor:.3f} of the heading's rate (standard error {sd:.3f}): {_shares(first, chosen)}."
     line = toml_line({"scale": {"r": round(factor, 4)}})
@@ -197,7 +197,7 @@ def _biases(
     drifts = {int(i): -left[run == i] / span for i in np.unique(run) if np.sum(run == i) >= 3}
     shared = float(np.median([d.mean() for d in drifts.values()])) if drifts else np.inf
     half_step = 0.5 * float(recording.steps[R])  # a record in steps is off by half of one for as long as it stands
-    least = max(THRESHOLDS.value("least_yaw_bias") * recording.turning, half_step)
+    least = max(THRESHOLDS.value("least_share") * recording.turning, half_step)
     if "bias" in chosen.names and abs(shared) > 0.5 * abs(float(chosen.value["bias"][0])):
         bias, sd = -float(chosen.value["bias"][0]), float(chosen.sd["bias"][0])
         if abs(bias) < least:
@@ -222,11 +222,11 @@ def _biases(
     usual = spread(np.concatenate([d - d.mean() for d in drifts.values()])) if drifts else 0.0
     found: dict[str, float] = {}
     for i, mine in drifts.items():
-        parts = min(len(mine), THRESHOLDS.count("yaw_bias_blocks"))
+        parts = min(len(mine), THRESHOLDS.count("windows"))
         blocks = np.array([part.mean() for part in np.array_split(mine, parts)])
         mean = float(np.mean(mine))
         sd = max(usual / np.sqrt(len(mine)), float(np.std(blocks, ddof=1)) / np.sqrt(len(blocks)) / 2.0)
-        if abs(mean) > THRESHOLDS.value("yaw_bias_doubt") * sd and abs(mean) > least:
+        if abs(mean) > THRESHOLDS.value("beyond_noise") * sd and abs(mean) > least:
             found[recording.name_of(recording.runs[i])] = mean
     if not found:
         return []
