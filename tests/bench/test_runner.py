@@ -81,9 +81,9 @@ def study(toy, tmp_path, monkeypatch):
     monkeypatch.setattr("shipbench.bench.runner.load_dataset", lambda name: sets[name])
 
     def run(*models, out="out", resume=False, task=None, **data):
-        sets["toy"] = toy(**data)
+        sets["toy"] = toy(**{"runs": 6, **data})
         specs = [m if m in ("hold", "oracle") else f"{file}:{m}" for m in models]
-        task = make_task({"dataset": "toy", "models": specs, "horizon_s": 20, "folds": 5, **(task or {})})
+        task = make_task({"dataset": "toy", "models": specs, "horizon_s": 20, "folds": 3, **(task or {})})
         return run_tasks([task], tmp_path / out, resume=resume, command="shipbench run test")
 
     run.file, run.out, run.sets = file, tmp_path / "out", sets
@@ -96,9 +96,9 @@ def log(study):
 
 def test_one_row_per_model_fold_seed_and_run(study):
     rows = study("hold", "Spy", task={"seeds": [0, 7]}).rows
-    assert len(rows) == 10 + 2 * 10  # hold draws no random numbers: one seed is enough
+    assert len(rows) == 6 + 2 * 6  # hold draws no random numbers: one seed is enough
     assert not rows.duplicated(["dataset", "model", "fold", "seed", "run"]).any()
-    assert sorted(rows[rows.model == "hold"]["run"]) == [f"r{i:02d}" for i in range(10)]
+    assert sorted(rows[rows.model == "hold"]["run"]) == [f"r{i:02d}" for i in range(6)]
     assert (rows.status == "ok").all()
 
 
@@ -116,7 +116,7 @@ def test_a_model_never_sees_the_runs_it_is_scored_on(study):
 def test_all_models_get_the_same_folds(study):
     study("Spy", "Together", runs=20)
     entries = log(study)
-    assert entries[:5] == entries[5:]
+    assert entries[:3] == entries[3:]
 
 
 def test_a_model_that_writes_into_its_inputs_does_not_change_the_truth(study):
@@ -129,7 +129,7 @@ def test_a_model_that_writes_into_its_inputs_does_not_change_the_truth(study):
 
 def test_the_folds_of_a_seed_train_together_where_the_class_can_and_share_the_time(study):
     outcome = study("Together", task={"seeds": [0, 1]})
-    assert {s["fit_shared_by"] for s in outcome.summaries} == {5}
+    assert {s["fit_shared_by"] for s in outcome.summaries} == {3}
     assert (outcome.rows.groupby("seed")["fit_s"].nunique() == 1).all()
 
 
@@ -146,11 +146,11 @@ def test_a_failed_fit_gives_a_row_for_every_run_of_the_fold_and_stops_nothing(st
     outcome = study("FailsToFit", "hold")
     rows = outcome.rows
     failed = rows[rows["model"].str.endswith("FailsToFit")]
-    assert len(failed) == 10
+    assert len(failed) == 6
     assert set(failed["status"]) == {"failed"}
     assert set(failed["reason"]) == {"fit: ZeroDivisionError: no data at all"}
     assert (rows[rows.model == "hold"]["status"] == "ok").all()
-    assert len(outcome.failed) == 5
+    assert len(outcome.failed) == 3
 
 
 @pytest.mark.long
@@ -205,10 +205,10 @@ def test_a_summary_alone_identifies_its_experiment(study):
 
 def test_resume_keeps_finished_cells_and_makes_the_missing_ones(study):
     before = study("Spy").rows
-    cell = study.out / Cell("toy", f"{study.file}:Spy", 3, 0).folder
+    cell = study.out / Cell("toy", f"{study.file}:Spy", 2, 0).folder
     (cell / "summary.json").unlink()
     after = study("Spy", resume=True).rows
-    assert len(log(study)) == 5 + 1
+    assert len(log(study)) == 3 + 1
     scores = ["fold", "run", "ed", "status"]
     pd.testing.assert_frame_equal(before[scores], after[scores])
 
@@ -222,13 +222,13 @@ def test_resume_runs_again_what_other_data_code_or_task_made(study, change):
     study(
         "Spy", resume=True, task={"valid_runs": 2} if change == "task" else None, steps=21 if change == "data" else 20
     )
-    assert len(log(study)) == 10
+    assert len(log(study)) == 6
 
 
 def test_without_resume_everything_is_run_again(study):
     study("Spy")
     study("Spy")
-    assert len(log(study)) == 10
+    assert len(log(study)) == 6
     assert not list(study.out.rglob("*.tmp*"))
 
 
