@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from toy_ship import write_toy_folder
 
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.submissions import read_results
@@ -21,10 +22,11 @@ from shipbench.leaderboard.plots import (
 )
 
 
-@pytest.fixture
-def study(toy, tmp_path, monkeypatch):
-    monkeypatch.setattr("shipbench.bench.runner.load_dataset", lambda name: toy())
-    (tmp_path / "m.py").write_text(
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    data = write_toy_folder(folder / "toy", 10, 20)
+    (folder / "m.py").write_text(
         "import numpy as np\n"
         "class Still:\n"
         "    def fit(self, train, valid=None, *, seed=0): return self\n"
@@ -32,9 +34,9 @@ def study(toy, tmp_path, monkeypatch):
         "class Fails(Still):\n"
         "    def predict(self, s0, U, history=None): raise ValueError('no')\n"
     )
-    models = ["hold", f"{tmp_path}/m.py:Still", f"{tmp_path}/m.py:Fails"]
-    run_tasks([make_task({"dataset": "toy", "models": models, "horizon_s": 20, "folds": 2})], tmp_path / "out")
-    return read_results([tmp_path / "out"]), models
+    models = ["hold", f"{folder}/m.py:Still", f"{folder}/m.py:Fails"]
+    run_tasks([make_task({"dataset": str(data), "models": models, "horizon_s": 20, "folds": 2})], folder / "out")
+    return read_results([folder / "out"]), models
 
 
 def test_every_plot_is_a_png_of_some_size(study, tmp_path):
