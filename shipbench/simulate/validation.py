@@ -71,12 +71,12 @@ def table() -> list[dict[str, Any]]:
     rows = []
     model, kcs = Simulator(load_mmg_ship("kvlcc2_l7"), 0.1), Simulator(load_mmg_ship("kcs"), 0.5)
     paper = "Yasukawa & Yoshimura (2015), Table 4"
-    turn = turning_circle(model, KVLCC2_SPEED, KVLCC2_RPM, 35.0, 0.1, 120.0)
+    turn = turning_circle(model, KVLCC2_SPEED, KVLCC2_RPM, 35.0, 0.1, 60.0)
     rows += [
         _row("kvlcc2_l7", "advance, +35 deg", turn.advance, 3.31, "L", 0.03, True, paper),
         _row("kvlcc2_l7", "tactical diameter, +35 deg", turn.tactical_diameter, 3.36, "L", 0.03, True, paper),
     ]
-    turn = turning_circle(model, KVLCC2_SPEED, KVLCC2_RPM, -35.0, 0.1, 120.0)
+    turn = turning_circle(model, KVLCC2_SPEED, KVLCC2_RPM, -35.0, 0.1, 60.0)
     rows += [
         _row("kvlcc2_l7", "advance, -35 deg", turn.advance, 3.36, "L", None, True, "reference's own run"),
         _row(
@@ -103,7 +103,7 @@ def table() -> list[dict[str, Any]]:
         )
     )
     for sign, advance, diameter in ((1, 3.36, 3.59), (-1, 3.24, 3.36)):
-        turn = turning_circle(kcs, KCS_SPEED, KCS_RPM, 35.0 * sign, 0.5, 600.0)
+        turn = turning_circle(kcs, KCS_SPEED, KCS_RPM, 35.0 * sign, 0.5, 300.0)
         rows += [
             _row("kcs", f"advance, {35 * sign:+d} deg", turn.advance, advance, "L", None, True, "reference's own run"),
             _row(

@@ -139,10 +139,10 @@ def exact_mariner() -> Fit:
     return null_fit(plant, Scales(plant))
 
 
-def test_what_ships_differ_by_more_counts_for_less(exact_mariner, monkeypatch):
-    less = needed(exact_mariner)
+def test_what_ships_differ_by_more_counts_for_less(mariner, monkeypatch):
+    less = needed(mariner)
     monkeypatch.setattr(type(STRUCTURE), "wider", lambda self, ship: {})
-    before = needed(exact_mariner)
+    before = needed(mariner)
     narrow = PLACES["thrust_backing"]
     assert less[narrow] == pytest.approx(before[narrow] / 2.5)
     np.testing.assert_array_equal(
@@ -150,6 +150,7 @@ def test_what_ships_differ_by_more_counts_for_less(exact_mariner, monkeypatch):
     )
 
 
+@pytest.mark.long
 def test_what_a_small_force_could_stand_for_is_not_asked_of_the_ship(exact_mariner):
     found = exact_mariner
     moved, less = found.solution.mean[:NUM_BASE], needed(found, NOTICEABLE)

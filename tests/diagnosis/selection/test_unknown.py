@@ -34,6 +34,7 @@ def s175() -> Fit:
     return null_fit(plant, Scales(plant))
 
 
+@pytest.mark.long
 def test_beside_the_hull_nothing_is_left_of_what_the_hull_explains(s175):
     alone, beside = dependences(s175), dependences(s175, HULL)
     assert (alone[0].axis, alone[0].variable in HULL) == ("yaw", True)
@@ -42,6 +43,7 @@ def test_beside_the_hull_nothing_is_left_of_what_the_hull_explains(s175):
     assert beside[0].score < 10.0
 
 
+@pytest.mark.long
 def test_a_variable_is_worth_the_same_beside_one_that_nothing_follows(s175):
     scores = {(d.axis, d.variable): d.score for d in dependences(s175)}
     others = {(d.axis, d.variable): d.score for d in dependences(s175, ("run",))}
