@@ -31,8 +31,8 @@ from shipbench.signals import DELTA
 
 
 def is_sure(fit: Fit, index: int) -> bool:
-    """Whether a cause meets all that is asked of it by itself, but for a ship that may have it."""
-    return first_unmet(SURE[1:], fit, index, Standard(fit, 10.0)).met
+    """Whether a cause meets all requirements on a cause by itself."""
+    return first_unmet(SURE, fit, index, Standard(fit, 10.0)).met
 
 
 def test_runs_that_scatter_as_the_model_says_are_not_inflated():
