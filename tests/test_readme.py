@@ -11,6 +11,7 @@ import pytest
 from shipbench.bench.task import load_tasks
 from shipbench.contract.base import BROKEN
 from shipbench.contract.check import check_model
+from shipbench.effects.base import EFFECTS
 from shipbench.predictors.base import make_predictor, parse_spec
 
 ROOT = Path(__file__).parent.parent
@@ -38,6 +39,10 @@ def test_the_model_of_ones_own_runs_from_its_file(tmp_path, harbour):
 @pytest.mark.parametrize("config", sorted(set(re.findall(r"--config (\S+\.toml)", README))))
 def test_every_config_that_is_named_exists_and_is_valid(config):
     assert load_tasks(ROOT / config, {})
+
+
+def test_the_number_of_causes_is_that_of_the_library():
+    assert [int(n) for n in re.findall(r"causes out of (\d+)", README)] == [len(EFFECTS.built_in())]
 
 
 def test_ci_runs_the_readmes_test_command():

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..checking.units import UnitFinding
-from ..effects.base import EFFECTS, Effect, searched_by
+from ..effects.base import EFFECTS, Effect, aliases_of, searched_by
 from .actuators.kinds import GearFinding
 from .evaluation.forces import force_of_hull, force_of_term
 from .evaluation.run_values import goes_with, of_runs
@@ -109,7 +109,7 @@ def rivals_of(found: Analysis, term: Term) -> tuple[str, ...]:
     steps = found.selection.steps
     own = max((s for s in steps if s.term.label == term.label), key=lambda s: (s.round, s.score), default=None)
     near = [s.term.label for s in steps if own is not None and s.is_near(own)]
-    near += term.effect.traits.aliases
+    near += aliases_of(term.effect.name)
     present = {t.label for t in found.final.model.terms}
     return tuple(dict.fromkeys(n for n in near if n not in present))
 

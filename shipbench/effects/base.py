@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
@@ -73,10 +74,11 @@ class Effect:
     (measured inputs without which it means nothing), `known_with` (measured inputs with which the model has it
     already), `scales` (channels that it records (1 + q) times too large), `breaks_symmetry` (a force that knows port
     from starboard, or directions or places of the earth: what no hull, propeller or rudder does by coefficients that
-    are wrong), `late` (tells of another time, and as much of the motion as a sensor in time, but where a record begins
-    or ends), `unrecorded` (of a gear's: it may also act behind the record of the actuator, where the motion alone shows
-    it), `traits` (facts about ships and about its look-alikes). `way`: how one of those that `fitted` gives acts, where
-    the user should be told.
+    are wrong), `moves_flow` (it sets water or air in motion: it writes `Modifiers.u_c`, `v_c`, `drift`, `air_u` or
+    `air_v`, and acts before the forces that follow the flow), `late` (tells of another time, and as much of the motion
+    as a sensor in time, but where a record begins or ends), `unrecorded` (of a gear's: it may also act behind the
+    record of the actuator, where the motion alone shows it), `traits` (facts about ships and about its look-alikes).
+    `way`: how one of those that `fitted` gives acts, where the user should be told.
     """
 
     name: str = ""
@@ -92,6 +94,7 @@ class Effect:
     known_with: ClassVar[tuple[str, ...]] = ()
     scales: ClassVar[tuple[str, ...]] = ()
     breaks_symmetry: ClassVar[bool] = False
+    moves_flow: ClassVar[bool] = False
     late: ClassVar[bool] = False
     unrecorded: ClassVar[bool] = False
     traits: ClassVar[Traits] = Traits()
@@ -208,6 +211,20 @@ def having(trait: str) -> tuple[Effect, ...]:
     return tuple(sorted(found, key=lambda effect: FAMILIES.index(effect.family)))
 
 
+def aliases_of(name: str) -> tuple[str, ...]:
+    """Names of the effects with which an effect is reported as confounded, sorted: those of its own trait `aliases`,
+    and those whose trait has it."""
+    return _aliases(tuple(EFFECTS.names())).get(name, ())
+
+
+@cache
+def _aliases(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+    """Aliases by name, both ways, of these effects of the registry."""
+    pairs = [(name, other) for name in names for other in EFFECTS.get(name).traits.aliases if other in names]
+    mutual = sorted({*pairs, *((other, name) for name, other in pairs)})
+    return {name: tuple(other for own, other in mutual if own == name) for name, _ in mutual}
+
+
 class Holder(Protocol):
     """Object that carries an effect with its values, in a simulator or in a fitted model."""
 
@@ -219,8 +236,8 @@ H = TypeVar("H", bound=Holder)
 
 
 def flow_first(items: Iterable[H]) -> list[H]:
-    """Effects that set water and air in motion before those whose forces follow the flow (`Modifiers.u_c`, ...)."""
-    return sorted(items, key=lambda item: item.effect.family != "environment")
+    """Effects that set water or air in motion (`Effect.moves_flow`) before those whose forces follow the flow."""
+    return sorted(items, key=lambda item: not item.effect.moves_flow)
 
 
 def body_axes(north: Array, east: Array, psi: Array) -> tuple[Array, Array]:

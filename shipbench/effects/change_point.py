@@ -72,7 +72,7 @@ class ChangePoint(Effect):
         changed = ChangePoint()
         changed.inner, changed.from_run, changed.from_time = effect, from_run, from_time
         changed.rows = None if rows is None else np.asarray(rows)
-        for key in ("parameters", "per_run", "vector", "separate"):
+        for key in ("parameters", "per_run", "vector", "separate", "moves_flow"):
             setattr(changed, key, getattr(effect, key))
         begins = f"run {from_run}" if from_time is None else f"{from_time:g} s"
         vars(changed)["summary"] = f"{effect.name} from {begins} on"

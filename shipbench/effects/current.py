@@ -26,6 +26,7 @@ class Current(Effect):
         Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"),
     )
     breaks_symmetry = True
+    moves_flow = True
     vector = ("speed", "to")
     separate = "straight runs on reciprocal courses at two speeds, or a full turn"
 

@@ -22,6 +22,7 @@ class CurrentPerRun(Effect):
         Parameter("east", "m/s", 0.3, -6.0, 6.0, scaling="speed"),
     )
     breaks_symmetry = True
+    moves_flow = True
     per_run = True
     vector = ("speed", "to")
     separate = "straight runs on reciprocal courses within one run"

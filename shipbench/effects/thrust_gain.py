@@ -16,7 +16,7 @@ class ThrustGain(Effect):
     summary = "thrust of the propeller"
     phrase = "a propeller thrust that is {gain}"
     source = "docs/theory.md#propulsion"
-    traits = Traits(between_ships=True, absorbs_misfit=True, aliases=("mass_change",), on_card=True)
+    traits = Traits(between_ships=True, absorbs_misfit=True, on_card=True)
     parameters = (Parameter("gain", "1", 0.15, -0.6, 1.0, title="propeller thrust", relative=True),)
     separate = "acceleration from rest, or a bollard pull"
 

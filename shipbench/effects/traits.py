@@ -38,7 +38,8 @@ class Traits:
             a run.
         least_size: size from which it is practically significant, in typical sizes.
         least_unrecorded: the same behind the record of an actuator, where the motion alone shows it.
-        aliases: effects with which it is reported as confounded, however far apart their scores are.
+        aliases: effects with which it is reported as confounded, however far apart their scores are. One of two
+            effects states it, and it holds for both (`aliases_of`).
         group: effects of one group occur together and have similar forces: beside one of them the others are not
             reported.
         imitates: effects whose own law leaves a residual like this one along their normal (`Effect.normal`): there it

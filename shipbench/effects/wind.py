@@ -33,6 +33,7 @@ class Wind(Effect):
         Parameter("east", "m/s", 7.0, -60.0, 60.0, scaling="speed"),
     )
     breaks_symmetry = True
+    moves_flow = True
     vector = ("speed", "from")
     known_with = ("wind_speed", "wind_from")
     separate = (

@@ -18,6 +18,7 @@ class WindDrift(Effect):
     source = "Wu (1975), J. Fluid Mech. 68, 49-70: some 3 % of the wind at the surface, less over the draught"
     traits = Traits(least_size=0.3)
     parameters = (Parameter("share", "1", 0.01, -0.1, 0.1, title="water drift", share_of="wind speed"),)
+    moves_flow = True
     separate = "drifting with the shaft stopped, in wind of several strengths"
     channels = ("wind_speed", "wind_from")
 

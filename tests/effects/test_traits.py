@@ -39,7 +39,7 @@ def test_traits_are_consistent(name: str) -> None:
     assert traits.search in SEARCHES
     assert {*traits.aliases, *traits.imitates} <= set(EFFECTS.names())
     for other in traits.aliases:
-        assert name in EFFECTS.get(other).traits.aliases, "aliases are mutual"
+        assert name not in EFFECTS.get(other).traits.aliases, "one of the two states it"
     for other in traits.imitates:
         of = EFFECTS.get(other)
         assert type(of).normal is not Effect.normal, "what is imitated has a normal"
