@@ -41,8 +41,9 @@ def test_every_config_that_is_named_exists_and_is_valid(config):
     assert load_tasks(ROOT / config, {})
 
 
-def test_the_number_of_causes_is_that_of_the_library():
-    assert [int(n) for n in re.findall(r"causes out of (\d+)", README)] == [len(EFFECTS.built_in())]
+def test_the_library_has_more_causes_than_the_readme_states():
+    (stated,) = re.findall(r"causes out of more than (\d+)", README)
+    assert len(EFFECTS.built_in()) > int(stated)
 
 
 def test_ci_runs_the_readmes_test_command():
