@@ -115,7 +115,8 @@ def test_the_residual_sees_the_measured_wind(windy):
 
 
 @pytest.mark.long
-def test_a_wrong_wind_force_is_learned_and_the_solvers_agree_on_it(windy, tmp_path):
+def test_a_wrong_wind_force_is_learned_and_the_solvers_agree_on_it(windy, tmp_path, monkeypatch):
+    monkeypatch.setattr(neural_ode._Windows, "MINIBATCHES", 20)
     model = NeuralODE(epochs=6, hidden=16).fit(windy[0], windy[1], seed=0)
     assert model.improved
     unseen = windy[1].merged(windy[2])
