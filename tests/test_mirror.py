@@ -41,6 +41,7 @@ ELSEWHERE = {
     "diagnosis/preparation/log_dropout": "checking/test_speed_log.py",
     "diagnosis/preparation/time_offsets": "diagnosis/test_budget.py",
     "diagnosis/result": "diagnosis/test_candidates.py",
+    "diagnosis/thresholds": "test_thresholds.py",
     "importing/blocks": "importing/test_order.py",
     "importing/channels": "importing/test_import_parts.py",
     "importing/mapping": "importing/test_cells.py",
