@@ -14,14 +14,14 @@ from __future__ import annotations
 
 import measure
 
-from shipbench.diagnosis.inference.baseline import null_fit
-from shipbench.diagnosis.inference.gauss_newton import Origin, looking_at
-from shipbench.diagnosis.inference.laplace import Fit
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.linearisation import Scales
 from shipbench.diagnosis.selection.screening import screen
 from shipbench.diagnosis.selection.stepwise import Beginning, candidates_for, select
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.baseline import null_fit
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.gauss_newton import Origin, looking_at
+from shipbench.estimation.laplace import Fit
+from shipbench.estimation.linearisation import Scales
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials

@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from shipbench import load_dataset
-from shipbench.diagnosis.model.forward import Plant
 from shipbench.diagnosis.preparation.time_offsets import late_effects, late_velocities_of
 from shipbench.diagnosis.selection.analysis import analyse, plain_model
+from shipbench.estimation.forward import Plant
 from shipbench.records import Dataset
 
 

@@ -77,6 +77,12 @@ def reason(error: BaseException) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())[:300]
 
 
+@cache
+def _stems(folder: str) -> tuple[str, ...]:
+    """Names of the modules in a folder of the package, sorted."""
+    return tuple(sorted(p.stem for p in (Path(__file__).parent / folder).glob("*.py")))
+
+
 @dataclass(frozen=True)
 class Registry:
     """Parts of one kind.
@@ -103,8 +109,7 @@ class Registry:
         return brief(f"<Registry of {self.kind}s: {', '.join(sorted({*self._files(), *self.plugins()}))}>")
 
     def _files(self) -> dict[str, str]:
-        root = Path(__file__).parent / self.folder
-        stems = (p.stem for p in sorted(root.glob("*.py")))
+        stems = _stems(self.folder)
         return {s: f"{_PACKAGE}.{self.folder}.{s}" for s in stems if not s.startswith("_") and s not in self.helpers}
 
     def plugins(self) -> dict[str, list[EntryPoint]]:

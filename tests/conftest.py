@@ -46,3 +46,13 @@ def undrawn() -> Iterator[pytest.MonkeyPatch]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("shipbench.leaderboard.plots.draw_all", lambda *_: [])
         yield patch
+
+
+@pytest.fixture(scope="session")
+def plant():
+    """Forward model of four runs of 60 s of a container ship."""
+    from shipbench.estimation.forward import Plant
+    from shipbench.physics.mmg import load_mmg_ship
+    from shipbench.simulate.trials import Trials, sea_trials
+
+    return Plant.of(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=4, samples=60)))

@@ -7,15 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipbench.diagnosis.inference.gram import Gram, Hyper, Products, Reduced, Solution, ornstein_uhlenbeck, solve
-from shipbench.diagnosis.inference.laplace import Fit, Model
-from shipbench.diagnosis.model.columns import Columns
-from shipbench.diagnosis.model.forward import Plant, Segments
-from shipbench.diagnosis.model.linearisation import NUM_BASE, Point, Scales
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection.analysis import Analysis
 from shipbench.diagnosis.selection.stepwise import Selection, Step
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.coefficients import NUM_BASE
+from shipbench.estimation.columns import Columns
+from shipbench.estimation.forward import Plant, Segments
+from shipbench.estimation.gram import Gram, Hyper, Products, Reduced, Solution, ornstein_uhlenbeck, solve
+from shipbench.estimation.laplace import Fit, Model
+from shipbench.estimation.linearisation import Point, Scales
+from shipbench.estimation.term import Term
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.ship import Particulars, complete
 

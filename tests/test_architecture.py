@@ -38,6 +38,7 @@ HOUSE: dict[float, dict[str, str]] = {
     2.5: {"metrics": "one error measure a file"},
     2.7: {"effects": "one cause a file, with the traits by which it is judged"},
     3: {"simulate": "the MMG simulator and ships of the literature"},
+    3.2: {"estimation": "the ship's coefficients with priors: forward model, linearisation, evidence, calibration"},
     3.5: {"predictors": "one model a file; `physics_model/` and `networks/` hold what they share"},
     4: {"data": "data sets, files, corrections"},
     4.3: {"importing": "logs into data sets"},

@@ -10,7 +10,7 @@ import pytest
 
 TESTS = Path(__file__).parent
 PACKAGE = TESTS.parent / "shipbench"
-DECIDING = ("bench", "checking", "contract", "data", "diagnosis", "importing", "leaderboard", "metrics")
+DECIDING = ("bench", "checking", "contract", "data", "diagnosis", "estimation", "importing", "leaderboard", "metrics")
 """Packages whose modules decide something: what is found, scored, ranked, read or refused."""
 ELSEWHERE = {
     "bench/durations": "bench/test_progress.py",
@@ -36,12 +36,15 @@ ELSEWHERE = {
     "data/sensitivity": "data/test_coverage.py",
     "data/units": "data/test_files_pitfalls.py",
     "diagnosis/diagnose": "diagnosis/actuators/test_identify.py",
-    "diagnosis/inference/baseline": "diagnosis/inference/test_gauss_newton.py",
     "diagnosis/preparation/base": "diagnosis/preparation/test_apparent_wind.py",
     "diagnosis/preparation/log_dropout": "checking/test_speed_log.py",
-    "diagnosis/preparation/time_offsets": "diagnosis/test_budget.py",
+    "diagnosis/preparation/time_offsets": "estimation/test_budget.py",
     "diagnosis/result": "diagnosis/test_candidates.py",
     "diagnosis/thresholds": "test_thresholds.py",
+    "estimation/actuator_fit": "predictors/test_physics.py",
+    "estimation/baseline": "estimation/test_gauss_newton.py",
+    "estimation/coefficients": "estimation/test_robust_prior.py",
+    "estimation/eq2_rollout": "estimation/test_robust_prior.py",
     "importing/blocks": "importing/test_order.py",
     "importing/channels": "importing/test_import_parts.py",
     "importing/mapping": "importing/test_cells.py",
@@ -59,6 +62,8 @@ ELSEWHERE = {
 }
 """Modules without a test of their name, and a test file that imports them."""
 THROUGH = {
+    "estimation/gears": "estimation/test_extension.py",
+    "estimation/intervals": "estimation/test_extension.py",
     "bench/answering": "bench/test_isolate.py",
     "bench/entry": "bench/test_isolate.py",
     "bench/lock": "bench/test_study_folder.py",

@@ -40,8 +40,8 @@ def diagnose(
     """Show what the physics model gets wrong on a data set, name the cause, and measure its held-out gain."""
     from ..bench.progress import steps_shown
     from ..data.base import load_dataset
-    from ..diagnosis.budget import Budget
     from ..diagnosis.diagnose import diagnose as run
+    from ..estimation.budget import Budget
     from ..reports.diagnosis.files import document, write_diagnosis
     from ..reports.diagnosis.text import summary_lines
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects.base import EFFECTS, searched_by
+from ..estimation.laplace import Fit
 from .actuators.kinds import GearFinding
 from .explain import p_of
-from .inference.laplace import Fit
 from .preparation.time_offsets import late_velocities_effect
 from .result import Candidate
 from .selection.analysis import HULL_THRESHOLD, Analysis

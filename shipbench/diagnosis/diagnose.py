@@ -17,23 +17,24 @@ from ..checking.standing import standing
 from ..checking.units import UnitFinding, corrected
 from ..effects.base import EFFECTS, searched_by
 from ..errors import InputError
+from ..estimation.budget import Budget, is_spent, limited
+from ..estimation.forward import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, least_depth
+from ..estimation.gauss_newton import Fit
+from ..estimation.noise_selection import noise_in_words
+from ..estimation.outliers import left_out
 from ..processes import process_pool
 from ..records import Dataset
 from ..steps import step, within
-from .budget import Budget, is_spent, limited
 from .candidates import describe_candidates
 from .evaluation.held_out_gain import FoldGain, fold_gain, summarise
 from .evaluation.residuals import what_is_wrong
 from .evaluation.series import trace_of
 from .explain import describe_causes, remaining, unknown_part, what_is_left
-from .inference.gauss_newton import Fit
-from .inference.noise_selection import noise_in_words
-from .inference.outliers import left_out
-from .model.forward import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, least_depth
 from .preparation import actuator_readings as misread
 from .preparation.actuator_signs import turned_actuators
 from .preparation.base import prepare
 from .preparation.passes import GIVEN, PASSES
+from .preparation.plant import plant_of
 from .preparation.record_errors import joined
 from .preparation.splitting import is_too_little
 from .preparation.time_offsets import ruled_out
@@ -96,7 +97,7 @@ def _diagnosed(
         # whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
         step("fit the plain model", 0.02, whole)
-        null = plain_model(Plant.of(dataset, steps), only, settled)
+        null = plain_model(plant_of(dataset, steps), only, settled)
         step("look for causes", whole, 2.0 * whole)
         rests = not is_spent()
         if only is not None or cautious or not rests:
@@ -174,7 +175,7 @@ def _as_it_must_be_read(
     """
 
     def plain(read: Dataset) -> Fit:
-        return plain_model(Plant.of(read, steps), settled=settled)
+        return plain_model(plant_of(read, steps), settled=settled)
 
     turned = turned_actuators(dataset, null)
     turned = [] if is_spent() else turned  # fits that were stopped are not to be compared
@@ -225,7 +226,7 @@ def _one_fold(
     """Selection and fits on the training part of one fold, within a part of the budget of the whole."""
     test = _folds(dataset, seed)[fold]
     train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
-    plant = Plant.of(dataset.with_runs(train), FOLD_STEPS)
+    plant = plant_of(dataset.with_runs(train), FOLD_STEPS)
     with limited(Budget(budget.iterations, budget.seconds, budget.gigabytes)) as used:
         extension, plain = causes_of(plant, threshold, only, settled)
         return replace(fold_gain(dataset, test, extension, plain, hull), stopped=used.is_spent)

@@ -11,13 +11,12 @@ import numpy as np
 
 from ..checking.units import UnitFinding
 from ..effects.base import EFFECTS, Effect, aliases_of, searched_by
+from ..estimation.coefficients import FREE, HULL, NUM_HULL, hull_changes
+from ..estimation.laplace import Fit
+from ..estimation.term import Term
 from .actuators.kinds import GearFinding
 from .evaluation.forces import force_of_hull, force_of_term
 from .evaluation.run_values import goes_with, of_runs
-from .inference.laplace import Fit
-from .model.forward import HULL, NUM_HULL
-from .model.linearisation import FREE, hull_changes
-from .model.term import Term
 from .preparation.time_offsets import LateVelocities, late_effects, late_velocities_effect
 from .result import Cause, Estimate, Gain, what_it_is
 from .selection.agreement import covariance, inflation

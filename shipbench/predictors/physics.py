@@ -6,28 +6,24 @@ Source: the source paper, eq. (2) to (9).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from ..errors import WorkError
-from ..physics import eq2
+from ..estimation.actuator_fit import fit_actuators
+from ..estimation.eq2_rollout import Rolling
+from ..estimation.extension import Extension, measured, roll, true_start
+from ..estimation.gears import fit_gears
 from ..records import Batch, Dataset
-from ..ship import Ship, complete
 from ..signals import ACTUATORS, COMMANDS, MOTION
-from ..specs import EffectSpec
 from ._numbers import check_numbers
-from ._saved import check_shapes, sample_time
-from .base import History, PredictorBase
+from ._saved import check_shapes
+from .base import History
 from .hold import Hold
-from .physics_model.actuator_fit import DEFAULT_ACTUATORS, fit_actuators
-from .physics_model.effects import Extension, extension_of, geared, measured, no_gear, roll, true_start
 from .physics_model.fit_report import FitReport, position_error, with_reversed_shaft
-from .physics_model.gears import fit_gears, gears_of
-from .physics_model.rollout import Rolling, actuators_after
+from .physics_model.fitted_ship import ACTUATOR_PARAMETERS, FittedShip
 
 if TYPE_CHECKING:
     from .physics_model.fit import Fit
@@ -45,15 +41,10 @@ PARAMETERS = (
     ("p9", "rudder drag, linear", "1/rad"),
     ("p10", "rudder drag, quadratic", "1/rad^2"),
 )
-ACTUATOR_PARAMETERS = (
-    ("T_n", "shaft time constant", "s"), ("rate_n", "shaft rate limit", "rpm/s"),
-    ("T_delta", "rudder time constant", "s"), ("rate_delta", "rudder rate limit", "rad/s"),
-    ("T_F", "thruster time constant", "s"), ("rate_F", "thruster rate limit", "N/s"),
-)  # fmt: skip
 
 
 @dataclass
-class Physics(PredictorBase):
+class Physics(FittedShip):
     """Fitted eq. (2) to (8).
 
     Args:
@@ -73,30 +64,8 @@ class Physics(PredictorBase):
         check_numbers(self, {"iterations": (0, 10_000), "tolerance": (0.0, 1.0)})
         if isinstance(self.piece, bool) or not isinstance(self.piece, (int, float)) or not 0.0 <= self.piece < np.inf:
             raise ValueError(f"piece = {self.piece}; accepted: 0 (whole runs), or a time in s")
-        self.extension: Extension | None = None
         self.held: dict[int, str] = {}
         self.report: FitReport | None = None
-
-    def extend(self, effects: Sequence[EffectSpec]) -> Self:
-        """Add effects to the fitted model (`physics+current`): their formulas are those of `shipbench.effects`.
-
-        Values that the spec sets are held. The others are fitted with p0..p10; those of actuator effects from commands
-        and recorded positions, where both are recorded. p4 stays zero beside a fitted rudder offset or asymmetry, p0
-        beside a fitted propeller walk (and beside a rudder offset where hull derivatives are fitted too): they are
-        confounded. Runs begin at t = 0 s, the time of s0.
-
-        Raises:
-            InputError: an effect or a parameter is unknown, or cannot be part of a predictor.
-        """
-        self.extension = extension_of(effects)
-        return self
-
-    def skip(self, dataset: Dataset) -> str | None:
-        """Reason why this model cannot take `dataset`: an effect needs a channel that was not measured; or None."""
-        for term in self.extension.terms if self.extension is not None else ():
-            if missing := [c for c in term.effect.channels if c not in dataset.inputs]:
-                return f"effect '{term.name}' needs {' and '.join(missing)}, which data set '{dataset.name}' lacks"
-        return None
 
     @property
     def fitted(self) -> bool:
@@ -194,49 +163,6 @@ class Physics(PredictorBase):
         self.extension = extension
         return self.actuator_path(batch.s0, batch.U)
 
-    def _set_ship(self, ship: Ship, inputs: tuple[str, ...], dt: float, commanded: bool) -> None:
-        self.ship, self.inputs, self.dt, self.commanded = ship, inputs, dt, commanded
-        self.particulars = complete(ship)
-        self.c = eq2.coefficients(self.particulars)
-        self.actuator_params = DEFAULT_ACTUATORS.copy()
-        # One step a second serves 100 m; the time scale of a ship goes with sqrt(L) (Froude).
-        self.substeps = max(1, int(np.ceil(dt / (0.15 * np.sqrt(self.c.L)) - 1e-9)))
-
-    def actuators_after(self, actuators: np.ndarray, commands: np.ndarray, dt: float) -> np.ndarray:
-        """Actuator states (..., 4) after `dt` seconds of held commands (..., 4); the commands themselves where no
-        actuators were measured."""
-        if self.commanded:
-            return commands.copy()
-        now, wanted = (list(np.moveaxis(a, -1, 0)) for a in (actuators, commands))
-        return np.stack(actuators_after(now, wanted, dt, list(self.actuator_params)), axis=-1)
-
-    def actuator_path(self, s0: np.ndarray, U: np.ndarray) -> np.ndarray:
-        """Actuators n, delta, F_b, F_s at the beginning, middle and end of every substep, (batch, K * substeps, 3,
-        4)."""
-        h = self.dt / self.substeps
-        path = np.empty((len(s0), U.shape[1] * self.substeps, 3, 4))
-        now = s0[:, ACTUATORS]
-        for j in range(path.shape[1]):
-            command = U[:, j // self.substeps, : len(COMMANDS)]
-            path[:, j, 0] = command if self.commanded else now
-            path[:, j, 1] = self.actuators_after(now, command, 0.5 * h)
-            now = self.actuators_after(now, command, h)
-            path[:, j, 2] = now
-        gears = [] if self.extension is None else self.extension.active("gear")
-        if not gears:
-            return path
-        base = dict.fromkeys(("n", "delta", "F"), no_gear(h)) if self.commanded else gears_of(self.actuator_params)
-        return geared(path, s0, U, base, gears, self.dt, self.substeps)
-
-    def _wind_columns(self) -> list[int]:
-        """Columns of U with the measured wind's speed and direction; none where it was not measured."""
-        names = ("wind_speed", "wind_from")
-        return [self.inputs.index(name) for name in names] if set(names) <= set(self.inputs) else []
-
-    def _wind(self, U: np.ndarray) -> np.ndarray | None:
-        """Measured wind speed and direction (batch, K, 2), or None."""
-        return U[..., columns] if (columns := self._wind_columns()) else None
-
     def _rolling(self) -> Rolling:
         columns = (*range(len(COMMANDS)), *self._wind_columns())
         return Rolling(self.c, None if self.commanded else self.actuator_params, columns, self.dt, self.substeps)
@@ -315,46 +241,22 @@ class Physics(PredictorBase):
         return "\n".join(lines + [f"  note: {n}" for n in self.particulars.notes])
 
     def _arrays(self) -> dict[str, np.ndarray]:
-        arrays = {"p": self.p, "ci95": self.ci95, "actuators": self.actuator_params}
-        if self.extension is not None:
-            arrays |= {
-                "effect_values": np.concatenate([*map(np.array, self.extension.values)]),
-                "effect_ci95": self.extension.ci95,
-            }
-        return arrays
+        return {"p": self.p, "ci95": self.ci95, **self._ship_arrays()}
 
     def _meta(self) -> dict[str, Any]:
-        meta = {
-            "ship": self.ship.model_dump(exclude_none=True),
-            "dt": self.dt,
-            "commanded": self.commanded,
-            "cost": float(self.cost),
-        }
+        meta = self._ship_meta() | {"cost": float(self.cost)}
         if self.report is not None:
             meta["report"] = self.report.as_dict()
-        if self.extension is not None:
-            meta["effects"] = [{"name": t.spec.name, "params": t.spec.params} for t in self.extension.terms]
         return meta
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
         num = len(PARAMETERS)
-        check_shapes(arrays, {"p": (num,), "ci95": (num, 2), "actuators": (len(ACTUATOR_PARAMETERS),)})
-        self._set_ship(
-            Ship.from_dict(meta["ship"], "saved model"), self.inputs, sample_time(meta), bool(meta["commanded"])
-        )
-        self.p, self.ci95, self.actuator_params, self.cost = (
-            arrays["p"],
-            arrays["ci95"],
-            arrays["actuators"],
-            float(meta["cost"]),
-        )
+        check_shapes(arrays, {"p": (num,), "ci95": (num, 2)})
+        self._restore_ship(arrays, meta)
+        self.p, self.ci95, self.cost = arrays["p"], arrays["ci95"], float(meta["cost"])
         self.report = FitReport.from_dict(meta["report"]) if "report" in meta else None
-        if "effects" in meta:
-            asked = extension_of([EffectSpec(e["name"], e["params"]) for e in meta["effects"]])
-            at = np.cumsum([0, *(len(t.given) for t in asked.terms)])
-            check_shapes(arrays, {"effect_values": (at[-1],), "effect_ci95": (at[-1], 2)})
-            values = [tuple(float(v) for v in arrays["effect_values"][a:b]) for a, b in pairwise(at)]
-            self.extension, self.held = Extension(asked.terms, values, arrays["effect_ci95"]), asked.held()
+        if self.extension is not None:
+            self.held = self.extension.held()
 
 
 PREDICTOR = Physics

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import pysindy
 
+from ..estimation.actuator_fit import fit_actuators
 from ..integrate import motion_rhs, rk4_step
 from ..physics.actuators import lag_with_rate_limit
 from ..records import Dataset
@@ -25,7 +26,6 @@ from ._features import InputFeatures
 from ._numbers import WEIGHT, check_numbers
 from ._saved import check_shapes, sample_time
 from .base import History, PredictorBase
-from .physics_model.actuator_fit import fit_actuators
 
 _BEYOND = 10.0
 """Factor of the largest training velocity above which a run has diverged: polynomials grow fast outside the data."""

@@ -10,7 +10,6 @@ from made_fits import RUNS, made_analysis, made_fit
 
 from shipbench.diagnosis.actuators.kinds import GearFinding
 from shipbench.diagnosis.candidates import describe_candidates
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.result import Candidate
 from shipbench.diagnosis.selection.analysis import HULL_THRESHOLD, Analysis
 from shipbench.diagnosis.selection.requirements import detection_limit
@@ -18,6 +17,7 @@ from shipbench.diagnosis.selection.screening import Score
 from shipbench.diagnosis.selection.stepwise import Step
 from shipbench.diagnosis.selection.unknown import Dependence
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.term import Term
 from shipbench.physics.actuators import Gear
 
 

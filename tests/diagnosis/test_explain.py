@@ -7,9 +7,9 @@ import pytest
 from made_fits import made_analysis, made_fit
 
 from shipbench.diagnosis.explain import rivals_of
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection.stepwise import Step
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.term import Term
 
 
 def step(number: int, label: str, score: float) -> Step:

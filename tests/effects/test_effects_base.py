@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from shipbench import registry
-from shipbench.diagnosis.model.term import Term
 from shipbench.effects.base import EFFECTS, Effect, aliases_of, flow_first
 from shipbench.effects.traits import Traits
+from shipbench.estimation.term import Term
 from shipbench.physics.hull import HullFactors
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.physics.modifiers import Flow, Modifiers

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shipbench.estimation.actuator_fit import DEFAULT_ACTUATORS, fit_actuators
 from shipbench.physics import eq2
 from shipbench.physics.actuators import lag_with_rate_limit
 from shipbench.predictors.physics import Physics
-from shipbench.predictors.physics_model.actuator_fit import DEFAULT_ACTUATORS, fit_actuators
 from shipbench.records import Batch, Dataset, Run
 from shipbench.ship import complete
 from shipbench.signals import COMMANDS
@@ -200,9 +200,8 @@ def test_left_side_is_clarke_and_inoue_by_hand():
 
 @pytest.mark.parametrize(("commanded", "wind", "substeps"), [(False, False, 1), (False, True, 3), (True, True, 1)])
 def test_rolling_is_the_same_model_as_the_formula_step_by_step(harbour, fitted, commanded, wind, substeps):
-    from shipbench.predictors.physics_model.effects import roll
-    from shipbench.predictors.physics_model.fit import parameter_scale
-    from shipbench.predictors.physics_model.rollout import Rolling
+    from shipbench.estimation.eq2_rollout import Rolling, parameter_scale
+    from shipbench.estimation.extension import roll
 
     model = Physics()
     model._set_ship(harbour.ship, (*COMMANDS, "depth", "wind_from", "wind_speed") if wind else COMMANDS, 1.0, commanded)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.diagnose import _of_depth, diagnose
-from shipbench.diagnosis.inference.baseline import null_fit
-from shipbench.diagnosis.model.forward import DEEP, Plant
-from shipbench.diagnosis.model.linearisation import Scales
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.baseline import null_fit
+from shipbench.estimation.forward import DEEP, Plant
+from shipbench.estimation.linearisation import Scales
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
 from shipbench.simulate.hidden import Hidden

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from shipbench.data.base import load_dataset
-from shipbench.diagnosis.inference.baseline import null_fit
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.linearisation import Scales
 from shipbench.diagnosis.preparation.time_offsets import put_back, unfiltered
 from shipbench.diagnosis.selection.screening import screen
 from shipbench.diagnosis.selection.stepwise import candidates_for
 from shipbench.errors import InputError
+from shipbench.estimation.baseline import null_fit
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.linearisation import Scales
 from shipbench.records import Dataset, Run
 
 FILTER = 0.93

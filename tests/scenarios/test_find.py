@@ -16,10 +16,6 @@ from made_fits import made_analysis, made_fit
 
 from shipbench.bench.provenance import source_digest
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.inference.baseline import null_fit
-from shipbench.diagnosis.inference.gauss_newton import Origin
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.linearisation import Scales
 from shipbench.diagnosis.result import Diagnosis
 from shipbench.diagnosis.selection.analysis import THRESHOLD
 from shipbench.diagnosis.selection.screening import changes, screen
@@ -27,6 +23,10 @@ from shipbench.diagnosis.selection.ship_file import whatever_the_ship
 from shipbench.diagnosis.selection.stepwise import absorbed, candidates_for, select
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
+from shipbench.estimation.baseline import null_fit
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.gauss_newton import Origin
+from shipbench.estimation.linearisation import Scales
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
 from shipbench.simulate.hidden import Hidden

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.model.forward import HULL, NUM_HULL, Plant
-from shipbench.diagnosis.model.linearisation import hull_changes
 from shipbench.diagnosis.selection.analysis import THRESHOLD, plain_model
 from shipbench.diagnosis.selection.stepwise import select
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.coefficients import HULL, NUM_HULL, hull_changes
+from shipbench.estimation.forward import Plant
 from shipbench.ops import Array
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.physics.modifiers import Flow, Modifiers

@@ -15,15 +15,6 @@ import shipbench.simulate.trials
 from shipbench.checking.recording import Recording
 from shipbench.checking.track import keeps_time
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.inference.baseline import beside_noise_of, null_fit
-from shipbench.diagnosis.inference.gauss_newton import Origin, fit
-from shipbench.diagnosis.inference.laplace import Model
-from shipbench.diagnosis.inference.noise_selection import colour_of
-from shipbench.diagnosis.inference.outliers import left_out
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.linearisation import Scales
-from shipbench.diagnosis.model.noise import Colour
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.preparation import time_offsets as clocks
 from shipbench.diagnosis.preparation.base import Prepared
 from shipbench.diagnosis.preparation.time_offsets import late_velocities_of
@@ -32,6 +23,15 @@ from shipbench.diagnosis.selection.analysis import THRESHOLD, plain_model
 from shipbench.diagnosis.selection.stepwise import select
 from shipbench.diagnosis.thresholds import THRESHOLDS
 from shipbench.effects.base import EFFECTS, delayed
+from shipbench.estimation.baseline import beside_noise_of, null_fit
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.gauss_newton import Origin, fit
+from shipbench.estimation.laplace import Model
+from shipbench.estimation.linearisation import Scales
+from shipbench.estimation.noise import Colour
+from shipbench.estimation.noise_selection import colour_of
+from shipbench.estimation.outliers import left_out
+from shipbench.estimation.term import Term
 from shipbench.physics.actuators import gear_path
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset

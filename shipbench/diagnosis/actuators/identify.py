@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...estimation.budget import is_spent
+from ...estimation.forward import Plant, Segments, ordinary_gears
 from ...ops import where
 from ...physics.actuators import Gear, gear_path, gear_step
-from ..budget import is_spent
-from ..model.forward import Plant, Segments, ordinary_gears
 from ..thresholds import THRESHOLDS
 from .kinds import ORDINARY, GearFinding, Kind, kinds_of, least_rate
 from .record_error import CHANNELS, FORMS, RecordError, readings

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...effects.base import flow_first
-from ..inference.laplace import Fit, point_from
-from ..inference.robust_prior import NOTICEABLE
-from ..model.forward import HULL, NUM_HULL
-from ..model.linearisation import Point, actives, parameters
-from ..model.rollout import Active
+from ...estimation.coefficients import HULL, NUM_HULL, parameters
+from ...estimation.laplace import Fit, point_from
+from ...estimation.linearisation import Point, actives
+from ...estimation.robust_prior import NOTICEABLE
+from ...estimation.rollout import Active
 
 AXES = ("surge", "sway", "yaw")
 

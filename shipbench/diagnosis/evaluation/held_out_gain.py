@@ -11,15 +11,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...estimation.between_ships import STRUCTURE
+from ...estimation.budget import is_spent
+from ...estimation.coefficients import FREE, NUM_BASE, NUM_HULL
+from ...estimation.forward import Plant, cut
+from ...estimation.linearisation import Linearisation, Point, Scales
+from ...estimation.resampling import averaged
+from ...estimation.term import Term
 from ...physics.actuators import Gear
 from ...records import Dataset
 from ...ship import complete
-from ..budget import is_spent
-from ..model.between_ships import STRUCTURE
-from ..model.forward import NUM_HULL, Plant, cut
-from ..model.linearisation import FREE, NUM_BASE, Linearisation, Point, Scales
-from ..model.resampling import averaged
-from ..model.term import Term
 from ..result import Gain
 from ..thresholds import THRESHOLDS
 

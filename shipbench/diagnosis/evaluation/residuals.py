@@ -9,19 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...estimation.noise import CHANNEL_UNITS, RESIDUALS
 from ..result import Trace, Wrong
 from ..thresholds import THRESHOLDS
 from .dependence import AXES, UNITS, Follows, curve, follows, variables, with_speed
 
 CHANNELS = ("position", "heading", "surge", "sway", "yaw rate")
-CHANNEL_UNITS = {
-    "position": ("m", 1.0),
-    "heading": ("deg", 57.29578),
-    "surge": ("m/s", 1.0),
-    "sway": ("m/s", 1.0),
-    "yaw rate": ("deg/s", 57.29578),
-}
-RESIDUALS = ("x", "y", "heading", "surge", "sway", "yaw rate")
 INPUTS = ("revolutions", "rudder", "bow thruster", "stern thruster")
 FORCE_UNITS = (("mm/s^2", 1e3), ("mm/s^2", 1e3), ("mdeg/s^2", 57.29578e3))
 LAGS = THRESHOLDS.count("correlation_lags")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..inference.laplace import Fit
-from ..model.forward import Segments
+from ...estimation.forward import Segments
+from ...estimation.laplace import Fit
 from ..thresholds import THRESHOLDS
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...estimation.forward import Segments
+from ...estimation.linearisation import Scales
 from ...records import Dataset
-from ..model.forward import Segments
-from ..model.linearisation import Scales
 from ..result import Trace
 from ..selection.analysis import Analysis
 from .held_out_gain import Extension, distance, fit_rollout, rollout_plant

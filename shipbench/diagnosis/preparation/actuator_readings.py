@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...estimation.baseline import first_evidence
+from ...estimation.laplace import Fit
 from ...records import Dataset
 from ...signals import ACTUATORS, MOTION
 from ..actuators.record_error import CHANNELS, RecordError
-from ..inference.baseline import first_evidence
-from ..inference.laplace import Fit
 from ..result import what_it_is
 
 

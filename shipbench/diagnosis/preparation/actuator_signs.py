@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...checking.units import UnitFinding, check_commands
+from ...estimation.baseline import first_evidence, first_fit
+from ...estimation.coefficients import CENTRE, FREE, SPREAD
+from ...estimation.laplace import Fit
 from ...records import Dataset
 from ...signals import DELTA, F_B, F_S, STATES, N
-from ..inference.baseline import first_evidence, first_fit
-from ..inference.laplace import Fit
-from ..model.linearisation import CENTRE, FREE, SPREAD
 from ..thresholds import THRESHOLDS, standard_errors
 
 _LIFT = FREE.index(5)

@@ -21,10 +21,10 @@ from ...data.reread import reread
 from ...data.units import sign_factor, unit_factor
 from ...effects.base import EFFECTS
 from ...errors import InputError
+from ...estimation.forward import SEGMENT
 from ...records import Run
 from ...ship import Particulars, complete
 from ...signals import COMMANDS, PSI, STATES, X, Y
-from ..model.forward import SEGMENT
 from ..thresholds import THRESHOLDS
 from .base import Prepared
 from .derived_speeds import beside_heading, beside_track

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from ...errors import InputError
+from ...estimation.forward import SEGMENT
 from ...records import Dataset
-from ..model.forward import SEGMENT
 from ..thresholds import THRESHOLDS
 from .base import Prepared
 

@@ -17,17 +17,17 @@ from ...checking.track import keeps_time, lags, late_velocities, may_be_none
 from ...checking.yaw import late_yaw_rate
 from ...data.corrections import undelayed
 from ...effects.base import EFFECTS, Effect
+from ...estimation.budget import is_spent
+from ...estimation.gauss_newton import Origin, fit
+from ...estimation.gram import by_run
+from ...estimation.laplace import Fit, Model
+from ...estimation.linearisation import Scales
 from ...records import Dataset, Run
 from ...signals import PSI, STATES, U, V
-from ..budget import is_spent
-from ..inference.gauss_newton import Origin, fit
-from ..inference.gram import by_run
-from ..inference.laplace import Fit, Model
-from ..model.forward import Plant
-from ..model.linearisation import Scales
 from ..thresholds import standard_errors
 from .base import LateVelocities, Prepared
 from .derived_speeds import has_speeds
+from .plant import plant_of
 
 
 def correct_late_velocities(prepared: Prepared) -> Prepared:
@@ -155,7 +155,7 @@ def unfiltered(dataset: Dataset, delay: float) -> tuple[Dataset, float]:
 def _evidence(dataset: Dataset, noise_gain: float) -> np.ndarray:
     """Log evidence (N,) by run of the baseline model for the recorded samples, where those of u and v were amplified by
     `noise_gain`."""
-    plant = Plant.of(dataset)
+    plant = plant_of(dataset)
     scales = Scales(plant)
     origin = Origin.of(plant, scales)
     found = fit(plant, scales, Model(), origin.point, origin.hyper, guess=origin.motion, far=True)

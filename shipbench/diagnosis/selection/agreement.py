@@ -9,13 +9,13 @@ import numpy as np
 
 from ...data.noise import white_noise
 from ...effects.base import Effect
+from ...estimation.coefficients import PLACES
+from ...estimation.forward import Segments
+from ...estimation.gram import by_run, shared_alone, solve
+from ...estimation.laplace import Fit
+from ...estimation.robust_prior import STRANGE, is_strange, needed
+from ...estimation.term import Term
 from ...signals import STATES
-from ..inference.gram import by_run, shared_alone, solve
-from ..inference.laplace import Fit
-from ..inference.robust_prior import STRANGE, is_strange, needed
-from ..model.forward import Segments
-from ..model.linearisation import PLACES
-from ..model.term import Term
 from ..thresholds import THRESHOLDS
 from .screening import evidence
 

@@ -7,17 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...estimation.baseline import null_fit
+from ...estimation.budget import is_spent, refuse_large
+from ...estimation.coefficients import HULL, NUM_BASE
+from ...estimation.forward import Plant
+from ...estimation.laplace import Fit, hull_evidence
+from ...estimation.linearisation import Scales
+from ...estimation.robust_prior import NOTICEABLE
 from ...physics.actuators import Gear
 from ..actuators.identify import find_in_gears
 from ..actuators.kinds import GearFinding
 from ..actuators.record_error import RecordError
-from ..budget import is_spent, refuse_large
 from ..evaluation.held_out_gain import Extension
-from ..inference.baseline import null_fit
-from ..inference.laplace import Fit, hull_evidence
-from ..inference.robust_prior import NOTICEABLE
-from ..model.forward import HULL, Plant
-from ..model.linearisation import NUM_BASE, Scales
 from ..preparation.actuator_readings import judged
 from ..thresholds import THRESHOLDS
 from .requirements import Standard

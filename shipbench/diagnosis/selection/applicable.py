@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...effects.base import Effect
-from ..model.forward import Plant
+from ...estimation.forward import Plant
 
 _PARTS = {"delta": "rudder never moves", "n": "shaft never turns", "F_b": "thrusters are not used"}
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from ..inference.baseline import REFIT_ITERATIONS
-from ..inference.gauss_newton import fit
-from ..inference.laplace import Fit
+from ...estimation.baseline import REFIT_ITERATIONS
+from ...estimation.gauss_newton import fit
+from ...estimation.laplace import Fit
 from .requirements import EVIDENCE, Requirement, Standard, first_unmet
 
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...estimation.forward import Plant, Segments
+from ...estimation.linearisation import Linearisation
 from ...physics.wind import apparent_wind
-from ..model.forward import Plant, Segments
-from ..model.linearisation import Linearisation
 from ..thresholds import THRESHOLDS
 
 Features = tuple[np.ndarray, ...]

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..budget import is_spent
-from ..inference.baseline import first_evidence, null_fit
-from ..inference.laplace import Fit
-from ..model.linearisation import Scales
+from ...estimation.baseline import first_evidence, null_fit
+from ...estimation.budget import is_spent
+from ...estimation.laplace import Fit
+from ...estimation.linearisation import Scales
 from ..thresholds import THRESHOLDS
 
 _FACTORS, _NEAR = (0.4, 2.5), (0.7, 0.85, 1.2, 1.4)

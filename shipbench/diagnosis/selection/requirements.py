@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inference.laplace import Fit
-from ..inference.robust_prior import STRANGE_SIZE
-from ..model.term import Term
+from ...estimation.laplace import Fit
+from ...estimation.robust_prior import STRANGE_SIZE
+from ...estimation.term import Term
 from ..thresholds import THRESHOLDS
 from .agreement import (
     bends,

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..budget import is_spent
-from ..inference.gram import Gram, Prior, Reduced, accelerated, background, shared_alone, solve, update_force
-from ..inference.laplace import Fit
-from ..inference.linalg import log_determinant
-from ..model.term import Term
+from ...estimation.budget import is_spent
+from ...estimation.gram import Gram, Prior, Reduced, accelerated, background, shared_alone, solve, update_force
+from ...estimation.laplace import Fit
+from ...estimation.linalg import log_determinant
+from ...estimation.term import Term
 from ..thresholds import THRESHOLDS
 
 _TAUS = np.log(np.array([0.03, 0.1, 0.3, 1.0, 3.0]) ** 2)

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...effects.base import EFFECTS
+from ...estimation.coefficients import NUM_BASE, PLACES
+from ...estimation.laplace import Fit
+from ...estimation.robust_prior import STRANGE_SIZE, is_strange, needed
 from ..actuators.kinds import slow_on_any_ship
-from ..inference.laplace import Fit
-from ..inference.robust_prior import STRANGE_SIZE, is_strange, needed
-from ..model.linearisation import NUM_BASE, PLACES
 from ..thresholds import THRESHOLDS
 from .agreement import shows_on_any_ship
 from .analysis import Analysis

@@ -9,14 +9,14 @@ from itertools import product, takewhile
 import numpy as np
 
 from ...effects.base import EFFECTS, Effect
-from ..budget import is_spent
-from ..inference.baseline import REFIT_ITERATIONS, beside_noise_of
-from ..inference.gauss_newton import Origin, fit, looking_at
-from ..inference.laplace import Fit, hull_evidence, settle
-from ..inference.robust_prior import widened
-from ..model.forward import Plant
-from ..model.linearisation import Linearisation
-from ..model.term import Term
+from ...estimation.baseline import REFIT_ITERATIONS, beside_noise_of
+from ...estimation.budget import is_spent
+from ...estimation.forward import Plant
+from ...estimation.gauss_newton import Origin, fit, looking_at
+from ...estimation.laplace import Fit, hull_evidence, settle
+from ...estimation.linearisation import Linearisation
+from ...estimation.robust_prior import widened
+from ...estimation.term import Term
 from ..thresholds import THRESHOLDS
 from .applicable import why_not
 from .backward import needed_only, wanted_only

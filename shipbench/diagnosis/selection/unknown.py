@@ -9,13 +9,13 @@ from itertools import groupby
 
 import numpy as np
 
-from ..budget import is_spent
-from ..inference.gauss_newton import fit
-from ..inference.gram import Gram, Prior, beside_products, ornstein_uhlenbeck, solve
-from ..inference.laplace import Fit, products_of, settled_evidence, sloped, whitened
-from ..inference.log_determinant import coefficients_at, slopes
-from ..model.columns import Bend, Columns
-from ..model.linearisation import Linearisation
+from ...estimation.budget import is_spent
+from ...estimation.columns import Bend, Columns
+from ...estimation.gauss_newton import fit
+from ...estimation.gram import Gram, Prior, beside_products, ornstein_uhlenbeck, solve
+from ...estimation.laplace import Fit, products_of, settled_evidence, sloped, whitened
+from ...estimation.linearisation import Linearisation
+from ...estimation.log_determinant import coefficients_at, slopes
 from ..thresholds import THRESHOLDS
 from .features import Feature, of_forces, of_sensors
 from .screening import evidence

@@ -11,6 +11,7 @@ import torch
 import torchdiffeq
 from torch import Tensor, nn
 
+from ...estimation.extension import Active, accelerations
 from ...physics import eq2
 from ...physics.modifiers import Flow
 from ...physics.wind import apparent_wind
@@ -18,7 +19,6 @@ from ...records import Dataset
 from ...signals import PSI, R, U, V
 from .._features import CHANNELS
 from ..physics import Physics
-from ..physics_model.effects import Active, accelerations
 from .stacked import Scaler, StackedMLP
 
 Air = tuple[Tensor, Tensor]

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...estimation.extension import Extension, measured, true_start
 from ...physics import eq2
 from ...ship import Particulars
 from ...signals import MOTION
-from .effects import Extension, measured, true_start
 from .fit import Data, Fit, Forces, bounds, descend, intervals, parameter_scale, rollout_function, subproblem
 
 _P = eq2.NUM_PARAMETERS

@@ -19,6 +19,9 @@ import numpy as np
 
 from ...compiled import Rollout
 from ...effects.base import Effect
+from ...estimation.eq2_rollout import Rolling, parameter_scale
+from ...estimation.extension import Active, accelerations
+from ...estimation.intervals import intervals
 from ...integrate import kinematics, rk4_step
 from ...ops import Array
 from ...physics import eq2
@@ -26,8 +29,6 @@ from ...physics.modifiers import Flow
 from ...records import Batch
 from ...signals import COMMANDS, MOTION
 from ..hold import Hold
-from .effects import Active, accelerations
-from .rollout import Rolling
 
 _P = eq2.NUM_PARAMETERS
 _START = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, -0.8, 1.0, 0.0, 1.0])
@@ -91,16 +92,6 @@ def _rollout_function(
     S_next = ca.jacobian(x_next, x) @ S + ca.jacobian(x_next, p)
     state, following = ca.vertcat(x, ca.vec(S.T)), ca.vertcat(x_next, ca.vec(S_next.T))
     return Rollout(ca.Function("step", [state, w, p], [following], {"cse": True}), machine_code)
-
-
-def parameter_scale(c: eq2.Coefficients) -> np.ndarray:
-    """Typical sizes of p0..p10 for this ship; resistance terms scale with rho L T and the speed sqrt(g L)/10 (130 m:
-    3.6 m/s)."""
-    area = 0.5 * c.rho * c.L * c.T
-    speed = 0.1 * np.sqrt(9.81 * c.L)
-    return np.array(
-        [0.05, 0.01 * area * speed, 0.015 * area, 0.005 * area / speed, 0.05, 2.5, 0.5, 2.0, 0.03, 0.1, 1.5]
-    )
 
 
 def bounds(scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -272,22 +263,3 @@ def _hold_error(batch: Batch, dt: float) -> np.ndarray:
     size = np.sqrt(np.mean(error**2, axis=(0, 1)))
     size[:2] = np.sqrt(np.mean(size[:2] ** 2))
     return np.maximum(size, 1e-9)
-
-
-def intervals(q: np.ndarray, e: np.ndarray, J: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """95 % intervals (num, 2) of the scaled parameters: sandwich covariance clustered over runs, Student's t; NaN at a
-    bound."""
-    from scipy.special import stdtrit  # Student's t; scipy.stats would take a second to import
-
-    free = (q > low + 1e-6) & (q < high - 1e-6)
-    interval = np.full((len(q), 2), np.nan)
-    runs = len(e)
-    if runs < 2 or not free.any():
-        return interval
-    bread = np.linalg.pinv(np.einsum("bksp,bksq->pq", J, J)[np.ix_(free, free)])
-    scores = np.einsum("bksp,bks->bp", J, e)[:, free]
-    with np.errstate(invalid="ignore"):  # a variance that rounds below zero has no interval
-        spread = np.sqrt(np.diag(bread @ (scores.T @ scores * runs / (runs - 1)) @ bread))
-    half = float(stdtrit(runs - 1, 0.975)) * spread
-    interval[free] = np.stack([q[free] - half, q[free] + half], axis=1)
-    return interval

@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from ...diagnosis.evaluation.dependence import AXES
-from ...diagnosis.evaluation.residuals import CHANNEL_UNITS, CHANNELS, ErrorTables, squared_error
+from ...diagnosis.evaluation.residuals import CHANNELS, ErrorTables, squared_error
 from ...diagnosis.result import Diagnosis, Trace
+from ...estimation.noise import CHANNEL_UNITS
 from ...render.table import Table, TableColumn, number, significant
 from ...signals import PSI, R, U, V
 from .linked import fits, rollouts

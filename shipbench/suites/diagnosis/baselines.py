@@ -12,12 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...diagnosis.inference.gauss_newton import between, start
-from ...diagnosis.model.forward import NUM_HULL, Plant
-from ...diagnosis.model.linearisation import FREE, NUM_BASE, Columns, Linearisation, Point, Scales, parameters, predict
-from ...diagnosis.model.rollout import Active
-from ...diagnosis.model.term import Term
+from ...diagnosis.preparation.plant import plant_of
 from ...effects.base import EFFECTS, flow_first
+from ...estimation.coefficients import FREE, NUM_BASE, NUM_HULL, parameters
+from ...estimation.forward import Plant
+from ...estimation.gauss_newton import between, start
+from ...estimation.linearisation import Columns, Linearisation, Point, Scales, predict
+from ...estimation.rollout import Active
+from ...estimation.term import Term
 from ...ops import Array
 from ...physics import eq2
 from ...physics.modifiers import Flow, Modifiers
@@ -70,7 +72,7 @@ def white_residual_test(dataset: Dataset, names: Sequence[str] | None = None) ->
     The residuals count as white with one variance per channel; the penalty is that of BIC. Effects with one set of
     values per run have as many degrees of freedom as runs.
     """
-    plant = Plant.of(dataset)
+    plant = plant_of(dataset)
     scales, terms = Scales(plant), candidate_terms(plant, names)
     point, _ = start(plant)
     noise = scales.noise
@@ -97,7 +99,7 @@ def derivative_regression(dataset: Dataset, names: Sequence[str] | None = None) 
     column, by forward selection with BIC. Sensor errors, which are no forces, have no columns: with them it selects
     `speed_scale` in every set, since smoothing makes all derivatives too small.
     """
-    plant = Plant.of(dataset)
+    plant = plant_of(dataset)
     scales, terms = Scales(plant), [t for t in candidate_terms(plant, names) if t.effect.enters != "sensor"]
     rows = _Derivatives(plant, scales)
     target = rows.defect((), np.zeros(NUM_BASE))

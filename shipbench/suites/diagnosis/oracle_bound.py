@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...diagnosis.actuators.identify import find_in_gears
-from ...diagnosis.inference.baseline import null_fit
-from ...diagnosis.inference.laplace import Fit, settle
-from ...diagnosis.model.forward import Plant
-from ...diagnosis.model.linearisation import Linearisation, Scales
-from ...diagnosis.model.term import Term
+from ...diagnosis.preparation.plant import plant_of
 from ...effects.base import Effect
+from ...estimation.baseline import null_fit
+from ...estimation.laplace import Fit, settle
+from ...estimation.linearisation import Linearisation, Scales
+from ...estimation.term import Term
 from ...records import Dataset
 
 LEVEL = 0.05
@@ -64,6 +64,6 @@ def power(expected: float, level: float = LEVEL) -> float:
 
 def bound(dataset: Dataset, hidden: Sequence[tuple[Effect, Sequence[np.ndarray]]]) -> float:
     """Power of the test for the hidden effect of least non-centrality."""
-    plant = Plant.of(dataset)
+    plant = plant_of(dataset)
     null = null_fit(plant, Scales(plant))
     return min(power(expected_ratio(null, effect, values)) for effect, values in hidden)

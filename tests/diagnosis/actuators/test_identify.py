@@ -14,12 +14,12 @@ from shipbench.diagnosis.actuators.identify import _Record, find_in_gears
 from shipbench.diagnosis.actuators.kinds import GearFinding, kinds_of
 from shipbench.diagnosis.diagnose import diagnose
 from shipbench.diagnosis.evaluation.held_out_gain import rollout_plant
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.rollout import Active
 from shipbench.diagnosis.selection import stepwise
 from shipbench.diagnosis.selection.analysis import plain_model
 from shipbench.diagnosis.selection.stepwise import select
 from shipbench.effects.base import EFFECTS, Effect, Parameter
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.rollout import Active
 from shipbench.ops import Array
 from shipbench.physics.actuators import Gear, gear_path
 from shipbench.physics.mmg import MMGShip, load_mmg_ship

@@ -11,8 +11,8 @@ import pytest
 from shipbench.diagnosis.actuators.identify import find_in_gears
 from shipbench.diagnosis.actuators.record_error import RecordError, readings
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.model.forward import Plant
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.forward import Plant
 from shipbench.physics.actuators import Gear, gear_path
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset

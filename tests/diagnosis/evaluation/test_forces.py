@@ -9,11 +9,11 @@ import pytest
 from made_fits import made_fit
 
 from shipbench.diagnosis.evaluation.forces import force_of_hull, force_of_term
-from shipbench.diagnosis.inference.laplace import Fit
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.linearisation import FREE, NUM_BASE
-from shipbench.diagnosis.model.term import Term
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.coefficients import FREE, NUM_BASE
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.laplace import Fit
+from shipbench.estimation.term import Term
 
 
 def moving(plant: Plant, name: str, *values: float) -> Fit:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from shipbench.diagnosis.budget import Budget
 from shipbench.diagnosis.diagnose import _folds, _one_fold, diagnose
 from shipbench.diagnosis.evaluation.held_out_gain import summarise
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.budget import Budget
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
 from shipbench.simulate.hidden import Hidden

@@ -10,12 +10,12 @@ from made_fits import made_fit
 
 from shipbench.checking.units import check_units, corrected, merged
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.inference.laplace import Fit
-from shipbench.diagnosis.model.forward import Plant
 from shipbench.diagnosis.preparation import actuator_signs as turned
 from shipbench.diagnosis.preparation.actuator_signs import turned_actuators
 from shipbench.diagnosis.selection.analysis import plain_model
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.laplace import Fit
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
 from shipbench.signals import DELTA, F_B, F_S, STATES

@@ -9,10 +9,6 @@ import pytest
 from made_fits import RUNS, fit_of, fit_to, fit_to_pieces, made_fit, made_plant
 
 from shipbench.diagnosis.actuators.kinds import ORDINARY
-from shipbench.diagnosis.inference.laplace import Fit
-from shipbench.diagnosis.model.forward import ordinary_gears
-from shipbench.diagnosis.model.linearisation import NUM_BASE, PLACES
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection import agreement as robust
 from shipbench.diagnosis.selection import requirements
 from shipbench.diagnosis.selection.agreement import (
@@ -27,6 +23,10 @@ from shipbench.diagnosis.selection.agreement import (
 )
 from shipbench.diagnosis.selection.requirements import SURE, Standard, first_unmet
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.coefficients import NUM_BASE, PLACES
+from shipbench.estimation.forward import ordinary_gears
+from shipbench.estimation.laplace import Fit
+from shipbench.estimation.term import Term
 from shipbench.signals import DELTA
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from made_fits import made_fit
 
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection.agreement import is_on_a_ship
 from shipbench.diagnosis.selection.applicable import why_not
 from shipbench.diagnosis.selection.stepwise import candidates_for
 from shipbench.effects.base import EFFECTS, Effect, Parameter
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.term import Term
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
 from shipbench.ship import complete
@@ -61,12 +61,10 @@ def test_what_acts_through_an_actuator_that_never_works_is_not_asked(channels: t
     assert {"current", "heading_bias", "added_resistance"} <= asked
 
 
-def test_a_rudder_that_stands_still_while_the_ship_turns_does_not_work(monkeypatch):
-    assert why_not(EFFECTS.get("rudder_offset"), without(DELTA, value=1e-3)) == ""  # held, for all that is known
-    monkeypatch.setattr(
-        "shipbench.diagnosis.model.forward.standing", lambda _: {"delta": ("it turns all the same", {})}
-    )
-    assert "rudder never moves" in why_not(EFFECTS.get("rudder_offset"), without(DELTA, value=1e-3))
+def test_a_rudder_whose_record_stands_still_does_not_work():
+    data = trials()
+    assert why_not(EFFECTS.get("rudder_offset"), Plant.of(data)) == ""
+    assert "rudder never moves" in why_not(EFFECTS.get("rudder_offset"), Plant.of(data, still={"delta"}))
 
 
 def test_a_plug_in_is_asked_as_much_as_a_built_in_effect():

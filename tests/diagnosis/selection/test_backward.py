@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from made_fits import RUNS, fit_of, fit_to, made_fit
 
-from shipbench.diagnosis.inference.gauss_newton import start
-from shipbench.diagnosis.inference.laplace import Fit
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection import backward
 from shipbench.diagnosis.selection.backward import needed_only, wanted_only, without
 from shipbench.diagnosis.selection.requirements import EVIDENCE, SIGNIFICANT, Standard
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.gauss_newton import start
+from shipbench.estimation.laplace import Fit
+from shipbench.estimation.term import Term
 
 TERMS = tuple(Term(EFFECTS.get(name)) for name in ("rudder_offset", "thrust_gain", "mass_change"))
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.inference.gauss_newton import start
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.linearisation import Linearisation, Scales
 from shipbench.diagnosis.selection.features import Feature, of_forces, of_sensors
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.gauss_newton import start
+from shipbench.estimation.linearisation import Linearisation, Scales
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.trials import Trials, sea_trials
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from made_fits import made_fit
 
-from shipbench.diagnosis.inference.baseline import null_fit
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.linearisation import Scales
 from shipbench.diagnosis.selection import other_size
 from shipbench.diagnosis.selection.other_size import better_size
+from shipbench.estimation.baseline import null_fit
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.linearisation import Scales
 from shipbench.ship import Ship, complete
 from shipbench.simulate.published import PUBLISHED, published_trials
 from shipbench.simulate.trials import Trials

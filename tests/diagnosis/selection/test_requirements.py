@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from made_fits import RUNS, fit_of, made_fit
 
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection import requirements
 from shipbench.diagnosis.selection.requirements import (
     REQUIREMENTS,
@@ -23,6 +22,7 @@ from shipbench.diagnosis.selection.requirements import (
 from shipbench.diagnosis.selection.screening import Score
 from shipbench.effects.base import EFFECTS, Effect
 from shipbench.effects.traits import Traits
+from shipbench.estimation.term import Term
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "shipbench-example"
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection.screening import _wrong_way, other_kinds_from
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.term import Term
 
 
 @pytest.mark.parametrize(

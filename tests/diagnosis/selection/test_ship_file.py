@@ -11,14 +11,14 @@ from made_fits import made_analysis, made_fit
 from shipbench.checking.units import UnitFinding
 from shipbench.diagnosis import diagnose as whole
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.linearisation import NUM_BASE
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection import ship_file
 from shipbench.diagnosis.selection.analysis import THRESHOLD, plain_model
 from shipbench.diagnosis.selection.ship_file import doubts_of, whatever_the_ship
 from shipbench.diagnosis.selection.stepwise import select
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.coefficients import NUM_BASE
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.term import Term
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials

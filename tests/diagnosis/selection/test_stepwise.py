@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from made_fits import RUNS, made_fit, made_plant
 
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection.screening import Score
 from shipbench.diagnosis.selection.stepwise import (
     CONFUSED,
@@ -17,6 +16,7 @@ from shipbench.diagnosis.selection.stepwise import (
     worth_a_refit,
 )
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.term import Term
 
 
 def step(number: int, name: str, score: float) -> Step:

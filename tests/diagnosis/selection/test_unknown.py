@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from shipbench.diagnosis.inference.baseline import null_fit
-from shipbench.diagnosis.inference.gauss_newton import fit
-from shipbench.diagnosis.inference.laplace import Fit, Model
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.linearisation import Scales
-from shipbench.diagnosis.model.term import Term
 from shipbench.diagnosis.selection.unknown import SENSORS, Dependence, Search, dependences
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.baseline import null_fit
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.gauss_newton import fit
+from shipbench.estimation.laplace import Fit, Model
+from shipbench.estimation.linearisation import Scales
+from shipbench.estimation.term import Term
 from shipbench.ops import Array
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.physics.modifiers import Flow, Modifiers

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from shipbench.diagnosis.inference.baseline import null_fit
-from shipbench.diagnosis.inference.laplace import Fit
-from shipbench.diagnosis.model.forward import Plant
-from shipbench.diagnosis.model.linearisation import Scales
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation.baseline import null_fit
+from shipbench.estimation.forward import Plant
+from shipbench.estimation.laplace import Fit
+from shipbench.estimation.linearisation import Scales
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.trials import Trials, sea_trials

@@ -1,0 +1,269 @@
+"""The whole ship calibrated: eq. (2) to (8) with every coefficient free about its prior between ships.
+
+Hull, rudder, propeller in four quadrants, thrusters and wind take part. Published regressions are the prior means, the
+differences between ordinary ships the prior standard deviations. The fit is the maximum of the posterior with a latent
+force integrated out. Open-loop rollouts refine it where that pays on validation runs.
+
+Source: docs/theory.md#calibration; priors: docs/calibration.md#ordinary-differences-between-ships.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from itertools import product
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ..effects.base import flow_first
+from ..errors import WorkError
+from ..estimation.actuator_fit import fit_actuators
+from ..estimation.calibration import (  # fmt: skip
+    Calibration,
+    calibrated,
+    calibration_of,
+    estimated,
+    position_errors,
+    refined,
+    rollout_plant,
+    some_of,
+)
+from ..estimation.coefficients import FREE, NUM_BASE, NUM_HULL, ShipScales, hull_changes, parameters
+from ..estimation.extension import ACTUATOR_OF, Extension, measured, true_start
+from ..estimation.forward import Plant, known_effects
+from ..estimation.gears import fit_gears, gears_of
+from ..estimation.laplace import Fit
+from ..estimation.linearisation import Scales
+from ..estimation.priors import PRIORS
+from ..estimation.rollout import Active, Course, Vessel
+from ..estimation.term import Given, Term
+from ..physics.actuators import Gear, gear_path
+from ..records import Dataset
+from ..signals import ACTUATORS, COMMANDS, MOTION
+from ._saved import check_shapes
+from .base import History
+from .physics_model.fitted_ship import ACTUATOR_PARAMETERS, FittedShip
+
+_PIECES = (60.0, 240.0)
+"""Lengths of rollouts [s] that are tried in the refinement, for a ship of 130 m (Froude-scaled)."""
+_UNKNOWN = 0.9
+"""Posterior over prior standard deviation above which runs hold next to no information about a coefficient."""
+
+
+@dataclass
+class Calibrated(FittedShip):
+    """Fitted physics with all coefficients of the ship calibrated.
+
+    Args:
+        refine: whether open-loop rollouts refine the estimate where that pays on validation runs.
+    """
+
+    refine: bool = True
+    name: ClassVar[str] = "calibrated"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.refine, bool):
+            raise ValueError(f"refine = {self.refine}; accepted: true or false")
+
+    @property
+    def fitted(self) -> bool:
+        """Whether it can predict."""
+        return hasattr(self, "calibration")
+
+    def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
+        """Calibrate the ship to `train`; `valid` decides whether rollouts refine the estimate, then joins the runs.
+
+        Raises:
+            InputError: the spec gives an effect a value that no such ship has.
+            WorkError: the fit found no finite estimate.
+        """
+        self._set_ship(train.ship, train.inputs, train.dt, train.actuators == "commanded")
+        if self.extension is not None:
+            self.extension = Extension(self.extension.terms)  # a second fit starts afresh
+            self.extension.check(self.particulars.L)
+        data = train.merged(valid)
+        plant = Plant.of(data)
+        self.shallow = bool(plant.water)
+        self.gears = self._fit_gears(data, plant)
+        first = self._first(some_of(Plant.of(train)))
+        seconds = self._refinement(train, valid, calibration_of(first)) if self.refine and valid is not None else None
+        model = calibration_of(calibrated(plant, first, first.model.terms))
+        if seconds is not None:
+            rolled = rollout_plant(data, self.gears, seconds)
+            model = refined(rolled, Scales(rolled), model)
+        if not np.isfinite(model.base).all():
+            raise WorkError(
+                f"the calibration of '{train.name}' found no finite estimate; check units and signs with `shipbench "
+                "data check`."
+            )
+        self._take(model)
+        return self
+
+    def _fit_gears(self, data: Dataset, plant: Plant) -> dict[str, Gear]:
+        """Dynamics between commands and actuators: found from the records, or ordinary ones where there are none."""
+        if self.commanded:
+            return dict(plant.ordinary)
+        batch = data.windows(min(len(r) for r in data.runs) - 1).batch()
+        self.actuator_params = fit_actuators(batch, self.dt)
+        if self.extension is not None:
+            self.actuator_params, self.extension = fit_gears(
+                batch, self.dt, self.substeps, self.extension, self.actuator_params, self.particulars
+            )
+        gears = gears_of(self.actuator_params)
+        for active in self.extension.active("gear") if self.extension is not None else []:
+            active.effect.gear(gears, active.q)
+        return gears
+
+    def _first(self, plant: Plant) -> Fit:
+        """First estimate; beside effects whose shape parameters are open, that with the most evidence."""
+        found = estimated(plant)
+        choices = self._choices(plant)
+        if choices == [()]:
+            return found
+        return max((calibrated(plant, found, terms) for terms in choices), key=lambda fit: fit.evidence)
+
+    def _choices(self, plant: Plant) -> list[tuple[Term, ...]]:
+        """Terms of the effects that the motion shows, once for every setting of open shape parameters."""
+        found = []
+        for t in self._shown():
+            effect = t.effect if not any(v is not None for v in t.given) else Given(t.effect, t.given)
+            open_shapes = [i for i, p in enumerate(t.effect.parameters) if p.shape and t.given[i] is None]
+            shapes = [i for i, p in enumerate(t.effect.parameters) if p.shape]
+            positions = plant.seg.states[..., :2]
+            settings = {
+                tuple(value for i, value in zip(shapes, setting, strict=True) if i in open_shapes)
+                for setting in t.effect.settings(positions, self.particulars)
+            }
+            found.append([Term(effect, setting) for setting in sorted(settings)])
+        return list(product(*found))
+
+    def _shown(self) -> list[Any]:
+        """Effects of the spec that are found from the motion; gears are where the record has the commands alone."""
+        terms = () if self.extension is None else self.extension.terms
+        return [t for t in terms if self.commanded or t.effect.enters != "gear"]
+
+    def _refinement(self, train: Dataset, valid: Dataset, start: Calibration) -> float | None:
+        """Length of the rollouts [s] whose refinement of a first estimate predicts the validation runs best; None where
+        the estimate itself does. As few rollouts take part as pieces in the estimate."""
+        froude = (self.particulars.L / 130.0) ** 0.5
+        test = rollout_plant(valid, self.gears, _PIECES[-1] * froude)
+        errors = {None: position_errors(test, Scales(test), start).mean()}
+        for seconds in (froude * piece for piece in _PIECES):
+            plant = some_of(rollout_plant(train, self.gears, seconds))
+            errors[seconds] = position_errors(test, Scales(test), refined(plant, Scales(plant), start)).mean()
+        return min(errors, key=errors.__getitem__)
+
+    def _take(self, model: Calibration) -> None:
+        """Keep a calibration, and put the amplitudes of its terms into the extension."""
+        self.calibration = model
+        if self.extension is None:
+            return
+        values, row = [list(q) for q in self.extension.values], np.cumsum([0, *map(len, self.extension.values)])
+        terms = [i for i, t in enumerate(self.extension.terms) if any(t is shown for shown in self._shown())]
+        for i, term, value, spread in zip(terms, model.terms, model.values, model.value_spreads, strict=True):
+            size = np.array([abs(p.typical) for p in term.effect.sized(self.particulars.L) if not p.shape])
+            t = self.extension.terms[i]
+            free = [j for j, p in enumerate(t.effect.parameters) if t.given[j] is None and not p.shape]
+            open_shapes = [j for j, p in enumerate(t.effect.parameters) if t.given[j] is None and p.shape]
+            for j, amplitude, half in zip(free, size * value, 1.96 * size * spread, strict=True):
+                values[i][j] = float(amplitude)
+                self.extension.ci95[row[i] + j] = amplitude - half, amplitude + half
+            for j, shape in zip(open_shapes, term.setting, strict=True):
+                values[i][j] = shape
+        self.extension = replace(self.extension, values=[tuple(q) for q in values])
+
+    def actuator_path(self, s0: np.ndarray, U: np.ndarray) -> np.ndarray:
+        """n, delta, F_b, F_s at the beginning, middle and end of every substep, (batch, K * substeps, 3, 4)."""
+        gears = dict(self.gears)
+        if self.commanded and self.extension is not None:
+            for active in self.extension.active("gear"):
+                active.effect.gear(gears, active.q)
+        steps = U.shape[1] * self.substeps
+        path = np.empty((len(s0), steps, 3, 4))
+        for i, key in enumerate(ACTUATOR_OF):
+            fine = gear_path(s0[:, 6 + i], U[:, :, i], self.dt, gears[key], 2 * self.substeps)
+            path[:, :, :, i] = np.stack([fine[:, stage : stage + 2 * steps - 1 : 2] for stage in range(3)], axis=-1)
+        return path
+
+    def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
+        active = () if self.extension is None else self.extension.active("force")
+        sensors = [] if self.extension is None else self.extension.active("sensor")
+        start, path = true_start(s0, sensors, self.dt), self.actuator_path(s0, U)
+        B, K = U.shape[:2]
+        h = self.dt / self.substeps
+        at = (np.arange(K * self.substeps)[:, None] + 0.5 * np.arange(3)) * h
+        t = np.broadcast_to(at.reshape(K, 1, self.substeps, 3), (K, B, self.substeps, 3))
+        wind = self._wind(U)
+        air = None if wind is None else np.swapaxes(wind, 0, 1)
+        course = Course(Vessel(self.particulars, self.c), h, np.ascontiguousarray(t), air)
+        p, ship = parameters(self._scales(), self.calibration.base)
+        depth = {"depth": U[..., self.inputs.index("depth")].mean(axis=1)} if self.shallow else {}
+        forces = flow_first([Active(a.effect, a.q) for a in active])
+        act = np.moveaxis(path.reshape(B, K, self.substeps, 3, 4), 1, 0)
+        push = np.zeros((K, B, self.substeps, 3, 3))
+        S = np.empty((B, K + 1, s0.shape[1]))
+        S[:, 0] = start
+        water = known_effects(depth, self.particulars)
+        S[..., MOTION] = course.rolled(start[:, MOTION], p, [*forces, *ship, *water], act, push)
+        S[:, 1:, ACTUATORS] = (
+            U[..., : len(COMMANDS)] if self.commanded else path[:, self.substeps - 1 :: self.substeps, 2]
+        )
+        return measured(S, sensors, self.dt)[:, 1:]
+
+    def _scales(self) -> ShipScales:
+        return ShipScales.of(self.particulars, self.c, bool(self._wind_columns()))
+
+    def describe(self) -> str:
+        """Every coefficient with its prior and its posterior (mean +- standard deviation), how many prior standard
+        deviations it moved, and what these runs do not determine."""
+        lines = [
+            f"calibrated physics of {self.ship.name}: eq. (2) to (8) with {NUM_BASE} coefficients, prior and posterior "
+            "(mean +- standard deviation)",
+            f"  {'coefficient':24s} {'prior':>17s} {'posterior':>17s} {'moved':>6s}  unit; meaning",
+        ]
+        unknown = []
+        widths, base, spread = self.calibration.widths, self.calibration.base, self.calibration.spread
+        changes = hull_changes(base[len(FREE) : len(FREE) + NUM_HULL])
+        structure = self._scales().structure
+        for i, prior in enumerate(PRIORS):
+            unit = structure[i - len(FREE) - NUM_HULL] if i >= len(FREE) + NUM_HULL else prior.spread
+            if unit == 0.0:
+                continue  # the ship file or a missing input leaves no room
+            hull = len(FREE) <= i < len(FREE) + NUM_HULL
+            value = prior.centre + (changes[i - len(FREE)] if hull else unit * base[i])
+            if spread[i] > _UNKNOWN * widths[i]:
+                unknown.append(prior.name)
+            lines.append(
+                f"  {prior.name:24s} {prior.centre:8.3g} +-{unit:7.2g} {value:8.3g} +-{unit * spread[i]:7.2g} "
+                f"{base[i]:+6.1f}  {prior.unit}; {prior.title}"
+            )
+        if unknown:
+            lines.append(f"  not determined by these runs (the prior stands): {', '.join(unknown)}")
+        if self.commanded:
+            lines.append("  actuators: the data record commands only; ordinary dynamics between command and actuator")
+        else:
+            lines += [
+                f"  {symbol:10s} = {value:10.4g} {unit:6s} {meaning}"
+                for (symbol, meaning, unit), value in zip(ACTUATOR_PARAMETERS, self.actuator_params, strict=True)
+            ]
+        lines += self.extension.describe() if self.extension is not None else []
+        return "\n".join(lines + [f"  note: {n}" for n in self.particulars.notes])
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        model = self.calibration
+        return {"base": model.base, "spread": model.spread, "widths": model.widths, **self._ship_arrays()}
+
+    def _meta(self) -> dict[str, Any]:
+        return self._ship_meta() | {"gears": {k: asdict(g) for k, g in self.gears.items()}, "shallow": self.shallow}
+
+    def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+        check_shapes(arrays, {name: (NUM_BASE,) for name in ("base", "spread", "widths")})
+        self._restore_ship(arrays, meta)
+        self.calibration = Calibration(arrays["base"], arrays["spread"], arrays["widths"])
+        self.gears = {
+            name: Gear(**{k: float(v) for k, v in meta["gears"][name].items()}) for name in ("n", "delta", "F")
+        }
+        self.shallow = bool(meta["shallow"])
+
+
+PREDICTOR = Calibrated
