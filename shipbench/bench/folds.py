@@ -12,7 +12,13 @@ import numpy as np
 from ..errors import InputError
 from ..records import Dataset, Run
 from ..signals import U, V
+from .severity import measured, severities, severity_notes
 from .task import Task
+
+_MILD_SHARE = 0.6
+"""Share of the runs, the least severe, that split = "extrapolate" trains on."""
+_LEAST_STEP = 1.1
+"""Severity of the most severe run relative to the training runs, below which all runs count as alike."""
 
 
 @dataclass(frozen=True)
@@ -52,12 +58,17 @@ def select_runs(dataset: Dataset, task: Task) -> tuple[Dataset, tuple[str, ...]]
     return selected, (*notes, *split_notes(selected, task))
 
 
-def _groups(runs: Sequence[Run], rng: np.random.Generator) -> list[list[Run]]:
-    """Runs by group, groups in random order."""
+def _grouped(runs: Sequence[Run]) -> list[list[Run]]:
+    """Runs by group, in the order of the data set."""
     groups: dict[str, list[Run]] = {}
     for run in runs:
         groups.setdefault(run.group, []).append(run)
-    ordered = list(groups.values())
+    return list(groups.values())
+
+
+def _groups(runs: Sequence[Run], rng: np.random.Generator) -> list[list[Run]]:
+    """Runs by group, groups in random order."""
+    ordered = _grouped(runs)
     return [ordered[i] for i in rng.permutation(len(ordered))]
 
 
@@ -152,17 +163,45 @@ def mean_speed(run: Run) -> float:
     return float(np.hypot(run.states[:, U], run.states[:, V]).mean())
 
 
+def _by_severity(dataset: Dataset) -> tuple[list[Run], list[Run]]:
+    """Training and scored runs (rest, test) by severity, whole groups: the least severe train, the runs beyond all of
+    them are scored.
+
+    A group is as severe as its most severe run. The milder runs of a group that is scored are left out.
+    """
+    severity = dict(zip((r.id for r in dataset.runs), severities(measured(dataset.runs)).tolist(), strict=True))
+    mildest, *others = sorted(_grouped(dataset.runs), key=lambda group: max(severity[r.id] for r in group))
+    rest = [*mildest]
+    for group in others:
+        if len(rest) + len(group) > _MILD_SHARE * len(dataset):
+            break
+        rest += group
+    limit, largest = max(severity[r.id] for r in rest), max(severity.values())
+    if largest <= _LEAST_STEP * limit:
+        why = (
+            f"rudder, drift angle and speed of all runs are alike: severity {largest:.3g} at most, {limit:.3g} in "
+            f"the training runs, and more than {_LEAST_STEP:g} times that is needed"
+            if others
+            else "all runs are one group, which no split may part"
+        )
+        raise InputError(
+            f"split = 'extrapolate', but in data set '{dataset.name}' {why}. Add runs with larger rudder angles or "
+            "higher speeds, or use split = 'folds'."
+        )
+    trained = {r.group for r in rest}
+    test = [r for r in dataset.runs if r.group not in trained and severity[r.id] > limit]
+    return [r for r in dataset.runs if r.group in trained], test
+
+
 def _by_speed(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]:
     """Folds by mean speed, whole groups: the fastest are scored, until they are one `folds`-th of the runs."""
-    groups: dict[str, list[Run]] = {}
-    for run in dataset.runs:
-        groups.setdefault(run.group, []).append(run)
+    groups = _grouped(dataset.runs)
     if len(groups) < 2:
         raise InputError(
             f"split = 'speed', but data set '{dataset.name}' has one group of runs only; two or more are needed. "
             "Use split = 'published'."
         )
-    fastest = sorted(groups.values(), key=lambda group: -float(np.mean([mean_speed(r) for r in group])))
+    fastest = sorted(groups, key=lambda group: -float(np.mean([mean_speed(r) for r in group])))
     test: list[Run] = []
     for group in fastest[:-1]:
         test += group
@@ -195,8 +234,7 @@ def _fewer(rest: list[Run], task: Task, index: int) -> tuple[list[Run], int | No
 
 
 def split_notes(dataset: Dataset, task: Task) -> tuple[str, ...]:
-    """Notes on an extrapolation split: the kind that each fold scores, or the speeds that separate training and test
-    runs."""
+    """Notes on an extrapolation split: the kind that each fold scores, or the ranges of the training and test runs."""
     if task.split == "kind":
         pairs = _by_kind(dataset)
         return tuple(
@@ -210,6 +248,11 @@ def split_notes(dataset: Dataset, task: Task) -> tuple[str, ...]:
             f"trained on {len(rest)} runs with mean speeds of {slow[0]:.3g} to {slow[-1]:.3g} m/s, "
             f"scored on the {len(test)} fastest with {fast[0]:.3g} to {fast[-1]:.3g} m/s",
         )
+    if task.split == "extrapolate":
+        rest, test = _by_severity(dataset)
+        out = len(dataset) - len(rest) - len(test)
+        left = (f"{out} milder runs are left out: their groups are scored, or they are at the limit",) if out else ()
+        return (*severity_notes(measured(rest), measured(test)), *left)
     return ()
 
 
@@ -219,18 +262,21 @@ def _pairs(dataset: Dataset, task: Task) -> list[tuple[list[Run], list[Run]]]:
         return _published(dataset)
     if task.split == "kind":
         return _by_kind(dataset)
+    if task.split == "extrapolate":
+        return [_by_severity(dataset)]
     return _by_speed(dataset, task) if task.split == "speed" else _by_folds(dataset, task)
 
 
 def make_folds(dataset: Dataset, task: Task) -> list[Fold]:
-    """The folds of a task, the same for every model. The published split and the split by speed are a single fold.
+    """The folds of a task, the same for every model. The splits "published", "speed" and "extrapolate" are a
+    single fold.
 
     `dataset` holds whole runs (see `select_runs`). Training and validation windows do not overlap; scored windows are
     `stride_s` apart.
 
     Raises:
-        InputError: more folds than groups, too many training or validation runs, or no published split, or no kinds to
-            tell apart.
+        InputError: more folds than groups, too many training or validation runs, no published split, no kinds to tell
+            apart, or runs that are all alike.
     """
     steps, history, stride = task.steps(dataset.dt), task.history(dataset.dt), task.stride(dataset.dt)
     cut = cache(lambda run, every: run.windows(history + steps + 1, every))  # the folds share the windows of a run

@@ -33,11 +33,12 @@ class Task(BaseModel):
 
     `history_s`: recorded time before s0 that every predictor may use. `split`: "folds" (by run, seeded by `fold_seed`),
     "published" (the data set's own `split` of each run), "kind" (each fold scores one kind of manoeuvre and trains on
-    all others) or "speed" (trains on the slower runs and scores the fastest 1/`folds` of them). `stride_s`: distance of
-    the scored windows in runs longer than the horizon (default: they do not overlap). `valid_runs`: training runs set
-    aside for early stopping (default: one ninth, 8 of 72). `train_runs`: use only that many runs for fitting and early
-    stopping together, the same scored runs (`valid_runs` shrinks in proportion, to one at least). `max_runs`: use only
-    that many runs, evenly spread over the data set.
+    all others), "speed" (trains on the slower runs and scores the fastest 1/`folds` of them) or "extrapolate" (trains
+    on the 60 % of the runs with the least rudder angles, drift angles and speeds, and scores the runs beyond them; see
+    `severity`). `stride_s`: distance of the scored windows in runs longer than the horizon (default: they do not
+    overlap). `valid_runs`: training runs set aside for early stopping (default: one ninth, 8 of 72). `train_runs`: use
+    only that many runs for fitting and early stopping together, the same scored runs (`valid_runs` shrinks in
+    proportion, to one at least). `max_runs`: use only that many runs, evenly spread over the data set.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -58,7 +59,7 @@ class Task(BaseModel):
     horizon_s: Number = Field(120.0, gt=0)
     history_s: Number = Field(0.0, ge=0)
     folds: Whole = Field(5, ge=2)
-    split: Literal["folds", "published", "kind", "speed"] = "folds"
+    split: Literal["folds", "published", "kind", "speed", "extrapolate"] = "folds"
     stride_s: Number | None = Field(None, gt=0)
     seeds: tuple[_Seed, ...] = Field((0,), min_length=1)
     metrics: tuple[str, ...] = DEFAULT_METRICS

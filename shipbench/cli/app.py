@@ -135,7 +135,10 @@ def run(
     folds: Annotated[int | None, typer.Option(help="Number of folds (default 5).")] = None,
     split: Annotated[
         str | None,
-        typer.Option(help="folds, published, kind (leave one kind of manoeuvre out) or speed (score the fastest)."),
+        typer.Option(
+            help="folds, published, kind (leave one kind of manoeuvre out), speed (score the fastest) or extrapolate "
+            "(train on small rudder angles, drift angles and speeds, score beyond them)."
+        ),
     ] = None,
     seeds: Annotated[str | None, typer.Option(help="Seeds, such as 0,1,2 (default 0).")] = None,
     horizon: Annotated[float | None, typer.Option(help="Seconds to predict (default 120).")] = None,

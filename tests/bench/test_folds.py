@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from shipbench.bench.folds import make_folds, mean_speed, select_runs
+from shipbench.bench.severity import measured, severities
 from shipbench.bench.task import make_task
 from shipbench.errors import InputError
+from shipbench.signals import DELTA, U, V
 
 
 def task(**changes):
@@ -174,6 +178,60 @@ def test_the_split_by_speed_scores_the_fastest_runs_only(toy):
     [note] = select_runs(data, task(split="speed", folds=4))[1]
     assert note.startswith("trained on 15 runs with mean speeds of ")
     assert f"to {max(speed.values()):.3g} m/s" in note
+
+
+def steered(dataset, rudder):
+    """The runs at 5 m/s without drift; run i has its rudder at rudder[i] degrees."""
+    runs = []
+    for run, angle in zip(dataset.runs, rudder, strict=True):
+        states = run.states.copy()
+        states[:, U], states[:, V], states[:, DELTA] = 5.0, 0.0, np.deg2rad(angle)
+        runs.append(replace(run, states=states))
+    return dataset.with_runs(runs)
+
+
+def test_extrapolation_tests_every_run_beyond_all_training_runs(toy):
+    data = toy(20)
+    severity = dict(zip((r.id for r in data.runs), severities(measured(data.runs)), strict=True))
+    [fold] = make_folds(data, task(split="extrapolate", valid_runs=2))
+    train, valid, test = sides(fold)
+    assert [len(side) for side in (train, valid, test)] == [10, 2, 8]
+    assert min(severity[r] for r in test) > max(severity[r] for r in train | valid)
+    largest = measured([data[r] for r in sorted(train | valid)]).max(axis=0)
+    assert (measured([data[r] for r in sorted(test)]) > largest).any(axis=1).all()
+
+
+def test_extrapolation_says_which_ranges_were_trained_and_tested(toy):
+    data = steered(toy(10), [10, -20, 5, 35, -4, 15.2, 8, 11.8, 25, 2])
+    assert select_runs(data, task(split="extrapolate"))[1] == (
+        "trained on the 6 least severe runs: rudder up to 11.8 deg, drift angle up to 0 deg, speed up to 5.00 m/s",
+        "tested on 4 runs beyond: rudder 15.2 to 35.0 deg (4 runs)",
+    )
+
+
+def test_extrapolation_leaves_out_the_mild_runs_of_a_group_that_is_tested(toy):
+    rudder = [2, 35, 3, 30, 4, 5, 6, 7, 8, 9]
+    data = steered(toy(10, meta=lambda i: {"group": i // 2 if i < 4 else i}), rudder)
+    [fold] = make_folds(data, task(split="extrapolate", valid_runs=0))
+    assert sides(fold) == ({"r04", "r05", "r06", "r07", "r08", "r09"}, set(), {"r01", "r03"})
+    assert select_runs(data, task(split="extrapolate"))[1][-1].startswith("2 milder runs are left out")
+
+
+@pytest.mark.parametrize(
+    ("group", "rudder", "message"),
+    [
+        (
+            lambda i: {},
+            [10] * 10,
+            r"all runs are alike: severity 1 at most, 1 in the training runs, and more than 1\.1",
+        ),
+        (lambda i: {}, [10.0 + 0.1 * i for i in range(10)], r"in data set 'toy' rudder, drift angle and speed of all"),
+        (lambda i: {"group": 1}, range(10), r"all runs are one group, which no split may part\. Add runs"),
+    ],
+)
+def test_runs_that_are_alike_have_nothing_to_extrapolate_to(toy, group, rudder, message):
+    with pytest.raises(InputError, match=message):
+        make_folds(steered(toy(10, meta=group), rudder), task(split="extrapolate"))
 
 
 def test_fewer_training_runs_are_among_the_more_and_are_scored_on_the_same(toy):

@@ -53,7 +53,7 @@ def test_shipped_configs_are_found_by_name_and_valid(name):
         ('models = ["hold"]\nhorizn_s = 60', r"unknown key 'horizn_s'. Did you mean 'horizon_s'\?"),
         ('models = ["hold"]\nhorizon_s = -1', r"horizon_s: .*greater than 0.*\(value: -1\)"),
         ('models = ["hold"]\nfolds = 1', r"folds: .*\(value: 1\)"),
-        ('models = ["hold"]\nsplit = "random"', r"split: .*'folds', 'published', 'kind' or 'speed'"),
+        ('models = ["hold"]\nsplit = "random"', r"split: .*'folds', 'published', 'kind', 'speed' or 'extrapolate'"),
         ('models = ["hold"]\nmetrics = ["ed", "edx"]', r"unknown metric 'edx'. Did you mean 'ed"),
         ('models = ["hold"]\nmetrics = ["edh"]', r"'ed' must be among the metrics"),
         ('dataset = "a"\ndatasets = ["b"]\nmodels = ["hold"]', r"both 'dataset' and 'datasets'"),
@@ -117,4 +117,4 @@ def test_a_task_without_the_newer_keys_keeps_its_key():
     rows."""
     assert load_tasks("paper")[0].key("e102babe79cc29d8") == "ea05ddf8a550"
     assert task(train_runs=8).key("data") != task().key("data")
-    assert len({task(split=s).key("data") for s in ("folds", "published", "kind", "speed")}) == 4
+    assert len({task(split=s).key("data") for s in ("folds", "published", "kind", "speed", "extrapolate")}) == 5
