@@ -251,7 +251,7 @@ def split_notes(dataset: Dataset, task: Task) -> tuple[str, ...]:
     if task.split == "extrapolate":
         rest, test = _by_severity(dataset)
         out = len(dataset) - len(rest) - len(test)
-        left = (f"{out} milder runs are left out: their groups are scored, or they are at the limit",) if out else ()
+        left = [f"left out: {out} runs that are no more severe than the training runs"] if out else []
         return (*severity_notes(measured(rest), measured(test)), *left)
     return ()
 

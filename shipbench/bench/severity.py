@@ -69,8 +69,8 @@ def severity_notes(trained: np.ndarray, tested: np.ndarray) -> tuple[str, str]:
         within.append(f"{measure.name} up to {digits(float(largest) * factor)} {unit}")
         if (out := values[values > largest]).size:
             low, high = (digits(float(end) * factor) for end in (out.min(), out.max()))
-            beyond.append(f"{measure.name} {low} to {high} {unit} ({len(out)} runs)")
+            beyond.append(f"{measure.name} {low} to {high} {unit} in {len(out)} of {len(tested)}")
     return (
         f"trained on the {len(trained)} least severe runs: {', '.join(within)}",
-        f"tested on {len(tested)} runs beyond: {', '.join(beyond)}",
+        f"tested on runs beyond: {', '.join(beyond)}",
     )

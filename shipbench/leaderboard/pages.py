@@ -28,7 +28,7 @@ SPLITS = {
     "kind": ("{folds} folds, each scored on a kind "
              "of manoeuvre left out of training"),
     "speed": "trained on the slower runs, scored on the fastest",
-    "extrapolate": "trained on small rudder angles, drift angles and speeds, scored beyond them",
+    "extrapolate": "trained on the least severe runs, scored on those beyond",
 }  # fmt: skip
 """Description of the split of a task on a page."""
 

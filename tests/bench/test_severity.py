@@ -48,5 +48,5 @@ def test_notes_name_the_measures_in_which_runs_go_beyond():
     trained, tested = np.array([[0.2, 0.1, 4.0], [0.1, 0.0, 5.0]]), np.array([[0.5, 0.05, 4.5], [0.3, 0.05, 6.0]])
     assert severity_notes(trained, tested) == (
         "trained on the 2 least severe runs: rudder up to 11.5 deg, drift angle up to 5.73 deg, speed up to 5.00 m/s",
-        "tested on 2 runs beyond: rudder 17.2 to 28.6 deg (2 runs), speed 6.00 to 6.00 m/s (1 runs)",
+        "tested on runs beyond: rudder 17.2 to 28.6 deg in 2 of 2, speed 6.00 to 6.00 m/s in 1 of 2",
     )
