@@ -26,6 +26,7 @@ from ..processes import process_pool
 from ..records import Dataset
 from ..steps import step, within
 from .candidates import describe_candidates
+from .evaluation.calibration_gain import calibration_gain
 from .evaluation.held_out_gain import FoldGain, fold_gain, summarise
 from .evaluation.residuals import what_is_wrong
 from .evaluation.series import trace_of
@@ -150,6 +151,7 @@ def _diagnosed(
         extended_model="+".join(["physics", *names]), fingerprint=fingerprint, seconds=time.perf_counter() - began,
         warnings=tuple(lines), gain=worth.gain if causes else None, unknown=unknown_part(found),
         gain_per_run=worth.per_run if causes else (), trace=trace,
+        calibration=calibration_gain(dataset, found.selection.null) if rests else None,
     )  # fmt: skip
 
 

@@ -23,6 +23,16 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class Calibrated:
+    """Mean position error [m] of open-loop rollouts of the fitted runs: of the ship file's model, and with the ship's
+    own coefficients calibrated; seconds: longest rollout."""
+
+    before: float
+    after: float
+    seconds: float
+
+
+@dataclass(frozen=True)
 class Gain:
     """Error of open-loop rollouts on held-out runs, before and after the model is extended.
 
@@ -155,6 +165,7 @@ class Diagnosis:
     gain_per_run: tuple[tuple[str, float, float], ...] = ()
     trace: Trace | None = None
     spec: str = ""
+    calibration: Calibrated | None = None
 
     def __repr__(self) -> str:
         return brief(f"<Diagnosis of {self.dataset}: {self.verdict}, {self.extended_model}>")
@@ -167,11 +178,15 @@ class Diagnosis:
             "causes": [_plain(asdict(c)) for c in self.causes],
             "candidates": [_plain(asdict(c)) for c in self.candidates],
             "what_is_wrong": [_plain(asdict(w)) for w in self.what_is_wrong],
+            "calibration": None if self.calibration is None else self._calibration(self.calibration),
             "unexplained_after": _plain(self.unexplained_after),
             "extended_model": self.extended_model, "fingerprint": self.fingerprint, "seconds": round(self.seconds, 2),
             "gain": None if self.gain is None else _plain(asdict(self.gain)), "unknown": _plain(self.unknown),
             "warnings": list(self.warnings),
         }  # fmt: skip
+
+    def _calibration(self, found: Calibrated) -> dict[str, Any]:
+        return _plain({"metric": "ED", "on": "fitted runs", **asdict(found)})
 
 
 def _plain(value: Any) -> Any:

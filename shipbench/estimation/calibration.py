@@ -12,16 +12,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..physics.actuators import Gear
-from ..records import Dataset
-from ..ship import complete
 from .baseline import from_regressions
 from .coefficients import NUM_BASE
-from .forward import Plant, cut
+from .forward import Plant
 from .gauss_newton import Origin, fit
 from .laplace import Fit, Model, base_precision, point_from, settle
-from .linearisation import Linearisation, Point, Scales
-from .resampling import averaged
+from .linearisation import Linearisation, Scales
+from .open_loop import cost, errors, rolled, sizes
 from .robust_prior import widened
 from .term import Term
 
@@ -95,14 +92,6 @@ def calibration_of(found: Fit) -> Calibration:
     )  # fmt: skip
 
 
-def rollout_plant(dataset: Dataset, gears: dict[str, Gear], seconds: float) -> Plant:
-    """Plant with segments of at most `seconds`, fast records averaged; the commands drive it through `gears`, from
-    where the actuators begin."""
-    ship, dataset = complete(dataset.ship), averaged(dataset)
-    segments = cut(dataset, max(20, round(seconds / dataset.dt)))
-    return Plant(ship, replace(segments, commanded=True), gears=gears, recorded=not segments.commanded)
-
-
 def refined(plant: Plant, scales: Scales, start: Calibration) -> Calibration:
     """Least squares of open-loop rollouts over all coefficients and amplitudes, from `start` and under the same prior.
 
@@ -111,44 +100,30 @@ def refined(plant: Plant, scales: Scales, start: Calibration) -> Calibration:
     """
     free = np.ones(NUM_BASE + sum(t.size for t in start.terms))
     free[:NUM_BASE] = base_precision(Model(widths=tuple(start.widths)))
-    lin = _rolled(plant, scales, start)
+    lin = rolled(plant, scales, start)
     weights, before = _weights(lin), np.inf
     for _ in range(_REFINEMENTS):
         at = _stacked(start)
-        old = _cost(lin, weights) + float(free @ at**2)
+        old = cost(lin, weights) + float(free @ at**2)
         if old > (1.0 - _LEAST_GAIN) * before:
             break
         base, own = lin.parameter_columns()
         J = np.concatenate([base, *own], axis=-1) * weights[:, :, None]
-        e = _errors(lin) * weights
+        e = errors(lin) * weights
         ok = np.isfinite(J).all(axis=(1, 2)) & np.isfinite(e).all(axis=1)
         H = np.einsum("bti,btj->ij", J[ok], J[ok]) + np.diag(free)
         cov, share, before = np.linalg.inv(H), 1.0, old
         step, start = cov @ (np.einsum("bti,bt->i", J[ok], e[ok]) - free * at), _with_spreads(start, cov)
         while share > _LEAST_SHARE:
             moved = _unstacked(start, at + share * step)
-            trial = _rolled(plant, scales, moved)
-            if _cost(trial, weights) + float(free @ _stacked(moved) ** 2) < old:
+            trial = rolled(plant, scales, moved)
+            if cost(trial, weights) + float(free @ _stacked(moved) ** 2) < old:
                 start, lin = moved, trial
                 break
             share *= 0.5
         else:
             break
     return start
-
-
-def position_errors(plant: Plant, scales: Scales, model: Calibration) -> np.ndarray:
-    """Mean position error [m] of the open-loop rollout of every run (runs,), the first sample not scored."""
-    lin = _rolled(plant, scales, model)
-    with np.errstate(all="ignore"):
-        ed = np.hypot(*np.moveaxis(lin.predicted[..., :2] - plant.seg.states[..., :2], -1, 0))
-    ed = np.nan_to_num(ed, nan=1e3 * plant.c.L, posinf=1e3 * plant.c.L)
-    scored = plant.seg.mask.copy()
-    scored[:, 0] = False
-    total, count = np.zeros(plant.seg.runs), np.zeros(plant.seg.runs)
-    np.add.at(total, plant.seg.run, np.sum(np.where(scored, ed, 0.0), axis=1))
-    np.add.at(count, plant.seg.run, scored.sum(axis=1))
-    return total / np.maximum(count, 1)
 
 
 def _stacked(model: Calibration) -> np.ndarray:
@@ -165,35 +140,8 @@ def _with_spreads(like: Calibration, cov: np.ndarray) -> Calibration:
     return replace(like, spread=spreads.base, value_spreads=spreads.values)
 
 
-def _rolled(plant: Plant, scales: Scales, model: Calibration) -> Linearisation:
-    """Rollouts without latent force, begun so that the sensors of the model read what was measured first."""
-    B = len(plant.seg.run)
-    point = Point(model.base, np.zeros((B, 6)), np.zeros((B, plant.knots, 3)), model.terms, model.values)
-    lin = Linearisation(plant, scales, point)
-    if not any(a.effect.enters == "sensor" for a in lin.now):
-        return lin
-    eta = -(lin.predicted[:, 0] - plant.seg.states[:, 0, :6]) / scales.eta
-    return Linearisation(plant, scales, replace(point, eta=eta))
-
-
-def _errors(lin: Linearisation) -> np.ndarray:
-    seg = lin.plant.seg
-    e = np.where(seg.mask[..., None] & seg.seen, seg.states[..., :6] - lin.predicted, 0.0)
-    return e.reshape(len(e), -1)
-
-
 def _weights(lin: Linearisation) -> np.ndarray:
-    """Weights (B, T) with which the squares of a segment sum up to one for each channel."""
-    e = _errors(lin).reshape(len(lin.motion), -1, 6)
-    size = np.sqrt(np.nanmean(np.where(np.isfinite(e), e, np.nan) ** 2, axis=(0, 1)))
-    size[:2] = np.sqrt(np.mean(size[:2] ** 2))
-    count = lin.plant.seg.mask.sum(axis=1)
-    by_channel = 1.0 / np.maximum(size, 1e-9) / np.sqrt(count)[:, None]
+    """Weights (B, T) with which the squares of a segment sum up to one for each measured channel."""
+    seg = lin.plant.seg
+    by_channel = seg.seen / np.maximum(sizes(lin), 1e-9) / np.sqrt(seg.mask.sum(axis=1))[:, None]
     return np.tile(by_channel, lin.plant.steps + 1)
-
-
-def _cost(lin: Linearisation, weights: np.ndarray) -> float:
-    """Sum of weighted squares; a segment that diverges counts as errors of a hundred times the ordinary."""
-    with np.errstate(all="ignore"):
-        e = np.nan_to_num(_errors(lin) * weights, nan=100.0, posinf=100.0, neginf=-100.0)
-    return float(np.sum(np.clip(e, -100.0, 100.0) ** 2))

@@ -23,9 +23,7 @@ from ..estimation.calibration import (  # fmt: skip
     calibrated,
     calibration_of,
     estimated,
-    position_errors,
     refined,
-    rollout_plant,
     some_of,
 )
 from ..estimation.coefficients import FREE, NUM_BASE, NUM_HULL, ShipScales, hull_changes, parameters
@@ -34,6 +32,7 @@ from ..estimation.forward import Plant, known_effects
 from ..estimation.gears import fit_gears, gears_of
 from ..estimation.laplace import Fit
 from ..estimation.linearisation import Scales
+from ..estimation.open_loop import distance, rollout_plant
 from ..estimation.priors import PRIORS
 from ..estimation.rollout import Active, Course, Vessel
 from ..estimation.term import Given, Term
@@ -147,10 +146,10 @@ class Calibrated(FittedShip):
         the estimate itself does. As few rollouts take part as pieces in the estimate."""
         froude = (self.particulars.L / 130.0) ** 0.5
         test = rollout_plant(valid, self.gears, _PIECES[-1] * froude)
-        errors = {None: position_errors(test, Scales(test), start).mean()}
+        errors = {None: distance(test, Scales(test), start)[0].mean()}
         for seconds in (froude * piece for piece in _PIECES):
             plant = some_of(rollout_plant(train, self.gears, seconds))
-            errors[seconds] = position_errors(test, Scales(test), refined(plant, Scales(plant), start)).mean()
+            errors[seconds] = distance(test, Scales(test), refined(plant, Scales(plant), start))[0].mean()
         return min(errors, key=errors.__getitem__)
 
     def _take(self, model: Calibration) -> None:

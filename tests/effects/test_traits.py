@@ -17,7 +17,18 @@ GENERIC = {"current", "wind", "list"}
 """Names of effects that are words of their own: a group of channels, a command."""
 FILES = [
     p
-    for folder in ("bench", "data", "diagnosis", "importing", "leaderboard", "predictors", "reports", "simulate")
+    for folder in (
+        "bench",
+        "checking",
+        "data",
+        "diagnosis",
+        "estimation",
+        "importing",
+        "leaderboard",
+        "predictors",
+        "reports",
+        "simulate",
+    )
     for p in sorted((PACKAGE / folder).rglob("*.py"))
 ]
 

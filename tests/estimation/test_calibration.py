@@ -13,15 +13,14 @@ from shipbench.estimation.calibration import (
     calibrated,
     calibration_of,
     estimated,
-    position_errors,
     refined,
-    rollout_plant,
     some_of,
 )  # fmt: skip
 from shipbench.estimation.coefficients import NUM_BASE
 from shipbench.estimation.forward import Plant
 from shipbench.estimation.gears import gears_of
 from shipbench.estimation.linearisation import Scales
+from shipbench.estimation.open_loop import distance, rollout_plant
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.trials import Trials, sea_trials
 
@@ -42,7 +41,7 @@ def from_pieces() -> Calibration:
 
 def test_calibration_predicts_better_than_the_prior_means():
     plant = rollouts(60.0)
-    after, before = (position_errors(plant, Scales(plant), model).mean() for model in (from_pieces(), PRIOR))
+    after, before = (distance(plant, Scales(plant), model)[0].mean() for model in (from_pieces(), PRIOR))
     assert after < 0.7 * before
 
 
@@ -57,7 +56,7 @@ def test_refinement_lowers_the_error_on_its_own_rollouts_and_stays_near_the_prio
     plant = rollouts(60.0)
     start = from_pieces()
     after = refined(plant, Scales(plant), start)
-    assert position_errors(plant, Scales(plant), after).mean() < position_errors(plant, Scales(plant), start).mean()
+    assert distance(plant, Scales(plant), after)[0].mean() < distance(plant, Scales(plant), start)[0].mean()
     assert np.sum(after.base**2) < np.sum(start.base**2) + NUM_BASE
 
 
@@ -70,4 +69,4 @@ def test_rollouts_are_as_long_as_asked_and_driven_by_commands():
 @pytest.mark.parametrize("runs", [1, 4])
 def test_errors_are_told_by_run(runs: int):
     plant = rollouts(30.0).where(rollouts(30.0).seg.run < runs)
-    assert position_errors(plant, Scales(plant), PRIOR).shape == (runs,)
+    assert distance(plant, Scales(plant), PRIOR)[0].shape == (runs,)

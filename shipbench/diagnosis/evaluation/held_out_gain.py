@@ -14,13 +14,12 @@ import numpy as np
 from ...estimation.between_ships import STRUCTURE
 from ...estimation.budget import is_spent
 from ...estimation.coefficients import FREE, NUM_BASE, NUM_HULL
-from ...estimation.forward import Plant, cut
-from ...estimation.linearisation import Linearisation, Point, Scales
-from ...estimation.resampling import averaged
+from ...estimation.forward import Plant
+from ...estimation.linearisation import Point, Scales
+from ...estimation.open_loop import Rollout, cost, distance, errors, rolled, rollout_plant, sizes
 from ...estimation.term import Term
 from ...physics.actuators import Gear
 from ...records import Dataset
-from ...ship import complete
 from ..result import Gain
 from ..thresholds import THRESHOLDS
 
@@ -35,24 +34,9 @@ class Extension:
     gears: dict[str, Gear] | None = None
 
 
-@dataclass(frozen=True)
-class Rollout:
-    """Fitted open-loop model: base parameters and effects; no latent force, initial states as measured."""
-
-    base: np.ndarray
-    terms: tuple[Term, ...]
-    values: tuple[np.ndarray, ...]
-
-
-def rollout_plant(dataset: Dataset, gears: dict[str, Gear]) -> Plant:
-    """Forward model with segments as long as the horizon of rollouts (Froude-scaled), fast records averaged.
-
-    The commands drive it through `gears`, from the initial positions of the actuators.
-    """
-    ship, dataset = complete(dataset.ship), averaged(dataset)
-    horizon = THRESHOLDS.value("run_duration") * (ship.L / 130.0) ** 0.5
-    segments = cut(dataset, max(20, round(horizon / dataset.dt)))
-    return Plant(ship, replace(segments, commanded=True), gears=gears, recorded=not segments.commanded)
+def horizon(L: float) -> float:
+    """Longest rollout [s] of a ship of length L [m] (Froude-scaled)."""
+    return THRESHOLDS.value("run_duration") * (L / 130.0) ** 0.5
 
 
 def plain_base() -> np.ndarray:
@@ -73,15 +57,15 @@ def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
     free = list(range(len(FREE) + (NUM_HULL if extension.hull else 0)))
     terms = tuple(t for t in extension.terms if not t.per_run)  # a run that was not seen has no value of its own
     start = tuple(v for t, v in zip(extension.terms, extension.values, strict=True) if not t.per_run)
-    lin = _lin(plant, scales, Rollout(plain_base(), terms, start))
-    weights = _weights(lin)
+    lin = rolled(plant, scales, Rollout(plain_base(), terms, start))
+    weights = np.tile(1.0 / np.maximum(sizes(lin), lin.scales.noise), lin.plant.steps + 1)
     for _ in range(8):
         if is_spent():
             break
         base, own = lin.parameter_columns(free)
         J = np.concatenate([base, *own], axis=-1) * weights[None, :, None]
         J = J * np.repeat(plant.seg.mask, 6, axis=1)[..., None]
-        e = _errors(lin) * weights
+        e = errors(lin) * weights
         ok = np.isfinite(J).all(axis=(1, 2)) & np.isfinite(e).all(axis=1)
         at = np.concatenate([lin.point.base[free], *lin.point.values]) if terms else lin.point.base[free]
         prior = np.ones(len(at))
@@ -89,13 +73,13 @@ def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
             np.einsum("bti,btj->ij", J[ok], J[ok]) + np.diag(prior),
             np.einsum("bti,bt->i", J[ok], e[ok]) - prior * (at - _centre(free, terms)),
         )
-        share, old = 1.0, _cost(lin, weights)
+        share, old = 1.0, cost(lin, weights)
         while True:
-            trial = _lin(plant, scales, _moved(lin.point, free, terms, at + share * step))
-            if _cost(trial, weights) < old or share < 0.1:
+            trial = rolled(plant, scales, _moved(lin.point, free, terms, at + share * step))
+            if cost(trial, weights) < old or share < 0.1:
                 break
             share *= 0.5
-        if _cost(trial, weights) > 0.999 * old:
+        if cost(trial, weights) > 0.999 * old:
             break
         lin = trial
     return Rollout(lin.point.base, terms, lin.point.values)
@@ -110,50 +94,6 @@ def _moved(point: Point, free: Sequence[int], terms: Sequence[Term], at: np.ndar
     base[list(free)] = at[: len(free)]
     sizes = np.cumsum([len(free), *(t.size for t in terms)])
     return Rollout(base, tuple(terms), tuple(at[a:b] for a, b in pairwise(sizes)))
-
-
-def _lin(plant: Plant, scales: Scales, model: Rollout) -> Linearisation:
-    """Linearisation of the rollout from initial states at which the model's sensors read the first measurement."""
-    B = len(plant.seg.run)
-    point = Point(model.base, np.zeros((B, 6)), np.zeros((B, plant.knots, 3)), model.terms, model.values)
-    lin = Linearisation(plant, scales, point)
-    if not any(a.effect.enters == "sensor" for a in lin.now):
-        return lin
-    eta = -(lin.predicted[:, 0] - plant.seg.states[:, 0, :6]) / scales.eta
-    return Linearisation(plant, scales, replace(point, eta=eta))
-
-
-def _errors(lin: Linearisation) -> np.ndarray:
-    e = np.where(lin.plant.seg.mask[..., None], lin.plant.seg.states[..., :6] - lin.predicted, 0.0)
-    return e.reshape(len(e), -1)
-
-
-def _weights(lin: Linearisation) -> np.ndarray:
-    e = _errors(lin).reshape(len(lin.motion), -1, 6)
-    size = np.sqrt(np.nanmean(np.where(np.isfinite(e), e, np.nan) ** 2, axis=(0, 1)))
-    size[:2] = np.sqrt(np.mean(size[:2] ** 2))
-    return np.tile(1.0 / np.maximum(size, lin.scales.noise), lin.plant.steps + 1)
-
-
-def _cost(lin: Linearisation, weights: np.ndarray) -> float:
-    """Cost of the rollouts. Diverged segments count as errors of a hundred times the typical one."""
-    with np.errstate(all="ignore"):
-        e = np.clip(np.nan_to_num(_errors(lin) * weights, nan=100.0, posinf=100.0, neginf=-100.0), -100.0, 100.0)
-    return float(np.sum(e**2))
-
-
-def distance(plant: Plant, scales: Scales, model: Rollout) -> tuple[np.ndarray, np.ndarray]:
-    """Mean ED [m] of every run (N,), without the initial sample, and the predicted motion (B, K + 1, 6)."""
-    lin = _lin(plant, scales, model)
-    with np.errstate(all="ignore"):
-        ed = np.hypot(*np.moveaxis(lin.predicted[..., :2] - plant.seg.states[..., :2], -1, 0))
-    ed = np.nan_to_num(ed, nan=1e3 * plant.c.L, posinf=1e3 * plant.c.L)
-    scored = plant.seg.mask.copy()
-    scored[:, 0] = False
-    total, count = np.zeros(plant.seg.runs), np.zeros(plant.seg.runs)
-    np.add.at(total, plant.seg.run, np.sum(np.where(scored, ed, 0.0), axis=1))
-    np.add.at(count, plant.seg.run, scored.sum(axis=1))
-    return total / np.maximum(count, 1), lin.predicted
 
 
 @dataclass(frozen=True)
@@ -175,14 +115,15 @@ def fold_gain(dataset: Dataset, test: np.ndarray, extension: Extension, plain: d
     inside = set(test.tolist())
     part = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i not in inside])
     rest = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i in inside])
-    plant, held = rollout_plant(part, plain), rollout_plant(rest, plain)
+    seconds = horizon(dataset.ship.L)
+    plant, held = rollout_plant(part, plain, seconds), rollout_plant(rest, plain, seconds)
     scales = Scales(plant)
     before, _ = distance(held, scales, fit_rollout(plant, scales, Extension()))
     names = tuple(t.label for t in extension.terms)
     after, driven, goal = before, plant, held
     if extension.gears:
         gears = plain | extension.gears
-        driven, goal = rollout_plant(part, gears), rollout_plant(rest, gears)
+        driven, goal = rollout_plant(part, gears, seconds), rollout_plant(rest, gears, seconds)
     if names or extension.gears:
         after, _ = distance(goal, scales, fit_rollout(driven, scales, extension))
     with_hull = after

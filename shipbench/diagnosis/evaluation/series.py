@@ -6,22 +6,24 @@ import numpy as np
 
 from ...estimation.forward import Segments
 from ...estimation.linearisation import Scales
+from ...estimation.open_loop import distance, rollout_plant
 from ...records import Dataset
 from ..result import Trace
 from ..selection.analysis import Analysis
-from .held_out_gain import Extension, distance, fit_rollout, rollout_plant
+from .held_out_gain import Extension, fit_rollout, horizon
 
 
 def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
     """Trace of open-loop rollouts of the models fitted to all runs (the gain is held out, these plots are not), and of
     latent forces before and after."""
     extension = found.extension(hull)
-    plain = rollout_plant(dataset, found.plain_gears)
+    seconds = horizon(dataset.ship.L)
+    plain = rollout_plant(dataset, found.plain_gears, seconds)
     scales = Scales(plain)
     before = distance(plain, scales, fit_rollout(plain, scales, Extension()))[1]
     after = before
     if extension.terms or extension.hull or extension.gears:
-        driven = rollout_plant(dataset, found.plain_gears | (extension.gears or {}))
+        driven = rollout_plant(dataset, found.plain_gears | (extension.gears or {}), seconds)
         after = distance(driven, scales, fit_rollout(driven, scales, extension))[1]
     seg, null, final = plain.seg, found.selection.null, found.final
     short, B = null.plant, len(null.estimate)

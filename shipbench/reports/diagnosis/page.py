@@ -21,6 +21,7 @@ from . import tables as tables
 from .linked import FITS, MODELS, changed, position_errors, rollout_plots, rollouts
 from .remains import remaining_sentences
 from .text import (
+    calibration_words,
     estimate,
     figure,
     force_words,
@@ -54,7 +55,8 @@ def diagnosis_page(d: Diagnosis) -> str:
     """HTML of a diagnosis; it needs no network and no other file."""
     return render_page(
         "diagnosis.html.j2", title=f"Diagnosis: {d.dataset}", dataset=d.dataset,
-        command=f"shipbench diagnose {shlex.quote(d.spec or d.dataset)}", lead=headline(d), tiles=_tiles(d),
+        command=f"shipbench diagnose {shlex.quote(d.spec or d.dataset)}",
+        lead=f"{headline(d)} {calibration_words(d)}".strip(), tiles=_tiles(d),
         plots=d.trace is not None, style=_STYLE,
         warnings=d.warnings, causes=[_cause(c, d) for c in d.causes], instead=_no_cause(d), gain=_gain_of_all(d),
         extended_model=d.extended_model,

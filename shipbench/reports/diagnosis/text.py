@@ -173,6 +173,18 @@ def headline(d: Diagnosis) -> str:
     )
 
 
+def calibration_words(d: Diagnosis) -> str:
+    """Errors of the ship file's model and of the calibrated one; "" where they were not computed."""
+    if d.calibration is None:
+        return ""
+    c = d.calibration
+    return (
+        f"In open-loop rollouts of at most {c.seconds:.0f} s, the ship file's model is {figure(c.before)} m off on "
+        f"average. With the ship's own coefficients calibrated it is {figure(c.after)} m off, on the runs that were "
+        "fitted."
+    )
+
+
 def next_command(d: Diagnosis) -> str:
     """Command that compares the baseline model with the extended one."""
     inside = [c.effect for c in d.causes if not (c.effect in EFFECTS and EFFECTS.get(c.effect).traits.describes_data)]
@@ -320,6 +332,8 @@ def summary_lines(d: Diagnosis, width: int = WIDTH, full: bool = True) -> list[s
             causes and the next command.
     """
     lines = [*paragraph(f"Diagnosis of {d.dataset} ({d.seconds:.0f} s)", width), "", *paragraph(headline(d), width), ""]
+    if calibration := calibration_words(d):
+        lines += [*paragraph(calibration, width), ""]
     for warning in d.warnings:
         lines += paragraph(f"WARNING: {warning}", width, "", " " * 9)
     if d.warnings:

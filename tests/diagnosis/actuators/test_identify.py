@@ -13,12 +13,12 @@ from shipbench.diagnosis.actuators import identify as gears
 from shipbench.diagnosis.actuators.identify import _Record, find_in_gears
 from shipbench.diagnosis.actuators.kinds import GearFinding, kinds_of
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.evaluation.held_out_gain import rollout_plant
 from shipbench.diagnosis.selection import stepwise
 from shipbench.diagnosis.selection.analysis import plain_model
 from shipbench.diagnosis.selection.stepwise import select
 from shipbench.effects.base import EFFECTS, Effect, Parameter
 from shipbench.estimation.forward import Plant
+from shipbench.estimation.open_loop import rollout_plant
 from shipbench.estimation.rollout import Active
 from shipbench.ops import Array
 from shipbench.physics.actuators import Gear, gear_path
@@ -213,7 +213,7 @@ def test_a_lag_behind_the_record_follows_the_motor_where_orders_drive_the_ship(a
     data = replace(sea_trials(load_mmg_ship("kcs"), 3, (), Trials(runs=2, samples=60)), actuators=actuators)
     ordinary = Gear(2.0, 0.05)
     plant, goal = (
-        rollout_plant(data, {"delta": gear})
+        rollout_plant(data, {"delta": gear}, 120.0)
         for gear in (ordinary, replace(ordinary, **{field: getattr(ordinary, field) + 3.0}))
     )
     np.testing.assert_allclose(plant.path_of([Active(EFFECTS.get("rudder_lag"), (3.0,))]), goal.path, atol=1e-12)
