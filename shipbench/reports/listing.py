@@ -103,8 +103,8 @@ def _source(entry: str) -> Path | None:
 
 
 def read_part(path: Path, attribute: str, entry: str | None = None) -> tuple[str, dict[str, str], tuple[str, ...]]:
-    """First line of the module's docstring; the fields (name -> default as written) of the class bound to `attribute`;
-    the packages it needs.
+    """First paragraph of the module's docstring; the fields (name -> default as written) of the class bound to
+    `attribute`; the packages it needs.
 
     `entry` ("module:Class") names the class of a plug-in instead.
     """
@@ -113,7 +113,7 @@ def read_part(path: Path, attribute: str, entry: str | None = None) -> tuple[str
     except (OSError, SyntaxError, UnicodeDecodeError):
         return "(its source cannot be read)", {}, ()
     classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
-    summary = (ast.get_docstring(tree) or "").strip().split("\n")[0]
+    summary = " ".join((ast.get_docstring(tree) or "").split("\n\n")[0].split())
     bound = entry.partition(":")[2] if entry else next((_bound_name(n) for n in tree.body if _binds(n, attribute)), "")
     return (
         (summary, _fields(classes[bound], classes), _needs(classes[bound])) if bound in classes else (summary, {}, ())

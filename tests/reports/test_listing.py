@@ -14,15 +14,15 @@ from shipbench.reports.listing import read_part
 def test_fields_of_the_bound_class_and_its_bases_are_parameters(tmp_path):
     file = tmp_path / "part.py"
     file.write_text(
-        '"""One line on it.\n\nMore."""\nimport nothing_of_that_name\n'
+        '"""One sentence\non it.\n\nMore."""\nimport nothing_of_that_name\n'
         "class Base:\n    first: int = 1\n    name: ClassVar[str] = 'x'\n    _hidden: int = 2\n"
         "class Part(Base):\n    needs: ClassVar[tuple[str, ...]] = ('torch',)\n    second: float\n"
         "    third: list = field(init=False)\n"
         "class Other:\n    wrong: int = 0\n"
         "PREDICTOR = Part\n"
     )
-    assert read_part(file, "PREDICTOR") == ("One line on it.", {"first": "1", "second": ""}, ("torch",))
-    assert read_part(file, "PREDICTOR", "part:Other") == ("One line on it.", {"wrong": "0"}, ())
+    assert read_part(file, "PREDICTOR") == ("One sentence on it.", {"first": "1", "second": ""}, ("torch",))
+    assert read_part(file, "PREDICTOR", "part:Other") == ("One sentence on it.", {"wrong": "0"}, ())
 
 
 def test_a_part_that_cannot_be_read_is_still_listed(tmp_path):
