@@ -29,24 +29,49 @@ _REFINEMENTS, _LEAST_GAIN, _LEAST_SHARE = 5, 3e-3, 0.1
 
 
 @dataclass(frozen=True)
+class Pushes:
+    """Random parts of the motion and of its record.
+
+    Attributes:
+        force: (3,) standard deviations of the latent acceleration [m/s^2, m/s^2, rad/s^2].
+        tau: its correlation time [s].
+        noise: (6,) standard deviations of the sensors.
+    """
+
+    force: np.ndarray
+    tau: float
+    noise: np.ndarray
+
+
+@dataclass(frozen=True)
 class Calibration:
     """Calibrated coefficients of one ship.
 
     Attributes:
         base: (NUM_BASE,) differences from the prior means, in prior standard deviations.
-        spread: (NUM_BASE,) posterior standard deviations, in prior ones.
+        cov: posterior covariance of `base` and then of the amplitudes, in the same units.
         widths: (NUM_BASE,) factors of the prior standard deviations, above 1 for outliers among ships.
+        pushes: random parts.
         terms: effects in the model.
         values: their amplitudes, in typical sizes.
-        value_spreads: posterior standard deviations of `values`.
     """
 
     base: np.ndarray
-    spread: np.ndarray
+    cov: np.ndarray
     widths: np.ndarray
+    pushes: Pushes
     terms: tuple[Term, ...] = ()
     values: tuple[np.ndarray, ...] = ()
-    value_spreads: tuple[np.ndarray, ...] = ()
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Posterior standard deviations of `base`."""
+        return np.asarray(np.sqrt(np.diag(self.cov)[:NUM_BASE]))
+
+    @property
+    def value_spreads(self) -> tuple[np.ndarray, ...]:
+        """Posterior standard deviations of `values`."""
+        return _parts(np.sqrt(np.diag(self.cov)), self.terms)
 
 
 def estimated(plant: Plant) -> Fit:
@@ -83,13 +108,20 @@ def calibrated(plant: Plant, like: Fit, terms: Sequence[Term] = ()) -> Fit:
 
 
 def calibration_of(found: Fit) -> Calibration:
-    """Estimates and posterior standard deviations of a fit."""
-    spreads = np.sqrt(np.diag(found.solution.cov))
-    edges = np.cumsum([NUM_BASE, *(t.size for t in found.model.terms)])
+    """Estimates, their covariance and the random parts of a fit."""
+    size = NUM_BASE + sum(t.size for t in found.model.terms)
+    hyper, scales = found.hyper, found.scales
+    pushes = Pushes(np.exp(0.5 * hyper.log_force) * scales.w, hyper.tau, np.exp(0.5 * hyper.log_noise) * scales.noise)
     return Calibration(
-        found.solution.mean[:NUM_BASE], spreads[:NUM_BASE], np.asarray(found.model.widths or np.ones(NUM_BASE)),
-        found.model.terms, found.values, tuple(spreads[a:b] for a, b in pairwise(edges)),
+        found.solution.mean[:NUM_BASE], found.solution.cov[:size, :size],
+        np.asarray(found.model.widths or np.ones(NUM_BASE)), pushes, found.model.terms, found.values,
     )  # fmt: skip
+
+
+def _parts(at: np.ndarray, terms: Sequence[Term]) -> tuple[np.ndarray, ...]:
+    """Amplitudes of the terms in a vector that begins with the coefficients."""
+    edges = np.cumsum([NUM_BASE, *(t.size for t in terms)])
+    return tuple(at[a:b] for a, b in pairwise(edges))
 
 
 def refined(plant: Plant, scales: Scales, start: Calibration) -> Calibration:
@@ -113,7 +145,7 @@ def refined(plant: Plant, scales: Scales, start: Calibration) -> Calibration:
         ok = np.isfinite(J).all(axis=(1, 2)) & np.isfinite(e).all(axis=1)
         H = np.einsum("bti,btj->ij", J[ok], J[ok]) + np.diag(free)
         cov, share, before = np.linalg.inv(H), 1.0, old
-        step, start = cov @ (np.einsum("bti,bt->i", J[ok], e[ok]) - free * at), _with_spreads(start, cov)
+        step, start = cov @ (np.einsum("bti,bt->i", J[ok], e[ok]) - free * at), replace(start, cov=cov)
         while share > _LEAST_SHARE:
             moved = _unstacked(start, at + share * step)
             trial = rolled(plant, scales, moved)
@@ -131,13 +163,7 @@ def _stacked(model: Calibration) -> np.ndarray:
 
 
 def _unstacked(like: Calibration, at: np.ndarray) -> Calibration:
-    edges = np.cumsum([NUM_BASE, *(t.size for t in like.terms)])
-    return replace(like, base=at[:NUM_BASE], values=tuple(at[a:b] for a, b in pairwise(edges)))
-
-
-def _with_spreads(like: Calibration, cov: np.ndarray) -> Calibration:
-    spreads = _unstacked(like, np.sqrt(np.maximum(np.diag(cov), 0.0)))
-    return replace(like, spread=spreads.base, value_spreads=spreads.values)
+    return replace(like, base=at[:NUM_BASE], values=_parts(at, like.terms))
 
 
 def _weights(lin: Linearisation) -> np.ndarray:

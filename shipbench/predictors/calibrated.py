@@ -9,6 +9,7 @@ Source: docs/theory.md#calibration; priors: docs/calibration.md#ordinary-differe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import Any, ClassVar, Self
@@ -20,6 +21,7 @@ from ..errors import WorkError
 from ..estimation.actuator_fit import fit_actuators
 from ..estimation.calibration import (  # fmt: skip
     Calibration,
+    Pushes,
     calibrated,
     calibration_of,
     estimated,
@@ -28,6 +30,7 @@ from ..estimation.calibration import (  # fmt: skip
 )
 from ..estimation.coefficients import FREE, NUM_BASE, NUM_HULL, ShipScales, hull_changes, parameters
 from ..estimation.extension import ACTUATOR_OF, Extension, measured, true_start
+from ..estimation.extension import Active as Acting
 from ..estimation.forward import Plant, known_effects
 from ..estimation.gears import fit_gears, gears_of
 from ..estimation.laplace import Fit
@@ -185,29 +188,85 @@ class Calibrated(FittedShip):
         return path
 
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
-        active = () if self.extension is None else self.extension.active("force")
-        sensors = [] if self.extension is None else self.extension.active("sensor")
+        forces, sensors = self._active("force"), self._active("sensor")
         start, path = true_start(s0, sensors, self.dt), self.actuator_path(s0, U)
-        B, K = U.shape[:2]
-        h = self.dt / self.substeps
-        at = (np.arange(K * self.substeps)[:, None] + 0.5 * np.arange(3)) * h
-        t = np.broadcast_to(at.reshape(K, 1, self.substeps, 3), (K, B, self.substeps, 3))
-        wind = self._wind(U)
-        air = None if wind is None else np.swapaxes(wind, 0, 1)
-        course = Course(Vessel(self.particulars, self.c), h, np.ascontiguousarray(t), air)
-        p, ship = parameters(self._scales(), self.calibration.base)
-        depth = {"depth": U[..., self.inputs.index("depth")].mean(axis=1)} if self.shallow else {}
-        forces = flow_first([Active(a.effect, a.q) for a in active])
-        act = np.moveaxis(path.reshape(B, K, self.substeps, 3, 4), 1, 0)
-        push = np.zeros((K, B, self.substeps, 3, 3))
-        S = np.empty((B, K + 1, s0.shape[1]))
+        S = np.empty((len(s0), U.shape[1] + 1, s0.shape[1]))
         S[:, 0] = start
-        water = known_effects(depth, self.particulars)
-        S[..., MOTION] = course.rolled(start[:, MOTION], p, [*forces, *ship, *water], act, push)
+        S[..., MOTION] = self._motion(start, U, path, self.calibration.base, forces)
         S[:, 1:, ACTUATORS] = (
             U[..., : len(COMMANDS)] if self.commanded else path[:, self.substeps - 1 :: self.substeps, 2]
         )
         return measured(S, sensors, self.dt)[:, 1:]
+
+    def _active(self, enters: str) -> list[Acting]:
+        return [] if self.extension is None else self.extension.active(enters)
+
+    def _motion(
+        self, start: np.ndarray, U: np.ndarray, path: np.ndarray, base: np.ndarray, forces: Sequence[Acting],
+        w: np.ndarray | None = None,
+    ) -> np.ndarray:  # fmt: skip
+        """Motion (batch, K + 1, 6) with coefficients `base`, one set or one of each rollout, and a latent acceleration
+        w (batch, K + 1, 3) at the samples."""
+        B, K = U.shape[:2]
+        part = (np.arange(self.substeps)[:, None] + 0.5 * np.arange(3)) / self.substeps
+        t = np.broadcast_to((np.arange(K)[:, None, None, None] + part) * self.dt, (K, B, self.substeps, 3))
+        wind = self._wind(U)
+        air = None if wind is None else np.swapaxes(wind, 0, 1)
+        course = Course(Vessel(self.particulars, self.c), self.dt / self.substeps, np.ascontiguousarray(t), air)
+        p, ship = parameters(self._scales(), base)
+        depth = {"depth": U[..., self.inputs.index("depth")].mean(axis=1)} if self.shallow else {}
+        act = np.moveaxis(path.reshape(B, K, self.substeps, 3, 4), 1, 0)
+        push = np.zeros((K, B, self.substeps, 3, 3))
+        if w is not None:
+            ends = np.swapaxes(w, 0, 1)[:, :, None, None]
+            push = (1.0 - part[..., None]) * ends[:-1] + part[..., None] * ends[1:]
+        named = [Active(a.effect, a.q) for a in flow_first(forces)]
+        active = [*named, *ship, *known_effects(depth, self.particulars)]
+        return course.rolled(start[:, MOTION], p, active, act, push)
+
+    def predict_samples(self, s0: np.ndarray, U: np.ndarray, samples: int = 100, *, seed: int = 0) -> np.ndarray:
+        """Random records of the motion that is to come; quantiles over samples are bands of what will be measured.
+
+        The coefficients are drawn from the posterior, the latent force from its process, the errors of s0 and of the
+        record from the sensors' noise. Effects keep their estimates.
+
+        Args:
+            s0: (batch, 10), as in `predict`.
+            U: (batch, K, inputs), as in `predict`.
+            samples: number of records of each rollout.
+            seed: of the draws.
+
+        Returns:
+            Motion (samples, batch, K, 6): x, y, psi, u, v, r; not finite where a rollout diverges.
+
+        Raises:
+            InputError: the model is not fitted, or an argument does not suit `predict`.
+        """
+        s0, U = np.atleast_2d(s0), U if np.ndim(U) == 3 else np.asarray(U)[None]
+        self.predict(s0, U)  # refuses what is wrong
+        rng, (B, K), model = np.random.default_rng(seed), U.shape[:2], self.calibration
+        lanes, sensors = samples * B, self._active("sensor")
+        values, vectors = np.linalg.eigh(model.cov[:NUM_BASE, :NUM_BASE])
+        drawn = rng.standard_normal((samples, NUM_BASE)) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+        start = np.tile(true_start(s0, sensors, self.dt), (samples, 1))
+        noise = rng.standard_normal((lanes, K + 1, 6)) * model.pushes.noise
+        start[:, MOTION] += noise[:, 0]
+        path, whole = np.tile(self.actuator_path(s0, U), (samples, 1, 1, 1)), np.tile(U, (samples, 1, 1))
+        base = np.repeat(model.base + drawn, B, axis=0)
+        X = self._motion(start, whole, path, base, self._active("force"), self._latent(rng, lanes, K))
+        if sensors:
+            S = np.concatenate([X, np.zeros((*X.shape[:2], 4))], axis=-1)
+            X = measured(S, sensors, self.dt)[..., MOTION]
+        return (X + noise)[:, 1:].reshape(samples, B, K, 6)
+
+    def _latent(self, rng: np.random.Generator, lanes: int, K: int) -> np.ndarray:
+        """Latent accelerations (lanes, K + 1, 3): an Ornstein-Uhlenbeck process, exact at the samples."""
+        pushes = self.calibration.pushes
+        keep = np.exp(-self.dt / pushes.tau)
+        w = rng.standard_normal((lanes, K + 1, 3))
+        for k in range(1, K + 1):
+            w[:, k] = keep * w[:, k - 1] + np.sqrt(1.0 - keep**2) * w[:, k]
+        return w * pushes.force
 
     def _scales(self) -> ShipScales:
         return ShipScales.of(self.particulars, self.c, bool(self._wind_columns()))
@@ -250,15 +309,22 @@ class Calibrated(FittedShip):
 
     def _arrays(self) -> dict[str, np.ndarray]:
         model = self.calibration
-        return {"base": model.base, "spread": model.spread, "widths": model.widths, **self._ship_arrays()}
+        return {
+            "base": model.base, "cov": model.cov, "widths": model.widths, "force": model.pushes.force,
+            "noise": model.pushes.noise, **self._ship_arrays(),
+        }  # fmt: skip
 
     def _meta(self) -> dict[str, Any]:
-        return self._ship_meta() | {"gears": {k: asdict(g) for k, g in self.gears.items()}, "shallow": self.shallow}
+        gears = {name: asdict(gear) for name, gear in self.gears.items()}
+        return self._ship_meta() | {"gears": gears, "shallow": self.shallow, "tau": float(self.calibration.pushes.tau)}
 
     def _restore(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
-        check_shapes(arrays, {name: (NUM_BASE,) for name in ("base", "spread", "widths")})
+        check_shapes(arrays, {"base": (NUM_BASE,), "widths": (NUM_BASE,), "force": (3,), "noise": (6,)})
+        size = max(NUM_BASE, len(arrays["cov"]))
+        check_shapes(arrays, {"cov": (size, size)})
         self._restore_ship(arrays, meta)
-        self.calibration = Calibration(arrays["base"], arrays["spread"], arrays["widths"])
+        pushes = Pushes(arrays["force"], float(meta["tau"]), arrays["noise"])
+        self.calibration = Calibration(arrays["base"], arrays["cov"], arrays["widths"], pushes)
         self.gears = {
             name: Gear(**{k: float(v) for k, v in meta["gears"][name].items()}) for name in ("n", "delta", "F")
         }

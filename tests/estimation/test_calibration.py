@@ -20,11 +20,11 @@ from shipbench.estimation.coefficients import NUM_BASE
 from shipbench.estimation.forward import Plant
 from shipbench.estimation.gears import gears_of
 from shipbench.estimation.linearisation import Scales
-from shipbench.estimation.open_loop import distance, rollout_plant
+from shipbench.estimation.open_loop import Rollout, distance, rollout_plant
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.trials import Trials, sea_trials
 
-PRIOR = Calibration(np.zeros(NUM_BASE), np.ones(NUM_BASE), np.ones(NUM_BASE))
+PRIOR = Rollout(np.zeros(NUM_BASE), (), ())
 
 
 @cache

@@ -113,3 +113,30 @@ def test_refine_is_true_or_false(wrong):
 def test_an_effect_beyond_its_bounds_is_refused():
     with pytest.raises(InputError, match="accepted"):
         make_predictor("calibrated+current[speed=90,to=0]").fit(trials(1))
+
+
+def test_random_records_cover_what_is_measured_later():
+    model, batch = fitted("calibrated", 1), trials(101).batch()
+    records = model.predict_samples(batch.s0, batch.U, 60)
+    assert records.shape == (60, *batch.U.shape[:2], 6)
+    low, high = np.quantile(records, [0.05, 0.95], axis=0)
+    truth = batch.truth[..., :6]
+    inside = (truth >= low) & (truth <= high)
+    assert 0.75 < inside.mean() < 0.99  # 8 runs: 0.9 is expected
+    width = (high - low)[..., :2].mean(axis=(0, 2))
+    assert width[-1] > 3.0 * width[4]  # errors grow
+
+
+def test_random_records_depend_on_the_seed_alone(tmp_path):
+    model, batch = fitted("calibrated", 1), trials(101).batch()
+    one, two = (model.predict_samples(batch.s0[:2], batch.U[:2], 5, seed=seed) for seed in (0, 1))
+    assert not np.array_equal(one, two)
+    model.save(tmp_path / "model")
+    again = make_predictor(str(tmp_path / "model")).predict_samples(batch.s0[:2], batch.U[:2], 5)
+    np.testing.assert_array_equal(again, one)
+
+
+def test_random_records_refuse_what_predict_refuses():
+    model, batch = fitted("calibrated", 1), trials(101).batch()
+    with pytest.raises(InputError, match="must be finite"):
+        model.predict_samples(np.full_like(batch.s0, np.nan), batch.U)
