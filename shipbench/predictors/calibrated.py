@@ -146,14 +146,21 @@ class Calibrated(FittedShip):
 
     def _refinement(self, train: Dataset, valid: Dataset, start: Calibration) -> float | None:
         """Length of the rollouts [s] whose refinement of a first estimate predicts the validation runs best; None where
-        the estimate itself does. As few rollouts take part as pieces in the estimate."""
+        no gain exceeds its standard error over these runs (the rule of one standard error), as of a single run.
+
+        As few rollouts take part as pieces in the estimate.
+        """
+        if len(valid) < 2:
+            return None
         froude = (self.particulars.L / 130.0) ** 0.5
         test = rollout_plant(valid, self.gears, _PIECES[-1] * froude)
-        errors = {None: distance(test, Scales(test), start)[0].mean()}
+        before, gains = distance(test, Scales(test), start)[0], {}
         for seconds in (froude * piece for piece in _PIECES):
             plant = some_of(rollout_plant(train, self.gears, seconds))
-            errors[seconds] = distance(test, Scales(test), refined(plant, Scales(plant), start))[0].mean()
-        return min(errors, key=errors.__getitem__)
+            gain = before - distance(test, Scales(test), refined(plant, Scales(plant), start))[0]
+            if gain.mean() > gain.std(ddof=1) / np.sqrt(len(gain)):
+                gains[seconds] = gain.mean()
+        return max(gains, key=gains.__getitem__, default=None)
 
     def _take(self, model: Calibration) -> None:
         """Keep a calibration, and put the amplitudes of its terms into the extension."""

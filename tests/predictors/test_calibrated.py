@@ -86,6 +86,13 @@ def test_refinement_is_kept_only_where_it_predicts_the_validation_runs_better():
     assert error(model, valid) <= 1.02 * error(start, valid)
 
 
+def test_a_single_validation_run_is_no_reason_to_refine():
+    whole = trials(1)
+    train, valid = whole.with_runs(whole.runs[:7]), whole.with_runs(whole.runs[7:])
+    one, other = (Calibrated(refine=refine).fit(train, valid) for refine in (True, False))
+    np.testing.assert_array_equal(one.calibration.base, other.calibration.base)
+
+
 def test_a_saved_model_predicts_the_same(tmp_path):
     hidden = ("current", (0.3, -0.25))
     model, batch = fitted("calibrated+current", 1, hidden), trials(101).batch()
