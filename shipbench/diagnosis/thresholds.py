@@ -21,7 +21,9 @@ THRESHOLDS = Thresholds(
     Threshold("evidence_of_misfit", 30.0, "2 log evidence", _MISFIT, "evidence-asked"),
     Threshold("evidence_of_run_values", 50.0, "2 log evidence", "asked besides of one value a run", "evidence-asked"),
     Threshold("off_form", 0.02, "share", "of the hull's evidence, asked besides where ships differ", "evidence-asked"),
-    Threshold("off_form_of_unknown", 14.0, "times", "that share, asked of an unknown force", "unknown-forces"),
+    Threshold("off_form_of_large", 4.0, "times", "that share, asked of a large unknown force", "unknown-forces"),
+    Threshold("off_form_of_small", 12.0, "times", "that share, asked of a noticeable unknown force", "unknown-forces"),
+    Threshold("off_form_slope", 0.75, "per unit", "growth of these multiples with that share", "unknown-forces"),
     # probabilities and distances
     Threshold("error_probability", 0.05, "probability", "of an error in one test", "probabilities-of-error"),
     Threshold("error_probability_of_many", 1e-5, "probability", "of one among many tests", "probabilities-of-error"),

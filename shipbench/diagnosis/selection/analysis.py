@@ -188,7 +188,8 @@ def asked(d: Dependence, off_form: float) -> float:
     """Least score of an unknown force or error, 2 log Bayes factor; infinite for one that is too small.
 
     A force that depends on a variable of a ship's form must exceed several times `off_form` (`Selection.off_form`)
-    besides. A force that depends on time, but leaves the latent force as large as it was, is wave motion.
+    besides: the more, the less of the latent force it explains. A force that depends on time, but leaves the latent
+    force as large as it was, is wave motion.
     """
     least = THRESHOLDS.value("error_size") if d.of_sensor else 0.5 * NOTICEABLE
     if not d.of_sensor and d.variable == "time" and d.taken < least:
@@ -200,7 +201,10 @@ def asked(d: Dependence, off_form: float) -> float:
     )  # a resistance or a propeller of another form comes near a constant
     if d.of_sensor or (d.variable in NO_FORM and not ahead):
         return beyond if d.size > least else np.inf
-    return beyond + THRESHOLDS.value("off_form_of_unknown") * off_form if d.taken > least else np.inf
+    large, small = THRESHOLDS.value("off_form_of_large"), THRESHOLDS.value("off_form_of_small")
+    ordinary = large + (small - large) * max(2.0 - d.taken / NOTICEABLE, 0.0)
+    times = max(ordinary, THRESHOLDS.value("off_form_slope") * off_form)
+    return beyond + times * off_form if d.taken > least else np.inf
 
 
 def _unknown(
