@@ -79,7 +79,7 @@ def fit(
         lin = after
     assert best is not None
     found, lin = _followed(*best[1:])
-    if free_steps and found.excess > THRESHOLDS.value("unconverged_excess") and not is_spent():
+    if free_steps and found.excess > THRESHOLDS.value("led_astray") and not is_spent():
         again = fit(
             plant, scales, model, point, *began, iterations=iterations, candidates=candidates, guess=guess, hope=hope,
             far=far, begun=begun,

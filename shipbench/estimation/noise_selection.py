@@ -122,11 +122,11 @@ def swinging_force(found: Fit, colour: Colour) -> Colour:
     """
     for axis, channel in enumerate((U, V, R)):
         w = np.where(found.plant.seg.mask, found.point.w[..., axis] @ found.plant.hat.T, 0.0)
-        lags = range(1, min(THRESHOLDS.count("wave_lag"), w.shape[1] - 1) + 1)
+        lags = range(1, min(THRESHOLDS.count("swell_lag"), w.shape[1] - 1) + 1)
         correlation = np.array([np.sum(w[:, lag:] * w[:, :-lag]) for lag in lags]) / max(np.sum(w**2), 1e-300)
         lowest, later = np.minimum.accumulate(correlation), np.maximum.accumulate(correlation[::-1])[::-1]
         half = int(np.argmax(later - lowest))
-        if np.isinf(colour.period[channel]) and later[half] - lowest[half] > THRESHOLDS.value("wave_correlation"):
+        if np.isinf(colour.period[channel]) and later[half] - lowest[half] > THRESHOLDS.value("swell_correlation"):
             period = 1.0 + half + float(np.argmax(correlation[half:]))
             share, time = _WAVES[0][1], period / (2.0 * np.pi * _WAVES[2][0])
             colour = colour.with_channel(channel, share, time, period)

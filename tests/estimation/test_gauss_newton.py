@@ -66,7 +66,7 @@ def test_where_free_steps_lead_astray_each_step_lowers_the_cost(null, monkeypatc
         return (None, None) if free else real(lin, found, free, share)
 
     def fitted(lost: float) -> float:
-        row = THRESHOLDS.rows["unconverged_excess"]
+        row = THRESHOLDS.rows["led_astray"]
         monkeypatch.setitem(THRESHOLDS.rows, row.name, replace(row, value=lost))
         return fit(null.plant, null.scales, model, origin.point, origin.hyper, guess=origin.motion, far=True).evidence
 

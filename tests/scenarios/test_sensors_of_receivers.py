@@ -21,7 +21,6 @@ from shipbench.diagnosis.preparation.time_offsets import late_velocities_of
 from shipbench.diagnosis.preparation.water_speeds import speeds_over_ground
 from shipbench.diagnosis.selection.analysis import THRESHOLD, plain_model
 from shipbench.diagnosis.selection.stepwise import select
-from shipbench.diagnosis.thresholds import THRESHOLDS
 from shipbench.effects.base import EFFECTS, delayed
 from shipbench.estimation.baseline import beside_noise_of, null_fit
 from shipbench.estimation.forward import Plant
@@ -32,6 +31,7 @@ from shipbench.estimation.noise import Colour
 from shipbench.estimation.noise_selection import colour_of
 from shipbench.estimation.outliers import left_out
 from shipbench.estimation.term import Term
+from shipbench.estimation.thresholds import THRESHOLDS
 from shipbench.physics.actuators import gear_path
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
