@@ -239,7 +239,9 @@ class Plant:
 
     def thinned(self, most: int) -> Plant:
         """Forward model of at most `most` of its segments, evenly spread; every run keeps at least one."""
-        return self if len(self.seg.run) <= most else Plant(self.ship, self.seg.thinned(most), self.long, self.ordinary)
+        if len(self.seg.run) <= most:
+            return self
+        return Plant(self.ship, self.seg.thinned(most), self.long, self.ordinary, recorded=self.recorded)
 
     def where(self, wanted: np.ndarray) -> Plant:
         """The `wanted` segments, with the runs that have any."""

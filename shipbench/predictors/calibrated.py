@@ -31,7 +31,7 @@ from ..estimation.calibration import (  # fmt: skip
 from ..estimation.coefficients import FREE, NUM_BASE, NUM_HULL, ShipScales, hull_changes, parameters
 from ..estimation.extension import ACTUATOR_OF, Extension, measured, true_start
 from ..estimation.extension import Active as Acting
-from ..estimation.forward import Plant, known_effects
+from ..estimation.forward import MOST_STEPS, Plant, known_effects
 from ..estimation.gears import fit_gears, gears_of
 from ..estimation.laplace import Fit
 from ..estimation.linearisation import Scales
@@ -92,6 +92,7 @@ class Calibrated(FittedShip):
         model = calibration_of(calibrated(plant, first, first.model.terms))
         if seconds is not None:
             rolled = rollout_plant(data, self.gears, seconds)
+            rolled = rolled.thinned(max(len(data), MOST_STEPS // (rolled.steps * rolled.substeps)))
             model = refined(rolled, Scales(rolled), model)
         if not np.isfinite(model.base).all():
             raise WorkError(
