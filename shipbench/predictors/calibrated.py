@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..effects.base import flow_first
-from ..errors import WorkError
+from ..errors import InputError, WorkError
 from ..estimation.actuator_fit import fit_actuators
 from ..estimation.calibration import (  # fmt: skip
     Calibration,
@@ -42,6 +42,7 @@ from ..estimation.term import Given, Term
 from ..physics.actuators import Gear, gear_path
 from ..records import Dataset
 from ..signals import ACTUATORS, COMMANDS, MOTION
+from ..specs import EffectSpec
 from ._saved import check_shapes
 from .base import History
 from .physics_model.fitted_ship import ACTUATOR_PARAMETERS, FittedShip
@@ -66,6 +67,20 @@ class Calibrated(FittedShip):
     def __post_init__(self) -> None:
         if not isinstance(self.refine, bool):
             raise ValueError(f"refine = {self.refine}; accepted: true or false")
+
+    def extend(self, effects: Sequence[EffectSpec]) -> Self:
+        """Add effects to what is fitted (`calibrated+current`), as with `physics`.
+
+        Raises:
+            InputError: an effect or a parameter is unknown, cannot be part of a predictor, or is fitted already.
+        """
+        super().extend(effects)
+        for term in self.extension.terms if self.extension is not None else ():
+            if term.effect.traits.search == "hull":
+                raise InputError(
+                    f"effect '{term.name}': '{self.name}' fits the hull's coefficients already; leave it out."
+                )
+        return self
 
     @property
     def fitted(self) -> bool:

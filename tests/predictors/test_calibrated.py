@@ -117,6 +117,11 @@ def test_refine_is_true_or_false(wrong):
         Calibrated(refine=wrong)
 
 
+def test_what_is_fitted_already_is_no_effect_beside_it():
+    with pytest.raises(InputError, match="fits the hull's coefficients already; leave it out"):
+        make_predictor("calibrated+hull_derivatives")
+
+
 def test_an_effect_beyond_its_bounds_is_refused():
     with pytest.raises(InputError, match="accepted"):
         make_predictor("calibrated+current[speed=90,to=0]").fit(trials(1))
