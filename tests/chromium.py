@@ -2,8 +2,8 @@
 process of its own.
 
 `browse` takes steps and returns one result for each:
-    ["open", file, width, "light" or "dark"]  load a local file in a window that wide; gives the messages of the console
-    since the start ["js", code]                              the value of an expression in the page
+    ["open", file, width]                     load a local file in a window that wide; gives the console's messages
+    ["js", code]                              the value of an expression in the page
     ["click", selector]                       a mouse click on the middle of the first such element, scrolled into view
     ["hover", selector, x, y]                 the mouse on a point of that element, in parts of its width and height
     ["drag", selector, x0, y0, x1, y1]        a drag from one such point to another

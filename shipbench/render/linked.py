@@ -3,8 +3,9 @@
 The contract, as JSON in the page (macro `linked` of `macros.html.j2`):
 
     columns   one entry for each quantity: `name`, `label`, `unit`, `decimals`
-    series    one entry for each line: `name`, `role` ("measured", or the number of a model: its colour and its switch
-    `data-toggle`) track     names of the columns east and north [m], or null for a page without tracks
+    series    one entry for each line: `name`, `role` ("measured", or the number of a model: its colour and its
+              switch `data-toggle`)
+    track     names of the columns east and north [m], or null for a page without tracks
     histories names of the columns that are drawn against time, from the top
     runs      one entry for each run: `name`, `note`, `t`, `values[series][column]`, `outlines`, `cells[model]`
     start     the number of the run shown first
