@@ -22,6 +22,7 @@ from .linked import FITS, MODELS, changed, position_errors, rollout_plots, rollo
 from .remains import remaining_sentences
 from .text import (
     calibration_words,
+    compared_model,
     estimate,
     figure,
     force_words,
@@ -59,7 +60,7 @@ def diagnosis_page(d: Diagnosis) -> str:
         lead=f"{headline(d)} {calibration_words(d)}".strip(), tiles=_tiles(d),
         plots=d.trace is not None, style=_STYLE,
         warnings=d.warnings, causes=[_cause(c, d) for c in d.causes], instead=_no_cause(d), gain=_gain_of_all(d),
-        extended_model=d.extended_model,
+        extended_model=compared_model(d),
         compare=next_command(d), remains=remaining_sentences(d),
         wrong=[_wrong(w.channel, w.share_of_error, w.when) for w in d.what_is_wrong],
         candidates=table_cells(tables.candidates(d)), limits=table_cells(tables.detection_limits(d)),

@@ -186,14 +186,20 @@ def calibration_words(d: Diagnosis) -> str:
 
 
 def next_command(d: Diagnosis) -> str:
-    """Command that compares the baseline model with the extended one."""
+    """Command that compares the baseline model with the extended one on held-out runs, or with the calibrated one where
+    no cause is identified; "" where neither is better."""
     inside = [c.effect for c in d.causes if not (c.effect in EFFECTS and EFFECTS.get(c.effect).traits.describes_data)]
     model = "+".join(["physics", *inside])
-    return (
-        f"shipbench run --model physics --model {shlex.quote(model)} --dataset {shlex.quote(d.spec or d.dataset)}"
-        if inside
-        else ""
-    )
+    if not d.causes and d.calibration is not None and d.calibration.after < d.calibration.before:
+        model = "calibrated"
+    if model == "physics":
+        return ""
+    return f"shipbench run --model physics --model {shlex.quote(model)} --dataset {shlex.quote(d.spec or d.dataset)}"
+
+
+def compared_model(d: Diagnosis) -> str:
+    """Name of the model that `next_command` compares with the baseline."""
+    return d.extended_model if d.causes else "calibrated"
 
 
 def detectable(c: Candidate) -> str:
@@ -346,7 +352,7 @@ def summary_lines(d: Diagnosis, width: int = WIDTH, full: bool = True) -> list[s
     if full:
         lines += _wrong_lines(d, width) + _candidate_lines(d, width) + _detectable_lines(d, width)
     if command := next_command(d):
-        lines += [*paragraph(f"Extended model: {d.extended_model}", width), *command_lines(command, width)]
+        lines += [*paragraph(f"Model to compare: {compared_model(d)}", width), *command_lines(command, width)]
     if not full:
         lines += ["", "All tables (errors by channel, candidates, detection limits): --full"]
     return lines

@@ -1,12 +1,21 @@
 """The words of a diagnosis, for every effect."""
 
 import re
+from dataclasses import replace
 
 import pytest
+from made_diagnosis import make_diagnosis
 
-from shipbench.diagnosis.result import Cause, Estimate
+from shipbench.diagnosis.result import Calibrated, Cause, Estimate
 from shipbench.effects.base import EFFECTS
-from shipbench.reports.diagnosis.text import cause_lines, estimate, force_words, in_words
+from shipbench.reports.diagnosis.text import (
+    cause_lines,
+    estimate,
+    force_words,
+    in_words,
+    next_command,
+    summary_lines,
+)  # fmt: skip
 
 BANNED = re.compile(
     r"\b(told|said|felt|knots?|heals?|mends?|misread|plant|revolutions|off the regressions|off the formula)\b",
@@ -99,3 +108,12 @@ def test_a_headline_leaves_out_a_size_whose_interval_holds_zero():
     sizes = {"forward": Estimate(-0.55, "m", (-1.84, 0.74)), "starboard": Estimate(-0.041, "m", (-0.05, -0.03))}
     words = in_words(Cause("antenna_offset", 1, 160.0, 0.0, sizes, (), "12 of 12 runs", None, ""))
     assert words.startswith("a position antenna an undetermined distance forward and -0.041 m to starboard")
+
+
+def test_without_a_cause_the_next_command_tries_the_calibrated_ship():
+    none = make_diagnosis("none")
+    assert next_command(none) == ""
+    better, worse = (replace(none, calibration=Calibrated(9.4, after, 120.0)) for after in (1.4, 9.6))
+    assert "--model physics --model calibrated --dataset trial" in next_command(better)
+    assert "Model to compare: calibrated" in "\n".join(summary_lines(better))
+    assert next_command(worse) == ""
