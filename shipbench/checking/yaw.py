@@ -197,7 +197,7 @@ def _biases(
     drifts = {int(i): -left[run == i] / span for i in np.unique(run) if np.sum(run == i) >= 3}
     shared = float(np.median([d.mean() for d in drifts.values()])) if drifts else np.inf
     half_step = 0.5 * float(recording.steps[R])  # a record in steps is off by half of one for as long as it stands
-    least = max(THRESHOLDS.value("least_share") * recording.turning, half_step)
+    least = max(THRESHOLDS.value("least_bias") * recording.turning, half_step)
     if "bias" in chosen.names and abs(shared) > 0.5 * abs(float(chosen.value["bias"][0])):
         bias, sd = -float(chosen.value["bias"][0]), float(chosen.sd["bias"][0])
         if abs(bias) < least:
