@@ -20,7 +20,7 @@ THRESHOLDS = Thresholds(
     Threshold("little", 0.25, "share", "that is little: what a right reading may leave", "explanations"),
     Threshold("large_share", 0.2, "share", "of a range, of a speed, that is clearly visible", "sizes-that-count"),
     Threshold("least_share", 0.02, "share", "that counts: of a speed, of a range, of samples", "sizes-that-count"),
-    Threshold("least_bias", 0.01, "share of the yaw rate", "constant error that counts: it adds up", "sizes-that-count"),
+    Threshold("least_bias", 0.01, "share of the yaw rate", "bias that counts, for it adds up", "sizes-that-count"),
     Threshold("similar", 1.1, "times", "squares within which readings are equal", "explanations"),
     # sizes
     Threshold("least_distance", 0.02, "ship lengths", "distance that counts", "sizes-that-count"),
