@@ -16,14 +16,15 @@ from .baseline import from_regressions
 from .coefficients import NUM_BASE
 from .forward import Plant
 from .gauss_newton import Origin, fit
-from .laplace import Fit, Model, base_precision, point_from, settle
+from .laplace import Fit, Model, base_precision
 from .linearisation import Linearisation, Scales
 from .open_loop import cost, errors, rolled, sizes
 from .robust_prior import widened
 from .term import Term
+from .thresholds import THRESHOLDS
 
-_PIECES, _STEPS, _NEAR = 24, 1, 1.0
-"""Pieces of a first estimate; steps on all pieces from there; longest last step, in posterior standard deviations."""
+_PIECES = 24
+"""Pieces of a first estimate."""
 _REFINEMENTS, _LEAST_GAIN, _LEAST_SHARE = 5, 3e-3, 0.1
 """Most Gauss-Newton steps of `refined`; relative decrease of its cost, and share of a step, at which it stops."""
 
@@ -85,26 +86,17 @@ def some_of(plant: Plant) -> Plant:
 
 
 def calibrated(plant: Plant, like: Fit, terms: Sequence[Term] = ()) -> Fit:
-    """Maximum of the posterior of all coefficients and the amplitudes of `terms`, from `like` on: a fit to other
-    pieces, with these terms or without.
-
-    Gauss-Newton is nearly linear from trajectories that follow the measured ones (`Origin`), so a few full steps are
-    enough. Where the last one is still long, the fit with step control goes on.
+    """Maximum of the posterior of all coefficients and the amplitudes of `terms`, from those of `like` on, a fit to
+    other pieces. Where that path has not converged, the one from the regressions is tried, too.
     """
     scales = Scales(plant).with_background(like.hyper)
-    origin, model = Origin.of(plant, scales), replace(like.model, terms=tuple(terms))
-    values = like.values if like.model.terms == model.terms else tuple(np.zeros(t.size) for t in model.terms)
-    start = replace(origin.point, base=like.solution.mean[:NUM_BASE], terms=model.terms, values=values)
-    lin = Linearisation(plant, scales, start, origin.motion)
-    found = settle(lin, model, like.hyper, {})
-    for _ in range(_STEPS):
-        point = point_from(model, lin.point, found.solution, found.prior, found.estimate)
-        lin = Linearisation(plant, scales, point, lin.towards(point))
-        found = settle(lin, model, found.hyper, {})
-    last = np.abs(found.solution.mean[:NUM_BASE] - lin.point.base) / np.sqrt(np.diag(found.solution.cov)[:NUM_BASE])
-    if last.max() < _NEAR:
+    model, origin = replace(like.model, terms=tuple(terms)), Origin.like(plant, scales, like)
+    found = fit(plant, scales, model, origin.point, like.hyper, guess=origin.motion)
+    if found.excess < THRESHOLDS.value("unconverged_excess"):
         return found
-    return fit(plant, scales, model, found.point, found.hyper, guess=found.motion)
+    origin = Origin.of(plant, scales)
+    other = fit(plant, scales, model, origin.point, like.hyper, guess=origin.motion, far=True)
+    return found if found.evidence > other.evidence else other
 
 
 def calibration_of(found: Fit) -> Calibration:

@@ -58,7 +58,7 @@ def fit(
         if number and found.promise < hope:
             return found
         hyper, log_tau2 = found.hyper, found.log_tau2
-        worth = found.evidence if free else found.evidence_followed
+        worth = float(np.nan_to_num(found.evidence if free else found.evidence_followed, nan=-np.inf))
         if free or best is None or worth > best[0] + _AT_REST_EVIDENCE or found.promise > promised + _AT_REST_EVIDENCE:
             stale = 0
         else:
@@ -225,3 +225,13 @@ class Origin:
         found = settle(lin, still, hyper, {})
         tracked = point_from(still, point, found.solution, found.prior, found.estimate)
         return cls(tracked, found.hyper, lin.towards(tracked))
+
+    @classmethod
+    def like(cls, plant: Plant, scales: Scales, other: Fit) -> Origin:
+        """Starting point at the parameters of a fit to other pieces, trajectories kept on the measured ones as well."""
+        base, terms = other.solution.mean[:NUM_BASE], other.model.terms
+        point = replace(start(plant)[0], base=base, terms=terms, values=other.values)
+        lin = Linearisation(plant, scales, point, plant.seg.states[..., :6].copy())
+        eta, w = suiting(settle(lin, other.model, other.hyper, {}, leap=0.0), point)
+        tracked = replace(point, eta=eta, w=w)
+        return cls(tracked, other.hyper, lin.towards(tracked))

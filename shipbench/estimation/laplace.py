@@ -36,6 +36,8 @@ from .term import Term
 from .thresholds import THRESHOLDS
 
 _EM_CYCLES = 3
+_GREATEST = 1e100
+"""Greatest value whose products are taken; a trajectory beyond it has diverged."""
 
 
 @dataclass(frozen=True)
@@ -158,6 +160,7 @@ def products_of(
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def whitened(
     plant: Plant, scales: Scales, point: Point, columns: Columns, channels: Sequence[int] = range(6)
 ) -> np.ndarray:
@@ -180,10 +183,8 @@ def whitened(
         by_channel = np.moveaxis(block.reshape(B, plant.steps + 1, 6, -1), 2, 0)
         for at, channel in enumerate(channels):
             np.divide(by_channel[channel], scales.noise[channel], out=Z[at, ..., low:high])
-    with np.errstate(over="ignore", invalid="ignore"):
-        blown_up = not np.isfinite(np.sum(Z))
-    if blown_up:
-        Z = np.nan_to_num(Z, nan=0.0, posinf=0.0, neginf=0.0)
+    if not np.isfinite(np.vdot(Z, Z)):
+        Z[~(np.abs(Z) < _GREATEST)] = 0.0
     scales.colour.whiten(Z, channels)
     Z[:, ~seg.mask] = 0.0
     Z[~seg.seen[list(channels)]] = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -18,8 +19,10 @@ from shipbench.estimation.calibration import (
 )  # fmt: skip
 from shipbench.estimation.coefficients import NUM_BASE
 from shipbench.estimation.forward import Plant
+from shipbench.estimation.gauss_newton import Origin
 from shipbench.estimation.gears import gears_of
-from shipbench.estimation.linearisation import Scales
+from shipbench.estimation.laplace import settle
+from shipbench.estimation.linearisation import Linearisation, Scales
 from shipbench.estimation.open_loop import Rollout, distance, rollout_plant
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.simulate.trials import Trials, sea_trials
@@ -43,6 +46,26 @@ def test_calibration_predicts_better_than_the_prior_means():
     plant = rollouts(60.0)
     after, before = (distance(plant, Scales(plant), model)[0].mean() for model in (from_pieces(), PRIOR))
     assert after < 0.7 * before
+
+
+def test_the_path_from_another_fit_begins_near_its_optimum():
+    """Its trajectories follow the measured ones with the latent force of these coefficients."""
+    plant = Plant.of(sea_trials(load_mmg_ship("container130"), 5, (), Trials(runs=4, samples=60, gusts=0.0, noise=0.1)))
+    like, scales = estimated(plant), Scales(plant)
+    start = Origin.like(plant, scales, like)
+    near = settle(Linearisation(plant, scales, start.point, start.motion), like.model, like.hyper, {}, leap=0.0)
+    assert near.excess < 30.0
+    assert near.evidence == pytest.approx(like.evidence, abs=100.0)
+
+
+def test_a_position_that_jumps_leaves_the_calibration_finite():
+    data = sea_trials(load_mmg_ship("container130"), 5, (), Trials(runs=4, samples=60, gusts=0.0, noise=0.1))
+    states = data.runs[0].states.copy()
+    states[30:, :2] += 5000.0
+    plant = Plant.of(replace(data, runs=[replace(data.runs[0], states=states), *data.runs[1:]]))
+    model = calibration_of(calibrated(plant, estimated(Plant.of(data))))
+    assert np.isfinite(model.base).all()
+    assert np.abs(model.base).max() < 10.0
 
 
 def test_every_coefficient_is_known_no_worse_than_before():

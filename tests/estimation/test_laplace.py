@@ -79,3 +79,11 @@ def test_a_fit_that_has_not_come_to_rest_is_charged_with_the_cost_it_has(plant):
     assert short.evidence < short.solution.log_evidence - 5.0
     assert long.excess < 1.0
     assert long.evidence > short.evidence
+
+
+def test_values_of_a_diverged_trajectory_have_no_products(plant):
+    scales, (point, _) = Scales(plant), start(plant)
+    lin = Linearisation(plant, scales, point)
+    columns = lin.columns()
+    columns.base[0, 0, 0] = 1e200
+    assert np.isfinite(products_of(plant, scales, point, columns).weigh(start(plant)[1]).reduce(np.zeros(3)).S).all()
